@@ -1,0 +1,1 @@
+"""Training set of the data-driven coarsening: hexahedron, 2x2x2 block, fits, shards."""

@@ -1,0 +1,112 @@
+"""The 8-node hexahedron with one Young's modulus per quadrature point.
+
+Local numbering: corner and quadrature point `c` sit at the bits `(c & 1, c >> 1 & 1, c >> 2 & 1)`
+along (x, y, z); degree of freedom `3 c + i` is the displacement of corner `c` along axis `i`.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+CORNERS: NDArray[np.int64] = np.array([[c & 1, c >> 1 & 1, c >> 2 & 1] for c in range(8)])
+"""(8, 3) offsets of the corners, in bit order."""
+
+DEFAULT_POISSON = 0.25
+"""Poisson's ratio of all experiments in the paper (section 8.1)."""
+
+GAUSS_POINTS: Array = 0.5 + (CORNERS - 0.5) / np.sqrt(3.0)
+"""(8, 3) points of the 2x2x2 Gauss rule on the unit cube; each has weight 1/8."""
+
+
+def shape_functions(points: Array) -> Array:
+    """Trilinear shape functions at `points` (p, 3) of the unit cube; shape (p, 8)."""
+    factors = np.where(CORNERS[None] == 1, points[:, None], 1.0 - points[:, None])
+    return np.asarray(factors.prod(axis=2))
+
+
+def shape_gradients(points: Array) -> Array:
+    """Gradients of the shape functions on the unit cube; shape (p, 8, 3)."""
+    factors = np.where(CORNERS[None] == 1, points[:, None], 1.0 - points[:, None])
+    signs = 2.0 * CORNERS - 1.0
+    gradients = np.empty((len(points), 8, 3))
+    for axis in range(3):
+        others = [a for a in range(3) if a != axis]
+        gradients[:, :, axis] = signs[:, axis] * factors[:, :, others].prod(axis=2)
+    return gradients
+
+
+def elasticity_matrix(poisson: float = DEFAULT_POISSON) -> Array:
+    """Isotropic elasticity matrix (6, 6) for Young's modulus 1; engineering shear strains."""
+    if not -1.0 < poisson < 0.5:
+        raise ValueError(f"Poisson's ratio {poisson} is outside (-1, 0.5)")
+    lame = poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson))
+    shear = 0.5 / (1.0 + poisson)
+    matrix = np.zeros((6, 6))
+    matrix[:3, :3] = lame
+    matrix[np.arange(3), np.arange(3)] += 2.0 * shear
+    matrix[np.arange(3, 6), np.arange(3, 6)] = shear
+    return matrix
+
+
+def strain_displacement(gradients: Array) -> Array:
+    """Strain-displacement matrices (p, 6, 24) from shape gradients (p, 8, 3)."""
+    matrices = np.zeros((len(gradients), 6, 8, 3))
+    for axis in range(3):
+        matrices[:, axis, :, axis] = gradients[:, :, axis]
+    for row, (a, b) in enumerate(((0, 1), (1, 2), (2, 0)), start=3):
+        matrices[:, row, :, a] = gradients[:, :, b]
+        matrices[:, row, :, b] = gradients[:, :, a]
+    return matrices.reshape(len(gradients), 6, 24)
+
+
+@cache
+def quadrature_stiffness(poisson: float = DEFAULT_POISSON) -> Array:
+    """Stiffness contributions K_q (8, 24, 24) of the quadrature points for unit edge and modulus.
+
+    An element of edge h with moduli E_q has the stiffness `h * sum_q E_q K_q`.
+    """
+    strain = strain_displacement(shape_gradients(GAUSS_POINTS))
+    elasticity = elasticity_matrix(poisson)
+    matrices = np.einsum("qia,ij,qjb->qab", strain, elasticity, strain, optimize=True) / 8.0
+    matrices = 0.5 * (matrices + matrices.transpose(0, 2, 1))
+    matrices.setflags(write=False)
+    return matrices
+
+
+@cache
+def uniform_stiffness(poisson: float = DEFAULT_POISSON) -> Array:
+    """Stiffness (24, 24) of the element with uniform unit modulus and unit edge."""
+    matrix = quadrature_stiffness(poisson).sum(axis=0)
+    matrix.setflags(write=False)
+    return matrix
+
+
+@cache
+def nodal_mass(lumped: bool = False) -> Array:
+    """Mass (8, 8) between corners for unit edge and density; row sums on the diagonal if `lumped`.
+
+    Each displacement component has this same matrix; an edge h and density rho scale it by rho h^3.
+    """
+    line = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
+    matrix = np.kron(np.kron(line, line), line)
+    if lumped:
+        matrix = np.diag(matrix.sum(axis=1))
+    matrix.setflags(write=False)
+    return matrix
+
+
+def rigid_motions(nodes: Array) -> Array:
+    """Three translations and three rotations about the centroid of `nodes` (n, 3); shape (3n, 6)."""
+    centred = nodes - nodes.mean(axis=0)
+    motions = np.zeros((len(nodes), 3, 6))
+    motions[:, np.arange(3), np.arange(3)] = 1.0
+    for axis in range(3):
+        a, b = (axis + 1) % 3, (axis + 2) % 3
+        motions[:, a, 3 + axis] = -centred[:, b]
+        motions[:, b, 3 + axis] = centred[:, a]
+    return motions.reshape(-1, 6)
