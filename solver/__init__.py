@@ -1,0 +1,1 @@
+"""Modal analysis of voxel solids, from the mesh file to the modes file."""

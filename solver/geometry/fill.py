@@ -1,0 +1,128 @@
+"""Which voxels of a grid a surface fills.
+
+Measured on the Stanford bunny (holes in its base) and the teapot (open, intersecting shells):
+filling between the outermost surface voxels (``orthographic``) makes the solid half a voxel thicker
+on every side, 23 % too much volume for the bunny at resolution 32, and so stiffens thin parts far
+more than the voxel size suggests. Winding numbers at voxel centres get the volume within 1 %, but
+break thin ears and handles off. ``winding``, the default, therefore keeps the voxels that are at
+least half full and, of the others, those without which the solid would lose a piece or a handle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import igl
+import numpy as np
+import trimesh
+from scipy import ndimage
+
+from solver.geometry.topology import CORNERS, thin_to
+
+#: Sample points per voxel edge for the filled fraction of a voxel; odd, so that the centre is one.
+SAMPLES = 3
+
+#: Points whose winding number is computed at once.
+CHUNK = 2_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Cubes of edge `edge` [m] from the corner `origin` (3,) [m], `shape` of them along the axes."""
+
+    origin: np.ndarray
+    edge: float
+    shape: tuple[int, int, int]
+
+
+def bounding_grid(surface: trimesh.Trimesh, resolution: int) -> Grid:
+    """Grid with `resolution` voxels along the longest side of the bounding box, centred on it."""
+    low, high = np.asarray(surface.bounds)
+    edge = float((high - low).max() / resolution)
+    # The tolerance keeps a side of exactly n voxels from rounding up to n + 1.
+    shape = np.maximum(np.ceil((high - low) / edge - 1e-6), 1).astype(int)
+    return Grid((low + high - edge * shape) / 2, edge, tuple(int(n) for n in shape))
+
+
+def winding_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
+    """Voxels at least half inside the surface, plus those that hold it together.
+
+    Inside is where the generalised winding number exceeds 1/2 in magnitude (Jacobson et al. 2013;
+    Barill et al. 2018), which is defined for surfaces with holes and for overlapping shells. The
+    filled fraction of a voxel comes from `SAMPLES`^3 points. Voxels less than half full go, the
+    emptiest first, unless that would change the pieces, tunnels or cavities of the solid.
+
+    Returns
+    -------
+    filled : (nx, ny, nz) bool.
+    origin : (3,) corner of the grid [m].
+    """
+    fraction = filled_fraction(surface, grid)
+    return thin_to(fraction > 0, fraction >= 0.5, fraction), grid.origin
+
+
+def centre_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
+    """Voxels whose centre is inside the surface by its winding number; thin parts may break off."""
+    index = np.indices(grid.shape).reshape(3, -1).T
+    return _inside(surface, grid, index + 0.5).reshape(grid.shape), grid.origin
+
+
+def orthographic_fill(
+    surface: trimesh.Trimesh, grid: Grid
+) -> tuple[np.ndarray, np.ndarray]:
+    """Voxels that the surface touches and all between them along every axis.
+
+    Voxels are centred on multiples of the edge, so there is one more along the longest side, and
+    the solid is about half a voxel thicker than the surface on every side.
+    """
+    voxels = surface.voxelized(grid.edge).fill(method="orthographic")
+    origin = np.asarray(voxels.transform)[:3, 3] - grid.edge / 2
+    return np.array(voxels.matrix, dtype=bool), origin
+
+
+FILLS: dict[str, Callable[[trimesh.Trimesh, Grid], tuple[np.ndarray, np.ndarray]]] = {
+    "winding": winding_fill,
+    "centre": centre_fill,
+    "orthographic": orthographic_fill,
+}
+
+
+def filled_fraction(surface: trimesh.Trimesh, grid: Grid) -> np.ndarray:
+    """Fraction of each voxel that is inside the surface, (nx, ny, nz), in steps of 1/SAMPLES^3."""
+    fraction = centre_fill(surface, grid)[0].astype(float)
+    # Away from the surface a voxel is full or empty, and its centre says which.
+    near = np.argwhere(_near_surface(surface, grid))
+    step = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    offsets = np.stack(np.meshgrid(step, step, step, indexing="ij"), axis=-1).reshape(
+        -1, 3
+    )
+    points = (near[:, None, :] + offsets).reshape(-1, 3)
+    inside = _inside(surface, grid, points).reshape(len(near), -1)
+    fraction[tuple(near.T)] = inside.mean(axis=1)
+    return fraction
+
+
+def _near_surface(surface: trimesh.Trimesh, grid: Grid) -> np.ndarray:
+    vertices, _ = trimesh.remesh.subdivide_to_size(
+        surface.vertices, surface.faces, max_edge=grid.edge, max_iter=30
+    )
+    index = np.floor((vertices - grid.origin) / grid.edge).astype(int)
+    touched = np.zeros(grid.shape, dtype=bool)
+    touched[tuple(np.clip(index, 0, np.array(grid.shape) - 1).T)] = True
+    return ndimage.binary_dilation(touched, structure=CORNERS)
+
+
+def _inside(surface: trimesh.Trimesh, grid: Grid, points: np.ndarray) -> np.ndarray:
+    """Whether `points` (p, 3), in voxels from the grid's corner, are inside the surface."""
+    # In voxel units, so that the result does not depend on the unit of length.
+    vertices = np.ascontiguousarray((surface.vertices - grid.origin) / grid.edge)
+    faces = np.ascontiguousarray(surface.faces, dtype=np.int64)
+    inside = np.empty(len(points), dtype=bool)
+    for start in range(0, len(points), CHUNK):
+        part = slice(start, start + CHUNK)
+        number = igl.fast_winding_number(
+            vertices, faces, np.ascontiguousarray(points[part])
+        )
+        inside[part] = np.abs(number) > 0.5
+    return inside
