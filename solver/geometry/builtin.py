@@ -1,24 +1,171 @@
-"""Struck objects made by code, in metres."""
+"""Struck objects made by code, in metres and z up.
+
+Walls measure at least a sixteenth of the longest side: two voxels at resolution 32, since a wall of
+one voxel does not bend as a wall does. Parts overlap without being united; voxels do that.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
 import trimesh
+from trimesh.creation import revolve
 
 from carillon.errors import UserError
 
+#: Segments of a full turn.
+SECTIONS = 96
+
 
 def bar() -> trimesh.Trimesh:
-    """Metallophone bar, 240 x 36 x 24 mm."""
-    return trimesh.creation.box(extents=(0.240, 0.036, 0.024))
+    """Marimba bar, 240 x 45 x 30 mm, with the arch below its middle that tunes the overtones."""
+    x = np.linspace(-0.120, 0.120, 49)
+    arch = 0.015 * np.clip(1 - (x / 0.075) ** 2, 0, None)
+    width, top = 0.045 / 2, 0.030
+    low, high = np.full_like(x, -width), np.full_like(x, width)
+    ceiling = np.full_like(x, top)
+    corners = [(x, low, arch), (x, high, arch), (x, high, ceiling), (x, low, ceiling)]
+    return _sweep(np.stack([np.stack(corner, axis=1) for corner in corners], axis=1))
 
 
-BUILTINS: dict[str, Callable[[], trimesh.Trimesh]] = {"bar": bar}
+def bowl() -> trimesh.Trimesh:
+    """Singing bowl, 160 mm wide and 84 mm high, wall 10 mm."""
+    angle = np.linspace(0.0, np.pi / 2, 25)
+    outside = np.stack([0.080 * np.sin(angle) ** 0.8, 0.084 * (1 - np.cos(angle))], axis=1)
+    inside = np.stack([0.069 * np.sin(angle) ** 0.8, 0.012 + 0.072 * (1 - np.cos(angle))], axis=1)
+    return _turn([*outside, *inside[::-1]])
+
+
+def bell() -> trimesh.Trimesh:
+    """Church bell, 176 mm wide and 202 mm high, with a thick sound bow and a ring to hang it by."""
+    outside = [
+        (0.000, 0.168),
+        (0.028, 0.167),
+        (0.041, 0.160),
+        (0.047, 0.148),
+        (0.051, 0.120),
+        (0.055, 0.090),
+        (0.061, 0.060),
+        (0.070, 0.034),
+        (0.081, 0.013),
+        (0.088, 0.000),
+    ]
+    inside = [
+        (0.072, 0.000),
+        (0.064, 0.014),
+        (0.053, 0.036),
+        (0.045, 0.062),
+        (0.041, 0.090),
+        (0.037, 0.120),
+        (0.033, 0.141),
+        (0.022, 0.150),
+        (0.000, 0.152),
+    ]
+    turn = np.linspace(-np.pi / 6, np.pi + np.pi / 6, 33)
+    ring = np.stack([0.021 * np.cos(turn), np.zeros_like(turn), 0.174 + 0.021 * np.sin(turn)], 1)
+    return _together(_turn([*outside, *inside]), _tube(ring, 0.0075))
+
+
+def frying_pan() -> trimesh.Trimesh:
+    """Cast-iron frying pan, 240 mm wide, with a handle of 130 mm."""
+    pan = [
+        (0.000, 0.000),
+        (0.095, 0.000),
+        (0.103, 0.006),
+        (0.120, 0.066),
+        (0.097, 0.066),
+        (0.086, 0.022),
+        (0.000, 0.022),
+    ]
+    x = np.linspace(0.100, 0.245, 25)
+    along = (x - x[0]) / (x[-1] - x[0])
+    rise = 0.048 + 0.020 * along
+    width = 0.013 + 0.006 * along
+    # A rounded end, an eighth of the handle long.
+    width = width * np.sqrt(np.clip(1 - np.clip((along - 0.87) / 0.14, 0, 1) ** 2, 0, None))
+    centre = np.stack([x, np.zeros_like(x), rise], axis=1)
+    return _together(_turn(pan), _tube(centre, width, flatten=0.0125))
+
+
+def pitcher() -> trimesh.Trimesh:
+    """Jug of 240 mm height, with a handle on one side and a lip on the other."""
+    outside = [
+        (0.000, 0.000),
+        (0.052, 0.000),
+        (0.064, 0.010),
+        (0.079, 0.055),
+        (0.080, 0.085),
+        (0.072, 0.125),
+        (0.057, 0.165),
+        (0.053, 0.190),
+        (0.060, 0.240),
+    ]
+    inside = [
+        (0.044, 0.240),
+        (0.037, 0.190),
+        (0.041, 0.165),
+        (0.056, 0.125),
+        (0.064, 0.085),
+        (0.063, 0.055),
+        (0.050, 0.018),
+        (0.000, 0.018),
+    ]
+    body = _turn([*outside, *inside])
+    _pull_lip(body, start=0.185, top=0.240, reach=0.034)
+    handle = _spline([(-0.052, 0.212), (-0.100, 0.222), (-0.126, 0.165), (-0.070, 0.085)])
+    return _together(body, _tube(handle, 0.0100))
+
+
+def snare_drum() -> trimesh.Trimesh:
+    """Snare drum of 14 inches as one solid: shell, two heads, hoops and eight lugs."""
+    radius, height, wall = 0.178, 0.150, 0.025
+    shell = _turn(
+        [(radius - wall, 0.0), (radius, 0.0), (radius, height), (radius - wall, height)], ring=True
+    )
+    parts = [shell]
+    for z in (0.012, height - 0.012):
+        head = trimesh.creation.cylinder(radius - wall / 2, height=0.024, sections=SECTIONS)
+        parts.append(head.apply_translation((0.0, 0.0, z)))
+        hoop = [(radius - wall, -0.017), (radius + 0.014, -0.017)]
+        hoop += [(radius + 0.014, 0.017), (radius - wall, 0.017)]
+        parts.append(_turn(hoop, ring=True).apply_translation((0.0, 0.0, z)))
+    for angle in np.arange(8) * np.pi / 4 + np.pi / 8:
+        lug = trimesh.creation.box(extents=(0.034, 0.026, height))
+        lug.apply_translation((radius, 0.0, height / 2))
+        parts.append(lug.apply_transform(trimesh.transformations.rotation_matrix(angle, (0, 0, 1))))
+    return _together(*parts)
+
+
+def plate() -> trimesh.Trimesh:
+    """Stoneware plate, 240 mm wide, 15 mm thick, with a raised rim."""
+    return _turn(
+        [
+            (0.000, 0.000),
+            (0.072, 0.000),
+            (0.088, 0.010),
+            (0.120, 0.022),
+            (0.120, 0.038),
+            (0.084, 0.026),
+            (0.068, 0.016),
+            (0.000, 0.016),
+        ]
+    )
+
+
+BUILTINS: dict[str, Callable[[], trimesh.Trimesh]] = {
+    "bar": bar,
+    "bell": bell,
+    "bowl": bowl,
+    "frying-pan": frying_pan,
+    "pitcher": pitcher,
+    "plate": plate,
+    "snare-drum": snare_drum,
+}
 
 
 def builtin_surface(name: str) -> trimesh.Trimesh:
-    """Surface of the built-in object `name` in metres, z up.
+    """Surface of the built-in object `name` in metres, z up, of closed shells facing outwards.
 
     Raises
     ------
@@ -30,3 +177,68 @@ def builtin_surface(name: str) -> trimesh.Trimesh:
             f"builtin:{name}: no such built-in object, expected one of {', '.join(BUILTINS)}"
         )
     return BUILTINS[name]()
+
+
+def _together(*parts: trimesh.Trimesh) -> trimesh.Trimesh:
+    return trimesh.util.concatenate(parts)
+
+
+def _turn(profile: list, ring: bool = False) -> trimesh.Trimesh:
+    """Turn a profile of (radius, z) about z; a `ring` closes on itself instead of on the axis."""
+    points = np.array([*profile, profile[0]] if ring else profile, dtype=float)
+    return _outward(revolve(points, sections=SECTIONS))
+
+
+def _tube(
+    centre: np.ndarray, radius: float | np.ndarray, flatten: float | None = None
+) -> trimesh.Trimesh:
+    """Tube around a curve (k, 3) in the plane y = 0; `flatten` is its half height if elliptic."""
+    across = np.broadcast_to(np.asarray(radius, dtype=float), len(centre))
+    height = across if flatten is None else np.minimum(flatten, across)
+    tangent = np.gradient(centre, axis=0)
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    side = np.array([0.0, 1.0, 0.0])
+    normal = np.cross(tangent, side)
+    turn = np.linspace(0, 2 * np.pi, 24, endpoint=False)[None, :, None]
+    return _sweep(
+        centre[:, None, :]
+        + across[:, None, None] * np.cos(turn) * side
+        + height[:, None, None] * np.sin(turn) * normal[:, None, :]
+    )
+
+
+def _sweep(sections: np.ndarray) -> trimesh.Trimesh:
+    """Closed surface through cross-sections (k, p, 3), with a fan over the first and the last."""
+    k, p = sections.shape[:2]
+    ends = sections[[0, -1]].mean(axis=1)
+    index = np.arange(k * p).reshape(k, p)
+    after = np.roll(index, -1, axis=1)
+    a, b, c, d = (part.ravel() for part in (index[:-1], after[:-1], after[1:], index[1:]))
+    first = np.stack([np.full(p, k * p), after[0], index[0]], axis=1)
+    last = np.stack([np.full(p, k * p + 1), index[-1], after[-1]], axis=1)
+    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1), first, last])
+    return _outward(trimesh.Trimesh(np.concatenate([sections.reshape(-1, 3), ends]), faces))
+
+
+def _spline(points: list[tuple[float, float]], count: int = 41) -> np.ndarray:
+    """Bezier curve of (x, z) control points in the plane y = 0, (count, 3)."""
+    curve = np.array(points, dtype=float)[None]
+    t = np.linspace(0, 1, count)[:, None, None]
+    while curve.shape[1] > 1:
+        curve = (1 - t) * curve[:, :-1] + t * curve[:, 1:]
+    return np.stack([curve[:, 0, 0], np.zeros(count), curve[:, 0, 1]], axis=1)
+
+
+def _pull_lip(body: trimesh.Trimesh, start: float, top: float, reach: float) -> None:
+    """Draw the rim of a turned body out towards +x, above the height `start`, by up to `reach`."""
+    x, y, z = np.asarray(body.vertices).T
+    rise = np.clip((z - start) / (top - start), 0, 1) ** 2
+    facing = np.clip(x / np.maximum(np.hypot(x, y), 1e-9), 0, 1) ** 4
+    body.vertices = np.stack([x + reach * rise * facing, y, z + 0.3 * reach * rise * facing], 1)
+
+
+def _outward(surface: trimesh.Trimesh) -> trimesh.Trimesh:
+    surface.merge_vertices()
+    if surface.volume < 0:
+        surface.invert()
+    return surface

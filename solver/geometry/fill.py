@@ -50,16 +50,18 @@ def winding_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.n
 
     Inside is where the generalised winding number exceeds 1/2 in magnitude (Jacobson et al. 2013;
     Barill et al. 2018), which is defined for surfaces with holes and for overlapping shells. The
-    filled fraction of a voxel comes from `SAMPLES`^3 points. Voxels less than half full go, the
-    emptiest first, unless that would change the pieces, tunnels or cavities of the solid.
+    filled fraction of a voxel comes from `SAMPLES`^3 points. Starting from every voxel that the
+    surface touches or encloses, those less than half full go, the emptiest first, unless that
+    would change the pieces, tunnels or cavities of the solid. Gaps narrower than a voxel close.
 
     Returns
     -------
     filled : (nx, ny, nz) bool.
     origin : (3,) corner of the grid [m].
     """
-    fraction = filled_fraction(surface, grid)
-    return thin_to(fraction > 0, fraction >= 0.5, fraction), grid.origin
+    touched = touched_voxels(surface, grid)
+    fraction = filled_fraction(surface, grid, touched)
+    return thin_to(touched | (fraction > 0), fraction >= 0.5, fraction), grid.origin
 
 
 def centre_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
@@ -68,9 +70,7 @@ def centre_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.nd
     return _inside(surface, grid, index + 0.5).reshape(grid.shape), grid.origin
 
 
-def orthographic_fill(
-    surface: trimesh.Trimesh, grid: Grid
-) -> tuple[np.ndarray, np.ndarray]:
+def orthographic_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
     """Voxels that the surface touches and all between them along every axis.
 
     Voxels are centred on multiples of the edge, so there is one more along the longest side, and
@@ -88,29 +88,28 @@ FILLS: dict[str, Callable[[trimesh.Trimesh, Grid], tuple[np.ndarray, np.ndarray]
 }
 
 
-def filled_fraction(surface: trimesh.Trimesh, grid: Grid) -> np.ndarray:
+def filled_fraction(surface: trimesh.Trimesh, grid: Grid, touched: np.ndarray) -> np.ndarray:
     """Fraction of each voxel that is inside the surface, (nx, ny, nz), in steps of 1/SAMPLES^3."""
     fraction = centre_fill(surface, grid)[0].astype(float)
     # Away from the surface a voxel is full or empty, and its centre says which.
-    near = np.argwhere(_near_surface(surface, grid))
+    near = np.argwhere(ndimage.binary_dilation(touched, structure=CORNERS))
     step = (np.arange(SAMPLES) + 0.5) / SAMPLES
-    offsets = np.stack(np.meshgrid(step, step, step, indexing="ij"), axis=-1).reshape(
-        -1, 3
-    )
+    offsets = np.stack(np.meshgrid(step, step, step, indexing="ij"), axis=-1).reshape(-1, 3)
     points = (near[:, None, :] + offsets).reshape(-1, 3)
     inside = _inside(surface, grid, points).reshape(len(near), -1)
     fraction[tuple(near.T)] = inside.mean(axis=1)
     return fraction
 
 
-def _near_surface(surface: trimesh.Trimesh, grid: Grid) -> np.ndarray:
+def touched_voxels(surface: trimesh.Trimesh, grid: Grid) -> np.ndarray:
+    """Voxels that hold a vertex of the surface after its edges are cut to half a voxel or less."""
     vertices, _ = trimesh.remesh.subdivide_to_size(
-        surface.vertices, surface.faces, max_edge=grid.edge, max_iter=30
+        surface.vertices, surface.faces, max_edge=grid.edge / 2, max_iter=30
     )
     index = np.floor((vertices - grid.origin) / grid.edge).astype(int)
     touched = np.zeros(grid.shape, dtype=bool)
     touched[tuple(np.clip(index, 0, np.array(grid.shape) - 1).T)] = True
-    return ndimage.binary_dilation(touched, structure=CORNERS)
+    return touched
 
 
 def _inside(surface: trimesh.Trimesh, grid: Grid, points: np.ndarray) -> np.ndarray:
@@ -121,8 +120,6 @@ def _inside(surface: trimesh.Trimesh, grid: Grid, points: np.ndarray) -> np.ndar
     inside = np.empty(len(points), dtype=bool)
     for start in range(0, len(points), CHUNK):
         part = slice(start, start + CHUNK)
-        number = igl.fast_winding_number(
-            vertices, faces, np.ascontiguousarray(points[part])
-        )
+        number = igl.fast_winding_number(vertices, faces, np.ascontiguousarray(points[part]))
         inside[part] = np.abs(number) > 0.5
     return inside

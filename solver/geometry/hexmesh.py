@@ -10,9 +10,7 @@ import numpy as np
 from solver.geometry.voxels import VoxelModel
 
 #: Offset of local corner c = x + 2*y + 4*z from the cell's lowest corner, shape (8, 3).
-CORNER_OFFSETS = np.array(
-    [[c & 1, (c >> 1) & 1, (c >> 2) & 1] for c in range(8)], dtype=np.int32
-)
+CORNER_OFFSETS = np.array([[c & 1, (c >> 1) & 1, (c >> 2) & 1] for c in range(8)], dtype=np.int32)
 
 
 @dataclass(frozen=True, eq=False)

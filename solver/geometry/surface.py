@@ -39,9 +39,7 @@ def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
         that are not finite; if `unit` is not positive; if the built-in name is unknown.
     """
     if not (math.isfinite(unit) and unit > 0):
-        raise UserError(
-            f"unit {unit:g}: expected a positive number of metres per mesh unit"
-        )
+        raise UserError(f"unit {unit:g}: expected a positive number of metres per mesh unit")
     if mesh.startswith(BUILTIN_PREFIX):
         surface = builtin_surface(mesh.removeprefix(BUILTIN_PREFIX))
     else:
@@ -54,11 +52,7 @@ def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
 
 def surface_name(mesh: str) -> str:
     """Short name of a mesh for messages and files: ``builtin:bell`` -> ``bell``, a path -> stem."""
-    return (
-        mesh.removeprefix(BUILTIN_PREFIX)
-        if mesh.startswith(BUILTIN_PREFIX)
-        else Path(mesh).stem
-    )
+    return mesh.removeprefix(BUILTIN_PREFIX) if mesh.startswith(BUILTIN_PREFIX) else Path(mesh).stem
 
 
 def _read(path: Path) -> trimesh.Trimesh:

@@ -95,9 +95,7 @@ def voxelize(
     if fill not in FILLS:
         raise UserError(f"fill {fill!r} is unknown, expected one of {', '.join(FILLS)}")
     if pieces not in PIECES:
-        raise UserError(
-            f"pieces {pieces!r} is unknown, expected one of {', '.join(PIECES)}"
-        )
+        raise UserError(f"pieces {pieces!r} is unknown, expected one of {', '.join(PIECES)}")
     model = _filled_model(surface, resolution, fill, name)
     if model.n_cells == 0:
         raise UserError(
@@ -131,9 +129,7 @@ def _checked_resolution(surface: trimesh.Trimesh, resolution: int, name: str) ->
     return checked
 
 
-def _filled_model(
-    surface: trimesh.Trimesh, resolution: int, fill: str, name: str
-) -> VoxelModel:
+def _filled_model(surface: trimesh.Trimesh, resolution: int, fill: str, name: str) -> VoxelModel:
     grid = bounding_grid(surface, resolution)
     filled, origin = FILLS[fill](surface, grid)
     # Padding at the far end keeps index 0 the start of a block.
@@ -156,9 +152,7 @@ def _pieces_message(
     )
 
 
-def _connected_resolution(
-    surface: trimesh.Trimesh, model: VoxelModel, fill: str
-) -> int | None:
+def _connected_resolution(surface: trimesh.Trimesh, model: VoxelModel, fill: str) -> int | None:
     for factor in TRIAL_FACTORS:
         resolution = int(np.ceil(model.resolution * factor))
         if model.filled.size * factor**3 > TRIAL_GRID:
