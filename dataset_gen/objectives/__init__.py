@@ -1,0 +1,108 @@
+"""Fit objectives by name: eight fine moduli of a block -> eight coarse moduli of one element.
+
+Every objective is homogeneous of degree one in the fine moduli and equivariant under the cube's 48
+symmetries. Each lives in a module of its own with a function `fit_pattern`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from carillon.errors import UserError
+from dataset_gen.element import DEFAULT_POISSON, Array
+from dataset_gen.objectives import chen2015, energy, hybrid, inertial, oversampled
+from dataset_gen.objectives.quadratic import PatternFits
+
+OBJECTIVES: dict[str, Callable[[Array, int, float], PatternFits]] = {
+    "energy": energy.fit_pattern,
+    "chen2015": chen2015.fit_pattern,
+    "inertial": inertial.fit_pattern,
+    "oversampled": oversampled.fit_pattern,
+    "hybrid": hybrid.fit_pattern,
+}
+"""All objectives; `hybrid` gives the best spectra and is the default."""
+
+DEFAULT_OBJECTIVE = "hybrid"
+
+CHUNK = 32
+"""Blocks factorised together: few enough for the matrices to stay in the cache."""
+
+
+class Fits(NamedTuple):
+    """Result of `fit`.
+
+    Attributes
+    ----------
+    moduli : (n, 8) coarse moduli E, in the unit of the fine ones, positive.
+    residual : (n,) root of the objective relative to its value for E = 0.
+    converged : (n,) whether the minimiser settled.
+    """
+
+    moduli: Array
+    residual: Array
+    converged: NDArray[np.bool_]
+
+
+def require_objective(objective: str) -> None:
+    """Raise UserError unless `objective` is known."""
+    if objective not in OBJECTIVES:
+        raise UserError(
+            f"objective {objective!r} is unknown, choose one of {', '.join(OBJECTIVES)}"
+        )
+
+
+def require_poisson(poisson: float) -> None:
+    """Raise UserError unless Poisson's ratio lies in (-1, 0.5)."""
+    if not -1.0 < poisson < 0.5:
+        raise UserError(f"Poisson's ratio {poisson} is outside (-1, 0.5)")
+
+
+def _require_blocks(young: Array) -> None:
+    if young.ndim != 2 or young.shape[1] != 8:
+        raise UserError(f"fine moduli have shape {young.shape}, expected (n, 8)")
+    if not np.isfinite(young).all() or (young < 0.0).any():
+        raise UserError("fine moduli must be finite and not negative")
+    empty = np.flatnonzero(~(young > 0.0).any(axis=1))
+    if len(empty):
+        raise UserError(f"block {empty[0]} is void in all eight cells: there is nothing to fit")
+
+
+def fit(objective: str, e: ArrayLike, poisson: float = DEFAULT_POISSON) -> Fits:
+    """Fit the coarse moduli of many blocks.
+
+    Parameters
+    ----------
+    objective : name in `OBJECTIVES`.
+    e : (n, 8) fine moduli in bit order, any unit, 0 where a cell is void.
+    poisson : Poisson's ratio of all cells.
+
+    Raises
+    ------
+    UserError
+        For an unknown objective, a bad shape, a negative or non-finite modulus, an all-void block.
+
+    Notes
+    -----
+    A row's result does not depend on the other rows, bit for bit, as long as BLAS is serial.
+    """
+    require_objective(objective)
+    require_poisson(poisson)
+    young = np.ascontiguousarray(e, dtype=float)
+    _require_blocks(young)
+    fit_pattern = OBJECTIVES[objective]
+    moduli = np.empty_like(young)
+    residual = np.empty(len(young))
+    converged = np.empty(len(young), dtype=bool)
+    masks = (young > 0.0) @ (1 << np.arange(8))
+    for mask in np.unique(masks):
+        rows = np.flatnonzero(masks == mask)
+        for start in range(0, len(rows), CHUNK):
+            chunk = rows[start : start + CHUNK]
+            moduli[chunk], residual[chunk], converged[chunk] = fit_pattern(
+                young[chunk], int(mask), float(poisson)
+            )
+    return Fits(moduli, residual, converged)
