@@ -1,0 +1,7 @@
+"""Carillon's common ground: what every room needs and no room owns.
+
+Errors meant for the user, atomic HDF5 files, provenance, progress, and the check of the numerical
+runtime (BLAS, threads).  Nothing in here knows any mathematics of the method.
+"""
+
+__version__ = "0.1.0"

@@ -1,0 +1,160 @@
+"""A result file is complete or absent, and a bad one is named in one sentence."""
+
+from __future__ import annotations
+
+import os
+import stat
+
+import h5py
+import numpy as np
+import pytest
+
+from carillon.errors import UserError
+from carillon.files import atomic_path, create_h5, open_h5, require_writable
+
+
+@pytest.fixture
+def shard(tmp_path):
+    path = tmp_path / "shard.h5"
+    with create_h5(path, "shard", 3) as file:
+        file["young"] = np.arange(1000.0)
+    return path
+
+
+def one_sentence(caught: pytest.ExceptionInfo[UserError]) -> str:
+    text = str(caught.value)
+    assert "\n" not in text
+    return text
+
+
+def test_what_was_written_is_read_back(shard):
+    with open_h5(shard, "shard", 3) as file:
+        assert np.array_equal(file["young"], np.arange(1000.0))
+
+
+def test_an_exception_leaves_no_file_behind(tmp_path):
+    path = tmp_path / "modes.h5"
+    with pytest.raises(RuntimeError), create_h5(path, "modes", 1) as file:
+        file["eigenvalues"] = np.ones(3)
+        raise RuntimeError("interrupted")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupt_from_the_keyboard_leaves_no_file_behind(tmp_path):
+    with pytest.raises(KeyboardInterrupt), create_h5(tmp_path / "modes.h5", "modes", 1):
+        raise KeyboardInterrupt
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_exception_keeps_the_earlier_file(shard):
+    before = shard.read_bytes()
+    with pytest.raises(RuntimeError), create_h5(shard, "shard", 3):
+        raise RuntimeError("interrupted")
+    assert shard.read_bytes() == before
+    assert list(shard.parent.iterdir()) == [shard]
+
+
+def test_the_final_name_appears_only_when_the_file_is_complete(tmp_path):
+    path = tmp_path / "modes.h5"
+    with atomic_path(path) as temporary:
+        temporary.write_text("half")
+        assert not path.exists()
+        assert temporary.parent == path.parent, "a rename across file systems is not atomic"
+    assert path.read_text() == "half"
+
+
+def test_permissions_follow_the_umask(shard):
+    umask = os.umask(0)
+    os.umask(umask)
+    assert stat.S_IMODE(shard.stat().st_mode) == 0o666 & ~umask
+
+
+def test_a_missing_folder_is_named_before_any_work(tmp_path):
+    with pytest.raises(UserError) as caught:
+        require_writable(tmp_path / "nowhere" / "modes.h5")
+    assert "nowhere does not exist" in one_sentence(caught)
+
+
+def test_a_folder_is_no_file_to_write(tmp_path):
+    with pytest.raises(UserError) as caught:
+        require_writable(tmp_path)
+    assert "is a folder" in one_sentence(caught)
+
+
+def test_a_folder_that_cannot_be_written_to_is_named():
+    with pytest.raises(UserError) as caught:
+        require_writable("/proc/modes.h5")  # not even root may create files there
+    assert "/proc/modes.h5: cannot be written" in one_sentence(caught)
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(UserError) as caught, open_h5(tmp_path / "absent.h5", "shard", 3):
+        pass
+    assert "absent.h5: no such file, expected a Carillon shard file" in one_sentence(caught)
+
+
+def test_a_file_that_is_not_hdf5_is_refused(tmp_path):
+    path = tmp_path / "text.h5"
+    path.write_text("these are no numbers\n")
+    with pytest.raises(UserError) as caught, open_h5(path, "shard", 3):
+        pass
+    assert "is not readable as HDF5" in one_sentence(caught)
+
+
+def test_an_empty_file_is_refused(tmp_path):
+    path = tmp_path / "empty.h5"
+    path.touch()
+    with pytest.raises(UserError) as caught, open_h5(path, "shard", 3):
+        pass
+    assert "is not readable as HDF5" in one_sentence(caught)
+
+
+def test_a_truncated_file_is_refused(shard):
+    with open(shard, "rb+") as stream:
+        stream.truncate(shard.stat().st_size // 2)
+    with pytest.raises(UserError) as caught, open_h5(shard, "shard", 3):
+        pass
+    assert "is not readable as HDF5" in one_sentence(caught)
+
+
+def test_a_file_of_another_kind_is_refused(shard):
+    with pytest.raises(UserError) as caught, open_h5(shard, "modes", 3):
+        pass
+    assert "holds 'shard', expected a Carillon modes file" in one_sentence(caught)
+
+
+def test_a_foreign_hdf5_file_is_refused(tmp_path):
+    path = tmp_path / "foreign.h5"
+    with h5py.File(path, "w") as file:
+        file["x"] = 1
+    with pytest.raises(UserError) as caught, open_h5(path, "modes", 3):
+        pass
+    assert "expected a Carillon modes file" in one_sentence(caught)
+
+
+def test_an_older_schema_is_refused(shard):
+    with pytest.raises(UserError) as caught, open_h5(shard, "shard", 4):
+        pass
+    text = one_sentence(caught)
+    assert "schema 3" in text and "schema 4" in text and "generate the file again" in text
+
+
+def test_a_flipped_byte_is_noticed_on_reading(tmp_path):
+    path = tmp_path / "shard.h5"
+    with create_h5(path, "shard", 3) as file:
+        young = file.create_dataset("young", data=np.arange(1000.0), fletcher32=True)
+        offset = young.id.get_chunk_info(0).byte_offset
+    with open(path, "rb+") as stream:
+        stream.seek(offset + 100)
+        byte = stream.read(1)[0]
+        stream.seek(offset + 100)
+        stream.write(bytes([byte ^ 0xFF]))
+    with pytest.raises(UserError) as caught, open_h5(path, "shard", 3) as file:
+        file["young"][:]
+    assert "shard.h5: is damaged" in one_sentence(caught)
+
+
+def test_a_dataset_that_is_not_there_is_named(shard):
+    with pytest.raises(UserError) as caught, open_h5(shard, "shard", 3) as file:
+        file["density"][:]
+    assert "is incomplete" in one_sentence(caught) and "density" in str(caught.value)
