@@ -1,0 +1,52 @@
+# Carillon: `make run` for the default workflow and its report, `make test` for the test suite.
+# From a fresh Debian or Ubuntu machine both install what is missing first.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DEFAULT_GOAL := help
+MAKEFLAGS += --no-print-directory
+
+VENV ?= .venv
+PYTHON_OF_VENV = $(VENV)/bin/python
+# One job of as many cores as there are, or as many as fit: Snakemake adds up the threads of its
+# jobs, and every MPI rank takes its share of them (carillon.runtime.limit_threads).
+CORES ?= all
+TARGETS ?= all
+PYTEST_OPTIONS ?=
+PACKAGES = $(patsubst %/__init__.py,%,$(wildcard */__init__.py))
+RULES = $(wildcard Snakefile workflow/rules/*.smk)
+
+# Rules and tests call the tools of the environment by name.
+export PATH := $(abspath $(VENV))/bin:$(PATH)
+export VENV
+# Open MPI refuses to start as root, the usual user of a container, unless told twice.
+ifeq ($(shell id -u),0)
+export OMPI_ALLOW_RUN_AS_ROOT := 1
+export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
+endif
+
+.PHONY: help env run test check clean
+
+help:  ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-6s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@echo "  PETSC=source make env   build PETSc and SLEPc against the MPI on PATH instead of using apt's"
+
+env:  ## only the environment: .venv with PETSc and SLEPc
+	@bash workflow/envs/setup.sh
+
+run: env  ## the default workflow; ends at results/report.html
+	@snakemake --profile workflow/profiles/default --cores $(CORES) $(TARGETS)
+	@echo "report: $(abspath results/report.html)"
+
+test: env  ## the whole test suite
+	@$(PYTHON_OF_VENV) -m pytest -q $(PYTEST_OPTIONS)
+
+check: env  ## lint, formatting, types, Snakemake rules
+	@ruff check --quiet
+	@ruff format --check --quiet || { ruff format --diff --quiet; exit 1; }
+	@mypy $(PACKAGES)
+	@if [ -n "$(RULES)" ]; then snakefmt --check $(RULES) && snakemake --lint; fi
+
+clean:  ## remove the environment, caches and built files; results/ stays
+	@rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache *.egg-info
+	@find . -name __pycache__ -type d -prune -exec rm -rf {} +
