@@ -1,0 +1,127 @@
+"""Fixtures that every test may use: MPI runs, command-line runs, the meshes beside the checkout."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pytest
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+MESH_FILES = ("stanford-bunny.obj", "teapot.obj")
+
+Run = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+def _environment(threads: int, extra: Mapping[str, str] | None) -> dict[str, str]:
+    environment = dict(os.environ)
+    environment.update(
+        OMP_NUM_THREADS=str(threads),
+        PYTHONPATH=str(CHECKOUT),
+        # Open MPI refuses to run as root, the usual user of a container, unless told twice.
+        OMPI_ALLOW_RUN_AS_ROOT="1",
+        OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1",
+        # More ranks than cores, told to Open MPI 4 and 5; other MPIs allow it anyway.
+        OMPI_MCA_rmaps_base_oversubscribe="1",
+        PRTE_MCA_rmaps_default_mapping_policy=":oversubscribe",
+    )
+    environment.update(extra or {})
+    return environment
+
+
+def _run(
+    command: list[str],
+    environment: dict[str, str],
+    timeout: float,
+    check: bool,
+    cwd: Path | str | None,
+) -> subprocess.CompletedProcess[str]:
+    shown = " ".join(command)
+    try:
+        done = subprocess.run(
+            command,
+            env=environment,
+            timeout=timeout,
+            cwd=cwd or CHECKOUT,
+            capture_output=True,
+            text=True,
+        )
+    except subprocess.TimeoutExpired as error:
+        output = error.stderr or b""
+        text = output.decode(errors="replace") if isinstance(output, bytes) else output
+        pytest.fail(f"no end after {timeout:g} s: {shown}\n{text}")
+    if check and done.returncode != 0:
+        pytest.fail(f"exit status {done.returncode}: {shown}\n{done.stdout}\n{done.stderr}")
+    return done
+
+
+@pytest.fixture(scope="session")
+def run_cli() -> Run:
+    """Run `python -m MODULE ARGUMENTS...` and return the CompletedProcess.
+
+    Keywords: `timeout` [s], `check` (fail the test unless the exit status is 0), `env` (variables
+    added to the environment), `cwd`.
+    """
+
+    def run(
+        module: str,
+        *arguments: object,
+        timeout: float = 120,
+        check: bool = False,
+        env: Mapping[str, str] | None = None,
+        cwd: Path | str | None = None,
+    ) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", module, *map(str, arguments)]
+        return _run(command, _environment(_cores(), env), timeout, check, cwd)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def mpiexec() -> Run:
+    """Run `python -m mpi4py -m MODULE ARGUMENTS...` on a number of ranks.
+
+    Called as `mpiexec(ranks, module, *arguments)`; keywords as for `run_cli`.  A module that ends
+    in `.py` is run as a script.  Each rank gets its share of the cores as threads, one at least.
+    """
+    launcher = shutil.which("mpiexec")
+    if launcher is None:
+        pytest.fail("no mpiexec on PATH; run the tests with `make test`, which installs MPI")
+
+    def run(
+        ranks: int,
+        module: str | Path,
+        *arguments: object,
+        timeout: float = 120,
+        check: bool = False,
+        env: Mapping[str, str] | None = None,
+        cwd: Path | str | None = None,
+    ) -> subprocess.CompletedProcess[str]:
+        target = [str(module)] if str(module).endswith(".py") else ["-m", str(module)]
+        program = [sys.executable, "-m", "mpi4py", *target, *map(str, arguments)]
+        command = [launcher, "-n", str(ranks), *program]
+        threads = max(1, _cores() // ranks)
+        return _run(command, _environment(threads, env), timeout, check, cwd)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def meshes() -> Path:
+    """Folder with the meshes of MESH_FILES; skips the test where it is absent."""
+    named = os.environ.get("CARILLON_MESHES")
+    folder = Path(named) if named else CHECKOUT.parent / "shared" / "models"
+    missing = [name for name in MESH_FILES if not (folder / name).is_file()]
+    if missing:
+        pytest.skip(
+            f"no {' and '.join(missing)} in {folder}; set CARILLON_MESHES to a folder that has them"
+        )
+    return folder
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0))

@@ -1,0 +1,139 @@
+"""The environment starts with no variable set and is fast; licence and citation are in order."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import tomllib
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+import yaml
+
+import carillon
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+
+
+def test_petsc_and_slepc_start_in_an_empty_environment():
+    program = "from petsc4py import PETSc; from slepc4py import SLEPc; SLEPc.EPS().create()"
+    done = subprocess.run(
+        [sys.executable, "-c", program], env={}, cwd="/", capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_packages_import_from_any_folder_without_pythonpath():
+    done = subprocess.run(
+        [sys.executable, "-c", "import carillon; print(carillon.__file__)"],
+        env={},
+        cwd="/",
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert Path(done.stdout.strip()).parent == CHECKOUT / "carillon", done.stderr
+
+
+@pytest.fixture(scope="module")
+def environment(run_cli) -> dict:
+    return json.loads(run_cli("carillon", "--json", check=True).stdout)
+
+
+def test_the_start_up_check_names_what_is_used(environment):
+    assert environment["versions"]["carillon"] == carillon.__version__
+    assert re.match(r"3\.\d+\.\d+", environment["petsc"])
+    assert re.match(r"3\.\d+\.\d+", environment["slepc"])
+    assert environment["mpi"]
+    assert environment["cores"] >= 1
+
+
+def test_petsc_does_not_run_on_the_reference_blas(environment):
+    assert not environment["reference_blas"], environment["blas"]
+    assert "reference" not in environment["blas"]
+
+
+def test_the_start_up_check_is_readable(run_cli):
+    done = run_cli("carillon", check=True)
+    for word in ("Carillon", "PETSc", "SLEPc", "BLAS", "MUMPS"):
+        assert word in done.stdout
+
+
+@pytest.mark.mpi
+def test_ranks_see_each_other_and_share_the_cores(mpiexec, tmp_path):
+    script = tmp_path / "ranks.py"
+    script.write_text(
+        "import os\n"
+        "from mpi4py import MPI\n"
+        "from petsc4py import PETSc\n"
+        "ranks = MPI.COMM_WORLD.allgather(PETSc.COMM_WORLD.getRank())\n"
+        "threads = MPI.COMM_WORLD.allreduce(int(os.environ['OMP_NUM_THREADS']))\n"
+        "cores = len(os.sched_getaffinity(0))\n"
+        "if not MPI.COMM_WORLD.rank:\n"
+        "    print(ranks, threads <= max(cores, len(ranks)))\n"
+    )
+    assert mpiexec(3, script, check=True).stdout.strip() == "[0, 1, 2] True"
+
+
+@pytest.mark.mpi
+def test_an_error_on_one_rank_ends_all_of_them(mpiexec, tmp_path):
+    script = tmp_path / "error.py"
+    script.write_text(
+        "from mpi4py import MPI\n"
+        "if MPI.COMM_WORLD.rank == 1:\n"
+        "    raise ValueError('rank 1 cannot go on')\n"
+        "MPI.COMM_WORLD.barrier()\n"
+    )
+    done = mpiexec(2, script, timeout=60)
+    assert done.returncode != 0
+    assert "rank 1 cannot go on" in done.stderr
+
+
+def locked(name: str) -> dict[str, str]:
+    lines = (CHECKOUT / "workflow" / "envs" / name).read_text().splitlines()
+    pins = (line.split("==") for line in lines if line and not line.startswith("#"))
+    return {package.lower().replace("_", "-"): version for package, version in pins}
+
+
+@pytest.mark.parametrize("lock", ["lock.txt", "lock-numpy2.txt"])
+@pytest.mark.parametrize("requirements", ["requirements.txt", "requirements-dev.txt"])
+def test_every_requirement_is_locked(lock, requirements):
+    from packaging.requirements import Requirement
+
+    pins = locked(lock)
+    for line in (CHECKOUT / "workflow" / "envs" / requirements).read_text().splitlines():
+        if line and not line.startswith("#"):
+            requirement = Requirement(line)
+            assert requirement.specifier.contains(pins[requirement.name.lower()]), line
+
+
+def test_the_installed_numpy_is_the_locked_one():
+    assert metadata.version("numpy") in {
+        locked("lock.txt")["numpy"],
+        locked("lock-numpy2.txt")["numpy"],
+    }
+
+
+def test_the_licence_is_bsd_3_clause():
+    text = (CHECKOUT / "LICENSE").read_text()
+    assert text.startswith("BSD 3-Clause License")
+    assert "Copyright (c) 2026, The Carillon developers" in text
+    project = tomllib.loads((CHECKOUT / "pyproject.toml").read_text())["project"]
+    assert project["license"] == "BSD-3-Clause"
+
+
+def test_the_citation_names_software_version_and_paper():
+    citation = yaml.safe_load((CHECKOUT / "CITATION.cff").read_text())
+    assert citation["cff-version"] == "1.2.0"
+    assert citation["title"] == "Carillon"
+    assert citation["version"] == carillon.__version__
+    paper = citation["preferred-citation"]
+    assert [author["family-names"] for author in paper["authors"]] == ["Yamamoto", "Igarashi"]
+    assert paper["year"] == 2016
+
+
+def test_the_changelog_has_an_entry_for_this_version():
+    assert f"## [{carillon.__version__}]" in (CHECKOUT / "CHANGELOG.md").read_text()
