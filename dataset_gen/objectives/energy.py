@@ -1,8 +1,8 @@
 """Objective `energy`: the paper's Eq. (8) in closed form.
 
 For a self-equilibrated force f the fine energy is `f^T K(e)^+ f` and the coarse one
-`(P^T f)^T K_c(E)^+ (P^T f)`. For Gaussian f and symmetric A, `E[(f^T A f)^2] = 2 |A|_F^2 + tr(A)^2`,
-so the mean over all forces needs no sample. Everything that depends on E lives on the coarse
+`(P^T f)^T K_c(E)^+ (P^T f)`. For Gaussian f and symmetric A the mean of `(f^T A f)^2` is
+`2 |A|_F^2 + tr(A)^2`, so no force is sampled. Everything that depends on E lives on the coarse
 element's 18 straining motions.
 """
 

@@ -22,6 +22,9 @@ from dataset_gen.objectives.quadratic import (
     reference_moduli,
 )
 
+RIGID_SHARE = 1e-10
+"""Energy added to every field before whitening, as a share of all fields' energy."""
+
 PATCH_NODES = np.array([[x, y, z] for z in range(5) for y in range(5) for x in range(5)])
 
 
@@ -78,10 +81,21 @@ def fit_pattern(young: Array, mask: int, poisson: float) -> PatternFits:
     displacements = np.linalg.solve(held, loads)
     own = (filled @ pattern.stiffness).reshape(count, size, size)
     energies = displacements.transpose(0, 2, 1) @ (own @ displacements)
-    factor = np.linalg.cholesky(0.5 * (energies + energies.transpose(0, 2, 1)))
+    factor = np.linalg.cholesky(_regularised(energies))
     motions = pattern.to_corners @ displacements
-    whitened = np.linalg.solve(factor, motions.transpose(0, 2, 1)).transpose(0, 2, 1)
-    identity = np.broadcast_to(np.eye(energies.shape[1]), energies.shape)
-    return bounded_moduli(
-        energy_mismatch(whitened, identity, poisson), young, reference_moduli(young)
-    )
+    whitened = _divided(motions.transpose(0, 2, 1), factor).transpose(0, 2, 1)
+    half = _divided(energies, factor)
+    unit = _divided(half.transpose(0, 2, 1), factor)
+    return bounded_moduli(energy_mismatch(whitened, unit, poisson), young, reference_moduli(young))
+
+
+def _regularised(energies: Array) -> Array:
+    """Positive definite even for a single filled cell, which one prescribed field leaves rigid."""
+    trace = np.einsum("nii->n", energies)[:, None, None]
+    symmetric = 0.5 * (energies + energies.transpose(0, 2, 1))
+    return np.asarray(symmetric + RIGID_SHARE * trace * np.eye(energies.shape[1]))
+
+
+def _divided(rows: Array, factor: Array) -> Array:
+    """`L^-1 B` for each Cholesky factor L (n, m, m) and B (n, m, k)."""
+    return np.asarray(np.linalg.solve(factor, rows))
