@@ -16,12 +16,12 @@ from dataclasses import dataclass
 import igl
 import numpy as np
 import trimesh
-from scipy import ndimage
 
-from solver.geometry.topology import CORNERS, thin_to
+from solver.geometry.topology import thin_to
 
-#: Sample points per voxel edge for the filled fraction of a voxel; odd, so that the centre is one.
-SAMPLES = 3
+#: Sample points per voxel edge for the filled fraction of a voxel. Even, so that a wall through the
+#: middle of a voxel passes between samples and leaves it exactly half full on either side.
+SAMPLES = 4
 
 #: Points whose winding number is computed at once.
 CHUNK = 2_000_000
@@ -29,7 +29,7 @@ CHUNK = 2_000_000
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Cubes of edge `edge` [m] from the corner `origin` (3,) [m], `shape` of them along the axes."""
+    """Cubes of edge `edge` [m], `shape` of them along the axes, from the corner `origin` [m]."""
 
     origin: np.ndarray
     edge: float
@@ -59,6 +59,8 @@ def winding_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.n
     filled : (nx, ny, nz) bool.
     origin : (3,) corner of the grid [m].
     """
+    # The hierarchy behind fast winding numbers suffers from long triangles.
+    surface = _cut(surface, 2 * grid.edge)
     touched = touched_voxels(surface, grid)
     fraction = filled_fraction(surface, grid, touched)
     return thin_to(touched | (fraction > 0), fraction >= 0.5, fraction), grid.origin
@@ -91,8 +93,8 @@ FILLS: dict[str, Callable[[trimesh.Trimesh, Grid], tuple[np.ndarray, np.ndarray]
 def filled_fraction(surface: trimesh.Trimesh, grid: Grid, touched: np.ndarray) -> np.ndarray:
     """Fraction of each voxel that is inside the surface, (nx, ny, nz), in steps of 1/SAMPLES^3."""
     fraction = centre_fill(surface, grid)[0].astype(float)
-    # Away from the surface a voxel is full or empty, and its centre says which.
-    near = np.argwhere(ndimage.binary_dilation(touched, structure=CORNERS))
+    # A voxel that the surface does not touch is full or empty, and its centre says which.
+    near = np.argwhere(touched)
     step = (np.arange(SAMPLES) + 0.5) / SAMPLES
     offsets = np.stack(np.meshgrid(step, step, step, indexing="ij"), axis=-1).reshape(-1, 3)
     points = (near[:, None, :] + offsets).reshape(-1, 3)
@@ -103,13 +105,19 @@ def filled_fraction(surface: trimesh.Trimesh, grid: Grid, touched: np.ndarray) -
 
 def touched_voxels(surface: trimesh.Trimesh, grid: Grid) -> np.ndarray:
     """Voxels that hold a vertex of the surface after its edges are cut to half a voxel or less."""
-    vertices, _ = trimesh.remesh.subdivide_to_size(
-        surface.vertices, surface.faces, max_edge=grid.edge / 2, max_iter=30
-    )
+    vertices = np.asarray(_cut(surface, grid.edge / 2).vertices)
     index = np.floor((vertices - grid.origin) / grid.edge).astype(int)
     touched = np.zeros(grid.shape, dtype=bool)
     touched[tuple(np.clip(index, 0, np.array(grid.shape) - 1).T)] = True
     return touched
+
+
+def _cut(surface: trimesh.Trimesh, max_edge: float) -> trimesh.Trimesh:
+    """The same surface in triangles with edges of at most `max_edge` [m]."""
+    vertices, faces = trimesh.remesh.subdivide_to_size(
+        surface.vertices, surface.faces, max_edge=max_edge, max_iter=30
+    )
+    return trimesh.Trimesh(vertices, faces, process=False)
 
 
 def _inside(surface: trimesh.Trimesh, grid: Grid, points: np.ndarray) -> np.ndarray:

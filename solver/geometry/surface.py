@@ -74,7 +74,7 @@ def _read(path: Path) -> trimesh.Trimesh:
         loaded = trimesh.load(path, process=False)
         if isinstance(loaded, trimesh.Scene):
             loaded = loaded.to_geometry() if loaded.geometry else trimesh.Trimesh()
-    except Exception as error:  # noqa: BLE001, parsers of a dozen formats raise anything
+    except Exception as error:  # parsers of a dozen formats raise anything
         reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
         raise UserError(
             f"{path}: could not be read as a mesh ({reason}); check or export the file again"

@@ -11,7 +11,6 @@ import numpy as np
 from scipy import ndimage
 
 FACES = ndimage.generate_binary_structure(3, 1)
-CORNERS = ndimage.generate_binary_structure(3, 3)
 
 # A 3x3x3 neighbourhood is an integer with one bit per position.
 _POSITIONS = tuple(product((-1, 0, 1), repeat=3))

@@ -99,8 +99,8 @@ def voxelize(
     model = _filled_model(surface, resolution, fill, name)
     if model.n_cells == 0:
         raise UserError(
-            f"mesh {name!r} at resolution {resolution} fills no voxel; raise --resolution, or check "
-            f"that the surface encloses a solid with its faces oriented alike"
+            f"mesh {name!r} at resolution {resolution} fills no voxel; raise --resolution, or "
+            f"check that the surface encloses a solid with its faces oriented alike"
         )
     labels, sizes = label_pieces(model.filled)
     if len(sizes) > 1 and pieces == "error":

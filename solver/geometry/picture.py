@@ -1,0 +1,203 @@
+"""Pictures of hexahedral meshes and their motion, for reports."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.geometry.hexmesh import HexMesh
+
+if TYPE_CHECKING:
+    from mpl_toolkits.mplot3d import Axes3D
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+#: Local corners of the six faces of a cell, anticlockwise seen from outside, and the direction
+#: each of them looks in.
+FACE_CORNERS = np.array(
+    [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
+)
+FACE_DIRECTIONS = np.array(
+    [[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]], dtype=np.int64
+)
+
+#: Colour of a body that shows no values.
+PLAIN = (0.80, 0.74, 0.64)
+
+#: Share of the object's diagonal that the largest displacement is drawn with.
+DRAWN_AMPLITUDE = 0.08
+
+
+def surface_quads(mesh: HexMesh) -> np.ndarray:
+    """Node indices (q, 4) int32 of the boundary faces, anticlockwise seen from outside."""
+    return _surface(mesh)[0]
+
+
+def draw(
+    ax: Axes3D,
+    mesh: HexMesh,
+    displacement: np.ndarray | None = None,
+    values: np.ndarray | None = None,
+    scale: float | str = "auto",
+    up: str = "auto",
+    view: tuple[float, float] = (22.0, -58.0),
+    cmap: str = "viridis",
+    limits: tuple[float, float] | None = None,
+) -> Poly3DCollection:
+    """Draw the surface of a mesh, deformed if wanted, lit from the upper left.
+
+    Parameters
+    ----------
+    ax : axes made with ``projection="3d"``.
+    mesh : fine or coarse mesh.
+    displacement : (n, 3) or (3*n,) displacement of the nodes, any unit.
+    values : (n,) per node or (m,) per cell, shown in colour; without them a deformed body is
+        coloured by the length of its displacement and a body at rest is plain.
+    scale : factor of the displacement, or ``"auto"``: the largest is drawn as `DRAWN_AMPLITUDE`
+        of the object's diagonal.
+    up : axis that points upwards, ``"x"``, ``"y"`` or ``"z"``; ``"auto"`` asks `guess_up`.
+    view : elevation and azimuth of the eye [degrees].
+    cmap : name of a matplotlib colour map.
+    limits : values at both ends of the colour map; their range by default.
+
+    Returns
+    -------
+    The polygons, with the values as their array, so that ``figure.colorbar`` accepts them.
+
+    Raises
+    ------
+    ValueError
+        If an array's shape or `up` does not fit.
+    """
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    quads, cell = _surface(mesh)
+    turn = _rotation(guess_up(mesh) if up == "auto" else up)
+    if displacement is not None:
+        displacement = np.asarray(displacement, dtype=float).reshape(-1, 3)
+        if len(displacement) != mesh.n_nodes:
+            raise ValueError(f"{len(displacement)} displacements for {mesh.n_nodes} nodes")
+        if values is None:
+            values = np.linalg.norm(displacement, axis=1)
+    points = (mesh.nodes + _drawn_motion(mesh, displacement, scale)) @ turn.T
+    corners = points[quads]
+
+    if values is None:
+        face_values = None
+        colours = np.tile(PLAIN, (len(quads), 1))
+    else:
+        face_values = _on_faces(mesh, np.asarray(values, dtype=float), quads, cell)
+        low, high = limits or (float(face_values.min()), float(face_values.max()))
+        mapping = ScalarMappable(Normalize(low, high if high > low else low + 1.0), cmap)
+        colours = mapping.to_rgba(face_values)[:, :3]
+    colours = np.clip(colours * _light(corners, view)[:, None], 0, 1)
+
+    polygons = Poly3DCollection(corners, facecolors=colours, edgecolors=colours * 0.86)
+    polygons.set_linewidth(0.25)
+    if face_values is not None:
+        # Kept for a colour bar; the lit colours above stay as they are.
+        polygons.set_norm(mapping.norm)
+        polygons.set_cmap(cmap)
+        polygons.set_array(face_values)
+        polygons._face_is_mapped = polygons._edge_is_mapped = False
+        polygons.update_scalarmappable = lambda: None
+    ax.add_collection3d(polygons)
+    _frame(ax, points[np.unique(quads)], view)
+    return polygons
+
+
+def guess_up(mesh: HexMesh) -> str:
+    """Axis on which the object stands firmly: ``"y"`` or ``"z"``, the two customs of mesh files.
+
+    Firm is a low centre of mass over a wide footprint of the lowest cells; ``"z"`` if in doubt.
+    """
+    firmness = {axis: _firmness(mesh, "xyz".index(axis)) for axis in "yz"}
+    return "y" if firmness["y"] > 1.05 * firmness["z"] else "z"
+
+
+def _firmness(mesh: HexMesh, axis: int) -> float:
+    height = mesh.grid[:, axis] - mesh.grid[:, axis].min() + 0.5
+    foot = np.delete(mesh.grid[height < 2], axis, axis=1)
+    centre = np.delete(mesh.grid.mean(axis=0), axis)
+    reach = np.minimum(foot.max(axis=0) - centre, centre - foot.min(axis=0)).min() + 0.5
+    return float(reach / height.mean())
+
+
+def _surface(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray]:
+    """Boundary quads and the cell that each belongs to."""
+    grid = mesh.grid.astype(np.int64) - mesh.grid.min(axis=0) + 1
+    size = grid.max(axis=0) + 2
+    filled = np.zeros(size, dtype=bool)
+    filled[tuple(grid.T)] = True
+    quads, cells = [], []
+    for corners, direction in zip(FACE_CORNERS, FACE_DIRECTIONS, strict=True):
+        open_cells = np.flatnonzero(~filled[tuple((grid + direction).T)])
+        quads.append(mesh.cells[open_cells][:, corners])
+        cells.append(open_cells)
+    return np.concatenate(quads), np.concatenate(cells)
+
+
+def _rotation(up: str) -> np.ndarray:
+    """Rotation (3, 3) that turns the axis `up` into the z axis of the plot."""
+    rotations = {
+        "x": [[0, 1, 0], [0, 0, 1], [1, 0, 0]],
+        "y": [[1, 0, 0], [0, 0, -1], [0, 1, 0]],
+        "z": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    }
+    if up not in rotations:
+        raise ValueError(f"up is {up!r}, expected 'auto', 'x', 'y' or 'z'")
+    return np.array(rotations[up], dtype=float)
+
+
+def _drawn_motion(
+    mesh: HexMesh, displacement: np.ndarray | None, scale: float | str
+) -> np.ndarray | float:
+    if displacement is None:
+        return 0.0
+    if scale != "auto":
+        return float(scale) * displacement
+    largest = np.linalg.norm(displacement, axis=1).max()
+    diagonal = np.linalg.norm(np.ptp(mesh.nodes, axis=0))
+    return displacement * (DRAWN_AMPLITUDE * diagonal / largest if largest > 0 else 0.0)
+
+
+def _on_faces(mesh: HexMesh, values: np.ndarray, quads: np.ndarray, cell: np.ndarray) -> np.ndarray:
+    if values.shape == (mesh.n_nodes,):
+        return values[quads].mean(axis=1)
+    if values.shape == (mesh.n_cells,):
+        return values[cell]
+    raise ValueError(
+        f"values have shape {values.shape}, expected ({mesh.n_nodes},) per node or "
+        f"({mesh.n_cells},) per cell"
+    )
+
+
+def _light(corners: np.ndarray, view: tuple[float, float]) -> np.ndarray:
+    """Brightness of each face (q,) for its corners (q, 4, 3): ambient, key and fill light."""
+    normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    azimuth = np.radians(view[1])
+    key = _direction(np.radians(48.0), azimuth - np.radians(35.0))
+    fill = _direction(np.radians(15.0), azimuth + np.radians(50.0))
+    return 0.52 + 0.46 * np.clip(normal @ key, 0, 1) + 0.16 * np.clip(normal @ fill, 0, 1)
+
+
+def _direction(elevation: float, azimuth: float) -> np.ndarray:
+    return np.array(
+        [
+            np.cos(elevation) * np.cos(azimuth),
+            np.cos(elevation) * np.sin(azimuth),
+            np.sin(elevation),
+        ]
+    )
+
+
+def _frame(ax: Axes3D, points: np.ndarray, view: tuple[float, float]) -> None:
+    low, high = points.min(axis=0), points.max(axis=0)
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    ax.set_box_aspect(np.maximum(high - low, 1e-12), zoom=1.35)
+    ax.set_proj_type("persp", focal_length=1.6)
+    ax.view_init(elev=view[0], azim=view[1])
+    ax.set_axis_off()
