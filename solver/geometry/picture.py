@@ -22,7 +22,7 @@ FACE_DIRECTIONS = np.array(
 )
 
 #: Colour of a body that shows no values.
-PLAIN = (0.80, 0.74, 0.64)
+PLAIN = (0.90, 0.80, 0.64)
 
 #: Share of the object's diagonal that the largest displacement is drawn with.
 DRAWN_AMPLITUDE = 0.08
@@ -92,7 +92,7 @@ def draw(
         low, high = limits or (float(face_values.min()), float(face_values.max()))
         mapping = ScalarMappable(Normalize(low, high if high > low else low + 1.0), cmap)
         colours = mapping.to_rgba(face_values)[:, :3]
-    colours = np.clip(colours * _light(corners, view)[:, None], 0, 1)
+    colours = np.clip(colours * _light(points, quads, view)[:, None], 0, 1)
 
     polygons = Poly3DCollection(corners, facecolors=colours, edgecolors=colours * 0.86)
     polygons.set_linewidth(0.25)
@@ -174,14 +174,31 @@ def _on_faces(mesh: HexMesh, values: np.ndarray, quads: np.ndarray, cell: np.nda
     )
 
 
-def _light(corners: np.ndarray, view: tuple[float, float]) -> np.ndarray:
-    """Brightness of each face (q,) for its corners (q, 4, 3): ambient, key and fill light."""
+def _light(
+    points: np.ndarray, quads: np.ndarray, view: tuple[float, float], rounds: int = 4
+) -> np.ndarray:
+    """Brightness of each face (q,): ambient, key and fill light.
+
+    The face's own normal shows the voxels; the normal averaged over `rounds` rings of neighbours
+    shows the shape that they approximate. Their sum shows both.
+    """
+    corners = points[quads]
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    normal = _unit(normal)
+    smooth = normal
+    for _ in range(rounds):
+        at_nodes = np.zeros_like(points)
+        np.add.at(at_nodes, quads, smooth[:, None, :])
+        smooth = _unit(_unit(at_nodes)[quads].mean(axis=1))
+    normal = _unit(normal + 1.2 * smooth)
     azimuth = np.radians(view[1])
-    key = _direction(np.radians(48.0), azimuth - np.radians(35.0))
+    key = _direction(np.radians(48.0), azimuth - np.radians(40.0))
     fill = _direction(np.radians(15.0), azimuth + np.radians(50.0))
-    return 0.52 + 0.46 * np.clip(normal @ key, 0, 1) + 0.16 * np.clip(normal @ fill, 0, 1)
+    return 0.45 + 0.57 * np.clip(normal @ key, 0, 1) + 0.13 * np.clip(normal @ fill, 0, 1)
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300)
 
 
 def _direction(elevation: float, azimuth: float) -> np.ndarray:
@@ -197,7 +214,13 @@ def _direction(elevation: float, azimuth: float) -> np.ndarray:
 def _frame(ax: Axes3D, points: np.ndarray, view: tuple[float, float]) -> None:
     low, high = points.min(axis=0), points.max(axis=0)
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    ax.set_box_aspect(np.maximum(high - low, 1e-12), zoom=1.35)
+    elevation, azimuth = np.radians(view)
+    right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+    upwards = _direction(elevation + np.pi / 2, azimuth)
+    seen = (points - (low + high) / 2) @ np.stack([right, upwards], axis=1)
+    # matplotlib scales the box by its diagonal; fill the frame with what is seen of it instead.
+    zoom = 0.42 * np.linalg.norm(high - low) / max(np.abs(seen).max(), 1e-300)
+    ax.set_box_aspect(np.maximum(high - low, 1e-12), zoom=zoom)
     ax.set_proj_type("persp", focal_length=1.6)
     ax.view_init(elev=view[0], azim=view[1])
     ax.set_axis_off()
