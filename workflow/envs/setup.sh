@@ -200,7 +200,11 @@ site_packages() { "$VENV/bin/python" -c 'import sysconfig; print(sysconfig.get_p
 # A .pth file and not an editable install: it needs no build backend (which a fresh virtual
 # environment of Python 3.12 lacks), cannot fail half-way, and shows every folder of the checkout.
 write_checkout_pth() {
-    printf '%s\n' "$ROOT" >"$(site_packages)/carillon-checkout.pth"
+    # Without PATH (Open MPI 4) or HOME (5), as in some batch jobs, MPI cannot start even one process.
+    local defaults='import os; '
+    defaults+='os.environ.setdefault("PATH", os.defpath); '
+    defaults+='os.environ.setdefault("HOME", os.path.expanduser("~"))'
+    printf '%s\n' "$ROOT" "$defaults" >"$(site_packages)/carillon-checkout.pth"
 }
 
 # Debian keeps petsc4py and slepc4py out of Python's path, one folder per version, architecture and
@@ -213,8 +217,6 @@ write_petsc_pth() {
             "installed; reinstall python3-${package}4py, or run PETSC=source make env"
         lines+=("$folder")
     done
-    # Without a PATH (an empty environment, some batch systems) Open MPI cannot start even one process.
-    lines+=('import os; os.environ.setdefault("PATH", os.defpath)')
     printf '%s\n' "${lines[@]}" >"$(site_packages)/petsc-slepc.pth"
 }
 
