@@ -1,0 +1,87 @@
+"""The elastic solid that the eigenvalue problem K u = lambda M u is assembled from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dataset_gen.block import coarse_cell_mass
+from dataset_gen.element import DEFAULT_POISSON, quadrature_stiffness
+from solver.geometry import HexMesh
+
+Array = NDArray[np.float64]
+
+ALL_OCTANTS = 255
+"""Fill pattern of a cell whose eight octants are all filled."""
+
+DEFAULT_DENSITY = 1000.0
+"""Mass density [kg/m^3] where none is given."""
+
+
+@dataclass(frozen=True)
+class ElasticModel:
+    """A hexahedral mesh with material.
+
+    Parameters
+    ----------
+    mesh
+        Nodes and cells.
+    young
+        (m, 8) Young's modulus [Pa] at each cell's quadrature points.
+    fill
+        (m,) bit pattern of the octants of each cell that hold mass; 255 everywhere on a fine mesh.
+    poisson
+        Poisson's ratio.
+    density
+        Mass density of the filled octants [kg/m^3].
+    lumped
+        Whether the mass is row-sum lumped (diagonal) instead of consistent.
+    """
+
+    mesh: HexMesh
+    young: Array
+    fill: NDArray[np.uint8]
+    poisson: float = DEFAULT_POISSON
+    density: float = DEFAULT_DENSITY
+    lumped: bool = False
+
+    @property
+    def n_dofs(self) -> int:
+        """Number of displacement unknowns."""
+        return 3 * self.mesh.n_nodes
+
+    def stiffness(self, cells: NDArray[np.integer] | slice = slice(None)) -> Array:
+        """Element stiffness matrices (c, 24, 24) [N/m] of the chosen cells."""
+        kernels = quadrature_stiffness(self.poisson).reshape(8, 576)
+        return (self.mesh.edge * (self.young[cells] @ kernels)).reshape(-1, 24, 24)
+
+    def nodal_mass(self, cells: NDArray[np.integer] | slice = slice(None)) -> Array:
+        """Element masses (c, 8, 8) [kg] between corners, the same for each displacement component.
+
+        The trilinear shape functions are integrated over the filled octants: P^T M P of the fine
+        cells that a coarse cell stands for, and the consistent mass of a fine cell.
+        """
+        octants = np.unpackbits(self.fill[cells][:, None], axis=1, bitorder="little")
+        scale = self.density * (self.mesh.edge / 2.0) ** 3
+        mass = (scale * octants @ coarse_cell_mass().reshape(8, 64)).reshape(-1, 8, 8)
+        if self.lumped:
+            mass = mass.sum(axis=2)[:, :, None] * np.eye(8)
+        return mass
+
+    @property
+    def mass(self) -> float:
+        """Mass of the solid [kg]."""
+        octants = np.unpackbits(self.fill).sum()
+        return float(octants * self.density * (self.mesh.edge / 2.0) ** 3)
+
+
+def fine_model(mesh: HexMesh, young: Array, **constants: float | bool) -> ElasticModel:
+    """Model of a fine mesh with one modulus per cell; `young` is (m,) [Pa]."""
+    return ElasticModel(
+        mesh,
+        np.repeat(young[:, None], 8, axis=1),
+        np.full(mesh.n_cells, ALL_OCTANTS, dtype=np.uint8),
+        **constants,  # type: ignore[arg-type]
+    )

@@ -1,0 +1,70 @@
+"""Sparse matrices from element matrices, block by block."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def sum_blocks(
+    rows: NDArray[np.integer], columns: NDArray[np.integer], blocks: Array, shape: tuple[int, int]
+) -> sp.csr_matrix:
+    """Sparse matrix of the summed square `blocks` (k, b, b) at block positions `rows`, `columns`.
+
+    `shape` counts blocks.  Duplicates are added in a fixed order, so the result is reproducible.
+    """
+    width = blocks.shape[-1]
+    key = rows.astype(np.int64) * shape[1] + columns
+    order = np.argsort(key, kind="stable")
+    key = key[order]
+    first = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]])) if len(key) else key
+    if len(key) == 0:
+        return sp.csr_matrix((shape[0] * width, shape[1] * width))
+    data = np.add.reduceat(blocks[order], first, axis=0)
+    row, column = np.divmod(key[first], shape[1])
+    indptr = np.searchsorted(row, np.arange(shape[0] + 1))
+    matrix = sp.bsr_matrix(
+        (data, column, indptr), shape=(shape[0] * width, shape[1] * width), blocksize=(width, width)
+    )
+    return matrix.tocsr()
+
+
+def node_blocks(matrices: Array) -> Array:
+    """Element stiffness (c, 24, 24) as blocks (c, 8, 8, 3, 3) between corners."""
+    return matrices.reshape(-1, 8, 3, 8, 3).transpose(0, 1, 3, 2, 4)
+
+
+def assemble_elements(
+    cells: NDArray[np.integer],
+    stiffness: Array,
+    mass: Array,
+    n_rows: int,
+    n_columns: int | None = None,
+    row_of: NDArray[np.integer] | None = None,
+) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    """Stiffness and mass (both on displacement unknowns) from element matrices.
+
+    Parameters
+    ----------
+    cells
+        (c, 8) column number of each corner.
+    stiffness, mass
+        (c, 24, 24) and (c, 8, 8) element matrices.
+    n_rows, n_columns
+        Number of node rows and node columns (equal if not given).
+    row_of
+        Row number of each column number, -1 for rows to leave out; the identity if not given.
+    """
+    columns = n_rows if n_columns is None else n_columns
+    row = cells if row_of is None else row_of[cells]
+    rows = np.repeat(row, 8, axis=1).ravel()
+    cols = np.tile(cells, (1, 8)).ravel()
+    kept = slice(None) if row_of is None else np.flatnonzero(rows >= 0)
+    rows, cols = rows[kept], cols[kept]
+    shape = (n_rows, columns)
+    stiff = sum_blocks(rows, cols, node_blocks(stiffness).reshape(-1, 3, 3)[kept], shape)
+    nodal = sum_blocks(rows, cols, mass.reshape(-1, 1, 1)[kept], shape)
+    return stiff, sp.kron(nodal, sp.identity(3), format="csr")

@@ -1,0 +1,187 @@
+"""Ground truth by SLEPc: shift-and-invert Krylov-Schur or ARPACK, with proof of completeness."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import slepc4py
+from numpy.typing import NDArray
+
+slepc4py.init([])
+from petsc4py import PETSc  # noqa: E402
+from slepc4py import SLEPc  # noqa: E402
+
+from carillon.errors import ConvergenceError, UserError  # noqa: E402
+from solver.correction import rayleigh_ritz  # noqa: E402
+from solver.system import System, factor_package  # noqa: E402
+
+Array = NDArray[np.float64]
+
+METHODS = {"slepc": SLEPc.EPS.Type.KRYLOVSCHUR, "arpack": SLEPc.EPS.Type.ARPACK}
+SPARE_MODES = 8
+"""Modes computed beyond those asked for, so that the inertia count finds a gap to look through."""
+POLYNOMIAL_DEGREE = 3
+
+
+@dataclass
+class Truth:
+    """Eigenpairs with the evidence for them.
+
+    Attributes
+    ----------
+    values, vectors
+        (k,) and (local, k), rigid modes included.
+    iterations
+        Outer iterations of the eigensolver.
+    inertia
+        Number of eigenvalues below `inertia_at` by the factorisation's inertia, or -1 if not counted.
+    expected_inertia
+        Number of computed eigenvalues below it.
+    """
+
+    values: Array
+    vectors: Array
+    iterations: int
+    inertia: int
+    expected_inertia: int
+    inertia_at: float
+
+
+def first_elastic_estimate(system: System, nodes: Array) -> float:
+    """Upper bound [rad^2/s^2] of the first elastic eigenvalue, from polynomial displacement fields.
+
+    Parameters
+    ----------
+    nodes
+        (n, 3) coordinates [m] in mesh order.
+    """
+    centred = nodes - nodes.mean(axis=0)
+    centred = centred / np.abs(centred).max()
+    powers = [
+        (a, b, c)
+        for a in range(POLYNOMIAL_DEGREE + 1)
+        for b in range(POLYNOMIAL_DEGREE + 1 - a)
+        for c in range(POLYNOMIAL_DEGREE + 1 - a - b)
+    ]
+    fields = np.stack([(centred**power).prod(axis=1) for power in powers], axis=1)
+    block = np.einsum("np,ij->nipj", fields, np.eye(3)).reshape(3 * len(nodes), -1)
+    values, _ = rayleigh_ritz(system, system.local_rows(block))
+    return float(values[0])
+
+
+def solve_truth(
+    system: System,
+    nodes: Array,
+    modes: int,
+    method: str = "slepc",
+    tolerance: float = 1e-10,
+    prove: bool = True,
+) -> Truth:
+    """Compute the `modes` lowest eigenpairs of the assembled system, rigid modes included.
+
+    Parameters
+    ----------
+    method
+        `slepc` (Krylov-Schur) or `arpack`, both in shift-and-invert mode.
+    tolerance
+        Relative residual tolerance of the eigensolver.
+    prove
+        Whether to count the eigenvalues below the last one by the inertia of K - mu M.
+
+    Raises
+    ------
+    ConvergenceError
+        If too few pairs converge, or the inertia count contradicts the computed number.
+    """
+    shift = 0.1 * first_elastic_estimate(system, nodes)
+    wanted = min(modes + SPARE_MODES, system.n_dofs)
+    solver = SLEPc.EPS().create(system.comm)
+    try:
+        solver.setType(METHODS[method])
+    except PETSc.Error:
+        raise UserError(
+            f"this SLEPc was built without {method}; use --method slepc or rebuild SLEPc with it"
+        ) from None
+    try:
+        solver.setOperators(system.K, system.M)
+        solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+        solver.setDimensions(wanted)
+        solver.setTolerances(tolerance, 500)
+        solver.setTarget(-shift)
+        solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
+        transform = solver.getST()
+        transform.setType(SLEPc.ST.Type.SINVERT)
+        transform.setMatStructure(PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        linear = transform.getKSP()
+        linear.setType(PETSc.KSP.Type.PREONLY)
+        preconditioner = linear.getPC()
+        preconditioner.setType(PETSc.PC.Type.CHOLESKY)
+        preconditioner.setFactorSolverType(factor_package(system.comm.size))
+        solver.setFromOptions()
+        solver.solve()
+        found = solver.getConverged()
+        if found < modes:
+            raise ConvergenceError(
+                f"{method} converged {found} of {modes} modes to {tolerance:.0e} in "
+                f"{solver.getIterationNumber()} iterations"
+            )
+        values, vectors = _collect(system, solver, min(found, wanted))
+        iterations = solver.getIterationNumber()
+    finally:
+        solver.destroy()
+    inertia, expected, at = -1, -1, float("nan")
+    if prove:
+        at, expected = _gap(values, modes)
+        inertia = count_below(system, at)
+        if inertia != expected:
+            raise ConvergenceError(
+                f"{method} found {expected} eigenvalues below {at:.6g} rad^2/s^2, the inertia of "
+                f"K - mu M counts {inertia}: eigenvalues were missed"
+            )
+    return Truth(values[:modes], vectors[:, :modes], iterations, inertia, expected, at)
+
+
+def _collect(system: System, solver: SLEPc.EPS, count: int) -> tuple[Array, Array]:
+    local = 3 * (system.stop - system.start)
+    vectors = np.empty((local, count), order="F")
+    values = np.empty(count)
+    vector = system.K.createVecRight()
+    for index in range(count):
+        values[index] = solver.getEigenpair(index, vector).real
+        vectors[:, index] = vector.getArray(readonly=True)
+    vector.destroy()
+    order = np.argsort(values)
+    return values[order], np.asfortranarray(vectors[:, order])
+
+
+def _gap(values: Array, modes: int) -> tuple[float, int]:
+    """Middle of the widest relative gap at or after the last wanted value, and the count below it."""
+    if len(values) <= modes:
+        return float(values[-1] * (1.0 + 1e-6)), len(values)
+    gaps = np.diff(values[modes - 1 :]) / values[modes:]
+    widest = int(np.argmax(gaps)) + modes
+    return float(0.5 * (values[widest - 1] + values[widest])), widest
+
+
+def count_below(system: System, value: float) -> int:
+    """Number of eigenvalues below `value` [rad^2/s^2], by Sylvester's law of inertia."""
+    shifted = system.K.copy()
+    shifted.axpy(-value, system.M, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+    shifted.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    factorisation = PETSc.PC().create(system.comm)
+    factorisation.setOperators(shifted)
+    factorisation.setType(PETSc.PC.Type.CHOLESKY)
+    package = factor_package(system.comm.size)
+    factorisation.setFactorSolverType(package)
+    factorisation.setFactorSetUpSolverType()
+    if package == "mumps":
+        # Inertia needs the root of the elimination tree on one rank, and pivots are counted exactly.
+        factor = factorisation.getFactorMatrix()
+        factor.setMumpsIcntl(13, 1)
+        factor.setMumpsIcntl(24, 1)
+    factorisation.setUp()
+    negative, _, _ = factorisation.getFactorMatrix().getInertia()
+    factorisation.destroy()
+    shifted.destroy()
+    return int(negative)
