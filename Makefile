@@ -45,7 +45,7 @@ check: env  ## lint, formatting, types, Snakemake rules
 	@ruff check --quiet
 	@ruff format --check --quiet || { ruff format --diff --quiet; exit 1; }
 	@mypy $(PACKAGES)
-	@if [ -n "$(RULES)" ]; then snakefmt --check $(RULES) && snakemake --lint; fi
+	@if [ -n "$(RULES)" ]; then snakefmt --check $(RULES); python .ci/lint_rules.py; fi
 
 clean:  ## remove the environment, caches and built files; results/ stays
 	@rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache *.egg-info
