@@ -1,8 +1,8 @@
 """The 2x2x2 block of fine hexahedra that one coarse hexahedron replaces.
 
 Numbering: fine cell `j` of the block and coarse corner `c` use the bit order of
-`dataset_gen.element`; the 27 nodes are numbered x fastest, then y, then z, on the lattice {0,1,2}^3.
-All matrices are for fine edge 1 and unit modulus or density.
+`dataset_gen.element`; the 27 nodes are numbered x fastest, then y, then z, on {0,1,2}^3. All
+matrices are for fine edge 1 and unit modulus or density.
 """
 
 from __future__ import annotations
@@ -25,7 +25,9 @@ from dataset_gen.element import (
 FINE_EDGE = 1.0
 COARSE_EDGE = 2.0
 
-NODES: NDArray[np.int64] = np.array([[x, y, z] for z in range(3) for y in range(3) for x in range(3)])
+NODES: NDArray[np.int64] = np.array(
+    [[x, y, z] for z in range(3) for y in range(3) for x in range(3)]
+)
 """(27, 3) lattice positions of the block's nodes."""
 
 CELL_NODES: NDArray[np.int64] = np.array(
@@ -38,7 +40,7 @@ CORNER_NODES: NDArray[np.int64] = np.array([2 * c @ (1, 3, 9) for c in CORNERS],
 
 
 def degrees_of_freedom(nodes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Degrees of freedom 3n, 3n+1, 3n+2 of each node, in order; shape (..., 3 * nodes.shape[-1])."""
+    """Degrees of freedom 3n, 3n+1, 3n+2 of nodes (..., n), in order; shape (..., 3 n)."""
     dofs = 3 * nodes[..., None] + np.arange(3)
     return dofs.reshape(*nodes.shape[:-1], -1)
 
@@ -96,7 +98,7 @@ def active_nodes(filled: NDArray[np.bool_]) -> NDArray[np.int64]:
 
 @cache
 def symmetries() -> NDArray[np.int64]:
-    """The cube's 48 symmetries as permutations (48, 8) of the cells: row g sends cell j to [g, j]."""
+    """The cube's 48 symmetries as permutations (48, 8): row g sends cell j to [g, j]."""
     images = []
     for axes in permutations(range(3)):
         for flips in product((0, 1), repeat=3):

@@ -101,7 +101,7 @@ def nodal_mass(lumped: bool = False) -> Array:
 
 
 def rigid_motions(nodes: Array) -> Array:
-    """Three translations and three rotations about the centroid of `nodes` (n, 3); shape (3n, 6)."""
+    """Three translations, three rotations about the centroid of `nodes` (n, 3); (3n, 6)."""
     centred = nodes - nodes.mean(axis=0)
     motions = np.zeros((len(nodes), 3, 6))
     motions[:, np.arange(3), np.arange(3)] = 1.0

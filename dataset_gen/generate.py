@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
 from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
-
-import numpy as np
 
 from carillon import provenance
 from carillon.errors import UserError

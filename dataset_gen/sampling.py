@@ -63,7 +63,7 @@ def _latin_hypercube(generator: Generator) -> Array:
 
 
 def _void_patterns(generator: Generator, share: float, uniform: NDArray[np.bool_]) -> Array:
-    """Filled cells (HYPERCUBE, 8) as 0 and 1; uniform blocks run through all the classes in turn."""
+    """Filled cells (1024, 8) as 0 and 1; uniform blocks run through all classes in turn."""
     classes = pattern_classes()
     partial = classes[:-1]
     chosen = np.full(HYPERCUBE, len(classes) - 1)

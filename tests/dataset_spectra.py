@@ -31,7 +31,7 @@ def lattice_cells(shape: tuple[int, int, int]) -> np.ndarray:
 def assemble(
     cells: np.ndarray, stiffness: Array, mass: Array
 ) -> tuple[sp.csc_matrix, sp.csc_matrix]:
-    """K and M from element matrices (m, 24, 24) and nodal masses (m, 8, 8); unused nodes dropped."""
+    """K and M from element matrices (m, 24, 24) and nodal masses (m, 8, 8) on used nodes."""
     used, local = np.unique(cells, return_inverse=True)
     local = local.reshape(cells.shape)
     dofs = (3 * local[..., None] + np.arange(3)).reshape(len(cells), 24)
@@ -80,18 +80,6 @@ def coarse_frequencies(
     stiffness = COARSE_EDGE * np.einsum("mq,qab->mab", moduli, quadrature_stiffness(poisson))
     mass = np.einsum("mj,jab->mab", (blocks[filled] > 0).astype(float), coarse_cell_mass())
     return lowest(*assemble(lattice_cells(shape)[filled], stiffness, mass), count)
-
-
-def average(e: Array) -> Array:
-    """Native coarsening: the mean of the eight cells everywhere."""
-    return np.repeat(e.mean(axis=1, keepdims=True), 8, axis=1)
-
-
-def galerkin(e: Array) -> Array:
-    """Moduli of `P^T K(e) P`, which is representable exactly."""
-    near = 0.5 + 0.5 * np.sqrt(0.75)
-    line = np.array([[near, 1 - near], [1 - near, near]])
-    return e @ np.kron(np.kron(line, line), line)
 
 
 def box_fields(shape: tuple[int, int, int] = (16, 12, 8), seed: int = 0) -> dict[str, Array]:

@@ -112,8 +112,7 @@ def _fit_block(
 @numba.njit(cache=True, nogil=True)
 def _fit_all(
     starts: Array,
-    lows: Array,
-    highs: Array,
+    bounds: Array,
     strains: Array,
     gram: Array,
     flexibilities: Array,
@@ -126,7 +125,7 @@ def _fit_all(
     for row in range(len(starts)):
         logs[row], values[row], converged[row] = _fit_block(
             starts[row],
-            (lows[row], highs[row]),
+            (bounds[0], bounds[1]),
             strains,
             gram,
             flexibilities[row],
@@ -136,22 +135,51 @@ def _fit_all(
     return logs, values, converged
 
 
+def _fine_flexibility(young: Array, mask: int, poisson: float) -> Array:
+    """K(e)^+ (n, a, a) on the active nodes."""
+    pattern = pattern_of(mask, poisson)
+    rigid = pattern.null @ pattern.null.T
+    shift = young[:, pattern.cells].mean(axis=1)[:, None, None]
+    return np.asarray(np.linalg.inv(pattern.assemble(young)) - rigid / shift)
+
+
+def _loaded_motions(mask: int, poisson: float) -> Array:
+    """Straining motions of the corners (a, 18) as self-equilibrated nodal forces feel them."""
+    pattern = pattern_of(mask, poisson)
+    return pattern.without_null(pattern.interpolation @ straining_motions())
+
+
+def expected_mismatch(moduli: Array, young: Array, mask: int, poisson: float) -> Array:
+    """Mean squared energy difference (n,) of Eq. (8) over standard Gaussian forces.
+
+    `moduli` and `young` are (n, 8); all blocks share the void pattern `mask`.
+    """
+    flexibility = _fine_flexibility(young, mask, poisson)
+    fields = _loaded_motions(mask, poisson)
+    strains = corner_strains(poisson) @ straining_motions()
+    values = np.empty(len(young))
+    for row, fine in enumerate(flexibility):
+        values[row] = _mismatch(
+            _compliance(moduli[row], strains),
+            fields.T @ fields,
+            np.ascontiguousarray(fields.T @ fine @ fields),
+            np.trace(fine),
+            (fine * fine).sum(),
+        )
+    return values
+
+
 def fit_pattern(young: Array, mask: int, poisson: float) -> PatternFits:
     """Fit blocks (n, 8) that share one void pattern."""
-    pattern = pattern_of(mask, poisson)
     largest = young.max(axis=1)
     scaled = young / largest[:, None]
-    null = pattern.null
-    shift = scaled[:, pattern.cells].mean(axis=1)[:, None, None]
-    inverse = np.linalg.inv(pattern.assemble(scaled)) - (null @ null.T) / shift
-    fields = pattern.without_null(pattern.interpolation @ straining_motions())
-    ones = np.ones(len(young))
+    inverse = _fine_flexibility(scaled, mask, poisson)
+    fields = _loaded_motions(mask, poisson)
     traces = np.einsum("nii->n", inverse)
     squares = (inverse * inverse).sum(axis=(1, 2))
     logs, values, converged = _fit_all(
         np.log(reference_moduli(scaled)),
-        np.log(MODULUS_FLOOR) * ones,
-        np.log(MODULUS_CEILING) * ones,
+        np.log(np.array([MODULUS_FLOOR, MODULUS_CEILING])),
         corner_strains(poisson) @ straining_motions(),
         fields.T @ fields,
         np.ascontiguousarray(fields.T @ inverse @ fields),

@@ -1,0 +1,44 @@
+"""What a model file holds, for people and for scripts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from forests.model import load_model
+
+
+def describe(path: str | Path) -> dict[str, Any]:
+    """Validate the model at `path` and summarise it.
+
+    Raises
+    ------
+    UserError
+        See `forests.model.load_model`.
+    """
+    model = load_model(path)
+    return {
+        "path": str(path),
+        "objective": model.objective,
+        "poisson": model.poisson,
+        "transform": model.transform,
+        "trees": int(model.forests.roots.shape[1]),
+        "nodes": len(model.forests.left),
+        "leaves": len(model.forests.coefficients),
+        "memory_bytes": model.nbytes,
+        "scores": model.scores,
+        "provenance": model.provenance,
+    }
+
+
+def as_text(summary: dict[str, Any]) -> str:
+    """The result of `describe` as lines."""
+    lines = [
+        f"{summary['path']}: forests of objective {summary['objective']}, "
+        f"Poisson's ratio {summary['poisson']}, {summary['transform']} features",
+        f"2 x {summary['trees']} trees, {summary['leaves']:,} leaves, "
+        f"{summary['memory_bytes'] / 1e6:.1f} MB in memory",
+    ]
+    lines += [f"{name:<28}{value:.6g}" for name, value in summary["scores"].items()]
+    lines.append(f"commit {summary['provenance'].get('commit', 'unknown')}")
+    return "\n".join(lines)
