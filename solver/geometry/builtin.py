@@ -7,6 +7,7 @@ one voxel does not bend as a wall does. Parts overlap without being united; voxe
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import cast
 
 import numpy as np
 import trimesh
@@ -180,7 +181,7 @@ def builtin_surface(name: str) -> trimesh.Trimesh:
 
 
 def _together(*parts: trimesh.Trimesh) -> trimesh.Trimesh:
-    return trimesh.util.concatenate(parts)
+    return cast(trimesh.Trimesh, trimesh.util.concatenate(parts))
 
 
 def _turn(profile: list, ring: bool = False) -> trimesh.Trimesh:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable
 from functools import lru_cache
 from itertools import product
 
@@ -13,28 +12,25 @@ from scipy import ndimage
 FACES = ndimage.generate_binary_structure(3, 1)
 
 # A 3x3x3 neighbourhood is an integer with one bit per position.
-_POSITIONS = tuple(product((-1, 0, 1), repeat=3))
+_POSITIONS = np.array(list(product((-1, 0, 1), repeat=3)))
 
 
-def _bits(wanted: Callable[[tuple[int, int, int]], bool]) -> int:
-    return sum(1 << bit for bit, position in enumerate(_POSITIONS) if wanted(position))
+def _bits(wanted: np.ndarray) -> int:
+    return sum(1 << int(bit) for bit in np.flatnonzero(wanted))
 
 
-def _neighbours(reach: Callable[[tuple[int, int, int]], bool]) -> tuple[int, ...]:
-    return tuple(
-        _bits(lambda q, p=p: reach((q[0] - p[0], q[1] - p[1], q[2] - p[2]))) for p in _POSITIONS
-    )
+def _around(position: np.ndarray, steps: tuple[int, ...]) -> int:
+    """Positions as many unit steps away, along different axes, as `steps` lists."""
+    offset = np.abs(_POSITIONS - position)
+    return _bits((offset.max(axis=1) == 1) & np.isin(offset.sum(axis=1), steps))
 
 
-def _steps(offset: tuple[int, int, int]) -> int:
-    return sum(map(abs, offset))
-
-
-_SIX = _bits(lambda p: _steps(p) == 1)
-_EIGHTEEN = _bits(lambda p: _steps(p) in (1, 2))
-_TWENTY_SIX = _bits(lambda p: _steps(p) > 0)
-_BY_FACE = _neighbours(lambda d: _steps(d) == 1)
-_BY_CORNER = _neighbours(lambda d: 0 < max(map(abs, d)) <= 1)
+_CENTRE = np.zeros(3, dtype=int)
+_SIX = _around(_CENTRE, (1,))
+_EIGHTEEN = _around(_CENTRE, (1, 2))
+_TWENTY_SIX = _around(_CENTRE, (1, 2, 3))
+_BY_FACE = tuple(_around(position, (1,)) for position in _POSITIONS)
+_BY_CORNER = tuple(_around(position, (1, 2, 3)) for position in _POSITIONS)
 
 
 def pieces(filled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -105,7 +101,7 @@ def thin_to(cover: np.ndarray, keep: np.ndarray, rank: np.ndarray) -> np.ndarray
     """
     shape = tuple(size + 2 for size in cover.shape)
     stride = np.array([shape[1] * shape[2], shape[2], 1])
-    around = [int(offset) for offset in np.array(_POSITIONS) @ stride]
+    around = [int(offset) for offset in _POSITIONS @ stride]
     # Flat Python sequences: single elements of numpy arrays are slow to reach.
     solid = bytearray(np.pad(cover, 1).tobytes())
     removable = bytearray(np.pad(cover & ~keep, 1).tobytes())

@@ -44,7 +44,9 @@ class VoxelModel:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        return self.filled.shape
+        """Voxels along x, y and z."""
+        nx, ny, nz = self.filled.shape
+        return nx, ny, nz
 
     @property
     def n_cells(self) -> int:
@@ -99,8 +101,9 @@ def voxelize(
     model = _filled_model(surface, resolution, fill, name)
     if model.n_cells == 0:
         raise UserError(
-            f"mesh {name!r} at resolution {resolution} fills no voxel; raise --resolution, or "
-            f"check that the surface encloses a solid with its faces oriented alike"
+            f"mesh {name!r} at resolution {resolution} fills no voxel: its walls are thinner than "
+            f"a voxel of {model.edge:.3g} m, or it encloses nothing; raise --resolution or repair "
+            f"the mesh"
         )
     labels, sizes = label_pieces(model.filled)
     if len(sizes) > 1 and pieces == "error":
