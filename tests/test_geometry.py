@@ -209,7 +209,7 @@ def test_resolution_must_be_a_whole_number(resolution):
 
 
 def test_resolution_beyond_memory_names_one_that_fits():
-    with pytest.raises(UserError, match="about 3[34][0-9] or less") as error:
+    with pytest.raises(UserError, match="about 25[0-9] or less") as error:
         voxelize(trimesh.creation.box(), 5000, name="box")
     one_sentence(error)
 

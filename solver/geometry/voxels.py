@@ -14,8 +14,8 @@ from solver.geometry.topology import pieces as label_pieces
 
 PIECES = ("error", "largest")
 
-#: Most voxels of a bounding grid; at this size the grid and its samples stay below 2 GiB.
-MAX_GRID = 40_000_000
+#: Most voxels of a bounding grid; filling takes about 150 bytes for each of them.
+MAX_GRID = 16_000_000
 
 #: Factors by which a resolution is raised in search of one that leaves the model in one piece,
 #: and the largest grid [voxels] that such a trial may have.
