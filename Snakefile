@@ -1,0 +1,40 @@
+# Training data -> forests -> spectra of every model -> tables -> results/report.html
+from pathlib import Path
+
+from snakemake.utils import min_version, validate
+
+from carillon.errors import UserError
+from workflow import settings
+
+min_version("9.0")
+
+
+# A configuration file on the command line takes the place of the default one, it does not extend it:
+# otherwise the default models could not be left out.
+if not workflow.overwrite_configfiles:
+
+    configfile: str(Path(workflow.basedir, "workflow/config/default.yaml"))
+
+
+try:
+    settings.check(config)
+    validate(config, schema="workflow/schemas/config.schema.yaml")
+    settings.check_links(config)
+except UserError as error:
+    raise WorkflowError(str(error)) from None
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/dataset.smk"
+include: "workflow/rules/forests.smk"
+include: "workflow/rules/model.smk"
+include: "workflow/rules/spectra.smk"
+include: "workflow/rules/tables.smk"
+include: "workflow/rules/report.smk"
+
+
+rule all:
+    default_target: True
+    input:
+        f"{RESULTS}/report.html",
+        f"{RESULTS}/figures/overview.png",

@@ -1,0 +1,1 @@
+"""The Snakemake workflow: rules, configuration, schemas, scripts and the report."""

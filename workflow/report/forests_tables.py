@@ -1,0 +1,98 @@
+"""Tables of the training data and of the forests' quality."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from workflow.report.numbers import show
+from workflow.report.results import Results
+from workflow.report.table import Column, Table
+
+LABELS = {
+    "training_samples": "Blocks trained on",
+    "held_out_samples": "Blocks held out",
+    "median_error": "Median relative error of a modulus, held-out blocks",
+    "median_error_solid": "… of solid blocks",
+    "median_error_partly_void": "… of partly void blocks",
+    "r2_log": "R² of the logarithm of the modulus, held-out blocks",
+    "r2_log_solid": "… of solid blocks",
+    "r2_log_partly_void": "… of partly void blocks",
+    "uniform_solid": "Error on uniform solid blocks",
+    "uniform_partly_void": "Error on uniform partly void blocks",
+}
+"""Scores of `forests inspect` for people; a score without a label is shown by its own name."""
+
+
+def training(results: Results) -> Table:
+    """Counts and held-out scores."""
+    shards, forests = results.shards, results.forests
+    rows = [
+        _row("fits", "Blocks drawn and fitted", "count", _fits(shards)),
+        _row("converged", "… whose fit converged", "percent", _mean(shards, "converged")),
+        _row("partly_void", "… that are partly void", "percent", _mean(shards, "partly_void")),
+        _row("at_floor", "… moduli that ended at the floor", "percent", _mean(shards, "at_floor")),
+    ]
+    rows += [_score(name, value) for name, value in forests["scores"].items()]
+    rows += [
+        _row("trees", "Trees of each of the two forests", "count", forests["trees"]),
+        _row("leaves", "Leaves", "count", forests["leaves"]),
+        _row("memory_bytes", "Memory", "bytes", forests["memory_bytes"]),
+    ]
+    return Table(
+        "training",
+        f"Training data (objective {forests['objective']}) and forests. Held-out blocks were not used "
+        "in training.",
+        [
+            Column("key", "Key", shown=False),
+            Column("quantity", "Quantity"),
+            Column("shown", "Value"),
+            Column("value", "Raw value", shown=False),
+        ],
+        rows,
+    )
+
+
+def blocks(results: Results) -> Table:
+    """Error, cost and storage on single blocks, as in Fig. 9 of the paper."""
+    found = results.blocks
+    return Table(
+        "blocks",
+        f"Coarsening of {found['blocks']:,} random solid blocks, {found['forces']} random forces each: "
+        "relative displacement error against the fine block, under forces on all nodes as in the paper "
+        "and under the inertia that vibration brings; cost on one core; storage. The first range is the "
+        "trained one.",
+        [
+            Column("range_gpa", "Moduli [GPa]", "range", "GPa"),
+            Column("method", "Coarsening"),
+            Column("mean_error_nodal", "Nodal forces, mean", "percent"),
+            Column("median_error_nodal", "median", "percent"),
+            Column("mean_error_inertial", "Inertia, mean", "percent"),
+            Column("median_error_inertial", "median", "percent"),
+            Column("seconds_per_block", "Cost per block", "seconds", "s"),
+            Column("storage_bytes", "Storage", "bytes", "B"),
+        ],
+        found["rows"],
+    )
+
+
+def _row(key: str, label: str, kind: str, value: Any) -> dict[str, Any]:
+    return {"key": key, "quantity": label, "shown": show(value, kind), "value": value}
+
+
+def _score(name: str, value: float) -> dict[str, Any]:
+    if name.endswith("samples"):
+        kind = "count"
+    else:
+        kind = "fraction" if name.startswith("r2") else "percent"
+    return _row(name, LABELS.get(name, name.replace("_", " ")), kind, value)
+
+
+def _fits(shards: list[dict[str, Any]]) -> int:
+    return sum(shard["samples"][1] - shard["samples"][0] for shard in shards)
+
+
+def _mean(shards: list[dict[str, Any]], key: str) -> float:
+    weights = [shard["samples"][1] - shard["samples"][0] for shard in shards]
+    return float(np.average([shard[key] for shard in shards], weights=weights))

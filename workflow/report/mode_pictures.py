@@ -1,0 +1,92 @@
+"""Pictures of the first elastic mode by every variant, turned and scaled alike (Fig. 8)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from solver.analysis import RIGID_MODES
+from solver.geometry import HexMesh
+from solver.geometry.picture import DRAWN_AMPLITUDE, draw
+from solver.modes_file import ModesFile, read_modes
+from workflow.report.results import Results
+from workflow.report.style import SETTINGS, save_transparent
+from workflow.variants import SHOWN, TRUTH
+
+Array = NDArray[np.float64]
+
+CLUSTER_WIDTH = 0.02
+"""Modes whose frequencies lie this close above the first elastic one count as one space with it."""
+
+PICTURE_INCHES = (3.4, 2.7)
+
+
+def draw_first_elastic_modes(
+    results: Results, model: str, paths: Sequence[str]
+) -> dict[str, dict[str, Any]]:
+    """Draw mode 7 of every shown variant to `paths`; return frequency and likeness of each."""
+    truth = read_modes(results.modes_path(model, TRUTH))
+    wanted = displacement(truth, RIGID_MODES)
+    diagonal = float(np.linalg.norm(np.ptp(truth.mesh.nodes, axis=0)))
+    largest = float(np.linalg.norm(wanted, axis=1).max())
+    scale = DRAWN_AMPLITUDE * diagonal / largest
+    description = {}
+    for variant, path in zip(SHOWN, paths, strict=True):
+        found = read_modes(results.modes_path(model, variant))
+        motion, likeness = aligned(found, truth, wanted)
+        save_transparent(mode_figure(found.mesh, motion, scale, (0.0, largest)), path)
+        description[variant] = {
+            "hertz": float(found.frequencies[RIGID_MODES]),
+            "likeness": likeness,
+            "cells": found.mesh.n_cells,
+            "unknowns": found.mesh.n_dofs,
+            "combined": len(cluster(truth.frequencies)),
+        }
+    return description
+
+
+def displacement(file: ModesFile, index: int) -> Array:
+    """Mode `index` as displacements (n, 3) of the nodes."""
+    assert file.modes is not None
+    return file.modes[:, index].reshape(-1, 3)
+
+
+def cluster(frequencies: Array) -> list[int]:
+    """Indices of the modes that share the first elastic frequency, as symmetric bodies have them."""
+    first = frequencies[RIGID_MODES]
+    near = np.abs(frequencies[RIGID_MODES:] / first - 1.0) <= CLUSTER_WIDTH
+    return [RIGID_MODES + int(index) for index in np.flatnonzero(near)]
+
+
+def aligned(file: ModesFile, truth: ModesFile, wanted: Array) -> tuple[Array, float]:
+    """First elastic motion of `file` with sign, and turn within its cluster, closest to the truth's.
+
+    Returns
+    -------
+    Displacements (n, 3) on the file's own nodes, as long as the truth's there, and their likeness:
+    the cosine between both, 1 for the same shape.
+    """
+    assert file.modes is not None
+    # Nodes of a coarsened mesh lie on those of the fine one, or beside them where cells are void.
+    target = wanted[cKDTree(truth.mesh.nodes).query(file.mesh.nodes)[1]].ravel()
+    basis = file.modes[:, cluster(truth.frequencies)]
+    motion = basis @ np.linalg.lstsq(basis, target, rcond=None)[0]
+    length, target_length = np.linalg.norm(motion), np.linalg.norm(target)
+    likeness = float(motion @ target / (length * target_length)) if length > 0 else 0.0
+    return (motion * (target_length / max(float(length), 1e-300))).reshape(-1, 3), likeness
+
+
+def mode_figure(mesh: HexMesh, motion: Array, scale: float, limits: tuple[float, float]) -> Any:
+    """One deformed body, coloured by the length of its displacement."""
+    import matplotlib.pyplot as plt
+
+    with plt.rc_context(SETTINGS):
+        figure = plt.figure(figsize=PICTURE_INCHES, layout="none")
+        axes = figure.add_axes((0, 0, 1, 1), projection="3d")
+        draw(axes, mesh, motion, scale=scale, limits=limits)
+        axes.patch.set_alpha(0.0)
+    return figure

@@ -1,0 +1,79 @@
+"""Numbers as people read them: few digits, units beside, powers of ten spelt as such."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+MISSING = "–"
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def show(value: Any, kind: str = "text") -> str:
+    """Format `value` by the kind of its column.
+
+    Kinds: `text`, `count`, `hertz`, `percent` (of a fraction), `seconds`, `times` (a ratio), `small`
+    (an error or residual), `bytes`, `fraction`, `range` (of GPa).
+
+    Examples
+    --------
+    >>> show(0.0312, "percent"), show(3.1e-9, "percent"), show(12345, "count")
+    ('3.1 %', '3.1·10⁻⁷ %', '12,345')
+    >>> show(4.56e-12, "small"), show(0.00123, "seconds"), show(123.4, "seconds")
+    ('4.6·10⁻¹²', '0.0012 s', '123 s')
+    """
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return MISSING
+    return _FORMATS[kind](value)
+
+
+def _percent(fraction: float) -> str:
+    percent = 100.0 * fraction
+    if abs(percent) < 0.01:
+        return f"{_power(percent)} %"
+    return f"{_digits(percent, 2)} %"
+
+
+def _small(value: float) -> str:
+    return _digits(value, 2) if 0.01 <= abs(value) < 100 else _power(value)
+
+
+def _seconds(value: float) -> str:
+    if abs(value) < 1e-3:
+        return f"{_digits(1e6 * value, 2)} µs"
+    return f"{_digits(value, 3 if value >= 1 else 2)} s"
+
+
+def _bytes(value: float) -> str:
+    if value < 1e5:
+        return f"{_digits(value / 1e3, 2)} kB" if value else "0"
+    return f"{_digits(value / 1e6, 3)} MB" if value < 1e9 else f"{_digits(value / 1e9, 3)} GB"
+
+
+def _digits(value: float, digits: int) -> str:
+    """At least `digits` significant digits, never an exponent."""
+    if value == 0:
+        return "0"
+    after_point = digits - 1 - math.floor(math.log10(abs(value)))
+    return f"{value:,.{max(0, after_point)}f}"
+
+
+def _power(value: float) -> str:
+    if value == 0:
+        return "0"
+    mantissa, exponent = f"{value:.1e}".split("e")
+    return f"{mantissa}·10{str(int(exponent)).translate(_SUPERSCRIPTS)}".replace("-", "−")
+
+
+_FORMATS = {
+    "text": str,
+    "count": lambda value: f"{int(value):,}",
+    "hertz": lambda value: f"{_digits(value, 5)}",
+    "percent": _percent,
+    "seconds": _seconds,
+    "times": lambda value: f"{_digits(value, 2)}×",
+    "small": _small,
+    "bytes": _bytes,
+    "fraction": lambda value: _digits(value, 3),
+    "range": lambda value: f"{value[0]:g}…{value[1]:g}",
+}

@@ -1,0 +1,120 @@
+"""How figures look, and how they are written."""
+
+from __future__ import annotations
+
+import io
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import matplotlib
+
+from carillon.files import atomic_path
+
+matplotlib.use("Agg")
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+INK, MUTED, FAINT = "#23211d", "#6f6a60", "#dedad1"
+"""Text and truth, axes, grid."""
+
+COLOURS = {
+    "truth": INK,
+    "ddfem_slepc": "#7a6a9c",
+    "hcms": "#8a94a0",
+    "hcms_ec": "#1f7a6d",
+    "ddfem_hcms_ec": "#b8641b",
+    "random": "#b03a5b",
+}
+"""Colour of each variant, the same in all figures and on the page."""
+
+THEMED = {
+    INK: "--ink",
+    MUTED: "--muted",
+    FAINT: "--faint",
+    **{colour: f"--{name.replace('_', '-')}" for name, colour in COLOURS.items() if colour != INK},
+}
+"""Style-sheet variables that take the place of colours on the page, so that figures follow it into
+the dark."""
+
+SETTINGS: dict[str, Any] = {
+    "font.family": "sans-serif",
+    "font.size": 9.0,
+    "axes.labelsize": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.edgecolor": MUTED,
+    "axes.labelcolor": INK,
+    "axes.titlecolor": INK,
+    "axes.linewidth": 0.7,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "grid.color": FAINT,
+    "grid.linewidth": 0.7,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.minor.visible": False,
+    "ytick.minor.visible": False,
+    "text.color": INK,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "figure.facecolor": "none",
+    "axes.facecolor": "none",
+    "savefig.facecolor": "none",
+    "svg.fonttype": "none",
+    "figure.constrained_layout.use": True,
+}
+
+PNG_DPI = 200
+
+
+def save(figure: Figure, outputs: Any) -> None:
+    """Write a figure to `outputs.svg` and `outputs.png`."""
+    name = Path(outputs.svg).stem
+    with atomic_path(outputs.svg) as temporary:
+        temporary.write_text(svg(figure, name), encoding="utf-8")
+    save_png(figure, outputs.png)
+
+
+def save_png(figure: Figure, path: str | Path) -> None:
+    """Write a figure as PNG on white."""
+    with atomic_path(path) as temporary, matplotlib.rc_context(SETTINGS):
+        figure.savefig(temporary, format="png", dpi=PNG_DPI, facecolor="white")
+
+
+def svg(figure: Figure, name: str) -> str:
+    """The figure as an `<svg>` element whose identifiers all begin with `name`.
+
+    Several such elements can then stand in one page. Text stays text, in the page's own font.
+    """
+    text = io.StringIO()
+    with matplotlib.rc_context({**SETTINGS, "svg.hashsalt": name}):
+        figure.savefig(text, format="svg", metadata={"Date": None})
+    source = text.getvalue()
+    source = source[source.index("<svg") :]
+    source = re.sub(r"<metadata>.*?</metadata>", "", source, flags=re.DOTALL)
+    source = re.sub(r'\bid="', f'id="{name}-', source)
+    return re.sub(r'(href="#|url\(#)', rf"\g<1>{name}-", source)
+
+
+def themed(source: str) -> str:
+    """Replace the colours of an SVG by style-sheet variables, which only a page defines."""
+    for colour, variable in THEMED.items():
+        source = re.sub(colour, f"var({variable})", source, flags=re.IGNORECASE)
+    # Fonts come from the page; without this, matplotlib's own family list would ask for others.
+    return re.sub(r"(font:[^;\"]*?px) [^;\"]*", r"\1 var(--sans)", source)
+
+
+def save_transparent(figure: Figure, path: str | Path) -> None:
+    """Write a figure as PNG without background, and close it."""
+    import matplotlib.pyplot as plt
+
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, format="png", dpi=PNG_DPI, transparent=True)
+    plt.close(figure)

@@ -1,0 +1,44 @@
+# Names, folders and helper functions that the other rules share.
+import os
+import sys
+from pathlib import Path
+
+from workflow import variants
+
+RESULTS = config["results_dir"].rstrip("/")
+LOGS = f"{RESULTS}/logs"
+BENCHMARKS = f"{RESULTS}/benchmarks"
+MODELS = list(config["models"])
+
+# Timed rules take all cores, so that no other job disturbs their wall times.
+SOLVER_CORES = config["solver"]["cores"] or workflow.cores or 1
+RANKS = config["solver"]["ranks"]
+# On several ranks a launcher goes in front; on a cluster the profile names its own as resource mpi.
+LAUNCHER = "mpiexec" if RANKS > 1 else ""
+ON_RANKS = f"-n {RANKS}" if RANKS > 1 else ""
+
+
+wildcard_constraints:
+    model="|".join(MODELS),
+    variant="|".join(variants.VARIANTS),
+    shard=r"\d+",
+
+
+def prepend(variable, folder):
+    """Put a folder first in a search path of the jobs' environment."""
+    rest = os.environ.get(variable)
+    os.environ[variable] = f"{folder}{os.pathsep}{rest}" if rest else str(folder)
+
+
+# Jobs run the interpreter that Snakemake runs in, and the packages of this checkout.
+prepend("PATH", Path(sys.executable).parent)
+prepend("PYTHONPATH", Path(workflow.basedir))
+# Ranks get their share of the cores as threads, which a rank bound to one core could not use; and
+# Open MPI refuses to start as root, the usual user of a container, unless told twice.
+for name, value in {
+    "OMPI_MCA_hwloc_base_binding_policy": "none",
+    "PRTE_MCA_hwloc_default_binding_policy": "none",
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+}.items():
+    os.environ.setdefault(name, value)

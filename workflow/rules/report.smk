@@ -1,0 +1,115 @@
+# Figures, and the page that shows everything.
+
+
+rule draw_modes:
+    input:
+        config=f"{RESULTS}/config.yaml",
+        modes=expand(f"{RESULTS}/models/{{{{model}}}}/{{variant}}.h5", variant=variants.SHOWN),
+    output:
+        pictures=expand(
+            f"{RESULTS}/figures/{{{{model}}}}-mode-{{variant}}.png", variant=variants.SHOWN
+        ),
+        description=f"{RESULTS}/figures/{{model}}-mode.json",
+    log:
+        f"{LOGS}/figures/{{model}}-mode.log",
+    resources:
+        mem_mb=2000,
+        runtime="15m",
+    script:
+        "../scripts/draw_modes.py"
+
+
+rule plot_spectrum:
+    input:
+        config=f"{RESULTS}/config.yaml",
+        frequencies=f"{RESULTS}/tables/frequencies.json",
+    output:
+        svg=f"{RESULTS}/figures/{{model}}-spectrum.svg",
+        png=f"{RESULTS}/figures/{{model}}-spectrum.png",
+    log:
+        f"{LOGS}/figures/{{model}}-spectrum.log",
+    resources:
+        mem_mb=1000,
+        runtime="10m",
+    script:
+        "../scripts/plot_spectrum.py"
+
+
+rule plot_convergence:
+    input:
+        history=f"{RESULTS}/models/{{model}}/convergence.json",
+        truth=f"{RESULTS}/models/{{model}}/{variants.TRUTH}.h5",
+    output:
+        svg=f"{RESULTS}/figures/{{model}}-convergence.svg",
+        png=f"{RESULTS}/figures/{{model}}-convergence.png",
+    log:
+        f"{LOGS}/figures/{{model}}-convergence.log",
+    resources:
+        mem_mb=1000,
+        runtime="10m",
+    script:
+        "../scripts/plot_convergence.py"
+
+
+rule plot_times:
+    input:
+        times=f"{RESULTS}/tables/times.json",
+    output:
+        svg=f"{RESULTS}/figures/times.svg",
+        png=f"{RESULTS}/figures/times.png",
+    log:
+        f"{LOGS}/figures/times.log",
+    resources:
+        mem_mb=1000,
+        runtime="10m",
+    script:
+        "../scripts/plot_times.py"
+
+
+# The picture for a README or a slide: the first model's mode and spectrum against the truth.
+rule draw_overview:
+    input:
+        modes=f"{RESULTS}/models/{MODELS[0]}/ddfem_hcms_ec.h5",
+        truth=f"{RESULTS}/models/{MODELS[0]}/{variants.TRUTH}.h5",
+        frequencies=f"{RESULTS}/tables/frequencies.json",
+        config=f"{RESULTS}/config.yaml",
+    output:
+        f"{RESULTS}/figures/overview.png",
+    log:
+        f"{LOGS}/figures/overview.log",
+    resources:
+        mem_mb=1000,
+        runtime="10m",
+    params:
+        model=MODELS[0],
+    script:
+        "../scripts/draw_overview.py"
+
+
+rule build_report:
+    input:
+        config=f"{RESULTS}/config.yaml",
+        tables=expand(f"{RESULTS}/tables/{{table}}.json", table=TABLES),
+        pictures=expand(
+            f"{RESULTS}/figures/{{model}}-mode-{{variant}}.png",
+            model=MODELS,
+            variant=variants.SHOWN,
+        ),
+        descriptions=expand(f"{RESULTS}/figures/{{model}}-mode.json", model=MODELS),
+        spectra=expand(f"{RESULTS}/figures/{{model}}-spectrum.svg", model=MODELS),
+        convergence=expand(
+            f"{RESULTS}/figures/{{model}}-convergence.svg",
+            model=config["convergence"]["models"],
+        ),
+        times=f"{RESULTS}/figures/times.svg",
+        template=Path(workflow.basedir, "workflow/report/page.html.j2"),
+        style=Path(workflow.basedir, "workflow/report/page.css"),
+    output:
+        f"{RESULTS}/report.html",
+    log:
+        f"{LOGS}/report.log",
+    resources:
+        mem_mb=1000,
+        runtime="10m",
+    script:
+        "../scripts/build_report.py"

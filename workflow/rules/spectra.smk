@@ -1,0 +1,69 @@
+# Modes of every model by every variant, how they converge, and how far they are from the truth.
+
+
+rule find_modes:
+    input:
+        model=model_files,
+        forests=variant_files,
+    output:
+        f"{RESULTS}/models/{{model}}/{{variant}}.h5",
+    log:
+        f"{LOGS}/models/{{model}}/{{variant}}.log",
+    benchmark:
+        f"{BENCHMARKS}/models/{{model}}/{{variant}}.tsv"
+    threads: SOLVER_CORES
+    resources:
+        mpi=LAUNCHER,
+        tasks=RANKS,
+        mem_mb=8000,
+        runtime="2h",
+    params:
+        ranks=RANKS,
+        on_ranks=ON_RANKS,
+        model=model_arguments,
+        variant=variant_arguments,
+        modes=model_modes,
+    shell:
+        "OMP_NUM_THREADS=$(( {threads} > {params.ranks} ? {threads} / {params.ranks} : 1 ))"
+        " {resources.mpi} {params.on_ranks}"
+        " python -m mpi4py -m solver modes {params.model} {params.variant}"
+        " --modes {params.modes} --out {output} > {log} 2>&1"
+
+
+rule follow_convergence:
+    input:
+        model=model_files,
+    output:
+        f"{RESULTS}/models/{{model}}/convergence.json",
+    log:
+        f"{LOGS}/models/{{model}}/convergence.log",
+    benchmark:
+        f"{BENCHMARKS}/models/{{model}}/convergence.tsv"
+    threads: SOLVER_CORES
+    resources:
+        mem_mb=8000,
+        runtime="2h",
+    params:
+        model=model_arguments,
+        modes=lambda wildcards: min(config["convergence"]["modes"], model_modes(wildcards)),
+        steps=config["convergence"]["steps"],
+    shell:
+        "OMP_NUM_THREADS={threads} python -m solver convergence {params.model}"
+        " --modes {params.modes} --steps {params.steps} --out {output} > {log} 2>&1"
+
+
+rule compare_with_truth:
+    input:
+        candidate=f"{RESULTS}/models/{{model}}/{{variant}}.h5",
+        truth=f"{RESULTS}/models/{{model}}/{variants.TRUTH}.h5",
+    output:
+        f"{RESULTS}/models/{{model}}/{{variant}}.comparison.json",
+    log:
+        f"{LOGS}/models/{{model}}/{{variant}}.comparison.log",
+    threads: 1
+    resources:
+        mem_mb=4000,
+        runtime="30m",
+    shell:
+        "OMP_NUM_THREADS={threads} python -m solver compare {input.candidate} {input.truth} --json"
+        " > {output}.partial 2> {log} && mv {output}.partial {output}"

@@ -1,0 +1,68 @@
+# All results as tables: CSV for programs, Markdown for people, JSON for the report.
+
+TABLES = [
+    "summary",
+    "frequencies",
+    "errors",
+    "coarsening",
+    "times",
+    "phases",
+    "training",
+    "blocks",
+    "evidence",
+    "provenance",
+]
+
+
+rule save_config:
+    output:
+        f"{RESULTS}/config.yaml",
+    log:
+        f"{LOGS}/config.log",
+    resources:
+        mem_mb=200,
+        runtime="5m",
+    params:
+        config=config,
+    script:
+        "../scripts/save_config.py"
+
+
+rule tabulate_results:
+    input:
+        config=f"{RESULTS}/config.yaml",
+        shards=expand(
+            f"{RESULTS}/dataset/shard-{{shard}}.json",
+            shard=range(config["dataset"]["shards"]),
+        ),
+        forests=f"{RESULTS}/forests/forests.json",
+        blocks=f"{RESULTS}/forests/table.json",
+        modes=expand(
+            f"{RESULTS}/models/{{model}}/{{variant}}.h5",
+            model=MODELS,
+            variant=list(variants.VARIANTS),
+        ),
+        comparisons=expand(
+            f"{RESULTS}/models/{{model}}/{{variant}}.comparison.json",
+            model=MODELS,
+            variant=variants.CANDIDATES,
+        ),
+        convergence=expand(
+            f"{RESULTS}/models/{{model}}/convergence.json",
+            model=config["convergence"]["models"],
+        ),
+    output:
+        expand(
+            f"{RESULTS}/tables/{{table}}.{{kind}}",
+            table=TABLES,
+            kind=["csv", "md", "json"],
+        ),
+    log:
+        f"{LOGS}/tables.log",
+    resources:
+        mem_mb=2000,
+        runtime="10m",
+    params:
+        tables=TABLES,
+    script:
+        "../scripts/tabulate_results.py"

@@ -1,0 +1,98 @@
+"""The configuration: one file describes a run, keys that it leaves out take the schema's defaults."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+from jsonschema import Draft202012Validator
+from jsonschema.exceptions import ValidationError, best_match
+
+from carillon.errors import UserError
+from solver.materials import NAMES as MATERIALS
+
+SCHEMA = Path(__file__).parent / "schemas" / "config.schema.yaml"
+BUILTIN = "builtin:"
+
+
+def schema() -> dict[str, Any]:
+    """The JSON schema of the configuration."""
+    loaded: dict[str, Any] = yaml.safe_load(SCHEMA.read_text())
+    return loaded
+
+
+def check(config: Mapping[str, Any]) -> None:
+    """Check a configuration before any rule is built from it.
+
+    Raises
+    ------
+    UserError
+        With one sentence about the first value that does not fit.
+    """
+    mistake = best_match(Draft202012Validator(schema()).iter_errors(config))
+    if mistake is not None:
+        raise UserError(_sentence(mistake))
+
+
+def check_links(config: Mapping[str, Any]) -> None:
+    """Check what a schema cannot say: names and files that a complete configuration refers to.
+
+    Raises
+    ------
+    UserError
+        If a model's mesh or material does not exist, or `convergence.models` names no model.
+    """
+    for name in config["models"]:
+        for path in model_files(config, name):
+            if not Path(path).is_file():
+                raise UserError(
+                    f"models.{name}: there is no file {path}; put it there, or set mesh_folder to "
+                    "the folder that holds it"
+                )
+    for name in config["convergence"]["models"]:
+        if name not in config["models"]:
+            raise UserError(
+                f"convergence.models: {name!r} is not among the models "
+                f"{', '.join(config['models'])}"
+            )
+
+
+def mesh_of(config: Mapping[str, Any], model: str) -> str:
+    """Mesh argument of the solver: `builtin:NAME` or the path of a file."""
+    mesh: str = config["models"][model]["mesh"]
+    return mesh if mesh.startswith(BUILTIN) else _in_mesh_folder(config, mesh)
+
+
+def material_of(config: Mapping[str, Any], model: str) -> str:
+    """Material argument of the solver: a name or the path of a file."""
+    material: str = config["models"][model]["material"]
+    return material if material in MATERIALS else _in_mesh_folder(config, material)
+
+
+def model_files(config: Mapping[str, Any], model: str) -> list[str]:
+    """Files that a model is made from; none for a built-in object with a named material."""
+    mesh, material = mesh_of(config, model), material_of(config, model)
+    files = [] if mesh.startswith(BUILTIN) else [mesh]
+    return files if material in MATERIALS else [*files, material]
+
+
+def modes_of(config: Mapping[str, Any], model: str) -> int:
+    """Number of modes computed for a model, rigid ones included."""
+    own = config["models"][model]["modes"]
+    return int(own if own is not None else config["solver"]["modes"])
+
+
+def _in_mesh_folder(config: Mapping[str, Any], path: str) -> str:
+    return str(Path(config["mesh_folder"]) / path)
+
+
+def _sentence(mistake: ValidationError) -> str:
+    where = ".".join(str(part) for part in mistake.absolute_path) or "configuration"
+    meant = mistake.schema.get("description") if isinstance(mistake.schema, dict) else None
+    return f"{where}: {mistake.message}" + (f"; expected: {_lower(meant)}" if meant else "")
+
+
+def _lower(text: str) -> str:
+    return text[0].lower() + text[1:].rstrip(".")

@@ -1,0 +1,59 @@
+"""The solver runs that every model goes through, and what they are called."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One way to compute the spectrum of a model.
+
+    Attributes
+    ----------
+    label
+        Name for people, short enough for a table's head.
+    coarsen, method
+        Options of `solver modes`.
+    corrected
+        Whether error correction runs until its tolerance is met; plain HCMS otherwise.
+    role
+        What the run is there for, in a few words.
+    """
+
+    label: str
+    coarsen: str
+    method: str
+    corrected: bool
+    role: str
+
+
+TRUTH = "truth"
+
+VARIANTS = {
+    TRUTH: Variant("Ground truth", "none", "slepc", False, "SLEPc on the fine mesh"),
+    "hcms": Variant("HCMS", "none", "hcms", False, "fine mesh, no error correction"),
+    "hcms_ec": Variant("HCMS + EC", "none", "hcms", True, "fine mesh, error corrected"),
+    "ddfem_hcms_ec": Variant(
+        "DDFEM* + HCMS + EC", "ddfem", "hcms", True, "mesh coarsened by the forests"
+    ),
+    "ddfem_slepc": Variant("DDFEM*", "ddfem", "slepc", False, "SLEPc on the coarsened mesh"),
+    "average_hcms_ec": Variant(
+        "Average + HCMS + EC", "average", "hcms", True, "mesh coarsened by averaging moduli"
+    ),
+    "galerkin_hcms_ec": Variant(
+        "Galerkin + HCMS + EC", "galerkin", "hcms", True, "mesh coarsened by Galerkin projection"
+    ),
+}
+
+CANDIDATES = tuple(name for name in VARIANTS if name != TRUTH)
+
+SHOWN = (TRUTH, "hcms", "hcms_ec", "ddfem_hcms_ec")
+"""Variants whose modes are drawn and whose frequencies are listed."""
+
+COARSENED = {
+    "average_hcms_ec": "average",
+    "galerkin_hcms_ec": "Galerkin",
+    "ddfem_hcms_ec": "DDFEM*",
+}
+"""Variants that differ in nothing but the coarsening."""
