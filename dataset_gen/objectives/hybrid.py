@@ -1,7 +1,6 @@
 """Objective `hybrid`: `oversampled` where all cells are filled, `inertial` where some are void.
 
-A block inside the solid is held by its neighbours; one at a void surface moves freely there. Of
-all objectives this one gives the best spectra.
+A block inside the solid is held by its neighbours; one at a void surface moves freely there.
 """
 
 from __future__ import annotations
