@@ -97,6 +97,7 @@ def correct(
     degree: int = 3,
     guard: int | None = None,
     report: Callable[[int, float], None] | None = None,
+    observe: Callable[[int, Array], None] | None = None,
 ) -> Correction:
     """Improve the `wanted` lowest elastic modes from the block `start` until they are accurate.
 
@@ -116,7 +117,11 @@ def correct(
     max_steps
         Steps allowed; reaching `tolerance` within them is not required when `tolerance` is zero.
     guard
-        Extra vectors iterated beyond `wanted`; a third of `wanted` plus 16 if not given.
+        Extra vectors iterated beyond `wanted`; `default_guard` if not given.
+    report
+        Called with the step and the largest estimated error of the wanted modes.
+    observe
+        Called with the step and the Ritz values of the wanted modes.
 
     Raises
     ------
@@ -131,12 +136,18 @@ def correct(
     x lacks lies beyond the last iterated value theta_p.  The solve is the one that the step makes
     anyway.
     """
-    guard = wanted // 3 + 16 if guard is None else guard
+    guard = default_guard(wanted) if guard is None else guard
     values, vectors = rayleigh_ritz(system, start, wanted + guard)
     if len(values) < wanted:
         raise ConvergenceError(
             f"the start block spans {len(values)} elastic modes, {wanted} are wanted; keep more modes"
         )
+    if observe is not None:
+        observe(0, values[:wanted])
+    if len(values) == system.n_dofs - system.rigid.shape[1]:
+        # The subspace is the whole space, where Ritz pairs are eigenpairs.
+        exact = np.full(wanted, np.finfo(float).eps)
+        return Correction(values[:wanted], vectors[:, :wanted], exact, 0, 0, [])
     inverse = ShiftedInverse(system, SHIFT_FRACTION * values[0])
     errors = np.full(len(values), np.nan)
     history: list[float] = []
@@ -156,20 +167,28 @@ def correct(
             history.append(worst)
             if report is not None:
                 report(step, worst)
-            if worst <= tolerance or step >= max_steps:
+            if step >= max_steps and worst > tolerance:
                 break
             first = _first_inaccurate(errors, wanted, tolerance)
-            rest = slice(first - active, None)
+            # Accurate modes are locked as their images, which have lost what was left of the highest
+            # frequencies: the residual falls by orders of magnitude at no further solve.
+            new = first - active
+            locked = np.concatenate([vectors[:, :active], image[:, :new]], axis=1)
+            if worst <= tolerance:
+                values, vectors = rayleigh_ritz(system, locked, wanted)
+                break
             filtered, used = _chebyshev(
-                system, inverse, block[:, rest], image[:, rest], values[first:], degree
+                system, inverse, block[:, new:], image[:, new:], values[first:], degree
             )
             solves += filtered.shape[1] * (used - 1)
             values, vectors = rayleigh_ritz(
-                system, np.concatenate([vectors[:, :first], filtered], axis=1), wanted + guard
+                system, np.concatenate([locked, filtered], axis=1), wanted + guard
             )
             active = min(first, len(values) - 1)
             errors = np.concatenate([errors[:active], np.full(len(values) - active, np.nan)])
             step += 1
+            if observe is not None:
+                observe(step, values[:wanted])
     finally:
         inverse.destroy()
     if tolerance > 0.0 and worst > tolerance:
@@ -185,6 +204,11 @@ def correct(
         solves,
         history,
     )
+
+
+def default_guard(wanted: int) -> int:
+    """Extra vectors that the iteration carries; the more, the faster the last modes converge."""
+    return wanted // 3 + 16
 
 
 def _first_inaccurate(errors: Array, wanted: int, tolerance: float) -> int:

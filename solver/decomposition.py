@@ -70,7 +70,9 @@ def decompose(
     """
 
     def cut() -> tuple[MergeTree, NDArray[np.int32]]:
-        parts = default_subdomains(3 * mesh.n_nodes) if subdomains is None else subdomains
+        parts = subdomains
+        if parts is None:
+            parts = min(max(default_subdomains(3 * mesh.n_nodes), comm.size), mesh.n_cells)
         node_part = partition_nodes(mesh, partition_cells(mesh, parts, seed))
         tree, renumbered = build_tree(node_part[mesh.cells])
         return tree, renumbered[node_part]
@@ -92,5 +94,6 @@ def on_root(comm: MPI.Comm, compute):  # type: ignore[no-untyped-def]
             outcome = (None, error)
     result, error = comm.bcast(outcome, root=0)
     if error is not None:
+        # Every rank raises it, so that no rank is left waiting for the others.
         raise error
     return result

@@ -12,7 +12,7 @@ slepc4py.init([])
 from petsc4py import PETSc  # noqa: E402
 from slepc4py import SLEPc  # noqa: E402
 
-from carillon.errors import ConvergenceError  # noqa: E402
+from carillon.errors import LocalConvergenceError  # noqa: E402
 
 Array = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ def _krylov_schur(K: sp.csr_matrix, M: sp.csr_matrix, count: int) -> tuple[Array
             preconditioner.setFactorSolverType("mumps")
         solver.solve()
         if solver.getConverged() < count:
-            raise ConvergenceError(
+            raise LocalConvergenceError(
                 f"a subdomain of {K.shape[0]} unknowns gave {solver.getConverged()} of {count} modes"
             )
         vector = stiffness.createVecRight()

@@ -13,12 +13,14 @@ from solver.laplacian import laplacian_modes
 EMBEDDING_MODES = 12
 """Laplacian eigenvectors that span the clustering space, the constant left out."""
 SUBDOMAIN_DOFS = 1800
-"""Aimed unknowns of a subdomain: dense local eigenproblems stay below a tenth of a second."""
+"""Aimed unknowns of a subdomain."""
+FEWEST_SUBDOMAINS = 4
+"""Subdomains of the smallest models, so that a few ranks can share them."""
 
 
 def default_subdomains(n_dofs: int) -> int:
     """Number of subdomains for a model of `n_dofs` unknowns; independent of the number of ranks."""
-    return max(1, round(n_dofs / SUBDOMAIN_DOFS))
+    return max(FEWEST_SUBDOMAINS, round(n_dofs / SUBDOMAIN_DOFS))
 
 
 def partition_cells(mesh: HexMesh, parts: int, seed: int = 0) -> NDArray[np.int32]:

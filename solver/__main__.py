@@ -1,0 +1,296 @@
+"""Command line: `python -m solver modes | compare | convergence | benchmark`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import traceback
+from typing import Any
+
+import petsc4py
+
+petsc4py.init([])
+
+from mpi4py import MPI  # noqa: E402
+
+from carillon.cli import EXIT_BAD_INPUT, EXIT_NOT_CONVERGED  # noqa: E402
+from carillon.errors import ConvergenceError, UserError  # noqa: E402
+from carillon.files import atomic_path, require_writable  # noqa: E402
+from carillon.runtime import limit_threads, warn_about_reference_blas  # noqa: E402
+from solver import coarsening, materials  # noqa: E402
+from solver.analysis import METHODS, SolverOptions, modal_analysis  # noqa: E402
+from solver.decomposition import on_root  # noqa: E402
+from solver.geometry import FILLS, PIECES  # noqa: E402
+from solver.hcms.condense import INTERFACES  # noqa: E402
+from solver.problem import ProblemOptions, build_problem  # noqa: E402
+
+_PROBLEM_FIELDS = tuple(ProblemOptions.__dataclass_fields__)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command; every rank returns the same status, or the whole job is aborted."""
+    comm = MPI.COMM_WORLD
+    options = _parser().parse_args(arguments)
+    node = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    limit_threads(node.size)
+    node.Free()
+    if comm.rank == 0:
+        warn_about_reference_blas()
+    try:
+        options.run(options, comm)
+    except (UserError, ConvergenceError) as error:
+        status = EXIT_BAD_INPUT if isinstance(error, UserError) else EXIT_NOT_CONVERGED
+        if comm.rank == 0 or not error.collective:
+            print(f"solver {options.command}: {error}", file=sys.stderr, flush=True)
+        if comm.size > 1 and not error.collective:
+            comm.Abort(status)
+        return status
+    except BrokenPipeError:
+        return 0
+    except Exception:
+        if comm.size == 1:
+            raise
+        traceback.print_exc()
+        comm.Abort(1)
+    return 0
+
+
+def _modes(options: argparse.Namespace, comm: MPI.Comm) -> None:
+    from solver.modes_file import write_modes
+
+    on_root(comm, lambda: require_writable(options.out))
+    parameters = _problem_options(options)
+    solver = SolverOptions(
+        options.method,
+        options.modes,
+        options.tol,
+        options.corrections,
+        options.degree,
+        options.keep,
+        options.subdomains,
+        options.interface,
+        options.seed,
+    )
+    problem = on_root(comm, lambda: build_problem(parameters))
+    result = modal_analysis(problem.model, solver, comm, verbose=sys.stderr.isatty())
+    vectors = result.system.gather(result.vectors)
+    attributes: dict[str, Any] = {
+        "method": options.method,
+        "coarsen": options.coarsen,
+        "mesh": options.mesh,
+        "resolution": options.resolution,
+        "material": options.material,
+        "seed": options.seed,
+        "interface": options.interface,
+        "fine_n_dofs": problem.fine.n_dofs,
+        **result.evidence,
+        "timings": {**problem.seconds, **result.seconds},
+    }
+    if options.tol is not None:
+        attributes["tolerance"] = options.tol
+
+    def write() -> None:
+        assert vectors is not None
+        write_modes(
+            options.out,
+            problem.model,
+            result.values,
+            vectors,
+            result.residuals,
+            attributes,
+            _command_parameters(options),
+        )
+
+    on_root(comm, write)
+    if comm.rank == 0:
+        _print_summary(attributes, result.values, options)
+
+
+def _print_summary(attributes: dict[str, Any], values: Any, options: argparse.Namespace) -> None:
+    from solver.modes_file import frequencies
+
+    hertz = frequencies(values)
+    if options.json:
+        print(json.dumps({**attributes, "frequencies_hz": hertz.tolist(), "out": options.out}))
+        return
+    total = sum(attributes["timings"].values())
+    elastic = hertz[6:]
+    span = f"{elastic[0]:.2f} to {elastic[-1]:.2f} Hz" if len(elastic) else "none elastic"
+    print(
+        f"{options.out}: {len(values)} modes of {attributes['n_dofs']:,} unknowns, {span}; "
+        f"{attributes['rigid_modes']} rigid, largest residual {attributes['residual_max']:.1e}, "
+        f"orthogonal to {attributes['orthogonality']:.1e}, {total:.1f} s on {attributes['ranks']} "
+        f"rank{'s' if attributes['ranks'] > 1 else ''}"
+    )
+
+
+def _compare(options: argparse.Namespace, comm: MPI.Comm) -> None:
+    from solver.comparison import compare_files
+
+    comparison = on_root(comm, lambda: compare_files(options.candidate, options.truth).as_dict())
+    if comm.rank:
+        return
+    if options.json:
+        print(json.dumps(comparison, indent=2))
+        return
+    error = comparison["eigenvalue_relative_error"]
+    print(f"modes compared            {comparison['modes_compared']} (elastic)")
+    print(
+        f"eigenvalue error          median {error['median']:.2e}, 90 % below {error['p90']:.2e}, "
+        f"max {error['max']:.2e}"
+    )
+    print(f"frequency error, rms      {comparison['frequency_rms_relative_error']:.2e}")
+    print(
+        f"frequency error, 7..60    rms {comparison['frequency_rms_relative_error_7_60']:.2e}, "
+        f"max {comparison['frequency_max_relative_error_7_60']:.2e}"
+    )
+    print(f"largest subspace angle    {comparison['subspace_angle_max']:.2e} rad")
+    print(f"largest residual          {comparison['residual_max']:.2e}")
+
+
+def _convergence(options: argparse.Namespace, comm: MPI.Comm) -> None:
+    from carillon.provenance import record
+    from solver.convergence import correction_history
+
+    on_root(comm, lambda: require_writable(options.out))
+    problem = on_root(comm, lambda: build_problem(_problem_options(options)))
+    history = correction_history(
+        problem.model, options.modes, options.steps, options.degree, options.seed, comm
+    )
+    _write_json(options, {**history, "provenance": record(_command_parameters(options))}, comm)
+
+
+def _benchmark(options: argparse.Namespace, comm: MPI.Comm) -> None:
+    from carillon.provenance import record
+    from solver.benchmark import benchmark_row
+
+    if options.out is not None:
+        on_root(comm, lambda: require_writable(options.out))
+    row = benchmark_row(
+        _problem_options(options), options.modes, options.runs, not options.skip_arpack, comm
+    )
+    row["provenance"] = record(_command_parameters(options))
+    if options.out is not None:
+        _write_json(options, row, comm)
+    if options.json and comm.rank == 0:
+        print(json.dumps(row, indent=2))
+
+
+def _write_json(options: argparse.Namespace, content: dict[str, Any], comm: MPI.Comm) -> None:
+    def write() -> None:
+        with atomic_path(options.out) as temporary:
+            temporary.write_text(json.dumps(content))
+
+    on_root(comm, write)
+
+
+def _problem_options(options: argparse.Namespace) -> ProblemOptions:
+    return ProblemOptions(**{name: getattr(options, name) for name in _PROBLEM_FIELDS})
+
+
+def _command_parameters(options: argparse.Namespace) -> dict[str, Any]:
+    hidden = ("run", "out", "json")
+    return {key: value for key, value in vars(options).items() if key not in hidden}
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="solver",
+        description="Vibration modes of solids with spatially varying material.",
+    )
+    commands = parser.add_subparsers(dest="command", required=True)
+
+    modes = commands.add_parser("modes", help="compute modes and write modes.h5")
+    _add_problem(modes)
+    modes.add_argument("--method", choices=METHODS, default="hcms", help="default: %(default)s")
+    modes.add_argument("--modes", type=int, default=256, help="number, rigid included (default 256)")
+    modes.add_argument("--out", required=True, help="modes file to write (HDF5)")
+    modes.add_argument(
+        "--tol",
+        type=float,
+        help="hcms: relative eigenvalue error to correct to (default 1e-7; 0 makes exactly "
+        "--corrections steps); slepc, arpack: residual tolerance (default 1e-10)",
+    )
+    modes.add_argument(
+        "--corrections",
+        type=int,
+        default=SolverOptions.corrections,
+        help="largest number of correction steps; 0 is plain HCMS (default %(default)s)",
+    )
+    modes.add_argument(
+        "--degree",
+        type=int,
+        default=SolverOptions.degree,
+        help="polynomial degree of a correction; 1 is the paper's (default %(default)s)",
+    )
+    modes.add_argument("--keep", type=int, help="modes kept at the root of the merge tree")
+    modes.add_argument("--subdomains", type=int, help="number of subdomains")
+    modes.add_argument("--interface", choices=INTERFACES, default="free", help="default: free")
+    modes.add_argument("--json", action="store_true", help="print a summary as JSON")
+    modes.set_defaults(run=_modes)
+
+    compare = commands.add_parser("compare", help="errors of one modes file against another")
+    compare.add_argument("candidate", help="modes file to judge")
+    compare.add_argument("truth", help="modes file taken for the truth")
+    compare.add_argument("--json", action="store_true", help="print JSON")
+    compare.set_defaults(run=_compare)
+
+    convergence = commands.add_parser(
+        "convergence", help="eigenvalues after each correction from several starts (Fig. 10)"
+    )
+    _add_problem(convergence)
+    convergence.add_argument("--modes", type=int, default=256, help="rigid included (default 256)")
+    convergence.add_argument("--steps", type=int, default=3, help="corrections (default 3)")
+    convergence.add_argument("--degree", type=int, default=1, help="see modes (default 1)")
+    convergence.add_argument("--out", required=True, help="JSON file to write")
+    convergence.set_defaults(run=_convergence)
+
+    benchmark = commands.add_parser("benchmark", help="time all methods on one solid (Fig. 11)")
+    _add_problem(benchmark)
+    benchmark.add_argument("--modes", type=int, default=256, help="rigid included (default 256)")
+    benchmark.add_argument("--runs", type=int, default=3, help="timed runs a method (default 3)")
+    benchmark.add_argument("--skip-arpack", action="store_true", help="leave the slowest one out")
+    benchmark.add_argument("--out", help="also write the row to this JSON file")
+    benchmark.add_argument("--json", action="store_true", help="print JSON")
+    benchmark.set_defaults(run=_benchmark)
+    return parser
+
+
+def _add_problem(parser: argparse.ArgumentParser) -> None:
+    defaults = ProblemOptions
+    parser.add_argument("mesh", metavar="MESH", help="surface mesh file, or builtin:NAME")
+    parser.add_argument(
+        "--resolution", type=int, required=True, help="voxels along the longest side"
+    )
+    parser.add_argument(
+        "--material",
+        default=defaults.material,
+        help=f"{', '.join(materials.NAMES)}, or a file with one Young's modulus [Pa] per voxel "
+        "(default %(default)s)",
+    )
+    parser.add_argument(
+        "--coarsen", choices=coarsening.METHODS, default=defaults.coarsen, help="default: none"
+    )
+    parser.add_argument("--forest", help="forests for --coarsen ddfem (HDF5)")
+    parser.add_argument(
+        "--unit", type=float, default=defaults.unit, help="metres per mesh unit (default 1)"
+    )
+    parser.add_argument("--fill", choices=sorted(FILLS), default=defaults.fill, help="voxel filling")
+    parser.add_argument(
+        "--pieces", choices=PIECES, default=defaults.pieces, help="if the voxels fall apart"
+    )
+    parser.add_argument(
+        "--poisson", type=float, default=defaults.poisson, help="Poisson's ratio (default 0.25)"
+    )
+    parser.add_argument(
+        "--density", type=float, default=defaults.density, help="kg/m^3 (default 1000)"
+    )
+    parser.add_argument("--lumped", action="store_true", help="lump the mass")
+    parser.add_argument(
+        "--seed", type=int, default=defaults.seed, help="of random materials and the partition"
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,267 @@
+"""Modal analysis of a model by any method, with the evidence that the result is right."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from carillon.errors import ConvergenceError, UserError
+from solver.correction import correct, default_guard
+from solver.decomposition import Decomposition, decompose
+from solver.hcms.synthesis import synthesize
+from solver.model import ElasticModel
+from solver.system import System, assemble
+from solver.timing import Phases, peak_memory
+from solver.truth import solve_truth
+
+Array = NDArray[np.float64]
+
+METHODS = ("hcms", "slepc", "arpack")
+RIGID_MODES = 6
+"""Zero-frequency modes of a connected free body."""
+RIGID_TOLERANCE = 1e-9
+"""Eigenvalues below this fraction of the largest computed one count as zero."""
+ORTHOGONALITY_TOLERANCE = 1e-8
+"""Largest accepted entry of X^T M X - I."""
+MAX_CORRECTIONS = 40
+
+
+@dataclass(frozen=True)
+class SolverOptions:
+    """What to compute and how; the defaults suit a model of some ten thousand unknowns.
+
+    Attributes
+    ----------
+    method
+        `hcms` (with error correction), `slepc` or `arpack` (ground truth).
+    modes
+        Number of modes, rigid ones included.
+    tolerance
+        `hcms`: relative eigenvalue error at which the correction stops; 0 makes exactly `corrections`
+        steps.  Ground truth: relative residual of the eigensolver.
+    corrections
+        Largest number of correction steps; 0 is plain HCMS.
+    degree
+        Polynomial degree of a correction step, see `solver.correction.correct`.
+    keep
+        Modes kept at the root of the merge tree; a margin above `modes` if not given.
+    subdomains
+        Number of subdomains; from the number of unknowns if not given.
+    interface
+        `free` or `fixed`, see `solver.hcms.condense`.
+    seed
+        Seed of the partition.
+    prove
+        Whether ground truth is proven complete by an inertia count.
+    """
+
+    method: str = "hcms"
+    modes: int = 256
+    tolerance: float | None = None
+    corrections: int = MAX_CORRECTIONS
+    degree: int = 3
+    keep: int | None = None
+    subdomains: int | None = None
+    interface: str = "free"
+    seed: int = 0
+    prove: bool = True
+
+
+@dataclass
+class Modes:
+    """Result of a modal analysis.
+
+    Attributes
+    ----------
+    values
+        (k,) eigenvalues [rad^2/s^2], ascending.
+    vectors
+        (local, k) mass-normalised modes, this rank's rows of `system`.
+    residuals
+        (k,) residual ratios, see `residual_ratios`.
+    evidence
+        What the solver achieved: orthogonality, error estimate, steps, inertia, rigid modes, ranks,
+        peak memory.
+    seconds
+        Wall time by phase.
+    """
+
+    values: Array
+    vectors: Array
+    residuals: Array
+    system: System
+    evidence: dict[str, Any] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+
+
+def modal_analysis(
+    model: ElasticModel,
+    options: SolverOptions,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    verbose: bool = False,
+) -> Modes:
+    """Compute the lowest modes of `model`.
+
+    All ranks of `comm` pass the same model and options and get the same values.
+
+    Raises
+    ------
+    UserError
+        If more modes are wanted than there are unknowns, or more ranks than subdomains.
+    ConvergenceError
+        If a tolerance was missed, the modes are not orthonormal, or the body does not have six
+        zero-frequency modes.
+    """
+    check_mode_count(options.modes, model.n_dofs)
+    phases = Phases(comm, verbose)
+    with phases("partition"):
+        decomposition = decompose(model.mesh, options.subdomains, options.seed, comm)
+    with phases("assembly"):
+        system = assemble(model, decomposition, comm)
+    evidence: dict[str, Any] = {
+        "ranks": comm.size,
+        "subdomains": decomposition.tree.parts,
+        "n_dofs": model.n_dofs,
+    }
+    if options.method == "hcms":
+        values, vectors = _hcms(model, decomposition, system, options, phases, evidence, verbose)
+    else:
+        with phases("eigensolver"):
+            truth = solve_truth(
+                system,
+                model.mesh.nodes,
+                options.modes,
+                options.method,
+                options.tolerance or 1e-10,
+                options.prove,
+            )
+        values, vectors = truth.values, truth.vectors
+        evidence |= {
+            "eigensolver_iterations": truth.iterations,
+            "inertia_count": truth.inertia,
+            "inertia_expected": truth.expected_inertia,
+            "inertia_at": truth.inertia_at,
+        }
+    with phases("verification"):
+        residuals, orthogonality = verify(system, values, vectors)
+    evidence["orthogonality"] = orthogonality
+    evidence["residual_max"] = float(residuals.max())
+    evidence["rigid_modes"] = count_rigid(values)
+    evidence["peak_memory_bytes"] = peak_memory(comm)
+    _judge(options, evidence)
+    return Modes(values, vectors, residuals, system, evidence, phases.seconds)
+
+
+def check_mode_count(modes: int, n_dofs: int) -> None:
+    """Raise UserError unless 1 <= modes <= n_dofs."""
+    if modes < 1:
+        raise UserError(f"{modes} modes asked for; expected at least 1")
+    if modes > n_dofs:
+        raise UserError(
+            f"{modes:,} modes asked for, but the model has {n_dofs:,} unknowns; ask for fewer modes "
+            "or raise --resolution"
+        )
+
+
+def default_keep(modes: int) -> int:
+    """Modes kept at the root: those that the correction iterates, and a few to choose from."""
+    return modes + default_guard(modes) + 16
+
+
+def _hcms(
+    model: ElasticModel,
+    decomposition: Decomposition,
+    system: System,
+    options: SolverOptions,
+    phases: Phases,
+    evidence: dict[str, Any],
+    verbose: bool,
+) -> tuple[Array, Array]:
+    keep = max(options.keep or default_keep(options.modes), options.modes)
+    with phases("hcms"):
+        start = synthesize(model, decomposition, keep, options.interface, system.comm)
+    if options.corrections == 0:
+        if len(start.values) < options.modes:
+            raise UserError(
+                f"HCMS kept {len(start.values)} modes, {options.modes} are wanted; raise --keep or "
+                "lower --subdomains"
+            )
+        return start.values[: options.modes], start.vectors[:, : options.modes]
+    with phases("correction"):
+        result = correct(
+            system,
+            start.vectors,
+            max(options.modes - RIGID_MODES, 1),
+            1e-7 if options.tolerance is None else options.tolerance,
+            options.corrections,
+            options.degree,
+            report=_reporter(verbose and system.comm.rank == 0),
+        )
+        stiff = system.inner(system.rigid, system.multiply(system.K, system.rigid))
+    evidence |= {
+        "corrections": result.steps,
+        "right_hand_sides": result.solves,
+        "eigenvalue_error_estimate": float(result.errors.max()),
+    }
+    values = np.concatenate([np.maximum(np.diag(stiff), 0.0), result.values])[: options.modes]
+    vectors = np.concatenate([system.rigid, result.vectors], axis=1)[:, : options.modes]
+    return values, np.asfortranarray(vectors)
+
+
+def _reporter(visible: bool) -> Callable[[int, float], None] | None:
+    if not visible:
+        return None
+    from carillon.progress import say
+
+    return lambda step, worst: say(f"  after {step} corrections: eigenvalue error {worst:.1e}")
+
+
+def verify(system: System, values: Array, vectors: Array) -> tuple[Array, float]:
+    """Residual ratios of the pairs, and the largest entry of X^T M X - I.
+
+    Products are taken with the assembled matrices; nothing is believed of the solver.
+    """
+    mass_vectors = system.multiply(system.M, vectors)
+    gram = system.inner(vectors, mass_vectors)
+    orthogonality = float(np.abs(gram - np.eye(len(values))).max())
+    return residual_ratios(system, values, vectors, mass_vectors), orthogonality
+
+
+def residual_ratios(system: System, values: Array, vectors: Array, mass_vectors: Array) -> Array:
+    """|K x - lambda M x| / (lambda |M x|) of each pair, in the 2-norm.
+
+    Rigid modes, whose lambda is zero, are measured with the first elastic eigenvalue instead.
+    """
+    residual = system.multiply(system.K, vectors) - mass_vectors * values
+    scale = np.maximum(values, values[min(RIGID_MODES, len(values) - 1)])
+    norms = np.sqrt(system.column_products(residual, residual))
+    mass_norms = np.sqrt(system.column_products(mass_vectors, mass_vectors))
+    tiny = np.finfo(float).tiny
+    return np.asarray(norms / np.maximum(scale * mass_norms, tiny))
+
+
+def count_rigid(values: Array) -> int:
+    """Number of eigenvalues that are zero to rounding."""
+    if len(values) <= RIGID_MODES:
+        return len(values)
+    return int(np.sum(values < RIGID_TOLERANCE * values[-1]))
+
+
+def _judge(options: SolverOptions, evidence: dict[str, Any]) -> None:
+    if evidence["orthogonality"] > ORTHOGONALITY_TOLERANCE:
+        raise ConvergenceError(
+            f"the modes are mass-orthonormal to {evidence['orthogonality']:.1e} only, "
+            f"{ORTHOGONALITY_TOLERANCE:.0e} is required"
+        )
+    exact = options.method != "hcms" or (options.corrections > 0 and options.tolerance != 0.0)
+    expected = min(RIGID_MODES, options.modes)
+    if exact and evidence["rigid_modes"] != expected:
+        raise ConvergenceError(
+            f"{evidence['rigid_modes']} zero-frequency modes found, a connected free body has "
+            f"{RIGID_MODES}; part of the model hangs on a hinge or has almost no stiffness"
+        )

@@ -1,0 +1,113 @@
+"""From the fine mesh to the mesh of its 2x2x2 blocks (section 7.1)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.errors import UserError
+from dataset_gen.block import COARSE_EDGE, cell_stiffness, prolongation
+from dataset_gen.element import quadrature_stiffness
+from dataset_gen.objectives import DEFAULT_OBJECTIVE, fit
+from forests import coarsen as evaluate_forest
+from forests import load_model
+from solver.geometry import Blocks, HexMesh, blocks_from_mesh
+from solver.model import ElasticModel, fine_model
+
+Array = NDArray[np.float64]
+
+METHODS = ("none", "average", "galerkin", "ddfem", "fit")
+
+
+def average(e: Array) -> Array:
+    """The block's mean modulus at every quadrature point, void cells counted as zero."""
+    return np.repeat(e.mean(axis=1, keepdims=True), 8, axis=1)
+
+
+def galerkin(e: Array, poisson: float) -> Array:
+    """Moduli whose stiffness is P^T K(e) P, the exact energy of trilinear motions."""
+    kernels = COARSE_EDGE * quadrature_stiffness(poisson).reshape(8, 576)
+    P = prolongation()
+    projected = np.einsum("ka,jkl,lb->jab", P, cell_stiffness(poisson), P, optimize=True)
+    weights, *_ = np.linalg.lstsq(kernels.T, projected.reshape(8, 576).T, rcond=None)
+    return np.asarray(e @ weights.T)
+
+
+def coarse_moduli(
+    e: Array, method: str, poisson: float, forest: str | Path | None = None
+) -> Array:
+    """Quadrature-point moduli (mc, 8) of coarse elements from the blocks' fine moduli (mc, 8).
+
+    `method` is one of `average`, `galerkin`, `ddfem` (the regression forests in the file `forest`)
+    and `fit` (the default objective solved for every block, what the forests learn).
+
+    Raises
+    ------
+    UserError
+        If `ddfem` has no forest, or the forest was trained for another Poisson's ratio.
+    """
+    match method:
+        case "average":
+            return average(e)
+        case "galerkin":
+            return galerkin(e, poisson)
+        case "fit":
+            return fit(DEFAULT_OBJECTIVE, e, poisson).moduli
+        case "ddfem":
+            return _forest_moduli(e, poisson, forest)
+    raise UserError(f"coarsening {method!r} is unknown, expected one of {', '.join(METHODS)}")
+
+
+def _forest_moduli(e: Array, poisson: float, forest: str | Path | None) -> Array:
+    if forest is None:
+        raise UserError(
+            "--coarsen ddfem needs trained forests; name them with --forest forests.h5 (made by "
+            "python -m forests train)"
+        )
+    model = load_model(forest)
+    if abs(model.poisson - poisson) > 1e-12:
+        raise UserError(
+            f"{forest}: trained for Poisson's ratio {model.poisson:g}, the model has {poisson:g}; "
+            "train forests for it or pass --poisson"
+        )
+    return evaluate_forest(model, e)
+
+
+def block_moduli(blocks: Blocks, young: Array) -> Array:
+    """Fine moduli (mc, 8) of every block, 0 where a cell is void; `young` is (m,) [Pa]."""
+    return np.where(blocks.mask, young[blocks.fine_of_block], 0.0)
+
+
+def build_model(
+    mesh: HexMesh,
+    young: Array,
+    method: str = "none",
+    forest: str | Path | None = None,
+    **constants: float | bool,
+) -> ElasticModel:
+    """Model of the fine mesh (`none`) or of its blocks.
+
+    Parameters
+    ----------
+    mesh
+        Fine mesh.
+    young
+        (m,) modulus [Pa] of each fine cell.
+    method, forest
+        See `coarse_moduli`.
+    constants
+        `poisson`, `density` [kg/m^3], `lumped`, see `ElasticModel`.
+
+    Notes
+    -----
+    The coarse mass is P^T M P over the filled cells; only the stiffness is fitted.
+    """
+    fine = fine_model(mesh, young, **constants)
+    if method == "none":
+        return fine
+    blocks = blocks_from_mesh(mesh)
+    moduli = coarse_moduli(block_moduli(blocks, young), method, fine.poisson, forest)
+    pattern = np.packbits(blocks.mask, axis=1, bitorder="little").ravel()
+    return ElasticModel(blocks.coarse, moduli, pattern, **constants)  # type: ignore[arg-type]

@@ -1,0 +1,163 @@
+"""How far a spectrum is from another that is taken for the truth."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from carillon.errors import UserError
+from solver.analysis import RIGID_MODES
+from solver.geometry import prolongation
+from solver.model import ElasticModel
+from solver.modes_file import ModesFile, read_modes
+from solver.sparse import assemble_elements
+
+Array = NDArray[np.float64]
+
+CLUSTER_GAP = 1e-3
+"""Truth eigenvalues closer than this, relatively, are one cluster."""
+AUDIBLE_FIRST, AUDIBLE_LAST = 7, 60
+"""Mode numbers, from 1, of the frequency errors that are reported for coarsened models."""
+
+
+@dataclass
+class Comparison:
+    """Errors of a candidate against the truth; rigid modes are left out.
+
+    Attributes
+    ----------
+    eigenvalue_relative_error
+        Median, 90th percentile and maximum of |lambda - truth| / truth.
+    frequency_rms_relative_error
+        Root mean square over all compared modes.
+    frequency_rms_relative_error_7_60, frequency_max_relative_error_7_60
+        The same and the maximum over modes 7..60, or as many as there are.
+    subspace_angle_max
+        Largest M-weighted principal angle [rad] between a cluster of the truth and the same modes of
+        the candidate; the last cluster, which the end of the spectrum may cut, is left out.  NaN if
+        the meshes are not related.
+    residual_max
+        Largest residual ratio of the candidate, recomputed from the K and M in its file.
+    modes_compared
+        Number of elastic modes compared.
+    """
+
+    candidate: str
+    truth: str
+    eigenvalue_relative_error: dict[str, float]
+    frequency_rms_relative_error: float
+    frequency_rms_relative_error_7_60: float
+    frequency_max_relative_error_7_60: float
+    subspace_angle_max: float
+    residual_max: float
+    modes_compared: int
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain dictionary, ready for JSON."""
+        return asdict(self)
+
+
+def compare_files(candidate: str | Path, truth: str | Path) -> Comparison:
+    """Compare two modes files, of the same mesh or of a mesh and its coarsening.
+
+    Raises
+    ------
+    UserError
+        If a file is unusable or there is no elastic mode to compare.
+    """
+    a, b = read_modes(candidate), read_modes(truth)
+    count = min(len(a.eigenvalues), len(b.eigenvalues))
+    if count <= RIGID_MODES:
+        raise UserError(
+            f"{candidate} and {truth} share {count} modes, of which {RIGID_MODES} are rigid; compute "
+            "more modes"
+        )
+    elastic = slice(RIGID_MODES, count)
+    values, exact = a.eigenvalues[elastic], b.eigenvalues[elastic]
+    error = np.abs(values / exact - 1.0)
+    shift = a.frequencies[elastic] / b.frequencies[elastic] - 1.0
+    audible = shift[AUDIBLE_FIRST - 1 - RIGID_MODES : AUDIBLE_LAST - RIGID_MODES]
+    return Comparison(
+        str(candidate),
+        str(truth),
+        {
+            "median": float(np.median(error)),
+            "p90": float(np.quantile(error, 0.9)),
+            "max": float(error.max()),
+        },
+        float(np.sqrt(np.mean(shift**2))),
+        float(np.sqrt(np.mean(audible**2))),
+        float(np.abs(audible).max()),
+        _largest_angle(a, b, count),
+        float(recomputed_residuals(a).max()),
+        count - RIGID_MODES,
+    )
+
+
+def recomputed_residuals(file: ModesFile) -> Array:
+    """Residual ratios (k,) from matrices assembled anew, see `solver.analysis.residual_ratios`."""
+    assert file.modes is not None
+    K, M = assembled(file.model)
+    mass_modes = M @ file.modes
+    residual = K @ file.modes - mass_modes * file.eigenvalues
+    first_elastic = file.eigenvalues[min(RIGID_MODES, len(file.eigenvalues) - 1)]
+    scale = np.maximum(file.eigenvalues, first_elastic)
+    return np.asarray(
+        np.linalg.norm(residual, axis=0) / (scale * np.linalg.norm(mass_modes, axis=0))
+    )
+
+
+def assembled(model: ElasticModel) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    """Stiffness and mass of the whole model on one rank."""
+    return assemble_elements(
+        model.mesh.cells, model.stiffness(), model.nodal_mass(), model.mesh.n_nodes
+    )
+
+
+def clusters(values: Array, gap: float = CLUSTER_GAP) -> list[slice]:
+    """Runs of ascending `values` whose neighbours are relatively closer than `gap`."""
+    breaks = np.flatnonzero(np.diff(values) > gap * values[1:]) + 1
+    bounds = [0, *breaks.tolist(), len(values)]
+    return [slice(start, stop) for start, stop in zip(bounds[:-1], bounds[1:], strict=True)]
+
+
+def subspace_angles(modes: Array, truth: Array, M: sp.csr_matrix, groups: list[slice]) -> Array:
+    """Largest M-weighted principal angle [rad] of each group of columns.
+
+    Both blocks are M-orthonormal (n, k).  The sine is taken from the part of the truth outside the
+    candidate's span, which is accurate for small angles too.
+    """
+    angles = np.empty(len(groups))
+    for index, group in enumerate(groups):
+        inside, wanted = modes[:, group], truth[:, group]
+        outside = wanted - inside @ (inside.T @ (M @ wanted))
+        square = np.linalg.eigvalsh(outside.T @ (M @ outside))[-1]
+        angles[index] = np.arcsin(min(1.0, np.sqrt(max(square, 0.0))))
+    return angles
+
+
+def _largest_angle(a: ModesFile, b: ModesFile, count: int) -> float:
+    assert a.modes is not None and b.modes is not None
+    modes = a.modes
+    if a.mesh.n_nodes == b.mesh.n_nodes and np.array_equal(a.mesh.node_grid, b.mesh.node_grid):
+        _, M = assembled(b.model)
+    elif np.isclose(a.mesh.edge, 2.0 * b.mesh.edge):
+        try:
+            to_fine = sp.kron(prolongation(b.mesh, a.mesh), sp.identity(3), format="csr")
+        except ValueError:
+            return float("nan")
+        _, M = assembled(b.model)
+        modes = to_fine @ modes
+    else:
+        return float("nan")
+    elastic = slice(RIGID_MODES, count)
+    groups = clusters(b.eigenvalues[elastic])[:-1]
+    if not groups:
+        return float("nan")
+    angles = subspace_angles(modes[:, elastic], b.modes[:, elastic], M, groups)
+    return float(angles.max())

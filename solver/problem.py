@@ -1,0 +1,121 @@
+"""From the names on a command line to a meshed solid with material."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.errors import UserError
+from dataset_gen.element import DEFAULT_POISSON
+from solver.coarsening import build_model
+from solver.geometry import (
+    HexMesh,
+    hexmesh_from_voxels,
+    load_surface,
+    surface_name,
+    voxelize,
+)
+from solver.materials import young_modulus
+from solver.model import DEFAULT_DENSITY, ElasticModel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ProblemOptions:
+    """The solid to analyse.
+
+    Attributes
+    ----------
+    mesh
+        Surface mesh file, or `builtin:NAME`.
+    resolution
+        Voxels along the longest side.
+    material
+        Name of a material or file with one modulus [Pa] per voxel.
+    coarsen
+        `none`, `average`, `galerkin`, `ddfem` or `fit`.
+    forest
+        Forests for `ddfem`.
+    unit
+        Metres per mesh unit.
+    fill, pieces
+        See `solver.geometry.voxelize`.
+    poisson, density
+        Poisson's ratio and mass density [kg/m^3].
+    lumped
+        Whether the mass is lumped.
+    seed
+        Seed of random materials.
+    """
+
+    mesh: str
+    resolution: int
+    material: str = "uniform"
+    coarsen: str = "none"
+    forest: str | None = None
+    unit: float = 1.0
+    fill: str = "winding"
+    pieces: str = "error"
+    poisson: float = DEFAULT_POISSON
+    density: float = DEFAULT_DENSITY
+    lumped: bool = False
+    seed: int = 0
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain dictionary, for provenance."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Fine mesh, its moduli (m,) [Pa], the model to solve, and how long making them took."""
+
+    fine: HexMesh
+    young: Array
+    model: ElasticModel
+    seconds: dict[str, float]
+
+
+def build_problem(options: ProblemOptions) -> Problem:
+    """Voxelise the mesh, assign the material and coarsen.
+
+    Raises
+    ------
+    UserError
+        For anything wrong with the mesh, the material or the parameters.
+    """
+    _check(options)
+    begin = time.perf_counter()
+    surface = load_surface(options.mesh, options.unit)
+    name = surface_name(options.mesh)
+    voxels = voxelize(surface, options.resolution, options.fill, options.pieces, name)
+    fine = hexmesh_from_voxels(voxels)
+    meshed = time.perf_counter()
+    label = f"mesh '{name}', resolution {options.resolution}"
+    young = young_modulus(options.material, fine, options.seed, label)
+    assigned = time.perf_counter()
+    model = build_model(
+        fine,
+        young,
+        options.coarsen,
+        options.forest,
+        poisson=options.poisson,
+        density=options.density,
+        lumped=options.lumped,
+    )
+    seconds = {"mesh": meshed - begin, "material": assigned - meshed}
+    if options.coarsen != "none":
+        seconds["coarsening"] = time.perf_counter() - assigned
+    return Problem(fine, young, model, seconds)
+
+
+def _check(options: ProblemOptions) -> None:
+    if not -1.0 < options.poisson < 0.5:
+        raise UserError(f"Poisson's ratio {options.poisson:g} is outside (-1, 0.5)")
+    if not (np.isfinite(options.density) and options.density > 0.0):
+        raise UserError(f"density {options.density:g} kg/m^3: expected a positive number")
