@@ -1,4 +1,4 @@
-"""The configuration: one file describes a run, keys that it leaves out take the schema's defaults."""
+"""The configuration: one file describes a run, the schema fills in what it leaves out."""
 
 from __future__ import annotations
 

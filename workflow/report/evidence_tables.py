@@ -15,9 +15,10 @@ def evidence(results: Results) -> Table:
     """Residual, orthogonality, inertia count of every run."""
     return Table(
         "evidence",
-        "What every run proves about itself, from products with its own assembled matrices. The inertia "
-        "of K − μM counts the eigenvalues below μ independently of the eigensolver: found equals "
-        "counted when none is missed. The error estimate is the solver's own, from residuals.",
+        "What every run proves about itself, from products with its own assembled matrices. The "
+        "inertia of K − μM counts the eigenvalues below μ independently of the eigensolver: "
+        "found equals counted when none is missed. The error estimate is the solver's own, from "
+        "residuals.",
         [
             Column("model", "Solid"),
             Column("variant", "Method"),

@@ -42,8 +42,8 @@ def training(results: Results) -> Table:
     ]
     return Table(
         "training",
-        f"Training data (objective {forests['objective']}) and forests. Held-out blocks were not used "
-        "in training.",
+        f"Training data (objective {forests['objective']}) and forests. Held-out blocks were not "
+        "used in training.",
         [
             Column("key", "Key", shown=False),
             Column("quantity", "Quantity"),
@@ -59,10 +59,10 @@ def blocks(results: Results) -> Table:
     found = results.blocks
     return Table(
         "blocks",
-        f"Coarsening of {found['blocks']:,} random solid blocks, {found['forces']} random forces each: "
-        "relative displacement error against the fine block, under forces on all nodes as in the paper "
-        "and under the inertia that vibration brings; cost on one core; storage. The first range is the "
-        "trained one.",
+        f"Coarsening of {found['blocks']:,} random solid blocks, {found['forces']} random forces "
+        "each: relative displacement error against the fine block, under forces on all nodes as "
+        "in the paper and under the inertia that vibration brings; cost on one core; storage. "
+        "The first range is the trained one.",
         [
             Column("range_gpa", "Moduli [GPa]", "range", "GPa"),
             Column("method", "Coarsening"),

@@ -14,12 +14,12 @@ from solver.geometry import HexMesh
 from solver.geometry.picture import DRAWN_AMPLITUDE, draw
 from solver.modes_file import ModesFile, read_modes
 from workflow.report.results import Results
-from workflow.report.style import SETTINGS, save_transparent
+from workflow.report.style import SETTINGS, pixels, save_pixels
 from workflow.variants import SHOWN, TRUTH
 
 Array = NDArray[np.float64]
 
-CLUSTER_WIDTH = 0.02
+CLUSTER_WIDTH = 0.05
 """Modes whose frequencies lie this close above the first elastic one count as one space with it."""
 
 PICTURE_INCHES = (3.4, 2.7)
@@ -34,18 +34,19 @@ def draw_first_elastic_modes(
     diagonal = float(np.linalg.norm(np.ptp(truth.mesh.nodes, axis=0)))
     largest = float(np.linalg.norm(wanted, axis=1).max())
     scale = DRAWN_AMPLITUDE * diagonal / largest
-    description = {}
-    for variant, path in zip(SHOWN, paths, strict=True):
+    description, pictures = {}, []
+    for variant in SHOWN:
         found = read_modes(results.modes_path(model, variant))
         motion, likeness = aligned(found, truth, wanted)
-        save_transparent(mode_figure(found.mesh, motion, scale, (0.0, largest)), path)
+        pictures.append(pixels(mode_figure(found.mesh, motion, scale, (0.0, largest))))
         description[variant] = {
             "hertz": float(found.frequencies[RIGID_MODES]),
             "likeness": likeness,
-            "cells": found.mesh.n_cells,
-            "unknowns": found.mesh.n_dofs,
             "combined": len(cluster(truth.frequencies)),
         }
+    for variant, path, picture in zip(SHOWN, paths, cropped(pictures), strict=True):
+        save_pixels(picture, path)
+        description[variant] |= {"height": picture.shape[0], "width": picture.shape[1]}
     return description
 
 
@@ -56,14 +57,14 @@ def displacement(file: ModesFile, index: int) -> Array:
 
 
 def cluster(frequencies: Array) -> list[int]:
-    """Indices of the modes that share the first elastic frequency, as symmetric bodies have them."""
+    """Indices of the modes that share the first elastic frequency, as in symmetric bodies."""
     first = frequencies[RIGID_MODES]
     near = np.abs(frequencies[RIGID_MODES:] / first - 1.0) <= CLUSTER_WIDTH
     return [RIGID_MODES + int(index) for index in np.flatnonzero(near)]
 
 
 def aligned(file: ModesFile, truth: ModesFile, wanted: Array) -> tuple[Array, float]:
-    """First elastic motion of `file` with sign, and turn within its cluster, closest to the truth's.
+    """First elastic motion of `file`, signed and turned within its cluster to match the truth.s.
 
     Returns
     -------
@@ -78,6 +79,15 @@ def aligned(file: ModesFile, truth: ModesFile, wanted: Array) -> tuple[Array, fl
     length, target_length = np.linalg.norm(motion), np.linalg.norm(target)
     likeness = float(motion @ target / (length * target_length)) if length > 0 else 0.0
     return (motion * (target_length / max(float(length), 1e-300))).reshape(-1, 3), likeness
+
+
+def cropped(pictures: Sequence[NDArray[np.uint8]], margin: int = 12) -> list[NDArray[np.uint8]]:
+    """Cut the same empty border off all RGBA pictures (h, w, 4), but for `margin` pixels."""
+    seen = np.any([picture[..., 3] > 0 for picture in pictures], axis=0)
+    rows, columns = (np.flatnonzero(seen.any(axis=axis)) for axis in (1, 0))
+    top, left = max(rows[0] - margin, 0), max(columns[0] - margin, 0)
+    window = np.s_[top : rows[-1] + margin + 1, left : columns[-1] + margin + 1]
+    return [picture[window] for picture in pictures]
 
 
 def mode_figure(mesh: HexMesh, motion: Array, scale: float, limits: tuple[float, float]) -> Any:

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 MISSING = "–"
+ROUNDING = 1e-9
+"""Relative errors below this are not told apart: the eigensolvers' own tolerances are no smaller."""
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def show(value: Any, kind: str = "text") -> str:
     """Format `value` by the kind of its column.
 
-    Kinds: `text`, `count`, `hertz`, `percent` (of a fraction), `seconds`, `times` (a ratio), `small`
-    (an error or residual), `bytes`, `fraction`, `range` (of GPa).
+    Kinds: `text`, `count`, `hertz`, `percent` (of a fraction), `seconds`, `times` (a ratio),
+    `small` (an error or residual), `angle` (of radians), `bytes`, `fraction`, `range` (of GPa).
 
     Examples
     --------
@@ -24,10 +27,13 @@ def show(value: Any, kind: str = "text") -> str:
     """
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return MISSING
-    return _FORMATS[kind](value)
+    text = _FORMATS[kind](value)
+    return text if kind == "text" else text.replace("-", "−")
 
 
 def _percent(fraction: float) -> str:
+    if 0 < abs(fraction) < ROUNDING:
+        return f"< {_power(100.0 * ROUNDING)} %"
     percent = 100.0 * fraction
     if abs(percent) < 0.01:
         return f"{_power(percent)} %"
@@ -42,6 +48,11 @@ def _seconds(value: float) -> str:
     if abs(value) < 1e-3:
         return f"{_digits(1e6 * value, 2)} µs"
     return f"{_digits(value, 3 if value >= 1 else 2)} s"
+
+
+def _angle(radians: float) -> str:
+    degrees = math.degrees(radians)
+    return f"{_digits(degrees, 2) if degrees >= 0.01 else _power(degrees)}°"
 
 
 def _bytes(value: float) -> str:
@@ -62,10 +73,11 @@ def _power(value: float) -> str:
     if value == 0:
         return "0"
     mantissa, exponent = f"{value:.1e}".split("e")
-    return f"{mantissa}·10{str(int(exponent)).translate(_SUPERSCRIPTS)}".replace("-", "−")
+    power = f"10{str(int(exponent)).translate(_SUPERSCRIPTS)}"
+    return power if mantissa == "1.0" else f"{mantissa}·{power}"
 
 
-_FORMATS = {
+_FORMATS: dict[str, Callable[[Any], str]] = {
     "text": str,
     "count": lambda value: f"{int(value):,}",
     "hertz": lambda value: f"{_digits(value, 5)}",
@@ -73,6 +85,7 @@ _FORMATS = {
     "seconds": _seconds,
     "times": lambda value: f"{_digits(value, 2)}×",
     "small": _small,
+    "angle": _angle,
     "bytes": _bytes,
     "fraction": lambda value: _digits(value, 3),
     "range": lambda value: f"{value[0]:g}…{value[1]:g}",

@@ -19,9 +19,10 @@ def summary(results: Results) -> Table:
     """One row a model: size, accuracy, time."""
     return Table(
         "summary",
-        "Every solid at a glance. Eigenvalue errors are relative to SLEPc on the fine mesh over all "
-        f"elastic modes; frequency errors of the coarsened mesh are root mean squares over {AUDIBLE}. "
-        "Times are wall seconds from the moduli to the modes; the speed-up's base is SLEPc.",
+        "Every solid at a glance. Eigenvalue errors are relative to SLEPc on the fine mesh over "
+        "all elastic modes; frequency errors of the coarsened mesh are root mean squares over "
+        f"{AUDIBLE}. Times are wall seconds from the moduli to the modes; the speed-up's base is "
+        "SLEPc.",
         [
             Column("model", "Model", shown=False),
             Column("title", "Solid"),
@@ -66,8 +67,8 @@ def frequencies(results: Results) -> Table:
         columns.append(Column(f"{variant}_error", "error", "percent"))
     return Table(
         "frequencies",
-        "Natural frequencies [Hz] from the first elastic mode on, and their relative errors against "
-        "SLEPc on the fine mesh.",
+        "Natural frequencies [Hz] from the first elastic mode on, and their relative errors "
+        "against SLEPc on the fine mesh.",
         columns,
         [row for model in results.models for row in _frequency_rows(results, model)],
     )
@@ -89,9 +90,9 @@ def errors(results: Results) -> Table:
     """Distances of every variant from the truth."""
     return Table(
         "errors",
-        "Distance from SLEPc on the fine mesh: relative errors of eigenvalues over all elastic modes, "
-        f"of frequencies over {AUDIBLE}, and the largest mass-weighted angle between the spaces of "
-        "modes, clusters taken together; 90° means that modes changed places.",
+        "Distance from SLEPc on the fine mesh: relative errors of eigenvalues over all elastic "
+        f"modes, of frequencies over {AUDIBLE}, and the largest mass-weighted angle between the "
+        "spaces of modes, clusters taken together; 90° means that modes changed places.",
         [
             Column("model", "Solid"),
             Column("variant", "Method"),
@@ -100,7 +101,7 @@ def errors(results: Results) -> Table:
             Column("max", "worst", "percent"),
             Column("rms_7_60", "Frequency, rms", "percent"),
             Column("max_7_60", "worst", "percent"),
-            Column("angle", "Largest angle", "small", "rad"),
+            Column("angle", "Largest angle", "angle", "rad"),
             Column("compared", "Modes compared", "count"),
         ],
         [
@@ -133,8 +134,8 @@ def coarsening(results: Results) -> Table:
         columns.append(Column(f"{variant}_max", "worst", "percent"))
     return Table(
         "coarsening",
-        f"Relative errors of the frequencies of {AUDIBLE} after coarsening 2×2×2 voxels to one cell, "
-        "against SLEPc on the fine mesh. All three solve the coarsened model by HCMS + EC.",
+        f"Relative errors of the frequencies of {AUDIBLE} after coarsening 2×2×2 voxels to one "
+        "cell, against SLEPc on the fine mesh. All three solve the coarsened model by HCMS + EC.",
         columns,
         [_coarsening_row(results, model) for model in results.models],
     )

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import matplotlib
+import numpy as np
+from numpy.typing import NDArray
 
 from carillon.files import atomic_path
 
@@ -38,7 +40,7 @@ THEMED = {
 """Style-sheet variables that take the place of colours on the page, so that figures follow it into
 the dark."""
 
-SETTINGS: dict[str, Any] = {
+SETTINGS: Any = {
     "font.family": "sans-serif",
     "font.size": 9.0,
     "axes.labelsize": 9.0,
@@ -104,17 +106,27 @@ def svg(figure: Figure, name: str) -> str:
 
 
 def themed(source: str) -> str:
-    """Replace the colours of an SVG by style-sheet variables, which only a page defines."""
+    """Replace colours and fonts of an SVG by style-sheet variables, which only a page defines."""
     for colour, variable in THEMED.items():
         source = re.sub(colour, f"var({variable})", source, flags=re.IGNORECASE)
-    # Fonts come from the page; without this, matplotlib's own family list would ask for others.
-    return re.sub(r"(font:[^;\"]*?px) [^;\"]*", r"\1 var(--sans)", source)
+    return re.sub(r"font-family: [^;\"]*", "font-family: var(--sans)", source)
 
 
-def save_transparent(figure: Figure, path: str | Path) -> None:
-    """Write a figure as PNG without background, and close it."""
+def pixels(figure: Any) -> NDArray[np.uint8]:
+    """The figure without background as RGBA values (h, w, 4); the figure is closed."""
     import matplotlib.pyplot as plt
 
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, format="png", dpi=PNG_DPI, transparent=True)
+    figure.set_dpi(PNG_DPI)
+    figure.patch.set_alpha(0.0)
+    figure.canvas.draw()
+    values = np.array(figure.canvas.buffer_rgba())
     plt.close(figure)
+    return values
+
+
+def save_pixels(picture: NDArray[np.uint8], path: str | Path) -> None:
+    """Write RGBA values (h, w, 4) as PNG."""
+    import matplotlib.image
+
+    with atomic_path(path) as temporary:
+        matplotlib.image.imsave(temporary, np.ascontiguousarray(picture), format="png")

@@ -43,9 +43,10 @@ def times(results: Results) -> Table:
     columns.append(Column("speed_up", "SLEPc ÷ DDFEM* + HCMS + EC", "times"))
     return Table(
         "times",
-        "Wall seconds of one cold run each, on all cores and nothing beside it, from meshed solid and "
-        "moduli to modes: coarsening, partition, assembly and solution count; voxels and material are "
-        "precomputation. SLEPc's time includes the factorisation that proves its spectrum complete.",
+        "Wall seconds of one cold run each, on all cores and nothing beside it, from meshed "
+        "solid and moduli to modes: coarsening, partition, assembly and solution count; voxels "
+        "and material are precomputation. SLEPc's time includes the factorisation that proves "
+        "its spectrum complete.",
         columns,
         [_times_row(results, model) for model in results.models],
     )

@@ -1,0 +1,98 @@
+"""The report: one HTML page that carries its figures, tables and style within itself."""
+
+from __future__ import annotations
+
+import base64
+import json
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+
+from workflow.report.findings import findings
+from workflow.report.numbers import show
+from workflow.report.results import Results
+from workflow.report.style import COLOURS, themed
+from workflow.report.table import Table, read_table
+from workflow.report.tables import BUILDERS
+from workflow.variants import SHOWN, TRUTH, VARIANTS
+
+HERE = Path(__file__).parent
+
+FIRST_MODES = 12
+"""Elastic modes listed from the first on; beyond them `HIGHER_MODES`."""
+HIGHER_MODES = (24, 32, 48, 64, 96, 128, 192, 256)
+
+
+def render(results: Results) -> str:
+    """Build the page from the tables and figures of a run.
+
+    Nothing is computed anew: every number comes from a table, so that page and tables agree.
+    """
+    tables = {name: read_table(results.folder / "tables" / f"{name}.json") for name in BUILDERS}
+    environment = Environment(
+        loader=FileSystemLoader(HERE),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["show"] = show
+    return environment.get_template("page.html.j2").render(
+        title=results.config["title"],
+        style=Markup((HERE / "page.css").read_text()),
+        colours=COLOURS,
+        variants=VARIANTS,
+        shown=SHOWN,
+        truth=TRUTH,
+        config=results.config,
+        tables=tables,
+        findings=findings(tables),
+        models=[_model(results, tables, model) for model in results.models],
+        convergence=[
+            {"title": results.title(model), "figure": _figure(results, f"{model}-convergence.svg")}
+            for model in results.config["convergence"]["models"]
+        ],
+        times=_figure(results, "times.svg"),
+    )
+
+
+def _model(results: Results, tables: dict[str, Table], model: str) -> dict[str, Any]:
+    description = json.loads(results.figure(f"{model}-mode.json").read_text())
+    pictures = [
+        {
+            "variant": variant,
+            "source": _data_uri(results.figure(f"{model}-mode-{variant}.png")),
+            **description[variant],
+        }
+        for variant in SHOWN
+    ]
+    return {
+        "name": model,
+        "title": results.title(model),
+        "settings": results.config["models"][model],
+        "summary": _rows(tables["summary"], model)[0],
+        "pictures": pictures,
+        "spectrum": _figure(results, f"{model}-spectrum.svg"),
+        "frequencies": _listed(_rows(tables["frequencies"], model)),
+        "errors": {row["variant"]: row for row in _rows(tables["errors"], model)},
+        "evidence": {row["variant"]: row for row in _rows(tables["evidence"], model)},
+    }
+
+
+def _rows(table: Table, model: str) -> list[dict[str, Any]]:
+    return [row for row in table.rows if row["model"] == model]
+
+
+def _listed(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    first = rows[:FIRST_MODES]
+    return first + [row for row in rows[FIRST_MODES:] if row["mode"] in HIGHER_MODES]
+
+
+def _figure(results: Results, name: str) -> Markup:
+    return Markup(themed(results.figure(name).read_text(encoding="utf-8")))
+
+
+def _data_uri(path: Path) -> str:
+    return f"data:image/png;base64,{base64.b64encode(path.read_bytes()).decode()}"
