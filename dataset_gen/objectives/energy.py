@@ -21,8 +21,8 @@ MODULUS_CEILING = 10.0
 LOG_RIDGE = 1e-6
 """Pull of log E towards log E0, as a share of the fine energies' mean square."""
 
-MAX_ITERATIONS = 60
-STEP_TOLERANCE = 1e-7
+MAX_ITERATIONS = 200
+STEP_TOLERANCE = 1e-6
 LARGEST_STEP = 1.0
 
 

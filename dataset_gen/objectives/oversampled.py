@@ -22,7 +22,7 @@ from dataset_gen.objectives.quadratic import (
     reference_moduli,
 )
 
-RIGID_SHARE = 1e-10
+RIGID_SHARE = 1e-8
 """Energy added to every field before whitening, as a share of all fields' energy."""
 
 PATCH_NODES = np.array([[x, y, z] for z in range(5) for y in range(5) for x in range(5)])
