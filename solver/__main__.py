@@ -18,6 +18,7 @@ from carillon.cli import EXIT_BAD_INPUT, EXIT_NOT_CONVERGED  # noqa: E402
 from carillon.errors import ConvergenceError, UserError  # noqa: E402
 from carillon.files import atomic_path, require_writable  # noqa: E402
 from carillon.runtime import limit_threads, warn_about_reference_blas  # noqa: E402
+from dataset_gen.arguments import Parser  # noqa: E402
 from solver import coarsening, materials  # noqa: E402
 from solver.analysis import METHODS, SolverOptions, modal_analysis  # noqa: E402
 from solver.decomposition import on_root  # noqa: E402
@@ -31,7 +32,12 @@ _PROBLEM_FIELDS = tuple(ProblemOptions.__dataclass_fields__)
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; every rank returns the same status, or the whole job is aborted."""
     comm = MPI.COMM_WORLD
-    options = _parser().parse_args(arguments)
+    try:
+        options = _parser().parse_args(arguments)
+    except UserError as error:
+        if comm.rank == 0:
+            print(f"solver: {error}", file=sys.stderr, flush=True)
+        return EXIT_BAD_INPUT
     node = comm.Split_type(MPI.COMM_TYPE_SHARED)
     limit_threads(node.size)
     node.Free()
@@ -46,8 +52,6 @@ def main(arguments: list[str] | None = None) -> int:
         if comm.size > 1 and not error.collective:
             comm.Abort(status)
         return status
-    except BrokenPipeError:
-        return 0
     except Exception:
         if comm.size == 1:
             raise
@@ -195,7 +199,7 @@ def _command_parameters(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="solver",
         description="Vibration modes of solids with spatially varying material.",
     )

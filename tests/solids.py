@@ -1,0 +1,129 @@
+"""Small solids and reference solutions that the solver's tests share."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import scipy.linalg as la
+from numpy.polynomial import legendre
+
+from dataset_gen.element import elasticity_matrix
+from solver.comparison import assembled
+from solver.geometry import HexMesh, hexmesh_from_grid
+from solver.model import ElasticModel, fine_model
+
+
+def box_mesh(nx: int, ny: int, nz: int, edge: float = 0.01) -> HexMesh:
+    """Solid box of nx x ny x nz cells."""
+    grid = np.array(list(product(range(nx), range(ny), range(nz))))
+    return hexmesh_from_grid(grid, np.zeros(3), edge)
+
+
+def random_box(nx: int, ny: int, nz: int, seed: int = 0, **constants) -> ElasticModel:
+    """Box whose cells have moduli over two decades."""
+    mesh = box_mesh(nx, ny, nz)
+    young = 1e9 * 10.0 ** np.random.default_rng(seed).uniform(-1.0, 1.0, mesh.n_cells)
+    return fine_model(mesh, young, **constants)
+
+
+def uniform_box(nx: int, ny: int, nz: int, edge: float, young: float = 1e9) -> ElasticModel:
+    """Homogeneous box."""
+    mesh = box_mesh(nx, ny, nz, edge)
+    return fine_model(mesh, np.full(mesh.n_cells, young))
+
+
+def dense_eigenvalues(model: ElasticModel) -> np.ndarray:
+    """All eigenvalues by LAPACK."""
+    K, M = assembled(model)
+    return la.eigh(K.toarray(), M.toarray(), eigvals_only=True)
+
+
+def parallelepiped_eigenvalues(
+    sides: tuple[float, float, float], young: float, poisson: float, density: float, degree: int = 9
+) -> np.ndarray:
+    """Eigenvalues of the free homogeneous parallelepiped by Rayleigh-Ritz with Legendre polynomials.
+
+    Independent of the finite elements: one global polynomial space, exact Gauss quadrature (Visscher
+    et al. 1991 use powers in the same way).
+    """
+    points, weights = legendre.leggauss(degree + 1)
+    values = legendre.legvander(points, degree)
+    slopes = np.stack(
+        [legendre.legval(points, legendre.legder(row)) for row in np.eye(degree + 1)], axis=1
+    )
+    mass = values.T @ (weights[:, None] * values)
+    stiff = slopes.T @ (weights[:, None] * slopes)
+    mixed = values.T @ (weights[:, None] * slopes)
+    indices = np.array(
+        [index for index in product(range(degree + 1), repeat=3) if sum(index) <= degree]
+    )
+    elasticity = young * elasticity_matrix(poisson)
+    half = 0.5 * np.array(sides)
+
+    def integral(a: int, b: int) -> np.ndarray:
+        """Integral of (d_a phi_m) (d_b phi_n), with a or b = 3 for no derivative."""
+        result = np.full((len(indices), len(indices)), half.prod())
+        for axis in range(3):
+            table = {(0, 0): mass, (1, 1): stiff, (0, 1): mixed, (1, 0): mixed.T}
+            factor = table[(int(a == axis), int(b == axis))]
+            scale = half[axis] ** -(int(a == axis) + int(b == axis))
+            result *= scale * factor[np.ix_(indices[:, axis], indices[:, axis])]
+        return result
+
+    lame, shear = elasticity[0, 1], elasticity[3, 3]
+    size = len(indices)
+    K = np.zeros((3, size, 3, size))
+    M = np.zeros((3, size, 3, size))
+    gradients = {(a, b): integral(a, b) for a in range(3) for b in range(3)}
+    for i in range(3):
+        M[i, :, i, :] = density * integral(3, 3)
+        for j in range(3):
+            K[i, :, j, :] += lame * gradients[i, j] + shear * gradients[j, i]
+        for k in range(3):
+            K[i, :, i, :] += shear * gradients[k, k]
+    K, M = K.reshape(3 * size, -1), M.reshape(3 * size, -1)
+    return la.eigh(K, M, eigvals_only=True)
+
+
+def timoshenko_free_frequencies(
+    length: float, side: float, young: float, poisson: float, density: float, count: int
+) -> np.ndarray:
+    """Bending frequencies [Hz] of a free beam of square section, by Timoshenko's theory.
+
+    Solved with a high-order spectral discretisation of the beam's two fields; shear coefficient of
+    Cowper (1966) for a rectangle.
+    """
+    shear_coefficient = 10.0 * (1.0 + poisson) / (12.0 + 11.0 * poisson)
+    area, inertia = side**2, side**4 / 12.0
+    shear = shear_coefficient * area * young / (2.0 * (1.0 + poisson))
+    degree = 24
+    points, weights = legendre.leggauss(degree + 2)
+    values = legendre.legvander(points, degree)
+    slopes = np.stack(
+        [legendre.legval(points, legendre.legder(row)) for row in np.eye(degree + 1)], axis=1
+    )
+    slopes *= 2.0 / length
+    weights = weights * length / 2.0
+
+    def form(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+        return left.T @ (weights[:, None] * right)
+
+    K = np.block(
+        [
+            [shear * form(slopes, slopes), -shear * form(slopes, values)],
+            [
+                -shear * form(values, slopes),
+                young * inertia * form(slopes, slopes) + shear * form(values, values),
+            ],
+        ]
+    )
+    zero = np.zeros((degree + 1, degree + 1))
+    M = np.block(
+        [
+            [density * area * form(values, values), zero],
+            [zero, density * inertia * form(values, values)],
+        ]
+    )
+    values_ = la.eigh(K, M, eigvals_only=True)
+    return np.sqrt(values_[2 : 2 + count]) / (2.0 * np.pi)

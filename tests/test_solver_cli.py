@@ -1,0 +1,184 @@
+"""The solver's commands: what they write, and one sentence for everything that can be wrong."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+
+from solver.geometry import hexmesh_from_voxels, load_surface, voxelize
+from solver.modes_file import read_modes
+
+BAR = ("builtin:bar", "--resolution", "16")
+
+
+@pytest.fixture(scope="module")
+def modes_file(tmp_path_factory, run_cli):
+    path = tmp_path_factory.mktemp("modes") / "modes.h5"
+    run_cli(
+        "solver", "modes", *BAR, "--material", "two-region", "--modes", "30", "--out", path, check=True
+    )
+    return path
+
+
+@pytest.fixture(scope="module")
+def n_voxels() -> int:
+    return hexmesh_from_voxels(voxelize(load_surface("builtin:bar"), 16)).n_cells
+
+
+def test_modes_file_is_complete(modes_file):
+    file = read_modes(modes_file)
+    k, n = 30, file.mesh.n_dofs
+    assert file.eigenvalues.shape == file.frequencies.shape == file.residuals.shape == (k,)
+    assert file.modes.shape == (n, k)
+    assert np.allclose(file.frequencies, np.sqrt(file.eigenvalues) / (2 * np.pi))
+    assert file.attributes["method"] == "hcms"
+    assert file.attributes["density"] == 1000.0
+    assert set(file.attributes["timings"]) >= {"mesh", "material", "assembly", "hcms", "correction"}
+    assert set(file.provenance) >= {"commit", "config_hash", "command", "versions", "blas"}
+    with h5py.File(modes_file) as raw:
+        assert raw["nodes"].attrs["units"] == "m"
+        assert raw["eigenvalues"].attrs["units"] == "rad^2/s^2"
+        assert all(dataset.fletcher32 for dataset in raw.values() if isinstance(dataset, h5py.Dataset))
+
+
+def test_compare_of_a_file_with_itself(modes_file, run_cli):
+    done = run_cli("solver", "compare", modes_file, modes_file, "--json", check=True)
+    result = json.loads(done.stdout)
+    assert set(result["eigenvalue_relative_error"]) == {"median", "p90", "max"}
+    assert result["eigenvalue_relative_error"]["max"] == 0.0
+    assert result["frequency_rms_relative_error"] == 0.0
+    assert result["subspace_angle_max"] < 1e-6
+    stored = read_modes(modes_file).residuals.max()
+    assert result["residual_max"] == pytest.approx(stored, rel=1e-3, abs=1e-12)
+
+
+def test_summary_as_json(tmp_path, run_cli):
+    out = tmp_path / "modes.h5"
+    done = run_cli("solver", "modes", *BAR, "--modes", "12", "--out", out, "--json", check=True)
+    summary = json.loads(done.stdout)
+    assert summary["rigid_modes"] == 6
+    assert len(summary["frequencies_hz"]) == 12
+
+
+def test_benchmark_row_names_every_method(tmp_path, run_cli):
+    out = tmp_path / "row.json"
+    done = run_cli(
+        "solver", "benchmark", *BAR, "--modes", "20", "--runs", "1", "--json", "--out", out, check=True
+    )
+    row = json.loads(done.stdout)
+    assert row["methods"] == json.loads(out.read_text())["methods"]
+    assert set(row["methods"]) == {"slepc", "arpack", "hcms", "hcms_ec", "average_hcms_ec"}
+    assert row["methods"]["hcms_ec"]["frequency_rms_relative_error"] < 1e-6
+
+
+def arrays(n: int) -> dict[str, np.ndarray]:
+    return {
+        "short": np.ones(n - 1),
+        "negative": np.r_[np.ones(n - 1), -1.0],
+        "nan": np.r_[np.nan, np.ones(n - 1)],
+        "zero": np.zeros(n),
+        "hole": np.r_[0.0, np.ones(n - 1)],
+        "text": np.array(["a"] * n),
+    }
+
+
+@pytest.mark.parametrize(
+    ("kind", "sentence"),
+    [
+        ("short", "values for"),
+        ("negative", "1 values are negative"),
+        ("nan", "1 values are not finite"),
+        ("zero", "values are zero"),
+        ("hole", "1 voxels have modulus zero"),
+        ("text", "is not readable as an array of numbers"),
+    ],
+)
+def test_bad_material_array(kind, sentence, tmp_path, run_cli, n_voxels):
+    material = tmp_path / "young.npy"
+    np.save(material, arrays(n_voxels)[kind])
+    expect_sentence(run_cli, tmp_path, [*BAR, "--material", material], sentence)
+
+
+def test_material_array_of_the_right_length_is_used(tmp_path, run_cli, n_voxels):
+    material = tmp_path / "young.npy"
+    np.save(material, np.full(n_voxels, 2e9))
+    out = tmp_path / "modes.h5"
+    run_cli(
+        "solver", "modes", *BAR, "--material", material, "--modes", "10", "--out", out, check=True
+    )
+    assert (read_modes(out).model.young == 2e9).all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["nothing.obj", "--resolution", "16"], "nothing.obj"),
+        (["builtin:gong", "--resolution", "16"], "gong"),
+        (["builtin:bar", "--resolution", "1"], "resolution 1"),
+        ([*BAR, "--material", "steel"], "material 'steel'"),
+        ([*BAR, "--modes", "100000"], "100,000 modes asked for"),
+        ([*BAR, "--modes", "0"], "0 modes asked for"),
+        ([*BAR, "--coarsen", "ddfem"], "needs trained forests"),
+        ([*BAR, "--coarsen", "ddfem", "--forest", "absent.h5"], "absent.h5"),
+        ([*BAR, "--poisson", "0.5"], "Poisson's ratio 0.5"),
+        ([*BAR, "--density", "-1"], "density -1"),
+        ([*BAR, "--unit", "0"], "unit"),
+        ([*BAR, "--subdomains", "100000"], "100000 subdomains"),
+        ([*BAR, "--method", "magic"], "magic"),
+    ],
+)
+def test_bad_arguments(arguments, sentence, tmp_path, run_cli):
+    expect_sentence(run_cli, tmp_path, arguments, sentence)
+
+
+def test_unwritable_output_is_found_before_the_work(tmp_path, run_cli):
+    for out in (tmp_path / "absent" / "modes.h5", tmp_path):
+        done = run_cli("solver", "modes", *BAR, "--modes", "10", "--out", out)
+        assert done.returncode == 2
+        assert done.stderr.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_damaged_and_foreign_files(modes_file, tmp_path, run_cli):
+    cut = tmp_path / "cut.h5"
+    cut.write_bytes(modes_file.read_bytes()[:2000])
+    older = tmp_path / "older.h5"
+    shutil.copy(modes_file, older)
+    with h5py.File(older, "r+") as file:
+        file.attrs["schema_version"] = 0
+    flipped = tmp_path / "flipped.h5"
+    shutil.copy(modes_file, flipped)
+    with h5py.File(flipped, "r+") as file:
+        offset = file["modes"].id.get_chunk_info(0).byte_offset
+    with open(flipped, "rb+") as raw:
+        raw.seek(offset)
+        raw.write(b"\xff" * 64)
+    gutted = tmp_path / "gutted.h5"
+    shutil.copy(modes_file, gutted)
+    with h5py.File(gutted, "r+") as file:
+        del file["modes"]
+    for path, sentence in (
+        (cut, "not readable as HDF5"),
+        (older, "schema 0"),
+        (flipped, "damaged"),
+        (gutted, "incomplete"),
+        (tmp_path / "absent.h5", "no such file"),
+    ):
+        done = run_cli("solver", "compare", path, modes_file)
+        assert done.returncode == 2, done.stderr
+        assert sentence in done.stderr
+        assert done.stderr.count("\n") == 1
+
+
+def expect_sentence(run_cli, folder, arguments, sentence) -> None:
+    out = folder / "modes.h5"
+    before = set(folder.iterdir())
+    done = run_cli("solver", "modes", *arguments, "--out", out)
+    assert done.returncode == 2, done.stderr
+    assert sentence in done.stderr
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert set(folder.iterdir()) == before

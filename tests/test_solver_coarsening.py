@@ -1,0 +1,69 @@
+"""The coarse model: mass, stiffness bounds, and spectra near the fine one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.linalg as la
+import scipy.sparse as sp
+from mpi4py import MPI
+
+from solver.analysis import SolverOptions, modal_analysis
+from solver.coarsening import build_model
+from solver.comparison import assembled
+from solver.geometry import blocks_from_mesh, hexmesh_from_grid, prolongation
+from tests import solids
+
+
+def carved_box(nx: int, ny: int, nz: int):
+    """Mesh of a box with a corner and a groove cut away, so that some blocks are partly void."""
+    grid = solids.box_mesh(nx, ny, nz).grid
+    corner = (grid >= np.array([nx, ny, nz]) - 3).all(axis=1)
+    groove = (grid[:, 0] == 2) & (grid[:, 2] == nz - 1)
+    return hexmesh_from_grid(grid[~(corner | groove)], np.zeros(3), 0.01)
+
+
+def test_galerkin_coarsening_is_the_projection_of_the_fine_matrices():
+    mesh = carved_box(6, 5, 4)
+    young = 10.0 ** np.random.default_rng(1).uniform(7.0, 10.0, mesh.n_cells)
+    fine = build_model(mesh, young)
+    coarse = build_model(mesh, young, "galerkin")
+    P = sp.kron(prolongation(mesh, blocks_from_mesh(mesh).coarse), sp.identity(3))
+    for fine_matrix, coarse_matrix in zip(assembled(fine), assembled(coarse), strict=True):
+        projected = (P.T @ fine_matrix @ P).toarray()
+        assert np.allclose(coarse_matrix.toarray(), projected, atol=1e-12 * np.abs(projected).max())
+
+
+@pytest.mark.parametrize("method", ["average", "galerkin", "fit"])
+def test_coarse_model_has_the_mass_of_the_fine_one(method):
+    mesh = carved_box(7, 5, 4)
+    young = np.full(mesh.n_cells, 1e9)
+    fine, coarse = build_model(mesh, young), build_model(mesh, young, method)
+    assert coarse.mass == pytest.approx(fine.mass, rel=1e-12)
+    _, M = assembled(coarse)
+    translation = np.tile([1.0, 0.0, 0.0], coarse.mesh.n_nodes)
+    assert translation @ (M @ translation) == pytest.approx(fine.mass, rel=1e-12)
+
+
+def test_coarse_models_are_sound_where_cells_are_void():
+    mesh = carved_box(7, 5, 5)
+    young = 10.0 ** np.random.default_rng(2).uniform(7.0, 10.0, mesh.n_cells)
+    K, M = assembled(build_model(mesh, young, "fit"))
+    values = la.eigh(K.toarray(), M.toarray(), eigvals_only=True)
+    assert np.abs(values[:6]).max() < 1e-9 * values[-1]
+    assert values[6] > 1e-6 * values[-1]
+
+
+@pytest.mark.parametrize("contrast", [0.0, 1.0])
+def test_fitted_coarsening_beats_galerkin_and_average(contrast):
+    mesh = solids.box_mesh(12, 8, 8)
+    young = 1e9 * 10.0 ** (contrast * np.random.default_rng(3).uniform(-1.0, 1.0, mesh.n_cells))
+    options = SolverOptions(method="slepc", modes=30, prove=False)
+    error = {}
+    exact = modal_analysis(build_model(mesh, young), options, MPI.COMM_SELF).values[6:]
+    for method in ("average", "galerkin", "fit"):
+        model = build_model(mesh, young, method)
+        values = modal_analysis(model, options, MPI.COMM_SELF).values[6:]
+        error[method] = np.sqrt(np.mean((np.sqrt(values / exact) - 1.0) ** 2))
+    assert error["fit"] < 0.8 * error["galerkin"]
+    assert error["galerkin"] <= error["average"] * (1.0 + 1e-9)

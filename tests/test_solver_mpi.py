@@ -1,0 +1,114 @@
+"""The solver on several ranks: the same result, and no rank left waiting after an error."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from solver.comparison import compare_files
+from solver.modes_file import read_modes
+
+pytestmark = pytest.mark.mpi
+
+MODEL = ("builtin:bar", "--resolution", "24", "--material", "smooth", "--subdomains", "6")
+MODES = ("--modes", "50")
+
+
+@pytest.fixture(scope="module")
+def truth(tmp_path_factory, run_cli) -> Path:
+    path = tmp_path_factory.mktemp("truth") / "truth.h5"
+    run_cli("solver", "modes", *MODEL, *MODES, "--method", "slepc", "--out", path, check=True)
+    return path
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3, 4])
+def test_corrected_modes_on_any_number_of_ranks(ranks, truth, tmp_path, mpiexec):
+    out = tmp_path / "modes.h5"
+    options = ("--tol", "1e-11", "--out", out)
+    mpiexec(ranks, "solver", "modes", *MODEL, *MODES, *options, check=True)
+    comparison = compare_files(out, truth)
+    assert comparison.eigenvalue_relative_error["max"] < 1e-10
+    assert comparison.subspace_angle_max < 1e-4
+    assert read_modes(out).attributes["ranks"] == ranks
+
+
+@pytest.mark.parametrize("interface", ["free", "fixed"])
+def test_synthesis_is_the_same_on_1_2_and_3_ranks(interface, tmp_path, mpiexec):
+    values = []
+    for ranks in (1, 2, 3):
+        out = tmp_path / f"{ranks}.h5"
+        options = ("--corrections", "0", "--interface", interface, "--out", out)
+        mpiexec(ranks, "solver", "modes", *MODEL, *MODES, *options, check=True)
+        values.append(read_modes(out).eigenvalues)
+    for other in values[1:]:
+        # Local modes come from an iterative solver, converged to 1e-5 in the residual.
+        assert np.abs(other - values[0]).max() < 1e-8 * values[0][-1]
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_ground_truth_in_parallel(ranks, truth, tmp_path, mpiexec):
+    out = tmp_path / "modes.h5"
+    options = ("--method", "slepc", "--out", out)
+    mpiexec(ranks, "solver", "modes", *MODEL, *MODES, *options, check=True)
+    assert compare_files(out, truth).eigenvalue_relative_error["max"] < 1e-9
+    attributes = read_modes(out).attributes
+    assert attributes["inertia_count"] == attributes["inertia_expected"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("missing.obj", "--resolution", "20"), "missing.obj"),
+        (("builtin:bar", "--resolution", "20", "--material", "absent.npy"), "absent.npy"),
+        (("builtin:bar", "--resolution", "20", "--subdomains", "2"), "3 ranks for 2 subdomains"),
+        (("builtin:bar", "--resolution", "6", "--modes", "5000"), "modes asked for"),
+    ],
+)
+def test_bad_input_ends_all_ranks_with_one_sentence(arguments, sentence, tmp_path, mpiexec):
+    out = tmp_path / "modes.h5"
+    done = mpiexec(3, "solver", "modes", *arguments, "--out", out, timeout=60)
+    assert done.returncode == 2
+    lines = [line for line in done.stderr.splitlines() if line.startswith("solver modes:")]
+    assert len(lines) == 1
+    assert sentence in lines[0]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_failure_of_one_rank_ends_the_others(tmp_path, mpiexec):
+    program = tmp_path / "one_fails.py"
+    program.write_text(
+        "import sys\n"
+        "from mpi4py import MPI\n"
+        "import solver.hcms.synthesis as synthesis\n"
+        "from carillon.errors import LocalConvergenceError\n"
+        "from solver.__main__ import main\n"
+        "def fail(*arguments):\n"
+        "    if MPI.COMM_WORLD.rank == 1:\n"
+        "        raise LocalConvergenceError('planted')\n"
+        "    return original(*arguments)\n"
+        "original, synthesis.local_modes = synthesis.local_modes, fail\n"
+        f"sys.exit(main(['modes', *{MODEL!r}, '--modes', '30', '--out', 'x.h5']))\n"
+    )
+    done = mpiexec(3, program, timeout=60, cwd=tmp_path)
+    assert done.returncode != 0
+    assert "solver modes: planted" in done.stderr
+    assert not (tmp_path / "x.h5").exists()
+
+
+def test_convergence_command_shows_that_synthesis_is_the_better_start(tmp_path, mpiexec):
+    histories = []
+    for ranks in (1, 2):
+        out = tmp_path / f"{ranks}.json"
+        mpiexec(ranks, "solver", "convergence", *MODEL[:5], *MODES, "--out", out, check=True)
+        histories.append(json.loads(out.read_text())["start"])
+    for start in ("hcms-free", "hcms-fixed", "random"):
+        one, two = (np.array(history[start]) for history in histories)
+        assert one.shape == (4, 44)
+        assert (np.diff(one, axis=0) <= 1e-9 * one[-1, -1]).all()
+        # The lowest modes have settled, whatever the number of ranks.
+        assert np.allclose(one[-1, :5], two[-1, :5], rtol=1e-4)
+    synthesised, drawn = (np.array(histories[0][start]) for start in ("hcms-free", "random"))
+    assert (synthesised[1] <= drawn[1]).all()

@@ -1,0 +1,233 @@
+"""What a spectrum must satisfy, whatever computed it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.linalg as la
+import scipy.sparse as sp
+from mpi4py import MPI
+
+from carillon.errors import ConvergenceError, UserError
+from dataset_gen.element import rigid_motions
+from solver.analysis import RIGID_MODES, SolverOptions, modal_analysis
+from solver.comparison import assembled, clusters, subspace_angles
+from solver.correction import correct
+from solver.decomposition import decompose
+from solver.hcms.condense import restrict_stiffness
+from solver.hcms.synthesis import synthesize
+from solver.model import fine_model
+from solver.system import assemble
+from solver.truth import count_below, solve_truth
+from tests import solids
+
+COMM = MPI.COMM_SELF
+POISSON = 0.25
+DENSITY = 1000.0
+
+
+def spectrum(model, **options) -> np.ndarray:
+    """Eigenvalues by `modal_analysis` on one rank."""
+    return modal_analysis(model, SolverOptions(**options), COMM).values
+
+
+@pytest.mark.parametrize("lumped", [False, True])
+def test_ritz_values_bound_the_spectrum_and_fall_with_more_modes(lumped):
+    model = solids.random_box(8, 5, 3, lumped=lumped)
+    exact = solids.dense_eigenvalues(model)
+    decomposition = decompose(model.mesh, 5, comm=COMM)
+    before = np.full(40, np.inf)
+    for keep in (60, 110, 200):
+        values = synthesize(model, decomposition, keep, "free", COMM).values[:40]
+        slack = 1e-9 * exact[40]
+        assert (values >= exact[:40] - slack).all()
+        assert (values <= before + slack).all()
+        before = values
+
+
+@pytest.mark.parametrize("interface", ["free", "fixed"])
+@pytest.mark.parametrize("subdomains", [1, 2, 5])
+@pytest.mark.parametrize("lumped", [False, True])
+def test_all_modes_kept_equal_the_full_solve(interface, subdomains, lumped):
+    model = solids.random_box(6, 4, 3, lumped=lumped)
+    exact = solids.dense_eigenvalues(model)
+    decomposition = decompose(model.mesh, subdomains, comm=COMM)
+    result = synthesize(model, decomposition, 10**6, interface, COMM)
+    # The eigenvalues of a backward stable solver are off by rounding of the largest one.
+    assert np.abs(result.values - exact).max() <= 1e-12 * exact[-1]
+    K, M = assembled(model)
+    order = (3 * decomposition.order[:, None] + np.arange(3)).ravel()
+    vectors = np.empty_like(result.vectors)
+    vectors[order] = result.vectors
+    gram = vectors.T @ (M @ vectors)
+    assert np.abs(gram - np.eye(len(gram))).max() < 1e-10
+    residual = K @ vectors - (M @ vectors) * result.values
+    assert np.abs(residual).max() < 1e-11 * np.abs(K).max() * np.abs(vectors).max()
+
+
+def test_element_restricted_to_its_nodes_relaxes_or_holds_the_others():
+    element = fine_model(solids.box_mesh(1, 1, 1), np.array([1e9])).stiffness()
+    everything = np.ones((1, 8), dtype=bool)
+    for interface in ("free", "fixed"):
+        whole = restrict_stiffness(element, everything, interface)
+        assert np.allclose(whole, element)
+    for code in range(1, 255):
+        inside = np.array([[code >> corner & 1 for corner in range(8)]], dtype=bool)
+        relaxed = restrict_stiffness(element, inside, "free")[0]
+        held = restrict_stiffness(element, inside, "fixed")[0]
+        scale = np.abs(element).max()
+        assert la.eigvalsh(relaxed)[0] > -1e-12 * scale
+        assert la.eigvalsh(held - relaxed)[0] > -1e-12 * scale
+        # Relaxed: free-standing, so rigid motions of the kept nodes cost nothing.
+        nodes = np.where(inside[0][:, None], solids.box_mesh(1, 1, 1).nodes, 0.0)
+        motion = np.repeat(inside[0], 3)[:, None] * rigid_motions(nodes)
+        assert np.abs(relaxed @ motion).max() < 1e-9 * scale * np.abs(motion).max()
+
+
+@pytest.mark.parametrize("interface", ["free", "fixed"])
+@pytest.mark.parametrize("degree", [1, 3])
+def test_corrected_modes_are_as_accurate_as_the_solver_says(interface, degree):
+    model = solids.random_box(12, 6, 5)
+    exact = solids.dense_eigenvalues(model)[:60]
+    result = modal_analysis(
+        model, SolverOptions(modes=60, interface=interface, degree=degree, subdomains=6), COMM
+    )
+    error = np.abs(result.values[6:] / exact[6:] - 1.0)
+    assert error.max() <= 1e-7
+    assert result.evidence["eigenvalue_error_estimate"] <= 1e-7
+    assert result.evidence["rigid_modes"] == RIGID_MODES
+    assert result.evidence["orthogonality"] < 1e-10
+
+
+def test_error_estimate_follows_the_true_error():
+    model = solids.random_box(12, 6, 5)
+    exact = solids.dense_eigenvalues(model)
+    decomposition = decompose(model.mesh, 6, comm=COMM)
+    system = assemble(model, decomposition, COMM)
+    start = synthesize(model, decomposition, 110, "free", COMM).vectors
+    steps = {}
+    result = correct(
+        system,
+        start,
+        50,
+        tolerance=0.0,
+        max_steps=4,
+        degree=1,
+        observe=lambda step, values: steps.update({step: values}),
+    )
+    for step, estimate in enumerate(result.history):
+        true = (steps[step] / exact[6:56] - 1.0).max()
+        assert 0.2 * true <= estimate <= 20.0 * true
+
+
+def test_correction_that_misses_its_tolerance_says_so():
+    model = solids.random_box(12, 6, 5)
+    with pytest.raises(ConvergenceError, match="eigenvalue error of .* was asked for"):
+        spectrum(model, modes=60, corrections=1, tolerance=1e-12, degree=1, subdomains=6)
+
+
+@pytest.mark.parametrize("method", ["slepc", "arpack"])
+def test_ground_truth_equals_lapack_and_is_proven_complete(method):
+    model = solids.random_box(8, 5, 4)
+    exact = solids.dense_eigenvalues(model)[:50]
+    result = modal_analysis(model, SolverOptions(method=method, modes=50), COMM)
+    assert np.abs(result.values[6:] / exact[6:] - 1.0).max() < 1e-9
+    assert result.evidence["inertia_count"] == result.evidence["inertia_expected"] >= 50
+    assert result.residuals.max() < 1e-8
+
+
+def test_inertia_counts_eigenvalues():
+    model = solids.random_box(6, 4, 3)
+    exact = solids.dense_eigenvalues(model)
+    system = assemble(model, decompose(model.mesh, 2, comm=COMM), COMM)
+    for count in (6, 7, 30, 100):
+        between = 0.5 * (exact[count - 1] + exact[count])
+        assert count_below(system, between) == count
+
+
+def test_missed_eigenvalue_is_caught(monkeypatch):
+    import solver.truth as truth
+
+    collect = truth._collect
+
+    def lose_one(system, eigensolver, count):
+        values, vectors = collect(system, eigensolver, count)
+        keep = np.delete(np.arange(count), 20)
+        return values[keep], np.asfortranarray(vectors[:, keep])
+
+    monkeypatch.setattr(truth, "_collect", lose_one)
+    model = solids.random_box(6, 4, 3)
+    system = assemble(model, decompose(model.mesh, 2, comm=COMM), COMM)
+    with pytest.raises(ConvergenceError, match="were missed"):
+        solve_truth(system, model.mesh.nodes, 40)
+
+
+def test_spectrum_scales_exactly_with_modulus_and_size():
+    base = solids.random_box(7, 4, 4)
+    values = spectrum(base, modes=40, tolerance=1e-12)
+    stiffer = fine_model(base.mesh, 4.0 * base.young[:, 0])
+    assert np.allclose(spectrum(stiffer, modes=40, tolerance=1e-12)[6:], 4.0 * values[6:], rtol=1e-9)
+    larger = fine_model(solids.box_mesh(7, 4, 4, edge=0.02), base.young[:, 0])
+    # Frequencies go with 1 / size, eigenvalues with its square.
+    assert np.allclose(spectrum(larger, modes=40, tolerance=1e-12)[6:], values[6:] / 4.0, rtol=1e-9)
+
+
+def test_box_converges_to_the_free_parallelepiped_at_second_order():
+    sides = (0.12, 0.08, 0.04)
+    exact = solids.parallelepiped_eigenvalues(sides, 1e9, POISSON, DENSITY)[6:16]
+    errors = []
+    for cells in (4, 8):
+        model = solids.uniform_box(3 * cells // 2, cells, cells // 2, 0.08 / cells)
+        values = spectrum(model, method="slepc", modes=16)[6:]
+        errors.append(np.sqrt(values / exact) - 1.0)
+    coarse, fine = errors
+    assert (fine > 0.0).all()
+    rates = np.log2(coarse / fine)
+    assert 1.8 < np.median(rates) < 2.3
+    assert fine.max() < 0.06
+
+
+def test_slender_bar_bends_as_timoshenko_says():
+    length, side = 0.32, 0.04
+    frequencies = []
+    for cells in (4, 8):
+        model = solids.uniform_box(8 * cells, cells, cells, side / cells)
+        values = spectrum(model, method="slepc", modes=12)
+        frequencies.append(np.sqrt(values[6]) / (2.0 * np.pi))
+    expected = solids.timoshenko_free_frequencies(length, side, 1e9, POISSON, DENSITY, 1)[0]
+    # Richardson extrapolation of a second-order element.
+    extrapolated = frequencies[1] + (frequencies[1] - frequencies[0]) / 3.0
+    assert abs(extrapolated / expected - 1.0) < 0.005
+
+
+def test_clustered_modes_of_a_cube_span_the_same_subspaces():
+    model = solids.uniform_box(6, 6, 6, 0.01)
+    K, M = assembled(model)
+    exact, truth = la.eigh(K.toarray(), M.toarray(), subset_by_index=[6, 60])
+    result = modal_analysis(model, SolverOptions(modes=61, tolerance=1e-10, subdomains=5), COMM)
+    vectors = result.system.gather(result.vectors)[:, 6:]
+    groups = clusters(exact)[:-1]
+    assert max(group.stop - group.start for group in groups) >= 3
+    angles = subspace_angles(vectors, truth, sp.csr_matrix(M), groups)
+    assert angles.max() < 1e-3
+
+
+def test_more_modes_than_unknowns_is_an_error():
+    model = solids.uniform_box(1, 1, 1, 0.01)
+    with pytest.raises(UserError, match="30 modes asked for, but the model has 24 unknowns"):
+        spectrum(model, modes=30)
+
+
+def test_every_mode_of_a_tiny_model_can_be_asked_for():
+    model = solids.random_box(2, 2, 1)
+    exact = solids.dense_eigenvalues(model)
+    values = spectrum(model, modes=model.n_dofs)
+    assert np.allclose(values[6:], exact[6:], rtol=1e-9)
+
+
+def test_hinged_model_is_refused():
+    grid = np.array([[0, 0, 0], [1, 1, 0]])
+    mesh = solids.hexmesh_from_grid(grid, np.zeros(3), 0.01)
+    model = fine_model(mesh, np.full(2, 1e9))
+    with pytest.raises(ConvergenceError, match="zero-frequency modes found"):
+        spectrum(model, modes=20)
