@@ -38,7 +38,7 @@ class Training:
 
     trees: int = 3
     depth: int = 20
-    min_leaf: int = 5
+    min_leaf: int = 10
     structure_rows: int = 400_000
     prior: float = 0.02
     uniform_weight: float = 20.0
