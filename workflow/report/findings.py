@@ -21,7 +21,7 @@ class Findings:
     hcms_error, hcms_ec_error
         Worst relative eigenvalue error of any model without and with error correction.
     ddfem_error, ddfem_errors
-        Median over the models, and smallest and largest, of the coarsened mesh's rms frequency error.
+        Median over the models, and range, of the coarsened mesh's rms frequency error.
     average_error, galerkin_error
         The same median for the other coarsenings.
     speed_up, speed_ups

@@ -34,7 +34,10 @@ def training(results: Results) -> Table:
         _row("partly_void", "… that are partly void", "percent", _mean(shards, "partly_void")),
         _row("at_floor", "… moduli that ended at the floor", "percent", _mean(shards, "at_floor")),
     ]
-    rows += [_score(name, value) for name, value in forests["scores"].items()]
+    scores = forests["scores"]
+    known = [name for name in LABELS if name in scores]
+    others = [name for name in scores if name not in LABELS]
+    rows += [_score(name, scores[name]) for name in known + others]
     rows += [
         _row("trees", "Trees of each of the two forests", "count", forests["trees"]),
         _row("leaves", "Leaves", "count", forests["leaves"]),

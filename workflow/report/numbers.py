@@ -8,8 +8,8 @@ from typing import Any
 
 MISSING = "–"
 ROUNDING = 1e-9
-"""Relative errors below this are not told apart: the eigensolvers' own tolerances are no smaller."""
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+"""Relative errors below this are not told apart: the eigensolvers' tolerances are no smaller."""
+_SUPERSCRIPTS = dict(zip(map(ord, "-0123456789"), "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
 def show(value: Any, kind: str = "text") -> str:
@@ -52,12 +52,12 @@ def _seconds(value: float) -> str:
 
 def _angle(radians: float) -> str:
     degrees = math.degrees(radians)
-    return f"{_digits(degrees, 2) if degrees >= 0.01 else _power(degrees)}°"
+    return f"{_digits(degrees, 2)}°" if degrees >= 1e-3 else "< 0.001°"
 
 
 def _bytes(value: float) -> str:
-    if value < 1e5:
-        return f"{_digits(value / 1e3, 2)} kB" if value else "0"
+    if value < 1e6:
+        return f"{_digits(value / 1e3, 3)} kB" if value else "0"
     return f"{_digits(value / 1e6, 3)} MB" if value < 1e9 else f"{_digits(value / 1e9, 3)} GB"
 
 
@@ -88,5 +88,5 @@ _FORMATS: dict[str, Callable[[Any], str]] = {
     "angle": _angle,
     "bytes": _bytes,
     "fraction": lambda value: _digits(value, 3),
-    "range": lambda value: f"{value[0]:g}…{value[1]:g}",
+    "range": lambda value: f"{value[0]:,.0f}…{value[1]:,.0f}",
 }

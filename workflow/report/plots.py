@@ -39,7 +39,7 @@ def spectrum_figure(frequencies: Table, model: str) -> Figure:
     mode = [row["mode"] for row in rows]
     with plt.rc_context(SETTINGS):
         figure, (above, below) = plt.subplots(
-            2, 1, figsize=(5.4, 5.2), sharex=True, height_ratios=(1, 1.15)
+            2, 1, figsize=(4.7, 5.0), sharex=True, height_ratios=(1, 1.15)
         )
         for variant in SHOWN:
             style = {"color": COLOURS[variant], "label": VARIANTS[variant].label, **LINES[variant]}

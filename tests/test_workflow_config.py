@@ -1,0 +1,119 @@
+"""Configuration: schema, defaults, and what is said about mistakes."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+
+import pytest
+import yaml
+from jsonschema import Draft202012Validator
+
+from carillon.errors import UserError
+from workflow import settings
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+CONFIGS = CHECKOUT / "workflow" / "config"
+
+
+def load(name: str) -> dict:
+    return yaml.safe_load((CONFIGS / f"{name}.yaml").read_text())
+
+
+def defaults_of(schema: dict) -> dict:
+    """Every default of a schema, nested as in the configuration."""
+    found = {}
+    for key, part in schema.get("properties", {}).items():
+        if part.get("type") == "object" and "properties" in part:
+            found[key] = defaults_of(part)
+        elif "default" in part:
+            found[key] = part["default"]
+    return found
+
+
+def every_key(schema: dict, path: str = "") -> list[tuple[str, dict]]:
+    found = []
+    parts = dict(schema.get("properties", {}))
+    if isinstance(schema.get("additionalProperties"), dict):
+        parts["*"] = schema["additionalProperties"]
+    for key, part in parts.items():
+        found += [(f"{path}{key}", part), *every_key(part, f"{path}{key}.")]
+    return found
+
+
+def test_schema_is_a_schema():
+    Draft202012Validator.check_schema(settings.schema())
+
+
+def test_every_key_has_a_description_and_objects_admit_no_unknown_key():
+    for path, part in every_key(settings.schema()):
+        assert part.get("description"), f"{path} has no description"
+        if part.get("type") == "object":
+            assert "additionalProperties" in part, f"{path} admits unknown keys"
+
+
+def test_default_configuration_states_the_defaults_of_the_schema():
+    config = load("default")
+    del config["models"]
+    expected = defaults_of(settings.schema())
+    # Which model is shown depends on the models, which have no default.
+    assert config["convergence"].pop("models")
+    expected["convergence"].pop("models")
+    assert config == expected
+
+
+@pytest.mark.parametrize("name", ["default", "tiny", "meshes"])
+def test_every_configuration_fits_the_schema(name):
+    settings.check(load(name))
+
+
+def test_default_run_needs_no_file_and_four_models_or_more():
+    config = load("default")
+    assert len(config["models"]) >= 4
+    assert all(model["mesh"].startswith("builtin:") for model in config["models"].values())
+
+
+@pytest.mark.parametrize(
+    ("keys", "value", "says"),
+    [
+        (("models", "bell", "resolution"), "fine", ["models.bell.resolution", "voxels"]),
+        (("models", "bell", "colour"), "red", ["models.bell", "colour"]),
+        (("models", "Big Bell"), {"mesh": "builtin:bell", "resolution": 20}, ["Big Bell"]),
+        (("models",), {}, ["models"]),
+        (("poisson",), 0.5, ["poisson", "0.5"]),
+        (("solver", "modes"), 3, ["solver.modes", "12"]),
+        (("solver", "interface"), "loose", ["solver.interface", "free", "fixed"]),
+        (("dataset", "objective"), "guess", ["dataset.objective", "hybrid"]),
+    ],
+)
+def test_a_bad_value_is_answered_in_one_sentence(keys, value, says):
+    config = copy.deepcopy(load("default"))
+    target = config
+    for key in keys[:-1]:
+        target = target[key]
+    target[keys[-1]] = value
+    with pytest.raises(UserError) as caught:
+        settings.check(config)
+    message = str(caught.value)
+    assert "\n" not in message
+    for word in says:
+        assert word in message
+
+
+def test_a_missing_mesh_file_and_an_unknown_model_are_named(tmp_path):
+    config = load("meshes")
+    config["mesh_folder"] = str(tmp_path)
+    with pytest.raises(UserError, match=r"models\.bunny: there is no file .*stanford-bunny\.obj"):
+        settings.check_links(config)
+    config["models"] = {"bell": config["models"]["bell"]}
+    with pytest.raises(UserError, match="'bunny' is not among the models bell"):
+        settings.check_links(config)
+
+
+def test_materials_and_objectives_of_the_schema_exist():
+    from dataset_gen.objectives import OBJECTIVES
+
+    schema = settings.schema()["properties"]
+    assert set(schema["dataset"]["properties"]["objective"]["enum"]) == set(OBJECTIVES)
+    material = schema["models"]["additionalProperties"]["properties"]["material"]["description"]
+    assert all(name in material for name in settings.MATERIALS)

@@ -1,0 +1,80 @@
+"""The rules: they lint, and the default run is planned as promised."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+
+
+def snakemake(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
+    """Run Snakemake on the Snakefile of the checkout, with `folder` as working directory."""
+    command = [sys.executable, "-m", "snakemake", "-s", CHECKOUT / "Snakefile", *arguments]
+    environment = {**os.environ, "PYTHONPATH": str(CHECKOUT)}
+    return subprocess.run(
+        [str(part) for part in command],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+
+
+def planned(output: str) -> dict[str, int]:
+    """Jobs of a dry run by rule."""
+    lines = output[output.index("Job stats:") :].splitlines()[3:]
+    table = [line.split() for line in lines[: lines.index("")]]
+    return {rule: int(count) for rule, count in table}
+
+
+def test_default_run_is_planned_without_a_gap(tmp_path):
+    done = snakemake(tmp_path, "--dry-run", "--cores", 2)
+    assert done.returncode == 0, done.stdout + done.stderr
+    jobs = planned(done.stdout + done.stderr)
+    models, shards = 4, 4
+    assert jobs["generate_shard"] == shards
+    assert jobs["find_modes"] == 7 * models
+    assert jobs["compare_with_truth"] == 6 * models
+    assert jobs["train_forests"] == jobs["tabulate_results"] == jobs["build_report"] == 1
+
+
+def test_default_profile_is_read(tmp_path):
+    profile = CHECKOUT / "workflow" / "profiles" / "default"
+    done = snakemake(tmp_path, "--dry-run", "--profile", profile)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_rules_lint():
+    lint = CHECKOUT / ".ci" / "lint_rules.py"
+    done = subprocess.run(
+        [sys.executable, lint], cwd=CHECKOUT, capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_a_bad_value_on_the_command_line_stops_the_run_with_a_sentence(tmp_path):
+    done = snakemake(tmp_path, "--dry-run", "--cores", 1, "--config", "poisson=0.7")
+    assert done.returncode != 0
+    output = done.stdout + done.stderr
+    assert "poisson: 0.7 is greater than or equal to the maximum of 0.5" in output
+    assert "Traceback" not in output
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_ranks_get_a_launcher_only_where_there_are_several(tmp_path, ranks):
+    config = tmp_path / "config.yaml"
+    config.write_text(
+        "models: {bar: {mesh: 'builtin:bar', resolution: 16}}\n"
+        f"solver: {{ranks: {ranks}, modes: 20}}\n"
+    )
+    target = "results/models/bar/truth.h5"
+    done = snakemake(tmp_path, target, "-n", "-p", "--cores", 2, "--configfile", config)
+    output = done.stdout + done.stderr
+    assert done.returncode == 0, output
+    assert ("mpiexec -n 2 python" in output) == (ranks == 2)
