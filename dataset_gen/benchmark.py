@@ -6,13 +6,13 @@ import time
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from carillon.progress import track
 from carillon.provenance import processor
 from dataset_gen.element import DEFAULT_POISSON
 from dataset_gen.objectives import OBJECTIVES, fit, sampled_energy
 from dataset_gen.sampling import samples
+from dataset_gen.serial import serial_blas
 
 SAMPLED_SHARE = 100
 """The sampled evaluator is timed on one block in so many; it is that much slower."""
@@ -25,6 +25,7 @@ def _fits_per_second(objective: str, young: np.ndarray, poisson: float) -> float
     return len(young) / (time.perf_counter() - start)
 
 
+@serial_blas
 def _sampled_per_second(young: np.ndarray, poisson: float) -> float:
     generator = np.random.default_rng(0)
     sampled_energy.fit_block(young[0], generator, poisson)
@@ -44,11 +45,10 @@ def benchmark(count: int, poisson: float = DEFAULT_POISSON) -> dict[str, Any]:
     """
     young = samples(0, 0, count)
     rates: dict[str, float] = {}
-    with threadpool_limits(1):
-        for objective in track(OBJECTIVES, "timing", total=len(OBJECTIVES), unit="objective"):
-            rates[objective] = _fits_per_second(objective, young, poisson)
-        few = young[: max(1, count // SAMPLED_SHARE)]
-        rates["energy, sampled"] = _sampled_per_second(few, poisson)
+    for objective in track(OBJECTIVES, "timing", total=len(OBJECTIVES), unit="objective"):
+        rates[objective] = _fits_per_second(objective, young, poisson)
+    few = young[: max(1, count // SAMPLED_SHARE)]
+    rates["energy, sampled"] = _sampled_per_second(few, poisson)
     return {
         "fits_per_second": rates,
         "samples": count,

@@ -4,24 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 from joblib import Parallel, delayed
-from threadpoolctl import threadpool_limits
 
 from carillon import provenance
 from carillon.errors import UserError
 from carillon.progress import track
 from dataset_gen.element import DEFAULT_POISSON
-from dataset_gen.objectives import DEFAULT_OBJECTIVE, Fits, fit, require_objective, require_poisson
+from dataset_gen.objectives import DEFAULT_OBJECTIVE, fit, require_objective, require_poisson
 from dataset_gen.sampling import samples, shard_range
 from dataset_gen.shards import Shard
 
 TASK_ROWS = 2048
 """Samples a worker fits at a time."""
-
-
-def _fit_task(objective: str, young: np.ndarray, poisson: float) -> Fits:
-    # A serial BLAS makes every row independent of the split, bit for bit.
-    with threadpool_limits(1):
-        return fit(objective, young, poisson)
 
 
 def generate(
@@ -49,7 +42,7 @@ def generate(
     young = samples(seed, start, stop)
     parts = [young[row : row + TASK_ROWS] for row in range(0, len(young), TASK_ROWS)]
     pool = Parallel(n_jobs=workers, return_as="generator")
-    tasks = pool(delayed(_fit_task)(objective, part, poisson) for part in parts)
+    tasks = pool(delayed(fit)(objective, part, poisson) for part in parts)
     fits = list(
         track(tasks, f"fitting {objective}", total=len(parts), unit="task", visible=progress)
     )

@@ -93,22 +93,8 @@ def _evaluate(
                 for k in range(FEATURES):
                     answer += np.float64(coefficients[number, k]) * np.float64(x[k])
                 bottom, top = np.float64(low[number]), np.float64(high[number])
-                total += min(max(answer, bottom), top)
+                total += float(min(max(answer, bottom), top))
             target[block, origin] = total / trees
-
-
-def _arrays(forests: Forests) -> tuple[np.ndarray, ...]:
-    return (
-        forests.roots,
-        forests.feature,
-        forests.threshold,
-        forests.left,
-        forests.right,
-        forests.leaf,
-        forests.coefficients,
-        forests.low,
-        forests.high,
-    )
 
 
 def _require_blocks(e: ArrayLike) -> Array:
@@ -143,6 +129,7 @@ def coarsen(model: Model, e: ArrayLike, threads: int = 1) -> Array:
     young = _require_blocks(e)
     scaled = separate(young, model.transform)
     target = np.empty_like(young)
+    forests = model.forests
     bounds = np.linspace(0, len(young), max(1, threads) + 1).astype(int)
 
     def run(part: slice) -> None:
@@ -151,7 +138,15 @@ def coarsen(model: Model, e: ArrayLike, threads: int = 1) -> Array:
             scaled.value[part],
             scaled.reference[part],
             model.transform == "log",
-            *_arrays(model.forests),
+            forests.roots,
+            forests.feature,
+            forests.threshold,
+            forests.left,
+            forests.right,
+            forests.leaf,
+            forests.coefficients,
+            forests.low,
+            forests.high,
             target[part],
         )
 

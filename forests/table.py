@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from carillon.progress import track
 from dataset_gen.block import prolongation
 from dataset_gen.element import Array
 from dataset_gen.objectives import fit
 from dataset_gen.objectives.patterns import corner_strains, pattern_of, straining_motions
+from dataset_gen.serial import serial_blas
 from forests.baselines import average, galerkin
 from forests.evaluate import coarsen
 from forests.model import Model
@@ -76,6 +76,7 @@ def _seconds_per_block(method: Method, young: Array) -> float:
     return (time.perf_counter() - start) / len(young)
 
 
+@serial_blas
 def table(model: Model, blocks: int = 1000, seed: int = 0) -> dict[str, Any]:
     """Rows of Fig. 9 on `blocks` random solid blocks of each range, on one core.
 
@@ -92,22 +93,21 @@ def table(model: Model, blocks: int = 1000, seed: int = 0) -> dict[str, Any]:
         "inertial": inertia @ generator.standard_normal((inertia.shape[1], FORCES)),
     }
     rows = []
-    with threadpool_limits(1):
-        for low, high in RANGES:
-            young = generator.uniform(max(low, 1e-3 * high), high, (blocks, 8))
-            for method in track(methods_of(model), f"{low:g}..{high:g} GPa", unit="method"):
-                moduli = method.coarsen(young)
-                row: dict[str, Any] = {
-                    "range_gpa": [low, high],
-                    "method": method.name,
-                    "seconds_per_block": _seconds_per_block(method, young),
-                    "storage_bytes": method.storage,
-                }
-                for name, forces in loads.items():
-                    errors = displacement_errors(young, moduli, forces, model.poisson)
-                    row[f"mean_error_{name}"] = float(errors.mean())
-                    row[f"median_error_{name}"] = float(np.median(errors))
-                rows.append(row)
+    for low, high in RANGES:
+        young = generator.uniform(max(low, 1e-3 * high), high, (blocks, 8))
+        for method in track(methods_of(model), f"{low:g}..{high:g} GPa", unit="method"):
+            moduli = method.coarsen(young)
+            row: dict[str, Any] = {
+                "range_gpa": [low, high],
+                "method": method.name,
+                "seconds_per_block": _seconds_per_block(method, young),
+                "storage_bytes": method.storage,
+            }
+            for name, forces in loads.items():
+                errors = displacement_errors(young, moduli, forces, model.poisson)
+                row[f"mean_error_{name}"] = float(errors.mean())
+                row[f"median_error_{name}"] = float(np.median(errors))
+            rows.append(row)
     return {"blocks": blocks, "forces": FORCES, "seed": seed, "rows": rows}
 
 

@@ -19,7 +19,7 @@ from dataset_gen.shards import Shard
 from forests.evaluate import coarsen
 from forests.leaves import Leaves, fit_leaves
 from forests.model import FILLED, VOID, Model, join
-from forests.scaling import FEATURES, TRANSFORMS, features_of, separate, target_of
+from forests.scaling import FEATURES, TRANSFORMS, Features, features_of, separate, target_of
 from forests.structure import GROWERS, Tree, grow
 
 
@@ -65,7 +65,7 @@ class Training:
 
 
 def _forest(
-    features: Array, target: Array, weight: Array, training: Training, workers: int
+    features: Features, target: Array, weight: Array, training: Training, workers: int
 ) -> list[tuple[Tree, Leaves]]:
     generator = np.random.default_rng(training.seed)
     subset = np.arange(len(target))

@@ -16,6 +16,7 @@ from carillon.errors import UserError
 from dataset_gen.element import DEFAULT_POISSON, Array
 from dataset_gen.objectives import chen2015, energy, factored, hybrid, inertial, oversampled
 from dataset_gen.objectives.quadratic import PatternFits
+from dataset_gen.serial import serial_blas
 
 OBJECTIVES: dict[str, Callable[[Array, int, float], PatternFits]] = {
     "energy": energy.fit_pattern,
@@ -73,6 +74,7 @@ def _require_blocks(young: Array) -> None:
         raise UserError(f"block {empty[0]} is void in all eight cells: there is nothing to fit")
 
 
+@serial_blas
 def fit(objective: str, e: ArrayLike, poisson: float = DEFAULT_POISSON) -> Fits:
     """Fit the coarse moduli of many blocks.
 
@@ -89,7 +91,8 @@ def fit(objective: str, e: ArrayLike, poisson: float = DEFAULT_POISSON) -> Fits:
 
     Notes
     -----
-    A row's result does not depend on the other rows, bit for bit, as long as BLAS is serial.
+    A row's result does not depend on the other rows, bit for bit: BLAS runs on one thread, so share
+    many rows among processes.
     """
     require_objective(objective)
     require_poisson(poisson)

@@ -16,11 +16,13 @@ import numpy as np
 from dataset_gen.element import Array
 from dataset_gen.objectives import inertial, oversampled
 from dataset_gen.objectives.quadratic import PatternFits
+from dataset_gen.serial import serial_blas
 
 ALL_FILLED = 0b11111111
 
 
 @cache
+@serial_blas
 def pattern_correction(mask: int, poisson: float) -> Array:
     """`E_inertial(1_p) / E_oversampled(1_p)` (8,) of the pattern `mask`; ones if all are filled."""
     if mask == ALL_FILLED:

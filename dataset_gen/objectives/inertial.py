@@ -14,9 +14,11 @@ from dataset_gen.objectives.quadratic import (
     energy_mismatch,
     reference_moduli,
 )
+from dataset_gen.serial import serial_blas
 
 
 @cache
+@serial_blas
 def inertia_loads(mask: int, poisson: float) -> Array:
     """Loads F (a, 24): inertia of the mass-normalised trilinear motions, in self-equilibrium.
 

@@ -21,6 +21,7 @@ from dataset_gen.objectives.quadratic import (
     energy_mismatch,
     reference_moduli,
 )
+from dataset_gen.serial import serial_blas
 
 RIGID_SHARE = 1e-8
 """Energy added to every field before whitening, as a share of all fields' energy."""
@@ -40,6 +41,7 @@ class Patch:
 
 
 @cache
+@serial_blas
 def _octants(poisson: float) -> tuple[Array, Array]:
     """Stiffness (8, 81, 81) and load (8, 81, 18) on the block's nodes from each octant."""
     block = degrees_of_freedom((NODES + 1) @ (1, 5, 25))

@@ -26,6 +26,7 @@ from dataset_gen.element import (
     shape_gradients,
     strain_displacement,
 )
+from dataset_gen.serial import serial_blas
 
 NULL_TOLERANCE = 1e-10
 """Eigenvalues below this share of the largest count as motions without strain."""
@@ -73,6 +74,7 @@ class Pattern:
 
 
 @cache
+@serial_blas
 def pattern_of(mask: int, poisson: float) -> Pattern:
     """Matrices of the pattern whose filled cells are the set bits of `mask` (1..255)."""
     filled = (mask >> np.arange(8) & 1).astype(bool)
@@ -97,6 +99,7 @@ def pattern_of(mask: int, poisson: float) -> Pattern:
 
 
 @cache
+@serial_blas
 def corner_strains(poisson: float) -> Array:
     """S (48, 24) with `K_q = S_q^T S_q` of the coarse element of edge 2, S_q = S[6 q : 6 q + 6]."""
     strain = strain_displacement(shape_gradients(GAUSS_POINTS))
@@ -105,6 +108,7 @@ def corner_strains(poisson: float) -> Array:
 
 
 @cache
+@serial_blas
 def straining_motions() -> Array:
     """Orthonormal complement Z (24, 18) of the rigid motions of the coarse corners."""
     rigid = rigid_motions(CORNERS.astype(float))
