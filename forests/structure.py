@@ -9,9 +9,12 @@ from numpy.typing import NDArray
 from sklearn.ensemble import ExtraTreesRegressor, RandomForestRegressor
 
 from dataset_gen.element import Array
-from forests.scaling import Features
+from forests.scaling import FEATURES, Features
 
 GROWERS = {"random": RandomForestRegressor, "extra": ExtraTreesRegressor}
+
+SPLIT_FEATURES = 5
+"""Features that a split of a random forest chooses from, so that its trees differ."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,8 @@ class Tree:
         return int(self.leaf.max()) + 1
 
 
-def _flatten(tree: object) -> Tree:
+def flatten(tree: object) -> Tree:
+    """Arrays of a fitted scikit-learn tree (its `tree_`)."""
     left = tree.children_left.astype(np.int32)  # type: ignore[attr-defined]
     leaf = np.where(left < 0, np.cumsum(left < 0) - 1, -1).astype(np.int32)
     return Tree(
@@ -65,7 +69,7 @@ def grow(
         random_state=seed,
         n_jobs=workers,
         bootstrap=False,
-        max_features=1.0 if grower == "extra" else 5,
+        max_features=FEATURES if grower == "extra" else SPLIT_FEATURES,
     )
     forest.fit(features, target, sample_weight=weight)
-    return [_flatten(estimator.tree_) for estimator in forest.estimators_]
+    return [flatten(estimator.tree_) for estimator in forest.estimators_]

@@ -40,8 +40,8 @@ class Training:
     depth: int = 20
     min_leaf: int = 10
     structure_rows: int = 400_000
-    prior: float = 0.02
-    uniform_weight: float = 20.0
+    prior: float = 0.005
+    uniform_weight: float = 400.0
     held_out: int = 20
     transform: str = "log"
     grower: str = "random"

@@ -17,7 +17,7 @@ from forests.baselines import average, galerkin
 from forests.evaluate import coarsen_reference
 from forests.leaves import fit_leaves, leaf_of
 from forests.model import Forests
-from forests.structure import Tree, _flatten
+from forests.structure import Tree, flatten
 from forests.train import Training, train
 
 TRANSFORMS = ("log", "ratio")
@@ -69,7 +69,7 @@ def test_leaves_are_those_of_scikit_learn_also_on_thresholds(grower):
     target = features @ np.arange(7) + np.abs(features[:, 0])
     forest = grower(n_estimators=3, max_depth=8, random_state=0).fit(features, target)
     for estimator in forest.estimators_:
-        tree = _flatten(estimator.tree_)
+        tree = flatten(estimator.tree_)
         exact = estimator.tree_.threshold[estimator.tree_.children_left >= 0]
         rows = generator.choice(exact, (4000, 7)).astype(np.float32)
         rows[::2] = np.nextafter(rows[::2], np.float32(np.inf))
