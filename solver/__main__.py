@@ -8,23 +8,19 @@ import sys
 import traceback
 from typing import Any
 
-import petsc4py
+from mpi4py import MPI
 
-petsc4py.init([])
-
-from mpi4py import MPI  # noqa: E402
-
-from carillon.cli import EXIT_BAD_INPUT, EXIT_NOT_CONVERGED  # noqa: E402
-from carillon.errors import ConvergenceError, UserError  # noqa: E402
-from carillon.files import atomic_path, require_writable  # noqa: E402
-from carillon.runtime import limit_threads, warn_about_reference_blas  # noqa: E402
-from dataset_gen.arguments import Parser  # noqa: E402
-from solver import coarsening, materials  # noqa: E402
-from solver.analysis import METHODS, SolverOptions, modal_analysis  # noqa: E402
-from solver.decomposition import on_root  # noqa: E402
-from solver.geometry import FILLS, PIECES  # noqa: E402
-from solver.hcms.condense import INTERFACES  # noqa: E402
-from solver.problem import ProblemOptions, build_problem  # noqa: E402
+from carillon.cli import EXIT_BAD_INPUT, EXIT_NOT_CONVERGED
+from carillon.errors import ConvergenceError, UserError
+from carillon.files import atomic_path, require_writable
+from carillon.runtime import limit_threads, warn_about_reference_blas
+from dataset_gen.arguments import Parser
+from solver import coarsening, materials
+from solver.analysis import METHODS, SolverOptions, modal_analysis
+from solver.decomposition import on_root
+from solver.geometry import FILLS, PIECES
+from solver.hcms.condense import INTERFACES
+from solver.problem import ProblemOptions, build_problem
 
 _PROBLEM_FIELDS = tuple(ProblemOptions.__dataclass_fields__)
 
@@ -208,7 +204,9 @@ def _parser() -> argparse.ArgumentParser:
     modes = commands.add_parser("modes", help="compute modes and write modes.h5")
     _add_problem(modes)
     modes.add_argument("--method", choices=METHODS, default="hcms", help="default: %(default)s")
-    modes.add_argument("--modes", type=int, default=256, help="number, rigid included (default 256)")
+    modes.add_argument(
+        "--modes", type=int, default=256, help="number, rigid included (default 256)"
+    )
     modes.add_argument("--out", required=True, help="modes file to write (HDF5)")
     modes.add_argument(
         "--tol",
@@ -280,7 +278,9 @@ def _add_problem(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--unit", type=float, default=defaults.unit, help="metres per mesh unit (default 1)"
     )
-    parser.add_argument("--fill", choices=sorted(FILLS), default=defaults.fill, help="voxel filling")
+    parser.add_argument(
+        "--fill", choices=sorted(FILLS), default=defaults.fill, help="voxel filling"
+    )
     parser.add_argument(
         "--pieces", choices=PIECES, default=defaults.pieces, help="if the voxels fall apart"
     )

@@ -11,8 +11,10 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError, UserError
+from carillon.progress import say
 from solver.correction import correct, default_guard
 from solver.decomposition import Decomposition, decompose
+from solver.eigensolver import TYPES
 from solver.hcms.synthesis import synthesize
 from solver.model import ElasticModel
 from solver.system import System, assemble
@@ -21,7 +23,7 @@ from solver.truth import solve_truth
 
 Array = NDArray[np.float64]
 
-METHODS = ("hcms", "slepc", "arpack")
+METHODS = ("hcms", *TYPES)
 RIGID_MODES = 6
 """Zero-frequency modes of a connected free body."""
 RIGID_TOLERANCE = 1e-9
@@ -42,8 +44,8 @@ class SolverOptions:
     modes
         Number of modes, rigid ones included.
     tolerance
-        `hcms`: relative eigenvalue error at which the correction stops; 0 makes exactly `corrections`
-        steps.  Ground truth: relative residual of the eigensolver.
+        `hcms`: relative eigenvalue error at which the correction stops; 0 makes exactly
+        `corrections` steps.  Ground truth: relative residual of the eigensolver.
     corrections
         Largest number of correction steps; 0 is plain HCMS.
     degree
@@ -163,8 +165,8 @@ def check_mode_count(modes: int, n_dofs: int) -> None:
         raise UserError(f"{modes} modes asked for; expected at least 1")
     if modes > n_dofs:
         raise UserError(
-            f"{modes:,} modes asked for, but the model has {n_dofs:,} unknowns; ask for fewer modes "
-            "or raise --resolution"
+            f"{modes:,} modes asked for, but the model has {n_dofs:,} unknowns; ask for fewer or "
+            "raise --resolution"
         )
 
 
@@ -216,8 +218,6 @@ def _hcms(
 def _reporter(visible: bool) -> Callable[[int, float], None] | None:
     if not visible:
         return None
-    from carillon.progress import say
-
     return lambda step, worst: say(f"  after {step} corrections: eigenvalue error {worst:.1e}")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -41,10 +42,9 @@ def benchmark_row(
     if options.forest is not None:
         methods["ddfem_slepc"] = ("ddfem", replace(plain, method="slepc", prove=False))
         methods["ddfem_hcms_ec"] = ("ddfem", plain)
-    problems: dict[str, Problem] = {
-        coarsen: on_root(comm, lambda c=coarsen: build_problem(replace(options, coarsen=c)))
-        for coarsen in dict.fromkeys(coarsen for coarsen, _ in methods.values())
-    }
+    problems: dict[str, Problem] = {}
+    for coarsen in dict.fromkeys(coarsen for coarsen, _ in methods.values()):
+        problems[coarsen] = on_root(comm, partial(build_problem, replace(options, coarsen=coarsen)))
     row: dict[str, Any] = {
         "mesh": options.mesh,
         "resolution": options.resolution,

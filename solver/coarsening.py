@@ -35,9 +35,7 @@ def galerkin(e: Array, poisson: float) -> Array:
     return np.asarray(e @ weights.T)
 
 
-def coarse_moduli(
-    e: Array, method: str, poisson: float, forest: str | Path | None = None
-) -> Array:
+def coarse_moduli(e: Array, method: str, poisson: float, forest: str | Path | None = None) -> Array:
     """Quadrature-point moduli (mc, 8) of coarse elements from the blocks' fine moduli (mc, 8).
 
     `method` is one of `average`, `galerkin`, `ddfem` (the regression forests in the file `forest`)

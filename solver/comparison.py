@@ -38,9 +38,9 @@ class Comparison:
     frequency_rms_relative_error_7_60, frequency_max_relative_error_7_60
         The same and the maximum over modes 7..60, or as many as there are.
     subspace_angle_max
-        Largest M-weighted principal angle [rad] between a cluster of the truth and the same modes of
-        the candidate; the last cluster, which the end of the spectrum may cut, is left out.  NaN if
-        the meshes are not related.
+        Largest M-weighted principal angle [rad] between a cluster of the truth and the same modes
+        of the candidate; the last cluster, which the end of the spectrum may cut, is left out.  NaN
+        if the meshes are not related.
     residual_max
         Largest residual ratio of the candidate, recomputed from the K and M in its file.
     modes_compared
@@ -74,8 +74,8 @@ def compare_files(candidate: str | Path, truth: str | Path) -> Comparison:
     count = min(len(a.eigenvalues), len(b.eigenvalues))
     if count <= RIGID_MODES:
         raise UserError(
-            f"{candidate} and {truth} share {count} modes, of which {RIGID_MODES} are rigid; compute "
-            "more modes"
+            f"{candidate} and {truth} share {count} modes, of which {RIGID_MODES} are rigid; "
+            "compute more"
         )
     elastic = slice(RIGID_MODES, count)
     values, exact = a.eigenvalues[elastic], b.eigenvalues[elastic]

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from solver.analysis import RIGID_MODES, check_mode_count, default_keep
 from solver.correction import correct
@@ -13,6 +14,8 @@ from solver.decomposition import Decomposition, decompose
 from solver.hcms.synthesis import synthesize
 from solver.model import ElasticModel
 from solver.system import System, assemble
+
+Array = NDArray[np.float64]
 
 STARTS = ("hcms-free", "hcms-fixed", "random")
 PAPER_DEGREE = 1
@@ -40,6 +43,10 @@ def correction_history(
     for start in STARTS:
         block = _start_block(start, model, decomposition, system, default_keep(modes), seed)
         history: list[list[float]] = []
+
+        def note(step: int, values: Array, rows: list[list[float]] = history) -> None:
+            rows.append(values.tolist())
+
         correct(
             system,
             block,
@@ -47,7 +54,7 @@ def correction_history(
             tolerance=0.0,
             max_steps=steps,
             degree=degree,
-            observe=lambda step, values, rows=history: rows.append(values.tolist()),
+            observe=note,
         )
         curves[start] = history
     return {"modes": modes, "degree": degree, "n_dofs": model.n_dofs, "start": curves}
@@ -60,7 +67,7 @@ def _start_block(
     system: System,
     keep: int,
     seed: int,
-) -> np.ndarray:
+) -> Array:
     if start == "random":
         # Drawn whole and cut by node, so that it does not depend on the number of ranks.
         whole = np.random.default_rng(seed).standard_normal((system.n_dofs, keep))

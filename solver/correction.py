@@ -19,8 +19,8 @@ SHIFT_FRACTION = 0.1
 RIGID_TOLERANCE = 1e-7
 """A column whose elastic part is shorter than this fraction of it is a rigid motion."""
 MAX_AMPLIFICATION = 1e5
-"""Largest growth of the lowest active mode over the highest in one polynomial; more would let the low
-modes drown the others in rounding."""
+"""Largest growth of the lowest active mode over the highest in one polynomial; more would let the
+low modes drown the others in rounding."""
 RANK_TOLERANCE = 1e-13
 """Directions whose share of the basis falls below this are dropped as linearly dependent."""
 
@@ -140,7 +140,7 @@ def correct(
     values, vectors = rayleigh_ritz(system, start, wanted + guard)
     if len(values) < wanted:
         raise ConvergenceError(
-            f"the start block spans {len(values)} elastic modes, {wanted} are wanted; keep more modes"
+            f"the start block spans {len(values)} elastic modes, {wanted} are wanted; keep more"
         )
     if observe is not None:
         observe(0, values[:wanted])
@@ -161,7 +161,10 @@ def correct(
             image = inverse.solve(mass_block)
             solves += block.shape[1]
             errors[active:] = _estimate(
-                values[active:], system.column_products(mass_block, image), inverse.shift, values[-1]
+                values[active:],
+                system.column_products(mass_block, image),
+                inverse.shift,
+                values[-1],
             )
             worst = float(np.max(errors[:wanted]))
             history.append(worst)
@@ -170,8 +173,8 @@ def correct(
             if step >= max_steps and worst > tolerance:
                 break
             first = _first_inaccurate(errors, wanted, tolerance)
-            # Accurate modes are locked as their images, which have lost what was left of the highest
-            # frequencies: the residual falls by orders of magnitude at no further solve.
+            # Accurate modes are locked as their images, which have lost what was left of the
+            # highest frequencies: the residual falls by orders of magnitude at no further solve.
             new = first - active
             locked = np.concatenate([vectors[:, :active], image[:, :new]], axis=1)
             if worst <= tolerance:
@@ -234,9 +237,9 @@ def _chebyshev(
 ) -> tuple[Array, int]:
     """Apply the Chebyshev polynomial that damps inverse eigenvalues below the last iterated one.
 
-    `image` is the inverse applied to `block`.  Columns are scaled by the polynomial at their own Ritz
-    value, so that all keep about unit length.  Returns the columns and the degree used, which is lower
-    while the lowest active mode would grow by more than `MAX_AMPLIFICATION`.
+    `image` is the inverse applied to `block`.  Columns are scaled by the polynomial at their own
+    Ritz value, so that all keep about unit length.  Returns the columns and the degree used, which
+    is lower while the lowest active mode would grow by more than `MAX_AMPLIFICATION`.
     """
     edge = 1.0 / (values[-1] + inverse.shift)
     argument = 2.0 / (edge * (values + inverse.shift)) - 1.0

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar, cast
 
 import numpy as np
 from mpi4py import MPI
@@ -11,6 +13,8 @@ from numpy.typing import NDArray
 from solver.geometry import HexMesh
 from solver.hcms.tree import MergeTree, assign_ranks, build_tree
 from solver.partition import default_subdomains, partition_cells, partition_nodes
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -84,16 +88,17 @@ def decompose(
     return Decomposition(tree, node_part, assign_ranks(sizes, comm.size), order, offsets)
 
 
-def on_root(comm: MPI.Comm, compute):  # type: ignore[no-untyped-def]
+def on_root(comm: MPI.Comm, compute: Callable[[], T]) -> T:
     """Call `compute` on rank 0 and give every rank its result, or its exception."""
-    outcome = None
+    result: T | None = None
+    failure: Exception | None = None
     if comm.rank == 0:
         try:
-            outcome = (compute(), None)
+            result = compute()
         except Exception as error:
-            outcome = (None, error)
-    result, error = comm.bcast(outcome, root=0)
-    if error is not None:
+            failure = error
+    result, failure = comm.bcast((result, failure), root=0)
+    if failure is not None:
         # Every rank raises it, so that no rank is left waiting for the others.
-        raise error
-    return result
+        raise failure
+    return cast(T, result)

@@ -5,14 +5,11 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
-import slepc4py
+from mpi4py import MPI
 from numpy.typing import NDArray
 
-slepc4py.init([])
-from petsc4py import PETSc  # noqa: E402
-from slepc4py import SLEPc  # noqa: E402
-
-from carillon.errors import LocalConvergenceError  # noqa: E402
+from carillon.errors import LocalConvergenceError
+from solver.eigensolver import distributed_matrix, smallest_eigenpairs
 
 Array = NDArray[np.float64]
 
@@ -22,6 +19,8 @@ DENSE_SHARE = 0.3
 """Above this share of wanted pairs LAPACK is faster too."""
 LOCAL_TOLERANCE = 1e-5
 """Residual tolerance of local modes; the truncation of the basis is a far larger error."""
+SHIFT_FRACTION = 1e-6
+"""Shift as a fraction of the ratio of the diagonals, which is typical of the highest modes."""
 
 
 def lowest_modes(K: sp.csr_matrix, M: sp.csr_matrix, count: int) -> tuple[Array, Array]:
@@ -30,59 +29,25 @@ def lowest_modes(K: sp.csr_matrix, M: sp.csr_matrix, count: int) -> tuple[Array,
     Returns
     -------
     values (count,) ascending and M-orthonormal vectors (n, count).
+
+    Raises
+    ------
+    LocalConvergenceError
+        If fewer pairs converge.
     """
     size = K.shape[0]
     if size <= DENSE_UNKNOWNS or count > DENSE_SHARE * size:
         values, vectors = la.eigh(K.toarray(), M.toarray(), driver="gvd", check_finite=False)
         return values[:count], np.asfortranarray(vectors[:, :count])
-    return _krylov_schur(K, M, count)
-
-
-def _krylov_schur(K: sp.csr_matrix, M: sp.csr_matrix, count: int) -> tuple[Array, Array]:
-    stiffness, mass = _petsc(K), _petsc(M)
-    # Below all eigenvalues, and small against the elastic ones: the diagonal's ratio is a typical
-    # eigenvalue of the highest modes.
-    shift = 1e-6 * K.diagonal().mean() / M.diagonal().mean()
-    solver = SLEPc.EPS().create(PETSc.COMM_SELF)
+    stiffness, mass = (distributed_matrix(matrix, MPI.COMM_SELF) for matrix in (K, M))
+    shift = SHIFT_FRACTION * K.diagonal().mean() / M.diagonal().mean()
     try:
-        solver.setOperators(stiffness, mass)
-        solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
-        solver.setDimensions(count)
-        solver.setTolerances(LOCAL_TOLERANCE, 500)
-        solver.setTarget(-shift)
-        solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
-        transform = solver.getST()
-        transform.setType(SLEPc.ST.Type.SINVERT)
-        linear = transform.getKSP()
-        linear.setType(PETSc.KSP.Type.PREONLY)
-        preconditioner = linear.getPC()
-        preconditioner.setType(PETSc.PC.Type.CHOLESKY)
-        if PETSc.Sys.hasExternalPackage("mumps"):
-            preconditioner.setFactorSolverType("mumps")
-        solver.solve()
-        if solver.getConverged() < count:
-            raise LocalConvergenceError(
-                f"a subdomain of {K.shape[0]} unknowns gave {solver.getConverged()} of {count} modes"
-            )
-        vector = stiffness.createVecRight()
-        values = np.empty(count)
-        vectors = np.empty((K.shape[0], count), order="F")
-        for index in range(count):
-            values[index] = solver.getEigenpair(index, vector).real
-            vectors[:, index] = vector.getArray(readonly=True)
-        vector.destroy()
+        values, vectors, _ = smallest_eigenpairs(stiffness, mass, count, shift, LOCAL_TOLERANCE)
     finally:
-        solver.destroy()
         stiffness.destroy()
         mass.destroy()
-    order = np.argsort(values)
-    return values[order], np.asfortranarray(vectors[:, order])
-
-
-def _petsc(matrix: sp.csr_matrix):  # type: ignore[no-untyped-def]
-    csr = (
-        matrix.indptr.astype(PETSc.IntType),
-        matrix.indices.astype(PETSc.IntType),
-        matrix.data.astype(PETSc.ScalarType),
-    )
-    return PETSc.Mat().createAIJ(matrix.shape, csr=csr, comm=PETSc.COMM_SELF)
+    if len(values) < count:
+        raise LocalConvergenceError(
+            f"a subdomain of {size} unknowns gave {len(values)} of {count} modes"
+        )
+    return values, vectors

@@ -84,7 +84,7 @@ def from_file(path: str | Path, mesh: HexMesh, label: str) -> Array:
 
 
 def check(values: Array, mesh: HexMesh, source: str, label: str) -> Array:
-    """Return `values` if they are usable moduli [Pa] for the cells of `mesh`, else raise UserError."""
+    """Return `values` if they are moduli [Pa] for the cells of `mesh`, else raise UserError."""
     if len(values) != mesh.n_cells:
         raise UserError(f"{source}: {len(values):,} values for {mesh.n_cells:,} voxels ({label})")
     bad = np.flatnonzero(~np.isfinite(values))
@@ -104,15 +104,15 @@ def check(values: Array, mesh: HexMesh, source: str, label: str) -> Array:
     bad = np.flatnonzero(values == 0.0)
     if len(bad):
         raise UserError(
-            f"{source}: {len(bad):,} voxels have modulus zero (the first at index {bad[0]}); remove "
-            "them from the mesh or give them a small positive modulus, since massive cells without "
-            "stiffness have no finite spectrum"
+            f"{source}: {len(bad):,} voxels have modulus zero (the first at index {bad[0]}); give "
+            "them a small positive modulus or take them out of the mesh, since mass without "
+            "stiffness has no place in a spectrum"
         )
     return values
 
 
 def young_modulus(name: str, mesh: HexMesh, seed: int = 0, label: str = "mesh") -> Array:
-    """Moduli (m,) [Pa] of the material `name`: one of `NAMES`, or a file with one value per cell."""
+    """Moduli (m,) [Pa] of a material: one of `NAMES`, or a file with one value per cell."""
     match name:
         case "uniform":
             return uniform(mesh)

@@ -144,7 +144,7 @@ def frequencies(eigenvalues: Array) -> Array:
     return np.asarray(np.sqrt(np.maximum(eigenvalues, 0.0)) / (2.0 * np.pi))
 
 
-def _put(file: h5py.File, name: str, data: Array, units: str, long_name: str) -> None:
+def _put(file: h5py.File, name: str, data: NDArray[Any], units: str, long_name: str) -> None:
     dataset = file.create_dataset(name, data=data, fletcher32=True, chunks=True)
     dataset.attrs["units"] = units
     dataset.attrs["long_name"] = long_name

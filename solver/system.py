@@ -1,7 +1,7 @@
 """The assembled eigenvalue problem on distributed rows, and dense blocks of vectors over it.
 
-Rows follow a `Decomposition`: each rank owns the unknowns of its subdomains.  A block of vectors is a
-Fortran-ordered numpy array with this rank's rows; products and solves take and return such arrays.
+Rows follow a `Decomposition`: each rank owns the unknowns of its subdomains.  A block of vectors is
+a Fortran-ordered numpy array with this rank's rows; products and solves take and return them.
 """
 
 from __future__ import annotations
@@ -10,18 +10,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import petsc4py
 from mpi4py import MPI
 from numpy.typing import NDArray
+from petsc4py import PETSc
 
-petsc4py.init([])
-from petsc4py import PETSc  # noqa: E402
-
-from carillon.errors import UserError  # noqa: E402
-from dataset_gen.element import rigid_motions  # noqa: E402
-from solver.decomposition import Decomposition  # noqa: E402
-from solver.model import ElasticModel  # noqa: E402
-from solver.sparse import assemble_elements  # noqa: E402
+from dataset_gen.element import rigid_motions
+from solver.decomposition import Decomposition
+from solver.eigensolver import distributed_matrix, factor_package
+from solver.model import ElasticModel
+from solver.sparse import assemble_elements
 
 Array = NDArray[np.float64]
 
@@ -124,8 +121,8 @@ def assemble(
         n_nodes,
         row_of,
     )
-    K = _petsc(K_rows, comm)
-    M = _petsc(M_rows, comm)
+    K = distributed_matrix(K_rows, comm)
+    M = distributed_matrix(M_rows, comm)
     motions = rigid_motions(model.mesh.nodes)[
         (3 * decomposition.order[start:stop, None] + np.arange(3)).ravel()
     ]
@@ -137,7 +134,7 @@ def assemble(
 
 
 class ShiftedInverse:
-    """Solves (K + shift M) X = B for blocks of right-hand sides by MUMPS's Cholesky factorisation."""
+    """Solves (K + shift M) X = B for blocks of right-hand sides by sparse Cholesky."""
 
     def __init__(self, system: System, shift: float) -> None:
         if shift <= 0.0:
@@ -170,31 +167,7 @@ class ShiftedInverse:
         self._matrix.destroy()
 
 
-def factor_package(ranks: int) -> str:
-    """PETSc's name of the sparse Cholesky to use: MUMPS, or PETSc's own on one rank without it."""
-    if PETSc.Sys.hasExternalPackage("mumps"):
-        return "mumps"
-    if ranks == 1:
-        return "petsc"
-    raise UserError(
-        "this PETSc was built without MUMPS, which a parallel factorisation needs; run on one rank "
-        "or rebuild PETSc with MUMPS"
-    )
-
-
-def _petsc(rows, comm: MPI.Comm):  # type: ignore[no-untyped-def]
-    local, total = rows.shape
-    csr = (
-        rows.indptr.astype(PETSc.IntType),
-        rows.indices.astype(PETSc.IntType),
-        rows.data.astype(PETSc.ScalarType),
-    )
-    matrix = PETSc.Mat().createAIJ(((local, total), (local, total)), bsize=3, csr=csr, comm=comm)
-    matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    return matrix
-
-
-def _wrap(block: Array, rows: int, comm: MPI.Comm):  # type: ignore[no-untyped-def]
+def _wrap(block: Array, rows: int, comm: MPI.Comm) -> Any:
     """PETSc view of a Fortran-ordered block, without a copy."""
     if not block.flags.f_contiguous:
         raise ValueError("blocks of vectors must be Fortran-contiguous")

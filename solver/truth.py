@@ -5,20 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import slepc4py
 from numpy.typing import NDArray
+from petsc4py import PETSc
 
-slepc4py.init([])
-from petsc4py import PETSc  # noqa: E402
-from slepc4py import SLEPc  # noqa: E402
-
-from carillon.errors import ConvergenceError, UserError  # noqa: E402
-from solver.correction import rayleigh_ritz  # noqa: E402
-from solver.system import System, factor_package  # noqa: E402
+from carillon.errors import ConvergenceError
+from solver.correction import SHIFT_FRACTION, rayleigh_ritz
+from solver.eigensolver import factor_package, smallest_eigenpairs
+from solver.system import System
 
 Array = NDArray[np.float64]
 
-METHODS = {"slepc": SLEPc.EPS.Type.KRYLOVSCHUR, "arpack": SLEPc.EPS.Type.ARPACK}
 SPARE_MODES = 8
 """Modes computed beyond those asked for, so that the inertia count finds a gap to look through."""
 POLYNOMIAL_DEGREE = 3
@@ -35,7 +31,7 @@ class Truth:
     iterations
         Outer iterations of the eigensolver.
     inertia
-        Number of eigenvalues below `inertia_at` by the factorisation's inertia, or -1 if not counted.
+        Number of eigenvalues below `inertia_at` by the factorisation's inertia, -1 if not counted.
     expected_inertia
         Number of computed eigenvalues below it.
     """
@@ -87,49 +83,24 @@ def solve_truth(
     tolerance
         Relative residual tolerance of the eigensolver.
     prove
-        Whether to count the eigenvalues below the last one by the inertia of K - mu M.
+        Whether to count the eigenvalues below the last one by the inertia of K - mu M; some modes
+        more are computed to find a gap for mu.
 
     Raises
     ------
     ConvergenceError
         If too few pairs converge, or the inertia count contradicts the computed number.
     """
-    shift = 0.1 * first_elastic_estimate(system, nodes)
+    shift = SHIFT_FRACTION * first_elastic_estimate(system, nodes)
     wanted = min(modes + SPARE_MODES, system.n_dofs)
-    solver = SLEPc.EPS().create(system.comm)
-    try:
-        solver.setType(METHODS[method])
-    except PETSc.Error:
-        raise UserError(
-            f"this SLEPc was built without {method}; use --method slepc or rebuild SLEPc with it"
-        ) from None
-    try:
-        solver.setOperators(system.K, system.M)
-        solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
-        solver.setDimensions(wanted)
-        solver.setTolerances(tolerance, 500)
-        solver.setTarget(-shift)
-        solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
-        transform = solver.getST()
-        transform.setType(SLEPc.ST.Type.SINVERT)
-        transform.setMatStructure(PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        linear = transform.getKSP()
-        linear.setType(PETSc.KSP.Type.PREONLY)
-        preconditioner = linear.getPC()
-        preconditioner.setType(PETSc.PC.Type.CHOLESKY)
-        preconditioner.setFactorSolverType(factor_package(system.comm.size))
-        solver.setFromOptions()
-        solver.solve()
-        found = solver.getConverged()
-        if found < modes:
-            raise ConvergenceError(
-                f"{method} converged {found} of {modes} modes to {tolerance:.0e} in "
-                f"{solver.getIterationNumber()} iterations"
-            )
-        values, vectors = _collect(system, solver, min(found, wanted))
-        iterations = solver.getIterationNumber()
-    finally:
-        solver.destroy()
+    values, vectors, iterations = smallest_eigenpairs(
+        system.K, system.M, wanted, shift, tolerance, method
+    )
+    if len(values) < modes:
+        raise ConvergenceError(
+            f"{method} converged {len(values)} of {modes} modes to {tolerance:.0e} in {iterations} "
+            "iterations"
+        )
     inertia, expected, at = -1, -1, float("nan")
     if prove:
         at, expected = _gap(values, modes)
@@ -142,21 +113,8 @@ def solve_truth(
     return Truth(values[:modes], vectors[:, :modes], iterations, inertia, expected, at)
 
 
-def _collect(system: System, solver: SLEPc.EPS, count: int) -> tuple[Array, Array]:
-    local = 3 * (system.stop - system.start)
-    vectors = np.empty((local, count), order="F")
-    values = np.empty(count)
-    vector = system.K.createVecRight()
-    for index in range(count):
-        values[index] = solver.getEigenpair(index, vector).real
-        vectors[:, index] = vector.getArray(readonly=True)
-    vector.destroy()
-    order = np.argsort(values)
-    return values[order], np.asfortranarray(vectors[:, order])
-
-
 def _gap(values: Array, modes: int) -> tuple[float, int]:
-    """Middle of the widest relative gap at or after the last wanted value, and the count below it."""
+    """Middle of the widest relative gap after the last wanted value, and the count below it."""
     if len(values) <= modes:
         return float(values[-1] * (1.0 + 1e-6)), len(values)
     gaps = np.diff(values[modes - 1 :]) / values[modes:]
@@ -176,7 +134,7 @@ def count_below(system: System, value: float) -> int:
     factorisation.setFactorSolverType(package)
     factorisation.setFactorSetUpSolverType()
     if package == "mumps":
-        # Inertia needs the root of the elimination tree on one rank, and pivots are counted exactly.
+        # Inertia needs the root of the elimination tree on one rank, and its null pivots detected.
         factor = factorisation.getFactorMatrix()
         factor.setMumpsIcntl(13, 1)
         factor.setMumpsIcntl(24, 1)

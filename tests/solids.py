@@ -42,10 +42,10 @@ def dense_eigenvalues(model: ElasticModel) -> np.ndarray:
 def parallelepiped_eigenvalues(
     sides: tuple[float, float, float], young: float, poisson: float, density: float, degree: int = 9
 ) -> np.ndarray:
-    """Eigenvalues of the free homogeneous parallelepiped by Rayleigh-Ritz with Legendre polynomials.
+    """Eigenvalues of the free homogeneous parallelepiped by Rayleigh-Ritz with polynomials.
 
-    Independent of the finite elements: one global polynomial space, exact Gauss quadrature (Visscher
-    et al. 1991 use powers in the same way).
+    Independent of the finite elements: one global space of Legendre polynomials, exact Gauss
+    quadrature (Visscher et al. 1991 use powers in the same way).
     """
     points, weights = legendre.leggauss(degree + 1)
     values = legendre.legvander(points, degree)

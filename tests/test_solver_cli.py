@@ -19,7 +19,16 @@ BAR = ("builtin:bar", "--resolution", "16")
 def modes_file(tmp_path_factory, run_cli):
     path = tmp_path_factory.mktemp("modes") / "modes.h5"
     run_cli(
-        "solver", "modes", *BAR, "--material", "two-region", "--modes", "30", "--out", path, check=True
+        "solver",
+        "modes",
+        *BAR,
+        "--material",
+        "two-region",
+        "--modes",
+        "30",
+        "--out",
+        path,
+        check=True,
     )
     return path
 
@@ -42,7 +51,9 @@ def test_modes_file_is_complete(modes_file):
     with h5py.File(modes_file) as raw:
         assert raw["nodes"].attrs["units"] == "m"
         assert raw["eigenvalues"].attrs["units"] == "rad^2/s^2"
-        assert all(dataset.fletcher32 for dataset in raw.values() if isinstance(dataset, h5py.Dataset))
+        assert all(
+            dataset.fletcher32 for dataset in raw.values() if isinstance(dataset, h5py.Dataset)
+        )
 
 
 def test_compare_of_a_file_with_itself(modes_file, run_cli):
@@ -67,7 +78,17 @@ def test_summary_as_json(tmp_path, run_cli):
 def test_benchmark_row_names_every_method(tmp_path, run_cli):
     out = tmp_path / "row.json"
     done = run_cli(
-        "solver", "benchmark", *BAR, "--modes", "20", "--runs", "1", "--json", "--out", out, check=True
+        "solver",
+        "benchmark",
+        *BAR,
+        "--modes",
+        "20",
+        "--runs",
+        "1",
+        "--json",
+        "--out",
+        out,
+        check=True,
     )
     row = json.loads(done.stdout)
     assert row["methods"] == json.loads(out.read_text())["methods"]

@@ -45,9 +45,7 @@ def restrict_stiffness(stiffness: Array, inside: NDArray[np.bool_], interface: s
     return restricted
 
 
-def _schur(
-    matrices: Array, kept: NDArray[np.integer], relaxed: NDArray[np.integer]
-) -> Array:
+def _schur(matrices: Array, kept: NDArray[np.integer], relaxed: NDArray[np.integer]) -> Array:
     inner = matrices[:, relaxed[:, None], relaxed]
     coupling = matrices[:, relaxed[:, None], kept]
     if len(kept) >= 3 * _NON_COLLINEAR:

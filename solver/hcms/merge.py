@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as la
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from solver.hcms.condense import restrict_stiffness
@@ -44,13 +45,11 @@ class Interface:
 
     nodes: NDArray[np.int64]
     in_left: NDArray[np.bool_]
-    stiffness: object
-    mass: object
+    stiffness: sp.csr_matrix
+    mass: sp.csr_matrix
 
 
-def interface(
-    model: ElasticModel, group_of: NDArray[np.int8], treatment: str
-) -> Interface:
+def interface(model: ElasticModel, group_of: NDArray[np.int8], treatment: str) -> Interface:
     """Interface between left (1) and right (2) nodes; `group_of` (n,) is 0 for nodes in neither."""
     corner_group = group_of[model.mesh.cells]
     straddling = np.flatnonzero((corner_group == 1).any(axis=1) & (corner_group == 2).any(axis=1))
@@ -84,11 +83,11 @@ def merge(left: Group, right: Group, between: Interface, keep: int) -> tuple[Arr
     in_left = np.repeat(between.in_left, 3)
     rows[in_left, :n_left] = _rows_at(left, between.nodes[between.in_left])
     rows[~in_left, n_left:] = _rows_at(right, between.nodes[~between.in_left])
-    K = rows.T @ (between.stiffness @ rows)  # type: ignore[operator]
+    K = rows.T @ (between.stiffness @ rows)
     K[np.diag_indices(size)] += np.concatenate([left.values, right.values])
     keep = min(keep, size)
-    if between.mass.nnz and abs(between.mass).max() > 0.0:  # type: ignore[attr-defined,operator,arg-type]
-        M = rows.T @ (between.mass @ rows)  # type: ignore[operator]
+    if between.mass.count_nonzero():
+        M = rows.T @ (between.mass @ rows)
         M[np.diag_indices(size)] += 1.0
         values, vectors = la.eigh(_symmetric(K), _symmetric(M), driver="gvd", check_finite=False)
     else:

@@ -2,13 +2,13 @@
 
 Upward, every merge happens on one rank, the owner of its left group; the right group sends its
 eigenvalues and the rows of its modes at nodes that later merges touch, and nothing else.  Downward,
-the coefficients of the final modes travel back along the tree, so that the full basis is formed once,
-from the small local bases, and stays distributed by rows.
+the coefficients of the final modes travel back along the tree, so that the full basis is formed
+once, from the small local bases, and stays distributed by rows.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from solver.decomposition import Decomposition
 from solver.hcms.local import local_modes
 from solver.hcms.merge import Group, interface, joined_rows, merge
+from solver.hcms.tree import Merge
 from solver.model import ElasticModel
 
 Array = NDArray[np.float64]
@@ -34,13 +35,10 @@ class Synthesis:
         (k,) Ritz values [rad^2/s^2], ascending, on every rank.
     vectors
         (local unknowns, k) this rank's rows in the decomposition's order, Fortran-contiguous.
-    kept
-        Number of modes kept by each group of the tree.
     """
 
     values: Array
     vectors: Array
-    kept: dict[int, int] = field(default_factory=dict)
 
 
 def modes_to_keep(share: float, keep: int) -> int:
@@ -119,9 +117,7 @@ def synthesize(
 
     root = 2 * tree.parts - 2
     values = comm.bcast(groups[root].values if rank == leader[root] else None, root=leader[root])
-    if rank == leader[root]:
-        coefficients[root] = coefficients.get(root, np.eye(len(values)))
-    weights = _push_down(tree.merges, leader, coefficients, left_sizes, rank, comm)
+    weights = _push_down(tree.merges, leader, coefficients, left_sizes, comm)
     if tree.parts == 1:
         weights = {0: np.eye(len(values))}
     blocks = [bases[part] @ weights[part] for part in np.flatnonzero(owner == rank)]
@@ -129,8 +125,15 @@ def synthesize(
     return Synthesis(values, vectors)
 
 
-def _push_down(merges, leader, coefficients, left_sizes, rank, comm):  # type: ignore[no-untyped-def]
+def _push_down(
+    merges: tuple[Merge, ...],
+    leader: list[int],
+    coefficients: dict[int, Array],
+    left_sizes: dict[int, int],
+    comm: MPI.Comm,
+) -> dict[int, Array]:
     """Coefficients of the final modes in every local basis of this rank."""
+    rank = comm.rank
     weights: dict[int, Array] = {}
     for step in reversed(merges):
         here, there = leader[step.left], leader[step.right]

@@ -23,8 +23,8 @@ class Merge:
 class MergeTree:
     """Binary tree over the subdomains 0..parts-1; group `parts + i` is made by `merges[i]`.
 
-    A child's merge always comes before its parent's.  Subdomains are numbered so that every group is
-    a contiguous range of them, which lets ranks own contiguous ranges too.
+    A child's merge always comes before its parent's.  Subdomains are numbered so that every group
+    is a contiguous range of them, which lets ranks own contiguous ranges too.
     """
 
     parts: int
@@ -97,7 +97,7 @@ def _heaviest_matching(weight: NDArray[np.float64]) -> list[tuple[int, int]]:
     first, second = np.triu_indices(size, 1)
     pairs = sorted(zip(-weight[first, second], first, second, strict=True))
     free = np.ones(size, dtype=bool)
-    matched = []
+    matched: list[tuple[int, int]] = []
     for negative_weight, a, b in pairs:
         if free[a] and free[b] and (negative_weight < 0.0 or not matched):
             free[a] = free[b] = False
