@@ -8,10 +8,10 @@ import sys
 from typing import Any
 
 from carillon import cli
+from carillon.arguments import Parser, poisson_ratio, whole_number
 from carillon.files import require_writable
 from carillon.progress import say
 from dataset_gen import benchmark, summary
-from dataset_gen.arguments import Parser, poisson_ratio, whole_number
 from dataset_gen.element import DEFAULT_POISSON
 from dataset_gen.generate import generate
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, OBJECTIVES

@@ -8,9 +8,9 @@ import sys
 from dataclasses import replace
 
 from carillon import cli
+from carillon.arguments import Parser, positive_number, whole_number
 from carillon.files import require_writable
 from carillon.progress import say
-from dataset_gen.arguments import Parser, positive_number, whole_number
 from dataset_gen.shards import read_shards
 from forests import summary, table
 from forests.model import load_model, save_model

@@ -10,11 +10,11 @@ from typing import Any
 
 from mpi4py import MPI
 
+from carillon.arguments import Parser
 from carillon.cli import EXIT_BAD_INPUT, EXIT_NOT_CONVERGED
 from carillon.errors import ConvergenceError, UserError
 from carillon.files import atomic_path, require_writable
 from carillon.runtime import limit_threads, warn_about_reference_blas
-from dataset_gen.arguments import Parser
 from solver import coarsening, materials
 from solver.analysis import METHODS, SolverOptions, modal_analysis
 from solver.decomposition import on_root

@@ -8,31 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from dataset_gen.block import COARSE_EDGE, cell_stiffness, prolongation
-from dataset_gen.element import quadrature_stiffness
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, fit
 from forests import coarsen as evaluate_forest
 from forests import load_model
+from forests.baselines import average, galerkin
 from solver.geometry import Blocks, HexMesh, blocks_from_mesh
 from solver.model import ElasticModel, fine_model
 
 Array = NDArray[np.float64]
 
 METHODS = ("none", "average", "galerkin", "ddfem", "fit")
-
-
-def average(e: Array) -> Array:
-    """The block's mean modulus at every quadrature point, void cells counted as zero."""
-    return np.repeat(e.mean(axis=1, keepdims=True), 8, axis=1)
-
-
-def galerkin(e: Array, poisson: float) -> Array:
-    """Moduli whose stiffness is P^T K(e) P, the exact energy of trilinear motions."""
-    kernels = COARSE_EDGE * quadrature_stiffness(poisson).reshape(8, 576)
-    P = prolongation()
-    projected = np.einsum("ka,jkl,lb->jab", P, cell_stiffness(poisson), P, optimize=True)
-    weights, *_ = np.linalg.lstsq(kernels.T, projected.reshape(8, 576).T, rcond=None)
-    return np.asarray(e @ weights.T)
 
 
 def coarse_moduli(e: Array, method: str, poisson: float, forest: str | Path | None = None) -> Array:
@@ -50,7 +35,7 @@ def coarse_moduli(e: Array, method: str, poisson: float, forest: str | Path | No
         case "average":
             return average(e)
         case "galerkin":
-            return galerkin(e, poisson)
+            return galerkin(e)
         case "fit":
             return fit(DEFAULT_OBJECTIVE, e, poisson).moduli
         case "ddfem":
