@@ -13,9 +13,10 @@ MODELS = list(config["models"])
 # Timed rules take all cores, so that no other job disturbs their wall times.
 SOLVER_CORES = config["solver"]["cores"] or workflow.cores or 1
 RANKS = config["solver"]["ranks"]
-# On several ranks a launcher goes in front; on a cluster the profile names its own as resource mpi.
+# On several ranks a launcher goes in front, on a cluster the one that the profile names as resource
+# mpi, and -m mpi4py lets one rank's failure end them all. A single rank needs neither.
 LAUNCHER = "mpiexec" if RANKS > 1 else ""
-ON_RANKS = f"-n {RANKS}" if RANKS > 1 else ""
+ON_RANKS = f"-n {RANKS} python -m mpi4py" if RANKS > 1 else "python"
 
 
 wildcard_constraints:

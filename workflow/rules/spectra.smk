@@ -25,8 +25,8 @@ rule find_modes:
         modes=model_modes,
     shell:
         "OMP_NUM_THREADS=$(( {threads} > {params.ranks} ? {threads} / {params.ranks} : 1 ))"
-        " {resources.mpi} {params.on_ranks}"
-        " python -m mpi4py -m solver modes {params.model} {params.variant}"
+        " {resources.mpi} {params.on_ranks} -m solver modes"
+        " {params.model} {params.variant}"
         " --modes {params.modes} --out {output} > {log} 2>&1"
 
 
