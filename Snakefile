@@ -37,4 +37,4 @@ rule all:
     default_target: True
     input:
         f"{RESULTS}/report.html",
-        f"{RESULTS}/figures/overview.png",
+        expand(f"{RESULTS}/figures/{{model}}-overview.png", model=MODELS),

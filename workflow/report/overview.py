@@ -1,57 +1,62 @@
-"""One picture that says what the project does: a mode, and its spectrum against the truth."""
+"""One picture that says what the project does: a mode, and its spectrum, against the truth."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
 from solver.analysis import RIGID_MODES
-from solver.geometry import HexMesh
 from solver.geometry.picture import DRAWN_AMPLITUDE, draw
 from solver.modes_file import read_modes
 from workflow.report.mode_pictures import aligned, displacement
 from workflow.report.plots import LINES
 from workflow.report.results import Results
-from workflow.report.style import COLOURS, SETTINGS
+from workflow.report.style import COLOURS, MUTED, SETTINGS
 from workflow.report.table import Table
 from workflow.variants import TRUTH, VARIANTS
 
 FAST = "ddfem_hcms_ec"
+COMPARED = (TRUTH, "hcms_ec", FAST)
 
 
 def overview_figure(results: Results, frequencies: Table, model: str) -> Figure:
-    """First elastic mode by the fast method on the left, both spectra on the right."""
+    """First elastic mode of the truth and of the fast method, and the spectra of both."""
     truth = read_modes(results.modes_path(model, TRUTH))
-    fast = read_modes(results.modes_path(model, FAST))
-    motion, _ = aligned(fast, truth, displacement(truth, RIGID_MODES))
-    diagonal = float(np.linalg.norm(np.ptp(truth.mesh.nodes, axis=0)))
-    largest = float(np.linalg.norm(motion, axis=1).max())
-    rows = [row for row in frequencies.rows if row["model"] == model]
-    mode = [row["mode"] for row in rows]
+    wanted = displacement(truth, RIGID_MODES)
+    largest = float(np.linalg.norm(wanted, axis=1).max())
+    scale = DRAWN_AMPLITUDE * float(np.linalg.norm(np.ptp(truth.mesh.nodes, axis=0))) / largest
     with plt.rc_context({**SETTINGS, "figure.constrained_layout.use": False}):
-        figure = plt.figure(figsize=(10, 4.1))
-        body = figure.add_axes((0.0, 0.0, 0.47, 0.92), projection="3d")
-        draw(body, fast.mesh, motion, scale=DRAWN_AMPLITUDE * diagonal / largest)
-        spectrum = figure.add_axes((0.56, 0.135, 0.42, 0.745))
-        for variant in (TRUTH, "hcms_ec", FAST):
-            spectrum.plot(
-                mode,
-                [row[variant] / 1e3 for row in rows],
-                color=COLOURS[variant],
-                label=_label(variant, fast.mesh if variant == FAST else truth.mesh),
-                **LINES[variant],
-            )
-        spectrum.set(xlabel="mode number", ylabel="frequency [kHz]")
-        spectrum.set_xlim(mode[0], mode[-1])
-        spectrum.set_ylim(bottom=0)
-        spectrum.legend(loc="upper left")
-        hertz = fast.frequencies[RIGID_MODES]
-        figure.text(0.03, 0.93, f"{results.title(model)}: mode 7, {hertz:,.0f} Hz", weight="bold")
-        figure.text(0.56, 0.93, f"Spectrum, {len(mode)} elastic modes", weight="bold")
+        figure = plt.figure(figsize=(11.6, 3.9))
+        for column, variant in enumerate((TRUTH, FAST)):
+            left = 0.01 + 0.3 * column
+            file = truth if variant == TRUTH else read_modes(results.modes_path(model, FAST))
+            motion, _ = aligned(file, truth, wanted)
+            body = figure.add_axes((left, 0.0, 0.29, 0.84), projection="3d")
+            draw(body, file.mesh, motion, scale=scale, limits=(0.0, largest))
+            figure.text(left + 0.01, 0.93, _label(variant), weight="bold", size=10.5)
+            hertz = file.frequencies[RIGID_MODES]
+            text = f"{file.mesh.n_dofs:,} unknowns, mode 7 at {hertz:,.0f} Hz"
+            figure.text(left + 0.01, 0.87, text, color=MUTED)
+        rows = [row for row in frequencies.rows if row["model"] == model]
+        _plot_spectra(figure.add_axes((0.68, 0.13, 0.305, 0.69)), rows)
+        figure.text(0.68, 0.93, results.title(model), weight="bold", size=10.5)
+        figure.text(0.68, 0.87, f"{len(rows)} natural frequencies", color=MUTED)
     return figure
 
 
-def _label(variant: str, mesh: HexMesh) -> str:
-    name = "SLEPc" if variant == TRUTH else VARIANTS[variant].label
-    return f"{name}, {mesh.n_dofs:,} unknowns"
+def _plot_spectra(axes: Any, rows: list[dict[str, Any]]) -> None:
+    mode = [row["mode"] for row in rows]
+    for variant in COMPARED:
+        kilohertz = [row[variant] / 1e3 for row in rows]
+        axes.plot(mode, kilohertz, color=COLOURS[variant], label=_label(variant), **LINES[variant])
+    axes.set(xlabel="mode number", ylabel="frequency [kHz]")
+    axes.set_xlim(mode[0], mode[-1])
+    axes.set_ylim(bottom=0)
+    axes.legend(loc="upper left")
+
+
+def _label(variant: str) -> str:
+    return "Ground truth (SLEPc)" if variant == TRUTH else VARIANTS[variant].label

@@ -66,22 +66,20 @@ rule plot_times:
         "../scripts/plot_times.py"
 
 
-# The picture for a README or a slide: the first model's mode and spectrum against the truth.
+# A picture for a README or a slide: one mode and the spectrum against the truth.
 rule draw_overview:
     input:
-        modes=f"{RESULTS}/models/{MODELS[0]}/ddfem_hcms_ec.h5",
-        truth=f"{RESULTS}/models/{MODELS[0]}/{variants.TRUTH}.h5",
+        modes=f"{RESULTS}/models/{{model}}/ddfem_hcms_ec.h5",
+        truth=f"{RESULTS}/models/{{model}}/{variants.TRUTH}.h5",
         frequencies=f"{RESULTS}/tables/frequencies.json",
         config=f"{RESULTS}/config.yaml",
     output:
-        f"{RESULTS}/figures/overview.png",
+        f"{RESULTS}/figures/{{model}}-overview.png",
     log:
-        f"{LOGS}/figures/overview.log",
+        f"{LOGS}/figures/{{model}}-overview.log",
     resources:
         mem_mb=1000,
         runtime="10m",
-    params:
-        model=MODELS[0],
     script:
         "../scripts/draw_overview.py"
 

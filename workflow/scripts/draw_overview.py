@@ -8,6 +8,6 @@ from workflow.report.table import read_table
 figure = overview_figure(
     results_beside(snakemake.input.config),
     read_table(snakemake.input.frequencies),
-    snakemake.params.model,
+    snakemake.wildcards.model,
 )
 save_png(figure, snakemake.output[0])
