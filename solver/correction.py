@@ -21,6 +21,8 @@ RIGID_TOLERANCE = 1e-7
 MAX_AMPLIFICATION = 1e5
 """Largest growth of the lowest active mode over the highest in one polynomial; more would let the
 low modes drown the others in rounding."""
+WELL_CONDITIONED = 1e-3
+"""Least diagonal entry of the Gram matrix's Cholesky factor for which the factor is used."""
 RANK_TOLERANCE = 1e-13
 """Directions whose share of the basis falls below this are dropped as linearly dependent."""
 
@@ -61,14 +63,26 @@ def rayleigh_ritz(system: System, block: Array, count: int | None = None) -> tup
     block, mass_block = remove_rigid(system, np.asfortranarray(block))
     gram = system.inner(block, mass_block)
     stiff = system.inner(block, system.multiply(system.K, block))
-    scale = 1.0 / np.sqrt(np.diag(gram))
-    spread, directions = la.eigh(_symmetric(gram * scale[:, None] * scale), driver="evd")
-    independent = spread > RANK_TOLERANCE * spread[-1]
-    whitening = scale[:, None] * directions[:, independent] / np.sqrt(spread[independent])
-    values, rotation = la.eigh(_symmetric(whitening.T @ stiff @ whitening), driver="evd")
+    values, weights = _reduced_eigenpairs(stiff, gram)
     count = len(values) if count is None else min(count, len(values))
-    vectors = np.asfortranarray(block @ (whitening @ rotation[:, :count]))
-    return values[:count], vectors
+    return values[:count], np.asfortranarray(block @ weights[:, :count])
+
+
+def _reduced_eigenpairs(stiff: Array, gram: Array) -> tuple[Array, Array]:
+    """Eigenpairs of the dense pencil in the numerically independent directions of `gram`."""
+    scale = 1.0 / np.sqrt(np.diag(gram))
+    gram = _symmetric(gram * scale[:, None] * scale)
+    stiff = _symmetric(stiff * scale[:, None] * scale)
+    factor, failed = la.lapack.dpotrf(gram, lower=True)
+    if not failed and np.diag(factor).min() > WELL_CONDITIONED:
+        values, weights = la.eigh(stiff, gram, driver="gvd", check_finite=False)
+        return values, scale[:, None] * weights
+    spread, directions = la.eigh(gram, driver="evd", check_finite=False)
+    independent = spread > RANK_TOLERANCE * spread[-1]
+    whitening = directions[:, independent] / np.sqrt(spread[independent])
+    reduced = _symmetric(whitening.T @ stiff @ whitening)
+    values, rotation = la.eigh(reduced, driver="evd", check_finite=False)
+    return values, scale[:, None] * (whitening @ rotation)
 
 
 def remove_rigid(system: System, block: Array) -> tuple[Array, Array]:
