@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from solver.analysis import RIGID_MODES
 from solver.geometry import HexMesh
-from solver.geometry.picture import DRAWN_AMPLITUDE, draw
+from solver.geometry.picture import DRAWN_AMPLITUDE, draw, guess_up
 from solver.modes_file import ModesFile, read_modes
 from workflow.report.results import Results
 from workflow.report.style import SETTINGS, pixels, save_pixels
@@ -34,11 +34,12 @@ def draw_first_elastic_modes(
     diagonal = float(np.linalg.norm(np.ptp(truth.mesh.nodes, axis=0)))
     largest = float(np.linalg.norm(wanted, axis=1).max())
     scale = DRAWN_AMPLITUDE * diagonal / largest
+    up = guess_up(truth.mesh)
     description, pictures = {}, []
     for variant in SHOWN:
         found = read_modes(results.modes_path(model, variant))
         motion, likeness = aligned(found, truth, wanted)
-        pictures.append(pixels(mode_figure(found.mesh, motion, scale, (0.0, largest))))
+        pictures.append(pixels(mode_figure(found.mesh, motion, scale, (0.0, largest), up)))
         description[variant] = {
             "hertz": float(found.frequencies[RIGID_MODES]),
             "likeness": likeness,
@@ -90,13 +91,15 @@ def cropped(pictures: Sequence[NDArray[np.uint8]], margin: int = 12) -> list[NDA
     return [picture[window] for picture in pictures]
 
 
-def mode_figure(mesh: HexMesh, motion: Array, scale: float, limits: tuple[float, float]) -> Any:
+def mode_figure(
+    mesh: HexMesh, motion: Array, scale: float, limits: tuple[float, float], up: str
+) -> Any:
     """One deformed body, coloured by the length of its displacement."""
     import matplotlib.pyplot as plt
 
     with plt.rc_context(SETTINGS):
         figure = plt.figure(figsize=PICTURE_INCHES, layout="none")
         axes = figure.add_axes((0, 0, 1, 1), projection="3d")
-        draw(axes, mesh, motion, scale=scale, limits=limits)
+        draw(axes, mesh, motion, scale=scale, limits=limits, up=up)
         axes.patch.set_alpha(0.0)
     return figure
