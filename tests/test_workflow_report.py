@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import csv
+import doctest
 import io
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from workflow.report import numbers
 from workflow.report.mode_pictures import aligned, cluster, cropped
 from workflow.report.numbers import show
 from workflow.report.style import COLOURS, svg, themed
@@ -56,6 +58,10 @@ def test_people_see_shown_columns_with_few_digits():
 )
 def test_numbers_are_short_and_honest(value, kind, text):
     assert show(value, kind) == text
+
+
+def test_examples_of_numbers_hold():
+    assert doctest.testmod(numbers).failed == 0
 
 
 def modes_file(frequencies, modes, nodes):

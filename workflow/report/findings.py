@@ -26,6 +26,8 @@ class Findings:
         The same median for the other coarsenings.
     speed_up, speed_ups
         Median, smallest and largest ratio of SLEPc's time to that of DDFEM* + HCMS + EC.
+    fine_ratio, coarse_ratio
+        Median ratio of SLEPc's time to that of HCMS + EC, on the fine and on the coarsened mesh.
     faster
         Whether the fast method was faster than SLEPc on every model.
     proven
@@ -42,6 +44,8 @@ class Findings:
     galerkin_error: float
     speed_up: float
     speed_ups: tuple[float, float]
+    fine_ratio: float
+    coarse_ratio: float
     faster: bool
     proven: bool
     residual: float
@@ -52,6 +56,7 @@ class Findings:
 def findings(tables: dict[str, Table]) -> Findings:
     """Reduce the tables of a run to its headline numbers."""
     summary, coarsening = tables["summary"].rows, tables["coarsening"].rows
+    times = tables["times"].rows
     truths = [row for row in tables["evidence"].rows if row["inertia"] is not None]
     speed_ups = _all(summary, "speed_up")
     ddfem = _all(summary, "ddfem_error")
@@ -65,6 +70,8 @@ def findings(tables: dict[str, Table]) -> Findings:
         galerkin_error=statistics.median(_all(coarsening, "galerkin_hcms_ec_rms")),
         speed_up=statistics.median(speed_ups),
         speed_ups=(min(speed_ups), max(speed_ups)),
+        fine_ratio=_median_ratio(times, "truth", "hcms_ec"),
+        coarse_ratio=_median_ratio(times, "ddfem_slepc", "ddfem_hcms_ec"),
         faster=min(speed_ups) > 1.0,
         proven=residual < PROVEN_RESIDUAL and all(_counted(row) for row in truths),
         residual=residual,
@@ -75,6 +82,10 @@ def findings(tables: dict[str, Table]) -> Findings:
 
 def _all(rows: list[dict[str, Any]], key: str) -> list[Any]:
     return [row[key] for row in rows]
+
+
+def _median_ratio(rows: list[dict[str, Any]], above: str, below: str) -> float:
+    return statistics.median(row[above] / row[below] for row in rows)
 
 
 def _counted(row: dict[str, Any]) -> bool:

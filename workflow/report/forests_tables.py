@@ -81,7 +81,12 @@ def blocks(results: Results) -> Table:
 
 
 def _row(key: str, label: str, kind: str, value: Any) -> dict[str, Any]:
-    return {"key": key, "quantity": label, "shown": show(value, kind), "value": value}
+    return {
+        "key": key,
+        "quantity": label,
+        "shown": show(value, kind).replace(" ", "\N{NO-BREAK SPACE}"),
+        "value": value,
+    }
 
 
 def _score(name: str, value: float) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from solver.analysis import RIGID_MODES
 from solver.geometry import HexMesh
-from solver.geometry.picture import DRAWN_AMPLITUDE, draw, guess_up
+from solver.geometry.picture import DRAWN_AMPLITUDE, draw, guess_up, surface_quads
 from solver.modes_file import ModesFile, read_modes
 from workflow.report.results import Results
 from workflow.report.style import SETTINGS, pixels, save_pixels
@@ -31,15 +31,12 @@ def draw_first_elastic_modes(
     """Draw mode 7 of every shown variant to `paths`; return frequency and likeness of each."""
     truth = read_modes(results.modes_path(model, TRUTH))
     wanted = displacement(truth, RIGID_MODES)
-    diagonal = float(np.linalg.norm(np.ptp(truth.mesh.nodes, axis=0)))
-    largest = float(np.linalg.norm(wanted, axis=1).max())
-    scale = DRAWN_AMPLITUDE * diagonal / largest
-    up = guess_up(truth.mesh)
+    view = View(truth.mesh, wanted)
     description, pictures = {}, []
     for variant in SHOWN:
         found = read_modes(results.modes_path(model, variant))
         motion, likeness = aligned(found, truth, wanted)
-        pictures.append(pixels(mode_figure(found.mesh, motion, scale, (0.0, largest), up)))
+        pictures.append(pixels(mode_figure(found.mesh, motion, view)))
         description[variant] = {
             "hertz": float(found.frequencies[RIGID_MODES]),
             "likeness": likeness,
@@ -91,15 +88,32 @@ def cropped(pictures: Sequence[NDArray[np.uint8]], margin: int = 12) -> list[NDA
     return [picture[window] for picture in pictures]
 
 
-def mode_figure(
-    mesh: HexMesh, motion: Array, scale: float, limits: tuple[float, float], up: str
-) -> Any:
+class View:
+    """How all pictures of one mode are drawn, decided by the ground truth `mesh` and `motion`.
+
+    Attributes
+    ----------
+    scale, limits, up
+        Arguments of `solver.geometry.picture.draw`. Colours end at the largest motion that can be
+        seen: inside, a body may move more than its surface does.
+    """
+
+    def __init__(self, mesh: HexMesh, motion: Array) -> None:
+        seen = np.unique(surface_quads(mesh))
+        largest = float(np.linalg.norm(motion[seen], axis=1).max())
+        diagonal = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+        self.scale = DRAWN_AMPLITUDE * diagonal / largest
+        self.limits = (0.0, largest)
+        self.up = guess_up(mesh)
+
+
+def mode_figure(mesh: HexMesh, motion: Array, view: View) -> Any:
     """One deformed body, coloured by the length of its displacement."""
     import matplotlib.pyplot as plt
 
     with plt.rc_context(SETTINGS):
         figure = plt.figure(figsize=PICTURE_INCHES, layout="none")
         axes = figure.add_axes((0, 0, 1, 1), projection="3d")
-        draw(axes, mesh, motion, scale=scale, limits=limits, up=up)
+        draw(axes, mesh, motion, scale=view.scale, limits=view.limits, up=view.up)
         axes.patch.set_alpha(0.0)
     return figure

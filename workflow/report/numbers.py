@@ -35,7 +35,7 @@ def _percent(fraction: float) -> str:
     if 0 < abs(fraction) < ROUNDING:
         return f"< {_power(100.0 * ROUNDING)} %"
     percent = 100.0 * fraction
-    if abs(percent) < 0.01:
+    if abs(percent) < 0.001:
         return f"{_power(percent)} %"
     return f"{_digits(percent, 2)} %"
 
@@ -65,6 +65,7 @@ def _digits(value: float, digits: int) -> str:
     """At least `digits` significant digits, never an exponent."""
     if value == 0:
         return "0"
+    value = float(f"{value:.{digits - 1}e}") if abs(value) < 10**digits else value
     after_point = digits - 1 - math.floor(math.log10(abs(value)))
     return f"{value:,.{max(0, after_point)}f}"
 

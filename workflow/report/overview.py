@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import matplotlib.pyplot as plt
-import numpy as np
 from matplotlib.figure import Figure
 
 from solver.analysis import RIGID_MODES
-from solver.geometry.picture import DRAWN_AMPLITUDE, draw
+from solver.geometry.picture import draw
 from solver.modes_file import read_modes
-from workflow.report.mode_pictures import aligned, displacement
+from workflow.report.mode_pictures import View, aligned, displacement
 from workflow.report.plots import LINES
 from workflow.report.results import Results
 from workflow.report.style import COLOURS, MUTED, SETTINGS
@@ -26,8 +25,7 @@ def overview_figure(results: Results, frequencies: Table, model: str) -> Figure:
     """First elastic mode of the truth and of the fast method, and the spectra of both."""
     truth = read_modes(results.modes_path(model, TRUTH))
     wanted = displacement(truth, RIGID_MODES)
-    largest = float(np.linalg.norm(wanted, axis=1).max())
-    scale = DRAWN_AMPLITUDE * float(np.linalg.norm(np.ptp(truth.mesh.nodes, axis=0))) / largest
+    view = View(truth.mesh, wanted)
     with plt.rc_context({**SETTINGS, "figure.constrained_layout.use": False}):
         figure = plt.figure(figsize=(11.6, 3.9))
         for column, variant in enumerate((TRUTH, FAST)):
@@ -35,7 +33,7 @@ def overview_figure(results: Results, frequencies: Table, model: str) -> Figure:
             file = truth if variant == TRUTH else read_modes(results.modes_path(model, FAST))
             motion, _ = aligned(file, truth, wanted)
             body = figure.add_axes((left, 0.0, 0.29, 0.84), projection="3d")
-            draw(body, file.mesh, motion, scale=scale, limits=(0.0, largest))
+            draw(body, file.mesh, motion, scale=view.scale, limits=view.limits, up=view.up)
             figure.text(left + 0.01, 0.93, _label(variant), weight="bold", size=10.5)
             hertz = file.frequencies[RIGID_MODES]
             text = f"{file.mesh.n_dofs:,} unknowns, mode 7 at {hertz:,.0f} Hz"
@@ -55,7 +53,7 @@ def _plot_spectra(axes: Any, rows: list[dict[str, Any]]) -> None:
     axes.set(xlabel="mode number", ylabel="frequency [kHz]")
     axes.set_xlim(mode[0], mode[-1])
     axes.set_ylim(bottom=0)
-    axes.legend(loc="upper left")
+    axes.legend(loc="lower right")
 
 
 def _label(variant: str) -> str:

@@ -38,7 +38,7 @@ def render(results: Results) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["show"] = show
+    environment.filters["show"] = unbroken
     return environment.get_template("page.html.j2").render(
         title=results.config["title"],
         style=Markup((HERE / "page.css").read_text()),
@@ -56,6 +56,12 @@ def render(results: Results) -> str:
         ],
         times=_figure(results, "times.svg"),
     )
+
+
+def unbroken(value: Any, kind: str = "text") -> str:
+    """The number as `show` writes it, with a space before its unit at which no line breaks."""
+    text = show(value, kind)
+    return text if kind == "text" else text.replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def _model(results: Results, tables: dict[str, Table], model: str) -> dict[str, Any]:

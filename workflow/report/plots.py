@@ -48,7 +48,7 @@ def spectrum_figure(frequencies: Table, model: str) -> Figure:
                 below.semilogy(mode, _visible([row[f"{variant}_error"] for row in rows]), **style)
         above.set(ylabel="frequency [Hz]", title="Natural frequencies")
         above.set_ylim(bottom=0)
-        above.legend(loc="upper left")
+        above.legend(loc="lower right")
         below.set(xlabel="mode number", ylabel="|relative error|", title="Error of the frequency")
         below.set_xlim(mode[0], mode[-1])
     return figure
