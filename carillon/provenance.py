@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 import platform
+import shlex
 import subprocess
 import sys
 from functools import cache
@@ -84,12 +85,19 @@ def record(parameters: dict[str, Any]) -> dict[str, Any]:
         "commit": commit(),
         "config_hash": config_hash(parameters),
         "parameters": json.dumps(parameters, sort_keys=True, default=str),
-        "command": " ".join([Path(sys.argv[0]).name, *sys.argv[1:]]),
+        "command": _command(),
         "versions": json.dumps(versions()),
         "processor": processor(),
         "cores": len(os.sched_getaffinity(0)),
         "blas": blas_name(),
     }
+
+
+def _command() -> str:
+    """The command line as one would type it."""
+    program = Path(sys.argv[0])
+    name = f"python -m {program.parent.name}" if program.name == "__main__.py" else program.name
+    return shlex.join([*name.split(), *sys.argv[1:]])
 
 
 def write(file: h5py.File, parameters: dict[str, Any]) -> None:

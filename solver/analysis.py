@@ -19,7 +19,7 @@ from solver.hcms.synthesis import synthesize
 from solver.model import ElasticModel
 from solver.system import System, assemble
 from solver.timing import Phases, peak_memory
-from solver.truth import solve_truth
+from solver.truth import can_count, prove_complete, solve_truth
 
 Array = NDArray[np.float64]
 
@@ -133,22 +133,7 @@ def modal_analysis(
     if options.method == "hcms":
         values, vectors = _hcms(model, decomposition, system, options, phases, evidence, verbose)
     else:
-        with phases("eigensolver"):
-            truth = solve_truth(
-                system,
-                model.mesh.nodes,
-                options.modes,
-                options.method,
-                options.tolerance or 1e-10,
-                options.prove,
-            )
-        values, vectors = truth.values, truth.vectors
-        evidence |= {
-            "eigensolver_iterations": truth.iterations,
-            "inertia_count": truth.inertia,
-            "inertia_expected": truth.expected_inertia,
-            "inertia_at": truth.inertia_at,
-        }
+        values, vectors = _general_solver(model, system, options, phases, evidence)
     with phases("verification"):
         residuals, orthogonality = verify(system, values, vectors)
     evidence["orthogonality"] = orthogonality
@@ -173,6 +158,29 @@ def check_mode_count(modes: int, n_dofs: int) -> None:
 def default_keep(modes: int) -> int:
     """Modes kept at the root: those that the correction iterates, and a few to choose from."""
     return modes + default_guard(modes) + 16
+
+
+def _general_solver(
+    model: ElasticModel,
+    system: System,
+    options: SolverOptions,
+    phases: Phases,
+    evidence: dict[str, Any],
+) -> tuple[Array, Array]:
+    with phases("eigensolver"):
+        truth = solve_truth(
+            system, model.mesh.nodes, options.modes, options.method, options.tolerance or 1e-10
+        )
+    evidence["eigensolver_iterations"] = truth.iterations
+    if options.prove and can_count():
+        with phases("inertia"):
+            inertia = prove_complete(system, truth)
+        evidence |= {
+            "inertia_at": inertia.value,
+            "inertia_count": inertia.counted,
+            "inertia_expected": inertia.computed,
+        }
+    return truth.values[: options.modes], np.asfortranarray(truth.vectors[:, : options.modes])
 
 
 def _hcms(

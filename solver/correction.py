@@ -65,7 +65,7 @@ def rayleigh_ritz(system: System, block: Array, count: int | None = None) -> tup
     stiff = system.inner(block, system.multiply(system.K, block))
     values, weights = _reduced_eigenpairs(stiff, gram)
     count = len(values) if count is None else min(count, len(values))
-    return values[:count], np.asfortranarray(block @ weights[:, :count])
+    return values[:count], _times(block, weights[:, :count])
 
 
 def _reduced_eigenpairs(stiff: Array, gram: Array) -> tuple[Array, Array]:
@@ -95,11 +95,18 @@ def remove_rigid(system: System, block: Array) -> tuple[Array, Array]:
     mass_block = system.multiply(system.M, block)
     before = system.column_products(block, mass_block)
     share = system.inner(mass_rigid, block)
-    block = block - rigid @ share
-    mass_block = mass_block - mass_rigid @ share
+    block = block - _times(rigid, share)
+    mass_block -= _times(mass_rigid, share)
     after = system.column_products(block, mass_block)
     elastic = after > RIGID_TOLERANCE**2 * before
-    return np.asfortranarray(block[:, elastic]), np.asfortranarray(mass_block[:, elastic])
+    if not elastic.all():
+        block, mass_block = block[:, elastic], mass_block[:, elastic]
+    return np.asfortranarray(block), np.asfortranarray(mass_block)
+
+
+def _times(block: Array, weights: Array) -> Array:
+    """Product of a block of vectors with a small matrix, in Fortran order without a copy."""
+    return (weights.T @ block.T).T
 
 
 def correct(

@@ -17,8 +17,8 @@ DENSE_UNKNOWNS = 600
 """Up to this size all pairs by LAPACK are faster than the lowest by Lanczos."""
 DENSE_SHARE = 0.3
 """Above this share of wanted pairs LAPACK is faster too."""
-LOCAL_TOLERANCE = 1e-5
-"""Residual tolerance of local modes; the truncation of the basis is a far larger error."""
+LOCAL_TOLERANCE = 1e-8
+"""Residual tolerance of local modes; looser ones would leave the basis less than orthonormal."""
 SHIFT_FRACTION = 1e-6
 """Shift as a fraction of the ratio of the diagonals, which is typical of the highest modes."""
 

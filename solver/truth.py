@@ -10,7 +10,7 @@ from petsc4py import PETSc
 
 from carillon.errors import ConvergenceError
 from solver.correction import SHIFT_FRACTION, rayleigh_ritz
-from solver.eigensolver import factor_package, smallest_eigenpairs
+from solver.eigensolver import smallest_eigenpairs
 from solver.system import System
 
 Array = NDArray[np.float64]
@@ -22,26 +22,31 @@ POLYNOMIAL_DEGREE = 3
 
 @dataclass
 class Truth:
-    """Eigenpairs with the evidence for them.
+    """Eigenpairs from a general solver.
 
     Attributes
     ----------
     values, vectors
-        (k,) and (local, k), rigid modes included.
+        (k,) and (local, k), rigid modes included, k = `modes` and a few to spare.
+    modes
+        Number of modes asked for.
     iterations
         Outer iterations of the eigensolver.
-    inertia
-        Number of eigenvalues below `inertia_at` by the factorisation's inertia, -1 if not counted.
-    expected_inertia
-        Number of computed eigenvalues below it.
     """
 
     values: Array
     vectors: Array
+    modes: int
     iterations: int
-    inertia: int
-    expected_inertia: int
-    inertia_at: float
+
+
+@dataclass
+class Inertia:
+    """Number of eigenvalues below `value` [rad^2/s^2]: counted by a factorisation, and computed."""
+
+    value: float
+    counted: int
+    computed: int
 
 
 def first_elastic_estimate(system: System, nodes: Array) -> float:
@@ -67,12 +72,7 @@ def first_elastic_estimate(system: System, nodes: Array) -> float:
 
 
 def solve_truth(
-    system: System,
-    nodes: Array,
-    modes: int,
-    method: str = "slepc",
-    tolerance: float = 1e-10,
-    prove: bool = True,
+    system: System, nodes: Array, modes: int, method: str = "slepc", tolerance: float = 1e-10
 ) -> Truth:
     """Compute the `modes` lowest eigenpairs of the assembled system, rigid modes included.
 
@@ -82,14 +82,11 @@ def solve_truth(
         `slepc` (Krylov-Schur) or `arpack`, both in shift-and-invert mode.
     tolerance
         Relative residual tolerance of the eigensolver.
-    prove
-        Whether to count the eigenvalues below the last one by the inertia of K - mu M; some modes
-        more are computed to find a gap for mu.
 
     Raises
     ------
     ConvergenceError
-        If too few pairs converge, or the inertia count contradicts the computed number.
+        If too few pairs converge.
     """
     shift = SHIFT_FRACTION * first_elastic_estimate(system, nodes)
     wanted = min(modes + SPARE_MODES, system.n_dofs)
@@ -101,16 +98,32 @@ def solve_truth(
             f"{method} converged {len(values)} of {modes} modes to {tolerance:.0e} in {iterations} "
             "iterations"
         )
-    inertia, expected, at = -1, -1, float("nan")
-    if prove:
-        at, expected = _gap(values, modes)
-        inertia = count_below(system, at)
-        if inertia != expected:
-            raise ConvergenceError(
-                f"{method} found {expected} eigenvalues below {at:.6g} rad^2/s^2, the inertia of "
-                f"K - mu M counts {inertia}: eigenvalues were missed"
-            )
-    return Truth(values[:modes], vectors[:, :modes], iterations, inertia, expected, at)
+    return Truth(values, vectors, modes, iterations)
+
+
+def can_count() -> bool:
+    """Whether this PETSc can count eigenvalues by inertia, for which it needs MUMPS."""
+    return bool(PETSc.Sys.hasExternalPackage("mumps"))
+
+
+def prove_complete(system: System, truth: Truth) -> Inertia:
+    """Check by the inertia of K - mu M that no eigenvalue below the last wanted one was missed.
+
+    The shift mu lies in the widest gap among the spare modes.
+
+    Raises
+    ------
+    ConvergenceError
+        If the count contradicts the computed number.
+    """
+    value, computed = _gap(truth.values, truth.modes)
+    counted = count_below(system, value)
+    if counted != computed:
+        raise ConvergenceError(
+            f"the solver found {computed} eigenvalues below {value:.6g} rad^2/s^2, the inertia "
+            f"of K - mu M counts {counted}: eigenvalues were missed"
+        )
+    return Inertia(value, counted, computed)
 
 
 def _gap(values: Array, modes: int) -> tuple[float, int]:
@@ -123,21 +136,19 @@ def _gap(values: Array, modes: int) -> tuple[float, int]:
 
 
 def count_below(system: System, value: float) -> int:
-    """Number of eigenvalues below `value` [rad^2/s^2], by Sylvester's law of inertia."""
+    """Number of eigenvalues below `value` [rad^2/s^2], by Sylvester's law of inertia and MUMPS."""
     shifted = system.K.copy()
     shifted.axpy(-value, system.M, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
     shifted.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     factorisation = PETSc.PC().create(system.comm)
     factorisation.setOperators(shifted)
     factorisation.setType(PETSc.PC.Type.CHOLESKY)
-    package = factor_package(system.comm.size)
-    factorisation.setFactorSolverType(package)
+    factorisation.setFactorSolverType("mumps")
     factorisation.setFactorSetUpSolverType()
-    if package == "mumps":
-        # Inertia needs the root of the elimination tree on one rank, and its null pivots detected.
-        factor = factorisation.getFactorMatrix()
-        factor.setMumpsIcntl(13, 1)
-        factor.setMumpsIcntl(24, 1)
+    # Inertia needs the root of the elimination tree on one rank, and its null pivots detected.
+    factor = factorisation.getFactorMatrix()
+    factor.setMumpsIcntl(13, 1)
+    factor.setMumpsIcntl(24, 1)
     factorisation.setUp()
     negative, _, _ = factorisation.getFactorMatrix().getInertia()
     factorisation.destroy()

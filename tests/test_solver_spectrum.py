@@ -18,7 +18,7 @@ from solver.hcms.condense import restrict_stiffness
 from solver.hcms.synthesis import synthesize
 from solver.model import fine_model
 from solver.system import assemble
-from solver.truth import count_below, solve_truth
+from solver.truth import count_below, prove_complete, solve_truth
 from tests import solids
 
 COMM = MPI.COMM_SELF
@@ -159,7 +159,7 @@ def test_missed_eigenvalue_is_caught(monkeypatch):
     model = solids.random_box(6, 4, 3)
     system = assemble(model, decompose(model.mesh, 2, comm=COMM), COMM)
     with pytest.raises(ConvergenceError, match="were missed"):
-        solve_truth(system, model.mesh.nodes, 40)
+        prove_complete(system, solve_truth(system, model.mesh.nodes, 40))
 
 
 def test_spectrum_scales_exactly_with_modulus_and_size():
