@@ -133,7 +133,7 @@ def modal_analysis(
     if options.method == "hcms":
         values, vectors = _hcms(model, decomposition, system, options, phases, evidence, verbose)
     else:
-        values, vectors = _general_solver(model, system, options, phases, evidence)
+        values, vectors = _general_solver(system, options, phases, evidence)
     with phases("verification"):
         residuals, orthogonality = verify(system, values, vectors)
     evidence["orthogonality"] = orthogonality
@@ -161,16 +161,10 @@ def default_keep(modes: int) -> int:
 
 
 def _general_solver(
-    model: ElasticModel,
-    system: System,
-    options: SolverOptions,
-    phases: Phases,
-    evidence: dict[str, Any],
+    system: System, options: SolverOptions, phases: Phases, evidence: dict[str, Any]
 ) -> tuple[Array, Array]:
     with phases("eigensolver"):
-        truth = solve_truth(
-            system, model.mesh.nodes, options.modes, options.method, options.tolerance or 1e-10
-        )
+        truth = solve_truth(system, options.modes, options.method, options.tolerance or 1e-10)
     evidence["eigensolver_iterations"] = truth.iterations
     if options.prove and can_count():
         with phases("inertia"):

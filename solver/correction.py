@@ -6,25 +6,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg as la
 from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
+from solver.rayleigh_ritz import rayleigh_ritz, safe_shift
 from solver.system import ShiftedInverse, System
 
 Array = NDArray[np.float64]
 
-SHIFT_FRACTION = 0.1
-"""Shift of the singular stiffness, as a fraction of the first elastic eigenvalue's estimate."""
-RIGID_TOLERANCE = 1e-7
-"""A column whose elastic part is shorter than this fraction of it is a rigid motion."""
 MAX_AMPLIFICATION = 1e5
 """Largest growth of the lowest active mode over the highest in one polynomial; more would let the
 low modes drown the others in rounding."""
-WELL_CONDITIONED = 1e-3
-"""Least diagonal entry of the Gram matrix's Cholesky factor for which the factor is used."""
-RANK_TOLERANCE = 1e-13
-"""Directions whose share of the basis falls below this are dropped as linearly dependent."""
 
 
 @dataclass
@@ -53,60 +45,6 @@ class Correction:
     steps: int
     solves: int
     history: list[float]
-
-
-def rayleigh_ritz(system: System, block: Array, count: int | None = None) -> tuple[Array, Array]:
-    """Ritz values and mass-orthonormal Ritz vectors of the span of `block`, rigid motions removed.
-
-    Linearly dependent directions are dropped, so fewer than `count` pairs may come back.
-    """
-    block, mass_block = remove_rigid(system, np.asfortranarray(block))
-    gram = system.inner(block, mass_block)
-    stiff = system.inner(block, system.multiply(system.K, block))
-    values, weights = _reduced_eigenpairs(stiff, gram)
-    count = len(values) if count is None else min(count, len(values))
-    return values[:count], _times(block, weights[:, :count])
-
-
-def _reduced_eigenpairs(stiff: Array, gram: Array) -> tuple[Array, Array]:
-    """Eigenpairs of the dense pencil in the numerically independent directions of `gram`."""
-    scale = 1.0 / np.sqrt(np.diag(gram))
-    gram = _symmetric(gram * scale[:, None] * scale)
-    stiff = _symmetric(stiff * scale[:, None] * scale)
-    factor, failed = la.lapack.dpotrf(gram, lower=True)
-    if not failed and np.diag(factor).min() > WELL_CONDITIONED:
-        values, weights = la.eigh(stiff, gram, driver="gvd", check_finite=False)
-        return values, scale[:, None] * weights
-    spread, directions = la.eigh(gram, driver="evd", check_finite=False)
-    independent = spread > RANK_TOLERANCE * spread[-1]
-    whitening = directions[:, independent] / np.sqrt(spread[independent])
-    reduced = _symmetric(whitening.T @ stiff @ whitening)
-    values, rotation = la.eigh(reduced, driver="evd", check_finite=False)
-    return values, scale[:, None] * (whitening @ rotation)
-
-
-def remove_rigid(system: System, block: Array) -> tuple[Array, Array]:
-    """Mass-orthogonal complement of `block` to the rigid motions, and its product with the mass.
-
-    Columns that were rigid motions, of which only rounding is left, are dropped.
-    """
-    rigid = system.rigid
-    mass_rigid = system.multiply(system.M, rigid)
-    mass_block = system.multiply(system.M, block)
-    before = system.column_products(block, mass_block)
-    share = system.inner(mass_rigid, block)
-    block = block - _times(rigid, share)
-    mass_block -= _times(mass_rigid, share)
-    after = system.column_products(block, mass_block)
-    elastic = after > RIGID_TOLERANCE**2 * before
-    if not elastic.all():
-        block, mass_block = block[:, elastic], mass_block[:, elastic]
-    return np.asfortranarray(block), np.asfortranarray(mass_block)
-
-
-def _times(block: Array, weights: Array) -> Array:
-    """Product of a block of vectors with a small matrix, in Fortran order without a copy."""
-    return (weights.T @ block.T).T
 
 
 def correct(
@@ -169,7 +107,7 @@ def correct(
         # The subspace is the whole space, where Ritz pairs are eigenpairs.
         exact = np.full(wanted, np.finfo(float).eps)
         return Correction(values[:wanted], vectors[:, :wanted], exact, 0, 0, [])
-    inverse = ShiftedInverse(system, SHIFT_FRACTION * values[0])
+    inverse = ShiftedInverse(system, safe_shift(system))
     errors = np.full(len(values), np.nan)
     history: list[float] = []
     solves = 0
@@ -275,7 +213,3 @@ def _chebyshev(
         before, current = current, following
         size_before, size = size, 2.0 * argument * size - size_before
     return np.asfortranarray(current / size), used
-
-
-def _symmetric(matrix: Array) -> Array:
-    return np.asarray(0.5 * (matrix + matrix.T))

@@ -6,7 +6,7 @@ a Fortran-ordered numpy array with this rank's rows; products and solves take an
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,8 @@ class System:
         PETSc matrices [N/m], [kg].
     rigid
         (local, 6) this rank's rows of the mass-orthonormal rigid motions.
+    coordinates
+        (local nodes, 3) positions relative to the centroid, in units of the largest half extent.
     order
         (n,) node numbers in distributed order.
     start, stop
@@ -42,6 +44,7 @@ class System:
     K: Any
     M: Any
     rigid: Array
+    coordinates: Array
     order: NDArray[np.int64]
     start: int
     stop: int
@@ -123,14 +126,15 @@ def assemble(
     )
     K = distributed_matrix(K_rows, comm)
     M = distributed_matrix(M_rows, comm)
-    motions = rigid_motions(model.mesh.nodes)[
-        (3 * decomposition.order[start:stop, None] + np.arange(3)).ravel()
-    ]
-    system = System(K, M, np.asfortranarray(motions), decomposition.order, start, stop, comm)
-    gram = system.inner(motions, system.multiply(M, system.rigid))
-    lower = np.linalg.cholesky(gram)
-    rigid = np.asfortranarray(np.linalg.solve(lower, motions.T).T)
-    return System(K, M, rigid, decomposition.order, start, stop, comm)
+    centred = model.mesh.nodes - model.mesh.nodes.mean(axis=0)
+    scaled = centred / np.abs(centred).max()
+    own = decomposition.order[start:stop]
+    # About the centroid of the whole body: every rank must hold rows of the same six motions.
+    motions = np.asfortranarray(rigid_motions(scaled).reshape(-1, 3, 6)[own].reshape(-1, 6))
+    system = System(K, M, motions, scaled[own], decomposition.order, start, stop, comm)
+    gram = system.inner(motions, system.multiply(M, motions))
+    rigid = np.asfortranarray(np.linalg.solve(np.linalg.cholesky(gram), motions.T).T)
+    return replace(system, rigid=rigid)
 
 
 class ShiftedInverse:

@@ -9,15 +9,14 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from carillon.errors import ConvergenceError
-from solver.correction import SHIFT_FRACTION, rayleigh_ritz
 from solver.eigensolver import smallest_eigenpairs
+from solver.rayleigh_ritz import safe_shift
 from solver.system import System
 
 Array = NDArray[np.float64]
 
 SPARE_MODES = 8
 """Modes computed beyond those asked for, so that the inertia count finds a gap to look through."""
-POLYNOMIAL_DEGREE = 3
 
 
 @dataclass
@@ -49,30 +48,8 @@ class Inertia:
     computed: int
 
 
-def first_elastic_estimate(system: System, nodes: Array) -> float:
-    """Upper bound [rad^2/s^2] of the first elastic eigenvalue, from polynomial displacement fields.
-
-    Parameters
-    ----------
-    nodes
-        (n, 3) coordinates [m] in mesh order.
-    """
-    centred = nodes - nodes.mean(axis=0)
-    centred = centred / np.abs(centred).max()
-    powers = [
-        (a, b, c)
-        for a in range(POLYNOMIAL_DEGREE + 1)
-        for b in range(POLYNOMIAL_DEGREE + 1 - a)
-        for c in range(POLYNOMIAL_DEGREE + 1 - a - b)
-    ]
-    fields = np.stack([(centred**power).prod(axis=1) for power in powers], axis=1)
-    block = np.einsum("np,ij->nipj", fields, np.eye(3)).reshape(3 * len(nodes), -1)
-    values, _ = rayleigh_ritz(system, system.local_rows(block))
-    return float(values[0])
-
-
 def solve_truth(
-    system: System, nodes: Array, modes: int, method: str = "slepc", tolerance: float = 1e-10
+    system: System, modes: int, method: str = "slepc", tolerance: float = 1e-10
 ) -> Truth:
     """Compute the `modes` lowest eigenpairs of the assembled system, rigid modes included.
 
@@ -88,7 +65,7 @@ def solve_truth(
     ConvergenceError
         If too few pairs converge.
     """
-    shift = SHIFT_FRACTION * first_elastic_estimate(system, nodes)
+    shift = safe_shift(system)
     wanted = min(modes + SPARE_MODES, system.n_dofs)
     values, vectors, iterations = smallest_eigenpairs(
         system.K, system.M, wanted, shift, tolerance, method

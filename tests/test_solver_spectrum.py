@@ -159,7 +159,7 @@ def test_missed_eigenvalue_is_caught(monkeypatch):
     model = solids.random_box(6, 4, 3)
     system = assemble(model, decompose(model.mesh, 2, comm=COMM), COMM)
     with pytest.raises(ConvergenceError, match="were missed"):
-        prove_complete(system, solve_truth(system, model.mesh.nodes, 40))
+        prove_complete(system, solve_truth(system, 40))
 
 
 def test_spectrum_scales_exactly_with_modulus_and_size():
@@ -231,5 +231,5 @@ def test_hinged_model_is_refused():
     grid = np.array([[0, 0, 0], [1, 1, 0]])
     mesh = solids.hexmesh_from_grid(grid, np.zeros(3), 0.01)
     model = fine_model(mesh, np.full(2, 1e9))
-    with pytest.raises(ConvergenceError, match="zero-frequency modes found"):
+    with pytest.raises(ConvergenceError, match="zero-frequency mode"):
         spectrum(model, modes=20)
