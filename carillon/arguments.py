@@ -34,10 +34,7 @@ def whole_number(least: int) -> Callable[[str], int]:
 
 def positive_number(text: str) -> float:
     """Argument type: a finite number above zero."""
-    try:
-        value = float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+    value = _number(text)
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is out of range, expected a number above 0")
     return value
@@ -45,10 +42,22 @@ def positive_number(text: str) -> float:
 
 def poisson_ratio(text: str) -> float:
     """Argument type: Poisson's ratio in (-1, 0.5)."""
-    try:
-        value = float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+    value = _number(text)
     if not -1.0 < value < 0.5:
         raise argparse.ArgumentTypeError(f"Poisson's ratio {text} is outside (-1, 0.5)")
     return value
+
+
+def non_negative_number(text: str) -> float:
+    """Argument type: a finite number, zero or above."""
+    value = _number(text)
+    if not 0.0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is out of range, expected 0 or above")
+    return value
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None

@@ -10,7 +10,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from carillon.arguments import Parser
+from carillon.arguments import Parser, non_negative_number, whole_number
 from carillon.cli import EXIT_BAD_INPUT, EXIT_NOT_CONVERGED
 from carillon.errors import ConvergenceError, UserError
 from carillon.files import atomic_path, require_writable
@@ -210,24 +210,26 @@ def _parser() -> argparse.ArgumentParser:
     modes.add_argument("--out", required=True, help="modes file to write (HDF5)")
     modes.add_argument(
         "--tol",
-        type=float,
+        type=non_negative_number,
         help="hcms: relative eigenvalue error to correct to (default 1e-7; 0 makes exactly "
         "--corrections steps); slepc, arpack: residual tolerance (default 1e-10)",
     )
     modes.add_argument(
         "--corrections",
-        type=int,
+        type=whole_number(0),
         default=SolverOptions.corrections,
         help="largest number of correction steps; 0 is plain HCMS (default %(default)s)",
     )
     modes.add_argument(
         "--degree",
-        type=int,
+        type=whole_number(1),
         default=SolverOptions.degree,
         help="polynomial degree of a correction; 1 is the paper's (default %(default)s)",
     )
-    modes.add_argument("--keep", type=int, help="modes kept at the root of the merge tree")
-    modes.add_argument("--subdomains", type=int, help="number of subdomains")
+    modes.add_argument(
+        "--keep", type=whole_number(1), help="modes kept at the root of the merge tree"
+    )
+    modes.add_argument("--subdomains", type=whole_number(1), help="number of subdomains")
     modes.add_argument("--interface", choices=INTERFACES, default="free", help="default: free")
     modes.add_argument("--json", action="store_true", help="print a summary as JSON")
     modes.set_defaults(run=_modes)
@@ -243,15 +245,21 @@ def _parser() -> argparse.ArgumentParser:
     )
     _add_problem(convergence)
     convergence.add_argument("--modes", type=int, default=256, help="rigid included (default 256)")
-    convergence.add_argument("--steps", type=int, default=3, help="corrections (default 3)")
-    convergence.add_argument("--degree", type=int, default=1, help="see modes (default 1)")
+    convergence.add_argument(
+        "--steps", type=whole_number(0), default=3, help="corrections (default 3)"
+    )
+    convergence.add_argument(
+        "--degree", type=whole_number(1), default=1, help="see modes (default 1)"
+    )
     convergence.add_argument("--out", required=True, help="JSON file to write")
     convergence.set_defaults(run=_convergence)
 
     benchmark = commands.add_parser("benchmark", help="time all methods on one solid (Fig. 11)")
     _add_problem(benchmark)
     benchmark.add_argument("--modes", type=int, default=256, help="rigid included (default 256)")
-    benchmark.add_argument("--runs", type=int, default=3, help="timed runs a method (default 3)")
+    benchmark.add_argument(
+        "--runs", type=whole_number(1), default=3, help="timed runs a method (default 3)"
+    )
     benchmark.add_argument("--skip-arpack", action="store_true", help="leave the slowest one out")
     benchmark.add_argument("--out", help="also write the row to this JSON file")
     benchmark.add_argument("--json", action="store_true", help="print JSON")
@@ -292,7 +300,10 @@ def _add_problem(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--lumped", action="store_true", help="lump the mass")
     parser.add_argument(
-        "--seed", type=int, default=defaults.seed, help="of random materials and the partition"
+        "--seed",
+        type=whole_number(0),
+        default=defaults.seed,
+        help="of random materials and the partition",
     )
 
 

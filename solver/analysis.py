@@ -31,6 +31,8 @@ RIGID_TOLERANCE = 1e-9
 ORTHOGONALITY_TOLERANCE = 1e-8
 """Largest accepted entry of X^T M X - I."""
 MAX_CORRECTIONS = 40
+FEWEST_SPARE = 8
+"""Vectors that the correction needs beyond the modes asked for, to tell the last from the rest."""
 
 
 @dataclass(frozen=True)
@@ -145,9 +147,12 @@ def modal_analysis(
 
 
 def check_mode_count(modes: int, n_dofs: int) -> None:
-    """Raise UserError unless 1 <= modes <= n_dofs."""
-    if modes < 1:
-        raise UserError(f"{modes} modes asked for; expected at least 1")
+    """Raise UserError unless there is an elastic mode among `modes` and unknowns for all."""
+    if modes <= RIGID_MODES:
+        raise UserError(
+            f"{modes} modes asked for; the first {RIGID_MODES} are rigid motions, expected at least "
+            f"{RIGID_MODES + 1}"
+        )
     if modes > n_dofs:
         raise UserError(
             f"{modes:,} modes asked for, but the model has {n_dofs:,} unknowns; ask for fewer or "
@@ -186,7 +191,13 @@ def _hcms(
     evidence: dict[str, Any],
     verbose: bool,
 ) -> tuple[Array, Array]:
-    keep = max(options.keep or default_keep(options.modes), options.modes)
+    keep = default_keep(options.modes) if options.keep is None else options.keep
+    least = options.modes + (FEWEST_SPARE if options.corrections else 0)
+    if keep < min(least, model.n_dofs):
+        raise UserError(
+            f"--keep {keep} is too few for {options.modes} modes; expected at least {least}, and a "
+            f"third more for fast convergence"
+        )
     with phases("hcms"):
         start = synthesize(model, decomposition, keep, options.interface, system.comm)
     if options.corrections == 0:
@@ -200,7 +211,7 @@ def _hcms(
         result = correct(
             system,
             start.vectors,
-            max(options.modes - RIGID_MODES, 1),
+            options.modes - RIGID_MODES,
             1e-7 if options.tolerance is None else options.tolerance,
             options.corrections,
             options.degree,
@@ -240,7 +251,7 @@ def residual_ratios(system: System, values: Array, vectors: Array, mass_vectors:
     Rigid modes, whose lambda is zero, are measured with the first elastic eigenvalue instead.
     """
     residual = system.multiply(system.K, vectors) - mass_vectors * values
-    scale = np.maximum(values, values[min(RIGID_MODES, len(values) - 1)])
+    scale = np.maximum(values, values[RIGID_MODES])
     norms = np.sqrt(system.column_products(residual, residual))
     mass_norms = np.sqrt(system.column_products(mass_vectors, mass_vectors))
     tiny = np.finfo(float).tiny
@@ -249,8 +260,6 @@ def residual_ratios(system: System, values: Array, vectors: Array, mass_vectors:
 
 def count_rigid(values: Array) -> int:
     """Number of eigenvalues that are zero to rounding."""
-    if len(values) <= RIGID_MODES:
-        return len(values)
     return int(np.sum(values < RIGID_TOLERANCE * values[-1]))
 
 
@@ -261,8 +270,7 @@ def _judge(options: SolverOptions, evidence: dict[str, Any]) -> None:
             f"{ORTHOGONALITY_TOLERANCE:.0e} is required"
         )
     exact = options.method != "hcms" or (options.corrections > 0 and options.tolerance != 0.0)
-    expected = min(RIGID_MODES, options.modes)
-    if exact and evidence["rigid_modes"] != expected:
+    if exact and evidence["rigid_modes"] != RIGID_MODES:
         raise ConvergenceError(
             f"{evidence['rigid_modes']} zero-frequency modes found, a connected free body has "
             f"{RIGID_MODES}; part of the model hangs on a hinge or has almost no stiffness"

@@ -105,8 +105,7 @@ def recomputed_residuals(file: ModesFile) -> Array:
     K, M = assembled(file.model)
     mass_modes = M @ file.modes
     residual = K @ file.modes - mass_modes * file.eigenvalues
-    first_elastic = file.eigenvalues[min(RIGID_MODES, len(file.eigenvalues) - 1)]
-    scale = np.maximum(file.eigenvalues, first_elastic)
+    scale = np.maximum(file.eigenvalues, file.eigenvalues[RIGID_MODES])
     return np.asarray(
         np.linalg.norm(residual, axis=0) / (scale * np.linalg.norm(mass_modes, axis=0))
     )

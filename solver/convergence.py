@@ -38,7 +38,7 @@ def correction_history(
     check_mode_count(modes, model.n_dofs)
     decomposition = decompose(model.mesh, None, seed, comm)
     system = assemble(model, decomposition, comm)
-    wanted = max(modes - RIGID_MODES, 1)
+    wanted = modes - RIGID_MODES
     curves = {}
     for start in STARTS:
         block = _start_block(start, model, decomposition, system, default_keep(modes), seed)
