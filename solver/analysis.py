@@ -150,8 +150,8 @@ def check_mode_count(modes: int, n_dofs: int) -> None:
     """Raise UserError unless there is an elastic mode among `modes` and unknowns for all."""
     if modes <= RIGID_MODES:
         raise UserError(
-            f"{modes} modes asked for; the first {RIGID_MODES} are rigid motions, expected at least "
-            f"{RIGID_MODES + 1}"
+            f"{modes} modes asked for; the first {RIGID_MODES} are rigid motions, expected "
+            f"{RIGID_MODES + 1} or more"
         )
     if modes > n_dofs:
         raise UserError(
