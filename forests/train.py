@@ -96,7 +96,7 @@ def train(
     workers: int = 1,
     progress: bool = True,
 ) -> Model:
-    """Train the forests of void and of filled origins on the shards' samples.
+    """Train the forests of void and of filled origins on the shards' converged samples.
 
     Raises
     ------
@@ -105,9 +105,12 @@ def train(
     """
     training = training or Training()
     training.validate()
-    fine = np.concatenate([shard.fine for shard in shards])
-    coarse = np.concatenate([shard.coarse for shard in shards])
-    number = np.concatenate([np.arange(shard.start, shard.stop) for shard in shards])
+    settled = np.concatenate([shard.converged for shard in shards])
+    fine = np.concatenate([shard.fine for shard in shards])[settled]
+    coarse = np.concatenate([shard.coarse for shard in shards])[settled]
+    number = np.concatenate([np.arange(shard.start, shard.stop) for shard in shards])[settled]
+    if not settled.all():
+        say(f"leaving out {np.sum(~settled)} fits that did not converge", progress)
     held = number % training.held_out == training.held_out - 1
     young, moduli = fine[~held], coarse[~held]
     scaled = separate(young, training.transform)

@@ -155,6 +155,28 @@ def test_training_is_reproducible(shard, models):
         )
 
 
+def test_fits_that_did_not_converge_teach_nothing(shard, models):
+    half = len(shard.converged) // 2
+    good = replace(
+        shard,
+        fine=shard.fine[:half],
+        coarse=shard.coarse[:half],
+        residual=shard.residual[:half],
+        converged=shard.converged[:half],
+        stop=shard.start + half,
+    )
+    nonsense = replace(
+        shard,
+        coarse=np.concatenate([shard.coarse[:half], 1e6 * shard.coarse[half:]]),
+        converged=np.arange(len(shard.converged)) < half,
+    )
+    expected, found = (train([each], Training(), progress=False) for each in (good, nonsense))
+    for field in fields(Forests):
+        np.testing.assert_array_equal(
+            getattr(found.forests, field.name), getattr(expected.forests, field.name)
+        )
+
+
 def stump():
     """One split at feature 0 <= 0, two leaves."""
     return Tree(
