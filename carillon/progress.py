@@ -19,7 +19,10 @@ def track(
     yield from tqdm(items, desc=label, total=total, unit=unit, disable=not show, dynamic_ncols=True)
 
 
-def say(text: str, visible: bool = True) -> None:
-    """Print one line to standard error; standard output stays free for results."""
+def say(text: str, visible: bool = True, end: str = "\n") -> None:
+    """Print one line to standard error; standard output stays free for results.
+
+    With `end="\\r"` the next line takes its place.
+    """
     if visible:
-        print(text, file=sys.stderr, flush=True)
+        print(text, file=sys.stderr, flush=True, end=end)

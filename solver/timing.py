@@ -23,6 +23,7 @@ class Phases:
     @contextmanager
     def __call__(self, name: str) -> Iterator[None]:
         """Time the body as part of phase `name`."""
+        say(f"{name:<18s}      ...  ", visible=self._verbose, end="\r")
         begin = time.perf_counter()
         yield
         self._comm.barrier()
