@@ -125,6 +125,8 @@ def correct(
                 inverse.shift,
                 values[-1],
             )
+            # All ranks decide by the same bits when to stop and what to lock.
+            errors = system.comm.bcast(errors)
             worst = float(np.max(errors[:wanted]))
             history.append(worst)
             if report is not None:
@@ -146,6 +148,11 @@ def correct(
             values, vectors = rayleigh_ritz(
                 system, np.concatenate([locked, filtered], axis=1), wanted + guard
             )
+            if len(values) < wanted:
+                raise ConvergenceError(
+                    f"the iterated vectors collapsed to {len(values)} independent ones after "
+                    f"{step + 1} steps, {wanted} modes are wanted; lower the degree or keep more"
+                )
             active = min(first, len(values) - 1)
             errors = np.concatenate([errors[:active], np.full(len(values) - active, np.nan)])
             step += 1

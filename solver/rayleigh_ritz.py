@@ -7,6 +7,7 @@ import scipy.linalg as la
 from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
+from solver.decomposition import on_root
 from solver.system import System
 
 Array = NDArray[np.float64]
@@ -33,7 +34,8 @@ def rayleigh_ritz(system: System, block: Array, count: int | None = None) -> tup
     block, mass_block = remove_rigid(system, np.asfortranarray(block))
     gram = system.inner(block, mass_block)
     stiff = system.inner(block, system.multiply(system.K, block))
-    values, weights = _reduced_eigenpairs(stiff, gram)
+    # Solved once: two processors may round apart, and an eigenvector's sign hangs on rounding.
+    values, weights = on_root(system.comm, lambda: _reduced_eigenpairs(stiff, gram))
     count = len(values) if count is None else min(count, len(values))
     return values[:count], _times(block, weights[:, :count])
 
