@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,15 +38,15 @@ class Tree:
         return int(self.leaf.max()) + 1
 
 
-def flatten(tree: object) -> Tree:
+def flatten(tree: Any) -> Tree:
     """Arrays of a fitted scikit-learn tree (its `tree_`)."""
-    left = tree.children_left.astype(np.int32)  # type: ignore[attr-defined]
+    left = tree.children_left.astype(np.int32)
     leaf = np.where(left < 0, np.cumsum(left < 0) - 1, -1).astype(np.int32)
     return Tree(
-        feature=np.where(left < 0, 0, tree.feature).astype(np.int32),  # type: ignore[attr-defined]
-        threshold=np.where(left < 0, 0.0, tree.threshold),  # type: ignore[attr-defined]
+        feature=np.where(left < 0, 0, tree.feature).astype(np.int32),
+        threshold=np.where(left < 0, 0.0, tree.threshold),
         left=left,
-        right=tree.children_right.astype(np.int32),  # type: ignore[attr-defined]
+        right=tree.children_right.astype(np.int32),
         leaf=leaf,
     )
 

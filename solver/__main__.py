@@ -17,10 +17,12 @@ from carillon.files import atomic_path, require_writable
 from carillon.runtime import limit_threads, warn_about_reference_blas
 from solver import coarsening, materials
 from solver.analysis import METHODS, SolverOptions, modal_analysis
+from solver.correction import EIGENVALUE_TOLERANCE
 from solver.decomposition import on_root
 from solver.geometry import FILLS, PIECES
 from solver.hcms.condense import INTERFACES
 from solver.problem import ProblemOptions, build_problem
+from solver.truth import RESIDUAL_TOLERANCE
 
 _PROBLEM_FIELDS = tuple(ProblemOptions.__dataclass_fields__)
 
@@ -211,8 +213,9 @@ def _parser() -> argparse.ArgumentParser:
     modes.add_argument(
         "--tol",
         type=non_negative_number,
-        help="hcms: relative eigenvalue error to correct to (default 1e-7; 0 makes exactly "
-        "--corrections steps); slepc, arpack: residual tolerance (default 1e-10)",
+        help="hcms: relative eigenvalue error to correct to "
+        f"(default {EIGENVALUE_TOLERANCE:g}; 0 makes exactly --corrections steps); "
+        f"slepc, arpack: residual tolerance (default {RESIDUAL_TOLERANCE:g})",
     )
     modes.add_argument(
         "--corrections",

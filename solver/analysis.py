@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError, UserError
 from carillon.progress import say
-from solver.correction import correct, default_guard
+from solver.correction import EIGENVALUE_TOLERANCE, correct, default_guard
 from solver.decomposition import Decomposition, decompose
 from solver.eigensolver import TYPES
 from solver.hcms.synthesis import synthesize
 from solver.model import ElasticModel
 from solver.system import System, assemble
 from solver.timing import Phases, peak_memory
-from solver.truth import can_count, prove_complete, solve_truth
+from solver.truth import RESIDUAL_TOLERANCE, can_count, prove_complete, solve_truth
 
 Array = NDArray[np.float64]
 
@@ -169,7 +169,9 @@ def _general_solver(
     system: System, options: SolverOptions, phases: Phases, evidence: dict[str, Any]
 ) -> tuple[Array, Array]:
     with phases("eigensolver"):
-        truth = solve_truth(system, options.modes, options.method, options.tolerance or 1e-10)
+        truth = solve_truth(
+            system, options.modes, options.method, options.tolerance or RESIDUAL_TOLERANCE
+        )
     evidence["eigensolver_iterations"] = truth.iterations
     if options.prove and can_count():
         with phases("inertia"):
@@ -212,7 +214,7 @@ def _hcms(
             system,
             start.vectors,
             options.modes - RIGID_MODES,
-            1e-7 if options.tolerance is None else options.tolerance,
+            EIGENVALUE_TOLERANCE if options.tolerance is None else options.tolerance,
             options.corrections,
             options.degree,
             report=_reporter(verbose and system.comm.rank == 0),
@@ -223,8 +225,8 @@ def _hcms(
         "right_hand_sides": result.solves,
         "eigenvalue_error_estimate": float(result.errors.max()),
     }
-    values = np.concatenate([np.maximum(np.diag(stiff), 0.0), result.values])[: options.modes]
-    vectors = np.concatenate([system.rigid, result.vectors], axis=1)[:, : options.modes]
+    values = np.concatenate([np.maximum(np.diag(stiff), 0.0), result.values])
+    vectors = np.concatenate([system.rigid, result.vectors], axis=1)
     return values, np.asfortranarray(vectors)
 
 
@@ -251,11 +253,15 @@ def residual_ratios(system: System, values: Array, vectors: Array, mass_vectors:
     Rigid modes, whose lambda is zero, are measured with the first elastic eigenvalue instead.
     """
     residual = system.multiply(system.K, vectors) - mass_vectors * values
-    scale = np.maximum(values, values[RIGID_MODES])
     norms = np.sqrt(system.column_products(residual, residual))
     mass_norms = np.sqrt(system.column_products(mass_vectors, mass_vectors))
     tiny = np.finfo(float).tiny
-    return np.asarray(norms / np.maximum(scale * mass_norms, tiny))
+    return np.asarray(norms / np.maximum(residual_scale(values) * mass_norms, tiny))
+
+
+def residual_scale(values: Array) -> Array:
+    """What residuals are measured with: each eigenvalue, the first elastic one for rigid modes."""
+    return np.maximum(values, values[RIGID_MODES])
 
 
 def count_rigid(values: Array) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from forests import coarsen as evaluate_forest
 from forests import load_model
 from forests.baselines import average, galerkin
 from solver.geometry import Blocks, HexMesh, blocks_from_mesh
-from solver.model import ElasticModel, fine_model
+from solver.model import Constants, ElasticModel, fine_model
 
 Array = NDArray[np.float64]
 
@@ -68,7 +69,7 @@ def build_model(
     young: Array,
     method: str = "none",
     forest: str | Path | None = None,
-    **constants: float | bool,
+    **constants: Unpack[Constants],
 ) -> ElasticModel:
     """Model of the fine mesh (`none`) or of its blocks.
 
@@ -93,4 +94,4 @@ def build_model(
     blocks = blocks_from_mesh(mesh)
     moduli = coarse_moduli(block_moduli(blocks, young), method, fine.poisson, forest)
     pattern = np.packbits(blocks.mask, axis=1, bitorder="little").ravel()
-    return ElasticModel(blocks.coarse, moduli, pattern, **constants)  # type: ignore[arg-type]
+    return ElasticModel(blocks.coarse, moduli, pattern, **constants)

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from solver.analysis import RIGID_MODES
+from solver.analysis import RIGID_MODES, residual_scale
 from solver.geometry import prolongation
 from solver.model import ElasticModel
 from solver.modes_file import ModesFile, read_modes
@@ -105,10 +105,8 @@ def recomputed_residuals(file: ModesFile) -> Array:
     K, M = assembled(file.model)
     mass_modes = M @ file.modes
     residual = K @ file.modes - mass_modes * file.eigenvalues
-    scale = np.maximum(file.eigenvalues, file.eigenvalues[RIGID_MODES])
-    return np.asarray(
-        np.linalg.norm(residual, axis=0) / (scale * np.linalg.norm(mass_modes, axis=0))
-    )
+    scale = residual_scale(file.eigenvalues) * np.linalg.norm(mass_modes, axis=0)
+    return np.asarray(np.linalg.norm(residual, axis=0) / scale)
 
 
 def assembled(model: ElasticModel) -> tuple[sp.csr_matrix, sp.csr_matrix]:
@@ -143,20 +141,18 @@ def subspace_angles(modes: Array, truth: Array, M: sp.csr_matrix, groups: list[s
 def _largest_angle(a: ModesFile, b: ModesFile, count: int) -> float:
     assert a.modes is not None and b.modes is not None
     modes = a.modes
-    if a.mesh.n_nodes == b.mesh.n_nodes and np.array_equal(a.mesh.node_grid, b.mesh.node_grid):
-        _, M = assembled(b.model)
-    elif np.isclose(a.mesh.edge, 2.0 * b.mesh.edge):
-        try:
-            to_fine = sp.kron(prolongation(b.mesh, a.mesh), sp.identity(3), format="csr")
-        except ValueError:
-            return float("nan")
-        _, M = assembled(b.model)
-        modes = to_fine @ modes
-    else:
-        return float("nan")
     elastic = slice(RIGID_MODES, count)
     groups = clusters(b.eigenvalues[elastic])[:-1]
     if not groups:
         return float("nan")
+    if not np.array_equal(a.mesh.node_grid, b.mesh.node_grid):
+        if not np.isclose(a.mesh.edge, 2.0 * b.mesh.edge):
+            return float("nan")
+        try:
+            to_fine = sp.kron(prolongation(b.mesh, a.mesh), sp.identity(3), format="csr")
+        except ValueError:
+            return float("nan")
+        modes = to_fine @ modes
+    _, M = assembled(b.model)
     angles = subspace_angles(modes[:, elastic], b.modes[:, elastic], M, groups)
     return float(angles.max())

@@ -14,6 +14,8 @@ from solver.system import ShiftedInverse, System
 
 Array = NDArray[np.float64]
 
+EIGENVALUE_TOLERANCE = 1e-7
+"""Relative eigenvalue error that a correction stops at unless told otherwise."""
 MAX_AMPLIFICATION = 1e5
 """Largest growth of the lowest active mode over the highest in one polynomial; more would let the
 low modes drown the others in rounding."""
@@ -51,7 +53,7 @@ def correct(
     system: System,
     start: Array,
     wanted: int,
-    tolerance: float = 1e-7,
+    tolerance: float = EIGENVALUE_TOLERANCE,
     max_steps: int = 30,
     degree: int = 3,
     guard: int | None = None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,11 +78,19 @@ class ElasticModel:
         return float(octants * self.density * (self.mesh.edge / 2.0) ** 3)
 
 
-def fine_model(mesh: HexMesh, young: Array, **constants: float | bool) -> ElasticModel:
+class Constants(TypedDict, total=False):
+    """Constants of an `ElasticModel` that are the same in every cell."""
+
+    poisson: float
+    density: float
+    lumped: bool
+
+
+def fine_model(mesh: HexMesh, young: Array, **constants: Unpack[Constants]) -> ElasticModel:
     """Model of a fine mesh with one modulus per cell; `young` is (m,) [Pa]."""
     return ElasticModel(
         mesh,
         np.repeat(young[:, None], 8, axis=1),
         np.full(mesh.n_cells, ALL_OCTANTS, dtype=np.uint8),
-        **constants,  # type: ignore[arg-type]
+        **constants,
     )

@@ -14,6 +14,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from dataset_gen.block import degrees_of_freedom
 from dataset_gen.element import rigid_motions
 from solver.decomposition import Decomposition
 from solver.eigensolver import distributed_matrix, factor_package
@@ -66,30 +67,29 @@ class System:
 
     def inner(self, left: Array, right: Array) -> Array:
         """left^T right summed over the ranks; equal on all ranks."""
-        local = left.T @ right
-        if self.comm.size > 1:
-            self.comm.Allreduce(MPI.IN_PLACE, local)
-        return np.asarray(local)
+        return self._summed(left.T @ right)
 
     def column_products(self, left: Array, right: Array) -> Array:
         """Inner product of each column of `left` with the same column of `right`."""
-        local = np.einsum("ij,ij->j", left, right)
+        return self._summed(np.einsum("ij,ij->j", left, right))
+
+    def _summed(self, local: Array) -> Array:
+        """Sum over the ranks, in place."""
         if self.comm.size > 1:
             self.comm.Allreduce(MPI.IN_PLACE, local)
-        return np.asarray(local)
+        return local
 
     def local_rows(self, block: Array) -> Array:
         """This rank's rows of a replicated block (n_dofs, k) given in mesh node order."""
-        nodes = self.order[self.start : self.stop]
-        dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
-        return np.asfortranarray(block[dofs])
+        own = degrees_of_freedom(self.order[self.start : self.stop])
+        return np.asfortranarray(block[own])
 
     def gather(self, block: Array) -> Array | None:
         """Whole block in mesh node order on rank 0, None elsewhere; columns travel one by one."""
         columns = block.shape[1]
         counts = self.comm.gather(block.shape[0])
         whole = np.empty((self.n_dofs, columns), order="F") if self.comm.rank == 0 else None
-        dofs = (3 * self.order[:, None] + np.arange(3)).ravel()
+        dofs = degrees_of_freedom(self.order)
         received = np.empty(self.n_dofs)
         for column in range(columns):
             local = np.ascontiguousarray(block[:, column])

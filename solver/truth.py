@@ -15,6 +15,8 @@ from solver.system import System
 
 Array = NDArray[np.float64]
 
+RESIDUAL_TOLERANCE = 1e-10
+"""Relative residual of ground truth unless told otherwise."""
 SPARE_MODES = 8
 """Modes computed beyond those asked for, so that the inertia count finds a gap to look through."""
 
@@ -49,7 +51,7 @@ class Inertia:
 
 
 def solve_truth(
-    system: System, modes: int, method: str = "slepc", tolerance: float = 1e-10
+    system: System, modes: int, method: str = "slepc", tolerance: float = RESIDUAL_TOLERANCE
 ) -> Truth:
     """Compute the `modes` lowest eigenpairs of the assembled system, rigid modes included.
 

@@ -9,6 +9,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from dataset_gen.block import degrees_of_freedom
 from solver.hcms.condense import restrict_stiffness
 from solver.model import ElasticModel
 from solver.sparse import assemble_elements
@@ -106,9 +107,7 @@ def joined_rows(left: Group, right: Group, Q: Array, boundary: NDArray[np.int64]
 
 
 def _rows_at(group: Group, nodes: NDArray[np.int64]) -> Array:
-    position = np.searchsorted(group.boundary, nodes)
-    dofs = (3 * position[:, None] + np.arange(3)).ravel()
-    return group.rows[dofs]
+    return group.rows[degrees_of_freedom(np.searchsorted(group.boundary, nodes))]
 
 
 def _symmetric(matrix: Array) -> Array:

@@ -14,6 +14,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from dataset_gen.block import degrees_of_freedom
 from solver.decomposition import Decomposition
 from solver.hcms.local import local_modes
 from solver.hcms.merge import Group, interface, joined_rows, merge
@@ -92,7 +93,7 @@ def synthesize(
         wanted = modes_to_keep(3 * len(nodes) / total, keep)
         values, bases[part] = local_modes(model, nodes, wanted, treatment)
         boundary = neighbours.boundary(part, part + 1)
-        rows = (3 * np.searchsorted(nodes, boundary)[:, None] + np.arange(3)).ravel()
+        rows = degrees_of_freedom(np.searchsorted(nodes, boundary))
         groups[part] = Group(values, boundary, bases[part][rows])
 
     coefficients: dict[int, Array] = {}

@@ -7,6 +7,7 @@ from typing import Any
 
 from solver.analysis import RIGID_MODES
 from solver.comparison import AUDIBLE_FIRST, AUDIBLE_LAST
+from workflow.report.identity import IDENTITY, identity
 from workflow.report.results import Results
 from workflow.report.table import Column, Table
 from workflow.report.times_tables import solve_seconds
@@ -24,10 +25,7 @@ def summary(results: Results) -> Table:
         f"{AUDIBLE}. Times are wall seconds from the moduli to the modes; the speed-up's base is "
         "SLEPc.",
         [
-            Column("model", "Model", shown=False),
-            Column("title", "Solid"),
-            Column("unknowns", "Unknowns", "count"),
-            Column("coarse_unknowns", "coarsened", "count"),
+            *IDENTITY,
             Column("modes", "Modes", "count"),
             Column("hcms_error", "HCMS, worst eigenvalue", "percent"),
             Column("hcms_ec_error", "HCMS + EC, worst eigenvalue", "percent"),
@@ -43,11 +41,7 @@ def summary(results: Results) -> Table:
 def _summary_row(results: Results, model: str) -> dict[str, Any]:
     spectra, comparisons = results.spectra[model], results.comparisons[model]
     truth, fast = (solve_seconds(spectra[variant]) for variant in (TRUTH, "ddfem_hcms_ec"))
-    return {
-        "model": model,
-        "title": results.title(model),
-        "unknowns": spectra[TRUTH].mesh.n_dofs,
-        "coarse_unknowns": spectra["ddfem_hcms_ec"].mesh.n_dofs,
+    return identity(results, model) | {
         "modes": len(spectra[TRUTH].eigenvalues),
         "hcms_error": comparisons["hcms"]["eigenvalue_relative_error"]["max"],
         "hcms_ec_error": comparisons["hcms_ec"]["eigenvalue_relative_error"]["max"],
@@ -123,12 +117,7 @@ def errors(results: Results) -> Table:
 
 def coarsening(results: Results) -> Table:
     """What the coarsening alone costs in accuracy."""
-    columns = [
-        Column("model", "Model", shown=False),
-        Column("title", "Solid"),
-        Column("unknowns", "Unknowns", "count"),
-        Column("coarse_unknowns", "coarsened", "count"),
-    ]
+    columns = [*IDENTITY]
     for variant, label in COARSENED.items():
         columns.append(Column(f"{variant}_rms", f"{label}, rms", "percent"))
         columns.append(Column(f"{variant}_max", "worst", "percent"))
@@ -142,13 +131,7 @@ def coarsening(results: Results) -> Table:
 
 
 def _coarsening_row(results: Results, model: str) -> dict[str, Any]:
-    spectra = results.spectra[model]
-    row: dict[str, Any] = {
-        "model": model,
-        "title": results.title(model),
-        "unknowns": spectra[TRUTH].mesh.n_dofs,
-        "coarse_unknowns": spectra["ddfem_hcms_ec"].mesh.n_dofs,
-    }
+    row = identity(results, model)
     for variant in COARSENED:
         comparison = results.comparisons[model][variant]
         row[f"{variant}_rms"] = comparison["frequency_rms_relative_error_7_60"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from solver.modes_file import ModesFile
+from workflow.report.identity import IDENTITY, identity
 from workflow.report.results import Results
 from workflow.report.table import Column, Table
 from workflow.variants import TRUTH, VARIANTS
@@ -32,10 +33,7 @@ def precomputation_seconds(spectrum: ModesFile) -> float:
 def times(results: Results) -> Table:
     """Wall time of every method on every model, as in Fig. 11 of the paper."""
     columns = [
-        Column("model", "Model", shown=False),
-        Column("title", "Solid"),
-        Column("unknowns", "Unknowns", "count"),
-        Column("coarse_unknowns", "coarsened", "count"),
+        *IDENTITY,
         Column("precomputation", "Precomputation", "seconds", "s"),
     ]
     labels = {variant: VARIANTS[variant].label for variant in TIMED} | {TRUTH: "SLEPc (truth)"}
@@ -53,13 +51,8 @@ def times(results: Results) -> Table:
 
 def _times_row(results: Results, model: str) -> dict[str, Any]:
     spectra = results.spectra[model]
-    row: dict[str, Any] = {
-        "model": model,
-        "title": results.title(model),
-        "unknowns": spectra[TRUTH].mesh.n_dofs,
-        "coarse_unknowns": spectra["ddfem_hcms_ec"].mesh.n_dofs,
-        "precomputation": precomputation_seconds(spectra[TRUTH]),
-    }
+    row = identity(results, model)
+    row["precomputation"] = precomputation_seconds(spectra[TRUTH])
     row |= {variant: solve_seconds(spectra[variant]) for variant in TIMED}
     row["speed_up"] = row[TRUTH] / row["ddfem_hcms_ec"]
     return row
