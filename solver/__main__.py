@@ -1,4 +1,4 @@
-"""Command line: `python -m solver modes | compare | convergence | benchmark`."""
+"""Command line: `python -m solver modes | compare | convergence | benchmark | objectives`."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from carillon.cli import EXIT_BAD_INPUT, EXIT_NOT_CONVERGED
 from carillon.errors import ConvergenceError, UserError
 from carillon.files import atomic_path, require_writable
 from carillon.runtime import limit_threads, warn_about_reference_blas
+from dataset_gen.objectives import OBJECTIVES, require_objective
 from solver import coarsening, materials
 from solver.analysis import METHODS, SolverOptions, modal_analysis
 from solver.correction import EIGENVALUE_TOLERANCE
@@ -89,6 +90,8 @@ def _modes(options: argparse.Namespace, comm: MPI.Comm) -> None:
         **result.evidence,
         "timings": {**problem.seconds, **result.seconds},
     }
+    if options.coarsen == "fit":
+        attributes["objective"] = options.objective
     if options.tol is not None:
         attributes["tolerance"] = options.tol
 
@@ -179,6 +182,45 @@ def _benchmark(options: argparse.Namespace, comm: MPI.Comm) -> None:
         print(json.dumps(row, indent=2))
 
 
+def _objectives(options: argparse.Namespace, comm: MPI.Comm) -> None:
+    from carillon.provenance import record
+    from solver.objectives import rate_objectives
+
+    if options.out is not None:
+        on_root(comm, lambda: require_writable(options.out))
+    found = rate_objectives(_problem_options(options), options.modes, options.objectives, comm)
+    found["provenance"] = record(_command_parameters(options))
+    if options.out is not None:
+        _write_json(options, found, comm)
+    if comm.rank:
+        return
+    if options.json:
+        print(json.dumps(found, indent=2))
+    else:
+        _print_objectives(found)
+
+
+def _print_objectives(found: dict[str, Any]) -> None:
+    print(
+        f"{found['n_dofs']:,} unknowns coarsened to {found['coarse_n_dofs']:,}; frequency errors "
+        "against SLEPc on the fine mesh"
+    )
+    parts = ("audible", "all")
+    spans = [f"modes 7 to {max(row[part]['last'] for row in found['rows'])}" for part in parts]
+    heads = "     rms     mean    worst  mode" * len(parts)
+    print(f"{'':<14s}" + "".join(f"{span:>32s}" for span in spans))
+    print(f"{'':<14s}{heads}      fit    modes")
+    for row in found["rows"]:
+        errors = "".join(_errors(row[part]) for part in parts)
+        seconds = "".join(f"{row[f'{step}_seconds']:7.2f} s" for step in ("fit", "solve"))
+        print(f"{row['coarsening']:<14s}{errors}{seconds}")
+
+
+def _errors(errors: dict[str, Any]) -> str:
+    percent = f"{errors['rms']:8.1%} {errors['mean']:+8.1%} {errors['worst']:+8.1%}"
+    return f"{percent} {errors['worst_mode']:5d}"
+
+
 def _write_json(options: argparse.Namespace, content: dict[str, Any], comm: MPI.Comm) -> None:
     def write() -> None:
         with atomic_path(options.out) as temporary:
@@ -188,12 +230,24 @@ def _write_json(options: argparse.Namespace, content: dict[str, Any], comm: MPI.
 
 
 def _problem_options(options: argparse.Namespace) -> ProblemOptions:
-    return ProblemOptions(**{name: getattr(options, name) for name in _PROBLEM_FIELDS})
+    given = vars(options)
+    return ProblemOptions(**{name: given[name] for name in _PROBLEM_FIELDS if name in given})
 
 
 def _command_parameters(options: argparse.Namespace) -> dict[str, Any]:
     hidden = ("run", "out", "json")
     return {key: value for key, value in vars(options).items() if key not in hidden}
+
+
+def _objective_names(text: str) -> list[str]:
+    """Argument type: names of objectives, separated by commas."""
+    names = list(dict.fromkeys(text.split(",")))
+    try:
+        for name in names:
+            require_objective(name)
+    except UserError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return names
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -267,10 +321,40 @@ def _parser() -> argparse.ArgumentParser:
     benchmark.add_argument("--out", help="also write the row to this JSON file")
     benchmark.add_argument("--json", action="store_true", help="print JSON")
     benchmark.set_defaults(run=_benchmark)
+
+    objectives = commands.add_parser(
+        "objectives", help="spectra of one solid coarsened by every fit objective, without forests"
+    )
+    _add_solid(objectives)
+    objectives.add_argument("--modes", type=int, default=256, help="rigid included (default 256)")
+    objectives.add_argument(
+        "--objectives",
+        type=_objective_names,
+        default=list(OBJECTIVES),
+        help="separated by commas (default: all)",
+    )
+    objectives.add_argument("--out", help="also write the result to this JSON file")
+    objectives.add_argument("--json", action="store_true", help="print JSON")
+    objectives.set_defaults(run=_objectives)
     return parser
 
 
 def _add_problem(parser: argparse.ArgumentParser) -> None:
+    _add_solid(parser)
+    defaults = ProblemOptions
+    parser.add_argument(
+        "--coarsen", choices=coarsening.METHODS, default=defaults.coarsen, help="default: none"
+    )
+    parser.add_argument("--forest", help="forests for --coarsen ddfem (HDF5)")
+    parser.add_argument(
+        "--objective",
+        choices=OBJECTIVES,
+        default=defaults.objective,
+        help="for --coarsen fit (default %(default)s)",
+    )
+
+
+def _add_solid(parser: argparse.ArgumentParser) -> None:
     defaults = ProblemOptions
     parser.add_argument("mesh", metavar="MESH", help="surface mesh file, or builtin:NAME")
     parser.add_argument(
@@ -282,10 +366,6 @@ def _add_problem(parser: argparse.ArgumentParser) -> None:
         help=f"{', '.join(materials.NAMES)}, or a file with one Young's modulus [Pa] per voxel "
         "(default %(default)s)",
     )
-    parser.add_argument(
-        "--coarsen", choices=coarsening.METHODS, default=defaults.coarsen, help="default: none"
-    )
-    parser.add_argument("--forest", help="forests for --coarsen ddfem (HDF5)")
     parser.add_argument(
         "--unit", type=float, default=defaults.unit, help="metres per mesh unit (default 1)"
     )

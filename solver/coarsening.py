@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from dataset_gen.objectives import DEFAULT_OBJECTIVE, fit
+from dataset_gen.objectives import DEFAULT_OBJECTIVE, Fits, fit
 from forests import coarsen as evaluate_forest
 from forests import load_model
 from forests.baselines import average, galerkin
@@ -21,11 +21,17 @@ Array = NDArray[np.float64]
 METHODS = ("none", "average", "galerkin", "ddfem", "fit")
 
 
-def coarse_moduli(e: Array, method: str, poisson: float, forest: str | Path | None = None) -> Array:
+def coarse_moduli(
+    e: Array,
+    method: str,
+    poisson: float,
+    forest: str | Path | None = None,
+    objective: str = DEFAULT_OBJECTIVE,
+) -> Array:
     """Quadrature-point moduli (mc, 8) of coarse elements from the blocks' fine moduli (mc, 8).
 
     `method` is one of `average`, `galerkin`, `ddfem` (the regression forests in the file `forest`)
-    and `fit` (the default objective solved for every block, what the forests learn).
+    and `fit` (the `objective` solved for every block, what the forests learn).
 
     Raises
     ------
@@ -38,10 +44,17 @@ def coarse_moduli(e: Array, method: str, poisson: float, forest: str | Path | No
         case "galerkin":
             return galerkin(e)
         case "fit":
-            return fit(DEFAULT_OBJECTIVE, e, poisson).moduli
+            return fit_distinct(objective, e, poisson).moduli
         case "ddfem":
             return _forest_moduli(e, poisson, forest)
     raise UserError(f"coarsening {method!r} is unknown, expected one of {', '.join(METHODS)}")
+
+
+def fit_distinct(objective: str, e: Array, poisson: float) -> Fits:
+    """The same as `dataset_gen.objectives.fit`, but blocks that are equal are fitted once."""
+    distinct, row = np.unique(e, axis=0, return_inverse=True)
+    fits = fit(objective, distinct, poisson)
+    return Fits(*(values[row.ravel()] for values in fits))
 
 
 def _forest_moduli(e: Array, poisson: float, forest: str | Path | None) -> Array:
@@ -69,6 +82,7 @@ def build_model(
     young: Array,
     method: str = "none",
     forest: str | Path | None = None,
+    objective: str = DEFAULT_OBJECTIVE,
     **constants: Unpack[Constants],
 ) -> ElasticModel:
     """Model of the fine mesh (`none`) or of its blocks.
@@ -79,19 +93,24 @@ def build_model(
         Fine mesh.
     young
         (m,) modulus [Pa] of each fine cell.
-    method, forest
+    method, forest, objective
         See `coarse_moduli`.
     constants
         `poisson`, `density` [kg/m^3], `lumped`, see `ElasticModel`.
-
-    Notes
-    -----
-    The coarse mass is P^T M P over the filled cells; only the stiffness is fitted.
     """
     fine = fine_model(mesh, young, **constants)
     if method == "none":
         return fine
     blocks = blocks_from_mesh(mesh)
-    moduli = coarse_moduli(block_moduli(blocks, young), method, fine.poisson, forest)
+    e = block_moduli(blocks, young)
+    moduli = coarse_moduli(e, method, fine.poisson, forest, objective)
+    return coarse_model(blocks, moduli, **constants)
+
+
+def coarse_model(blocks: Blocks, moduli: Array, **constants: Unpack[Constants]) -> ElasticModel:
+    """Model of the blocks with quadrature-point moduli (mc, 8) [Pa].
+
+    The mass is P^T M P over the filled cells; only the stiffness depends on the coarsening.
+    """
     pattern = np.packbits(blocks.mask, axis=1, bitorder="little").ravel()
     return ElasticModel(blocks.coarse, moduli, pattern, **constants)

@@ -62,6 +62,47 @@ class Comparison:
         return asdict(self)
 
 
+@dataclass(frozen=True)
+class FrequencyErrors:
+    """Relative errors of the frequencies of modes `first`..`last`, matched by index.
+
+    Attributes
+    ----------
+    rms, mean
+        Root mean square and signed mean.
+    worst, worst_mode
+        The error of largest magnitude, with its sign, and the mode that has it.
+    """
+
+    first: int
+    last: int
+    rms: float
+    mean: float
+    worst: float
+    worst_mode: int
+
+
+def frequency_errors(errors: Array, last: int) -> FrequencyErrors:
+    """Summary of the relative `errors` (k,) of modes 7, 8, ... up to `last`, if there are so many.
+
+    Examples
+    --------
+    >>> frequency_errors(np.array([0.25, -0.5, 1.0]), last=8)
+    FrequencyErrors(first=7, last=8, rms=0.395..., mean=-0.125, worst=-0.5, worst_mode=8)
+    """
+    part = errors[: last - RIGID_MODES]
+    worst = int(np.argmax(np.abs(part)))
+    first = RIGID_MODES + 1
+    return FrequencyErrors(
+        first,
+        RIGID_MODES + len(part),
+        float(np.sqrt(np.mean(part**2))),
+        float(np.mean(part)),
+        float(part[worst]),
+        first + worst,
+    )
+
+
 def compare_files(candidate: str | Path, truth: str | Path) -> Comparison:
     """Compare two modes files, of the same mesh or of a mesh and its coarsening.
 
@@ -81,7 +122,7 @@ def compare_files(candidate: str | Path, truth: str | Path) -> Comparison:
     values, exact = a.eigenvalues[elastic], b.eigenvalues[elastic]
     error = np.abs(values / exact - 1.0)
     shift = a.frequencies[elastic] / b.frequencies[elastic] - 1.0
-    audible = shift[AUDIBLE_FIRST - 1 - RIGID_MODES : AUDIBLE_LAST - RIGID_MODES]
+    audible = frequency_errors(shift, AUDIBLE_LAST)
     return Comparison(
         str(candidate),
         str(truth),
@@ -90,9 +131,9 @@ def compare_files(candidate: str | Path, truth: str | Path) -> Comparison:
             "p90": float(np.quantile(error, 0.9)),
             "max": float(error.max()),
         },
-        float(np.sqrt(np.mean(shift**2))),
-        float(np.sqrt(np.mean(audible**2))),
-        float(np.abs(audible).max()),
+        frequency_errors(shift, count).rms,
+        audible.rms,
+        abs(audible.worst),
         _largest_angle(a, b, count),
         float(recomputed_residuals(a).max()),
         count - RIGID_MODES,

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from carillon.errors import UserError
 from dataset_gen.element import DEFAULT_POISSON
+from dataset_gen.objectives import DEFAULT_OBJECTIVE
 from solver.coarsening import build_model
 from solver.geometry import (
     HexMesh,
@@ -41,6 +42,8 @@ class ProblemOptions:
         `none`, `average`, `galerkin`, `ddfem` or `fit`.
     forest
         Forests for `ddfem`.
+    objective
+        Objective for `fit`.
     unit
         Metres per mesh unit.
     fill, pieces
@@ -58,6 +61,7 @@ class ProblemOptions:
     material: str = "uniform"
     coarsen: str = "none"
     forest: str | None = None
+    objective: str = DEFAULT_OBJECTIVE
     unit: float = 1.0
     fill: str = "winding"
     pieces: str = "error"
@@ -104,6 +108,7 @@ def build_problem(options: ProblemOptions) -> Problem:
         young,
         options.coarsen,
         options.forest,
+        options.objective,
         poisson=options.poisson,
         density=options.density,
         lumped=options.lumped,

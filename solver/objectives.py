@@ -1,0 +1,123 @@
+"""Spectra of a solid coarsened by every fit objective, against the fine one: which fit is best."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from carillon.errors import ConvergenceError
+from carillon.progress import track
+from forests.baselines import average, galerkin
+from solver.analysis import RIGID_MODES, Modes, SolverOptions, modal_analysis
+from solver.coarsening import block_moduli, coarse_model, fit_distinct
+from solver.comparison import AUDIBLE_LAST, frequency_errors
+from solver.decomposition import on_root
+from solver.geometry import Blocks, blocks_from_mesh
+from solver.model import ElasticModel
+from solver.modes_file import frequencies
+from solver.problem import Problem, ProblemOptions, build_problem
+
+Array = NDArray[np.float64]
+
+BASELINES: dict[str, Callable[[Array], Array]] = {"galerkin": galerkin, "average": average}
+"""Coarsenings without a fit, which every objective is to beat."""
+
+CHECKS = ("inertia", "verification")
+"""Phases that check modes instead of computing them."""
+
+
+def rate_objectives(
+    options: ProblemOptions,
+    modes: int,
+    objectives: Sequence[str],
+    comm: MPI.Comm = MPI.COMM_WORLD,
+) -> dict[str, Any]:
+    """Frequency errors of one solid coarsened by each objective, and by the baselines.
+
+    The coarse moduli are the fits themselves, block by block, without forests between.  All coarse
+    models have the same mesh and mass; they and the fine one are solved by SLEPc.
+
+    Returns
+    -------
+    Plain values: sizes, `truth` (evidence, seconds, frequencies [Hz]) and `rows`, one a coarsening
+    with the errors over modes 7..60 (`audible`) and 7..`modes` (`all`), or as many as the coarse
+    model has.
+    """
+    problem = on_root(comm, lambda: build_problem(replace(options, coarsen="none")))
+    blocks = blocks_from_mesh(problem.fine)
+    e = block_moduli(blocks, problem.young)
+    truth = _solve(problem.model, modes, comm)
+    exact = frequencies(truth.values)
+    names = track((*objectives, *BASELINES), "coarsenings", visible=comm.rank == 0)
+    rows = [_row(name, problem, blocks, e, exact, comm) for name in names]
+    return {
+        "mesh": options.mesh,
+        "resolution": options.resolution,
+        "material": options.material,
+        "seed": options.seed,
+        "poisson": options.poisson,
+        "modes": modes,
+        "n_dofs": problem.model.n_dofs,
+        "coarse_n_dofs": 3 * blocks.coarse.n_nodes,
+        "blocks": len(e),
+        "distinct_blocks": len(np.unique(e, axis=0)),
+        "truth": {
+            **truth.evidence,
+            "seconds": solve_seconds(truth),
+            "frequencies_hz": exact.tolist(),
+        },
+        "rows": rows,
+    }
+
+
+def solve_seconds(result: Modes) -> float:
+    """Wall time [s] from the model to its modes, without the checks."""
+    return sum(seconds for phase, seconds in result.seconds.items() if phase not in CHECKS)
+
+
+def _solve(model: ElasticModel, modes: int, comm: MPI.Comm, prove: bool = True) -> Modes:
+    result = modal_analysis(model, SolverOptions(method="slepc", modes=modes, prove=prove), comm)
+    result.system.destroy()
+    return result
+
+
+def _row(
+    name: str, problem: Problem, blocks: Blocks, e: Array, exact: Array, comm: MPI.Comm
+) -> dict[str, Any]:
+    fine = problem.model
+    begin = time.perf_counter()
+    moduli, converged = on_root(comm, partial(_moduli, name, e, fine.poisson))
+    fitted = time.perf_counter() - begin
+    model = coarse_model(
+        blocks, moduli, poisson=fine.poisson, density=fine.density, lumped=fine.lumped
+    )
+    try:
+        result = _solve(model, min(len(exact), model.n_dofs), comm, prove=False)
+    except ConvergenceError as error:
+        raise ConvergenceError(f"{name}: {error}") from None
+    found = frequencies(result.values)
+    errors = found[RIGID_MODES:] / exact[RIGID_MODES : len(found)] - 1.0
+    return {
+        "coarsening": name,
+        "audible": asdict(frequency_errors(errors, AUDIBLE_LAST)),
+        "all": asdict(frequency_errors(errors, len(found))),
+        "converged": converged,
+        "fit_seconds": fitted,
+        "solve_seconds": solve_seconds(result),
+        "frequencies_hz": found.tolist(),
+    }
+
+
+def _moduli(name: str, e: Array, poisson: float) -> tuple[Array, float | None]:
+    """Coarse moduli (mc, 8) and the share of blocks whose fit converged, None without a fit."""
+    if name in BASELINES:
+        return BASELINES[name](e), None
+    fits = fit_distinct(name, e, poisson)
+    return fits.moduli, float(fits.converged.mean())
