@@ -23,7 +23,9 @@ SMOOTH_DECADES = 1.0
 """Half the range of the smooth field: log10 of its moduli spans twice this."""
 RANDOM_DECADES = (-2.0, 1.0)
 """Decades [GPa] that the random material draws from, log-uniformly per cell."""
-NAMES = ("uniform", "smooth", "two-region", "random")
+NOISE_YOUNG = (1.0e7, 1.0e10)
+"""Moduli [Pa] between which the noise material draws, uniformly per cell."""
+NAMES = ("uniform", "smooth", "two-region", "random", "noise")
 
 
 def uniform(mesh: HexMesh) -> Array:
@@ -55,6 +57,11 @@ def random(mesh: HexMesh, seed: int = 0) -> Array:
     """Independent log-uniform modulus in every cell."""
     low, high = RANDOM_DECADES
     return 1e9 * 10.0 ** np.random.default_rng(seed).uniform(low, high, mesh.n_cells)
+
+
+def noise(mesh: HexMesh, seed: int = 0) -> Array:
+    """Independent uniform modulus in every cell: the range of `random`, but seldom soft."""
+    return np.random.default_rng(seed).uniform(*NOISE_YOUNG, mesh.n_cells)
 
 
 def from_file(path: str | Path, mesh: HexMesh, label: str) -> Array:
@@ -122,5 +129,7 @@ def young_modulus(name: str, mesh: HexMesh, seed: int = 0, label: str = "mesh") 
             return two_region(mesh)
         case "random":
             return random(mesh, seed)
+        case "noise":
+            return noise(mesh, seed)
         case _:
             return from_file(name, mesh, label)

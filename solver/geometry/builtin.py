@@ -1,4 +1,4 @@
-"""Struck objects made by code, in metres and z up.
+"""Struck objects made by code, in metres and z up, and a plain box to measure on.
 
 Walls measure at least a sixteenth of the longest side: two voxels at resolution 32, since a wall of
 one voxel does not bend as a wall does. Parts overlap without being united; voxels do that.
@@ -28,6 +28,11 @@ def bar() -> trimesh.Trimesh:
     ceiling = np.full_like(x, top)
     corners = [(x, low, arch), (x, high, arch), (x, high, ceiling), (x, low, ceiling)]
     return _sweep(np.stack([np.stack(corner, axis=1) for corner in corners], axis=1))
+
+
+def box() -> trimesh.Trimesh:
+    """Solid box, 200 x 150 x 100 mm: whole 2x2x2 blocks at every resolution that 8 divides."""
+    return trimesh.creation.box(bounds=[(-0.100, -0.075, 0.0), (0.100, 0.075, 0.100)])
 
 
 def bowl() -> trimesh.Trimesh:
@@ -158,6 +163,7 @@ BUILTINS: dict[str, Callable[[], trimesh.Trimesh]] = {
     "bar": bar,
     "bell": bell,
     "bowl": bowl,
+    "box": box,
     "frying-pan": frying_pan,
     "pitcher": pitcher,
     "plate": plate,
