@@ -31,6 +31,8 @@ include: "workflow/rules/model.smk"
 include: "workflow/rules/spectra.smk"
 include: "workflow/rules/tables.smk"
 include: "workflow/rules/report.smk"
+include: "workflow/rules/study.smk"
+include: "workflow/rules/objectives.smk"
 
 
 rule all:

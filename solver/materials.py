@@ -29,19 +29,19 @@ NAMES = ("uniform", "smooth", "two-region", "random", "noise")
 
 
 def uniform(mesh: HexMesh) -> Array:
-    """The same modulus everywhere."""
+    """1 GPa everywhere."""
     return np.full(mesh.n_cells, UNIFORM_YOUNG)
 
 
 def two_region(mesh: HexMesh) -> Array:
-    """A stiff and a soft half, cut at the median across the longest extent."""
+    """A half of 10 GPa and one of 0.1 GPa, cut at the median across the longest extent."""
     axis = int(np.argmax(np.ptp(mesh.grid, axis=0)))
     position = mesh.grid[:, axis]
     return np.where(position < np.median(position), *TWO_REGION_YOUNG)
 
 
 def smooth(mesh: HexMesh, seed: int = 0) -> Array:
-    """Random combination of the lowest Laplacian eigenvectors, as log10 of the modulus."""
+    """0.1 to 10 GPa: a random sum of the lowest Laplacian eigenvectors, as log10 of the modulus."""
     _, modes = laplacian_modes(mesh, SMOOTH_MODES + 1)
     modes = modes[:, 1:]
     weights = np.random.default_rng(seed).standard_normal(modes.shape[1])
@@ -54,13 +54,13 @@ def smooth(mesh: HexMesh, seed: int = 0) -> Array:
 
 
 def random(mesh: HexMesh, seed: int = 0) -> Array:
-    """Independent log-uniform modulus in every cell."""
+    """Independent in every cell, log-uniform over 0.01 to 10 GPa."""
     low, high = RANDOM_DECADES
     return 1e9 * 10.0 ** np.random.default_rng(seed).uniform(low, high, mesh.n_cells)
 
 
 def noise(mesh: HexMesh, seed: int = 0) -> Array:
-    """Independent uniform modulus in every cell: the range of `random`, but seldom soft."""
+    """Independent in every cell, uniform over 0.01 to 10 GPa: seldom soft."""
     return np.random.default_rng(seed).uniform(*NOISE_YOUNG, mesh.n_cells)
 
 

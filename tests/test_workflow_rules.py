@@ -2,41 +2,16 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-CHECKOUT = Path(__file__).resolve().parent.parent
-
-
-def snakemake(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
-    """Run Snakemake on the Snakefile of the checkout, with `folder` as working directory."""
-    command = [sys.executable, "-m", "snakemake", "-s", CHECKOUT / "Snakefile", *arguments]
-    environment = {**os.environ, "PYTHONPATH": str(CHECKOUT)}
-    return subprocess.run(
-        [str(part) for part in command],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
-
-
-def planned(output: str) -> dict[str, int]:
-    """Jobs of a dry run by rule."""
-    lines = output[output.index("Job stats:") :].splitlines()[3:]
-    table = [line.split() for line in lines[: lines.index("")]]
-    return {rule: int(count) for rule, count in table}
+from tests.workflow_runs import CHECKOUT, PROFILE, planned, snakemake
 
 
 def test_default_run_is_planned_without_a_gap(tmp_path):
-    done = snakemake(tmp_path, "--dry-run", "--cores", 2)
-    assert done.returncode == 0, done.stdout + done.stderr
-    jobs = planned(done.stdout + done.stderr)
+    jobs = planned(snakemake(tmp_path, "--dry-run", "--cores", 2))
     models, shards = 4, 4
     assert jobs["generate_shard"] == shards
     assert jobs["find_modes"] == 7 * models
@@ -45,8 +20,7 @@ def test_default_run_is_planned_without_a_gap(tmp_path):
 
 
 def test_default_profile_is_read(tmp_path):
-    profile = CHECKOUT / "workflow" / "profiles" / "default"
-    done = snakemake(tmp_path, "--dry-run", "--profile", profile)
+    done = snakemake(tmp_path, "--dry-run", "--profile", PROFILE)
     assert done.returncode == 0, done.stdout + done.stderr
 
 

@@ -2,45 +2,29 @@
 
 from __future__ import annotations
 
-import csv
-import os
-import re
 import subprocess
-import sys
 import time
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
 import yaml
 
-from workflow.report.numbers import show
-from workflow.report.page import unbroken
+from tests.pages import Page, assert_same_numbers, assert_self_contained
+from tests.workflow_runs import PROFILE, TINY, snakemake
 from workflow.report.table import read_table
 from workflow.report.tables import BUILDERS
 from workflow.variants import CANDIDATES, SHOWN, VARIANTS
 
 pytestmark = pytest.mark.slow
 
-CHECKOUT = Path(__file__).resolve().parent.parent
-CONFIG = CHECKOUT / "workflow" / "config" / "tiny.yaml"
-PROFILE = CHECKOUT / "workflow" / "profiles" / "default"
-MODELS = list(yaml.safe_load(CONFIG.read_text())["models"])
+MODELS = list(yaml.safe_load(TINY.read_text())["models"])
 SECOND_RUN_SECONDS = 30
 """A run with nothing to do is planned within seconds; the rest is for a busy machine."""
 
 
 def run_tiny(folder: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "snakemake", "-s", CHECKOUT / "Snakefile"]
-    command += ["--profile", PROFILE, "--configfile", CONFIG, "--config", "results_dir=results"]
-    return subprocess.run(
-        [str(part) for part in command],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(CHECKOUT)},
-        capture_output=True,
-        text=True,
-        timeout=900,
-    )
+    options = ["--profile", PROFILE, "--configfile", TINY, "--config", "results_dir=results"]
+    return snakemake(folder, *options, timeout=900)
 
 
 @pytest.fixture(scope="module")
@@ -60,47 +44,6 @@ def results(finished):
 @pytest.fixture(scope="module")
 def page(results):
     return Page(results / "report.html")
-
-
-class Page(HTMLParser):
-    """What a browser would load and show."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__()
-        self.source = path.read_text(encoding="utf-8")
-        self.links: list[str] = []
-        self.ids: list[str] = []
-        self.tables: dict[str, list[list[tuple[str, str | None]]]] = {}
-        self._table: str | None = None
-        self._in_cell = False
-        self.feed(self.source)
-
-    def handle_starttag(self, tag, attrs):
-        found = dict(attrs)
-        for key in ("src", "href", "xlink:href", "srcset", "data", "action", "poster"):
-            if found.get(key):
-                self.links.append(found[key])
-        if found.get("id"):
-            self.ids.append(found["id"])
-        if tag == "table":
-            self._table = found["data-table"]
-            self.tables.setdefault(self._table, [])
-        elif tag == "tr" and self._table:
-            self.tables[self._table].append([])
-        elif tag == "td":
-            self.tables[self._table][-1].append(("", found.get("data-value")))
-            self._in_cell = True
-
-    def handle_endtag(self, tag):
-        if tag == "td":
-            self._in_cell = False
-        elif tag == "table":
-            self._table = None
-
-    def handle_data(self, data):
-        if self._in_cell:
-            text, value = self.tables[self._table][-1][-1]
-            self.tables[self._table][-1][-1] = (text + data, value)
 
 
 def test_a_second_run_does_nothing(finished):
@@ -124,11 +67,7 @@ def test_nothing_unfinished_is_left(finished):
 
 
 def test_page_needs_nothing_from_elsewhere(page):
-    assert page.links
-    assert all(link.startswith(("data:", "#")) for link in page.links)
-    assert not re.search(r"@import|url\((?!#)", page.source)
-    assert "<script" not in page.source
-    assert len(page.ids) == len(set(page.ids))
+    assert_self_contained(page)
 
 
 def test_page_shows_every_model_with_its_pictures(page, results):
@@ -144,20 +83,7 @@ def test_page_shows_every_model_with_its_pictures(page, results):
     "name", [name for name in BUILDERS if name not in ("phases", "frequencies")]
 )
 def test_page_and_files_hold_the_same_numbers(page, results, name):
-    table = read_table(results / "tables" / f"{name}.json")
-    rows = list(csv.reader((results / "tables" / f"{name}.csv").open()))[1:]
-    shown = [row for row in page.tables[name] if row]
-    assert len(shown) == len(rows) == len(table.rows) > 0
-    markdown = (results / "tables" / f"{name}.md").read_text()
-    on_page = {"processor", "cores", "versions", "blas"} if name == "provenance" else set()
-    columns = [column for column in table.shown if column.key not in on_page]
-    for row, cells, line in zip(table.rows, shown, rows):
-        raw = dict(zip([column.key for column in table.columns], line))
-        for column, (text, value) in zip(columns, cells, strict=True):
-            assert text == unbroken(row.get(column.key), column.kind)
-            assert show(row.get(column.key), column.kind).replace("|", "/") in markdown
-            if column.kind not in ("text", "range"):
-                assert raw[column.key] == ("" if value == "None" else value)
+    assert_same_numbers(page, results / "tables", name)
 
 
 def test_frequencies_on_the_page_are_those_of_the_table(page, results):

@@ -11,6 +11,7 @@ from jsonschema import Draft202012Validator
 from jsonschema.exceptions import ValidationError, best_match
 
 from carillon.errors import UserError
+from dataset_gen.objectives import OBJECTIVES, require_objective
 from solver.materials import NAMES as MATERIALS
 
 SCHEMA = Path(__file__).parent / "schemas" / "config.schema.yaml"
@@ -42,7 +43,8 @@ def check_links(config: Mapping[str, Any]) -> None:
     Raises
     ------
     UserError
-        If a model's mesh or material does not exist, or `convergence.models` names no model.
+        If a model's mesh or material does not exist, `convergence.models` names no model, or
+        `objectives.objectives` no objective.
     """
     for name in config["models"]:
         for path in model_files(config, name):
@@ -57,12 +59,16 @@ def check_links(config: Mapping[str, Any]) -> None:
                 f"convergence.models: {name!r} is not among the models "
                 f"{', '.join(config['models'])}"
             )
+    for name in studied_objectives(config):
+        try:
+            require_objective(name)
+        except UserError as error:
+            raise UserError(f"objectives.objectives: {error}") from None
 
 
 def mesh_of(config: Mapping[str, Any], model: str) -> str:
     """Mesh argument of the solver: `builtin:NAME` or the path of a file."""
-    mesh: str = config["models"][model]["mesh"]
-    return mesh if mesh.startswith(BUILTIN) else _in_mesh_folder(config, mesh)
+    return _located(config, config["models"][model]["mesh"])
 
 
 def material_of(config: Mapping[str, Any], model: str) -> str:
@@ -82,6 +88,20 @@ def modes_of(config: Mapping[str, Any], model: str) -> int:
     """Number of modes computed for a model, rigid ones included."""
     own = config["models"][model]["modes"]
     return int(own if own is not None else config["solver"]["modes"])
+
+
+def studied_mesh(config: Mapping[str, Any], solid: str) -> str:
+    """Mesh argument of the solver for a solid of the objectives' study."""
+    return _located(config, config["objectives"]["models"][solid]["mesh"])
+
+
+def studied_objectives(config: Mapping[str, Any]) -> list[str]:
+    """Names of the objectives that the study compares."""
+    return list(config["objectives"]["objectives"] or OBJECTIVES)
+
+
+def _located(config: Mapping[str, Any], mesh: str) -> str:
+    return mesh if mesh.startswith(BUILTIN) else _in_mesh_folder(config, mesh)
 
 
 def _in_mesh_folder(config: Mapping[str, Any], path: str) -> str:

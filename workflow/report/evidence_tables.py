@@ -71,6 +71,11 @@ def provenance(results: Results) -> Table:
         if model in results.convergence:
             history = results.convergence[model]
             origins[f"models/{model}/convergence.json"] = history.get("provenance", {})
+    return provenance_table(origins)
+
+
+def provenance_table(origins: dict[str, dict[str, Any]]) -> Table:
+    """Table of provenance records by result file."""
     return Table(
         "provenance",
         "Origin of every result file: the command, the commit of the code, seed and hash of all "

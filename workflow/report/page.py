@@ -7,13 +7,13 @@ import json
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from workflow.report.findings import findings
 from workflow.report.numbers import show
 from workflow.report.results import Results
-from workflow.report.style import COLOURS, themed
+from workflow.report.style import themed
 from workflow.report.table import Table, read_table
 from workflow.report.tables import BUILDERS
 from workflow.variants import SHOWN, TRUTH, VARIANTS
@@ -31,18 +31,8 @@ def render(results: Results) -> str:
     Nothing is computed anew: every number comes from a table, so that page and tables agree.
     """
     tables = {name: read_table(results.folder / "tables" / f"{name}.json") for name in BUILDERS}
-    environment = Environment(
-        loader=FileSystemLoader(HERE),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["show"] = unbroken
-    return environment.get_template("page.html.j2").render(
+    return page_template("report/page.html.j2").render(
         title=results.config["title"],
-        style=Markup((HERE / "page.css").read_text()),
-        colours=COLOURS,
         variants=VARIANTS,
         shown=SHOWN,
         truth=TRUTH,
@@ -51,11 +41,33 @@ def render(results: Results) -> str:
         findings=findings(tables),
         models=[_model(results, tables, model) for model in results.models],
         convergence=[
-            {"title": results.title(model), "figure": _figure(results, f"{model}-convergence.svg")}
+            {
+                "title": results.title(model),
+                "figure": inline(results.figure(f"{model}-convergence.svg")),
+            }
             for model in results.config["convergence"]["models"]
         ],
-        times=_figure(results, "times.svg"),
+        times=inline(results.figure("times.svg")),
     )
+
+
+def page_template(name: str) -> Template:
+    """Template below `workflow`, with the style sheet and the filter `show` that all pages use."""
+    environment = Environment(
+        loader=FileSystemLoader(HERE.parent),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["show"] = unbroken
+    environment.globals["style"] = Markup((HERE / "page.css").read_text())
+    return environment.get_template(name)
+
+
+def inline(path: Path) -> Markup:
+    """An SVG file as part of a page, in the page's own colours and font."""
+    return Markup(themed(path.read_text(encoding="utf-8")))
 
 
 def unbroken(value: Any, kind: str = "text") -> str:
@@ -80,7 +92,7 @@ def _model(results: Results, tables: dict[str, Table], model: str) -> dict[str, 
         "settings": results.config["models"][model],
         "summary": _rows(tables["summary"], model)[0],
         "pictures": pictures,
-        "spectrum": _figure(results, f"{model}-spectrum.svg"),
+        "spectrum": inline(results.figure(f"{model}-spectrum.svg")),
         "frequencies": _listed(_rows(tables["frequencies"], model)),
         "errors": {row["variant"]: row for row in _rows(tables["errors"], model)},
         "evidence": {row["variant"]: row for row in _rows(tables["evidence"], model)},
@@ -94,10 +106,6 @@ def _rows(table: Table, model: str) -> list[dict[str, Any]]:
 def _listed(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     first = rows[:FIRST_MODES]
     return first + [row for row in rows[FIRST_MODES:] if row["mode"] in HIGHER_MODES]
-
-
-def _figure(results: Results, name: str) -> Markup:
-    return Markup(themed(results.figure(name).read_text(encoding="utf-8")))
 
 
 def _data_uri(path: Path) -> str:

@@ -100,8 +100,10 @@ rule build_report:
             model=config["convergence"]["models"],
         ),
         times=f"{RESULTS}/figures/times.svg",
-        template=Path(workflow.basedir, "workflow/report/page.html.j2"),
-        style=Path(workflow.basedir, "workflow/report/page.css"),
+        templates=[
+            Path(workflow.basedir, "workflow/report", name)
+            for name in ("page.html.j2", "base.html.j2", "macros.html.j2", "page.css")
+        ],
     output:
         f"{RESULTS}/report.html",
     log:

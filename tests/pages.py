@@ -1,0 +1,81 @@
+"""Reading a page as a browser would, and comparing it with the files beside it (test support)."""
+
+from __future__ import annotations
+
+import csv
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+from workflow.report.numbers import show
+from workflow.report.page import unbroken
+from workflow.report.table import read_table
+
+
+class Page(HTMLParser):
+    """What a browser would load and show."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.source = path.read_text(encoding="utf-8")
+        self.links: list[str] = []
+        self.ids: list[str] = []
+        self.tables: dict[str, list[list[tuple[str, str | None]]]] = {}
+        self._table: str | None = None
+        self._in_cell = False
+        self.feed(self.source)
+
+    def handle_starttag(self, tag, attrs):
+        found = dict(attrs)
+        for key in ("src", "href", "xlink:href", "srcset", "data", "action", "poster"):
+            if found.get(key):
+                self.links.append(found[key])
+        if found.get("id"):
+            self.ids.append(found["id"])
+        if tag == "table":
+            self._table = found["data-table"]
+            self.tables.setdefault(self._table, [])
+        elif tag == "tr" and self._table:
+            self.tables[self._table].append([])
+        elif tag == "td":
+            self.tables[self._table][-1].append(("", found.get("data-value")))
+            self._in_cell = True
+
+    def handle_endtag(self, tag):
+        if tag == "td":
+            self._in_cell = False
+        elif tag == "table":
+            self._table = None
+
+    def handle_data(self, data):
+        if self._in_cell:
+            text, value = self.tables[self._table][-1][-1]
+            self.tables[self._table][-1][-1] = (text + data, value)
+
+
+def assert_self_contained(page: Page) -> None:
+    """The page loads nothing, runs nothing, and no identifier stands twice."""
+    assert page.links
+    assert all(link.startswith(("data:", "#")) for link in page.links)
+    assert not re.search(r"@import|url\((?!#)", page.source)
+    assert "<script" not in page.source
+    assert len(page.ids) == len(set(page.ids))
+
+
+def assert_same_numbers(page: Page, tables: Path, name: str, hidden: tuple[str, ...] = ()) -> None:
+    """A table reads the same on the page, but for columns `hidden` there, and in its files."""
+    table = read_table(tables / f"{name}.json")
+    rows = list(csv.reader((tables / f"{name}.csv").open()))[1:]
+    shown = [row for row in page.tables[name] if row]
+    assert len(shown) == len(rows) == len(table.rows) > 0
+    markdown = (tables / f"{name}.md").read_text()
+    if name == "provenance":
+        hidden = ("processor", "cores", "versions", "blas")
+    columns = [column for column in table.shown if column.key not in hidden]
+    for row, cells, line in zip(table.rows, shown, rows):
+        raw = dict(zip([column.key for column in table.columns], line))
+        for column, (text, value) in zip(columns, cells, strict=True):
+            assert text == unbroken(row.get(column.key), column.kind)
+            assert show(row.get(column.key), column.kind).replace("|", "/") in markdown
+            if column.kind not in ("text", "range"):
+                assert raw[column.key] == ("" if value == "None" else value)

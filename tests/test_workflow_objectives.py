@@ -1,0 +1,179 @@
+"""The study of the objectives: pooling, goals, what is left out, and a miniature end to end."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+import yaml
+
+from carillon.errors import UserError
+from dataset_gen.objectives import OBJECTIVES
+from tests.pages import Page, assert_same_numbers, assert_self_contained
+from tests.workflow_runs import CHECKOUT, PROFILE, TINY, planned, snakemake
+from workflow import settings
+from workflow.report.table import read_table
+from workflow.study.cases import Study, absent_meshes, cases_of, without
+from workflow.study.errors_tables import errors, summary
+from workflow.study.evidence_tables import description
+from workflow.study.goals import goals_of, judge
+from workflow.study.goals_tables import goal_cases, goals
+from workflow.study.page import shortened
+from workflow.study.tables import BUILDERS
+
+STUDY = {
+    "models": {
+        "box": {"title": "", "mesh": "builtin:box", "resolutions": [8, 16], "pieces": "error"},
+        "bust": {"title": "", "mesh": "bust.obj", "resolutions": [24], "pieces": "error"},
+    },
+    "materials": ["uniform", "noise"],
+    "modes": 70,
+    "objectives": ["good"],
+    "goals": [
+        {"model": "box", "quantity": "rms", "limit": 0.03},
+        {"model": "box", "quantity": "rms_of_galerkin", "limit": 0.5, "resolutions": [16]},
+        {"model": "box", "quantity": "worst", "limit": 0.04, "materials": ["noise"]},
+        {"model": "bust", "quantity": "rms", "limit": 0.05},
+    ],
+}
+RMS = {"good": {"uniform": 0.03, "noise": 0.04}, "galerkin": {"uniform": 0.06, "noise": 0.1}}
+
+
+def rated(material: str, resolution: int) -> dict:
+    """What `solver objectives` would write: half the error at twice the resolution."""
+
+    def part(rms: float, last: int) -> dict:
+        found = {"first": 7, "last": last, "rms": rms, "mean": rms / 2}
+        return {**found, "worst": -1.5 * rms, "worst_mode": 9}
+
+    rows = []
+    for name, by_material in RMS.items():
+        rms = by_material[material] * 8 / resolution
+        times = {"fit_seconds": 0.1, "solve_seconds": 0.2}
+        last = 66 if resolution == 8 else 70
+        rows.append(
+            {
+                "coarsening": name,
+                "audible": part(rms, 60),
+                "all": part(2 * rms, last),
+                "converged": None if name == "galerkin" else 1.0,
+                **times,
+            }
+        )
+    return {"n_dofs": 300, "coarse_n_dofs": 66, "modes": 70, "rows": rows}
+
+
+@pytest.fixture
+def study(tmp_path) -> Study:
+    """A study of a box, whose other solid has no mesh."""
+    goals = [{"resolutions": None, "materials": None, **goal} for goal in STUDY["goals"]]
+    config = {"mesh_folder": str(tmp_path), "objectives": {**STUDY, "goals": goals}}
+    (tmp_path / "config.yaml").write_text(yaml.safe_dump(config))
+    study = Study(tmp_path / "objectives")
+    for case in cases_of(config):
+        path = study.folder / "cases" / case.path
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(rated(case.material, case.resolution)))
+    return study
+
+
+def test_errors_are_pooled_as_root_mean_square_and_the_best_comes_first(study):
+    rows = summary(study).rows
+    assert [row["coarsening"] for row in rows] == ["good", "galerkin"]
+    assert rows[0]["uniform_rms"] == pytest.approx(((0.03**2 + 0.015**2) / 2) ** 0.5)
+    squares = [0.03**2, 0.015**2, 0.04**2, 0.02**2]
+    assert rows[0]["all_rms"] == pytest.approx((sum(squares) / 4) ** 0.5)
+    assert rows[0]["all_worst"] == pytest.approx(-0.06)
+    assert rows[0]["all_where"] == "Box 8, noise, mode 9"
+    assert rows[0]["uniform_where"] == "Box 8, uniform, mode 9"
+
+
+def test_the_full_table_has_a_row_for_every_coarsening_of_every_case(study):
+    rows = errors(study).rows
+    assert len(rows) == 2 * 2 * 2
+    assert rows[0]["audible_worst_mode"] == 9
+    assert (rows[0]["last"], rows[-1]["last"]) == (66, 70)
+
+
+def test_goals_are_met_only_if_every_case_keeps_the_limit(study):
+    rms, share, worst, absent = (judge(study, goal, "good") for goal in goals_of(study))
+    assert (rms.met, rms.cases, rms.value) == (3, 4, 0.04) and not rms.passed
+    assert str(rms) == "missed, 3 of 4 met"
+    assert (share.met, share.cases) == (2, 2) and str(share) == "met"
+    assert share.value == pytest.approx(0.5)
+    assert (worst.met, worst.cases) == (1, 2) and worst.value == pytest.approx(0.06)
+    assert str(absent) == "not studied" and not absent.passed
+    good, galerkin = goals(study).rows
+    assert good["met"] == "1 of 3" and galerkin["met"] == "0 of 3"
+    assert len(goal_cases(study).rows) == 4 + 2 + 2
+
+
+def test_a_solid_without_its_mesh_is_left_out_and_named(study, tmp_path):
+    assert study.solids == ["box"]
+    assert list(absent_meshes(study.config)) == ["bust"]
+    assert without(study.config).startswith(f"Without bust: there is no {tmp_path}/bust.obj")
+    (tmp_path / "bust.obj").touch()
+    assert without(study.config) == ""
+    assert len(cases_of(study.config)) == 6
+
+
+def test_coarse_models_with_fewer_modes_are_named(study):
+    assert shortened(study) == ["Box 8, uniform (66 modes)", "Box 8, noise (66 modes)"]
+
+
+@pytest.mark.parametrize("name", [*OBJECTIVES, "galerkin", "average"])
+def test_every_objective_is_described_in_one_line(name):
+    text = description(name)
+    assert text and "\n" not in text and not text.startswith("Objective")
+
+
+def test_an_unknown_objective_is_answered_in_one_sentence():
+    config = yaml.safe_load((CHECKOUT / "workflow" / "config" / "default.yaml").read_text())
+    assert settings.studied_objectives(config) == list(OBJECTIVES)
+    config["objectives"]["objectives"] = ["guess"]
+    with pytest.raises(UserError, match=r"objectives\.objectives: objective 'guess' is unknown"):
+        settings.check_links(config)
+
+
+def test_the_study_is_no_part_of_the_default_run(tmp_path):
+    default = planned(snakemake(tmp_path, "--dry-run", "--cores", 1))
+    assert "find_modes" in default and "rate_objectives" not in default
+    study = planned(snakemake(tmp_path, "objectives", "--dry-run", "--cores", 1))
+    # No mesh files lie here: box, bell and pan at two resolutions with five materials.
+    assert study["rate_objectives"] == 3 * 2 * 5
+    assert study["plot_objectives"] == 3
+    assert "find_modes" not in study
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """Folder of the tiny study."""
+    folder = tmp_path_factory.mktemp("study")
+    options = ["--profile", PROFILE, "objectives", "--configfile", TINY]
+    done = snakemake(folder, *options, "--config", "results_dir=results", timeout=300)
+    assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-6000:]
+    return folder / "results" / "objectives"
+
+
+@pytest.mark.slow
+def test_the_page_of_a_miniature_study_holds_its_tables(finished):
+    page = Page(finished / "report.html")
+    assert_self_contained(page)
+    assert {"model-box", "plot-box"} <= set(page.ids)
+    sizes = ("title", "unknowns", "coarse_unknowns")
+    for name in BUILDERS:
+        hidden = sizes if name == "errors" else ("title",) if name == "goal-cases" else ()
+        assert_same_numbers(page, finished / "tables", name, hidden)
+    assert (finished / "figures" / "box.png").stat().st_size > 5000
+
+
+@pytest.mark.slow
+def test_a_miniature_study_finds_that_a_fit_beats_galerkin(finished):
+    rows = {row["coarsening"]: row for row in read_table(finished / "tables/summary.json").rows}
+    assert rows["oversampled"]["all_rms"] < rows["galerkin"]["all_rms"]
+    assert set(rows) == {"chen2015", "oversampled", "galerkin", "average"}
+    for row in read_table(finished / "tables/truths.json").rows:
+        found, counted = row["inertia"].split(" / ")
+        assert found == counted
+    for row in read_table(finished / "tables/provenance.json").rows:
+        assert row["command"] and row["commit"] and row["config_hash"] and row["versions"]

@@ -1,0 +1,37 @@
+"""Snakemake on the rules of the checkout (test support)."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+TINY = CHECKOUT / "workflow" / "config" / "tiny.yaml"
+PROFILE = CHECKOUT / "workflow" / "profiles" / "default"
+
+
+def snakemake(
+    folder: Path, *arguments: object, timeout: float = 120
+) -> subprocess.CompletedProcess[str]:
+    """Run Snakemake on the Snakefile of the checkout, with `folder` as working directory."""
+    command = [sys.executable, "-m", "snakemake", "-s", CHECKOUT / "Snakefile", *arguments]
+    environment = {**os.environ, "PYTHONPATH": str(CHECKOUT)}
+    return subprocess.run(
+        [str(part) for part in command],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+    )
+
+
+def planned(done: subprocess.CompletedProcess[str]) -> dict[str, int]:
+    """Jobs of a dry run by rule."""
+    output = done.stdout + done.stderr
+    assert done.returncode == 0, output
+    lines = output[output.index("Job stats:") :].splitlines()[3:]
+    table = [line.split() for line in lines[: lines.index("")]]
+    return {rule: int(count) for rule, count in table}

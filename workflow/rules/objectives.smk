@@ -1,0 +1,88 @@
+# The objectives compared by spectra, case by case: `snakemake objectives`, no part of the default run.
+
+
+rule objectives:
+    input:
+        f"{STUDY}/report.html",
+
+
+rule rate_objectives:
+    input:
+        case_mesh,
+    output:
+        f"{STUDY}/cases/{{solid}}/{{resolution}}-{{material}}.json",
+    log:
+        f"{LOGS}/objectives/{{solid}}/{{resolution}}-{{material}}.log",
+    benchmark:
+        f"{BENCHMARKS}/objectives/{{solid}}/{{resolution}}-{{material}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime="1h",
+    params:
+        case=case_arguments,
+        modes=config["objectives"]["modes"],
+        objectives=",".join(settings.studied_objectives(config)),
+    shell:
+        "OMP_NUM_THREADS={threads} python -m solver objectives {params.case}"
+        " --modes {params.modes} --objectives {params.objectives} --out {output} > {log} 2>&1"
+
+
+rule tabulate_objectives:
+    input:
+        config=f"{RESULTS}/config.yaml",
+        cases=case_files,
+    output:
+        expand(
+            f"{STUDY}/tables/{{table}}.{{kind}}", table=list(BUILDERS), kind=["csv", "md", "json"]
+        ),
+    log:
+        f"{LOGS}/objectives/tables.log",
+    resources:
+        mem_mb=1000,
+        runtime="10m",
+    params:
+        goals=config["objectives"]["goals"],
+    script:
+        "../scripts/tabulate_objectives.py"
+
+
+rule plot_objectives:
+    input:
+        config=f"{RESULTS}/config.yaml",
+        errors=f"{STUDY}/tables/errors.json",
+    output:
+        svg=f"{STUDY}/figures/{{solid}}.svg",
+        png=f"{STUDY}/figures/{{solid}}.png",
+    log:
+        f"{LOGS}/objectives/{{solid}}.log",
+    resources:
+        mem_mb=1000,
+        runtime="10m",
+    script:
+        "../scripts/plot_objectives.py"
+
+
+rule build_objectives_report:
+    input:
+        config=f"{RESULTS}/config.yaml",
+        tables=expand(f"{STUDY}/tables/{{table}}.json", table=list(BUILDERS)),
+        figures=expand(f"{STUDY}/figures/{{solid}}.svg", solid=cases.solids_of(config)),
+        templates=[
+            Path(workflow.basedir, "workflow", name)
+            for name in (
+                "study/page.html.j2",
+                "report/base.html.j2",
+                "report/macros.html.j2",
+                "report/page.css",
+            )
+        ],
+    output:
+        f"{STUDY}/report.html",
+    log:
+        f"{LOGS}/objectives/report.log",
+    resources:
+        mem_mb=1000,
+        runtime="10m",
+    script:
+        "../scripts/build_objectives_report.py"
