@@ -2,15 +2,34 @@
 
 from __future__ import annotations
 
+import errno
+import hashlib
+import io
 import os
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import h5py
 
 from carillon.errors import UserError
+
+SEAL_BYTES = 512
+"""Length of the seal, which stands before the HDF5 file proper (its user block)."""
+
+_SEAL = b"Carillon: the bytes behind the first 512 have the SHA-256 "
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+
+def cause(error: OSError) -> str:
+    """What the operating system said, in one line, and what to do if there is no room left."""
+    text = error.strerror if error.errno and error.strerror else _first_line(error)
+    if error.errno in _NO_ROOM:
+        text = os.strerror(error.errno)
+        return f"{text}; make room and run the same command again"
+    return text
 
 
 def require_writable(path: str | Path) -> Path:
@@ -46,9 +65,8 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     When the body raises, the temporary file is removed and `path` stays as it was.
     """
     path = require_writable(path)
-    handle, name = tempfile.mkstemp(
-        prefix=f".{path.name}.", suffix=f".partial{path.suffix}", dir=path.parent
-    )
+    start, end = _temporary_name(path)
+    handle, name = tempfile.mkstemp(prefix=start, suffix=end, dir=path.parent)
     os.close(handle)
     temporary = Path(name)
     try:
@@ -59,25 +77,123 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         with open(temporary, "rb+") as stream:
             os.fsync(stream.fileno())
         os.replace(temporary, path)
+        sync_folder(path.parent)
     except OSError as error:
-        raise UserError(f"{path}: could not be written ({error})") from error
+        raise UserError(f"{path}: could not be written ({cause(error)})") from error
     finally:
         temporary.unlink(missing_ok=True)
 
 
+def sync_folder(folder: Path) -> None:
+    """Bring names made, changed or removed in `folder` to disk, where that is possible."""
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def remove_leftovers(path: Path) -> None:
+    """Remove what killed writers of `path` left; only for who knows that no other one writes it."""
+    start, end = _temporary_name(path)
+    for other in path.parent.iterdir():
+        if other.name.startswith(start) and other.name.endswith(end):
+            other.unlink(missing_ok=True)
+
+
+def _temporary_name(path: Path) -> tuple[str, str]:
+    return f".{path.name}.", f".partial{path.suffix}"
+
+
+class _Disk(io.FileIO):
+    """A file for HDF5 that never fails: the first error is kept for later, what follows is dropped.
+
+    HDF5 itself crashes at exit once it could not write what it holds, for instance on a full disk.
+    """
+
+    failure: OSError | None = None
+
+    def write(self, data: Any) -> int:
+        """Write all of `data`, or remember why that failed."""
+        view = memoryview(data).cast("B")
+        done = 0
+        while done < len(view) and self.failure is None:
+            try:
+                done += super().write(view[done:]) or 0
+            except OSError as error:
+                self.failure = error
+        return len(view)
+
+    def truncate(self, size: int | None = None) -> int:
+        """Set the length, or remember why that failed."""
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self.failure = self.failure or error
+            return size or 0
+
+    def check(self) -> None:
+        """Raise the first error."""
+        if self.failure is not None:
+            raise self.failure
+
+
 @contextmanager
-def create_h5(path: str | Path, kind: str, schema: int) -> Iterator[h5py.File]:
-    """Create the HDF5 file `path` atomically, marked with its kind and schema version."""
+def create_h5(
+    path: str | Path, kind: str, schema: int, sealed: bool = False
+) -> Iterator[h5py.File]:
+    """Create the HDF5 file `path` atomically, marked with its kind and schema version.
+
+    A sealed one begins with a checksum of all other bytes, which `open_h5` verifies.
+    """
     with atomic_path(path) as temporary:
-        with h5py.File(temporary, "w") as file:
-            file.attrs["kind"] = kind
-            file.attrs["schema_version"] = schema
-            yield file
+        with _Disk(temporary, "w+b") as disk:
+            with h5py.File(disk, "w", userblock_size=SEAL_BYTES if sealed else 0) as file:
+                file.attrs["kind"] = kind
+                file.attrs["schema_version"] = schema
+                yield file
+            disk.check()
+        if sealed:
+            with open(temporary, "rb+") as stream:
+                stream.write(_seal_of(stream))
+
+
+def _seal_of(stream: io.BufferedRandom | io.BufferedReader) -> bytes:
+    """The seal that `stream` should begin with; leaves the position at the beginning."""
+    digest = hashlib.sha256()
+    stream.seek(SEAL_BYTES)
+    while piece := stream.read(1 << 20):
+        digest.update(piece)
+    stream.seek(0)
+    return (_SEAL + digest.hexdigest().encode() + b"\n").ljust(SEAL_BYTES, b"\0")
+
+
+def _is_sealed(path: Path) -> bool:
+    """Whether the file begins with a seal.
+
+    Raises
+    ------
+    UserError
+        If the seal is broken.
+    """
+    with open(path, "rb") as stream:
+        found = stream.read(SEAL_BYTES)
+        if not found.startswith(_SEAL):
+            return False
+        if found != _seal_of(stream):
+            raise UserError(
+                f"{path}: is damaged (its bytes do not match their checksum); generate the file "
+                "again"
+            )
+    return True
 
 
 @contextmanager
-def open_h5(path: str | Path, kind: str, schema: int) -> Iterator[h5py.File]:
+def open_h5(path: str | Path, kind: str, schema: int, sealed: bool = False) -> Iterator[h5py.File]:
     """Open the HDF5 file `path` for reading and check that it is what it should be.
+
+    A seal is verified if there is one, before HDF5 sees the file; `sealed` demands one.
 
     Raises
     ------
@@ -88,6 +204,7 @@ def open_h5(path: str | Path, kind: str, schema: int) -> Iterator[h5py.File]:
     if not path.is_file():
         raise UserError(f"{path}: no such file, expected a Carillon {kind} file (HDF5)")
     try:
+        found_seal = _is_sealed(path)
         file = h5py.File(path, "r")
     except OSError as error:
         raise UserError(
@@ -95,17 +212,9 @@ def open_h5(path: str | Path, kind: str, schema: int) -> Iterator[h5py.File]:
             f"another format, expected a Carillon {kind} file"
         ) from None
     with file:
-        found_kind = file.attrs.get("kind")
-        if found_kind != kind:
-            raise UserError(
-                f"{path}: holds {found_kind or 'something else'!r}, expected a Carillon {kind} file"
-            )
-        found = int(file.attrs.get("schema_version", -1))
-        if found != schema:
-            raise UserError(
-                f"{path}: written with {kind} schema {found}, this version reads schema {schema}; "
-                f"generate the file again"
-            )
+        _require_kind(path, file, kind, schema)
+        if sealed and not found_seal:
+            raise UserError(f"{path}: is damaged (its checksum is gone); generate the file again")
         try:
             yield file
         except OSError as error:
@@ -118,5 +227,23 @@ def open_h5(path: str | Path, kind: str, schema: int) -> Iterator[h5py.File]:
             ) from None
 
 
+def _require_kind(path: Path, file: h5py.File, kind: str, schema: int) -> None:
+    try:
+        found_kind = str(file.attrs.get("kind", "something else"))
+        found = int(file.attrs.get("schema_version", -1))
+    except Exception as error:  # HDF5 has many ways to say that bytes make no sense
+        raise UserError(
+            f"{path}: is damaged ({_first_line(error)}); generate the file again"
+        ) from None
+    if found_kind != kind:
+        raise UserError(f"{path}: holds {found_kind!r}, expected a Carillon {kind} file")
+    if found != schema:
+        raise UserError(
+            f"{path}: written with {kind} schema {found}, this version reads schema {schema}; "
+            f"generate the file again"
+        )
+
+
 def _first_line(error: BaseException) -> str:
-    return str(error).strip("'\"").splitlines()[0]
+    lines = str(error).strip("'\"").splitlines()
+    return lines[0] if lines else type(error).__name__

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import os
 import stat
+import subprocess
+import sys
+from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 
 from carillon.errors import UserError
-from carillon.files import atomic_path, create_h5, open_h5, require_writable
+from carillon.files import atomic_path, create_h5, open_h5, remove_leftovers, require_writable
+
+CHECKOUT = Path(__file__).resolve().parent.parent
 
 
 @pytest.fixture
@@ -158,3 +163,90 @@ def test_a_dataset_that_is_not_there_is_named(shard):
     with pytest.raises(UserError) as caught, open_h5(shard, "shard", 3) as file:
         file["density"][:]
     assert "is incomplete" in one_sentence(caught) and "density" in str(caught.value)
+
+
+# Seals, full disks, leftovers ---------------------------------------------------------------------
+
+
+@pytest.fixture
+def sealed(tmp_path):
+    path = tmp_path / "sealed.h5"
+    with create_h5(path, "shard", 3, sealed=True) as file:
+        file.attrs["seed"] = 4
+        file["young"] = np.arange(1000.0)
+    return path
+
+
+def test_a_sealed_file_is_an_ordinary_hdf5_file(sealed):
+    with open_h5(sealed, "shard", 3, sealed=True) as file:
+        assert file.attrs["seed"] == 4
+    with h5py.File(sealed) as file:
+        assert np.array_equal(file["young"], np.arange(1000.0))
+
+
+def test_the_same_content_has_the_same_bytes(sealed, tmp_path):
+    again = tmp_path / "again.h5"
+    with create_h5(again, "shard", 3, sealed=True) as file:
+        file.attrs["seed"] = 4
+        file["young"] = np.arange(1000.0)
+    assert again.read_bytes() == sealed.read_bytes()
+
+
+@pytest.mark.parametrize("place", [0, 100, 200, 511, 512, 530, 1000, 5000, -1])
+def test_a_flipped_bit_breaks_the_seal(sealed, place):
+    content = bytearray(sealed.read_bytes())
+    content[place] ^= 1
+    sealed.write_bytes(content)
+    with pytest.raises(UserError) as caught, open_h5(sealed, "shard", 3, sealed=True):
+        pass
+    assert "is damaged" in one_sentence(caught)
+
+
+def test_a_file_without_a_seal_is_refused_where_one_is_demanded(shard):
+    with pytest.raises(UserError) as caught, open_h5(shard, "shard", 3, sealed=True):
+        pass
+    assert "its checksum is gone" in one_sentence(caught)
+
+
+FULL_DISK = """
+import resource, sys
+import numpy as np
+from carillon import cli
+from carillon.files import create_h5
+
+def main():
+    resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]),) * 2)
+    with create_h5(sys.argv[1], "shard", 3) as file:
+        column = file.create_dataset("young", (100_000,), "f8", chunks=(1000,))
+        for start in range(0, 100_000, 1000):
+            column[start : start + 1000] = np.random.rand(1000)
+
+sys.exit(cli.run("program", main))
+"""
+
+
+@pytest.mark.parametrize("largest_file", [100, 3000, 200_000, 400_000])
+def test_a_full_disk_is_one_sentence_and_no_crash_of_hdf5(tmp_path, largest_file):
+    path = tmp_path / "modes.h5"
+    done = subprocess.run(
+        [sys.executable, "-c", FULL_DISK, str(path), str(largest_file)],
+        cwd=CHECKOUT,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 2, done.stderr
+    assert done.stderr == (
+        f"program: {path}: could not be written (File too large; make room and run the same "
+        "command again)\n"
+    )
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_leftovers_of_killed_writers_are_removed_and_nothing_else(shard):
+    folder = shard.parent
+    left = folder / ".shard.h5.abc.partial.h5"
+    others = [folder / ".other.h5.abc.partial.h5", folder / ".shard.h5.journal", shard]
+    for path in (left, *others[:2]):
+        path.touch()
+    remove_leftovers(shard)
+    assert sorted(folder.iterdir()) == sorted(others)
