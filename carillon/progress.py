@@ -1,22 +1,89 @@
-"""Progress for people: a bar on a terminal, silence in a log file."""
+"""Progress for people: a bar on a terminal, a line a minute in a log file."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator, Sized
+from datetime import timedelta
 from typing import TypeVar
 
 from tqdm import tqdm
 
 T = TypeVar("T")
 
+LINE_SECONDS = 60.0
+"""Time between two lines in a log file; what is over sooner stays silent."""
+
 
 def track(
-    items: Iterable[T], label: str, total: int | None = None, unit: str = "it", visible: bool = True
+    items: Iterable[T],
+    label: str,
+    total: int | None = None,
+    unit: str = "it",
+    visible: bool = True,
+    weight: Callable[[T], int] | None = None,
+    done: int = 0,
 ) -> Iterator[T]:
-    """Iterate over `items`, showing rate and remaining time if standard error is a terminal."""
-    show = visible and sys.stderr.isatty()
-    yield from tqdm(items, desc=label, total=total, unit=unit, disable=not show, dynamic_ncols=True)
+    """Iterate over `items`, telling count, rate and remaining time on standard error.
+
+    Parameters
+    ----------
+    total : units in all, those `done` before included; the number of items unless told.
+    weight : units of an item, one unless told.
+    done : units that were there before the first item, which do not count for the rate.
+    """
+    if total is None and isinstance(items, Sized):
+        total = len(items)
+    if not visible:
+        yield from items
+        return
+    shown: tqdm | _Lines
+    if sys.stderr.isatty():
+        shown = tqdm(desc=label, total=total, unit=f" {unit}", initial=done, dynamic_ncols=True)
+    else:
+        shown = _Lines(label, total, unit, done)
+    with shown:
+        for item in items:
+            yield item
+            shown.update(1 if weight is None else weight(item))
+
+
+class _Lines:
+    """A line on standard error every `LINE_SECONDS`, in the place of a bar."""
+
+    def __init__(self, label: str, total: int | None, unit: str, done: int) -> None:
+        self.label, self.total, self.unit = label, total, unit
+        self.before = self.count = done
+        self.begin = time.monotonic()
+        self.due = self.begin + LINE_SECONDS
+
+    def __enter__(self) -> _Lines:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        return None
+
+    def update(self, units: int) -> None:
+        """Count `units` more; say so if a line is due."""
+        self.count += units
+        now = time.monotonic()
+        if now >= self.due:
+            say(self._line(now - self.begin))
+            self.due = now + LINE_SECONDS
+
+    def _line(self, seconds: float) -> str:
+        rate = (self.count - self.before) / seconds
+        of = "" if self.total is None else f" of {self.total:,}"
+        line = f"{self.label}: {self.count:,}{of} {self.unit}, {_short(rate)} {self.unit}/s"
+        if self.total is not None and rate > 0.0:
+            left = timedelta(seconds=round((self.total - self.count) / rate))
+            line += f", {left} left"
+        return line
+
+
+def _short(rate: float) -> str:
+    return f"{rate:,.0f}" if rate >= 10.0 else f"{rate:.2g}"
 
 
 def say(text: str, visible: bool = True, end: str = "\n") -> None:
