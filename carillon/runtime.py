@@ -27,8 +27,12 @@ _MAKERS_SYMBOLS = (
 
 
 def loaded_blas() -> list[dict[str, str]]:
-    """BLAS libraries in this process that threadpoolctl knows (OpenBLAS, MKL, BLIS, FlexiBLAS)."""
-    return [info for info in ThreadpoolController().info() if info["user_api"] == "blas"]
+    """BLAS libraries in this process that threadpoolctl knows (OpenBLAS, MKL, BLIS, FlexiBLAS).
+
+    Ordered by path, numpy's copy before scipy's; threadpoolctl's own order changes from run to run.
+    """
+    found = [info for info in ThreadpoolController().info() if info["user_api"] == "blas"]
+    return sorted(found, key=lambda info: str(info["filepath"]))
 
 
 def system_blas_path() -> str | None:
