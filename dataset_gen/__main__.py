@@ -5,21 +5,33 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from typing import Any
 
 from carillon import cli
-from carillon.arguments import Parser, poisson_ratio, whole_number
-from carillon.files import require_writable
+from carillon.arguments import (
+    Parser,
+    non_negative_number,
+    poisson_ratio,
+    positive_number,
+    whole_number,
+)
+from carillon.errors import UserError
 from carillon.progress import say
-from dataset_gen import benchmark, summary
+from dataset_gen import benchmark, ranks, summary
 from dataset_gen.element import DEFAULT_POISSON
-from dataset_gen.generate import generate
+from dataset_gen.generate import Engine, engine_of, generate_file
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, OBJECTIVES
-from dataset_gen.shards import write_shard
+from dataset_gen.sampling import DISTRIBUTIONS
+from dataset_gen.settings import settings_of
+from dataset_gen.shards import origin_of
+from dataset_gen.speed import Speed
+from dataset_gen.tasks import Plan
+
+PROGRAM = "dataset_gen"
+EXIT_INTERRUPTED = 130
 
 
 def _parser() -> Parser:
-    parser = Parser(prog="dataset_gen", description="Training data of the coarsening forests.")
+    parser = Parser(prog=PROGRAM, description="Training data of the coarsening forests.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     make = commands.add_parser("generate", help="draw and fit blocks, write one shard")
     make.add_argument("--samples", type=whole_number(1), required=True, help="of all shards")
@@ -28,6 +40,9 @@ def _parser() -> Parser:
     make.add_argument("--shards", type=whole_number(1), default=1, help="number of all shards")
     make.add_argument("--objective", choices=tuple(OBJECTIVES), default=DEFAULT_OBJECTIVE)
     make.add_argument("--poisson", type=poisson_ratio, default=DEFAULT_POISSON)
+    make.add_argument("--distribution", choices=tuple(DISTRIBUTIONS), default="uniform")
+    make.add_argument("--low", type=non_negative_number, help="least modulus in GPa (0 or 0.01)")
+    make.add_argument("--high", type=positive_number, help="largest modulus in GPa (10 or 1000)")
     make.add_argument("--workers", type=whole_number(1), default=1, help="processes")
     make.add_argument("--out", required=True, help="HDF5 file to write")
     time = commands.add_parser("benchmark", help="fits per second of every objective")
@@ -40,39 +55,81 @@ def _parser() -> Parser:
     return parser
 
 
-def _generate(arguments: argparse.Namespace) -> None:
-    require_writable(arguments.out)
-    parameters: dict[str, Any] = {
-        name: getattr(arguments, name)
-        for name in ("samples", "seed", "shard", "shards", "objective", "poisson")
-    }
-    shard = generate(
-        total=arguments.samples,
-        seed=arguments.seed,
-        shard=arguments.shard,
-        shards=arguments.shards,
-        objective=arguments.objective,
-        poisson=arguments.poisson,
-        workers=arguments.workers,
+def _generate(arguments: argparse.Namespace, engine: Engine) -> int:
+    split = (arguments.samples, arguments.shard, arguments.shards)
+    settings = settings_of(
+        arguments.samples,
+        arguments.seed,
+        arguments.shard,
+        arguments.shards,
+        arguments.objective,
+        arguments.poisson,
+        arguments.distribution,
+        arguments.low,
+        arguments.high,
     )
-    write_shard(arguments.out, shard, parameters)
-    say(f"{arguments.out}: samples {shard.start}..{shard.stop - 1}, {shard.objective}")
+    speed = Speed()
+    try:
+        fitted = generate_file(arguments.out, Plan(settings), origin_of(settings, *split), engine)
+    except KeyboardInterrupt:
+        say(f"{arguments.out}: interrupted; the same command goes on from here")
+        return EXIT_INTERRUPTED
+    what = f"samples {settings.start}..{settings.stop - 1}, {settings.objective}"
+    if fitted is None:
+        say(f"{arguments.out}: holds {what} already, nothing to do")
+        return 0
+    figures = speed.report(arguments.out, fitted, arguments.workers)
+    say(f"{arguments.out}: {what}; {figures}")
+    return 0
 
 
-def main(argv: list[str] | None = None) -> None:
+def _generate_anywhere(arguments: argparse.Namespace) -> int:
+    comm = ranks.world()
+    if comm is None:
+        return _generate(arguments, engine_of(arguments.workers))
+
+    def lead(engine: Engine) -> int:
+        if arguments.workers > 1:
+            raise UserError(
+                f"{arguments.workers} workers on each of {comm.size} ranks: every rank is one "
+                "process, ask for more ranks instead"
+            )
+        return _generate(arguments, engine)
+
+    return ranks.share(comm, PROGRAM, lead)
+
+
+def _arguments(argv: list[str] | None) -> argparse.Namespace | None:
+    """The command line; None if it is wrong and this is one of several ranks, which has said so."""
+    try:
+        return _parser().parse_args(argv)
+    except UserError as error:
+        comm = ranks.world()
+        if comm is None:
+            raise
+        ranks.refuse(comm, PROGRAM, error)
+        return None
+
+
+def main(argv: list[str] | None = None) -> int:
     """Run one command."""
-    arguments = _parser().parse_args(argv)
+    arguments = _arguments(argv)
+    if arguments is None:
+        return cli.EXIT_BAD_INPUT
     if arguments.command == "generate":
-        _generate(arguments)
-        return
+        return _generate_anywhere(arguments)
     if arguments.command == "benchmark":
         result = benchmark.benchmark(arguments.samples, arguments.poisson)
         text = benchmark.as_text(result)
     else:
+        speed = Speed()
         result = summary.describe(arguments.file)
         text = summary.as_text(result)
+        first, past = result["samples"]
+        say(f"read {speed.report(arguments.file, past - first)}")
     print(json.dumps(result, indent=2) if arguments.json else text)
+    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(cli.run("dataset_gen", main))
+    sys.exit(cli.run(PROGRAM, main))

@@ -2,19 +2,45 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Callable, Generator, Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
 import numpy as np
-from joblib import Parallel, delayed
 
-from carillon import provenance
 from carillon.errors import UserError
-from carillon.progress import track
+from carillon.files import remove_leftovers, require_writable
+from carillon.progress import say, track
 from dataset_gen.element import DEFAULT_POISSON
-from dataset_gen.objectives import DEFAULT_OBJECTIVE, fit, require_objective, require_poisson
-from dataset_gen.sampling import samples, shard_range
-from dataset_gen.shards import Shard
+from dataset_gen.journal import Journal, discard_journal
+from dataset_gen.objectives import DEFAULT_OBJECTIVE
+from dataset_gen.settings import settings_of
+from dataset_gen.shards import Shard, origin_of, read_settings, shard_of, write_rows
+from dataset_gen.tasks import Plan, rows_of
+from dataset_gen.workers import in_this_process, in_workers
 
-TASK_ROWS = 2048
-"""Samples a worker fits at a time."""
+Engine = Callable[[Plan, range], Generator[bytes, None, None]]
+"""Yields the results of tasks in order; see `dataset_gen.workers` and `dataset_gen.ranks`."""
+
+_ENVIRONMENT = ("commit", "versions", "processor", "blas")
+"""What an interrupted shard may have different when it is gone on with."""
+
+
+def engine_of(workers: int) -> Engine:
+    """The engine for a number of processes on this machine.
+
+    Raises
+    ------
+    UserError
+        For less than one.
+    """
+    if workers < 1:
+        raise UserError(f"{workers} workers requested, expected at least 1")
+    if workers == 1:
+        return in_this_process
+    return lambda plan, tasks: in_workers(plan, tasks, workers)
 
 
 def generate(
@@ -26,37 +52,105 @@ def generate(
     poisson: float = DEFAULT_POISSON,
     workers: int = 1,
     progress: bool = True,
+    distribution: str = "uniform",
+    low: float | None = None,
+    high: float | None = None,
 ) -> Shard:
-    """Fit one shard of the first `total` samples of `seed`.
+    """Fit one shard of the first `total` samples of `seed`, in memory.
 
     Raises
     ------
     UserError
-        For an unknown objective, an impossible split, seed, Poisson's ratio or number of workers.
+        For an unknown objective or distribution, an impossible split, seed, range of moduli,
+        Poisson's ratio or number of workers.
     """
-    require_objective(objective)
-    require_poisson(poisson)
-    if workers < 1:
-        raise UserError(f"{workers} workers requested, expected at least 1")
-    start, stop = shard_range(total, shard, shards)
-    young = samples(seed, start, stop)
-    parts = [young[row : row + TASK_ROWS] for row in range(0, len(young), TASK_ROWS)]
-    pool = Parallel(n_jobs=workers, return_as="generator")
-    tasks = pool(delayed(fit)(objective, part, poisson) for part in parts)
-    fits = list(
-        track(tasks, f"fitting {objective}", total=len(parts), unit="task", visible=progress)
-    )
-    return Shard(
-        objective=objective,
-        poisson=poisson,
-        seed=seed,
-        start=start,
-        stop=stop,
-        fine=young,
-        coarse=np.concatenate([part.moduli for part in fits]),
-        residual=np.concatenate([part.residual for part in fits]),
-        converged=np.concatenate([part.converged for part in fits]),
-        provenance=provenance.record(
-            {"seed": seed, "samples": total, "objective": objective, "poisson": poisson}
-        ),
+    settings = settings_of(total, seed, shard, shards, objective, poisson, distribution, low, high)
+    plan = Plan(settings)
+    found = _tracked(plan, engine_of(workers)(plan, range(plan.tasks)), 0, progress)
+    rows = np.concatenate([rows_of(work) for work in found])
+    return shard_of(settings, rows, origin_of(settings, total, shard, shards))
+
+
+def generate_file(
+    path: str | Path, plan: Plan, origin: dict[str, Any], engine: Engine = in_this_process
+) -> int | None:
+    """Fit one shard and write it to `path` in constant memory; go on where an earlier run ended.
+
+    Finished tasks go to the journal beside `path`, which becomes the shard when it is complete. A
+    shard that was interrupted has the same bytes as one that was not, unless it was finished with
+    other software or on another machine: those are then listed in its provenance, `resumed_on`.
+
+    Returns
+    -------
+    Samples that were fitted; None if `path` is this very shard already.
+
+    Raises
+    ------
+    UserError
+        If `path` is anything else, another process is writing it, the journal beside it belongs to
+        other settings, or the disk is full; what was done by then is kept.
+    """
+    path = require_writable(path)
+    if _is_there(path, plan):
+        discard_journal(path)
+        return None
+    journal = Journal(path, plan, {name: origin.get(name) for name in _ENVIRONMENT})
+    finished = False
+    try:
+        # Another process may have finished it before this one got the journal.
+        if path.exists():
+            finished = _is_there(path, plan)
+            return None
+        before = journal.rows
+        _fill(journal, engine)
+        remove_leftovers(path)
+        later = journal.environments[1:]
+        origin = origin | journal.environments[0]
+        if later:
+            origin["resumed_on"] = json.dumps(later)
+        write_rows(path, plan.settings, map(rows_of, journal.work()), origin)
+        finished = True
+    finally:
+        journal.close(remove=finished or not journal.tasks)
+    return plan.settings.count - before
+
+
+def _is_there(path: Path, plan: Plan) -> bool:
+    """Whether the finished shard of `plan` is at `path`; anything else but nothing is refused."""
+    if not path.exists():
+        return False
+    try:
+        found = read_settings(path)
+    except UserError as error:
+        raise UserError(
+            f"{path}: exists and is not the shard asked for ({error}); remove it or choose another "
+            "name"
+        ) from None
+    different = found.difference(plan.settings)
+    if different is not None:
+        raise UserError(
+            f"{path}: exists with {different}; remove it or choose another name for the new shard"
+        )
+    return True
+
+
+def _fill(journal: Journal, engine: Engine) -> None:
+    plan = journal.plan
+    if journal.tasks:
+        say(f"{journal.path}: going on after {journal.rows:,} of {plan.settings.count:,} samples")
+    with closing(engine(plan, range(journal.tasks, plan.tasks))) as results:
+        for work in _tracked(plan, results, journal.rows, True):
+            journal.append(work)
+
+
+def _tracked(plan: Plan, results: Iterator[bytes], done: int, progress: bool) -> Iterator[bytes]:
+    settings = plan.settings
+    return track(
+        results,
+        f"fitting {settings.objective}",
+        total=settings.count,
+        unit="samples",
+        visible=progress,
+        weight=lambda work: len(rows_of(work)),
+        done=done,
     )

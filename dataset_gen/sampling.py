@@ -16,8 +16,17 @@ from carillon.errors import UserError
 from dataset_gen.block import symmetries
 from dataset_gen.element import Array
 
-YOUNG_MAX = 10.0
-"""Upper end of the sampled moduli in GPa (paper, section 8.1)."""
+DISTRIBUTIONS = {"uniform": (0.0, 10.0), "log-uniform": (0.01, 1000.0)}
+"""Distributions of the fine moduli and their ranges in GPa unless told otherwise.
+
+The paper's (section 8.1) is uniform in 0..10; log-uniform spans rubber to diamond.
+"""
+
+EXTREMES = (1e-9, 1e9)
+"""Least and largest ends of a range in GPa, zero aside: what squares and products can bear."""
+
+LARGEST_CONTRAST = 1e8
+"""Most that the ends of a log-uniform range may differ: beyond, stiffness loses its digits."""
 
 HYPERCUBE = 1024
 """Samples of one Latin hypercube."""
@@ -27,14 +36,101 @@ NEIGHBOURS = (1, 2, 4)
 
 
 @dataclass(frozen=True)
+class Moduli:
+    """Where the fine moduli of filled cells are drawn from: a distribution on low..high [GPa].
+
+    Hypercubes are Latin, means are taken and blocks blended on the distribution's own scale: the
+    modulus itself if it is uniform, its logarithm if it is log-uniform.
+    """
+
+    distribution: str = "uniform"
+    low: float = DISTRIBUTIONS["uniform"][0]
+    high: float = DISTRIBUTIONS["uniform"][1]
+
+    def validate(self) -> None:
+        """Raise UserError unless the distribution is known and the range is possible."""
+        if self.distribution not in DISTRIBUTIONS:
+            raise UserError(
+                f"distribution {self.distribution!r} is unknown, choose "
+                f"{' or '.join(DISTRIBUTIONS)}"
+            )
+        least, most = EXTREMES
+        if not (self.low == 0.0 or self.low >= least) or not self.low < self.high <= most:
+            raise UserError(
+                f"moduli from {self.low:g} to {self.high:g} GPa: expected low < high, high up to "
+                f"{most:g}, low 0 or {least:g} at least"
+            )
+        if self.logarithmic and self.high > LARGEST_CONTRAST * self.low:
+            raise UserError(
+                f"log-uniform moduli from {self.low:g} to {self.high:g} GPa: expected low above 0 "
+                f"and high up to {LARGEST_CONTRAST:g} times as large"
+            )
+
+    @property
+    def logarithmic(self) -> bool:
+        """Whether the scale is that of logarithms."""
+        return self.distribution == "log-uniform"
+
+    def spread(self, unit: Array) -> Array:
+        """Numbers in 0..1 laid out over the range, on the distribution's scale."""
+        low, high = self._ends()
+        return np.asarray(low + (high - low) * unit)
+
+    def soft_phase(self, stiff: Array, depth: Array, ratio: float) -> Array:
+        """A second phase softer than `stiff`, by `depth` in 0..1 of the way down (own scale).
+
+        The way ends at the range's lower end or, for uniform moduli, already at `stiff / ratio`.
+        """
+        low, _ = self._ends()
+        if self.logarithmic:
+            return stiff - depth * (stiff - low)
+        furthest = np.minimum(ratio, stiff / low) if low > 0.0 else ratio
+        return np.asarray(stiff * furthest**-depth)
+
+    def values(self, place: Array) -> Array:
+        """Moduli [GPa] from the distribution's scale, kept in range where rounding would leave."""
+        return np.clip(np.exp(place) if self.logarithmic else place, self.low, self.high)
+
+    def _ends(self) -> tuple[float, float]:
+        if self.logarithmic:
+            return float(np.log(self.low)), float(np.log(self.high))
+        return self.low, self.high
+
+
+def moduli(
+    distribution: str = "uniform", low: float | None = None, high: float | None = None
+) -> Moduli:
+    """Validated `Moduli`; ends that are not given are those of the distribution.
+
+    Raises
+    ------
+    UserError
+        For an unknown distribution or an impossible range.
+    """
+    lowest, highest = DISTRIBUTIONS.get(distribution, (0.0, 1.0))
+    found = Moduli(
+        distribution,
+        lowest if low is None else float(low),
+        highest if high is None else float(high),
+    )
+    found.validate()
+    return found
+
+
+@dataclass(frozen=True)
 class Mixture:
     """What the samples of a hypercube are made of.
+
+    Means and contrasts are those of the scale of `Moduli`: arithmetic for uniform moduli, of
+    logarithms for log-uniform ones.
 
     Attributes
     ----------
     void : share of blocks with at least one void cell (never all eight).
-    uniform : share whose filled cells are all equal.
-    two_phase : share with two values, their ratio log-uniform up to `phase_ratio`.
+    uniform : share whose filled cells all have the mean of the block that was drawn.
+    two_phase : share with two values. Uniform: their ratio is log-uniform up to `phase_ratio`, or
+        up to what the range allows. Log-uniform: the softer one is log-uniform between the range's
+        lower end and the stiffer one.
     blended : share pulled towards the block's mean, the contrast log-uniform down to `contrast`.
         The rest fills the hypercube as it is.
     """
@@ -87,30 +183,38 @@ def orient(young: Array) -> Array:
     return np.asarray(candidates[np.arange(len(young)), ordered.argmax(axis=1)])
 
 
-def hypercube(seed: int, number: int, mixture: Mixture = Mixture()) -> Array:
+def hypercube(
+    seed: int, number: int, moduli: Moduli = Moduli(), mixture: Mixture = Mixture()
+) -> Array:
     """All blocks (1024, 8) of hypercube `number`, in GPa."""
     generator = Generator(Philox(key=np.array([seed, number], dtype=np.uint64)))
-    young = YOUNG_MAX * _latin_hypercube(generator)
+    place = moduli.spread(_latin_hypercube(generator))
     shares = [mixture.uniform, mixture.two_phase, mixture.blended]
     kind = np.searchsorted(np.cumsum(shares), generator.permutation(HYPERCUBE) / HYPERCUBE, "right")
-    mean = young.mean(axis=1, keepdims=True)
+    mean = place.mean(axis=1, keepdims=True)
     contrast = mixture.contrast ** generator.random((HYPERCUBE, 1))
-    ratio = mixture.phase_ratio ** -generator.random((HYPERCUBE, 1))
-    soft = generator.random((HYPERCUBE, 8)) < 0.5
-    phases = young[:, :1] * np.where(soft, ratio, 1.0)
-    variants = [np.repeat(mean, 8, axis=1), phases, mean + contrast * (young - mean), young]
-    young = np.choose(kind[:, None], variants)
+    stiff = place[:, :1]
+    soft = moduli.soft_phase(stiff, generator.random((HYPERCUBE, 1)), mixture.phase_ratio)
+    phases = np.where(generator.random((HYPERCUBE, 8)) < 0.5, soft, stiff)
+    variants = [np.repeat(mean, 8, axis=1), phases, mean + contrast * (place - mean), place]
+    young = moduli.values(np.choose(kind[:, None], variants))
     return orient(young * _void_patterns(generator, mixture.void, kind == 0))
 
 
-def samples(seed: int, start: int, stop: int, mixture: Mixture = Mixture()) -> Array:
+def samples(
+    seed: int,
+    start: int,
+    stop: int,
+    moduli: Moduli = Moduli(),
+    mixture: Mixture = Mixture(),
+) -> Array:
     """Blocks start..stop-1 (n, 8) of the endless sequence that belongs to `seed`, in GPa."""
     if seed < 0 or start < 0 or stop <= start:
         raise UserError(
             f"samples {start}..{stop} of seed {seed}: expected 0 <= start < stop and seed >= 0"
         )
     first, last = start // HYPERCUBE, (stop - 1) // HYPERCUBE
-    rows = np.concatenate([hypercube(seed, n, mixture) for n in range(first, last + 1)])
+    rows = np.concatenate([hypercube(seed, n, moduli, mixture) for n in range(first, last + 1)])
     offset = first * HYPERCUBE
     return rows[start - offset : stop - offset]
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +16,17 @@ from carillon import provenance
 from carillon.errors import UserError
 from carillon.files import create_h5, open_h5
 from dataset_gen.element import Array
+from dataset_gen.sampling import Moduli
+from dataset_gen.settings import Settings, settings_from
+from dataset_gen.tasks import ROW
 
 KIND = "dataset"
-SCHEMA = 1
+SCHEMA = 2
 CHUNK_ROWS = 4096
 UNIT = "GPa"
+
+PIECE_ROWS = 16 * CHUNK_ROWS
+"""Samples that are read at a time unless told otherwise, 9 MB."""
 
 _LONG_NAMES = {
     "fine": "Young's moduli of the eight fine cells, bit order x + 2 y + 4 z, 0 is void",
@@ -27,67 +34,188 @@ _LONG_NAMES = {
     "residual": "root of the objective relative to its value for zero moduli",
     "converged": "whether the minimiser settled",
 }
-_COLUMNS = {"fine": (8,), "coarse": (8,), "residual": (), "converged": ()}
 
 
 @dataclass(frozen=True)
 class Shard:
-    """Samples start..stop-1 of a seed with their fits.
+    """Samples with their fits, of a whole shard or of a piece of one.
 
     fine and coarse (n, 8) in GPa, residual (n,), converged (n,).
     """
 
-    objective: str
-    poisson: float
-    seed: int
-    start: int
-    stop: int
+    settings: Settings
     fine: Array
     coarse: Array
     residual: Array
     converged: NDArray[np.bool_]
     provenance: dict[str, Any]
 
+    @property
+    def objective(self) -> str:
+        """Name of the fit objective."""
+        return self.settings.objective
 
-def write_shard(path: str | Path, shard: Shard, parameters: dict[str, Any]) -> None:
-    """Write `shard` atomically, with checksums and provenance."""
-    with create_h5(path, KIND, SCHEMA) as file:
-        file.attrs["objective"] = shard.objective
-        file.attrs["poisson"] = shard.poisson
-        file.attrs["seed"] = shard.seed
-        file.attrs["sample_range"] = (shard.start, shard.stop)
-        for name, long_name in _LONG_NAMES.items():
-            values = getattr(shard, name)
-            dataset = file.create_dataset(
-                name,
-                data=values,
-                chunks=(min(CHUNK_ROWS, len(values)), *values.shape[1:]),
-                compression="gzip",
-                compression_opts=4,
-                shuffle=True,
-                fletcher32=True,
-            )
-            dataset.attrs["long_name"] = long_name
-            dataset.attrs["units"] = UNIT if name in ("fine", "coarse") else "1"
-        provenance.write(file, parameters)
+    @property
+    def poisson(self) -> float:
+        """Poisson's ratio of all cells."""
+        return self.settings.poisson
+
+    @property
+    def seed(self) -> int:
+        """Seed of the samples."""
+        return self.settings.seed
+
+    @property
+    def start(self) -> int:
+        """First sample."""
+        return self.settings.start
+
+    @property
+    def stop(self) -> int:
+        """Past-the-last sample."""
+        return self.settings.stop
+
+    @property
+    def moduli(self) -> Moduli:
+        """Where the fine moduli were drawn from."""
+        return self.settings.moduli
 
 
-def _attribute(path: Path, file: h5py.File, name: str) -> Any:
-    if name not in file.attrs:
-        raise UserError(f"{path}: has no attribute {name!r}; generate the file again")
-    return file.attrs[name]
+def shard_of(settings: Settings, rows: NDArray[np.void], origin: dict[str, Any]) -> Shard:
+    """Shard or piece from rows of type `dataset_gen.tasks.ROW`."""
+    columns = {name: np.ascontiguousarray(rows[name]) for name in _LONG_NAMES}
+    return Shard(settings=settings, provenance=origin, **columns)
 
 
-def _column(path: Path, file: h5py.File, name: str, rows: int) -> NDArray[Any]:
-    if name not in file:
-        raise UserError(f"{path}: has no dataset {name!r}; generate the file again")
-    expected = (rows, *_COLUMNS[name])
-    if file[name].shape != expected:
-        raise UserError(
-            f"{path}: {name} has shape {file[name].shape}, expected {expected} from its sample "
-            "range; generate the file again"
-        )
-    return np.asarray(file[name][()])
+def origin_of(settings: Settings, total: int, shard: int, shards: int) -> dict[str, Any]:
+    """Provenance of a shard: that of any result, less what must not matter.
+
+    The command is the one that makes this shard with one process on one rank, and the number of
+    cores is left out, so that a shard has the same bytes however it was made.
+    """
+    split = {"samples": total, "shard": shard, "shards": shards}
+    found = provenance.record({**settings.as_dict(), **split})
+    del found["cores"]
+    named = {"seed": settings.seed, **split, "objective": settings.objective}
+    named |= {"poisson": settings.poisson, "distribution": settings.distribution}
+    named |= {"low": settings.low, "high": settings.high}
+    options = " ".join(f"--{name} {value}" for name, value in named.items())
+    return found | {"command": f"python -m dataset_gen generate {options}"}
+
+
+def write_rows(
+    path: str | Path, settings: Settings, pieces: Iterable[NDArray[np.void]], origin: dict[str, Any]
+) -> None:
+    """Write a shard atomically from rows in order, keeping no more than one piece in memory.
+
+    Not compressed: most of a modulus is random digits, of which gzip saves 17 per cent at 30 MB/s.
+    Equal arguments give equal bytes.
+    """
+    with create_h5(path, KIND, SCHEMA, sealed=True) as file:
+        file.attrs.update(settings.as_dict())
+        group = file.create_group("provenance")
+        for key, value in origin.items():
+            group.attrs[key] = value
+        columns = {name: _new_column(file, name, settings.count) for name in _LONG_NAMES}
+        done = 0
+        for piece in pieces:
+            for name, column in columns.items():
+                column[done : done + len(piece)] = piece[name]
+            done += len(piece)
+    assert done == settings.count
+
+
+def _new_column(file: h5py.File, name: str, count: int) -> h5py.Dataset:
+    kind, shape = ROW[name].base, ROW[name].shape
+    column = file.create_dataset(
+        name,
+        shape=(count, *shape),
+        dtype=kind,
+        chunks=(min(CHUNK_ROWS, count), *shape),
+        fletcher32=True,
+        track_times=False,
+    )
+    column.attrs["long_name"] = _LONG_NAMES[name]
+    column.attrs["units"] = UNIT if name in ("fine", "coarse") else "1"
+    return column
+
+
+def write_shard(path: str | Path, shard: Shard) -> None:
+    """Write a shard that is in memory, atomically, with checksums and provenance."""
+    rows = np.empty(len(shard.fine), dtype=ROW)
+    for name in _LONG_NAMES:
+        rows[name] = getattr(shard, name)
+    write_rows(path, shard.settings, [rows], shard.provenance)
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[tuple[h5py.File, Settings]]:
+    """An open shard of the right shape, and its settings."""
+    with open_h5(path, KIND, SCHEMA, sealed=True) as file:
+        try:
+            settings = settings_from(file.attrs)
+        except (TypeError, ValueError) as error:
+            raise UserError(
+                f"{path}: is damaged (settings, {error}); generate the file again"
+            ) from None
+        for name in _LONG_NAMES:
+            expected = (settings.count, *ROW[name].shape)
+            if file[name].shape != expected:
+                raise UserError(
+                    f"{path}: {name} has shape {file[name].shape}, expected {expected} from its "
+                    "sample range; generate the file again"
+                )
+        yield file, settings
+
+
+def read_settings(path: str | Path) -> Settings:
+    """Settings of a shard that is complete and undamaged.
+
+    Raises
+    ------
+    UserError
+        If the file is missing, damaged, or of another kind or schema.
+    """
+    with _opened(Path(path)) as (_, settings):
+        return settings
+
+
+def iterate_shard(path: str | Path, rows: int = PIECE_ROWS) -> Iterator[Shard]:
+    """Read one shard in validated pieces of `rows` samples, in order and in constant memory.
+
+    Each piece is a shard of its own sample range. The whole file is checked before the first one.
+
+    Raises
+    ------
+    UserError
+        If the file is missing, damaged, of another kind or schema, or holds impossible values.
+    """
+    path = Path(path)
+    with _opened(path) as (file, settings):
+        origin = provenance.read(file)
+        for first in range(0, settings.count, rows):
+            past = min(first + rows, settings.count)
+            part = replace(settings, start=settings.start + first, stop=settings.start + past)
+            columns = {name: file[name][first:past] for name in _LONG_NAMES}
+            piece = Shard(settings=part, provenance=origin, **columns)
+            _require_sane(path, piece)
+            yield piece
+
+
+def read_shard(path: str | Path) -> Shard:
+    """Read and validate one whole shard.
+
+    Raises
+    ------
+    UserError
+        See `iterate_shard`.
+    """
+    pieces = list(iterate_shard(path))
+    columns = {
+        name: np.concatenate([getattr(piece, name) for piece in pieces]) for name in _LONG_NAMES
+    }
+    whole = replace(pieces[0].settings, stop=pieces[-1].stop)
+    return Shard(settings=whole, provenance=pieces[0].provenance, **columns)
 
 
 def _require_sane(path: Path, shard: Shard) -> None:
@@ -97,36 +225,8 @@ def _require_sane(path: Path, shard: Shard) -> None:
     if bad.any():
         raise UserError(
             f"{path}: sample {shard.start + int(bad.argmax())} holds moduli or residuals out of "
-            f"range ({bad.sum()} such samples); generate the file again"
+            f"range; generate the file again"
         )
-
-
-def read_shard(path: str | Path) -> Shard:
-    """Read and validate one shard.
-
-    Raises
-    ------
-    UserError
-        If the file is missing, damaged, of another kind or schema, or holds impossible values.
-    """
-    path = Path(path)
-    with open_h5(path, KIND, SCHEMA) as file:
-        start, stop = (int(bound) for bound in _attribute(path, file, "sample_range"))
-        columns = {name: _column(path, file, name, stop - start) for name in _COLUMNS}
-        shard = Shard(
-            objective=str(_attribute(path, file, "objective")),
-            poisson=float(_attribute(path, file, "poisson")),
-            seed=int(_attribute(path, file, "seed")),
-            start=start,
-            stop=stop,
-            fine=columns["fine"].astype(float),
-            coarse=columns["coarse"].astype(float),
-            residual=columns["residual"].astype(float),
-            converged=columns["converged"].astype(bool),
-            provenance=provenance.read(file),
-        )
-    _require_sane(path, shard)
-    return shard
 
 
 def _require_consistent(paths: Sequence[str | Path], shards: Sequence[Shard]) -> None:
@@ -142,18 +242,24 @@ def _require_consistent(paths: Sequence[str | Path], shards: Sequence[Shard]) ->
 
 
 def _require_disjoint(paths: Sequence[str | Path], shards: Sequence[Shard]) -> None:
-    order = sorted(range(len(shards)), key=lambda i: (shards[i].seed, shards[i].start))
+    order = sorted(range(len(shards)), key=lambda i: _place(shards[i]))
     for before, after in zip(order, order[1:]):
         one, two = shards[before], shards[after]
-        if one.seed == two.seed and two.start < one.stop:
+        same = (one.seed, one.moduli) == (two.seed, two.moduli)
+        if same and two.start < one.stop:
             raise UserError(
                 f"{paths[after]}: samples {two.start}..{two.stop - 1} of seed {two.seed} overlap "
                 f"{one.start}..{one.stop - 1} of {paths[before]}; list every sample once"
             )
 
 
+def _place(shard: Shard) -> tuple[int, str, float, float, int]:
+    drawn = shard.moduli
+    return (shard.seed, drawn.distribution, drawn.low, drawn.high, shard.start)
+
+
 def read_shards(paths: Sequence[str | Path]) -> list[Shard]:
-    """Read shards that belong together, ordered by seed and sample number.
+    """Read shards that belong together, ordered by seed, distribution and sample number.
 
     Raises
     ------
@@ -165,4 +271,4 @@ def read_shards(paths: Sequence[str | Path]) -> list[Shard]:
     shards = [read_shard(path) for path in paths]
     _require_consistent(paths, shards)
     _require_disjoint(paths, shards)
-    return sorted(shards, key=lambda shard: (shard.seed, shard.start))
+    return sorted(shards, key=_place)

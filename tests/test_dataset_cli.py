@@ -1,11 +1,19 @@
 """The commands of dataset_gen: results on standard output, mistakes in one line with status 2."""
 
 import json
+from dataclasses import replace
+from functools import partial
 
+import numpy as np
 import pytest
 
 from carillon import cli
+from dataset_gen import __main__ as program
+from dataset_gen import summary
 from dataset_gen.__main__ import main
+from dataset_gen.generate import generate
+from dataset_gen.objectives.quadratic import MODULUS_FLOOR
+from dataset_gen.shards import iterate_shard, write_shard
 
 
 def run(*arguments):
@@ -15,13 +23,71 @@ def run(*arguments):
 def test_generate_then_inspect(tmp_path, capsys):
     out = tmp_path / "a.h5"
     assert run("generate", "--samples", 40, "--seed", 1, "--out", out) == 0
-    capsys.readouterr()
+    captured = capsys.readouterr()
+    assert captured.out == "" and len(captured.err.splitlines()) == 1
+    assert "training rows/s" in captured.err and "peak memory" in captured.err
     assert run("inspect", out, "--json") == 0
     found = json.loads(capsys.readouterr().out)
     assert found["samples"] == [0, 40] and found["objective"] == "factored"
-    assert found["converged"] == 1.0
+    assert found["converged"] == 1.0 and found["failures"] == 0
     assert run("inspect", out) == 0
-    assert "samples 0..39 of seed 1" in capsys.readouterr().out
+    captured = capsys.readouterr()
+    assert "samples 0..39 of seed 1" in captured.out
+    assert "training rows/s" in captured.err
+
+
+def test_inspect_counts_what_is_there(tmp_path, capsys):
+    shard = generate(2990, 7, distribution="log-uniform", progress=False)
+    converged = shard.converged.copy()
+    converged[:299] = False
+    write_shard(tmp_path / "a.h5", replace(shard, converged=converged))
+    found = summary.describe(tmp_path / "a.h5")
+    filled = shard.fine[shard.fine > 0]
+    middle = np.quantile(shard.residual, 0.5, method="lower")
+    assert found["samples"] == [0, 2990] and found["distribution"] == "log-uniform"
+    assert found["range"] == [0.01, 1000.0]
+    assert (found["smallest_modulus"], found["largest_modulus"]) == (filled.min(), filled.max())
+    assert found["smallest_coarse_modulus"] == shard.coarse.min()
+    assert found["largest_coarse_modulus"] == shard.coarse.max()
+    assert found["failures"] == 299 and found["converged"] == 0.9
+    assert found["partly_void"] == (shard.fine == 0).any(axis=1).mean()
+    assert abs(found["median_residual"] - middle) <= summary.RESIDUAL_STEP
+    floor = MODULUS_FLOOR * shard.fine.max(axis=1, keepdims=True)
+    assert found["at_floor"] == (shard.coarse <= floor * (1 + 1e-9)).mean()
+    assert "did not converge 299 (10.00%)" in summary.as_text(found)
+
+
+def test_inspect_does_not_depend_on_the_pieces(tmp_path, monkeypatch):
+    write_shard(tmp_path / "a.h5", generate(3000, 7, progress=False))
+    whole = summary.describe(tmp_path / "a.h5")
+    pieces = partial(iterate_shard, rows=170)
+    monkeypatch.setattr(summary, "iterate_shard", pieces)
+    assert summary.describe(tmp_path / "a.h5") == whole
+
+
+def test_generate_again_does_nothing_and_otherwise_is_refused(tmp_path, capsys):
+    command = ("generate", "--samples", 40, "--out", tmp_path / "a.h5")
+    assert run(*command) == 0
+    capsys.readouterr()
+    assert run(*command, "--workers", 2) == 0
+    assert "nothing to do" in capsys.readouterr().err
+    assert run(*command, "--distribution", "log-uniform") == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "exists with distribution uniform where log-uniform is asked for" in line
+
+
+def test_an_interrupt_is_a_line_and_the_same_command_goes_on(tmp_path, capsys, monkeypatch):
+    def interrupted(plan, tasks):
+        yield plan.work(0)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(program, "engine_of", lambda workers: interrupted)
+    command = ("generate", "--samples", 5000, "--objective", "inertial", "--out", tmp_path / "a.h5")
+    assert run(*command) == 130
+    assert "goes on from here" in capsys.readouterr().err
+    monkeypatch.undo()
+    assert run(*command) == 0
+    assert "going on after 4,096 of 5,000 samples" in capsys.readouterr().err
 
 
 def test_benchmark_reports_every_objective(capsys, monkeypatch):
@@ -44,6 +110,14 @@ def test_benchmark_reports_every_objective(capsys, monkeypatch):
         ("generate", "--samples", "9", "--objective", "best", "--out", "a.h5"),
         ("generate", "--samples", "9", "--poisson", "0.5", "--out", "a.h5"),
         ("generate", "--samples", "9", "--workers", "0", "--out", "a.h5"),
+        ("generate", "--samples", "9", "--distribution", "normal", "--out", "a.h5"),
+        ("generate", "--samples", "9", "--low", "10", "--out", "a.h5"),
+        ("generate", "--samples", "9", "--low", "-1", "--out", "a.h5"),
+        ("generate", "--samples", "9", "--low", "nan", "--out", "a.h5"),
+        ("generate", "--samples", "9", "--high", "inf", "--out", "a.h5"),
+        ("generate", "--samples", "9", "--distribution", "log-uniform", "--low", "0")
+        + ("--out", "a.h5"),
+        ("generate", "--samples", "9", "--seed", str(1 << 64), "--out", "a.h5"),
         ("generate", "--samples", "9", "--out", "missing/a.h5"),
         ("inspect", "missing.h5"),
         ("benchmark", "--samples", "0"),

@@ -6,10 +6,20 @@ import h5py
 import numpy as np
 import pytest
 
+from carillon import files
 from carillon.errors import UserError
 from dataset_gen import shards as shards_module
 from dataset_gen.generate import generate
-from dataset_gen.shards import read_shard, read_shards, write_shard
+from dataset_gen.settings import settings_of
+from dataset_gen.shards import (
+    iterate_shard,
+    read_settings,
+    read_shard,
+    read_shards,
+    write_shard,
+)
+
+COLUMNS = ("fine", "coarse", "residual", "converged")
 
 
 @pytest.fixture(scope="module")
@@ -20,56 +30,85 @@ def shard():
 @pytest.fixture
 def path(tmp_path, shard):
     file = tmp_path / "shard.h5"
-    write_shard(file, shard, {"seed": 2})
+    write_shard(file, shard)
     return file
+
+
+def with_settings(shard, **change):
+    return replace(shard, settings=replace(shard.settings, **change))
 
 
 def test_round_trip_keeps_every_bit(path, shard):
     found = read_shard(path)
-    for name in ("fine", "coarse", "residual", "converged"):
+    for name in COLUMNS:
         np.testing.assert_array_equal(getattr(found, name), getattr(shard, name))
+    assert found.settings == read_settings(path) == settings_of(300, seed=2)
     assert (found.objective, found.seed, found.start, found.stop) == ("factored", 2, 0, 300)
-    assert found.poisson == 0.25
     assert found.provenance["commit"]
+
+
+def test_settings_and_provenance_are_attributes(path):
+    with h5py.File(path) as file:
+        assert file.attrs["distribution"] == "uniform"
+        assert (file.attrs["low"], file.attrs["high"]) == (0.0, 10.0)
+        command = file["provenance"].attrs["command"]
+        assert "cores" not in file["provenance"].attrs
+    assert command.endswith("--distribution uniform --low 0.0 --high 10.0")
+    assert "--samples 300 --shard 0 --shards 1" in command
 
 
 def test_columns_carry_units_and_checksums(path):
     with h5py.File(path) as file:
         for name in ("fine", "coarse"):
             assert file[name].attrs["units"] == "GPa"
-        for name in ("fine", "coarse", "residual", "converged"):
+        for name in COLUMNS:
             assert file[name].fletcher32 and file[name].attrs["long_name"]
 
 
-@pytest.mark.parametrize(("count", "workers"), [(2, 1), (3, 2)])
-def test_dataset_does_not_depend_on_shards_or_workers(shard, count, workers):
-    parts = [
-        generate(300, 2, number, count, workers=workers, progress=False) for number in range(count)
-    ]
-    for name in ("fine", "coarse", "residual", "converged"):
-        joined = np.concatenate([getattr(part, name) for part in parts])
+@pytest.mark.parametrize("rows", [1, 7, 100, 299, 300, 1000])
+def test_pieces_are_the_shard(path, shard, rows):
+    pieces = list(iterate_shard(path, rows))
+    assert [piece.start for piece in pieces] == list(range(0, 300, rows))
+    assert pieces[-1].stop == 300
+    for name in COLUMNS:
+        joined = np.concatenate([getattr(piece, name) for piece in pieces])
         np.testing.assert_array_equal(joined, getattr(shard, name))
 
 
-def test_more_workers_than_tasks_do_not_change_a_bit(monkeypatch, shard):
-    monkeypatch.setattr("dataset_gen.generate.TASK_ROWS", 100)
-    found = generate(300, 2, workers=2, progress=False)
-    np.testing.assert_array_equal(found.coarse, shard.coarse)
+@pytest.mark.parametrize(
+    ("count", "workers", "drawn"), [(2, 1, {}), (3, 2, {"distribution": "log-uniform"})]
+)
+def test_dataset_does_not_depend_on_shards_or_workers(count, workers, drawn):
+    whole = generate(300, 2, progress=False, **drawn)
+    parts = [
+        generate(300, 2, number, count, workers=workers, progress=False, **drawn)
+        for number in range(count)
+    ]
+    for name in COLUMNS:
+        joined = np.concatenate([getattr(part, name) for part in parts])
+        np.testing.assert_array_equal(joined, getattr(whole, name))
 
 
 def test_interrupted_write_leaves_nothing(tmp_path, shard, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(shards_module.provenance, "write", interrupted)
+    monkeypatch.setattr(shards_module, "_new_column", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        write_shard(tmp_path / "shard.h5", shard, {})
+        write_shard(tmp_path / "shard.h5", shard)
     assert list(tmp_path.iterdir()) == []
+
+
+def reseal(path):
+    """Make the checksum match, so that what it would have caught gets past it."""
+    with open(path, "rb+") as stream:
+        stream.write(files._seal_of(stream))
 
 
 def edit(path, change):
     with h5py.File(path, "r+") as file:
         change(file)
+    reseal(path)
 
 
 def replace_column(name, values):
@@ -83,11 +122,12 @@ def replace_column(name, values):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda file: file.attrs.modify("schema_version", 0), "schema 0"),
+        (lambda file: file.attrs.modify("schema_version", 1), "schema 1"),
         (lambda file: file.attrs.modify("kind", "modes"), "'modes'"),
-        (lambda file: file.attrs.pop("objective"), "no attribute 'objective'"),
-        (lambda file: file.pop("coarse"), "no dataset 'coarse'"),
-        (lambda file: file.attrs.modify("sample_range", (0, 299)), "expected (299, 8)"),
+        (lambda file: file.attrs.pop("objective"), "'objective'"),
+        (lambda file: file.attrs.create("seed", "many"), "settings"),
+        (lambda file: file.pop("coarse"), "'coarse'"),
+        (lambda file: file.attrs.modify("stop", 299), "expected (299, 8)"),
         (replace_column("coarse", np.full((300, 8), np.nan)), "out of range"),
         (replace_column("coarse", np.zeros((300, 8))), "out of range"),
         (replace_column("fine", np.zeros((300, 8))), "out of range"),
@@ -101,18 +141,46 @@ def test_unfit_shards_are_refused_in_a_sentence(path, change, message):
     assert message in text and str(path) in text and "\n" not in text
 
 
-def test_flipped_byte_is_noticed(path):
-    with h5py.File(path) as file:
-        chunk = file["coarse"].id.get_chunk_info(0)
-    content = bytearray(path.read_bytes())
-    content[chunk.byte_offset + chunk.size // 2] ^= 0xFF
-    path.write_bytes(content)
+def test_a_shard_of_the_first_schema_is_refused(tmp_path):
+    """As version 0.1.0 began to write them: without a seal."""
+    path = tmp_path / "old.h5"
+    with files.create_h5(path, "dataset", 1) as file:
+        file.attrs["sample_range"] = (0, 10)
+    with pytest.raises(UserError, match="schema 1, this version reads schema 2"):
+        read_shard(path)
+
+
+def test_a_changed_shard_is_refused_even_if_hdf5_finds_no_fault(path):
+    with h5py.File(path, "r+") as file:
+        file.attrs.modify("poisson", 0.3)
     with pytest.raises(UserError, match="damaged"):
         read_shard(path)
 
 
-def test_truncated_file_is_noticed(path):
-    path.write_bytes(path.read_bytes()[:1000])
+def test_any_flipped_bit_is_noticed(path):
+    content = path.read_bytes()
+    generator = np.random.default_rng(0)
+    size = len(content)
+    places = {0, 1, 60, 130, 511, 512, 520, 600, size - 1, *generator.integers(0, size, 300)}
+    for place in places:
+        flipped = bytearray(content)
+        flipped[place] ^= 1 << int(generator.integers(8))
+        path.write_bytes(flipped)
+        with pytest.raises(UserError) as error:
+            list(iterate_shard(path))
+        assert "\n" not in str(error.value) and str(path) in str(error.value)
+
+
+@pytest.mark.parametrize("size", [0, 1, 100, 511, 512, 513, 1000, 20_000, -1])
+def test_a_truncated_file_is_noticed(path, size):
+    path.write_bytes(path.read_bytes()[:size])
+    with pytest.raises(UserError) as error:
+        read_shard(path)
+    assert "\n" not in str(error.value)
+
+
+def test_a_file_that_became_longer_is_noticed(path):
+    path.write_bytes(path.read_bytes() + b"\0")
     with pytest.raises(UserError, match="damaged"):
         read_shard(path)
 
@@ -120,7 +188,7 @@ def test_truncated_file_is_noticed(path):
 def write_all(tmp_path, several):
     paths = [tmp_path / f"{i}.h5" for i in range(len(several))]
     for file, item in zip(paths, several):
-        write_shard(file, item, {})
+        write_shard(file, item)
     return paths
 
 
@@ -138,15 +206,22 @@ def test_shards_are_read_in_order_of_samples(tmp_path):
     ],
 )
 def test_mixtures_and_overlaps_are_refused(tmp_path, shard, change, message):
-    paths = write_all(tmp_path, [shard, replace(shard, **change)])
+    paths = write_all(tmp_path, [shard, with_settings(shard, **change)])
     with pytest.raises(UserError, match=message):
         read_shards(paths)
 
 
-def test_same_samples_of_another_seed_do_not_overlap(tmp_path, shard):
-    assert len(read_shards(write_all(tmp_path, [shard, replace(shard, seed=3)]))) == 2
+@pytest.mark.parametrize("change", [{"seed": 3}, {"high": 9.0}, {"distribution": "log-uniform"}])
+def test_same_numbers_of_other_samples_do_not_overlap(tmp_path, shard, change):
+    assert len(read_shards(write_all(tmp_path, [shard, with_settings(shard, **change)]))) == 2
 
 
 def test_no_shard_at_all_is_refused():
     with pytest.raises(UserError, match="at least one"):
         read_shards([])
+
+
+@pytest.mark.parametrize("seed", [-1, 1 << 63])
+def test_seeds_that_no_file_can_hold_are_refused(seed):
+    with pytest.raises(UserError, match=f"seed {seed}"):
+        settings_of(10, seed=seed)

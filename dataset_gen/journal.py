@@ -1,0 +1,270 @@
+"""The journal of a shard under way: finished tasks in order, on disk, owned by one process.
+
+A line that says what the file is, then frames: a tag of four letters, the length of the content, a
+CRC-32 of all three, the content. The first frame holds the settings; `ENVI` frames say which
+software and machine the work that follows was done on, `TASK` frames hold the rows of one task. A
+frame that is cut off or whose checksum differs ends the journal; what follows it is thrown away.
+"""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import json
+import os
+import struct
+import time
+import zlib
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from carillon.errors import UserError
+from carillon.files import cause, sync_folder
+from carillon.progress import say
+from dataset_gen.settings import settings_from
+from dataset_gen.tasks import Plan
+
+SYNC_SECONDS = 1.0
+"""Work that is lost with a machine that loses power; a process that is killed loses none of it."""
+
+_TITLE = b"Carillon journal of a shard, 1\n"
+_FRAME = struct.Struct("<4sQI")
+_PLAN, _ENVIRONMENT, _TASK = b"PLAN", b"ENVI", b"TASK"
+_NO_LOCKS = (errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOLCK, errno.EINVAL)
+
+
+def journal_of(path: Path) -> Path:
+    """Name of the journal of the shard `path`."""
+    return path.parent / f".{path.name}.journal"
+
+
+def discard_journal(path: Path) -> None:
+    """Remove a journal left beside the finished shard `path`, unless somebody uses it."""
+    if journal_of(path).exists():
+        with suppress(UserError):
+            file = _locked(journal_of(path))
+            journal_of(path).unlink(missing_ok=True)
+            os.close(file)
+
+
+class Journal:
+    """The journal beside the shard `path`, locked and ready to be continued.
+
+    Attributes
+    ----------
+    tasks : tasks it holds, the first ones of the plan.
+    environments : where the work was done, one record for each change.
+
+    Raises
+    ------
+    UserError
+        If another process works on the shard, or the journal cannot be written, is damaged at its
+        beginning, or belongs to other settings.
+    """
+
+    def __init__(self, path: Path, plan: Plan, environment: dict[str, Any]) -> None:
+        self.path = journal_of(path)
+        self.plan = plan
+        self.tasks = 0
+        self.environments: list[dict[str, Any]] = []
+        self._shard = path
+        self._synced = time.monotonic()
+        self._file = _locked(self.path)
+        try:
+            self._end = self._continued()
+            if environment not in self.environments[-1:]:
+                self._append(_ENVIRONMENT, json.dumps(environment).encode())
+                self.environments.append(environment)
+            self.sync()
+            sync_folder(self.path.parent)
+        except BaseException:
+            self.close(remove=os.fstat(self._file).st_size == 0)
+            raise
+
+    @property
+    def rows(self) -> int:
+        """Samples it holds."""
+        return self.plan.rows(self.tasks)
+
+    def append(self, work: bytes) -> None:
+        """Add the result of the next task.
+
+        Raises
+        ------
+        UserError
+            If it cannot be written; all earlier tasks are kept.
+        """
+        self._append(_TASK, work)
+        self.tasks += 1
+        if time.monotonic() - self._synced > SYNC_SECONDS:
+            self.sync()
+
+    def sync(self) -> None:
+        """Bring all that was appended to disk."""
+        try:
+            os.fsync(self._file)
+        except OSError as error:
+            raise self._failure(error) from None
+        self._synced = time.monotonic()
+
+    def work(self) -> Iterator[bytes]:
+        """Results of all tasks in order."""
+        for tag, content, _ in self._frames():
+            if tag == _TASK:
+                yield content
+
+    def close(self, remove: bool = False) -> None:
+        """Give up the lock, and the journal if it is to be removed."""
+        if remove:
+            self.path.unlink(missing_ok=True)
+        os.close(self._file)
+
+    def _continued(self) -> int:
+        """Read what is there; position after the last good frame, where the file is cut off."""
+        frames = self._frames()
+        tag, content, end = next(frames, (b"", b"", 0))
+        if tag != _PLAN:
+            return self._begun()
+        self._require_same_plan(content)
+        for tag, content, position in frames:
+            if tag == _ENVIRONMENT:
+                self.environments.append(json.loads(content))
+            elif tag == _TASK and len(content) == self.plan.size(self.tasks):
+                self.tasks += 1
+            else:
+                break
+            end = position
+        lost = os.fstat(self._file).st_size - end
+        if lost:
+            say(f"{self.path}: the last {lost:,} bytes are damaged or incomplete, done again")
+            os.ftruncate(self._file, end)
+        return end
+
+    def _begun(self) -> int:
+        """Write the beginning of a new journal; an older one may only be cut off within it."""
+        beginning = _TITLE + _framed(_PLAN, json.dumps(self._plan_values()).encode())
+        found = os.pread(self._file, len(beginning) + 1, 0)
+        if len(found) > len(beginning) or not _TITLE.startswith(found[: len(_TITLE)]):
+            raise UserError(
+                f"{self.path}: is no journal or damaged at its beginning, so that the work in it "
+                "cannot be used; remove it to begin again"
+            )
+        os.ftruncate(self._file, 0)
+        self._end = 0
+        self._write(beginning)
+        return self._end
+
+    def _plan_values(self) -> dict[str, Any]:
+        return {"task_rows": self.plan.task_rows, "settings": self.plan.settings.as_dict()}
+
+    def _require_same_plan(self, content: bytes) -> None:
+        values = json.loads(content)
+        try:
+            found = Plan(settings_from(values["settings"]), int(values["task_rows"]))
+        except (KeyError, TypeError, ValueError) as error:
+            raise UserError(
+                f"{self.path}: was begun by another version of Carillon ({error}); remove it to "
+                "begin again"
+            ) from None
+        different = found.settings.difference(self.plan.settings)
+        if different is None and found.task_rows != self.plan.task_rows:
+            different = f"tasks of {found.task_rows} samples where {self.plan.task_rows} are usual"
+        if different is not None:
+            raise UserError(
+                f"{self._shard}: was begun with {different}; finish it with the settings it was "
+                f"begun with, remove {self.path}, or choose another name"
+            )
+
+    def _frames(self) -> Iterator[tuple[bytes, bytes, int]]:
+        """Tag, content and end of every good frame from the beginning on."""
+        size = os.fstat(self._file).st_size
+        position = len(_TITLE)
+        if os.pread(self._file, position, 0) != _TITLE:
+            return
+        while size - position >= _FRAME.size:
+            tag, length, checksum = _FRAME.unpack(os.pread(self._file, _FRAME.size, position))
+            position += _FRAME.size
+            if length > size - position:
+                return
+            content = _read(self._file, length, position)
+            position += length
+            if checksum != _checksum(tag, content):
+                return
+            yield tag, content, position
+
+    def _append(self, tag: bytes, content: bytes) -> None:
+        self._write(_framed(tag, content))
+
+    def _write(self, data: bytes) -> None:
+        view = memoryview(data)
+        done = 0
+        try:
+            while done < len(view):
+                done += os.pwrite(self._file, view[done:], self._end + done)
+        except OSError as error:
+            with suppress(OSError):
+                os.ftruncate(self._file, self._end)
+            raise self._failure(error) from None
+        self._end += len(view)
+
+    def _failure(self, error: OSError) -> UserError:
+        return UserError(
+            f"{self.path}: could not be written ({cause(error)}); {self.rows:,} of "
+            f"{self.plan.settings.count:,} samples are kept"
+        )
+
+
+def _checksum(tag: bytes, content: bytes) -> int:
+    return zlib.crc32(content, zlib.crc32(tag + len(content).to_bytes(8, "little")))
+
+
+def _framed(tag: bytes, content: bytes) -> bytes:
+    return _FRAME.pack(tag, len(content), _checksum(tag, content)) + content
+
+
+def _read(file: int, length: int, position: int) -> bytes:
+    """`length` bytes, fewer only at the end of the file."""
+    pieces = []
+    while length > 0 and (piece := os.pread(file, length, position)):
+        pieces.append(piece)
+        length -= len(piece)
+        position += len(piece)
+    return b"".join(pieces)
+
+
+def _locked(path: Path) -> int:
+    """Open the journal `path`, made if need be, for this process alone."""
+    while True:
+        try:
+            file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        except OSError as error:
+            raise UserError(f"{path}: cannot be written ({cause(error)})") from None
+        try:
+            _lock(path, file)
+            if _is_at(path, file):
+                return file
+        except BaseException:
+            os.close(file)
+            raise
+        os.close(file)  # who had it before has finished and removed it
+
+
+def _lock(path: Path, file: int) -> None:
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise UserError(
+            f"{path}: another process is generating this shard; wait for it, or choose another name"
+        ) from None
+    except OSError as error:
+        if error.errno not in _NO_LOCKS:
+            raise UserError(f"{path}: cannot be locked ({cause(error)})") from None
+        say(f"{path}: this file system has no locks; generate no shard twice at a time")
+
+
+def _is_at(path: Path, file: int) -> bool:
+    with suppress(FileNotFoundError):
+        return os.path.samestat(os.stat(path), os.fstat(file))
+    return False

@@ -1,0 +1,143 @@
+"""Tasks shared among MPI ranks: rank 0 writes what all of them work out."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+import traceback
+from collections.abc import Callable, Generator
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
+from typing import Any
+
+from carillon.cli import EXIT_BAD_INPUT
+from carillon.errors import UserError
+from carillon.progress import say
+from dataset_gen.generate import Engine
+from dataset_gen.tasks import Dealer, Plan
+from dataset_gen.workers import QUEUE, WINDOW
+
+Comm = Any
+"""mpi4py's communicator; mpi4py is imported only where a launcher started several ranks."""
+
+PAUSE = 1e-3
+"""Seconds between two looks for messages, so that waiting takes no core from the work."""
+
+_LAUNCHERS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS")
+
+
+def world() -> Comm | None:
+    """All ranks of this job; None unless it has several.
+
+    Raises
+    ------
+    UserError
+        If a launcher started several ranks and there is no mpi4py.
+    """
+    launched = any(os.environ.get(name, "1") != "1" for name in _LAUNCHERS)
+    if not launched and "mpi4py" not in sys.modules:
+        return None
+    try:
+        from mpi4py import MPI
+    except ImportError as error:
+        raise UserError(
+            f"started as one of several ranks, but {error}; install mpi4py, or start one process "
+            "with --workers"
+        ) from None
+    return MPI.COMM_WORLD if MPI.COMM_WORLD.size > 1 else None
+
+
+def share(comm: Comm, program: str, lead: Callable[[Engine], int]) -> int:
+    """Call `lead` on rank 0 with an engine for which all ranks work; its exit status on every rank.
+
+    An error on any rank is printed there and ends all of them.
+    """
+    busy: list[Plan] = []
+    try:
+        _warn_about_cores(comm)
+        if comm.rank > 0:
+            return _follow(comm)
+        status = lead(partial(_in_ranks, comm, busy))
+    except UserError as error:
+        print(f"{program}: {error}", file=sys.stderr, flush=True)
+        if busy or comm.rank > 0:
+            comm.Abort(EXIT_BAD_INPUT)
+        status = EXIT_BAD_INPUT
+    except BaseException:
+        traceback.print_exc()
+        comm.Abort(1)
+    for rank in range(1, comm.size):
+        comm.send(_End(status), dest=rank)
+    return status
+
+
+def refuse(comm: Comm, program: str, error: UserError) -> None:
+    """Print a mistake that all ranks have found once, before any of them ends."""
+    if comm.rank == 0:
+        print(f"{program}: {error}", file=sys.stderr, flush=True)
+    comm.Barrier()
+
+
+class _End:
+    """Message to the other ranks that there is no more work, with the status to end with."""
+
+    def __init__(self, status: int) -> None:
+        self.status = status
+
+
+def _in_ranks(
+    comm: Comm, busy: list[Plan], plan: Plan, tasks: range
+) -> Generator[bytes, None, None]:
+    """Results of `tasks` in order, from all ranks; this one works in a thread of its own."""
+    busy.append(plan)
+    for rank in range(1, comm.size):
+        comm.send(plan, dest=rank)
+    dealer = Dealer(tasks, WINDOW * comm.size)
+    free = list(range(1, comm.size)) * QUEUE
+    own: Future[bytes] | None = None
+    with ThreadPoolExecutor(1) as thread:
+        while not dealer.finished:
+            while free and (task := dealer.deal()) is not None:
+                comm.send(task, dest=free.pop(0))
+            if own is None and (task := dealer.deal()) is not None:
+                mine, own = task, thread.submit(plan.work, task)
+            if own is not None and own.done():
+                dealer.keep(mine, own.result())
+                own = None
+            elif comm.iprobe():
+                rank, task, work = comm.recv()
+                dealer.keep(task, work)
+                free.append(rank)
+            else:
+                time.sleep(PAUSE)
+            yield from dealer.ready()
+    busy.clear()
+
+
+def _follow(comm: Comm) -> int:
+    """Do the tasks that rank 0 deals until it says that this is the end."""
+    plan: Plan | None = None
+    while True:
+        while not comm.iprobe(source=0):
+            time.sleep(PAUSE)
+        order = comm.recv(source=0)
+        if isinstance(order, _End):
+            return order.status
+        if isinstance(order, Plan):
+            plan = order
+        else:
+            assert plan is not None
+            # Blocks until rank 0 takes it, which is at once: it does not wait for its own work.
+            comm.send((comm.rank, order, plan.work(order)), dest=0)
+
+
+def _warn_about_cores(comm: Comm) -> None:
+    """Say so if the ranks of a machine are more than the cores they may run on together."""
+    from mpi4py import MPI
+
+    node = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    cores = set[int]().union(*node.allgather(os.sched_getaffinity(0)))
+    if node.rank == 0 and node.size > len(cores):
+        say(f"{node.size} ranks share {len(cores)} cores, more than that make nothing faster")
+    node.Free()

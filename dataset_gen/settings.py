@@ -1,0 +1,109 @@
+"""What a shard is made of: the settings that decide about its rows, and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from carillon import __version__
+from carillon.errors import UserError
+from dataset_gen.element import DEFAULT_POISSON
+from dataset_gen.objectives import DEFAULT_OBJECTIVE, require_objective, require_poisson
+from dataset_gen.sampling import Moduli, moduli, shard_range
+
+SEED_BITS = 63
+"""Seeds fit into a signed integer of the file format."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Samples start..stop-1 of a seed, their moduli drawn in low..high [GPa], and how to fit them.
+
+    Equal settings give equal rows on one kind of machine, however the work is divided.
+    """
+
+    objective: str
+    poisson: float
+    seed: int
+    start: int
+    stop: int
+    distribution: str
+    low: float
+    high: float
+    version: str = __version__
+
+    @property
+    def count(self) -> int:
+        """Number of samples."""
+        return self.stop - self.start
+
+    @property
+    def moduli(self) -> Moduli:
+        """Where the fine moduli are drawn from."""
+        return Moduli(self.distribution, self.low, self.high)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values by name."""
+        return asdict(self)
+
+    def difference(self, other: Settings) -> str | None:
+        """The first setting that `other` has different, in words; None if there is none."""
+        for name, mine in self.as_dict().items():
+            theirs = other.as_dict()[name]
+            if mine != theirs:
+                return f"{_LABELS.get(name, name)} {mine} where {theirs} is asked for"
+        return None
+
+
+_LABELS = {
+    "poisson": "Poisson's ratio",
+    "start": "first sample",
+    "stop": "samples up to",
+    "low": "moduli from",
+    "high": "moduli up to",
+    "version": "Carillon",
+}
+
+
+def settings_of(
+    total: int,
+    seed: int = 0,
+    shard: int = 0,
+    shards: int = 1,
+    objective: str = DEFAULT_OBJECTIVE,
+    poisson: float = DEFAULT_POISSON,
+    distribution: str = "uniform",
+    low: float | None = None,
+    high: float | None = None,
+) -> Settings:
+    """Settings of one of `shards` parts of the first `total` samples of `seed`.
+
+    Raises
+    ------
+    UserError
+        For an unknown objective or distribution, an impossible split, seed, range of moduli or
+        Poisson's ratio.
+    """
+    require_objective(objective)
+    require_poisson(poisson)
+    if not 0 <= seed < 1 << SEED_BITS:
+        raise UserError(f"seed {seed}: expected 0 or more, and less than 2^{SEED_BITS}")
+    drawn = moduli(distribution, low, high)
+    start, stop = shard_range(total, shard, shards)
+    return Settings(
+        objective, float(poisson), seed, start, stop, drawn.distribution, drawn.low, drawn.high
+    )
+
+
+def settings_from(values: Mapping[str, Any]) -> Settings:
+    """Settings from the plain values of `Settings.as_dict`.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        If a value is missing or no such value.
+    """
+    types = {"objective": str, "poisson": float, "seed": int, "start": int, "stop": int}
+    types |= {"distribution": str, "low": float, "high": float, "version": str}
+    return Settings(**{name: convert(values[name]) for name, convert in types.items()})

@@ -1,0 +1,36 @@
+"""How fast a shard was written or read, and in how much memory: the figures of every run."""
+
+from __future__ import annotations
+
+import resource
+import time
+from pathlib import Path
+
+ORIGINS = 8
+"""Training rows of a sample: each corner of the block in turn is the origin."""
+
+
+class Speed:
+    """A clock that starts when it is made."""
+
+    def __init__(self) -> None:
+        self._start = time.perf_counter()
+
+    def report(self, path: str | Path, samples: int, workers: int = 1) -> str:
+        """Rates of `samples` gone through since the start, file size and largest memory."""
+        seconds = time.perf_counter() - self._start
+        size = Path(path).stat().st_size / 1e6
+        rate = samples / seconds
+        text = (
+            f"{samples:,} samples in {seconds:.1f} s, {rate:,.0f} samples/s = "
+            f"{ORIGINS * rate:,.0f} training rows/s; {size:,.1f} MB, {size / seconds:,.1f} MB/s; "
+            f"peak memory {_peak(resource.RUSAGE_SELF):,.0f} MB"
+        )
+        if workers > 1:
+            text += f", of a worker {_peak(resource.RUSAGE_CHILDREN):,.0f} MB"
+        return text
+
+
+def _peak(who: int) -> float:
+    """Largest resident memory in MB of this process, or of the largest child that has ended."""
+    return resource.getrusage(who).ru_maxrss * 1024 / 1e6

@@ -1,0 +1,112 @@
+"""One shard on several MPI ranks: the same bytes, and no rank left waiting after an error."""
+
+from __future__ import annotations
+
+import pytest
+
+from dataset_gen.generate import generate_file
+from dataset_gen.journal import journal_of
+from dataset_gen.settings import settings_of
+from dataset_gen.shards import origin_of
+from dataset_gen.tasks import Plan
+
+pytestmark = pytest.mark.mpi
+
+SAMPLES, TASK = 3000, 128
+
+PROGRAM = f"""
+import sys
+from carillon.errors import UserError
+from dataset_gen import __main__ as program
+from dataset_gen import ranks, tasks
+
+class Plan(tasks.Plan):
+    def work(self, task):
+        comm = ranks.world()
+        if comm is not None and (comm.rank, task) in {{failing}}:
+            raise {{error}}("planted")
+        return super().work(task)
+
+program.Plan = lambda settings: Plan(settings, {TASK})
+sys.exit(program.cli.run("dataset_gen", program.main))
+"""
+
+
+def options(path, *more):
+    return ("generate", "--samples", SAMPLES, "--seed", 4, *more, "--out", path)
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory):
+    path = tmp_path_factory.mktemp("reference") / "shard.h5"
+    plan = Plan(settings_of(SAMPLES, 4), TASK)
+    generate_file(path, plan, origin_of(plan.settings, SAMPLES, 0, 1))
+    return path.read_bytes()
+
+
+@pytest.fixture
+def program(tmp_path):
+    """Write the program: the command line with small tasks, some of which may fail."""
+
+    def write(failing="()", error="UserError"):
+        path = tmp_path / "program.py"
+        path.write_text(PROGRAM.format(failing=failing, error=error))
+        return path
+
+    return write
+
+
+@pytest.fixture
+def path(tmp_path):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    return folder / "shard.h5"
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3])
+def test_bytes_do_not_depend_on_the_number_of_ranks(ranks, path, program, reference, mpiexec):
+    mpiexec(ranks, program(), *options(path), check=True)
+    assert path.read_bytes() == reference
+    assert list(path.parent.iterdir()) == [path]
+    # A second time, all ranks find that there is nothing to do.
+    done = mpiexec(ranks, program(), *options(path), check=True)
+    assert done.stderr.count("nothing to do") == 1
+
+
+def sentences(done):
+    return [line for line in done.stderr.splitlines() if line.startswith("dataset_gen: ")]
+
+
+@pytest.mark.parametrize("rank", [0, 2])
+def test_an_error_on_one_rank_ends_all_and_what_was_done_is_kept(
+    rank, path, program, reference, mpiexec
+):
+    failing = str(tuple((rank, task) for task in range(8, 30)))
+    done = mpiexec(3, program(failing), *options(path), timeout=60)
+    assert done.returncode == 2
+    assert sentences(done) == ["dataset_gen: planted"]
+    assert journal_of(path).stat().st_size > TASK * 137 and not path.exists()
+    done = mpiexec(2, program(), *options(path), check=True)
+    assert "going on after" in done.stderr
+    assert path.read_bytes() == reference
+
+
+def test_a_mistake_of_the_program_on_one_rank_ends_all_with_its_traceback(path, program, mpiexec):
+    done = mpiexec(3, program("((1, 2), (1, 3), (1, 4), (1, 5))", "ValueError"), *options(path))
+    assert done.returncode not in (0, 2)
+    assert "ValueError: planted" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("more", "sentence"),
+    [
+        (("--low", "-1"), "expected 0 or above"),
+        (("--workers", 2), "ask for more ranks instead"),
+    ],
+)
+def test_bad_input_is_one_sentence_on_all_ranks(more, sentence, path, mpiexec):
+    done = mpiexec(3, "dataset_gen", *options(path, *more), timeout=60)
+    assert done.returncode == 2
+    (line,) = sentences(done)
+    assert sentence in line
+    assert list(path.parent.iterdir()) == []
