@@ -58,6 +58,9 @@ def generate(
 ) -> Shard:
     """Fit one shard of the first `total` samples of `seed`, in memory.
 
+    A script that asks for several workers needs the usual `if __name__ == "__main__":`, since they
+    import it.
+
     Raises
     ------
     UserError
@@ -66,7 +69,8 @@ def generate(
     """
     settings = settings_of(total, seed, shard, shards, objective, poisson, distribution, low, high)
     plan = Plan(settings)
-    found = _tracked(plan, engine_of(workers)(plan, range(plan.tasks)), 0, progress)
+    label = f"fitting {objective}"
+    found = _tracked(plan, engine_of(workers)(plan, range(plan.tasks)), label, visible=progress)
     rows = np.concatenate([rows_of(work) for work in found])
     return shard_of(settings, rows, origin_of(settings, total, shard, shards))
 
@@ -103,12 +107,7 @@ def generate_file(
             return None
         before = journal.rows
         _fill(journal, engine)
-        remove_leftovers(path)
-        later = journal.environments[1:]
-        origin = origin | journal.environments[0]
-        if later:
-            origin["resumed_on"] = json.dumps(later)
-        write_rows(path, plan.settings, map(rows_of, journal.work()), origin)
+        _finish(path, journal, origin)
         finished = True
     finally:
         journal.close(remove=finished or not journal.tasks)
@@ -139,18 +138,28 @@ def _fill(journal: Journal, engine: Engine) -> None:
     if journal.tasks:
         say(f"{journal.path}: going on after {journal.rows:,} of {plan.settings.count:,} samples")
     with closing(engine(plan, range(journal.tasks, plan.tasks))) as results:
-        for work in _tracked(plan, results, journal.rows, True):
+        label = f"fitting {plan.settings.objective}"
+        for work in _tracked(plan, results, label, journal.rows):
             journal.append(work)
 
 
-def _tracked(plan: Plan, results: Iterator[bytes], done: int, progress: bool) -> Iterator[bytes]:
-    settings = plan.settings
+def _finish(path: Path, journal: Journal, origin: dict[str, Any]) -> None:
+    first, *later = journal.environments
+    origin = origin | first | ({"resumed_on": json.dumps(later)} if later else {})
+    remove_leftovers(path)
+    pieces = map(rows_of, _tracked(journal.plan, journal.work(), "writing"))
+    write_rows(path, journal.plan.settings, pieces, origin)
+
+
+def _tracked(
+    plan: Plan, results: Iterator[bytes], label: str, done: int = 0, visible: bool = True
+) -> Iterator[bytes]:
     return track(
         results,
-        f"fitting {settings.objective}",
-        total=settings.count,
+        label,
+        total=plan.settings.count,
         unit="samples",
-        visible=progress,
+        visible=visible,
         weight=lambda work: len(rows_of(work)),
         done=done,
     )

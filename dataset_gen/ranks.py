@@ -59,6 +59,8 @@ def share(comm: Comm, program: str, lead: Callable[[Engine], int]) -> int:
         if comm.rank > 0:
             return _follow(comm)
         status = lead(partial(_in_ranks, comm, busy))
+        if busy:  # interrupted, with the others in the middle of their work
+            comm.Abort(status)
     except UserError as error:
         print(f"{program}: {error}", file=sys.stderr, flush=True)
         if busy or comm.rank > 0:

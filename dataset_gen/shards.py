@@ -122,7 +122,11 @@ def write_rows(
             for name, column in columns.items():
                 column[done : done + len(piece)] = piece[name]
             done += len(piece)
-    assert done == settings.count
+        if done != settings.count:
+            raise UserError(
+                f"{path}: {done:,} of {settings.count:,} samples could be read back from the "
+                "journal, the disk loses data; run the same command again"
+            )
 
 
 def _new_column(file: h5py.File, name: str, count: int) -> h5py.Dataset:
