@@ -1,4 +1,11 @@
-# Blocks with random moduli and the coarse moduli fitted to them, one shard a job.
+# Blocks with random moduli and the coarse moduli fitted to them, one shard a job. A job that was
+# killed leaves a journal beside its shard, from which the next try goes on.
+WORKERS = config["dataset"]["workers"]
+RANGE = "".join(
+    f" --{end} {config['dataset'][end]}"
+    for end in ("low", "high")
+    if config["dataset"][end] is not None
+)
 
 
 rule generate_shard:
@@ -8,9 +15,10 @@ rule generate_shard:
         f"{LOGS}/dataset/shard-{{shard}}.log",
     benchmark:
         f"{BENCHMARKS}/dataset/shard-{{shard}}.tsv"
-    threads: 1
+    retries: 2
+    threads: WORKERS
     resources:
-        mem_mb=1000,
+        mem_mb=500 + 500 * WORKERS,
         runtime="2h",
     params:
         samples=config["dataset"]["samples"],
@@ -18,10 +26,12 @@ rule generate_shard:
         seed=config["dataset"]["seed"],
         objective=config["dataset"]["objective"],
         poisson=config["poisson"],
+        moduli=f"{config['dataset']['distribution']}{RANGE}",
     shell:
         "python -m dataset_gen generate --samples {params.samples} --seed {params.seed}"
         " --shard {wildcards.shard} --shards {params.shards} --objective {params.objective}"
-        " --poisson {params.poisson} --workers {threads} --out {output} > {log} 2>&1"
+        " --poisson {params.poisson} --distribution {params.moduli} --workers {threads}"
+        " --out {output} > {log} 2>&1"
 
 
 rule describe_shard:
