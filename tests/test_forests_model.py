@@ -163,7 +163,7 @@ def test_fits_that_did_not_converge_teach_nothing(shard, models):
         coarse=shard.coarse[:half],
         residual=shard.residual[:half],
         converged=shard.converged[:half],
-        stop=shard.start + half,
+        settings=replace(shard.settings, stop=shard.start + half),
     )
     nonsense = replace(
         shard,

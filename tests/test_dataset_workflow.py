@@ -1,0 +1,40 @@
+"""The rule that generates shards hands the configuration on."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+MODELS = "models: {bar: {mesh: 'builtin:bar', resolution: 16}}\n"
+
+
+@pytest.mark.parametrize(
+    ("dataset", "expected"),
+    [
+        ("{}", "--distribution uniform --workers 1 --out"),
+        (
+            "{distribution: log-uniform, low: 0.1, workers: 2}",
+            "--distribution log-uniform --low 0.1 --workers 2 --out",
+        ),
+    ],
+)
+def test_moduli_and_workers_reach_the_command(tmp_path, dataset, expected):
+    config = tmp_path / "config.yaml"
+    config.write_text(f"{MODELS}dataset: {dataset}\n")
+    command = [sys.executable, "-m", "snakemake", "-s", CHECKOUT / "Snakefile", "-n", "-p"]
+    command += ["results/dataset/shard-0.h5", "--cores", 2, "--configfile", config]
+    done = subprocess.run(
+        [str(part) for part in command],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(CHECKOUT)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert expected in done.stdout + done.stderr
