@@ -7,16 +7,17 @@ symmetries. Each lives in a module of its own with a function `fit_pattern`.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from carillon.errors import UserError
+from dataset_gen.block import symmetries
 from dataset_gen.element import DEFAULT_POISSON, Array
 from dataset_gen.objectives import chen2015, energy, factored, hybrid, inertial, oversampled
 from dataset_gen.objectives.quadratic import PatternFits
-from dataset_gen.serial import serial_blas
 
 OBJECTIVES: dict[str, Callable[[Array, int, float], PatternFits]] = {
     "energy": energy.fit_pattern,
@@ -30,9 +31,6 @@ OBJECTIVES: dict[str, Callable[[Array, int, float], PatternFits]] = {
 
 DEFAULT_OBJECTIVE = "factored"
 """The one with the best spectra: as good as `hybrid` on one material, better on mixed ones."""
-
-CHUNK = 32
-"""Blocks factorised together: few enough for the matrices to stay in the cache."""
 
 
 class Fits(NamedTuple):
@@ -74,7 +72,18 @@ def _require_blocks(young: Array) -> None:
         raise UserError(f"block {empty[0]} is void in all eight cells: there is nothing to fit")
 
 
-@serial_blas
+@cache
+def orientations() -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Least image (256,) of each void pattern under the symmetries, and the one used (256, 8).
+
+    Cell j of the pattern is cell [mask, j] of its image.
+    """
+    bits = 1 << symmetries()
+    filled = np.arange(256)[:, None] >> np.arange(8) & 1
+    images = filled @ bits.T
+    return images.min(axis=1), symmetries()[images.argmin(axis=1)]
+
+
 def fit(objective: str, e: ArrayLike, poisson: float = DEFAULT_POISSON) -> Fits:
     """Fit the coarse moduli of many blocks.
 
@@ -91,24 +100,24 @@ def fit(objective: str, e: ArrayLike, poisson: float = DEFAULT_POISSON) -> Fits:
 
     Notes
     -----
-    A row's result does not depend on the other rows, bit for bit: BLAS runs on one thread, so share
-    many rows among processes.
+    Blocks are turned so that 21 void patterns stand for all 255, and those of one pattern are
+    fitted together. A row's result does not depend on the other rows, bit for bit. One core is
+    used: share many rows among processes.
     """
     require_objective(objective)
     require_poisson(poisson)
     young = np.ascontiguousarray(e, dtype=float)
     _require_blocks(young)
-    fit_pattern = OBJECTIVES[objective]
+    images, turns = orientations()
+    masks = (young > 0.0) @ (1 << np.arange(8))
+    turn, image = turns[masks], images[masks]
+    turned = np.empty_like(young)
+    np.put_along_axis(turned, turn, young, axis=1)
     moduli = np.empty_like(young)
     residual = np.empty(len(young))
     converged = np.empty(len(young), dtype=bool)
-    masks = (young > 0.0) @ (1 << np.arange(8))
-    for mask in np.unique(masks):
-        rows = np.flatnonzero(masks == mask)
-        for start in range(0, len(rows), CHUNK):
-            chunk = rows[start : start + CHUNK]
-            # A lone row takes another path through numpy and rounds differently: never fit one.
-            padded = np.resize(chunk, max(2, len(chunk)))
-            fits = fit_pattern(young[padded], int(mask), float(poisson))
-            moduli[padded], residual[padded], converged[padded] = fits
-    return Fits(moduli, residual, converged)
+    for mask in np.unique(image):
+        rows = np.flatnonzero(image == mask)
+        fits = OBJECTIVES[objective](turned[rows], int(mask), float(poisson))
+        moduli[rows], residual[rows], converged[rows] = fits
+    return Fits(np.take_along_axis(moduli, turn, axis=1), residual, converged)

@@ -8,21 +8,68 @@ displacement; it continues the trilinear motion nearest to the active nodes.
 from __future__ import annotations
 
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
 from dataset_gen.block import CORNER_NODES, degrees_of_freedom
 from dataset_gen.element import Array
-from dataset_gen.objectives.patterns import corner_strains, pattern_of
-from dataset_gen.objectives.quadratic import NormalEquations, PatternFits, bounded_moduli
+from dataset_gen.objectives.elimination import TILE, elimination_of
+from dataset_gen.objectives.free_block import (
+    FreeBlock,
+    flexibility_norms,
+    free_block_of,
+    without_null,
+)
+from dataset_gen.objectives.kernel import (
+    DENSE,
+    LOWER,
+    MOTIONS,
+    WEIGHTS,
+    all_forms,
+    assemble,
+    copy_in,
+    factorise,
+    form_sizes,
+    lower_tiles,
+    multiply,
+    solve_lower,
+    solve_upper,
+    transpose,
+    weigh,
+    write_equations,
+)
+from dataset_gen.objectives.lanes import LANES, compiled, empty, spread, store
+from dataset_gen.objectives.patterns import corner_strains, pattern_of, straining_motions
+from dataset_gen.objectives.quadratic import (
+    NormalEquations,
+    PatternFits,
+    bounded_moduli,
+    form_equations,
+)
+from dataset_gen.serial import serial_blas
 
 WEIGHT = 0.02
 """Pull towards the fine moduli, as a share of the mean diagonal of the normal matrix."""
 
 
-@cache
+class Corners(NamedTuple):
+    """Corners of a void pattern, on the active nodes in the order of elimination.
+
+    Attributes
+    ----------
+    block : the free block.
+    loads : flat (a, 18), C^T Z: forces dual to the straining motions Z of the corners.
+    strains : flat (48, 18) strains of the coarse element in its straining motions.
+    """
+
+    block: FreeBlock
+    loads: Array
+    strains: Array
+
+
 def corner_selection(mask: int, poisson: float) -> Array:
-    """Matrix (24, a) that reads the corners' displacements off the active nodes."""
+    """Matrix C (24, a) that reads the corners' displacements off the active nodes."""
     pattern = pattern_of(mask, poisson)
     selection = pattern.to_corners.copy()
     for row, dof in enumerate(degrees_of_freedom(CORNER_NODES)):
@@ -33,28 +80,63 @@ def corner_selection(mask: int, poisson: float) -> Array:
     return selection
 
 
-def fit_pattern(young: Array, mask: int, poisson: float) -> PatternFits:
-    """Fit blocks (n, 8) that share one void pattern.
+@cache
+@serial_blas
+def corners_of(mask: int, poisson: float) -> Corners:
+    """Tables of the pattern whose filled cells are the set bits of `mask` (1..255)."""
+    pattern, motions = pattern_of(mask, poisson), straining_motions()
+    loads = pattern.without_null(corner_selection(mask, poisson).T @ motions)
+    order = pattern.positions(elimination_of(mask).dofs)
+    strains = (corner_strains(poisson) @ motions).ravel()
+    return Corners(free_block_of(mask, poisson), loads[order].ravel(), strains)
 
-    With `C` the corner selection, the coarse energy form is `K^+ C^T K_q C K^+` and the fine one
-    `K^+`; all products the closed form needs reduce to 24x24 matrices.
+
+@compiled
+def _form_equations(corners: Corners, young: Array, equations: NormalEquations) -> None:
+    """Normal equations of the energy forms on all forces, K^+ C^T K_q C K^+ and K^+.
+
+    The former live on the span of U = K^+ C^T Z. On orthonormal forces Q = U R^-T, with
+    R R^T = U^T U, they are those of the motions R^T, and the latter is R^-1 U^T K^+ U R^-T, but for
+    its trace and norm.
     """
-    pattern = pattern_of(mask, poisson)
-    null = pattern.null
-    shift = young[:, pattern.cells].mean(axis=1)[:, None, None]
-    inverse = np.linalg.inv(pattern.assemble(young)) - (null @ null.T) / shift
-    flexible = corner_selection(mask, poisson) @ inverse
-    scale = corner_strains(poisson)
-    squared = scale @ (flexible @ flexible.transpose(0, 2, 1)) @ scale.T
-    cubed = scale @ ((flexible @ inverse) @ flexible.transpose(0, 2, 1)) @ scale.T
-    count = len(young)
-    products = (squared * squared).reshape(count, 8, 6, 8, 6).sum(axis=(2, 4))
-    traces = np.einsum("nii->ni", squared).reshape(count, 8, 6).sum(axis=2)
-    loaded = np.einsum("nii->ni", cubed).reshape(count, 8, 6).sum(axis=2)
-    trace = np.einsum("nii->n", inverse)
-    equations = NormalEquations(
-        2.0 * products + traces[:, :, None] * traces[:, None, :],
-        2.0 * loaded + trace[:, None] * traces,
-        2.0 * (inverse * inverse).sum(axis=(1, 2)) + trace**2,
-    )
-    return bounded_moduli(equations, young, young, WEIGHT)
+    factor, stiffness, _ = corners.block
+    size = 3 * len(factor.diagonal)
+    weights, tiles, small = empty(WEIGHTS), empty(TILE * (len(stiffness.start) - 1)), empty(LOWER)
+    u, motions, energies = empty(MOTIONS * size), empty(MOTIONS**2), empty(MOTIONS**2)
+    off, on, last = form_sizes(MOTIONS)
+    forms = empty(9 * last)
+    for first in range(0, len(young), LANES):
+        weigh(young, first, weights)
+        assemble(stiffness, weights, tiles)
+        copy_in(corners.loads, u)
+        factorise(factor, tiles)
+        solve_lower(factor, tiles, u, MOTIONS)
+        solve_upper(factor, tiles, u, MOTIONS)
+        without_null(corners.block, u, MOTIONS)
+        columns = (u, 0, 1, MOTIONS)
+        multiply(motions, columns, columns, MOTIONS, MOTIONS, size)
+        solve_lower(factor, tiles, u, MOTIONS)
+        multiply(energies, columns, columns, MOTIONS, MOTIONS, size)
+        lower_tiles(motions, MOTIONS, small)
+        factorise(DENSE, small)
+        solve_lower(DENSE, small, motions, MOTIONS)
+        solve_lower(DENSE, small, energies, MOTIONS)
+        transpose(energies, MOTIONS)
+        solve_lower(DENSE, small, energies, MOTIONS)
+        all_forms(motions, energies, MOTIONS, corners.strains, forms)
+        trace, square = flexibility_norms(corners.block, tiles)
+        store(forms, 9 * last - 1, trace)
+        write_equations(forms, MOTIONS, first, equations)
+        store(weights, 0, spread(2.0) * square + trace * trace)
+        for row in range(first, min(first + LANES, len(young))):
+            equations.constant[row] = weights[0, row - first]
+
+
+def normal_equations(young: Array, mask: int, poisson: float) -> NormalEquations:
+    """Normal equations of blocks (n, 8) that share one void pattern."""
+    return form_equations(_form_equations, corners_of(mask, poisson), young)
+
+
+def fit_pattern(young: Array, mask: int, poisson: float) -> PatternFits:
+    """Fit blocks (n, 8) that share one void pattern."""
+    return bounded_moduli(normal_equations(young, mask, poisson), young, young, WEIGHT)

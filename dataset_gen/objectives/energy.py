@@ -3,16 +3,56 @@
 For a self-equilibrated force f the fine energy is `f^T K(e)^+ f` and the coarse one
 `(P^T f)^T K_c(E)^+ (P^T f)`. For Gaussian f and symmetric A the mean of `(f^T A f)^2` is
 `2 |A|_F^2 + tr(A)^2`, so no force is sampled. Everything that depends on E lives on the coarse
-element's 18 straining motions.
+element's 18 straining motions; in a basis V of what nodal forces feel of them, orthonormal on the
+active nodes, the coarse flexibility is `V B V^T` with `B(E) = (sum_q E_q A_q)^-1`.
 """
 
 from __future__ import annotations
 
-import numba
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from dataset_gen.element import Array
-from dataset_gen.objectives.patterns import corner_strains, pattern_of, straining_motions
+from dataset_gen.objectives.coarse_response import (
+    Coarse,
+    Response,
+    coarse_of,
+    empty_response,
+    respond,
+    write_curvature,
+)
+from dataset_gen.objectives.descent import (
+    GRADIENT,
+    HESSIAN,
+    MAX_ITERATIONS,
+    VALUE,
+    begin,
+    converged,
+    judge,
+    propose,
+    start,
+)
+from dataset_gen.objectives.elimination import TILE
+from dataset_gen.objectives.free_block import flexibility_norms, squares
+from dataset_gen.objectives.kernel import (
+    MOTIONS,
+    WEIGHTS,
+    add_diagonal,
+    assemble,
+    copy_in,
+    element_forms,
+    factorise,
+    form_sizes,
+    inner_products,
+    matrix_form,
+    multiply,
+    solve_lower,
+    trace,
+    weigh,
+)
+from dataset_gen.objectives.lanes import LANES, Vector, compiled, empty, load, spread, store
 from dataset_gen.objectives.quadratic import MODULUS_FLOOR, PatternFits, reference_moduli
 
 MODULUS_CEILING = 10.0
@@ -21,170 +61,126 @@ MODULUS_CEILING = 10.0
 LOG_RIDGE = 1e-6
 """Pull of log E towards log E0, as a share of the fine energies' mean square."""
 
-MAX_ITERATIONS = 200
-STEP_TOLERANCE = 1e-6
-LARGEST_STEP = 1.0
 
+class Fine(NamedTuple):
+    """Fine flexibility of the blocks in the lanes.
 
-@numba.njit(cache=True, nogil=True)
-def _compliance(young: Array, strains: Array) -> Array:
-    """Inverse (18, 18) of the coarse stiffness on the straining motions."""
-    stiffness = np.zeros((strains.shape[1], strains.shape[1]))
-    for q in range(8):
-        part = strains[6 * q : 6 * q + 6]
-        stiffness += young[q] * (part.T @ part)
-    return np.linalg.inv(stiffness)
-
-
-@numba.njit(cache=True, nogil=True)
-def _mismatch(
-    compliance: Array, gram: Array, flexibility: Array, trace: float, square: float
-) -> float:
-    """`2 |B - K^+|_F^2 + (tr B - tr K^+)^2` of the coarse flexibility B."""
-    scaled = compliance @ gram
-    norm = (scaled * scaled.T).sum() - 2.0 * (compliance * flexibility).sum() + square
-    return 2.0 * norm + (np.trace(scaled) - trace) ** 2
-
-
-@numba.njit(cache=True, nogil=True)
-def _fit_block(
-    start: Array,
-    bounds: tuple[float, float],
-    strains: Array,
-    gram: Array,
-    flexibility: Array,
-    trace: float,
-    square: float,
-) -> tuple[Array, float, bool]:
-    """Projected Levenberg-Marquardt in log E; returns log E, the mismatch and convergence."""
-    weight = LOG_RIDGE * (2.0 * square + trace**2)
-    low, high = bounds
-    x = np.minimum(np.maximum(start, low), high)
-    origin = x.copy()
-    compliance = _compliance(np.exp(x), strains)
-    value = _mismatch(compliance, gram, flexibility, trace, square)
-    cost = value
-    damping = 1e-3
-    for _ in range(MAX_ITERATIONS):
-        young = np.exp(x)
-        middle = compliance @ gram @ compliance
-        spread = strains @ middle @ strains.T
-        miss = compliance @ (gram @ compliance @ gram - flexibility) @ compliance
-        error = np.trace(compliance @ gram) - trace
-        traces, slopes = np.zeros(8), np.zeros(8)
-        for q in range(8):
-            part = strains[6 * q : 6 * q + 6]
-            traces[q] = -young[q] * np.trace(spread[6 * q : 6 * q + 6, 6 * q : 6 * q + 6])
-            slopes[q] = -young[q] * (part @ miss * part).sum()
-        gradient = 2.0 * slopes + error * traces + weight * (x - origin)
-        hessian = np.zeros((8, 8))
-        for p in range(8):
-            for q in range(8):
-                shared = (spread[6 * p : 6 * p + 6, 6 * q : 6 * q + 6] ** 2).sum()
-                hessian[p, q] = 2.0 * young[p] * young[q] * shared + traces[p] * traces[q]
-            hessian[p, p] += weight
-        held = ((x <= low) & (gradient > 0.0)) | ((x >= high) & (gradient < 0.0))
-        for q in np.flatnonzero(held):
-            hessian[q, :] = 0.0
-            hessian[:, q] = 0.0
-            hessian[q, q] = 1.0
-            gradient[q] = 0.0
-        while True:
-            step = -np.linalg.solve(hessian + damping * np.diag(np.diag(hessian)), gradient)
-            longest = np.abs(step).max()
-            if longest > LARGEST_STEP:
-                step *= LARGEST_STEP / longest
-            trial = np.minimum(np.maximum(x + step, low), high)
-            moved = np.abs(trial - x).max()
-            if moved < STEP_TOLERANCE:
-                return x, value, True
-            trial_compliance = _compliance(np.exp(trial), strains)
-            trial_value = _mismatch(trial_compliance, gram, flexibility, trace, square)
-            trial_cost = trial_value + weight * ((trial - origin) ** 2).sum()
-            if trial_cost <= cost:
-                break
-            damping *= 4.0
-        x, compliance, value, cost = trial, trial_compliance, trial_value, trial_cost
-        damping = max(damping / 6.0, 1e-9)
-    return x, value, False
-
-
-@numba.njit(cache=True, nogil=True)
-def _fit_all(
-    starts: Array,
-    bounds: Array,
-    strains: Array,
-    gram: Array,
-    flexibilities: Array,
-    traces: Array,
-    squares: Array,
-) -> tuple[Array, Array, np.ndarray]:
-    logs = np.empty_like(starts)
-    values = np.empty(len(starts))
-    converged = np.empty(len(starts), dtype=np.bool_)
-    for row in range(len(starts)):
-        logs[row], values[row], converged[row] = _fit_block(
-            starts[row],
-            (bounds[0], bounds[1]),
-            strains,
-            gram,
-            flexibilities[row],
-            traces[row],
-            squares[row],
-        )
-    return logs, values, converged
-
-
-def _fine_flexibility(young: Array, mask: int, poisson: float) -> Array:
-    """K(e)^+ (n, a, a) on the active nodes."""
-    pattern = pattern_of(mask, poisson)
-    rigid = pattern.null @ pattern.null.T
-    shift = young[:, pattern.cells].mean(axis=1)[:, None, None]
-    return np.asarray(np.linalg.inv(pattern.assemble(young)) - rigid / shift)
-
-
-def _loaded_motions(mask: int, poisson: float) -> Array:
-    """Straining motions of the corners (a, 18) as self-equilibrated nodal forces feel them."""
-    pattern = pattern_of(mask, poisson)
-    return pattern.without_null(pattern.interpolation @ straining_motions())
-
-
-def expected_mismatch(moduli: Array, young: Array, mask: int, poisson: float) -> Array:
-    """Mean squared energy difference (n,) of Eq. (8) over standard Gaussian forces.
-
-    `moduli` and `young` are (n, 8); all blocks share the void pattern `mask`.
+    Attributes
+    ----------
+    flexibility : (18, 18), V^T K^+ V.
+    norms : (3) trace of K^+, mean square of the energies f^T K^+ f, and the part of it that no
+        coarse element can answer, twice |K^+|^2 - |V^T K^+ V|^2.
     """
-    flexibility = _fine_flexibility(young, mask, poisson)
-    fields = _loaded_motions(mask, poisson)
-    strains = corner_strains(poisson) @ straining_motions()
-    values = np.empty(len(young))
-    for row, fine in enumerate(flexibility):
-        values[row] = _mismatch(
-            _compliance(moduli[row], strains),
-            fields.T @ fields,
-            np.ascontiguousarray(fields.T @ fine @ fields),
-            np.trace(fine),
-            (fine * fine).sum(),
-        )
-    return values
+
+    flexibility: Array
+    norms: Array
+
+
+@compiled
+def _fine_response(coarse: Coarse, young: Array, first: int, fine: Fine) -> None:
+    """Fine flexibility of the blocks from row `first` on."""
+    factor, stiffness, _ = coarse.block
+    size = 3 * len(factor.diagonal)
+    weights, tiles, u = (
+        empty(WEIGHTS),
+        empty(TILE * (len(stiffness.start) - 1)),
+        empty(MOTIONS * size),
+    )
+    weigh(young, first, weights)
+    assemble(stiffness, weights, tiles)
+    factorise(factor, tiles)
+    copy_in(coarse.basis, u)
+    solve_lower(factor, tiles, u, MOTIONS)
+    columns = (u, 0, 1, MOTIONS)
+    multiply(fine.flexibility, columns, columns, MOTIONS, MOTIONS, size)
+    total, square = flexibility_norms(coarse.block, tiles)
+    answered = squares(fine.flexibility, 0, MOTIONS**2)
+    store(fine.norms, 0, total)
+    store(fine.norms, 1, spread(2.0) * square + total * total)
+    store(fine.norms, 2, spread(2.0) * (square - answered))
+
+
+@compiled
+def _evaluate(
+    coarse: Coarse, fine: Fine, response: Response, forms: Array, logs: Array, out: Array
+) -> None:
+    """Value, gradient and Hessian of `2 |B - V^T K^+ V|^2 + (tr B - tr K^+)^2` in log E."""
+    respond(coarse, logs, response)
+    gram, slope, size = empty(81), empty(MOTIONS**2), form_sizes(MOTIONS)[2]
+    for n in range(MOTIONS**2):
+        store(slope, n, load(response.flexibility, n) - load(fine.flexibility, n))
+    element_forms(response.strained, MOTIONS, forms)
+    matrix_form(slope, MOTIONS, forms, 8)
+    error = trace(response.flexibility, MOTIONS) - load(fine.norms, 0)
+    store(forms, 9 * size - 1, error)
+    inner_products(forms, MOTIONS, gram)
+    for n in range(MOTIONS**2):
+        store(slope, n, spread(4.0) * load(slope, n))
+    add_diagonal(slope, MOTIONS, spread(2.0) * error)
+    store(out, VALUE, load(gram, 80))
+    for p in range(8):
+        store(out, GRADIENT + p, spread(-2.0) * load(gram, 72 + p))
+        for q in range(p + 1):
+            store(out, HESSIAN + 8 * p + q, spread(2.0) * load(gram, 9 * p + q))
+    write_curvature(response, slope, out)
+
+
+@compiled
+def _add_pull(origin: Array, weight: Vector, logs: Array, out: Array) -> None:
+    """Add `weight |log E - log E0|^2` to value, gradient and Hessian."""
+    value = load(out, VALUE)
+    for i in range(8):
+        away = load(logs, i) - load(origin, i)
+        value = value + weight * away * away
+        store(out, GRADIENT + i, load(out, GRADIENT + i) + spread(2.0) * weight * away)
+        at = HESSIAN + 9 * i
+        store(out, at, load(out, at) + spread(2.0) * weight)
+    store(out, VALUE, value)
+
+
+@compiled
+def _fit_rows(
+    coarse: Coarse, young: Array, starts: Array, bounds: tuple[float, float]
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Logarithms (n, 8) of the moduli, residuals (n,) and convergence (n,)."""
+    count = len(young)
+    logs, residuals = np.empty((count, 8)), np.empty(count)
+    flags = np.empty(count, dtype=np.bool_)
+    fine, response = Fine(empty(MOTIONS**2), empty(3)), empty_response()
+    forms, origin, state = empty(9 * form_sizes(MOTIONS)[2]), empty(8), begin(*bounds)
+    for first in range(0, count, LANES):
+        _fine_response(coarse, young, first, fine)
+        store(state.scale, 0, load(fine.norms, 1))
+        pull = load(fine.norms, 1) * spread(LOG_RIDGE)
+        for lane in range(LANES):
+            for i in range(8):
+                begun = starts[min(first + lane, count - 1), i]
+                state.trial[i, lane] = origin[i, lane] = min(max(begun, bounds[0]), bounds[1])
+        _evaluate(coarse, fine, response, forms, state.trial, state.there)
+        _add_pull(origin, pull, state.trial, state.there)
+        start(state)
+        for _ in range(MAX_ITERATIONS):
+            propose(state)
+            _evaluate(coarse, fine, response, forms, state.trial, state.there)
+            _add_pull(origin, pull, state.trial, state.there)
+            if judge(state):
+                break
+        for lane in range(min(LANES, count - first)):
+            row = first + lane
+            flags[row] = converged(state, lane)
+            left = state.here[VALUE, lane] + fine.norms[2, lane]
+            for i in range(8):
+                logs[row, i] = state.x[i, lane]
+                left -= LOG_RIDGE * fine.norms[1, lane] * (state.x[i, lane] - origin[i, lane]) ** 2
+            residuals[row] = np.sqrt(max(left, 0.0) / fine.norms[1, lane])
+    return logs, residuals, flags
 
 
 def fit_pattern(young: Array, mask: int, poisson: float) -> PatternFits:
     """Fit blocks (n, 8) that share one void pattern."""
     largest = young.max(axis=1)
     scaled = young / largest[:, None]
-    inverse = _fine_flexibility(scaled, mask, poisson)
-    fields = _loaded_motions(mask, poisson)
-    traces = np.einsum("nii->n", inverse)
-    squares = (inverse * inverse).sum(axis=(1, 2))
-    logs, values, converged = _fit_all(
-        np.log(reference_moduli(scaled)),
-        np.log(np.array([MODULUS_FLOOR, MODULUS_CEILING])),
-        corner_strains(poisson) @ straining_motions(),
-        fields.T @ fields,
-        np.ascontiguousarray(fields.T @ inverse @ fields),
-        traces,
-        squares,
-    )
-    residual = np.sqrt(np.maximum(values, 0.0) / (2.0 * squares + traces**2))
-    return PatternFits(np.exp(logs) * largest[:, None], residual, converged)
+    starts = np.log(reference_moduli(scaled))
+    bounds = float(np.log(MODULUS_FLOOR)), float(np.log(MODULUS_CEILING))
+    logs, residual, flags = _fit_rows(coarse_of(mask, poisson), scaled, starts, bounds)
+    return PatternFits(np.exp(logs) * largest[:, None], residual, flags)

@@ -3,21 +3,59 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
 from dataset_gen.element import Array
-from dataset_gen.objectives.patterns import pattern_of
+from dataset_gen.objectives.elimination import TILE, elimination_of
+from dataset_gen.objectives.free_block import FreeBlock, free_block_of
+from dataset_gen.objectives.kernel import (
+    MOTIONS,
+    WEIGHTS,
+    all_forms,
+    assemble,
+    copy_in,
+    factorise,
+    form_sizes,
+    multiply,
+    solve_lower,
+    solve_upper,
+    symmetrise,
+    weigh,
+    write_equations,
+)
+from dataset_gen.objectives.lanes import LANES, compiled, empty
+from dataset_gen.objectives.patterns import corner_strains, pattern_of, straining_motions
 from dataset_gen.objectives.quadratic import (
+    NormalEquations,
     PatternFits,
     bounded_moduli,
-    energy_mismatch,
+    form_equations,
     reference_moduli,
 )
 from dataset_gen.serial import serial_blas
 
+LOADS = 24
 
-@cache
+
+class Inertia(NamedTuple):
+    """Loads of a void pattern, on the active nodes in the order of elimination.
+
+    Attributes
+    ----------
+    block : the free block.
+    loads : flat (a, 24).
+    to_corners : flat (18, a), straining motions nearest to nodal displacements.
+    strains : flat (48, 18) strains of the coarse element in its straining motions.
+    """
+
+    block: FreeBlock
+    loads: Array
+    to_corners: Array
+    strains: Array
+
+
 @serial_blas
 def inertia_loads(mask: int, poisson: float) -> Array:
     """Loads F (a, 24): inertia of the mass-normalised trilinear motions, in self-equilibrium.
@@ -33,13 +71,51 @@ def inertia_loads(mask: int, poisson: float) -> Array:
     return pattern.without_null(loads)
 
 
+@cache
+@serial_blas
+def inertia_of(mask: int, poisson: float) -> Inertia:
+    """Tables of the pattern whose filled cells are the set bits of `mask` (1..255)."""
+    pattern = pattern_of(mask, poisson)
+    order = pattern.positions(elimination_of(mask).dofs)
+    motions = straining_motions()
+    to_corners = pattern.without_null(pattern.to_corners.T @ motions).T
+    return Inertia(
+        block=free_block_of(mask, poisson),
+        loads=inertia_loads(mask, poisson)[order].ravel(),
+        to_corners=to_corners[:, order].ravel(),
+        strains=(corner_strains(poisson) @ motions).ravel(),
+    )
+
+
+@compiled
+def _form_equations(inertia: Inertia, young: Array, equations: NormalEquations) -> None:
+    factor, stiffness, _ = inertia.block
+    size = 3 * len(factor.diagonal)
+    weights, tiles = empty(WEIGHTS), empty(TILE * (len(stiffness.start) - 1))
+    displacements = empty(LOADS * size)
+    energies, motions = empty(LOADS * LOADS), empty(LOADS * MOTIONS)
+    forms = empty(9 * form_sizes(LOADS)[2])
+    for first in range(0, len(young), LANES):
+        weigh(young, first, weights)
+        assemble(stiffness, weights, tiles)
+        copy_in(inertia.loads, displacements)
+        factorise(factor, tiles)
+        solve_lower(factor, tiles, displacements, LOADS)
+        solve_upper(factor, tiles, displacements, LOADS)
+        fields = (displacements, 0, 1, LOADS)
+        multiply(energies, fields, (inertia.loads, 0, 1, LOADS), LOADS, LOADS, size)
+        symmetrise(energies, LOADS, 0.5)
+        multiply(motions, fields, (inertia.to_corners, 0, size, 1), LOADS, MOTIONS, size)
+        all_forms(motions, energies, LOADS, inertia.strains, forms)
+        write_equations(forms, LOADS, first, equations)
+
+
+def normal_equations(young: Array, mask: int, poisson: float) -> NormalEquations:
+    """Normal equations of blocks (n, 8) that share one void pattern."""
+    return form_equations(_form_equations, inertia_of(mask, poisson), young)
+
+
 def fit_pattern(young: Array, mask: int, poisson: float) -> PatternFits:
     """Fit blocks (n, 8) that share one void pattern."""
-    pattern = pattern_of(mask, poisson)
-    loads = inertia_loads(mask, poisson)
-    displacements = np.linalg.solve(pattern.assemble(young), loads[None])
-    energies = loads.T @ displacements
-    motions = pattern.to_corners @ displacements
-    return bounded_moduli(
-        energy_mismatch(motions, energies, poisson), young, reference_moduli(young)
-    )
+    equations = normal_equations(young, mask, poisson)
+    return bounded_moduli(equations, young, reference_moduli(young))

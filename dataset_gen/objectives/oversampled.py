@@ -7,42 +7,89 @@ block's own 27 nodes are free.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
-from dataset_gen.block import COARSE_EDGE, NODES, degrees_of_freedom
+from dataset_gen.block import COARSE_EDGE, NODES, cell_stiffness, degrees_of_freedom
 from dataset_gen.element import CORNERS, Array, shape_functions, uniform_stiffness
-from dataset_gen.objectives.patterns import pattern_of, straining_motions
+from dataset_gen.objectives.elimination import (
+    TILE,
+    Factor,
+    Links,
+    Sum,
+    elimination_of,
+    lower_links,
+    lower_tiles_of,
+    sum_of,
+)
+from dataset_gen.objectives.kernel import (
+    DENSE,
+    LOWER,
+    MOTIONS,
+    WEIGHTS,
+    add_diagonal,
+    all_forms,
+    assemble,
+    factorise,
+    form_sizes,
+    lower_tiles,
+    multiply,
+    multiply_sparse,
+    solve_lower,
+    solve_upper,
+    symmetrise,
+    trace,
+    transpose,
+    weigh,
+    write_equations,
+)
+from dataset_gen.objectives.lanes import LANES, compiled, empty, spread
+from dataset_gen.objectives.patterns import corner_strains, pattern_of, straining_motions
 from dataset_gen.objectives.quadratic import (
+    NormalEquations,
     PatternFits,
     bounded_moduli,
-    energy_mismatch,
+    form_equations,
     reference_moduli,
 )
 from dataset_gen.serial import serial_blas
 
 RIGID_SHARE = 1e-8
-"""Energy added to every field before whitening, as a share of all fields' energy."""
+"""Energy added to every field before whitening, as a share of all fields' energy.
+
+Positive definite even for a single filled cell, which one prescribed field leaves rigid.
+"""
 
 PATCH_NODES = np.array([[x, y, z] for z in range(5) for y in range(5) for x in range(5)])
 
 
-@dataclass(frozen=True)
-class Patch:
-    """Matrices of the patch for unit moduli of one octant, on the block's active nodes.
+class Patch(NamedTuple):
+    """The patch of a void pattern, on the active nodes in the order of elimination.
 
-    stiffness (f, a * a) and boundary load (f, a * 18) of each filled octant.
+    Attributes
+    ----------
+    factor : structure of the factor.
+    held : stiffness of the patch from each octant.
+    loads : (a, 18) loads of the prescribed fields from each octant.
+    links, own : where and what the block's own stiffness is, half of it on the diagonal.
+    to_corners : flat (18, a), straining motions nearest to nodal displacements.
+    strains : flat (48, 18) strains of the coarse element in its straining motions.
     """
 
-    stiffness: Array
-    load: Array
+    factor: Factor
+    held: Sum
+    loads: Sum
+    links: Links
+    own: Sum
+    to_corners: Array
+    strains: Array
 
 
 @cache
 @serial_blas
-def _octants(poisson: float) -> tuple[Array, Array]:
+def octants(poisson: float) -> tuple[Array, Array]:
     """Stiffness (8, 81, 81) and load (8, 81, 18) on the block's nodes from each octant."""
     block = degrees_of_freedom((NODES + 1) @ (1, 5, 25))
     boundary = np.setdiff1d(np.arange(3 * len(PATCH_NODES)), block)
@@ -60,44 +107,76 @@ def _octants(poisson: float) -> tuple[Array, Array]:
 
 
 @cache
+@serial_blas
 def patch_of(mask: int, poisson: float) -> Patch:
-    """Patch matrices restricted to the active nodes of the pattern `mask`."""
-    pattern = pattern_of(mask, poisson)
-    stiffness, load = _octants(poisson)
-    kept = stiffness[np.ix_(pattern.cells, pattern.dofs, pattern.dofs)]
-    loads = load[np.ix_(pattern.cells, pattern.dofs)]
-    count = len(pattern.cells)
+    """Patch of the pattern whose filled cells are the set bits of `mask` (1..255)."""
+    pattern, elimination = pattern_of(mask, poisson), elimination_of(mask)
+    dofs, cells = elimination.dofs, pattern.cells
+    stiffness, load = octants(poisson)
+    square = np.ix_(cells, dofs, dofs)
+    own = lower_tiles_of(cell_stiffness(poisson)[square], elimination.linked)
+    links = lower_links(elimination.linked)
+    own[:, links.tile[links.start[1:] - 1]] *= 0.5
+    motions = straining_motions()
     return Patch(
-        np.ascontiguousarray(kept.reshape(count, -1)),
-        np.ascontiguousarray(loads.reshape(count, -1)),
+        factor=elimination.factor,
+        held=sum_of(cells, lower_tiles_of(stiffness[square], elimination.filled)),
+        loads=sum_of(cells, load[np.ix_(cells, dofs)].reshape(len(cells), -1, TILE)),
+        links=links,
+        own=sum_of(cells, own),
+        to_corners=(motions.T @ pattern.to_corners[:, pattern.positions(dofs)]).ravel(),
+        strains=(corner_strains(poisson) @ motions).ravel(),
     )
+
+
+@compiled
+def _form_equations(patch: Patch, young: Array, equations: NormalEquations) -> None:
+    size = 3 * len(patch.factor.diagonal)
+    weights = empty(WEIGHTS)
+    held, own = empty(TILE * (len(patch.held.start) - 1)), empty(TILE * (len(patch.own.start) - 1))
+    displacements, forces = empty(MOTIONS * size), empty(MOTIONS * size)
+    energies, motions = empty(MOTIONS * MOTIONS), empty(MOTIONS * MOTIONS)
+    forms = empty(9 * form_sizes(MOTIONS)[2])
+    for first in range(0, len(young), LANES):
+        weigh(young, first, weights)
+        assemble(patch.held, weights, held)
+        assemble(patch.loads, weights, displacements)
+        assemble(patch.own, weights, own)
+        factorise(patch.factor, held)
+        solve_lower(patch.factor, held, displacements, MOTIONS)
+        solve_upper(patch.factor, held, displacements, MOTIONS)
+        # With half of K in `own`, u^T K u is half of K's part plus its transpose.
+        multiply_sparse(patch.links, own, displacements, forces, MOTIONS)
+        fields = (displacements, 0, 1, MOTIONS)
+        multiply(energies, fields, (forces, 0, 1, MOTIONS), MOTIONS, MOTIONS, size)
+        symmetrise(energies, MOTIONS, 1.0)
+        multiply(motions, fields, (patch.to_corners, 0, size, 1), MOTIONS, MOTIONS, size)
+        _whiten(energies, motions)
+        all_forms(motions, energies, MOTIONS, patch.strains, forms)
+        write_equations(forms, MOTIONS, first, equations)
+
+
+@compiled
+def _whiten(energies: Array, motions: Array) -> None:
+    """Combine the fields so that their energies are the unit matrix, but for `RIGID_SHARE`."""
+    factor = empty(LOWER)
+    more = trace(energies, MOTIONS) * spread(RIGID_SHARE)
+    add_diagonal(energies, MOTIONS, more)
+    lower_tiles(energies, MOTIONS, factor)
+    add_diagonal(energies, MOTIONS, spread(0.0) - more)
+    factorise(DENSE, factor)
+    solve_lower(DENSE, factor, motions, MOTIONS)
+    solve_lower(DENSE, factor, energies, MOTIONS)
+    transpose(energies, MOTIONS)
+    solve_lower(DENSE, factor, energies, MOTIONS)
+
+
+def normal_equations(young: Array, mask: int, poisson: float) -> NormalEquations:
+    """Normal equations of blocks (n, 8) that share one void pattern."""
+    return form_equations(_form_equations, patch_of(mask, poisson), young)
 
 
 def fit_pattern(young: Array, mask: int, poisson: float) -> PatternFits:
     """Fit blocks (n, 8) that share one void pattern."""
-    pattern, patch = pattern_of(mask, poisson), patch_of(mask, poisson)
-    size, count = len(pattern.dofs), len(young)
-    filled = young[:, None, pattern.cells]
-    held = (filled @ patch.stiffness).reshape(count, size, size)
-    loads = (filled @ patch.load).reshape(count, size, -1)
-    displacements = np.linalg.solve(held, loads)
-    own = (filled @ pattern.stiffness).reshape(count, size, size)
-    energies = displacements.transpose(0, 2, 1) @ (own @ displacements)
-    factor = np.linalg.cholesky(_regularised(energies))
-    motions = pattern.to_corners @ displacements
-    whitened = _divided(motions.transpose(0, 2, 1), factor).transpose(0, 2, 1)
-    half = _divided(energies, factor)
-    unit = _divided(half.transpose(0, 2, 1), factor)
-    return bounded_moduli(energy_mismatch(whitened, unit, poisson), young, reference_moduli(young))
-
-
-def _regularised(energies: Array) -> Array:
-    """Positive definite even for a single filled cell, which one prescribed field leaves rigid."""
-    trace = np.einsum("nii->n", energies)[:, None, None]
-    symmetric = 0.5 * (energies + energies.transpose(0, 2, 1))
-    return np.asarray(symmetric + RIGID_SHARE * trace * np.eye(energies.shape[1]))
-
-
-def _divided(rows: Array, factor: Array) -> Array:
-    """`L^-1 B` for each Cholesky factor L (n, m, m) and B (n, m, k)."""
-    return np.asarray(np.linalg.solve(factor, rows))
+    equations = normal_equations(young, mask, poisson)
+    return bounded_moduli(equations, young, reference_moduli(young))

@@ -57,6 +57,10 @@ class Pattern:
     rigid: Array
     null: Array
 
+    def positions(self, dofs: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Where degrees of freedom of the block are among the active ones."""
+        return np.searchsorted(self.dofs, dofs)
+
     def assemble(self, young: Array) -> Array:
         """Regularised K(e) + s N N^T of each block, positive definite; `young` (n, 8) -> (n, a, a).
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dataset_gen.element import Array
 from dataset_gen.objectives.bounded import minimise_above
-from dataset_gen.objectives.patterns import corner_strains
 
 RIDGE = 1e-3
 """Pull towards E0, as a share of the mean diagonal of the normal matrix."""
@@ -37,28 +37,14 @@ class NormalEquations(NamedTuple):
     constant: Array
 
 
-def energy_mismatch(motions: Array, energies: Array, poisson: float) -> NormalEquations:
-    """Normal equations of `2 |D|_F^2 + tr(D)^2` with `D = sum_q E_q u^T K_q u - V`.
-
-    This is the expected square of `g^T D g` for Gaussian mixtures g of the loads.
-
-    Parameters
-    ----------
-    motions : (n, 24, m) corner displacements u of each load.
-    energies : (n, m, m) fine energies V between the loads.
-    """
-    strains = corner_strains(poisson) @ motions
-    count = len(strains)
-    gram = strains @ strains.transpose(0, 2, 1)
-    products = (gram * gram).reshape(count, 8, 6, 8, 6).sum(axis=(2, 4))
-    traces = np.einsum("nii->ni", gram).reshape(count, 8, 6).sum(axis=2)
-    loaded = ((strains @ energies) * strains).sum(axis=2).reshape(count, 8, 6).sum(axis=2)
-    trace = np.einsum("nii->n", energies)
-    return NormalEquations(
-        2.0 * products + traces[:, :, None] * traces[:, None, :],
-        2.0 * loaded + trace[:, None] * traces,
-        2.0 * (energies * energies).sum(axis=(1, 2)) + trace**2,
-    )
+def form_equations(
+    kernel: Callable[[Any, Array, NormalEquations], None], tables: Any, young: Array
+) -> NormalEquations:
+    """Normal equations of blocks (n, 8) by a compiled `kernel` and the tables of their pattern."""
+    count = len(young)
+    equations = NormalEquations(np.empty((count, 8, 8)), np.empty((count, 8)), np.empty(count))
+    kernel(tables, np.ascontiguousarray(young), equations)
+    return equations
 
 
 def reference_moduli(young: Array) -> Array:

@@ -1,17 +1,62 @@
 """Eq. (8) as it is printed: forces are drawn, both meshes are solved, energies are compared.
 
-Kept to check `energy` and to measure what its closed form saves.
+Kept to check `energy` and to measure what its closed form saves. One block at a time: here the
+lanes are forces.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
-from scipy.optimize import least_squares
 
 from dataset_gen.element import DEFAULT_POISSON, Array
+from dataset_gen.objectives.coarse_response import (
+    Coarse,
+    Response,
+    coarse_of,
+    empty_response,
+    respond,
+    write_curvature,
+)
+from dataset_gen.objectives.descent import (
+    GRADIENT,
+    HESSIAN,
+    MAX_ITERATIONS,
+    VALUE,
+    begin,
+    converged,
+    judge,
+    propose,
+    start,
+)
+from dataset_gen.objectives.elimination import TILE, elimination_of
 from dataset_gen.objectives.energy import MODULUS_CEILING
-from dataset_gen.objectives.patterns import corner_strains, pattern_of, straining_motions
-from dataset_gen.objectives.quadratic import MODULUS_FLOOR, reference_moduli
+from dataset_gen.objectives.free_block import squares
+from dataset_gen.objectives.kernel import (
+    MOTIONS,
+    PANEL,
+    STRAINS,
+    WEIGHTS,
+    assemble,
+    factorise,
+    multiply,
+    solve_lower,
+    weigh,
+)
+from dataset_gen.objectives.lanes import (
+    LANES,
+    add_product,
+    compiled,
+    empty,
+    load,
+    spread,
+    store,
+    store_tile,
+    zeros,
+)
+from dataset_gen.objectives.patterns import pattern_of
+from dataset_gen.objectives.quadratic import MODULUS_FLOOR, PatternFits, reference_moduli
 
 DIRECTIONS = 1000
 """Force directions of one fit (section 8.1)."""
@@ -20,36 +65,141 @@ MAGNITUDES = (0.2, 0.4, 0.6, 0.8, 1.0)
 """Five magnitudes in each direction; they only rescale the energies."""
 
 
+class Loaded(NamedTuple):
+    """Forces on a block, `LANES` to a column.
+
+    Attributes
+    ----------
+    felt : (18, columns) what the coarse element feels of them, V^T f.
+    energies : (columns) fine energies f^T K^+ f.
+    """
+
+    felt: Array
+    energies: Array
+
+
 def draw_forces(young: Array, directions: int, generator: np.random.Generator) -> Array:
     """Self-equilibrated unit forces (a, directions) on the active nodes of the block `young` (8,).
 
     Multiplied by independent chi-distributed lengths they would be Gaussian.
     """
-    pattern = pattern_of(_mask(young), DEFAULT_POISSON)
+    pattern = pattern_of(mask_of(young), DEFAULT_POISSON)
     gaussian = generator.standard_normal((len(pattern.dofs), directions))
     forces = pattern.without_null(gaussian)
     return np.asarray(forces / np.linalg.norm(forces, axis=0))
 
 
-def _mask(young: Array) -> int:
+def mask_of(young: Array) -> int:
+    """Void pattern of the block `young` (8,)."""
     return int((young > 0) @ (1 << np.arange(8)))
 
 
-def fine_energies(young: Array, forces: Array, poisson: float = DEFAULT_POISSON) -> Array:
-    """Energies (m,) `f^T K(e)^+ f` of forces (a, m)."""
-    pattern = pattern_of(_mask(young), poisson)
-    displacements = np.linalg.solve(pattern.assemble(young[None])[0], forces)
-    return np.asarray((forces * displacements).sum(axis=0))
+@compiled
+def _load_block(coarse: Coarse, young: Array, forces: Array, loaded: Loaded) -> None:
+    """Solve the block `young` (1, 8) for the forces (a, columns, LANES)."""
+    factor, stiffness, _ = coarse.block
+    size, columns = 3 * len(factor.diagonal), len(loaded.energies)
+    weights, tiles = empty(WEIGHTS), empty(TILE * (len(stiffness.start) - 1))
+    x, felt = empty(size * PANEL), empty(MOTIONS * PANEL)
+    weigh(young, 0, weights)
+    assemble(stiffness, weights, tiles)
+    factorise(factor, tiles)
+    for panel in range(0, columns, PANEL):
+        for dof in range(size):
+            for column in range(PANEL):
+                for lane in range(LANES):
+                    x[dof * PANEL + column, lane] = forces[dof, panel + column, lane]
+        multiply(felt, (coarse.basis, 0, 1, MOTIONS), (x, 0, 1, PANEL), MOTIONS, PANEL, size)
+        solve_lower(factor, tiles, x, PANEL)
+        for column in range(PANEL):
+            energy = spread(0.0)
+            for n in range(column, PANEL * size, PANEL):
+                energy = energy + load(x, n) * load(x, n)
+            store(loaded.energies, panel + column, energy)
+            for i in range(MOTIONS):
+                value = load(felt, i * PANEL + column)
+                store(loaded.felt, i * columns + panel + column, value)
 
 
-def coarse_energies(moduli: Array, young: Array, forces: Array, poisson: float) -> Array:
-    """Energies (m,) `(P^T f)^T K_c(E)^+ (P^T f)` of forces (a, m)."""
-    motions = straining_motions()
-    strains = corner_strains(poisson) @ motions
-    interpolation = pattern_of(_mask(young), poisson).interpolation @ motions
-    loads = interpolation.T @ forces
-    weighted = np.repeat(moduli, 6)[:, None] * strains
-    return np.asarray((loads * np.linalg.solve(strains.T @ weighted, loads)).sum(axis=0))
+@compiled
+def _sum_lanes(numbers: Array) -> None:
+    """Put the sum of its lanes into all lanes of each number."""
+    for n in range(len(numbers)):
+        total = 0.0
+        for lane in range(LANES):
+            total += numbers[n, lane]
+        store(numbers, n, spread(total))
+
+
+@compiled
+def _evaluate(
+    coarse: Coarse, loaded: Loaded, response: Response, rows: Array, logs: Array, out: Array
+) -> None:
+    """Value, gradient and Hessian in log E of the sum over all forces of (coarse - fine energy)^2.
+
+    The coarse energy f^T V B V^T f is the sum of its derivatives by -log E_q. These, and in the
+    ninth row the energies' differences, are written to `rows` (9, columns).
+    """
+    respond(coarse, logs, response)
+    columns = len(loaded.energies)
+    strains, bent = empty(STRAINS * PANEL), empty(MOTIONS * columns)
+    gram, slope = empty(81), empty(MOTIONS**2)
+    for panel in range(0, columns, PANEL):
+        felt = (loaded.felt, panel, 1, columns)
+        multiply(strains, (response.strained, 0, 1, STRAINS), felt, STRAINS, PANEL, MOTIONS)
+        for column in range(PANEL):
+            energy = spread(0.0)
+            at = panel + column
+            for q in range(8):
+                part = spread(0.0)
+                for n in range(6 * q, 6 * q + 6):
+                    strain = load(strains, n * PANEL + column)
+                    part = part + strain * strain
+                store(rows, q * columns + at, part)
+                energy = energy + part
+            difference = energy - load(loaded.energies, at)
+            store(rows, 8 * columns + at, difference)
+            for i in range(MOTIONS):
+                n = i * columns + at
+                store(bent, n, spread(2.0) * difference * load(loaded.felt, n))
+    for i in range(0, 9, 3):
+        for j in range(0, i + 3, 3):
+            left, right = (rows, i * columns, columns, 1), (rows, j * columns, columns, 1)
+            store_tile((gram, 9 * i + j, 9, 1), add_product(zeros(3, 3), left, right, columns))
+    left, right = (bent, 0, columns, 1), (loaded.felt, 0, columns, 1)
+    multiply(slope, left, right, MOTIONS, MOTIONS, columns)
+    _sum_lanes(gram)
+    _sum_lanes(slope)
+    store(out, VALUE, load(gram, 80))
+    for p in range(8):
+        store(out, GRADIENT + p, spread(-2.0) * load(gram, 72 + p))
+        for q in range(p + 1):
+            store(out, HESSIAN + 8 * p + q, spread(2.0) * load(gram, 9 * p + q))
+    write_curvature(response, slope, out)
+
+
+@compiled
+def _fit(
+    coarse: Coarse, young: Array, forces: Array, origin: Array, bounds: tuple[float, float]
+) -> tuple[Array, float, bool]:
+    """Logarithms (8) of the moduli of the block `young` (1, 8), residual and convergence."""
+    columns = forces.shape[1]
+    loaded = Loaded(empty(MOTIONS * columns), empty(columns))
+    response, rows, state = empty_response(), empty(9 * columns), begin(*bounds)
+    _load_block(coarse, young, forces, loaded)
+    store(state.scale, 0, squares(loaded.energies, 0, columns))
+    _sum_lanes(state.scale)
+    for i in range(8):
+        store(state.trial, i, spread(min(max(origin[i], bounds[0]), bounds[1])))
+    _evaluate(coarse, loaded, response, rows, state.trial, state.there)
+    start(state)
+    for _ in range(MAX_ITERATIONS):
+        propose(state)
+        _evaluate(coarse, loaded, response, rows, state.trial, state.there)
+        if judge(state):
+            break
+    residual = np.sqrt(state.here[VALUE, 0] / state.scale[0, 0])
+    return state.x[:, 0].copy(), residual, converged(state, 0)
 
 
 def fit_block(
@@ -58,18 +208,27 @@ def fit_block(
     poisson: float = DEFAULT_POISSON,
     directions: int = DIRECTIONS,
     magnitudes: tuple[float, ...] = MAGNITUDES,
-) -> Array:
-    """Coarse moduli (8,) of the block `young` (8,) from sampled forces."""
+) -> PatternFits:
+    """Fit of the block `young` (8,) from sampled forces: one row.
+
+    Each direction is solved at each magnitude, and the squared differences of all energies are
+    summed, as the paper says.
+    """
+    largest = young.max()
+    scaled = (young / largest)[None]
     unit = draw_forces(young, directions, generator)
     forces = np.concatenate([size * unit for size in magnitudes], axis=1)
-    energies = fine_energies(young, forces, poisson)
-    largest = young.max()
+    return _fit_forces(scaled, largest, forces, poisson)
 
-    def mismatch(logs: Array) -> Array:
-        coarse = coarse_energies(np.exp(logs), young, forces, poisson)
-        return np.asarray((coarse - energies) * largest)
 
-    start = np.log(reference_moduli(young[None])[0])
-    bounds = np.log(largest * MODULUS_FLOOR), np.log(largest * MODULUS_CEILING)
-    found = least_squares(mismatch, np.clip(start, *bounds), bounds=bounds, xtol=1e-6, ftol=1e-8)
-    return np.asarray(np.exp(found.x))
+def _fit_forces(scaled: Array, largest: float, forces: Array, poisson: float) -> PatternFits:
+    mask = mask_of(scaled[0])
+    pattern = pattern_of(mask, poisson)
+    rest = -forces.shape[1] % (LANES * PANEL)
+    ordered = np.pad(forces[pattern.positions(elimination_of(mask).dofs)], ((0, 0), (0, rest)))
+    start = np.log(reference_moduli(scaled)[0])
+    bounds = float(np.log(MODULUS_FLOOR)), float(np.log(MODULUS_CEILING))
+    lanes = ordered.reshape(len(ordered), -1, LANES)
+    logs, residual, settled = _fit(coarse_of(mask, poisson), scaled, lanes, start, bounds)
+    moduli = largest * np.exp(logs)
+    return PatternFits(moduli[None], np.array([residual]), np.array([settled]))

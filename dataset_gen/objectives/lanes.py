@@ -1,0 +1,323 @@
+"""Eight blocks side by side: a numba type for a vector of `LANES` doubles, and tiles of such.
+
+All blocks of one void pattern take the same steps, so a step is done for `LANES` of them by one
+machine instruction. Arrays of lanes are (entries, `LANES`), one row per number of the block. Inside
+compiled functions a `Lanes` value adds and multiplies like a float; a tile is a small matrix of
+them that stays in registers. On processors with shorter vectors LLVM splits the lanes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import operator
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import njit, types
+from numba.core import cgutils
+from numba.extending import intrinsic as numba_intrinsic
+from numba.extending import models, overload, register_model
+
+from dataset_gen.element import Array
+
+LANES = 8
+BYTES = 8 * LANES
+
+_VECTOR = ir.VectorType(ir.DoubleType(), LANES)
+_INDEX = ir.IntType(64)
+
+
+def _sources() -> str:
+    """Digest of the modules whose compiled functions call each other."""
+    digest = hashlib.sha256()
+    for name in ("lanes", "kernel", "bounded", "descent", "free_block", "coarse_response"):
+        path = Path(__file__).parent / f"{name}.py"
+        digest.update(path.read_bytes() if path.exists() else b"")
+    return digest.hexdigest()[:12]
+
+
+_SOURCES = _sources()
+
+
+def compiled(function: Callable[..., Any]) -> Any:
+    """Compile with numba and cache the result under a name that changes with the kernel.
+
+    Numba's cache notices a change of the function's own file, not of the files it calls.
+    """
+    function.__qualname__ += f"_{_SOURCES}"
+    return njit(cache=True, nogil=True)(function)
+
+
+class LanesType(types.Type):
+    """One double of each of `LANES` blocks."""
+
+    def __init__(self) -> None:
+        super().__init__(name="Lanes")
+
+
+class TileType(types.Type):
+    """Small matrix of lanes."""
+
+    def __init__(self, rows: int, columns: int) -> None:
+        super().__init__(name=f"Tile({rows}, {columns})")
+        self.rows, self.columns = rows, columns
+
+
+LANES_TYPE = LanesType()
+intrinsic: Any = numba_intrinsic
+Vector = Any
+"""What compiled functions call a `LanesType` value."""
+
+
+@register_model(LanesType)
+class _LanesModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: LanesType) -> None:
+        super().__init__(manager, kind, _VECTOR)
+
+
+@register_model(TileType)
+class _TileModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: TileType) -> None:
+        super().__init__(manager, kind, ir.ArrayType(_VECTOR, kind.rows * kind.columns))
+
+
+# What follows emits LLVM instructions. `builder` appends them to the function being compiled.
+
+
+def _splat(builder: Any, scalar: Any) -> Any:
+    undefined = ir.Constant(_VECTOR, ir.Undefined)
+    single = builder.insert_element(undefined, scalar, ir.Constant(ir.IntType(32), 0))
+    everywhere = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+    return builder.shuffle_vector(single, undefined, everywhere)
+
+
+def _address(context: Any, builder: Any, kind: types.Array, array: Any, entry: Any) -> Any:
+    data = context.make_array(kind)(context, builder, array).data
+    if kind.ndim == 1:
+        return builder.gep(data, [entry])
+    first = builder.gep(data, [builder.mul(entry, _INDEX(LANES))])
+    return builder.bitcast(first, _VECTOR.as_pointer())
+
+
+def _load(context: Any, builder: Any, kind: types.Array, array: Any, entry: Any) -> Any:
+    """A row of an array of lanes, or a number of a flat array in all lanes."""
+    address = _address(context, builder, kind, array, entry)
+    if kind.ndim == 1:
+        return _splat(builder, builder.load(address))
+    return builder.load(address, align=BYTES)
+
+
+def _call(builder: Any, name: str, *arguments: Any) -> Any:
+    kind = ir.FunctionType(_VECTOR, [_VECTOR] * len(arguments))
+    function = cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{LANES}f64")
+    return builder.call(function, arguments)
+
+
+def _at(builder: Any, start: Any, *steps: tuple[Any, int]) -> Any:
+    """`start` plus multiples of strides."""
+    for stride, count in steps:
+        start = builder.add(start, builder.mul(stride, _INDEX(count)))
+    return start
+
+
+@intrinsic
+def load(context: Any, array: Any, entry: Any) -> Any:
+    """Row `entry` of an array of lanes; of a flat array, that number in all lanes."""
+
+    def emit(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return _load(context, builder, signature.args[0], *arguments)
+
+    return LANES_TYPE(array, types.intp), emit
+
+
+@intrinsic
+def store(context: Any, array: Any, entry: Any, value: Any) -> Any:
+    """Write row `entry` of an array of lanes."""
+
+    def emit(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array, entry, value = arguments
+        address = _address(context, builder, signature.args[0], array, entry)
+        builder.store(value, address, align=BYTES)
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, LANES_TYPE), emit
+
+
+@intrinsic
+def spread(context: Any, number: Any) -> Any:
+    """The same number in all lanes."""
+
+    def emit(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return _splat(builder, arguments[0])
+
+    return LANES_TYPE(types.float64), emit
+
+
+@intrinsic
+def root(context: Any, value: Any) -> Any:
+    """Square root, lane by lane."""
+
+    def emit(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return _call(builder, "sqrt", arguments[0])
+
+    return LANES_TYPE(LANES_TYPE), emit
+
+
+@intrinsic
+def where_less(context: Any, left: Any, right: Any, yes: Any, no: Any) -> Any:
+    """`yes` in the lanes with left < right, `no` in the others."""
+
+    def emit(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        left, right, yes, no = arguments
+        return builder.select(builder.fcmp_ordered("<", left, right), yes, no)
+
+    return LANES_TYPE(*[LANES_TYPE] * 4), emit
+
+
+@intrinsic
+def larger(context: Any, left: Any, right: Any) -> Any:
+    """The larger of two, lane by lane."""
+
+    def emit(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        left, right = arguments
+        return builder.select(builder.fcmp_ordered("<", left, right), right, left)
+
+    return LANES_TYPE(LANES_TYPE, LANES_TYPE), emit
+
+
+def _operate(symbol: Any, instruction: str) -> None:
+    """Let `symbol` act on lanes; a product and a sum may become one fused instruction."""
+
+    @intrinsic
+    def apply(context: Any, left: Any, right: Any) -> Any:
+        def emit(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return getattr(builder, instruction)(*arguments, flags=("contract",))
+
+        return LANES_TYPE(LANES_TYPE, LANES_TYPE), emit
+
+    def implementation(left: Any, right: Any) -> Any:
+        return apply(left, right)
+
+    @overload(symbol)
+    def operate(left: Any, right: Any) -> Any:
+        return implementation if left == right == LANES_TYPE else None
+
+
+_operate(operator.add, "fadd")
+_operate(operator.sub, "fsub")
+_operate(operator.mul, "fmul")
+_operate(operator.truediv, "fdiv")
+
+
+@intrinsic(prefer_literal=True)
+def zeros(context: Any, rows: Any, columns: Any) -> Any:
+    """Tile of zeros; `rows` and `columns` are literal numbers."""
+    tile = TileType(rows.literal_value, columns.literal_value)
+
+    def emit(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return context.get_constant_null(tile)
+
+    return tile(rows, columns), emit
+
+
+@intrinsic(prefer_literal=True)
+def load_tile(context: Any, source: Any, rows: Any, columns: Any) -> Any:
+    """Tile at `source`: (array, first entry, stride of rows, stride of columns)."""
+    tile = TileType(rows.literal_value, columns.literal_value)
+
+    def emit(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array, start, row, column = cgutils.unpack_tuple(builder, arguments[0])
+        entries = [
+            _load(context, builder, signature.args[0][0], array, entry)
+            for entry in _entries(builder, tile, start, row, column)
+        ]
+        return cgutils.pack_array(builder, entries)
+
+    return tile(types.unliteral(source), rows, columns), emit
+
+
+@intrinsic
+def store_tile(context: Any, target: Any, tile: Any) -> Any:
+    """Write a tile at `target`: (array, first entry, stride of rows, stride of columns)."""
+
+    def emit(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array, start, row, column = cgutils.unpack_tuple(builder, arguments[0])
+        values = cgutils.unpack_tuple(builder, arguments[1])
+        for entry, value in zip(_entries(builder, tile, start, row, column), values):
+            address = _address(context, builder, signature.args[0][0], array, entry)
+            builder.store(value, address, align=BYTES)
+        return context.get_dummy_value()
+
+    return types.void(types.unliteral(target), tile), emit
+
+
+@intrinsic
+def scale_tile(context: Any, tile: Any, factor: Any) -> Any:
+    """A tile times a number."""
+
+    def emit(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        factor = _splat(builder, arguments[1])
+        values = cgutils.unpack_tuple(builder, arguments[0])
+        return cgutils.pack_array(builder, [builder.fmul(value, factor) for value in values])
+
+    return tile(tile, types.float64), emit
+
+
+def _entries(builder: Any, tile: TileType, start: Any, row: Any, column: Any) -> list[Any]:
+    places = [(i, j) for i in range(tile.rows) for j in range(tile.columns)]
+    return [_at(builder, start, (row, i), (column, j)) for i, j in places]
+
+
+def _vectors(emitting: Any, kind: Any, operand: Any, index: Any, count: int) -> list[Any]:
+    """Entries of an operand (array, first, stride, stride of depth) at depth `index`."""
+    context, builder = emitting
+    array, start, stride, depth = cgutils.unpack_tuple(builder, operand)
+    start = builder.add(start, builder.mul(depth, index))
+    entries = [_at(builder, start, (stride, n)) for n in range(count)]
+    return [_load(context, builder, kind[0], array, entry) for entry in entries]
+
+
+def _product(sign: int) -> Any:
+    @intrinsic
+    def product(context: Any, tile: Any, left: Any, right: Any, depth: Any) -> Any:
+        kinds = types.unliteral(left), types.unliteral(right)
+
+        def emit(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            given, left, right, depth = arguments
+            emitting = context, builder
+            # Local variables that LLVM keeps in registers.
+            sums = [
+                cgutils.alloca_once_value(builder, value)
+                for value in cgutils.unpack_tuple(builder, given)
+            ]
+            with cgutils.for_range(builder, depth) as loop:
+                rows = _vectors(emitting, kinds[0], left, loop.index, tile.rows)
+                columns = _vectors(emitting, kinds[1], right, loop.index, tile.columns)
+                if sign < 0:
+                    rows = [builder.fneg(value) for value in rows]
+                for n, total in enumerate(sums):
+                    i, j = divmod(n, tile.columns)
+                    fused = _call(builder, "fmuladd", rows[i], columns[j], builder.load(total))
+                    builder.store(fused, total)
+            return cgutils.pack_array(builder, [builder.load(total) for total in sums])
+
+        return tile(tile, *kinds, types.intp), emit
+
+    return product
+
+
+# tile +- A B. A is (array, first entry, stride of rows, stride of depth), B likewise with the
+# stride of columns; a flat array holds numbers common to all lanes.
+add_product = _product(1)
+subtract_product = _product(-1)
+
+
+@compiled
+def empty(entries: int) -> Array:
+    """Uninitialised array of lanes whose rows do not straddle cache lines."""
+    raw = np.empty((entries + 1) * LANES)
+    skip = -(raw.ctypes.data // 8) % LANES
+    return raw[skip : skip + entries * LANES].reshape(entries, LANES)
