@@ -40,14 +40,15 @@ class Factor(NamedTuple):
     rows : tiles left of the diagonal in each row, by ascending node.
     columns : tiles below the diagonal in each column, by ascending node.
     diagonal : (n,) tile on the diagonal of each row.
-    start : (t + 1,) where the products of each tile begin: L_ij takes all L_ik L_jk^T with k < j.
-    left, right : (p,) the tiles L_ik and L_jk.
+    start : (n + 1,) where the updates by each column begin: column k takes L_ik L_jk^T from all ij.
+    updated, left, right : (p,) the tiles ij, L_ik and L_jk.
     """
 
     rows: Links
     columns: Links
     diagonal: Indices
     start: Indices
+    updated: Indices
     left: Indices
     right: Indices
 
@@ -117,21 +118,24 @@ def elimination_of(mask: int) -> Elimination:
 
 def factor_of(filled: NDArray[np.bool_]) -> Factor:
     """Structure of a factor that has the lower tiles of `filled` (n, n)."""
-    row, column = np.nonzero(np.tril(filled))
+    lower = np.tril(filled)
     number = np.zeros(filled.shape, dtype=np.int64)
-    number[row, column] = np.arange(len(row))
-    pairs = [
-        [(number[i, k], number[j, k]) for k in np.flatnonzero(filled[j, :j] & filled[i, :j])]
-        for i, j in zip(row, column)
-    ]
-    products = np.array([pair for tile in pairs for pair in tile], dtype=np.int64).reshape(-1, 2)
+    number[lower] = np.arange(lower.sum())
+    updates = []
+    for k in range(len(filled)):
+        front = k + 1 + np.flatnonzero(filled[k + 1 :, k])
+        row, column = np.tril_indices(len(front))
+        i, j = front[row], front[column]
+        updates.append(np.stack([number[i, j], number[i, k], number[j, k]], axis=1))
+    updated, left, right = np.concatenate(updates).T
     return Factor(
         rows=_links(np.tril(filled, -1), number),
         columns=_links(np.triu(filled, 1), number.T),
         diagonal=np.diagonal(number).copy(),
-        start=_starts(pairs),
-        left=products[:, 0].copy(),
-        right=products[:, 1].copy(),
+        start=_starts(updates),
+        updated=updated.copy(),
+        left=left.copy(),
+        right=right.copy(),
     )
 
 

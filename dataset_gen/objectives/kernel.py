@@ -46,7 +46,7 @@ MEAN, ONE, WEIGHTS = 8, 9, 10
 DENSE = factor_of(np.ones((MOTIONS // 3, MOTIONS // 3), dtype=bool))
 """Structure of the factor of a matrix on the straining motions, tiled as if these were nodes."""
 
-LOWER = TILE * len(DENSE.start) - TILE
+LOWER = TILE * (MOTIONS // 3) * (MOTIONS // 3 + 1) // 2
 """Numbers of the lower tiles of such a matrix."""
 
 
@@ -104,23 +104,18 @@ def factorise(factor: Factor, tiles: Array) -> None:
 
     The tiles on the diagonal become those of L^-1.
     """
-    rows = factor.rows
-    for i in range(len(factor.diagonal)):
-        for link in range(rows.start[i], rows.start[i + 1] + 1):
-            diagonal = link == rows.start[i + 1]
-            n = factor.diagonal[i] if diagonal else rows.tile[link]
-            here = (tiles, TILE * n, 3, 1)
-            tile = load_tile(here, 3, 3)
-            for pair in range(factor.start[n], factor.start[n + 1]):
-                left = (tiles, TILE * factor.left[pair], 3, 1)
-                right = (tiles, TILE * factor.right[pair], 3, 1)
-                tile = subtract_product(tile, left, right, 3)
-            store_tile(here, tile)
-            if diagonal:
-                _invert_root(tiles, TILE * n)
-            else:
-                inverse = (tiles, TILE * factor.diagonal[rows.node[link]], 3, 1)
-                store_tile(here, add_product(zeros(3, 3), here, inverse, 3))
+    below = factor.columns
+    for k in range(len(factor.diagonal)):
+        inverse = (tiles, TILE * factor.diagonal[k], 3, 1)
+        _invert_root(tiles, TILE * factor.diagonal[k])
+        for link in range(below.start[k], below.start[k + 1]):
+            here = (tiles, TILE * below.tile[link], 3, 1)
+            store_tile(here, add_product(zeros(3, 3), here, inverse, 3))
+        for update in range(factor.start[k], factor.start[k + 1]):
+            here = (tiles, TILE * factor.updated[update], 3, 1)
+            left = (tiles, TILE * factor.left[update], 3, 1)
+            right = (tiles, TILE * factor.right[update], 3, 1)
+            store_tile(here, subtract_product(load_tile(here, 3, 3), left, right, 3))
 
 
 @compiled
