@@ -98,7 +98,7 @@ def test_the_full_table_has_a_row_for_every_coarsening_of_every_case(study):
 def test_goals_are_met_only_if_every_case_keeps_the_limit(study):
     rms, share, worst, absent = (judge(study, goal, "good") for goal in goals_of(study))
     assert (rms.met, rms.cases, rms.value) == (3, 4, 0.04) and not rms.passed
-    assert str(rms) == "missed, 3 of 4 met"
+    assert str(rms).replace("\N{NO-BREAK SPACE}", " ") == "missed, 3 of 4 met"
     assert (share.met, share.cases) == (2, 2) and str(share) == "met"
     assert share.value == pytest.approx(0.5)
     assert (worst.met, worst.cases) == (1, 2) and worst.value == pytest.approx(0.06)
@@ -124,7 +124,7 @@ def test_coarse_models_with_fewer_modes_are_named(study):
 @pytest.mark.parametrize("name", [*OBJECTIVES, "galerkin", "average"])
 def test_every_objective_is_described_in_one_line(name):
     text = description(name)
-    assert text and "\n" not in text and not text.startswith("Objective")
+    assert text and not any(mark in text for mark in ("\n", "`", "Objective"))
 
 
 def test_an_unknown_objective_is_answered_in_one_sentence():

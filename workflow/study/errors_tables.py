@@ -32,7 +32,7 @@ def _pooled(study: Study, name: str, part: str, last: int) -> Table:
     for material in (*study.materials, ALL):
         columns.append(Column(f"{material}_rms", f"{material.capitalize()}, rms", "percent"))
         columns.append(Column(f"{material}_worst", "worst", "percent"))
-        columns.append(Column(f"{material}_where", "at", shown=material == ALL))
+        columns.append(Column(f"{material}_where", "at", shown=False))
     rows = [_pooled_row(study, coarsening, part) for coarsening in study.coarsenings]
     return Table(
         name,
@@ -77,7 +77,7 @@ def errors(study: Study) -> Table:
         columns.append(Column(f"{part}_worst", "worst", "percent"))
         columns.append(Column(f"{part}_worst_mode", "at mode", "count"))
     columns += [
-        Column("last", "Last mode compared", "count"),
+        Column("last", "Last mode compared", "count", shown=False),
         Column("converged", "Fits converged", "percent"),
         Column("fit_seconds", "Fits", "seconds", "s"),
         Column("solve_seconds", "Modes", "seconds", "s"),

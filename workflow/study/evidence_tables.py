@@ -69,7 +69,8 @@ def description(coarsening: str) -> str:
     if coarsening in BASELINES:
         return BASELINES[coarsening]
     documentation = inspect.getdoc(inspect.getmodule(OBJECTIVES[coarsening])) or ""
-    text = documentation.split("\n", 1)[0].removeprefix(f"Objective `{coarsening}`:").strip()
+    first = documentation.split("\n", 1)[0].removeprefix(f"Objective `{coarsening}`:")
+    text = first.replace("`", "").strip()
     return text[:1].upper() + text[1:]
 
 

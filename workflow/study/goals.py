@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from workflow.report.numbers import show
 from workflow.study.cases import Case, Study
 
+NBSP = "\N{NO-BREAK SPACE}"
 LABELS = {"rms": "rms", "rms_of_galerkin": "rms over Galerkin’s", "worst": "worst frequency"}
 
 
@@ -46,7 +46,7 @@ class Goal:
         where = self.model.replace("-", " ").capitalize()
         if self.resolutions:
             where += f" {', '.join(map(str, self.resolutions))}"
-        return f"{where}: {LABELS[self.quantity]} ≤ {show(self.limit, 'percent')}"
+        return f"{where}: {LABELS[self.quantity]} ≤{NBSP}{100 * self.limit:.3g}{NBSP}%"
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Verdict:
     def __str__(self) -> str:
         if self.cases == 0:
             return "not studied"
-        return "met" if self.passed else f"missed, {self.met} of {self.cases} met"
+        return "met" if self.passed else f"missed, {self.met}{NBSP}of{NBSP}{self.cases} met"
 
 
 def goals_of(study: Study) -> list[Goal]:
