@@ -92,6 +92,8 @@ def _row(
     name: str, problem: Problem, blocks: Blocks, e: Array, exact: Array, comm: MPI.Comm
 ) -> dict[str, Any]:
     fine = problem.model
+    # Compiling, or loading what was compiled, is not part of fitting.
+    on_root(comm, partial(_moduli, name, e[:1], fine.poisson))
     begin = time.perf_counter()
     moduli, converged = on_root(comm, partial(_moduli, name, e, fine.poisson))
     fitted = time.perf_counter() - begin

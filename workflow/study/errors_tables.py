@@ -86,8 +86,8 @@ def errors(study: Study) -> Table:
         "errors",
         "Relative errors of the frequencies against SLEPc on the fine mesh: root mean square, mean "
         "and worst, the last two positive if too high. Times are wall seconds on one core with "
-        "other jobs beside it: of the fits, equal blocks once and with what is prepared once a "
-        "process, and of the coarse model’s modes by SLEPc.",
+        "other jobs beside it: of the fits, equal blocks once, with what each void pattern needs "
+        "once, and of the coarse model’s modes by SLEPc.",
         columns,
         [row for case in study.found for row in _error_rows(study, case)],
     )
