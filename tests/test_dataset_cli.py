@@ -12,6 +12,7 @@ from dataset_gen import __main__ as program
 from dataset_gen import summary
 from dataset_gen.__main__ import main
 from dataset_gen.generate import generate
+from dataset_gen.objectives import DEFAULT_OBJECTIVE, OBJECTIVES
 from dataset_gen.objectives.quadratic import MODULUS_FLOOR
 from dataset_gen.shards import iterate_shard, write_shard
 
@@ -90,12 +91,39 @@ def test_an_interrupt_is_a_line_and_the_same_command_goes_on(tmp_path, capsys, m
     assert "going on after 4,096 of 5,000 samples" in capsys.readouterr().err
 
 
-def test_benchmark_reports_every_objective(capsys, monkeypatch):
-    monkeypatch.setattr("dataset_gen.objectives.sampled_energy.DIRECTIONS", 50)
+@pytest.fixture
+def quick(monkeypatch):
+    monkeypatch.setattr("dataset_gen.benchmark.RUNS", 2)
+    monkeypatch.setattr("dataset_gen.benchmark.MATRIX", 64)
+
+
+def test_benchmark_reports_every_objective(capsys, quick):
     assert run("benchmark", "--samples", 8, "--json") == 0
-    rates = json.loads(capsys.readouterr().out)["fits_per_second"]
-    assert set(rates) >= {"energy", "energy, sampled", "chen2015", "hybrid", "factored"}
-    assert all(rate > 0 for rate in rates.values())
+    found = json.loads(capsys.readouterr().out)
+    assert found["objective"] == DEFAULT_OBJECTIVE
+    assert set(found["fits_per_second"]) == {"closed_form", "sampled"}
+    assert set(found["objectives"]) == set(OBJECTIVES)
+    assert found["rows_per_fit"] == 8 and found["threads"] == 1 and found["samples"] == 8
+    rates = found["fits_per_second"]
+    assert rates["closed_form"] == found["objectives"][DEFAULT_OBJECTIVE]
+    assert found["speedup"] == rates["closed_form"] / rates["sampled"]
+    for name in ("closed_form", "sampled"):
+        least, largest = found["spread"][name]
+        assert 0 < least <= rates[name] <= largest
+    assert found["flops_per_fit"] > 1e5
+    assert found["gflops"] == pytest.approx(1e-9 * found["flops_per_fit"] * rates["closed_form"])
+    assert found["peak_fraction"] == found["gflops"] / found["gflops_peak"]
+    assert found["gflops_dgemm"] > 0 and found["processor"]
+
+
+def test_benchmark_of_one_objective_as_text_and_iterative_without_operations(capsys, quick):
+    assert run("benchmark", "--samples", 8, "--objective", "inertial") == 0
+    text = capsys.readouterr().out
+    assert "inertial" in text and "operations per fit" in text and "oversampled" not in text
+    assert run("benchmark", "--samples", 8, "--objective", "energy", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert list(found["objectives"]) == ["energy"] and found["objective"] == "energy"
+    assert found["flops_per_fit"] is None and found["peak_fraction"] is None
 
 
 @pytest.mark.parametrize(
@@ -121,6 +149,7 @@ def test_benchmark_reports_every_objective(capsys, monkeypatch):
         ("generate", "--samples", "9", "--out", "missing/a.h5"),
         ("inspect", "missing.h5"),
         ("benchmark", "--samples", "0"),
+        ("benchmark", "--objective", "best"),
     ],
 )
 def test_bad_input_is_one_line_and_status_2(arguments, capsys, tmp_path, monkeypatch):

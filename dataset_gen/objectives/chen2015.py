@@ -14,6 +14,7 @@ import numpy as np
 
 from dataset_gen.block import CORNER_NODES, degrees_of_freedom
 from dataset_gen.element import Array
+from dataset_gen.objectives import flops
 from dataset_gen.objectives.elimination import TILE, elimination_of
 from dataset_gen.objectives.free_block import (
     FreeBlock,
@@ -66,6 +67,22 @@ class Corners(NamedTuple):
     block: FreeBlock
     loads: Array
     strains: Array
+
+    def flops(self) -> int:
+        """Floating-point operations of one block's normal equations."""
+        factor, stiffness, null = self.block
+        size = 3 * len(factor.diagonal)
+        small = flops.factorisation(DENSE) + 3 * flops.substitution(DENSE, MOTIONS)
+        return (
+            flops.assembly(stiffness)
+            + flops.factorisation(factor)
+            + 3 * flops.substitution(factor, MOTIONS)
+            + 2 * flops.product(len(null) // size, MOTIONS, size)
+            + 2 * flops.product(MOTIONS, MOTIONS, size)
+            + small
+            + flops.flexibility(factor, len(null) // size)
+            + flops.normal_equations(MOTIONS)
+        )
 
 
 def corner_selection(mask: int, poisson: float) -> Array:

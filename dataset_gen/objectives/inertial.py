@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dataset_gen.element import Array
+from dataset_gen.objectives import flops
 from dataset_gen.objectives.elimination import TILE, elimination_of
 from dataset_gen.objectives.free_block import FreeBlock, free_block_of
 from dataset_gen.objectives.kernel import (
@@ -54,6 +55,18 @@ class Inertia(NamedTuple):
     loads: Array
     to_corners: Array
     strains: Array
+
+    def flops(self) -> int:
+        """Floating-point operations of one block's normal equations."""
+        factor, stiffness, _ = self.block
+        size = 3 * len(factor.diagonal)
+        return (
+            flops.assembly(stiffness)
+            + flops.factorisation(factor)
+            + 2 * flops.substitution(factor, LOADS)
+            + flops.product(LOADS, LOADS + MOTIONS, size)
+            + flops.normal_equations(LOADS)
+        )
 
 
 @serial_blas

@@ -14,6 +14,7 @@ import numpy as np
 
 from dataset_gen.block import COARSE_EDGE, NODES, cell_stiffness, degrees_of_freedom
 from dataset_gen.element import CORNERS, Array, shape_functions, uniform_stiffness
+from dataset_gen.objectives import flops
 from dataset_gen.objectives.elimination import (
     TILE,
     Factor,
@@ -85,6 +86,20 @@ class Patch(NamedTuple):
     own: Sum
     to_corners: Array
     strains: Array
+
+    def flops(self) -> int:
+        """Floating-point operations of one block's normal equations."""
+        size = 3 * len(self.factor.diagonal)
+        whitening = flops.factorisation(DENSE) + 3 * flops.substitution(DENSE, MOTIONS)
+        return (
+            flops.assembly(self.held, self.loads, self.own)
+            + flops.factorisation(self.factor)
+            + 2 * flops.substitution(self.factor, MOTIONS)
+            + flops.sparse_product(self.links, MOTIONS)
+            + 2 * flops.product(MOTIONS, MOTIONS, size)
+            + whitening
+            + flops.normal_equations(MOTIONS)
+        )
 
 
 @cache

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dataset_gen.element import Array
 from dataset_gen.objectives.bounded import minimise_above
+from dataset_gen.objectives.flops import count
 
 RIDGE = 1e-3
 """Pull towards E0, as a share of the mean diagonal of the normal matrix."""
@@ -19,6 +20,16 @@ REFERENCE_FLOOR = 1e-2
 
 MODULUS_FLOOR = 1e-2
 """Lower bound of every coarse modulus, as a share of the block's largest fine modulus."""
+
+
+class Tables(Protocol):
+    """What an objective knows of a void pattern."""
+
+    def flops(self) -> int:
+        """Floating-point operations of one block's normal equations."""
+
+
+T = TypeVar("T", bound=Tables)
 
 
 class PatternFits(NamedTuple):
@@ -38,12 +49,13 @@ class NormalEquations(NamedTuple):
 
 
 def form_equations(
-    kernel: Callable[[Any, Array, NormalEquations], None], tables: Any, young: Array
+    kernel: Callable[[T, Array, NormalEquations], None], tables: T, young: Array
 ) -> NormalEquations:
     """Normal equations of blocks (n, 8) by a compiled `kernel` and the tables of their pattern."""
-    count = len(young)
-    equations = NormalEquations(np.empty((count, 8, 8)), np.empty((count, 8)), np.empty(count))
+    rows = len(young)
+    equations = NormalEquations(np.empty((rows, 8, 8)), np.empty((rows, 8)), np.empty(rows))
     kernel(tables, np.ascontiguousarray(young), equations)
+    count(rows * tables.flops())
     return equations
 
 

@@ -57,6 +57,7 @@ from dataset_gen.objectives.lanes import (
 )
 from dataset_gen.objectives.patterns import pattern_of
 from dataset_gen.objectives.quadratic import MODULUS_FLOOR, PatternFits, reference_moduli
+from dataset_gen.serial import serial_blas
 
 DIRECTIONS = 1000
 """Force directions of one fit (section 8.1)."""
@@ -78,6 +79,14 @@ class Loaded(NamedTuple):
     energies: Array
 
 
+class Room(NamedTuple):
+    """Room for an evaluation: (9, columns) and (18, columns) numbers."""
+
+    rows: Array
+    bent: Array
+
+
+@serial_blas
 def draw_forces(young: Array, directions: int, generator: np.random.Generator) -> Array:
     """Self-equilibrated unit forces (a, directions) on the active nodes of the block `young` (8,).
 
@@ -95,10 +104,13 @@ def mask_of(young: Array) -> int:
 
 
 @compiled
-def _load_block(coarse: Coarse, young: Array, forces: Array, loaded: Loaded) -> None:
-    """Solve the block `young` (1, 8) for the forces (a, columns, LANES)."""
+def _load_block(
+    coarse: Coarse, young: Array, unit: Array, magnitudes: Array, loaded: Loaded
+) -> None:
+    """Solve the block `young` (1, 8) for the unit forces (a, m, LANES) times all magnitudes."""
     factor, stiffness, _ = coarse.block
     size, columns = 3 * len(factor.diagonal), len(loaded.energies)
+    directions = unit.shape[1]
     weights, tiles = empty(WEIGHTS), empty(TILE * (len(stiffness.start) - 1))
     x, felt = empty(size * PANEL), empty(MOTIONS * PANEL)
     weigh(young, 0, weights)
@@ -107,8 +119,10 @@ def _load_block(coarse: Coarse, young: Array, forces: Array, loaded: Loaded) -> 
     for panel in range(0, columns, PANEL):
         for dof in range(size):
             for column in range(PANEL):
+                magnitude, direction = divmod(panel + column, directions)
                 for lane in range(LANES):
-                    x[dof * PANEL + column, lane] = forces[dof, panel + column, lane]
+                    force = magnitudes[magnitude] * unit[dof, direction, lane]
+                    x[dof * PANEL + column, lane] = force
         multiply(felt, (coarse.basis, 0, 1, MOTIONS), (x, 0, 1, PANEL), MOTIONS, PANEL, size)
         solve_lower(factor, tiles, x, PANEL)
         for column in range(PANEL):
@@ -133,17 +147,17 @@ def _sum_lanes(numbers: Array) -> None:
 
 @compiled
 def _evaluate(
-    coarse: Coarse, loaded: Loaded, response: Response, rows: Array, logs: Array, out: Array
+    coarse: Coarse, loaded: Loaded, response: Response, room: Room, logs: Array, out: Array
 ) -> None:
     """Value, gradient and Hessian in log E of the sum over all forces of (coarse - fine energy)^2.
 
     The coarse energy f^T V B V^T f is the sum of its derivatives by -log E_q. These, and in the
-    ninth row the energies' differences, are written to `rows` (9, columns).
+    ninth row the energies' differences, are the `rows` (9, columns).
     """
     respond(coarse, logs, response)
+    rows, bent = room
     columns = len(loaded.energies)
-    strains, bent = empty(STRAINS * PANEL), empty(MOTIONS * columns)
-    gram, slope = empty(81), empty(MOTIONS**2)
+    strains, gram, slope = empty(STRAINS * PANEL), empty(81), empty(MOTIONS**2)
     for panel in range(0, columns, PANEL):
         felt = (loaded.felt, panel, 1, columns)
         multiply(strains, (response.strained, 0, 1, STRAINS), felt, STRAINS, PANEL, MOTIONS)
@@ -180,22 +194,28 @@ def _evaluate(
 
 @compiled
 def _fit(
-    coarse: Coarse, young: Array, forces: Array, origin: Array, bounds: tuple[float, float]
+    coarse: Coarse,
+    young: Array,
+    forces: tuple[Array, Array],
+    origin: Array,
+    bounds: tuple[float, float],
 ) -> tuple[Array, float, bool]:
     """Logarithms (8) of the moduli of the block `young` (1, 8), residual and convergence."""
-    columns = forces.shape[1]
+    unit, magnitudes = forces
+    columns = unit.shape[1] * len(magnitudes)
     loaded = Loaded(empty(MOTIONS * columns), empty(columns))
-    response, rows, state = empty_response(), empty(9 * columns), begin(*bounds)
-    _load_block(coarse, young, forces, loaded)
+    room = Room(empty(9 * columns), empty(MOTIONS * columns))
+    response, state = empty_response(), begin(*bounds)
+    _load_block(coarse, young, unit, magnitudes, loaded)
     store(state.scale, 0, squares(loaded.energies, 0, columns))
     _sum_lanes(state.scale)
     for i in range(8):
         store(state.trial, i, spread(min(max(origin[i], bounds[0]), bounds[1])))
-    _evaluate(coarse, loaded, response, rows, state.trial, state.there)
+    _evaluate(coarse, loaded, response, room, state.trial, state.there)
     start(state)
     for _ in range(MAX_ITERATIONS):
         propose(state)
-        _evaluate(coarse, loaded, response, rows, state.trial, state.there)
+        _evaluate(coarse, loaded, response, room, state.trial, state.there)
         if judge(state):
             break
     residual = np.sqrt(state.here[VALUE, 0] / state.scale[0, 0])
@@ -211,24 +231,21 @@ def fit_block(
 ) -> PatternFits:
     """Fit of the block `young` (8,) from sampled forces: one row.
 
-    Each direction is solved at each magnitude, and the squared differences of all energies are
-    summed, as the paper says.
+    Both meshes are solved for each direction at each magnitude, and the squared differences of all
+    these energies are summed, as the paper says.
     """
-    largest = young.max()
+    mask, largest = mask_of(young), young.max()
     scaled = (young / largest)[None]
-    unit = draw_forces(young, directions, generator)
-    forces = np.concatenate([size * unit for size in magnitudes], axis=1)
-    return _fit_forces(scaled, largest, forces, poisson)
-
-
-def _fit_forces(scaled: Array, largest: float, forces: Array, poisson: float) -> PatternFits:
-    mask = mask_of(scaled[0])
-    pattern = pattern_of(mask, poisson)
-    rest = -forces.shape[1] % (LANES * PANEL)
-    ordered = np.pad(forces[pattern.positions(elimination_of(mask).dofs)], ((0, 0), (0, rest)))
-    start = np.log(reference_moduli(scaled)[0])
-    bounds = float(np.log(MODULUS_FLOOR)), float(np.log(MODULUS_CEILING))
-    lanes = ordered.reshape(len(ordered), -1, LANES)
-    logs, residual, settled = _fit(coarse_of(mask, poisson), scaled, lanes, start, bounds)
+    order = pattern_of(mask, poisson).positions(elimination_of(mask).dofs)
+    forces = draw_forces(young, directions, generator)
+    unit = np.zeros((len(forces), directions + -directions % (LANES * PANEL)))
+    unit[:, :directions] = forces[order]
+    logs, residual, settled = _fit(
+        coarse_of(mask, poisson),
+        scaled,
+        (unit.reshape(len(unit), -1, LANES), np.array(magnitudes)),
+        np.log(reference_moduli(scaled)[0]),
+        (float(np.log(MODULUS_FLOOR)), float(np.log(MODULUS_CEILING))),
+    )
     moduli = largest * np.exp(logs)
     return PatternFits(moduli[None], np.array([residual]), np.array([settled]))
