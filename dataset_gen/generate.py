@@ -80,9 +80,10 @@ def generate_file(
 ) -> int | None:
     """Fit one shard and write it to `path` in constant memory; go on where an earlier run ended.
 
-    Finished tasks go to the journal beside `path`, which becomes the shard when it is complete. A
-    shard that was interrupted has the same bytes as one that was not, unless it was finished with
-    other software or on another machine: those are then listed in its provenance, `resumed_on`.
+    Finished tasks go to the journal beside `path` and to the shard, which gets its name when it is
+    complete; an interrupted one is written again from the journal. A shard that was interrupted has
+    the same bytes as one that was not, unless it was finished with other software or on another
+    machine: those are then listed in its provenance, `resumed_on`.
 
     Returns
     -------
@@ -106,8 +107,9 @@ def generate_file(
             finished = _is_there(path, plan)
             return None
         before = journal.rows
-        _fill(journal, engine)
-        _finish(path, journal, origin)
+        remove_leftovers(path)
+        origin = origin | _environment(journal)
+        write_rows(path, plan.settings, map(rows_of, _results(journal, engine)), origin)
         finished = True
     finally:
         journal.close(remove=finished or not journal.tasks)
@@ -133,22 +135,23 @@ def _is_there(path: Path, plan: Plan) -> bool:
     return True
 
 
-def _fill(journal: Journal, engine: Engine) -> None:
+def _environment(journal: Journal) -> dict[str, Any]:
+    first, *later = journal.environments
+    return first | ({"resumed_on": json.dumps(later)} if later else {})
+
+
+def _results(journal: Journal, engine: Engine) -> Iterator[bytes]:
+    """Rows of all tasks in order: those in the journal, then new ones, once they are in it too."""
     plan = journal.plan
     if journal.tasks:
         say(f"{journal.path}: going on after {journal.rows:,} of {plan.settings.count:,} samples")
-    with closing(engine(plan, range(journal.tasks, plan.tasks))) as results:
-        label = f"fitting {plan.settings.objective}"
-        for work in _tracked(plan, results, label, journal.rows):
+    before = journal.rows
+    left = range(journal.tasks, plan.tasks)
+    yield from journal.work()
+    with closing(engine(plan, left)) as results:
+        for work in _tracked(plan, results, f"fitting {plan.settings.objective}", before):
             journal.append(work)
-
-
-def _finish(path: Path, journal: Journal, origin: dict[str, Any]) -> None:
-    first, *later = journal.environments
-    origin = origin | first | ({"resumed_on": json.dumps(later)} if later else {})
-    remove_leftovers(path)
-    pieces = map(rows_of, _tracked(journal.plan, journal.work(), "writing"))
-    write_rows(path, journal.plan.settings, pieces, origin)
+            yield work
 
 
 def _tracked(

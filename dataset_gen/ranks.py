@@ -7,22 +7,18 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Generator
-from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from typing import Any
 
 from carillon.cli import EXIT_BAD_INPUT
 from carillon.errors import UserError
 from carillon.progress import say
+from dataset_gen.crew import PAUSE, lead
 from dataset_gen.generate import Engine
-from dataset_gen.tasks import Dealer, Plan
-from dataset_gen.workers import QUEUE, WINDOW
+from dataset_gen.tasks import Plan
 
 Comm = Any
 """mpi4py's communicator; mpi4py is imported only where a launcher started several ranks."""
-
-PAUSE = 1e-3
-"""Seconds between two looks for messages, so that waiting takes no core from the work."""
 
 _LAUNCHERS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS")
 
@@ -48,8 +44,8 @@ def world() -> Comm | None:
     return MPI.COMM_WORLD if MPI.COMM_WORLD.size > 1 else None
 
 
-def share(comm: Comm, program: str, lead: Callable[[Engine], int]) -> int:
-    """Call `lead` on rank 0 with an engine for which all ranks work; its exit status on every rank.
+def share(comm: Comm, program: str, make: Callable[[Engine], int]) -> int:
+    """Call `make` on rank 0 with an engine for which all ranks work; its exit status on every rank.
 
     An error on any rank is printed there and ends all of them.
     """
@@ -58,7 +54,7 @@ def share(comm: Comm, program: str, lead: Callable[[Engine], int]) -> int:
         _warn_about_cores(comm)
         if comm.rank > 0:
             return _follow(comm)
-        status = lead(partial(_in_ranks, comm, busy))
+        status = make(partial(_in_ranks, comm, busy))
         if busy:  # interrupted, with the others in the middle of their work
             comm.Abort(status)
     except UserError as error:
@@ -91,30 +87,35 @@ class _End:
 def _in_ranks(
     comm: Comm, busy: list[Plan], plan: Plan, tasks: range
 ) -> Generator[bytes, None, None]:
-    """Results of `tasks` in order, from all ranks; this one works in a thread of its own."""
+    """Results of `tasks` in order, from all ranks."""
     busy.append(plan)
     for rank in range(1, comm.size):
         comm.send(plan, dest=rank)
-    dealer = Dealer(tasks, WINDOW * comm.size)
-    free = list(range(1, comm.size)) * QUEUE
-    own: Future[bytes] | None = None
-    with ThreadPoolExecutor(1) as thread:
-        while not dealer.finished:
-            while free and (task := dealer.deal()) is not None:
-                comm.send(task, dest=free.pop(0))
-            if own is None and (task := dealer.deal()) is not None:
-                mine, own = task, thread.submit(plan.work, task)
-            if own is not None and own.done():
-                dealer.keep(mine, own.result())
-                own = None
-            elif comm.iprobe():
-                rank, task, work = comm.recv()
-                dealer.keep(task, work)
-                free.append(rank)
-            else:
-                time.sleep(PAUSE)
-            yield from dealer.ready()
+    yield from lead(plan, tasks, _Ranks(comm))
     busy.clear()
+
+
+class _Ranks:
+    """The other ranks, as rank 0 sees them."""
+
+    def __init__(self, comm: Comm) -> None:
+        self._comm = comm
+
+    def __len__(self) -> int:
+        return int(self._comm.size) - 1
+
+    def send(self, other: int, task: int) -> None:
+        """Hand over a task."""
+        self._comm.send(task, dest=other + 1)
+
+    def receive(self, seconds: float) -> tuple[int, int, bytes] | None:
+        """A finished task, if there is one within so many seconds."""
+        if not self._comm.iprobe():
+            time.sleep(seconds)
+            if not self._comm.iprobe():
+                return None
+        rank, task, work = self._comm.recv()
+        return rank - 1, task, work
 
 
 def _follow(comm: Comm) -> int:
@@ -122,7 +123,7 @@ def _follow(comm: Comm) -> int:
     plan: Plan | None = None
     while True:
         while not comm.iprobe(source=0):
-            time.sleep(PAUSE)
+            time.sleep(PAUSE)  # takes no core from others
         order = comm.recv(source=0)
         if isinstance(order, _End):
             return order.status

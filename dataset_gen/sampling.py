@@ -153,6 +153,17 @@ def pattern_classes() -> list[NDArray[np.int64]]:
     return [masks[least == representative] for representative in np.unique(least)]
 
 
+@cache
+def _class_table() -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """`pattern_classes` as one table, padded with zeros, and the size of each class."""
+    classes = pattern_classes()
+    sizes = np.array([len(masks) for masks in classes])
+    table = np.zeros((len(classes), sizes.max()), dtype=np.int64)
+    for row, masks in zip(table, classes):
+        row[: len(masks)] = masks
+    return table, sizes
+
+
 def _latin_hypercube(generator: Generator) -> Array:
     columns = [generator.permutation(HYPERCUBE) for _ in range(8)]
     return np.asarray((np.stack(columns, axis=1) + generator.random((HYPERCUBE, 8))) / HYPERCUBE)
@@ -166,8 +177,9 @@ def _void_patterns(generator: Generator, share: float, uniform: NDArray[np.bool_
     void = generator.random(HYPERCUBE) < share
     chosen[void] = generator.integers(len(partial), size=void.sum())
     chosen[uniform] = np.arange(uniform.sum()) % len(classes)
-    member = generator.random(HYPERCUBE)
-    masks = np.array([classes[c][int(m * len(classes[c]))] for c, m in zip(chosen, member)])
+    table, sizes = _class_table()
+    member = (generator.random(HYPERCUBE) * sizes[chosen]).astype(int)
+    masks = table[chosen, member]
     return (masks[:, None] >> np.arange(8) & 1).astype(float)
 
 

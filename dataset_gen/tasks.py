@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,8 +11,8 @@ from dataset_gen.objectives import fit
 from dataset_gen.sampling import samples
 from dataset_gen.settings import Settings
 
-TASK_ROWS = 4096
-"""Samples of a task: a multiple of a hypercube's, and a second's work or less."""
+TASK_ROWS = 8192
+"""Samples of a task: whole hypercubes, cheap to deal out, a fraction of a second's work."""
 
 ROW = np.dtype(
     [("fine", "<f8", (8,)), ("coarse", "<f8", (8,)), ("residual", "<f8"), ("converged", "?")]
@@ -56,39 +55,3 @@ class Plan:
 def rows_of(work: bytes) -> NDArray[np.void]:
     """Rows of type `ROW` from their bytes."""
     return np.frombuffer(work, dtype=ROW)
-
-
-class Dealer:
-    """Deals tasks in order to whoever is free and keeps results until it is their turn.
-
-    No task is dealt that is `window` or more ahead of the one awaited, so that not more than
-    `window` results are kept however slow one of the processes is.
-    """
-
-    def __init__(self, tasks: range, window: int) -> None:
-        self._next = self._awaited = tasks.start
-        self._stop = tasks.stop
-        self._window = window
-        self._kept: dict[int, bytes] = {}
-
-    @property
-    def finished(self) -> bool:
-        """Whether every result has been handed on."""
-        return self._awaited == self._stop
-
-    def deal(self) -> int | None:
-        """The next task; None if there is none or others have to be finished first."""
-        if self._next == min(self._stop, self._awaited + self._window):
-            return None
-        self._next += 1
-        return self._next - 1
-
-    def keep(self, task: int, work: bytes) -> None:
-        """Take a result."""
-        self._kept[task] = work
-
-    def ready(self) -> Iterator[bytes]:
-        """Results whose turn it is."""
-        while self._awaited in self._kept:
-            yield self._kept.pop(self._awaited)
-            self._awaited += 1

@@ -12,13 +12,8 @@ from multiprocessing.connection import Connection, wait
 
 from carillon.errors import UserError
 from carillon.progress import say
-from dataset_gen.tasks import Dealer, Plan
-
-QUEUE = 2
-"""Tasks a worker has at a time: one in work, one to go on with."""
-
-WINDOW = 4
-"""Tasks dealt ahead of the one awaited, per worker."""
+from dataset_gen.crew import lead
+from dataset_gen.tasks import Plan
 
 
 def in_this_process(plan: Plan, tasks: range) -> Generator[bytes, None, None]:
@@ -28,10 +23,10 @@ def in_this_process(plan: Plan, tasks: range) -> Generator[bytes, None, None]:
 
 
 def in_workers(plan: Plan, tasks: range, workers: int) -> Generator[bytes, None, None]:
-    """Results of `tasks` in order, worked out by several processes.
+    """Results of `tasks` in order, worked out by this process and `workers - 1` others.
 
-    The processes are fresh ones and hold nothing of this one but their end of a pipe: when this one
-    ends, however it ends, they find the pipe closed and end as well.
+    The others are fresh processes and hold nothing of this one but their end of a pipe: when this
+    one ends, however it ends, they find the pipe closed and end as well.
 
     Raises
     ------
@@ -41,64 +36,62 @@ def in_workers(plan: Plan, tasks: range, workers: int) -> Generator[bytes, None,
     cores = len(os.sched_getaffinity(0))
     if workers > cores:
         say(f"{workers} workers share {cores} cores, more than that make nothing faster")
-    crew = [_Worker(plan) for _ in range(min(workers, len(tasks)))]
-    dealer = Dealer(tasks, WINDOW * len(crew))
+    others = _Workers(plan, min(workers, len(tasks)) - 1)
     try:
-        free = crew * QUEUE
-        while not dealer.finished:
-            while free and (task := dealer.deal()) is not None:
-                free.pop(0).begin(task)
-            for worker in _with_results(crew):
-                dealer.keep(*worker.result())
-                free.append(worker)
-            yield from dealer.ready()
+        yield from lead(plan, tasks, others)
     finally:
-        for worker in crew:
-            worker.stop()
+        others.stop()
 
 
-class _Worker:
-    """A process that takes task numbers from a pipe and puts results into it."""
+class _Workers:
+    """Processes that take task numbers from pipes and put results into them."""
 
-    def __init__(self, plan: Plan) -> None:
-        # Neither forked, as threads do not survive that, nor sharing files with its siblings.
+    def __init__(self, plan: Plan, count: int) -> None:
+        # Neither forked, as threads do not survive that, nor sharing files with their siblings.
         context = get_context("spawn")
-        self.pipe, theirs = context.Pipe()
-        self.process = context.Process(target=_serve, args=(plan, theirs), daemon=True)
-        self.process.start()
-        theirs.close()
+        self._pipes: list[Connection] = []
+        self._processes = []
+        for _ in range(count):
+            ours, theirs = context.Pipe()
+            process = context.Process(target=_serve, args=(plan, theirs), daemon=True)
+            process.start()
+            theirs.close()
+            self._pipes.append(ours)
+            self._processes.append(process)
 
-    def begin(self, task: int) -> None:
+    def __len__(self) -> int:
+        return len(self._pipes)
+
+    def send(self, other: int, task: int) -> None:
         """Hand over a task."""
-        with suppress(BrokenPipeError):  # how it died is told by `result`
-            self.pipe.send(task)
+        with suppress(BrokenPipeError):  # how it died is told by `receive`
+            self._pipes[other].send(task)
 
-    def result(self) -> tuple[int, bytes]:
-        """A finished task and what came out."""
+    def receive(self, seconds: float) -> tuple[int, int, bytes] | None:
+        """A finished task, if there is one within so many seconds."""
+        ready = wait(self._pipes, seconds)
+        if not ready:
+            return None
+        other = next(k for k, pipe in enumerate(self._pipes) if pipe is ready[0])
         try:
-            found = self.pipe.recv()
+            found = self._pipes[other].recv()
         except (EOFError, ConnectionResetError):
-            self.process.join()
+            self._processes[other].join()
             raise UserError(
-                f"a worker died with exit code {self.process.exitcode} (-9: killed, perhaps for "
-                "lack of memory); run the same command again, with fewer workers"
+                f"a worker died with exit code {self._processes[other].exitcode} (-9: killed, "
+                "perhaps for lack of memory); run the same command again, with fewer workers"
             ) from None
         if isinstance(found, BaseException):
             raise found
         task, work = found
-        return task, work
+        return other, task, work
 
     def stop(self) -> None:
-        """End the process, whatever it is doing: it owns nothing."""
-        self.pipe.close()
-        self.process.terminate()
-        self.process.join()
-
-
-def _with_results(crew: list[_Worker]) -> list[_Worker]:
-    """Workers whose pipe has something to read; waits until there is one."""
-    ready = wait([worker.pipe for worker in crew])
-    return [worker for worker in crew if worker.pipe in ready]
+        """End the processes, whatever they are doing: they own nothing."""
+        for pipe, process in zip(self._pipes, self._processes):
+            pipe.close()
+            process.terminate()
+            process.join()
 
 
 def _serve(plan: Plan, pipe: Connection) -> None:

@@ -83,12 +83,12 @@ def test_an_interrupt_is_a_line_and_the_same_command_goes_on(tmp_path, capsys, m
         raise KeyboardInterrupt
 
     monkeypatch.setattr(program, "engine_of", lambda workers: interrupted)
-    command = ("generate", "--samples", 5000, "--objective", "inertial", "--out", tmp_path / "a.h5")
+    command = ("generate", "--samples", 9000, "--objective", "inertial", "--out", tmp_path / "a.h5")
     assert run(*command) == 130
     assert "goes on from here" in capsys.readouterr().err
     monkeypatch.undo()
     assert run(*command) == 0
-    assert "going on after 4,096 of 5,000 samples" in capsys.readouterr().err
+    assert "going on after 8,192 of 9,000 samples" in capsys.readouterr().err
 
 
 @pytest.fixture

@@ -18,11 +18,12 @@ import pytest
 from carillon.errors import UserError
 from dataset_gen import generate as generate_module
 from dataset_gen import journal as journal_module
+from dataset_gen.crew import Dealer
 from dataset_gen.generate import engine_of, generate_file
 from dataset_gen.journal import Journal, journal_of
 from dataset_gen.settings import settings_of
 from dataset_gen.shards import origin_of, read_shard
-from dataset_gen.tasks import ROW, Dealer, Plan
+from dataset_gen.tasks import ROW, Plan
 from dataset_gen.workers import in_this_process
 
 CHECKOUT = Path(__file__).resolve().parent.parent
@@ -101,7 +102,7 @@ def test_a_shard_finished_elsewhere_says_so(begun, reference, monkeypatch):
 
 PROGRAM = f"""
 import sys, time
-from carillon import cli
+from carillon import cli, files
 from dataset_gen import journal
 from dataset_gen.generate import engine_of, generate_file
 from dataset_gen.settings import settings_of
@@ -117,11 +118,15 @@ def slow(plan, numbers):
 
 def slowly(self, read=journal.Journal.work):
     for work in read(self):
-        time.sleep(seconds / 2)
+        time.sleep(seconds / 10)
         yield work
 
+def sealed_slowly(stream, seal=files._seal_of):
+    time.sleep(10 * seconds)
+    return seal(stream)
+
 def main():
-    journal.Journal.work = slowly
+    journal.Journal.work, files._seal_of = slowly, sealed_slowly
     plan = Plan(settings_of({SAMPLES}, 4), {TASK})
     print("begin", flush=True)
     generate_file(path, plan, origin_of(plan.settings, {SAMPLES}, 0, 1), slow)
@@ -166,7 +171,7 @@ def start(path, program):
 
 
 def test_killed_at_ten_random_moments_it_ends_with_the_same_bytes(path, start, reference):
-    """Early ones fall into the fits, later ones, with the journal full, into writing the shard."""
+    """Early ones fall into the fits, later ones, with the journal full, into sealing the shard."""
     generator = np.random.default_rng()
     rows = []
     for delay in generator.uniform(0.0, 0.7, 10):
@@ -323,7 +328,7 @@ def test_the_same_shard_is_not_made_twice(path, monkeypatch, capsys):
     before = path.stat().st_mtime_ns
     # As after a kill between the renaming of the shard and the removal of its journal.
     journal_of(path).write_bytes(b"")
-    monkeypatch.setattr(generate_module, "_fill", None)
+    monkeypatch.setattr(generate_module, "_results", None)
     assert make(path, plan) is None
     assert path.stat().st_mtime_ns == before
     assert list(path.parent.iterdir()) == [path]
