@@ -1,12 +1,15 @@
-"""BLAS on one thread: a sum shared among threads rounds differently, and a dataset must not."""
+"""BLAS on one thread: a sum shared among threads rounds differently, and a dataset must not.
+
+The compiled fits call no BLAS; the tables of their void patterns are made with it.
+"""
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 from functools import cache, wraps
 from typing import ParamSpec, TypeVar
 
-import scipy.linalg  # noqa: F401  its BLAS must be loaded before the controller looks for it
 from threadpoolctl import ThreadpoolController
 
 P = ParamSpec("P")
@@ -15,6 +18,7 @@ R = TypeVar("R")
 
 @cache
 def _controller() -> ThreadpoolController:
+    importlib.import_module("scipy.linalg")  # whose own BLAS is only found once it is there
     return ThreadpoolController()
 
 

@@ -56,7 +56,7 @@ class Response(NamedTuple):
 
     Attributes
     ----------
-    weights : (10) moduli E.
+    weights : (9) moduli E.
     factor : lower tiles of L with B^-1 = L L^T.
     flexibility : (18, 18), B.
     scaled : (18, 48), L^-1 S_q^T sqrt(E_q).

@@ -1,8 +1,9 @@
 """What the compiled fits share: sparse Cholesky, small products, normal equations, in lanes.
 
-A matrix of lanes is an array of lanes with its numbers row by row; operands of products are tuples
-(array, first entry, stride, stride). The factorised matrices consist of 3x3 tiles in the order of
-`dataset_gen.objectives.elimination`.
+Every number stands for `LANES` blocks, one row of an array of lanes (see
+`dataset_gen.objectives.lanes`). A matrix has its numbers row by row; operands of products are
+tuples (array, first entry, stride, stride). The factorised matrices consist of 3x3 tiles in the
+order of `dataset_gen.objectives.elimination`.
 """
 
 from __future__ import annotations
@@ -40,8 +41,8 @@ STRAINS = 48
 PANEL = 6
 """Columns of right-hand sides worked on together: with three rows, 18 numbers in registers."""
 
-MEAN, ONE, WEIGHTS = 8, 9, 10
-"""Weights of a block: the moduli 0..7, the mean of the filled cells', one; how many there are."""
+MEAN, WEIGHTS = 8, 9
+"""Weights of a block: the moduli 0..7, the mean of the filled cells'; how many there are."""
 
 DENSE = factor_of(np.ones((MOTIONS // 3, MOTIONS // 3), dtype=bool))
 """Structure of the factor of a matrix on the straining motions, tiled as if these were nodes."""
@@ -61,7 +62,6 @@ def weigh(young: Array, first: int, weights: Array) -> None:
             total += block[cell]
             filled += block[cell] > 0.0
         weights[MEAN, lane] = total / filled
-        weights[ONE, lane] = 1.0
 
 
 @compiled
