@@ -1,7 +1,9 @@
 """Damped Newton steps in the logarithms of eight bounded moduli, `LANES` problems at a time.
 
 The caller evaluates its objective at `trial` between `propose` and `judge`; each lane takes its own
-steps and stops on its own.
+steps and stops on its own. Far from the end the steps are those of Gauss and Newton, near it they
+use all of the Hessian. Eq. (8) has saddles where a block is symmetric: nearly symmetric blocks
+leave them, symmetric ones, which have no reason to prefer a side, end there.
 """
 
 from __future__ import annotations
@@ -33,13 +35,18 @@ It only counts while the damping is at most `LIGHT`, when the step is close to N
 """
 
 LIGHT = 1e-2
-SHIFTS = 16
-FIRST_SHIFT = 3e-5
-REFUSED = 1e-3
-FIRST_DAMPING = 1e-2
-LEAST_DAMPING = 1e-6
+
+FIRST_DAMPING, LEAST_DAMPING, REFUSED = 1e-2, 1e-6, 1e-3
+"""Share of the diagonal added to the Hessian: at the start, at least, and after a refused step."""
+
 LARGEST_STEP = 1.0
+"""Longest step in log E of Gauss and Newton."""
+
 NEAR = 0.2
+"""Step of Gauss and Newton from which on all of the Hessian is used; the longest such step."""
+
+FIRST_SHIFT, SHIFTS = 3e-5, 16
+"""First shift of a Hessian that is not positive, and how often it is doubled until it is."""
 
 SLACK = 1e-12
 """Rise of the cost taken for rounding, as a share of the objective's scale."""
@@ -121,9 +128,8 @@ def _newton_step(state: Descent, damping: Vector, share: Vector, step: Array) ->
         store(free, i, where_less(x, high, rising, where_less(gradient, zero, zero, rising)))
         store(slope, i, zero - gradient)
         for n in range(8 * i, 9 * i + 1):
-            store(
-                matrix, n, load(state.here, HESSIAN + n) + share * load(state.here, CURVATURE + n)
-            )
+            rest = share * load(state.here, CURVATURE + n)
+            store(matrix, n, load(state.here, HESSIAN + n) + rest)
         more = damping * load(state.here, HESSIAN + 9 * i)
         store(matrix, 9 * i, load(matrix, 9 * i) + more)
     solve_free(matrix, slope, free, factor, step)
@@ -139,8 +145,9 @@ def _newton_step(state: Descent, damping: Vector, share: Vector, step: Array) ->
 def _curved_step(state: Descent, step: Array) -> Vector:
     """Newton's step with all of the Hessian, and its length.
 
-    Where the Hessian is not positive, it is shifted by twice of what makes it so: near a saddle the
-    distance from it doubles at most, and what symmetry a block has is kept.
+    Where the Hessian is not positive, it is shifted by half as much again as makes it so: near a
+    saddle the distance from it then grows threefold at most, and a symmetry of the block, which
+    rounding breaks by 1e-16, outlasts the descent.
     """
     damping, shift, one = load(state.damping, 0), empty(1), spread(1.0)
     store(shift, 0, damping)

@@ -81,11 +81,8 @@ def _fine_response(coarse: Coarse, young: Array, first: int, fine: Fine) -> None
     """Fine flexibility of the blocks from row `first` on."""
     factor, stiffness, _ = coarse.block
     size = 3 * len(factor.diagonal)
-    weights, tiles, u = (
-        empty(WEIGHTS),
-        empty(TILE * (len(stiffness.start) - 1)),
-        empty(MOTIONS * size),
-    )
+    weights, tiles = empty(WEIGHTS), empty(TILE * (len(stiffness.start) - 1))
+    u = empty(MOTIONS * size)
     weigh(young, first, weights)
     assemble(stiffness, weights, tiles)
     factorise(factor, tiles)
