@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from dataset_gen.block import galerkin_moduli
 from dataset_gen.element import Array
 
 
@@ -13,11 +14,5 @@ def average(young: Array) -> Array:
 
 
 def galerkin(young: Array) -> Array:
-    """Moduli (m, 8) with `h sum_q E_q K_q = P^T K(e) P` for blocks (m, 8), exactly.
-
-    Along each axis a quadrature point takes 1/2 + sqrt(3)/4 from its own half and the rest from the
-    other one: the weights that integrate 1 and x over either half of the element.
-    """
-    near = 0.5 + np.sqrt(3.0) / 4.0
-    line = np.array([[near, 1.0 - near], [1.0 - near, near]])
-    return np.asarray(young @ np.kron(np.kron(line, line), line))
+    """Galerkin projection (m, 8) -> (m, 8), see `dataset_gen.block.galerkin_moduli`."""
+    return galerkin_moduli(young)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Unpack
+from typing import NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from dataset_gen.objectives import DEFAULT_OBJECTIVE, Fits, fit
+from dataset_gen.objectives import DEFAULT_OBJECTIVE, Fits, fit, lumped_share
 from forests import coarsen as evaluate_forest
 from forests import load_model
 from forests.baselines import average, galerkin
@@ -21,14 +21,27 @@ Array = NDArray[np.float64]
 METHODS = ("none", "average", "galerkin", "ddfem", "fit")
 
 
-def coarse_moduli(
+class CoarseMaterial(NamedTuple):
+    """What a coarsening decides about the coarse elements.
+
+    Attributes
+    ----------
+    moduli : (mc, 8) Young's modulus at the quadrature points, in the unit of the fine ones.
+    lumped_share : share of lumped mass in elements without void octants, see `ElasticModel`.
+    """
+
+    moduli: Array
+    lumped_share: float
+
+
+def coarse_material(
     e: Array,
     method: str,
     poisson: float,
     forest: str | Path | None = None,
     objective: str = DEFAULT_OBJECTIVE,
-) -> Array:
-    """Quadrature-point moduli (mc, 8) of coarse elements from the blocks' fine moduli (mc, 8).
+) -> CoarseMaterial:
+    """Material of coarse elements from the blocks' fine moduli (mc, 8).
 
     `method` is one of `average`, `galerkin`, `ddfem` (the regression forests in the file `forest`)
     and `fit` (the `objective` solved for every block, what the forests learn).
@@ -40,13 +53,14 @@ def coarse_moduli(
     """
     match method:
         case "average":
-            return average(e)
+            return CoarseMaterial(average(e), 0.0)
         case "galerkin":
-            return galerkin(e)
+            return CoarseMaterial(galerkin(e), 0.0)
         case "fit":
-            return fit_distinct(objective, e, poisson).moduli
+            moduli = fit_distinct(objective, e, poisson).moduli
+            return CoarseMaterial(moduli, lumped_share(objective))
         case "ddfem":
-            return _forest_moduli(e, poisson, forest)
+            return _from_forest(e, poisson, forest)
     raise UserError(f"coarsening {method!r} is unknown, expected one of {', '.join(METHODS)}")
 
 
@@ -57,7 +71,7 @@ def fit_distinct(objective: str, e: Array, poisson: float) -> Fits:
     return Fits(*(values[row.ravel()] for values in fits))
 
 
-def _forest_moduli(e: Array, poisson: float, forest: str | Path | None) -> Array:
+def _from_forest(e: Array, poisson: float, forest: str | Path | None) -> CoarseMaterial:
     if forest is None:
         raise UserError(
             "--coarsen ddfem needs trained forests; name them with --forest forests.h5 (made by "
@@ -69,7 +83,7 @@ def _forest_moduli(e: Array, poisson: float, forest: str | Path | None) -> Array
             f"{forest}: trained for Poisson's ratio {model.poisson:g}, the model has {poisson:g}; "
             "train forests for it or pass --poisson"
         )
-    return evaluate_forest(model, e)
+    return CoarseMaterial(evaluate_forest(model, e), lumped_share(model.objective))
 
 
 def block_moduli(blocks: Blocks, young: Array) -> Array:
@@ -94,7 +108,7 @@ def build_model(
     young
         (m,) modulus [Pa] of each fine cell.
     method, forest, objective
-        See `coarse_moduli`.
+        See `coarse_material`.
     constants
         `poisson`, `density` [kg/m^3], `lumped`, see `ElasticModel`.
     """
@@ -103,14 +117,19 @@ def build_model(
         return fine
     blocks = blocks_from_mesh(mesh)
     e = block_moduli(blocks, young)
-    moduli = coarse_moduli(e, method, fine.poisson, forest, objective)
-    return coarse_model(blocks, moduli, **constants)
+    material = coarse_material(e, method, fine.poisson, forest, objective)
+    return coarse_model(blocks, material, **constants)
 
 
-def coarse_model(blocks: Blocks, moduli: Array, **constants: Unpack[Constants]) -> ElasticModel:
-    """Model of the blocks with quadrature-point moduli (mc, 8) [Pa].
-
-    The mass is P^T M P over the filled cells; only the stiffness depends on the coarsening.
-    """
+def coarse_model(
+    blocks: Blocks, material: CoarseMaterial, **constants: Unpack[Constants]
+) -> ElasticModel:
+    """Model of the blocks. The consistent part of the mass is P^T M P over the filled cells."""
     pattern = np.packbits(blocks.mask, axis=1, bitorder="little").ravel()
-    return ElasticModel(blocks.coarse, moduli, pattern, **constants)
+    return ElasticModel(
+        blocks.coarse,
+        material.moduli,
+        pattern,
+        lumped_share=material.lumped_share,
+        **constants,
+    )

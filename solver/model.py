@@ -39,6 +39,9 @@ class ElasticModel:
         Mass density of the filled octants [kg/m^3].
     lumped
         Whether the mass is row-sum lumped (diagonal) instead of consistent.
+    lumped_share
+        Share of lumped in the mass of cells whose octants are all filled; the rest is consistent.
+        A mixture disperses less than either (`dataset_gen.objectives.lumped_share`).
     """
 
     mesh: HexMesh
@@ -47,6 +50,7 @@ class ElasticModel:
     poisson: float = DEFAULT_POISSON
     density: float = DEFAULT_DENSITY
     lumped: bool = False
+    lumped_share: float = 0.0
 
     @property
     def n_dofs(self) -> int:
@@ -67,9 +71,11 @@ class ElasticModel:
         octants = np.unpackbits(self.fill[cells][:, None], axis=1, bitorder="little")
         scale = self.density * (self.mesh.edge / 2.0) ** 3
         mass = (scale * octants @ coarse_cell_mass().reshape(8, 64)).reshape(-1, 8, 8)
+        share = np.where(self.fill[cells] == ALL_OCTANTS, self.lumped_share, 0.0)
         if self.lumped:
-            mass = mass.sum(axis=2)[:, :, None] * np.eye(8)
-        return mass
+            share[:] = 1.0
+        lumped = mass.sum(axis=2)[:, :, None] * np.eye(8)
+        return np.asarray(mass + share[:, None, None] * (lumped - mass))
 
     @property
     def mass(self) -> float:

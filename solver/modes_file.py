@@ -86,6 +86,7 @@ def write_modes(
         file.attrs["poisson"] = model.poisson
         file.attrs["density"] = model.density
         file.attrs["lumped"] = model.lumped
+        file.attrs["lumped_share"] = model.lumped_share
         file.attrs["cell_edge"] = mesh.edge
         file.attrs["origin"] = mesh.origin
         for key, value in attributes.items():
@@ -120,6 +121,7 @@ def read_modes(path: str | Path, with_modes: bool = True) -> ModesFile:
             float(file.attrs["poisson"]),
             float(file.attrs["density"]),
             bool(file.attrs["lumped"]),
+            float(file.attrs.get("lumped_share", 0.0)),
         )
         result = ModesFile(
             file["eigenvalues"][()],

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
 from carillon.progress import track
+from dataset_gen.objectives import lumped_share
 from forests.baselines import average, galerkin
 from solver.analysis import RIGID_MODES, Modes, SolverOptions, modal_analysis
-from solver.coarsening import block_moduli, coarse_model, fit_distinct
+from solver.coarsening import CoarseMaterial, block_moduli, coarse_model, fit_distinct
 from solver.comparison import AUDIBLE_LAST, frequency_errors
 from solver.decomposition import on_root
 from solver.geometry import Blocks, blocks_from_mesh
@@ -42,7 +43,7 @@ def rate_objectives(
     """Frequency errors of one solid coarsened by each objective, and by the baselines.
 
     The coarse moduli are the fits themselves, block by block, without forests between.  All coarse
-    models have the same mesh and mass; they and the fine one are solved by SLEPc.
+    models have the same mesh; they and the fine one are solved by SLEPc.
 
     Returns
     -------
@@ -93,12 +94,12 @@ def _row(
 ) -> dict[str, Any]:
     fine = problem.model
     # Compiling, or loading what was compiled, is not part of fitting.
-    on_root(comm, partial(_moduli, name, e[:1], fine.poisson))
+    on_root(comm, partial(_material, name, e[:1], fine.poisson))
     begin = time.perf_counter()
-    moduli, converged = on_root(comm, partial(_moduli, name, e, fine.poisson))
+    material, converged = on_root(comm, partial(_material, name, e, fine.poisson))
     fitted = time.perf_counter() - begin
     model = coarse_model(
-        blocks, moduli, poisson=fine.poisson, density=fine.density, lumped=fine.lumped
+        blocks, material, poisson=fine.poisson, density=fine.density, lumped=fine.lumped
     )
     try:
         result = _solve(model, min(len(exact), model.n_dofs), comm, prove=False)
@@ -117,9 +118,9 @@ def _row(
     }
 
 
-def _moduli(name: str, e: Array, poisson: float) -> tuple[Array, float | None]:
-    """Coarse moduli (mc, 8) and the share of blocks whose fit converged, None without a fit."""
+def _material(name: str, e: Array, poisson: float) -> tuple[CoarseMaterial, float | None]:
+    """Coarse material and the share of blocks whose fit converged, None without a fit."""
     if name in BASELINES:
-        return BASELINES[name](e), None
+        return CoarseMaterial(BASELINES[name](e), 0.0), None
     fits = fit_distinct(name, e, poisson)
-    return fits.moduli, float(fits.converged.mean())
+    return CoarseMaterial(fits.moduli, lumped_share(name)), float(fits.converged.mean())

@@ -1,0 +1,100 @@
+"""Constants of the objective `calibrated`, found by `python -m solver calibrate`.
+
+They are few: per class of void patterns one factor for every set of octants that the pattern's
+symmetries exchange, two exponents, and one share of lumped mass.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.errors import UserError
+from dataset_gen.block import symmetries
+from dataset_gen.element import Array
+
+ALL_FILLED = 0b11111111
+
+FILE = "calibration.json"
+"""Beside this module; written by `python -m solver calibrate`."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What `calibrated` multiplies the computed moduli with.
+
+    Attributes
+    ----------
+    factors : (256, 8) factors on the moduli of a block of one material, by void pattern; rows of
+        patterns that are not the least of their class under the cube's symmetries are not used.
+    galerkin_filled, galerkin_void : exponent of Galerkin's answer to contrast in blocks without
+        and with void cells; the rest is the answer of `oversampled`.
+    lumped_share : share of row-sum lumped mass in coarse cells whose octants are all filled.
+    provenance : how the constants were found.
+    """
+
+    factors: Array
+    galerkin_filled: float
+    galerkin_void: float
+    lumped_share: float
+    provenance: dict[str, Any]
+
+
+@cache
+def octant_orbits() -> tuple[NDArray[np.int64], int]:
+    """Number of the free factor of each octant (256, 8) of each void pattern, and their count.
+
+    Octants that a symmetry of the pattern exchanges have one number. Rows of patterns that are not
+    the least of their class are 0 and mean nothing, like those of `Calibration.factors`.
+    """
+    numbers = np.zeros((256, 8), dtype=np.int64)
+    count = 0
+    for mask in range(1, 256):
+        images = ((mask >> np.arange(8) & 1) << symmetries()).sum(axis=1)
+        if images.min() < mask:
+            continue
+        exchanged = symmetries()[images == mask].min(axis=0)
+        _, orbit = np.unique(exchanged, return_inverse=True)
+        numbers[mask] = count + orbit.ravel()
+        count += int(orbit.max()) + 1
+    return numbers, count
+
+
+def parse(content: Mapping[str, Any]) -> Calibration:
+    """Calibration from the content of its JSON file.
+
+    Raises
+    ------
+    UserError
+        If an entry is missing or not a positive number.
+    """
+    try:
+        factors = np.ones((256, 8))
+        for mask, row in content["factors"].items():
+            factors[int(mask)] = row
+        share = content["galerkin_share"]
+        return Calibration(
+            factors,
+            float(share["filled"]),
+            float(share["partly_void"]),
+            float(content["lumped_share"]),
+            dict(content.get("provenance", {})),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise UserError(
+            f"calibration: {error!r} is missing or not a number; write the file with "
+            "python -m solver calibrate"
+        ) from None
+
+
+@cache
+def default_calibration() -> Calibration:
+    """The calibration that belongs to this version."""
+    return parse(json.loads(resources.files(__package__).joinpath(FILE).read_text()))
