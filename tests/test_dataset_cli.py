@@ -29,7 +29,7 @@ def test_generate_then_inspect(tmp_path, capsys):
     assert "training rows/s" in captured.err and "peak memory" in captured.err
     assert run("inspect", out, "--json") == 0
     found = json.loads(capsys.readouterr().out)
-    assert found["samples"] == [0, 40] and found["objective"] == "factored"
+    assert found["samples"] == [0, 40] and found["objective"] == DEFAULT_OBJECTIVE
     assert found["converged"] == 1.0 and found["failures"] == 0
     assert run("inspect", out) == 0
     captured = capsys.readouterr()

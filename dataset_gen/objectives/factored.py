@@ -16,19 +16,16 @@ import numpy as np
 from dataset_gen.element import Array
 from dataset_gen.objectives import inertial, oversampled
 from dataset_gen.objectives.quadratic import PatternFits
-from dataset_gen.serial import serial_blas
 
 ALL_FILLED = 0b11111111
 
 
 @cache
-@serial_blas
 def pattern_correction(mask: int, poisson: float) -> Array:
     """`E_inertial(1_p) / E_oversampled(1_p)` (8,) of the pattern `mask`; ones if all are filled."""
     if mask == ALL_FILLED:
         return np.ones(8)
-    # Two rows, as one alone would round differently.
-    unit = np.repeat((mask >> np.arange(8) & 1).astype(float)[None], 2, axis=0)
+    unit = (mask >> np.arange(8) & 1).astype(float)[None]
     free = inertial.fit_pattern(unit, mask, poisson).moduli[0]
     held = oversampled.fit_pattern(unit, mask, poisson).moduli[0]
     return np.asarray(free / held)
