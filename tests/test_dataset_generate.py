@@ -21,6 +21,7 @@ from dataset_gen import journal as journal_module
 from dataset_gen.crew import Dealer
 from dataset_gen.generate import engine_of, generate_file
 from dataset_gen.journal import Journal, journal_of
+from dataset_gen.objectives import DEFAULT_OBJECTIVE
 from dataset_gen.settings import settings_of
 from dataset_gen.shards import origin_of, read_shard
 from dataset_gen.tasks import ROW, Plan
@@ -287,7 +288,7 @@ def test_what_is_no_journal_is_left_alone(begun, content):
 @pytest.mark.parametrize(
     ("plan", "message"),
     [
-        (plan_of(objective="hybrid"), "objective factored where hybrid is asked for"),
+        (plan_of(objective="hybrid"), f"objective {DEFAULT_OBJECTIVE} where hybrid is asked for"),
         (plan_of(poisson=0.3), "Poisson's ratio 0.25 where 0.3"),
         (plan_of(SAMPLES + 1), "samples up to 3000 where 3001"),
         (plan_of(high=9), "moduli up to 10.0 where 9.0"),
@@ -337,7 +338,10 @@ def test_the_same_shard_is_not_made_twice(path, monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("plan", "message"),
     [
-        (plan_of(200, objective="hybrid"), "objective factored where hybrid is asked for"),
+        (
+            plan_of(200, objective="hybrid"),
+            f"objective {DEFAULT_OBJECTIVE} where hybrid is asked for",
+        ),
         (plan_of(201), "samples up to 200 where 201"),
         (plan_of(200, low=1), "moduli from 0.0 where 1.0"),
         (Plan(settings_of(200, 5)), "seed 4 where 5"),

@@ -10,6 +10,7 @@ from carillon import files
 from carillon.errors import UserError
 from dataset_gen import shards as shards_module
 from dataset_gen.generate import generate
+from dataset_gen.objectives import DEFAULT_OBJECTIVE
 from dataset_gen.settings import settings_of
 from dataset_gen.shards import (
     iterate_shard,
@@ -43,7 +44,7 @@ def test_round_trip_keeps_every_bit(path, shard):
     for name in COLUMNS:
         np.testing.assert_array_equal(getattr(found, name), getattr(shard, name))
     assert found.settings == read_settings(path) == settings_of(300, seed=2)
-    assert (found.objective, found.seed, found.start, found.stop) == ("factored", 2, 0, 300)
+    assert (found.objective, found.seed, found.start, found.stop) == (DEFAULT_OBJECTIVE, 2, 0, 300)
     assert found.provenance["commit"]
 
 
