@@ -1,4 +1,4 @@
-"""Command line: `python -m solver modes | compare | convergence | benchmark | objectives`."""
+"""Command line: `python -m solver COMMAND`; `--help` lists the commands."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 import traceback
+from pathlib import Path
 from typing import Any
 
 from mpi4py import MPI
@@ -15,6 +16,7 @@ from carillon.cli import EXIT_BAD_INPUT, EXIT_NOT_CONVERGED
 from carillon.errors import ConvergenceError, UserError
 from carillon.files import atomic_path, require_writable
 from carillon.runtime import limit_threads, warn_about_reference_blas
+from dataset_gen.element import DEFAULT_POISSON
 from dataset_gen.objectives import OBJECTIVES, require_objective
 from solver import coarsening, materials
 from solver.analysis import METHODS, SolverOptions, modal_analysis
@@ -200,6 +202,33 @@ def _objectives(options: argparse.Namespace, comm: MPI.Comm) -> None:
         _print_objectives(found)
 
 
+def _calibrate(options: argparse.Namespace, comm: MPI.Comm) -> None:
+    from carillon.provenance import record
+    from solver.calibration.constants import Constants
+    from solver.calibration.exact import make_cases
+    from solver.calibration.gauss_newton import calibrate, rms_by_material, say_step
+
+    if comm.size > 1:
+        raise UserError("calibrate runs on one rank; share its work with --workers instead")
+    require_writable(options.out)
+    paths = make_cases(Path(options.cases), options.seed, options.solids)
+    start = Constants.neutral()
+    found = calibrate(
+        paths, start, DEFAULT_POISSON, options.workers, options.steps, report=say_step
+    )
+    content = {
+        **found.constants.as_json(),
+        "provenance": {
+            **record({"solids": options.solids, "seed": options.seed, "steps": options.steps}),
+            "settled": found.settled,
+            "rms_before": rms_by_material(paths, start, options.workers),
+            "rms_after": rms_by_material(paths, found.constants, options.workers),
+        },
+    }
+    with atomic_path(options.out) as temporary:
+        temporary.write_text(json.dumps(content, indent=1) + "\n")
+
+
 def _print_objectives(found: dict[str, Any]) -> None:
     print(
         f"{found['n_dofs']:,} unknowns coarsened to {found['coarse_n_dofs']:,}; frequency errors "
@@ -337,6 +366,23 @@ def _parser() -> argparse.ArgumentParser:
     objectives.add_argument("--out", help="also write the result to this JSON file")
     objectives.add_argument("--json", action="store_true", help="print JSON")
     objectives.set_defaults(run=_objectives)
+
+    calibrate = commands.add_parser(
+        "calibrate", help="constants of the objective `calibrated` from spectra of random solids"
+    )
+    calibrate.add_argument(
+        "--solids", type=whole_number(1), default=300, help="random solids (default 300)"
+    )
+    calibrate.add_argument("--seed", type=whole_number(0), default=0, help="of the solids")
+    calibrate.add_argument(
+        "--steps", type=whole_number(1), default=10, help="Gauss-Newton steps at most (default 10)"
+    )
+    calibrate.add_argument("--workers", type=whole_number(1), default=1, help="processes")
+    calibrate.add_argument(
+        "--cases", required=True, help="folder that keeps the solids' exact spectra"
+    )
+    calibrate.add_argument("--out", required=True, help="JSON file to write")
+    calibrate.set_defaults(run=_calibrate)
     return parser
 
 

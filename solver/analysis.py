@@ -16,7 +16,7 @@ from solver.correction import EIGENVALUE_TOLERANCE, correct, default_guard
 from solver.decomposition import Decomposition, decompose
 from solver.eigensolver import TYPES
 from solver.hcms.synthesis import synthesize
-from solver.model import ElasticModel
+from solver.model import RIGID_MODES, ElasticModel
 from solver.system import System, assemble
 from solver.timing import Phases, peak_memory
 from solver.truth import RESIDUAL_TOLERANCE, can_count, prove_complete, solve_truth
@@ -24,8 +24,6 @@ from solver.truth import RESIDUAL_TOLERANCE, can_count, prove_complete, solve_tr
 Array = NDArray[np.float64]
 
 METHODS = ("hcms", *TYPES)
-RIGID_MODES = 6
-"""Zero-frequency modes of a connected free body."""
 RIGID_TOLERANCE = 1e-9
 """Eigenvalues below this fraction of the largest computed one count as zero."""
 ORTHOGONALITY_TOLERANCE = 1e-8

@@ -17,6 +17,9 @@ Array = NDArray[np.float64]
 ALL_OCTANTS = 255
 """Fill pattern of a cell whose eight octants are all filled."""
 
+RIGID_MODES = 6
+"""Motions without strain of a connected free body."""
+
 DEFAULT_DENSITY = 1000.0
 """Mass density [kg/m^3] where none is given."""
 

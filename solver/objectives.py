@@ -16,12 +16,12 @@ from carillon.errors import ConvergenceError
 from carillon.progress import track
 from dataset_gen.objectives import lumped_share
 from forests.baselines import average, galerkin
-from solver.analysis import RIGID_MODES, Modes, SolverOptions, modal_analysis
+from solver.analysis import Modes, SolverOptions, modal_analysis
 from solver.coarsening import CoarseMaterial, block_moduli, coarse_model, fit_distinct
 from solver.comparison import AUDIBLE_LAST, frequency_errors
 from solver.decomposition import on_root
 from solver.geometry import Blocks, blocks_from_mesh
-from solver.model import ElasticModel
+from solver.model import RIGID_MODES, ElasticModel
 from solver.modes_file import frequencies
 from solver.problem import Problem, ProblemOptions, build_problem
 
