@@ -70,15 +70,25 @@ def fine_frequencies(field: Array, count: int = 60, poisson: float = DEFAULT_POI
 
 
 def coarse_frequencies(
-    field: Array, coarsen: Coarsen, count: int = 60, poisson: float = DEFAULT_POISSON
+    field: Array,
+    coarsen: Coarsen,
+    count: int = 60,
+    poisson: float = DEFAULT_POISSON,
+    lumped_share: float = 0.0,
 ) -> Array:
-    """Frequencies after replacing each block by one element with moduli `coarsen(blocks)`."""
+    """Frequencies after replacing each block by one element with moduli `coarsen(blocks)`.
+
+    `lumped_share` of the mass is lumped where a block is filled.
+    """
     blocks = blocks_of(field)
     filled = blocks.any(axis=1)
     shape = tuple(n // 2 for n in field.shape)
     moduli = coarsen(blocks[filled])
     stiffness = COARSE_EDGE * np.einsum("mq,qab->mab", moduli, quadrature_stiffness(poisson))
     mass = np.einsum("mj,jab->mab", (blocks[filled] > 0).astype(float), coarse_cell_mass())
+    lumped = mass.sum(axis=2)[:, :, None] * np.eye(8)
+    share = lumped_share * blocks[filled].all(axis=1)
+    mass = mass + share[:, None, None] * (lumped - mass)
     return lowest(*assemble(lattice_cells(shape)[filled], stiffness, mass), count)
 
 

@@ -6,6 +6,7 @@ import pytest
 
 from carillon import cli
 from dataset_gen.generate import generate
+from dataset_gen.objectives import DEFAULT_OBJECTIVE
 from dataset_gen.shards import write_shard
 from forests.__main__ import main
 
@@ -27,7 +28,7 @@ def folder(tmp_path_factory):
 def test_inspect_tells_what_was_trained(folder, capsys):
     assert run("inspect", folder / "forests.h5", "--json") == 0
     found = json.loads(capsys.readouterr().out)
-    assert found["trees"] == 2 and found["objective"] == "factored"
+    assert found["trees"] == 2 and found["objective"] == DEFAULT_OBJECTIVE
     assert found["scores"]["training_samples"] == 1425
     assert run("inspect", folder / "forests.h5") == 0
     assert "2 x 2 trees" in capsys.readouterr().out
@@ -39,9 +40,13 @@ def test_table_compares_every_method_inside_and_outside_the_trained_range(folder
     assert len(rows) == 10
     errors = {(row["range_gpa"][0], row["method"]): row["mean_error_inertial"] for row in rows}
     for low in (0.0, 100.0):
-        assert errors[low, "factored, forests"] < errors[low, "Galerkin"] < errors[low, "average"]
+        assert (
+            errors[low, f"{DEFAULT_OBJECTIVE}, forests"]
+            < errors[low, "Galerkin"]
+            < errors[low, "average"]
+        )
     assert run("table", "--model", folder / "forests.h5", "--blocks", 5) == 0
-    assert "factored, forests" in capsys.readouterr().out
+    assert f"{DEFAULT_OBJECTIVE}, forests" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

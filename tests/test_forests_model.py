@@ -10,7 +10,7 @@ from sklearn.ensemble import ExtraTreesRegressor, RandomForestRegressor
 from carillon.errors import UserError
 from dataset_gen.block import symmetries
 from dataset_gen.generate import generate
-from dataset_gen.objectives import fit
+from dataset_gen.objectives import DEFAULT_OBJECTIVE, fit
 from dataset_gen.sampling import samples
 from forests import coarsen, load_model, save_model
 from forests.baselines import average, galerkin
@@ -122,7 +122,7 @@ def test_one_material_is_met_within_one_percent(models):
     scores = models["log"].scores
     assert scores["uniform_solid"] < 0.003
     young = np.full((1, 8), 70e9)
-    direct = fit("factored", young).moduli
+    direct = fit(DEFAULT_OBJECTIVE, young).moduli
     np.testing.assert_allclose(coarsen(models["log"], young), direct, rtol=0.003)
 
 
@@ -142,7 +142,11 @@ def test_file_round_trip_is_exact(models, transform, blocks, tmp_path):
         saved, kept = getattr(found.forests, field.name), getattr(model.forests, field.name)
         assert saved.dtype == kept.dtype
         np.testing.assert_array_equal(saved, kept)
-    assert (found.objective, found.poisson, found.transform) == ("factored", 0.25, transform)
+    assert (found.objective, found.poisson, found.transform) == (
+        DEFAULT_OBJECTIVE,
+        0.25,
+        transform,
+    )
     assert found.scores == model.scores
     np.testing.assert_array_equal(coarsen(found, blocks), coarsen(model, blocks))
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from carillon.progress import say
 from dataset_gen.objectives.calibrated import unit_moduli
 from dataset_gen.objectives.calibration import octant_orbits
+from dataset_gen.serial import serial_blas
 from solver.calibration.cases import Case, read_case
 from solver.calibration.constants import Constants, patterns
 
@@ -55,6 +56,7 @@ def _case(path: Path) -> Case:
     return read_case(path)
 
 
+@serial_blas
 def _contribution(path: Path, vector: Array) -> _Sum:
     """Mean squared error of one case and its Gauss-Newton derivatives."""
     errors, columns = _case(path).linearised(Constants(vector))
