@@ -14,9 +14,6 @@ QUEUE = 2
 WINDOW = 4
 """Tasks dealt ahead of the one awaited, per process."""
 
-PAUSE = 1e-3
-"""Seconds to wait for others before looking after the work of this process again."""
-
 
 class Others(Protocol):
     """The other processes of a crew, numbered from 0."""
@@ -27,8 +24,8 @@ class Others(Protocol):
     def send(self, other: int, task: int) -> None:
         """Give one of them a task."""
 
-    def receive(self, seconds: float) -> tuple[int, int, bytes] | None:
-        """Who has done which task, and its rows; None if nobody has within so many seconds."""
+    def receive(self) -> tuple[int, int, bytes] | None:
+        """Who has done which task, and its rows; None if nobody has after a moment's waiting."""
 
 
 def lead(plan: Plan, tasks: range, others: Others) -> Generator[bytes, None, None]:
@@ -46,7 +43,7 @@ def lead(plan: Plan, tasks: range, others: Others) -> Generator[bytes, None, Non
             while own and own[0][1].done():
                 task, future = own.pop(0)
                 dealer.keep(task, future.result())
-            if (found := others.receive(PAUSE)) is not None:
+            if (found := others.receive()) is not None:
                 other, task, work = found
                 dealer.keep(task, work)
                 free.append(other)

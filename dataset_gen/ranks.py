@@ -13,12 +13,15 @@ from typing import Any
 from carillon.cli import EXIT_BAD_INPUT
 from carillon.errors import UserError
 from carillon.progress import say
-from dataset_gen.crew import PAUSE, lead
+from dataset_gen.crew import lead
 from dataset_gen.generate import Engine
 from dataset_gen.tasks import Plan
 
 Comm = Any
 """mpi4py's communicator; mpi4py is imported only where a launcher started several ranks."""
+
+PAUSE = 1e-3
+"""Seconds between two looks for messages, so that waiting takes no core from the work."""
 
 _LAUNCHERS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS")
 
@@ -108,10 +111,10 @@ class _Ranks:
         """Hand over a task."""
         self._comm.send(task, dest=other + 1)
 
-    def receive(self, seconds: float) -> tuple[int, int, bytes] | None:
-        """A finished task, if there is one within so many seconds."""
+    def receive(self) -> tuple[int, int, bytes] | None:
+        """A finished task, if there is one after a `PAUSE`."""
         if not self._comm.iprobe():
-            time.sleep(seconds)
+            time.sleep(PAUSE)
             if not self._comm.iprobe():
                 return None
         rank, task, work = self._comm.recv()
@@ -123,7 +126,7 @@ def _follow(comm: Comm) -> int:
     plan: Plan | None = None
     while True:
         while not comm.iprobe(source=0):
-            time.sleep(PAUSE)  # takes no core from others
+            time.sleep(PAUSE)
         order = comm.recv(source=0)
         if isinstance(order, _End):
             return order.status

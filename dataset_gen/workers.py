@@ -15,6 +15,9 @@ from carillon.progress import say
 from dataset_gen.crew import lead
 from dataset_gen.tasks import Plan
 
+PATIENCE = 1e-2
+"""Seconds to wait for the others at most; a result ends the waiting at once."""
+
 
 def in_this_process(plan: Plan, tasks: range) -> Generator[bytes, None, None]:
     """Results of `tasks` in order, one after the other."""
@@ -67,9 +70,9 @@ class _Workers:
         with suppress(BrokenPipeError):  # how it died is told by `receive`
             self._pipes[other].send(task)
 
-    def receive(self, seconds: float) -> tuple[int, int, bytes] | None:
-        """A finished task, if there is one within so many seconds."""
-        ready = wait(self._pipes, seconds)
+    def receive(self) -> tuple[int, int, bytes] | None:
+        """A finished task, if there is one within `PATIENCE`."""
+        ready = wait(self._pipes, PATIENCE)
         if not ready:
             return None
         other = next(k for k, pipe in enumerate(self._pipes) if pipe is ready[0])
