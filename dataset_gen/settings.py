@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 from carillon import __version__
@@ -14,6 +17,24 @@ from dataset_gen.sampling import Moduli, moduli, shard_range
 
 SEED_BITS = 63
 """Seeds fit into a signed integer of the file format."""
+
+
+_ROW_MAKERS = ("block.py", "element.py", "sampling.py", "objectives")
+"""Files and folders of this package that samples and fits come from."""
+
+
+@cache
+def code_of_rows() -> str:
+    """Short SHA-256 of the code and constants that samples and fits come from.
+
+    Rows of one version of Carillon may still change while it is being worked on.
+    """
+    digest = hashlib.sha256()
+    for path in (Path(__file__).parent / name for name in _ROW_MAKERS):
+        for file in sorted(path.iterdir()) if path.is_dir() else [path]:
+            if file.suffix in (".py", ".json"):
+                digest.update(file.name.encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()[:12]
 
 
 @dataclass(frozen=True)
@@ -31,7 +52,8 @@ class Settings:
     distribution: str
     low: float
     high: float
-    version: str = __version__
+    version: str
+    code: str
 
     @property
     def count(self) -> int:
@@ -63,6 +85,7 @@ _LABELS = {
     "low": "moduli from",
     "high": "moduli up to",
     "version": "Carillon",
+    "code": "samples or fits by the code",
 }
 
 
@@ -92,7 +115,16 @@ def settings_of(
     drawn = moduli(distribution, low, high)
     start, stop = shard_range(total, shard, shards)
     return Settings(
-        objective, float(poisson), seed, start, stop, drawn.distribution, drawn.low, drawn.high
+        objective=objective,
+        poisson=float(poisson),
+        seed=seed,
+        start=start,
+        stop=stop,
+        distribution=drawn.distribution,
+        low=drawn.low,
+        high=drawn.high,
+        version=__version__,
+        code=code_of_rows(),
     )
 
 
@@ -105,5 +137,5 @@ def settings_from(values: Mapping[str, Any]) -> Settings:
         If a value is missing or no such value.
     """
     types = {"objective": str, "poisson": float, "seed": int, "start": int, "stop": int}
-    types |= {"distribution": str, "low": float, "high": float, "version": str}
+    types |= {"distribution": str, "low": float, "high": float, "version": str, "code": str}
     return Settings(**{name: convert(values[name]) for name, convert in types.items()})

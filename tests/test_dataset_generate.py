@@ -18,6 +18,7 @@ import pytest
 from carillon.errors import UserError
 from dataset_gen import generate as generate_module
 from dataset_gen import journal as journal_module
+from dataset_gen import settings as settings_module
 from dataset_gen.crew import Dealer
 from dataset_gen.generate import engine_of, generate_file
 from dataset_gen.journal import Journal, journal_of
@@ -301,6 +302,12 @@ def test_a_journal_of_other_settings_is_refused_and_kept(begun, plan, message):
     with pytest.raises(UserError, match=message):
         make(begun, plan)
     assert journal_of(begun).read_bytes() == before
+
+
+def test_fits_of_other_code_are_not_mixed(begun, monkeypatch):
+    monkeypatch.setattr(settings_module, "code_of_rows", lambda: "other")
+    with pytest.raises(UserError, match="samples or fits by the code [0-9a-f]{12} where other is"):
+        make(begun)
 
 
 def test_one_shard_is_generated_once_at_a_time(path, start):
