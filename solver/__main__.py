@@ -206,14 +206,16 @@ def _calibrate(options: argparse.Namespace, comm: MPI.Comm) -> None:
     from carillon.provenance import record
     from solver.calibration.constants import Constants
     from solver.calibration.exact import make_cases
-    from solver.calibration.gauss_newton import calibrate, rms_by_material, say_step
+    from solver.calibration.gauss_newton import calibrate_in_turn, rms_by_material, say_step
 
     if comm.size > 1:
         raise UserError("calibrate runs on one rank; share its work with --workers instead")
     require_writable(options.out)
-    paths = make_cases(Path(options.cases), options.seed, options.solids)
+    paths = make_cases(
+        Path(options.cases), options.seed, options.solids, objects=not options.random_only
+    )
     start = Constants.neutral()
-    found = calibrate(
+    found = calibrate_in_turn(
         paths, start, DEFAULT_POISSON, options.workers, options.steps, report=say_step
     )
     content = {
@@ -371,7 +373,10 @@ def _parser() -> argparse.ArgumentParser:
         "calibrate", help="constants of the objective `calibrated` from spectra of random solids"
     )
     calibrate.add_argument(
-        "--solids", type=whole_number(1), default=300, help="random solids (default 300)"
+        "--solids", type=whole_number(1), default=150, help="random solids (default 150)"
+    )
+    calibrate.add_argument(
+        "--random-only", action="store_true", help="leave the built-in objects out"
     )
     calibrate.add_argument("--seed", type=whole_number(0), default=0, help="of the solids")
     calibrate.add_argument(

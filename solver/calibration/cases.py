@@ -54,7 +54,7 @@ class Case:
 
     Attributes
     ----------
-    name : number and material.
+    name : of the shape and of the material, with a colon between.
     model : coarse model; its moduli are placeholders.
     blocks : (mc, 8) fine moduli [Pa], 0 where void.
     exact : (k,) elastic angular frequencies [rad/s] of the fine model.

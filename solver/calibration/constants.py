@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dataset_gen.objectives import orientations
-from dataset_gen.objectives.calibration import Calibration, octant_orbits
+from dataset_gen.objectives.calibration import ALL_FILLED, Calibration, octant_orbits
 
 Array = NDArray[np.float64]
 
@@ -69,3 +69,9 @@ def patterns() -> list[int]:
     """Least void pattern of each class under the cube's symmetries."""
     images, _ = orientations()
     return [mask for mask in range(1, 256) if images[mask] == mask]
+
+
+def filled_places() -> NDArray[np.int64]:
+    """Places of the constants of blocks without void cells: factor, exponent and lumped share."""
+    numbers, count = octant_orbits()
+    return np.array([numbers[ALL_FILLED, 0], count + 3 + FILLED, count + 3 + LUMPED])

@@ -16,9 +16,10 @@ from dataset_gen.objectives.calibrated import unit_moduli
 from dataset_gen.objectives.calibration import octant_orbits
 from dataset_gen.serial import serial_blas
 from solver.calibration.cases import Case, read_case
-from solver.calibration.constants import Constants, patterns
+from solver.calibration.constants import Constants, filled_places, patterns
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 LEAST, LARGEST = 0.01, 4.0
 """Bounds of the coarse moduli of a block of one material, relative to it.
@@ -84,6 +85,7 @@ def calibrate(
     poisson: float,
     workers: int = 1,
     steps: int = 8,
+    free: Integers | None = None,
     report: Callable[[int, Progress], None] | None = None,
 ) -> Progress:
     """Minimise the mean squared logarithmic error of all cases' frequencies.
@@ -95,9 +97,13 @@ def calibrate(
     poisson : Poisson's ratio of the cases.
     workers : processes that share the cases.
     steps : largest number of steps.
+    free : places of the constants to find, all if not given.
     report : called after each step with its number.
     """
     low, high = bounds(poisson)
+    if free is not None:
+        low, high = np.copy(start.vector), np.copy(start.vector)
+        low[free], high[free] = (bound[free] for bound in bounds(poisson))
     pool = Parallel(n_jobs=workers, batch_size=1)
 
     def total(vector: Array) -> _Sum:
@@ -132,15 +138,35 @@ def calibrate(
 
 def _step(state: _Sum, vector: Array, low: Array, high: Array, damping: float) -> Array:
     """Damped step of the constants that do not press against a bound."""
-    pressed = ((vector <= low) & (state.gradient > 0.0)) | (
-        (vector >= high) & (state.gradient < 0.0)
-    )
+    down, up = vector <= low, vector >= high
+    pressed = (down & (state.gradient > 0.0)) | (up & (state.gradient < 0.0)) | (down & up)
     free = np.flatnonzero(~pressed)
     matrix = state.hessian[np.ix_(free, free)]
     matrix = matrix + damping * np.diag(np.diag(matrix))
     step = np.zeros_like(vector)
     step[free] = -np.linalg.solve(matrix, state.gradient[free])
     return np.clip(step, -LONGEST_STEP, LONGEST_STEP)
+
+
+def calibrate_in_turn(
+    paths: Sequence[Path],
+    start: Constants,
+    poisson: float,
+    workers: int = 1,
+    steps: int = 8,
+    report: Callable[[int, Progress], None] | None = None,
+) -> Progress:
+    """First the constants of filled blocks, from solids without void cells; then the others.
+
+    All at once, those of filled blocks would make up for what no factor can mend at a surface.
+    """
+    filled = filled_places()
+    solid = [path for path in paths if _case(path).filled.all()]
+    if solid:
+        first = calibrate(solid, start, poisson, workers, steps, filled, report)
+        start = first.constants
+    others = np.setdiff1d(np.arange(len(start.vector)), filled)
+    return calibrate(paths, start, poisson, workers, steps, others, report)
 
 
 def rms_by_material(paths: Sequence[Path], constants: Constants, workers: int) -> dict[str, float]:
@@ -157,7 +183,7 @@ def rms_by_material(paths: Sequence[Path], constants: Constants, workers: int) -
 def _squares(path: Path, vector: Array) -> tuple[str, float]:
     case = _case(path)
     errors = np.expm1(case.errors(Constants(vector)))
-    return case.name.split("-", 1)[1], float(np.mean(errors**2))
+    return case.name.rsplit(":", 1)[1], float(np.mean(errors**2))
 
 
 def say_step(number: int, state: Progress) -> None:
