@@ -218,10 +218,14 @@ def _calibrate(options: argparse.Namespace, comm: MPI.Comm) -> None:
     found = calibrate_in_turn(
         paths, start, DEFAULT_POISSON, options.workers, options.steps, report=say_step
     )
+    source = record(
+        {name: getattr(options, name) for name in ("solids", "random_only", "seed", "steps")}
+    )
+    del source["command"]  # It names folders of this machine, and the file goes into the package.
     content = {
         **found.constants.as_json(),
         "provenance": {
-            **record({"solids": options.solids, "seed": options.seed, "steps": options.steps}),
+            **source,
             "settled": found.settled,
             "rms_before": rms_by_material(paths, start, options.workers),
             "rms_after": rms_by_material(paths, found.constants, options.workers),

@@ -18,9 +18,9 @@ from dataset_gen.objectives.calibration import (
     parse,
 )
 from solver.calibration.cases import read_case
-from solver.calibration.constants import LUMPED, Constants, patterns
+from solver.calibration.constants import LUMPED, Constants, filled_places, patterns
 from solver.calibration.exact import make_cases
-from solver.calibration.gauss_newton import bounds, calibrate
+from solver.calibration.gauss_newton import bounds, calibrate, calibrate_in_turn
 from solver.calibration.solids import CELLS, random_solid
 from solver.model import ElasticModel
 from tests import solids
@@ -135,6 +135,15 @@ def test_the_search_lowers_the_errors_within_bounds_for_any_number_of_workers(pa
     low, high = bounds(0.25)
     assert ((one.constants.vector >= low) & (one.constants.vector <= high)).all()
     assert 0.0 <= one.constants.vector[LUMPED] <= 1.0
+
+
+def test_filled_blocks_are_left_to_solids_without_voids(paths):
+    start = Constants.neutral()
+    hollow = [path for path in paths if not read_case(path).filled.all()]
+    found = calibrate_in_turn(hollow, start, 0.25, steps=1).constants.vector
+    kept = filled_places()
+    assert np.array_equal(found[kept], start.vector[kept])
+    assert not np.array_equal(found, start.vector)
 
 
 def test_calibrate_writes_a_file_that_parses(tmp_path, run_cli):
