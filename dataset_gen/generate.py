@@ -24,7 +24,7 @@ from dataset_gen.workers import in_this_process, in_workers
 Engine = Callable[[Plan, range], Generator[bytes, None, None]]
 """Yields the results of tasks in order; see `dataset_gen.workers` and `dataset_gen.ranks`."""
 
-_ENVIRONMENT = ("commit", "versions", "processor", "blas")
+_ENVIRONMENT = ("commit", "versions", "processor")
 """What an interrupted shard may have different when it is gone on with."""
 
 

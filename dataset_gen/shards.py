@@ -90,12 +90,13 @@ def shard_of(settings: Settings, rows: NDArray[np.void], origin: dict[str, Any])
 def origin_of(settings: Settings, total: int, shard: int, shards: int) -> dict[str, Any]:
     """Provenance of a shard: that of any result, less what must not matter.
 
-    The command is the one that makes this shard with one process on one rank, and the number of
-    cores is left out, so that a shard has the same bytes however it was made.
+    The command is the one that makes this shard with one process on one rank. The number of cores
+    and the BLAS, which may be PETSc's if that is loaded too and which fits do not call, are left
+    out, so that a shard has the same bytes however it was made.
     """
     split = {"samples": total, "shard": shard, "shards": shards}
     found = provenance.record({**settings.as_dict(), **split})
-    del found["cores"]
+    del found["cores"], found["blas"]
     named = {"seed": settings.seed, **split, "objective": settings.objective}
     named |= {"poisson": settings.poisson, "distribution": settings.distribution}
     named |= {"low": settings.low, "high": settings.high}
