@@ -13,9 +13,11 @@ from carillon.files import require_writable
 from carillon.progress import say
 from dataset_gen.shards import read_shards
 from forests import summary, table
-from forests.model import load_model, save_model
+from forests.methods import load_models
+from forests.model import save_model
 from forests.scaling import TRANSFORMS
 from forests.structure import GROWERS
+from forests.table_plot import plot, require_plottable
 from forests.train import Training, parameters_of, train
 
 
@@ -37,9 +39,10 @@ def _parser() -> Parser:
     learn.add_argument("--seed", type=whole_number(0), default=default.seed)
     learn.add_argument("--workers", type=whole_number(1), default=1, help="threads")
     compare = commands.add_parser("table", help="error, cost and storage of every coarsening")
-    compare.add_argument("--model", required=True)
-    compare.add_argument("--blocks", type=whole_number(1), default=1000)
+    compare.add_argument("--model", action="append", help="forests to compare, may be repeated")
+    compare.add_argument("--blocks", type=whole_number(1), default=10_000, help="of each range")
     compare.add_argument("--seed", type=whole_number(0), default=0)
+    compare.add_argument("--plot", metavar="FILE", help="error over cost, as .png, .svg or .pdf")
     compare.add_argument("--json", action="store_true")
     show = commands.add_parser("inspect", help="validate and summarise a model")
     show.add_argument("file")
@@ -58,18 +61,29 @@ def _train(arguments: argparse.Namespace) -> None:
     say(f"{arguments.out}: {len(model.forests.low):,} leaves{scores}")
 
 
+def _table(arguments: argparse.Namespace) -> list[table.Row]:
+    if arguments.plot:
+        require_writable(require_plottable(arguments.plot))
+    models = load_models(arguments.model)
+    rows = table.table(models, arguments.blocks, arguments.seed)
+    if arguments.plot:
+        plot(rows, arguments.plot)
+    return rows
+
+
 def main(argv: list[str] | None = None) -> None:
     """Run one command."""
     arguments = _parser().parse_args(argv)
     if arguments.command == "train":
         _train(arguments)
         return
+    result: object
     if arguments.command == "table":
-        result = table.table(load_model(arguments.model), arguments.blocks, arguments.seed)
-        text = table.as_text(result)
+        result = rows = _table(arguments)
+        text = table.as_text(rows)
     else:
-        result = summary.describe(arguments.file)
-        text = summary.as_text(result)
+        result = found = summary.describe(arguments.file)
+        text = summary.as_text(found)
     print(json.dumps(result, indent=2) if arguments.json else text)
 
 
