@@ -25,6 +25,9 @@ from dataset_gen.element import (
 FINE_EDGE = 1.0
 COARSE_EDGE = 2.0
 
+ALL_FILLED = 0b11111111
+"""Void pattern without void cells; bit j of a pattern is set where cell j is filled."""
+
 NODES: NDArray[np.int64] = np.array(
     [[x, y, z] for z in range(3) for y in range(3) for x in range(3)]
 )
@@ -120,3 +123,18 @@ def symmetries() -> NDArray[np.int64]:
     table = np.array(images, dtype=np.int64)
     table.setflags(write=False)
     return table
+
+
+@cache
+def pattern_images() -> NDArray[np.int64]:
+    """Images (256, 48) of every void pattern under the cube's symmetries."""
+    filled = np.arange(256)[:, None] >> np.arange(8) & 1
+    images = filled @ (1 << symmetries()).T
+    images.setflags(write=False)
+    return images
+
+
+def least_patterns() -> list[int]:
+    """Least void pattern of each of the 21 classes under the cube's symmetries, all void aside."""
+    least = pattern_images().min(axis=1)
+    return [mask for mask in range(1, 256) if least[mask] == mask]

@@ -13,7 +13,7 @@ from numpy.random import Generator, Philox
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from dataset_gen.block import symmetries
+from dataset_gen.block import least_patterns, pattern_images, symmetries
 from dataset_gen.element import Array
 
 DISTRIBUTIONS = {"uniform": (0.0, 10.0), "log-uniform": (0.01, 1000.0)}
@@ -146,11 +146,8 @@ class Mixture:
 @cache
 def pattern_classes() -> list[NDArray[np.int64]]:
     """The 21 classes of the 255 fill patterns (bit masks) under the 48 symmetries; full is last."""
-    bits = 1 << symmetries()
-    masks = np.arange(1, 256)
-    filled = (masks[:, None] >> np.arange(8) & 1).astype(bool)
-    least = np.where(filled[:, None], bits[None], 0).sum(axis=2).min(axis=1)
-    return [masks[least == representative] for representative in np.unique(least)]
+    least = pattern_images().min(axis=1)
+    return [np.flatnonzero(least == representative) for representative in least_patterns()]
 
 
 @cache

@@ -8,14 +8,11 @@ from typing import TypedDict, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from dataset_gen.block import coarse_cell_mass
+from dataset_gen.block import ALL_FILLED, coarse_cell_mass
 from dataset_gen.element import DEFAULT_POISSON, quadrature_stiffness
 from solver.geometry import HexMesh
 
 Array = NDArray[np.float64]
-
-ALL_OCTANTS = 255
-"""Fill pattern of a cell whose eight octants are all filled."""
 
 RIGID_MODES = 6
 """Motions without strain of a connected free body."""
@@ -74,7 +71,7 @@ class ElasticModel:
         octants = np.unpackbits(self.fill[cells][:, None], axis=1, bitorder="little")
         scale = self.density * (self.mesh.edge / 2.0) ** 3
         mass = (scale * octants @ coarse_cell_mass().reshape(8, 64)).reshape(-1, 8, 8)
-        share = np.where(self.fill[cells] == ALL_OCTANTS, self.lumped_share, 0.0)
+        share = np.where(self.fill[cells] == ALL_FILLED, self.lumped_share, 0.0)
         if self.lumped:
             share[:] = 1.0
         lumped = mass.sum(axis=2)[:, :, None] * np.eye(8)
@@ -100,6 +97,6 @@ def fine_model(mesh: HexMesh, young: Array, **constants: Unpack[Constants]) -> E
     return ElasticModel(
         mesh,
         np.repeat(young[:, None], 8, axis=1),
-        np.full(mesh.n_cells, ALL_OCTANTS, dtype=np.uint8),
+        np.full(mesh.n_cells, ALL_FILLED, dtype=np.uint8),
         **constants,
     )

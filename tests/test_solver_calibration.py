@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from carillon.errors import UserError
+from dataset_gen.block import ALL_FILLED, least_patterns
 from dataset_gen.objectives import fit, orientations
 from dataset_gen.objectives.calibrated import combine
 from dataset_gen.objectives.calibration import (
@@ -18,7 +19,7 @@ from dataset_gen.objectives.calibration import (
     parse,
 )
 from solver.calibration.cases import read_case
-from solver.calibration.constants import LUMPED, Constants, filled_places, patterns
+from solver.calibration.constants import LUMPED, Constants, filled_places
 from solver.calibration.exact import make_cases
 from solver.calibration.gauss_newton import bounds, calibrate, calibrate_in_turn
 from solver.calibration.solids import CELLS, random_solid
@@ -35,17 +36,17 @@ def test_octants_of_one_orbit_are_exchanged_by_symmetries():
     """79 free factors, counted by hand from the 21 classes' symmetry groups."""
     numbers, count = octant_orbits()
     assert count == 79
-    assert len(patterns()) == 21
-    filled = numbers[patterns()]
+    assert len(least_patterns()) == 21
+    filled = numbers[least_patterns()]
     assert np.array_equal(np.unique(filled), np.arange(count))
-    assert len(np.unique(numbers[255])) == 1
+    assert len(np.unique(numbers[ALL_FILLED])) == 1
     assert len(np.unique(numbers[0b1111])) == 2
 
 
 def test_neutral_constants_leave_factored():
     neutral = Calibration(np.ones((256, 8)), 0.0, 0.0, 0.0, {})
     rng = np.random.default_rng(0)
-    for mask in patterns():
+    for mask in least_patterns():
         filled = (mask >> np.arange(8) & 1).astype(float)
         young = filled * rng.uniform(0.1, 10.0, (3, 8))
         held = fit("oversampled", young).moduli
@@ -57,10 +58,10 @@ def test_neutral_constants_leave_factored():
 def test_blocks_of_one_material_get_the_factors():
     calibration = default_calibration()
     images, _ = orientations()
-    one = (np.array(patterns())[:, None] >> np.arange(8) & 1).astype(float)
+    one = (np.array(least_patterns())[:, None] >> np.arange(8) & 1).astype(float)
     ratio = fit("calibrated", 3.0 * one).moduli / (3.0 * fit("factored", one).moduli)
-    np.testing.assert_allclose(ratio, calibration.factors[patterns()], rtol=1e-9)
-    assert set(images[1:]) == set(patterns())
+    np.testing.assert_allclose(ratio, calibration.factors[least_patterns()], rtol=1e-9)
+    assert set(images[1:]) == set(least_patterns())
 
 
 def test_a_vector_of_constants_survives_its_file():
@@ -80,7 +81,7 @@ def test_a_broken_calibration_is_refused(content):
 @pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
 def test_lumping_a_share_moves_no_mass(share):
     mesh = solids.box_mesh(3, 2, 2)
-    fill = np.full(mesh.n_cells, 255, dtype=np.uint8)
+    fill = np.full(mesh.n_cells, ALL_FILLED, dtype=np.uint8)
     fill[0] = 0b1111
     model = ElasticModel(mesh, np.ones((mesh.n_cells, 8)), fill)
     mixed = replace(model, lumped_share=share).nodal_mass()

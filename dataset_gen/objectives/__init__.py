@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from carillon.errors import UserError
-from dataset_gen.block import symmetries
+from dataset_gen.block import pattern_images, symmetries
 from dataset_gen.element import DEFAULT_POISSON, Array
 from dataset_gen.objectives import (
     calibrated,
@@ -96,9 +96,7 @@ def orientations() -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
     Cell j of the pattern is cell [mask, j] of its image.
     """
-    bits = 1 << symmetries()
-    filled = np.arange(256)[:, None] >> np.arange(8) & 1
-    images = filled @ bits.T
+    images = pattern_images()
     return images.min(axis=1), symmetries()[images.argmin(axis=1)]
 
 

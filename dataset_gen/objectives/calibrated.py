@@ -14,41 +14,25 @@ symmetries exchange keep it equivariant.
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 
-from dataset_gen.block import galerkin_moduli
+from dataset_gen.block import ALL_FILLED, galerkin_moduli
 from dataset_gen.element import Array
-from dataset_gen.objectives import inertial, oversampled
-from dataset_gen.objectives.calibration import ALL_FILLED, Calibration, default_calibration
+from dataset_gen.objectives import oversampled
+from dataset_gen.objectives.calibration import Calibration, default_calibration
+from dataset_gen.objectives.factored import held_unit_moduli, unit_block, unit_moduli
 from dataset_gen.objectives.quadratic import PatternFits
 
 
-def contrast_logs(young: Array, held: Array, mask: int, poisson: float) -> tuple[Array, Array]:
-    """`log O(e)/O(1_p)` and `log G(e)/G(1_p)` (n, 8) of blocks with the moduli `held` = O(e)."""
-    unit = _unit_block(mask)
+def contrast_logs(young: Array, held: Array, unit: Array, held_unit: Array) -> tuple[Array, Array]:
+    """`log O(e)/O(1_p)` and `log G(e)/G(1_p)` (n, 8) of blocks e = `young` (n, 8).
+
+    `unit` are the blocks 1_p, (n, 8) or one for all; `held` and `held_unit` the moduli O of both.
+    """
     return (
-        np.log(held / _held_unit(mask, poisson)),
+        np.log(held / held_unit),
         np.log(galerkin_moduli(young) / galerkin_moduli(unit)),
     )
-
-
-@cache
-def unit_moduli(mask: int, poisson: float) -> Array:
-    """E_free(1_p) (8,): coarse moduli of a block of one material before calibration."""
-    if mask == ALL_FILLED:
-        return _held_unit(mask, poisson)
-    return np.asarray(inertial.fit_pattern(_unit_block(mask), mask, poisson).moduli[0])
-
-
-@cache
-def _held_unit(mask: int, poisson: float) -> Array:
-    return np.asarray(oversampled.fit_pattern(_unit_block(mask), mask, poisson).moduli[0])
-
-
-def _unit_block(mask: int) -> Array:
-    return (mask >> np.arange(8) & 1).astype(float)[None]
 
 
 def combine(
@@ -57,7 +41,7 @@ def combine(
     """Moduli (n, 8) of blocks with the moduli `held` of `oversampled`."""
     filled = mask == ALL_FILLED
     share = calibration.galerkin_filled if filled else calibration.galerkin_void
-    ours, projected = contrast_logs(young, held, mask, poisson)
+    ours, projected = contrast_logs(young, held, unit_block(mask), held_unit_moduli(mask, poisson))
     contrast = np.exp((1.0 - share) * ours + share * projected)
     return np.asarray(calibration.factors[mask] * unit_moduli(mask, poisson) * contrast)
 

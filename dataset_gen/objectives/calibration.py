@@ -17,10 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from dataset_gen.block import symmetries
+from dataset_gen.block import least_patterns, pattern_images, symmetries
 from dataset_gen.element import Array
-
-ALL_FILLED = 0b11111111
 
 FILE = "calibration.json"
 """Beside this module; written by `python -m solver calibrate`."""
@@ -56,11 +54,8 @@ def octant_orbits() -> tuple[NDArray[np.int64], int]:
     """
     numbers = np.zeros((256, 8), dtype=np.int64)
     count = 0
-    for mask in range(1, 256):
-        images = ((mask >> np.arange(8) & 1) << symmetries()).sum(axis=1)
-        if images.min() < mask:
-            continue
-        exchanged = symmetries()[images == mask].min(axis=0)
+    for mask in least_patterns():
+        exchanged = symmetries()[pattern_images()[mask] == mask].min(axis=0)
         _, orbit = np.unique(exchanged, return_inverse=True)
         numbers[mask] = count + orbit.ravel()
         count += int(orbit.max()) + 1

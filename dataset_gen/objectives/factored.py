@@ -14,21 +14,31 @@ from functools import cache
 import numpy as np
 
 from dataset_gen.element import Array
-from dataset_gen.objectives import inertial, oversampled
+from dataset_gen.objectives import hybrid, oversampled
 from dataset_gen.objectives.quadratic import PatternFits
 
-ALL_FILLED = 0b11111111
+
+def unit_block(mask: int) -> Array:
+    """1_p (1, 8): the block of unit modulus with the void pattern `mask`."""
+    return (mask >> np.arange(8) & 1).astype(float)[None]
+
+
+@cache
+def unit_moduli(mask: int, poisson: float) -> Array:
+    """Moduli (8,) of 1_p: `E_inertial(1_p)`, or `E_oversampled(1_p)` if all cells are filled."""
+    return np.asarray(hybrid.fit_pattern(unit_block(mask), mask, poisson).moduli[0])
+
+
+@cache
+def held_unit_moduli(mask: int, poisson: float) -> Array:
+    """`E_oversampled(1_p)` (8,)."""
+    return np.asarray(oversampled.fit_pattern(unit_block(mask), mask, poisson).moduli[0])
 
 
 @cache
 def pattern_correction(mask: int, poisson: float) -> Array:
     """`E_inertial(1_p) / E_oversampled(1_p)` (8,) of the pattern `mask`; ones if all are filled."""
-    if mask == ALL_FILLED:
-        return np.ones(8)
-    unit = (mask >> np.arange(8) & 1).astype(float)[None]
-    free = inertial.fit_pattern(unit, mask, poisson).moduli[0]
-    held = oversampled.fit_pattern(unit, mask, poisson).moduli[0]
-    return np.asarray(free / held)
+    return np.asarray(unit_moduli(mask, poisson) / held_unit_moduli(mask, poisson))
 
 
 def fit_pattern(young: Array, mask: int, poisson: float) -> PatternFits:

@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import eigsh
 
 from carillon.files import create_h5, open_h5
-from dataset_gen.block import degrees_of_freedom, galerkin_moduli
+from dataset_gen.block import ALL_FILLED, degrees_of_freedom
 from dataset_gen.element import quadrature_stiffness
 from dataset_gen.objectives import fit, orientations
+from dataset_gen.objectives.calibrated import contrast_logs
 from dataset_gen.objectives.calibration import octant_orbits
 from solver.calibration.constants import FILLED, LUMPED, VOID, Constants
 from solver.geometry.hexmesh import hexmesh_from_grid
-from solver.model import ALL_OCTANTS, RIGID_MODES, ElasticModel
+from solver.model import RIGID_MODES, ElasticModel
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -73,7 +74,7 @@ class Case:
     @cached_property
     def filled(self) -> NDArray[np.bool_]:
         """Which blocks (mc,) have no void cell."""
-        return np.asarray(self.model.fill == ALL_OCTANTS)
+        return np.asarray(self.model.fill == ALL_FILLED)
 
     @cached_property
     def orbits(self) -> Integers:
@@ -89,10 +90,8 @@ class Case:
         one = (self.blocks > 0.0).astype(float)
         poisson = self.model.poisson
         held, held_one = (fit("oversampled", e, poisson).moduli for e in (self.blocks, one))
-        free_one = fit("inertial", one, poisson).moduli
-        unit = np.where(self.filled[:, None], held_one, free_one)
-        ours = np.log(held / held_one)
-        projected = np.log(galerkin_moduli(self.blocks) / galerkin_moduli(one))
+        unit = fit("hybrid", one, poisson).moduli
+        ours, projected = contrast_logs(self.blocks, held, one, held_one)
         return Logs(np.log(unit) + ours, projected - ours)
 
     @cached_property

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dataset_gen.objectives import orientations
-from dataset_gen.objectives.calibration import ALL_FILLED, Calibration, octant_orbits
+from dataset_gen.block import ALL_FILLED, least_patterns
+from dataset_gen.objectives.calibration import Calibration, octant_orbits
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ class Constants:
         """The vector of a calibration."""
         numbers, count = octant_orbits()
         vector = np.zeros(count + 3)
-        for mask in patterns():
+        for mask in least_patterns():
             vector[numbers[mask]] = np.log(calibration.factors[mask])
         vector[[FILLED, VOID, LUMPED]] = (
             calibration.galerkin_filled,
@@ -55,7 +55,7 @@ class Constants:
         return {
             "factors": {
                 str(mask): [round(float(f), 4) for f in np.exp(self.vector[numbers[mask]])]
-                for mask in patterns()
+                for mask in least_patterns()
             },
             "galerkin_share": {
                 "filled": round(float(self.vector[FILLED]), 4),
@@ -63,12 +63,6 @@ class Constants:
             },
             "lumped_share": round(self.lumped_share, 4),
         }
-
-
-def patterns() -> list[int]:
-    """Least void pattern of each class under the cube's symmetries."""
-    images, _ = orientations()
-    return [mask for mask in range(1, 256) if images[mask] == mask]
 
 
 def filled_places() -> NDArray[np.int64]:

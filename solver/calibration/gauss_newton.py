@@ -12,11 +12,12 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from carillon.progress import say
-from dataset_gen.objectives.calibrated import unit_moduli
+from dataset_gen.block import least_patterns
 from dataset_gen.objectives.calibration import octant_orbits
+from dataset_gen.objectives.factored import unit_moduli
 from dataset_gen.serial import serial_blas
 from solver.calibration.cases import Case, read_case
-from solver.calibration.constants import Constants, filled_places, patterns
+from solver.calibration.constants import Constants, filled_places
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -72,7 +73,7 @@ def bounds(poisson: float) -> tuple[Array, Array]:
     """Bounds of the vector of constants; the exponents and the lumped share lie in 0..1."""
     numbers, count = octant_orbits()
     low, high = np.zeros(count + 3), np.ones(count + 3)
-    for mask in patterns():
+    for mask in least_patterns():
         unit = np.log(unit_moduli(mask, poisson))
         low[numbers[mask]] = np.minimum(0.0, np.log(LEAST) - unit)
         high[numbers[mask]] = np.maximum(0.0, np.log(LARGEST) - unit)
