@@ -36,6 +36,10 @@ _LONG_NAMES = {
 }
 
 
+_OF_ONE_KIND = {"objective": "objective", "poisson": "Poisson's ratio", "code": "code"}
+"""Settings that shards to be used together must share, with their names for people."""
+
+
 @dataclass(frozen=True)
 class Shard:
     """Samples with their fits, of a whole shard or of a piece of one.
@@ -185,10 +189,13 @@ def read_settings(path: str | Path) -> Settings:
         return settings
 
 
-def iterate_shard(path: str | Path, rows: int = PIECE_ROWS) -> Iterator[Shard]:
+def iterate_shard(
+    path: str | Path, rows: int = PIECE_ROWS, first: int = 0, past: int | None = None
+) -> Iterator[Shard]:
     """Read one shard in validated pieces of `rows` samples, in order and in constant memory.
 
-    Each piece is a shard of its own sample range. The whole file is checked before the first one.
+    Each piece is a shard of its own sample range. The whole file is checked before the first one,
+    also if only its samples `first` up to `past`, counted from its own start, are read.
 
     Raises
     ------
@@ -198,10 +205,11 @@ def iterate_shard(path: str | Path, rows: int = PIECE_ROWS) -> Iterator[Shard]:
     path = Path(path)
     with _opened(path) as (file, settings):
         origin = provenance.read(file)
-        for first in range(0, settings.count, rows):
-            past = min(first + rows, settings.count)
-            part = replace(settings, start=settings.start + first, stop=settings.start + past)
-            columns = {name: file[name][first:past] for name in _LONG_NAMES}
+        end = settings.count if past is None else past
+        for begin in range(first, end, rows):
+            stop = min(begin + rows, end)
+            part = replace(settings, start=settings.start + begin, stop=settings.start + stop)
+            columns = {name: file[name][begin:stop] for name in _LONG_NAMES}
             piece = Shard(settings=part, provenance=origin, **columns)
             _require_sane(path, piece)
             yield piece
@@ -234,22 +242,22 @@ def _require_sane(path: Path, shard: Shard) -> None:
         )
 
 
-def _require_consistent(paths: Sequence[str | Path], shards: Sequence[Shard]) -> None:
-    first = shards[0]
-    for path, shard in zip(paths, shards):
-        for name in ("objective", "poisson"):
-            found, expected = getattr(shard, name), getattr(first, name)
-            if found != expected:
+def _require_consistent(paths: Sequence[str | Path], found: Sequence[Settings]) -> None:
+    first = found[0]
+    for path, settings in zip(paths, found):
+        for name, label in _OF_ONE_KIND.items():
+            mine, expected = getattr(settings, name), getattr(first, name)
+            if mine != expected:
                 raise UserError(
-                    f"{path}: fitted with {name} {found}, but {paths[0]} with {expected}; "
+                    f"{path}: fitted with {label} {mine}, but {paths[0]} with {expected}; "
                     "train on shards of one kind"
                 )
 
 
-def _require_disjoint(paths: Sequence[str | Path], shards: Sequence[Shard]) -> None:
-    order = sorted(range(len(shards)), key=lambda i: _place(shards[i]))
+def _require_disjoint(paths: Sequence[str | Path], found: Sequence[Settings]) -> None:
+    order = sorted(range(len(found)), key=lambda i: _place(found[i]))
     for before, after in zip(order, order[1:]):
-        one, two = shards[before], shards[after]
+        one, two = found[before], found[after]
         same = (one.seed, one.moduli) == (two.seed, two.moduli)
         if same and two.start < one.stop:
             raise UserError(
@@ -258,9 +266,27 @@ def _require_disjoint(paths: Sequence[str | Path], shards: Sequence[Shard]) -> N
             )
 
 
-def _place(shard: Shard) -> tuple[int, str, float, float, int]:
-    drawn = shard.moduli
-    return (shard.seed, drawn.distribution, drawn.low, drawn.high, shard.start)
+def _place(settings: Settings) -> tuple[int, str, float, float, int]:
+    drawn = settings.moduli
+    return (settings.seed, drawn.distribution, drawn.low, drawn.high, settings.start)
+
+
+def in_order(
+    paths: Sequence[str | Path], found: Sequence[Settings]
+) -> list[tuple[str | Path, Settings]]:
+    """Shards that belong together, ordered by seed, distribution and sample number.
+
+    Raises
+    ------
+    UserError
+        If there is none, objectives, Poisson's ratios or the code of the fits differ, or samples
+        overlap.
+    """
+    if not paths:
+        raise UserError("no dataset given, name at least one shard")
+    _require_consistent(paths, found)
+    _require_disjoint(paths, found)
+    return sorted(zip(paths, found), key=lambda pair: _place(pair[1]))
 
 
 def read_shards(paths: Sequence[str | Path]) -> list[Shard]:
@@ -269,11 +295,8 @@ def read_shards(paths: Sequence[str | Path]) -> list[Shard]:
     Raises
     ------
     UserError
-        If there is none, one is invalid, objectives or Poisson's ratios differ, or samples overlap.
+        If one is invalid, see `iterate_shard`, or they do not belong together, see `in_order`.
     """
-    if not paths:
-        raise UserError("no dataset given, name at least one shard")
-    shards = [read_shard(path) for path in paths]
-    _require_consistent(paths, shards)
-    _require_disjoint(paths, shards)
-    return sorted(shards, key=_place)
+    shards = {str(path): read_shard(path) for path in paths}
+    ordered = in_order(paths, [shards[str(path)].settings for path in paths])
+    return [shards[str(path)] for path, _ in ordered]

@@ -202,7 +202,8 @@ def test_shards_are_read_in_order_of_samples(tmp_path):
     ("change", "message"),
     [
         ({"objective": "hybrid"}, "objective hybrid"),
-        ({"poisson": 0.3}, "poisson 0.3"),
+        ({"poisson": 0.3}, "Poisson's ratio 0.3"),
+        ({"code": "0123456789ab"}, "code 0123456789ab"),
         ({}, "overlap"),
     ],
 )
@@ -215,6 +216,15 @@ def test_mixtures_and_overlaps_are_refused(tmp_path, shard, change, message):
 @pytest.mark.parametrize("change", [{"seed": 3}, {"high": 9.0}, {"distribution": "log-uniform"}])
 def test_same_numbers_of_other_samples_do_not_overlap(tmp_path, shard, change):
     assert len(read_shards(write_all(tmp_path, [shard, with_settings(shard, **change)]))) == 2
+
+
+def test_part_of_a_shard_is_read_alone(tmp_path, shard):
+    path = tmp_path / "s.h5"
+    write_shard(path, shard)
+    parts = list(iterate_shard(path, rows=7, first=5, past=25))
+    assert [len(part.fine) for part in parts] == [7, 7, 6]
+    np.testing.assert_array_equal(np.concatenate([part.fine for part in parts]), shard.fine[5:25])
+    assert parts[0].start == shard.start + 5 and parts[-1].stop == shard.start + 25
 
 
 def test_no_shard_at_all_is_refused():
