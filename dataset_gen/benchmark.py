@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -115,7 +116,7 @@ def benchmark(
     names = list(OBJECTIVES) if objective is None else [objective]
     rates: dict[str, Rate] = {}
     for name in track(names, "timing", total=len(names), unit="objective"):
-        rates[name] = _rate(lambda name=name: fit(name, young, poisson), count)  # type: ignore[misc]
+        rates[name] = _rate(partial(fit, name, young, poisson), count)
     few = young[: max(1, count // SAMPLED_SHARE)]
     closed, sampled = rates[chosen], _sampled_rate(few, poisson)
     per_fit = _flops_per_fit(chosen, young, poisson)

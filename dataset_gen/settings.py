@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 from carillon import __version__
 from carillon.errors import UserError
@@ -136,6 +136,5 @@ def settings_from(values: Mapping[str, Any]) -> Settings:
     KeyError, TypeError, ValueError
         If a value is missing or no such value.
     """
-    types = {"objective": str, "poisson": float, "seed": int, "start": int, "stop": int}
-    types |= {"distribution": str, "low": float, "high": float, "version": str, "code": str}
+    types = get_type_hints(Settings)
     return Settings(**{name: convert(values[name]) for name, convert in types.items()})
