@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from carillon.errors import UserError
 from solver.analysis import RIGID_MODES, residual_scale
 from solver.geometry import prolongation
-from solver.model import ElasticModel
 from solver.modes_file import ModesFile, read_modes
-from solver.sparse import assemble_elements
+from solver.sparse import assembled
 
 Array = NDArray[np.float64]
 
@@ -148,13 +147,6 @@ def recomputed_residuals(file: ModesFile) -> Array:
     residual = K @ file.modes - mass_modes * file.eigenvalues
     scale = residual_scale(file.eigenvalues) * np.linalg.norm(mass_modes, axis=0)
     return np.asarray(np.linalg.norm(residual, axis=0) / scale)
-
-
-def assembled(model: ElasticModel) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-    """Stiffness and mass of the whole model on one rank."""
-    return assemble_elements(
-        model.mesh.cells, model.stiffness(), model.nodal_mass(), model.mesh.n_nodes
-    )
 
 
 def clusters(values: Array, gap: float = CLUSTER_GAP) -> list[slice]:

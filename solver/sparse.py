@@ -6,6 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from solver.model import ElasticModel
+
 Array = NDArray[np.float64]
 
 
@@ -68,3 +70,10 @@ def assemble_elements(
     stiff = sum_blocks(rows, cols, node_blocks(stiffness).reshape(-1, 3, 3)[kept], shape)
     nodal = sum_blocks(rows, cols, mass.reshape(-1, 1, 1)[kept], shape)
     return stiff, sp.kron(nodal, sp.identity(3), format="csr")
+
+
+def assembled(model: ElasticModel) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    """Stiffness and mass of the whole model on one rank."""
+    return assemble_elements(
+        model.mesh.cells, model.stiffness(), model.nodal_mass(), model.mesh.n_nodes
+    )

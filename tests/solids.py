@@ -9,9 +9,9 @@ import scipy.linalg as la
 from numpy.polynomial import legendre
 
 from dataset_gen.element import elasticity_matrix
-from solver.comparison import assembled
 from solver.geometry import HexMesh, hexmesh_from_grid
 from solver.model import ElasticModel, fine_model
+from solver.sparse import assembled
 
 
 def box_mesh(nx: int, ny: int, nz: int, edge: float = 0.01) -> HexMesh:

@@ -10,8 +10,8 @@ from mpi4py import MPI
 
 from solver.analysis import SolverOptions, modal_analysis
 from solver.coarsening import build_model
-from solver.comparison import assembled
 from solver.geometry import blocks_from_mesh, hexmesh_from_grid, prolongation
+from solver.sparse import assembled
 from tests import solids
 
 

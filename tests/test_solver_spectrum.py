@@ -12,12 +12,13 @@ from carillon.errors import ConvergenceError, UserError
 from dataset_gen.block import degrees_of_freedom
 from dataset_gen.element import rigid_motions
 from solver.analysis import RIGID_MODES, SolverOptions, modal_analysis
-from solver.comparison import assembled, clusters, subspace_angles
+from solver.comparison import clusters, subspace_angles
 from solver.correction import correct
 from solver.decomposition import decompose
 from solver.hcms.condense import restrict_stiffness
 from solver.hcms.synthesis import synthesize
 from solver.model import fine_model
+from solver.sparse import assembled
 from solver.system import assemble
 from solver.truth import count_below, prove_complete, solve_truth
 from tests import solids

@@ -5,13 +5,12 @@ No MPI here: worker processes import this module.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import eigsh
 
@@ -24,6 +23,7 @@ from dataset_gen.objectives.calibration import octant_orbits
 from solver.calibration.constants import FILLED, LUMPED, VOID, Constants
 from solver.geometry.hexmesh import hexmesh_from_grid
 from solver.model import RIGID_MODES, ElasticModel
+from solver.sparse import assembled
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -95,11 +95,9 @@ class Case:
         return Logs(np.log(unit) + ours, projected - ours)
 
     @cached_property
-    def masses(self) -> tuple[Array, Array]:
-        """Consistent nodal mass (mc, 8, 8), and what lumping it adds in filled blocks."""
-        consistent = self.model.nodal_mass()
-        lumped = consistent.sum(axis=2)[:, :, None] * np.eye(8)
-        return consistent, (lumped - consistent) * self.filled[:, None, None]
+    def lumping(self) -> Array:
+        """What lumping adds to the consistent nodal mass (mc, 8, 8); zero in partly void blocks."""
+        return replace(self.model, lumped_share=1.0).nodal_mass() - self.model.nodal_mass()
 
     def moduli(self, constants: Constants) -> Array:
         """Coarse moduli (mc, 8) [Pa]."""
@@ -107,24 +105,15 @@ class Case:
         exponent = np.where(self.filled, vector[FILLED], vector[VOID])[:, None]
         return np.asarray(np.exp(logs.base + vector[self.orbits] + exponent * logs.slope))
 
-    def _assembled(self, elements: Array) -> sp.csc_matrix:
-        rows = np.repeat(self.dofs, 24, axis=1).ravel()
-        columns = np.tile(self.dofs, (1, 24)).ravel()
-        size = self.model.n_dofs
-        return sp.csc_matrix((elements.ravel(), (rows, columns)), shape=(size, size))
-
     def modes(self, constants: Constants) -> tuple[Array, Array]:
         """Elastic eigenvalues (k,) and modes (n, k) of the coarse model, as many as are exact."""
-        moduli = self.moduli(constants)
-        kernels = quadrature_stiffness(self.model.poisson).reshape(8, 576)
-        consistent, change = self.masses
-        nodal = consistent + constants.lumped_share * change
-        mass = np.einsum("mab,ij->maibj", nodal, np.eye(3)).reshape(-1, 24, 24)
+        young, share = self.moduli(constants), constants.lumped_share
+        stiffness, mass = assembled(replace(self.model, young=young, lumped_share=share))
         count = RIGID_MODES + len(self.exact)
         values, vectors = eigsh(
-            self._assembled(self.model.mesh.edge * (moduli @ kernels)),
+            stiffness,
             count,
-            self._assembled(mass),
+            mass,
             sigma=SHIFT * self.exact[0] ** 2,
             v0=np.random.default_rng(0).standard_normal(self.model.n_dofs),
             ncv=min(self.model.n_dofs - 1, 2 * count),
@@ -156,7 +145,7 @@ class Case:
         columns[:, FILLED] = sloped[:, self.filled].sum(axis=1)
         columns[:, VOID] = sloped[:, ~self.filled].sum(axis=1)
         motions = vectors[self.dofs].reshape(len(self.blocks), 8, -1)
-        kinetic = (motions * (self.masses[1] @ motions)).reshape(-1, 3, len(values))
+        kinetic = (motions * (self.lumping @ motions)).reshape(-1, 3, len(values))
         columns[:, LUMPED] = -0.5 * kinetic.sum(axis=(0, 1))
         return self._logs_of(values), columns
 
