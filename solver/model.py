@@ -71,6 +71,8 @@ class ElasticModel:
         octants = np.unpackbits(self.fill[cells][:, None], axis=1, bitorder="little")
         scale = self.density * (self.mesh.edge / 2.0) ** 3
         mass = (scale * octants @ coarse_cell_mass().reshape(8, 64)).reshape(-1, 8, 8)
+        if not (self.lumped or self.lumped_share):
+            return np.asarray(mass)
         share = np.where(self.fill[cells] == ALL_FILLED, self.lumped_share, 0.0)
         if self.lumped:
             share[:] = 1.0

@@ -76,7 +76,6 @@ def make_cases(folder: Path, seed: int, count: int, objects: bool = True) -> lis
     """
     folder.mkdir(parents=True, exist_ok=True)
     wanted = len(BUILTINS) * len(OBJECT_RESOLUTIONS) * len(NAMES) if objects else 0
-    paths: list[Path] = []
     with_progress = track(
         _made(folder, seed, count, objects), "exact spectra", total=wanted + count, unit="solid"
     )
