@@ -13,7 +13,9 @@ from carillon.files import require_writable
 from carillon.progress import say
 from dataset_gen.shards import read_shards
 from forests import summary, table
-from forests.methods import load_models
+from forests.cases import CASES
+from forests.database import MATERIALS
+from forests.methods import common_poisson, databases_of, load_models
 from forests.model import save_model
 from forests.scaling import TRANSFORMS
 from forests.structure import GROWERS
@@ -42,6 +44,8 @@ def _parser() -> Parser:
     compare.add_argument("--model", action="append", help="forests to compare, may be repeated")
     compare.add_argument("--blocks", type=whole_number(1), default=10_000, help="of each range")
     compare.add_argument("--seed", type=whole_number(0), default=0)
+    compare.add_argument("--materials", type=whole_number(2), default=MATERIALS, help="a database")
+    compare.add_argument("--database", metavar="FILE", help="read databases, or build and write")
     compare.add_argument("--plot", metavar="FILE", help="error over cost, as .png, .svg or .pdf")
     compare.add_argument("--json", action="store_true")
     show = commands.add_parser("inspect", help="validate and summarise a model")
@@ -65,7 +69,9 @@ def _table(arguments: argparse.Namespace) -> list[table.Row]:
     if arguments.plot:
         require_writable(require_plottable(arguments.plot))
     models = load_models(arguments.model)
-    rows = table.table(models, arguments.blocks, arguments.seed)
+    poisson = common_poisson(models)
+    databases = databases_of(CASES, poisson, arguments.database, arguments.materials)
+    rows = table.table(models, arguments.blocks, arguments.seed, databases=databases)
     if arguments.plot:
         plot(rows, arguments.plot)
     return rows

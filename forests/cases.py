@@ -54,6 +54,10 @@ class Case:
         """Distribution of the moduli before scaling."""
         return moduli(self.distribution, self.low, self.high)
 
+    def alike(self, other: Case) -> bool:
+        """Whether blocks of both cases differ in nothing but the range of their moduli."""
+        return (self.distribution, self.void) == (other.distribution, other.void)
+
     @property
     def name(self) -> str:
         """Range, distribution, fill and scale in words."""

@@ -4,13 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
 
 from carillon.errors import UserError
+from carillon.files import require_writable
 from dataset_gen.element import Array
 from dataset_gen.objectives import fit
 from forests import model as forest_model
 from forests.baselines import average, galerkin
+from forests.cases import Case
 from forests.condensation import condense, corner_flexibility
+from forests.database import (
+    MATERIALS,
+    REPRESENTATIVES,
+    Database,
+    base_materials,
+    build,
+    load_databases,
+    look_up,
+    save_databases,
+)
 from forests.evaluate import coarsen
 from forests.model import Model
 
@@ -93,6 +108,82 @@ def methods_of(models: dict[str, Model]) -> list[Method]:
     for name, model in models.items():
         suffix = f" of {name}" if len(models) > 1 else ""
         found.append(trained(f"{model.objective}, forests{suffix}", model))
+    return found
+
+
+def metamaterials(database: Database, name: str) -> Method:
+    """Lookup in a database of metamaterials [GPa]."""
+
+    def moduli(young: Array) -> Array:
+        return look_up(database, young)
+
+    return Method(name, moduli, database.nbytes, database.seconds, homogeneous=False)
+
+
+def databases_of(
+    cases: Sequence[Case],
+    poisson: float,
+    path: str | Path | None = None,
+    materials: int = MATERIALS,
+    representatives: int = REPRESENTATIVES,
+) -> dict[Case, Database]:
+    """A database made for each case that is not another one scaled.
+
+    Parameters
+    ----------
+    path : file to read them from; if there is none, they are built and written to it.
+    materials : base materials of each, void included.
+
+    Raises
+    ------
+    UserError
+        If the file has other databases, or cannot be written.
+    """
+    wanted = {
+        case: base_materials(case.moduli, materials, case.void)
+        for case in cases
+        if case.scaled_by == 1.0
+    }
+    if path is not None and Path(path).exists():
+        stored = load_databases(path)
+        return {case: _stored(stored, base, poisson, path) for case, base in wanted.items()}
+    if path is not None:
+        require_writable(path)
+    found = {
+        case: build(base, poisson, representatives, f"database of {case.name}", progress=True)
+        for case, base in wanted.items()
+    }
+    if path is not None:
+        save_databases(path, list(found.values()))
+    return found
+
+
+def _stored(
+    databases: Sequence[Database], materials: Array, poisson: float, path: str | Path
+) -> Database:
+    for database in databases:
+        if database.poisson == poisson and np.array_equal(database.materials, materials):
+            return database
+    low, high = materials[materials > 0.0][[0, -1]]
+    raise UserError(
+        f"{path}: has no database of {len(materials)} materials from {low:g} to {high:g} GPa for "
+        f"Poisson's ratio {poisson:g}; name a file that does not exist yet, to be written"
+    )
+
+
+def database_methods(case: Case, databases: dict[Case, Database]) -> list[Method]:
+    """The database made for the blocks of a case, and those made for a lower range of such blocks.
+
+    The latter take moduli beyond their range for their stiffest material.
+    """
+    found = []
+    for other, database in databases.items():
+        low, high = other.range_gpa
+        name = f"Chen et al. 2015, database {low:g}..{high:g} GPa"
+        if other == case:
+            found.append(metamaterials(database, name))
+        elif other.alike(case) and high < case.range_gpa[1]:
+            found.append(metamaterials(database, f"{name}, clamped"))
     return found
 
 

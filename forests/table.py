@@ -20,7 +20,8 @@ from dataset_gen.element import Array
 from dataset_gen.serial import serial_blas
 from forests.block_error import AT_ONCE, Errors, displacement_errors
 from forests.cases import CASES, Case
-from forests.methods import Method, common_poisson, methods_of
+from forests.database import Database
+from forests.methods import Method, common_poisson, database_methods, databases_of, methods_of
 from forests.model import Model
 
 TIMED_BLOCKS = 2000
@@ -91,12 +92,14 @@ def table(
     blocks: int = 10_000,
     seed: int = 0,
     cases: Sequence[Case] = CASES,
+    databases: dict[Case, Database] | None = None,
 ) -> list[Row]:
     """Rows of Fig. 9 on `blocks` random blocks of each case, on one core.
 
     Parameters
     ----------
     models : forests by the names of their files, all of one Poisson's ratio.
+    databases : of metamaterials, see `forests.methods.databases_of`; built if not given.
 
     Returns
     -------
@@ -112,10 +115,12 @@ def table(
         For no model, or models of different Poisson's ratios.
     """
     poisson = common_poisson(models)
+    if databases is None:
+        databases = databases_of(cases, poisson)
     rows: list[Row] = []
     for case in cases:
         young = case.blocks(blocks, seed)
-        methods = methods_of(models)
+        methods = [*methods_of(models), *database_methods(case, databases)]
         errors = errors_of(young, methods, poisson, case.name)
         rows += [_row(case, method, young, found) for method, found in zip(methods, errors)]
         for row in rows:
