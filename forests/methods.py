@@ -41,7 +41,7 @@ class Method:
     storage_bytes : kept beforehand.
     training_seconds : spent beforehand; None if unknown.
     flexibility : coarse flexibility (n, 18, 18) for the errors, of methods without moduli.
-    homogeneous : whether moduli scaled by a factor are coarsened to moduli scaled by it.
+    clamped : whether blocks have moduli beyond the range that the method was made for.
     """
 
     name: str
@@ -49,7 +49,7 @@ class Method:
     storage_bytes: int = 0
     training_seconds: float | None = 0.0
     flexibility: Callable[[Array], Array] | None = None
-    homogeneous: bool = True
+    clamped: bool = False
 
     def response(self, young: Array) -> Array:
         """What `forests.block_error` wants: moduli (n, 8) or flexibilities (n, 18, 18)."""
@@ -111,13 +111,13 @@ def methods_of(models: dict[str, Model]) -> list[Method]:
     return found
 
 
-def metamaterials(database: Database, name: str) -> Method:
+def metamaterials(database: Database, name: str, clamped: bool = False) -> Method:
     """Lookup in a database of metamaterials [GPa]."""
 
     def moduli(young: Array) -> Array:
         return look_up(database, young)
 
-    return Method(name, moduli, database.nbytes, database.seconds, homogeneous=False)
+    return Method(name, moduli, database.nbytes, database.seconds, clamped=clamped)
 
 
 def databases_of(
@@ -183,7 +183,7 @@ def database_methods(case: Case, databases: dict[Case, Database]) -> list[Method
         if other == case:
             found.append(metamaterials(database, name))
         elif other.alike(case) and high < case.range_gpa[1]:
-            found.append(metamaterials(database, f"{name}, clamped"))
+            found.append(metamaterials(database, f"{name}, clamped", clamped=True))
     return found
 
 

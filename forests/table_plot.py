@@ -32,13 +32,14 @@ def _case(row: dict[str, Any]) -> tuple[str, str]:
 def plot(rows: Sequence[dict[str, Any]], path: str | Path) -> None:
     """Write a panel for each case, mean error under nodal forces over cost, both axes logarithmic.
 
-    Cases that only scale others are left out: their errors are the same.
+    Cases that only scale others are left out, as their errors are the same, and so are methods
+    beyond the range that they were made for, as their errors are many thousand times larger.
     """
     from matplotlib.figure import Figure  # slow to import, and only needed here
     from matplotlib.ticker import FormatStrFormatter
 
     path = require_plottable(path)
-    shown = [row for row in rows if row["scaled_by"] == 1.0]
+    shown = [row for row in rows if row["scaled_by"] == 1.0 and not row["clamped"]]
     cases = list(dict.fromkeys(_case(row) for row in shown))
     names = list(dict.fromkeys(row["method"] for row in shown))
     across = min(2, len(cases))

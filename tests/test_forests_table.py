@@ -267,7 +267,7 @@ def test_json_is_a_list_of_rows(folder, capsys):
     assert isinstance(found, list)
     wanted = {"method", "range_gpa", "distribution", "fill", "mean_error", "median_error"}
     wanted |= {"mean_error_inertial", "median_error_inertial", "seconds_per_block"}
-    wanted |= {"storage_bytes", "training_seconds", "scaled_by", "blocks", "seed"}
+    wanted |= {"storage_bytes", "training_seconds", "scaled_by", "clamped", "blocks", "seed"}
     assert all(wanted <= row.keys() for row in found)
 
 
