@@ -89,6 +89,7 @@ def _modes(options: argparse.Namespace, comm: MPI.Comm) -> None:
         "seed": options.seed,
         "interface": options.interface,
         "fine_n_dofs": problem.fine.n_dofs,
+        **problem.forest,
         **result.evidence,
         "timings": {**problem.seconds, **result.seconds},
     }
@@ -359,9 +360,10 @@ def _parser() -> argparse.ArgumentParser:
     benchmark.set_defaults(run=_benchmark)
 
     objectives = commands.add_parser(
-        "objectives", help="spectra of one solid coarsened by every fit objective, without forests"
+        "objectives", help="spectra of one solid coarsened by every fit objective, and by forests"
     )
     _add_solid(objectives)
+    objectives.add_argument("--forest", help="forests to compare with (HDF5; default: packaged)")
     objectives.add_argument("--modes", type=int, default=256, help="rigid included (default 256)")
     objectives.add_argument(
         "--objectives",
@@ -401,7 +403,7 @@ def _add_problem(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--coarsen", choices=coarsening.METHODS, default=defaults.coarsen, help="default: none"
     )
-    parser.add_argument("--forest", help="forests for --coarsen ddfem (HDF5)")
+    parser.add_argument("--forest", help="forests for --coarsen ddfem (HDF5; default: packaged)")
     parser.add_argument(
         "--objective",
         choices=OBJECTIVES,

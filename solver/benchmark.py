@@ -15,6 +15,7 @@ from solver.analysis import RIGID_MODES, SolverOptions, modal_analysis
 from solver.decomposition import on_root
 from solver.modes_file import frequencies
 from solver.problem import Problem, ProblemOptions, build_problem
+from solver.trained import trained_or_reason
 
 
 def benchmark_row(
@@ -28,7 +29,8 @@ def benchmark_row(
 
     Each method runs `runs` times after one warm-up on a small number of modes; the median and the
     extremes are reported.  Time is that of partition, assembly and solution; voxelisation and
-    material count as precomputation.  Errors are relative to the fine SLEPc spectrum.
+    material count as precomputation.  Errors are relative to the fine SLEPc spectrum.  Without
+    forests, neither named nor default ones, `ddfem` is left out with a sentence.
     """
     plain = SolverOptions(modes=modes)
     methods: dict[str, tuple[str, SolverOptions]] = {
@@ -39,7 +41,10 @@ def benchmark_row(
     }
     if arpack:
         methods["arpack"] = ("none", replace(plain, method="arpack", prove=False))
-    if options.forest is not None:
+    forest = on_root(comm, lambda: trained_or_reason(options.forest, options.poisson))
+    if isinstance(forest, str):
+        say(forest, visible=comm.rank == 0)
+    else:
         methods["ddfem_slepc"] = ("ddfem", replace(plain, method="slepc", prove=False))
         methods["ddfem_hcms_ec"] = ("ddfem", plain)
     problems: dict[str, Problem] = {}

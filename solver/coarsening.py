@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import NamedTuple, Unpack
 
 import numpy as np
@@ -11,10 +10,10 @@ from numpy.typing import NDArray
 from carillon.errors import UserError
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, Fits, fit, lumped_share
 from forests import coarsen as evaluate_forest
-from forests import load_model
 from forests.baselines import average, galerkin
 from solver.geometry import Blocks, HexMesh, blocks_from_mesh
 from solver.model import Constants, ElasticModel, fine_model
+from solver.trained import Trained, load_trained
 
 Array = NDArray[np.float64]
 
@@ -38,18 +37,18 @@ def coarse_material(
     e: Array,
     method: str,
     poisson: float,
-    forest: str | Path | None = None,
+    forest: Trained | None = None,
     objective: str = DEFAULT_OBJECTIVE,
 ) -> CoarseMaterial:
     """Material of coarse elements from the blocks' fine moduli (mc, 8).
 
-    `method` is one of `average`, `galerkin`, `ddfem` (the regression forests in the file `forest`)
-    and `fit` (the `objective` solved for every block, what the forests learn).
+    `method` is one of `average`, `galerkin`, `ddfem` (the regression forests `forest`, or the
+    default ones) and `fit` (the `objective` solved for every block, what the forests learn).
 
     Raises
     ------
     UserError
-        If `ddfem` has no forest, or the forest was trained for another Poisson's ratio.
+        For an unknown method, or if the default forests are absent or for another Poisson's ratio.
     """
     match method:
         case "average":
@@ -60,7 +59,8 @@ def coarse_material(
             moduli = fit_distinct(objective, e, poisson).moduli
             return CoarseMaterial(moduli, lumped_share(objective))
         case "ddfem":
-            return _from_forest(e, poisson, forest)
+            model = (forest or load_trained(None, poisson)).model
+            return CoarseMaterial(evaluate_forest(model, e), lumped_share(model.objective))
     raise UserError(f"coarsening {method!r} is unknown, expected one of {', '.join(METHODS)}")
 
 
@@ -69,21 +69,6 @@ def fit_distinct(objective: str, e: Array, poisson: float) -> Fits:
     distinct, row = np.unique(e, axis=0, return_inverse=True)
     fits = fit(objective, distinct, poisson)
     return Fits(*(values[row.ravel()] for values in fits))
-
-
-def _from_forest(e: Array, poisson: float, forest: str | Path | None) -> CoarseMaterial:
-    if forest is None:
-        raise UserError(
-            "--coarsen ddfem needs trained forests; name them with --forest forests.h5 (made by "
-            "python -m forests train)"
-        )
-    model = load_model(forest)
-    if abs(model.poisson - poisson) > 1e-12:
-        raise UserError(
-            f"{forest}: trained for Poisson's ratio {model.poisson:g}, the model has {poisson:g}; "
-            "train forests for it or pass --poisson"
-        )
-    return CoarseMaterial(evaluate_forest(model, e), lumped_share(model.objective))
 
 
 def block_moduli(blocks: Blocks, young: Array) -> Array:
@@ -95,7 +80,7 @@ def build_model(
     mesh: HexMesh,
     young: Array,
     method: str = "none",
-    forest: str | Path | None = None,
+    forest: Trained | None = None,
     objective: str = DEFAULT_OBJECTIVE,
     **constants: Unpack[Constants],
 ) -> ElasticModel:

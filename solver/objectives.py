@@ -1,4 +1,7 @@
-"""Spectra of a solid coarsened by every fit objective, against the fine one: which fit is best."""
+"""Spectra of a solid coarsened by every fit objective, against the fine one: which fit is best.
+
+And by forests, which have learned one of the fits: what is lost by that.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
-from carillon.progress import track
+from carillon.progress import say, track
 from dataset_gen.objectives import lumped_share
 from solver.analysis import Modes, SolverOptions, modal_analysis
 from solver.coarsening import (
@@ -29,11 +32,15 @@ from solver.geometry import Blocks, blocks_from_mesh
 from solver.model import RIGID_MODES, ElasticModel
 from solver.modes_file import frequencies
 from solver.problem import Problem, ProblemOptions, build_problem
+from solver.trained import Trained, trained_or_reason
 
 Array = NDArray[np.float64]
 
 BASELINES = ("galerkin", "average")
 """Coarsenings without a fit, which every objective is to beat."""
+
+FOREST = "ddfem"
+"""Coarsening by the forests."""
 
 CHECKS = ("inertia", "verification")
 """Phases that check modes instead of computing them."""
@@ -45,24 +52,32 @@ def rate_objectives(
     objectives: Sequence[str],
     comm: MPI.Comm = MPI.COMM_WORLD,
 ) -> dict[str, Any]:
-    """Frequency errors of one solid coarsened by each objective, and by the baselines.
+    """Frequency errors of one solid coarsened by each objective, by forests and by the baselines.
 
-    The coarse moduli are the fits themselves, block by block, without forests between.  All coarse
-    models have the same mesh; they and the fine one are solved by SLEPc.
+    The coarse moduli of an objective are the fits themselves, block by block; those of `ddfem` are
+    from `options.forest` or the default forests, which are left out if they are absent or for
+    another Poisson's ratio.  All coarse models have the same mesh; they and the fine one are
+    solved by SLEPc.
 
     Returns
     -------
-    Plain values: sizes, `truth` (evidence, seconds, frequencies [Hz]) and `rows`, one a coarsening
-    with the errors over modes 7..60 (`audible`) and 7..`modes` (`all`), or as many as the coarse
-    model has.
+    Plain values: sizes, `forest` (which; None without, then `without_forest` says why), `truth`
+    (evidence, seconds, frequencies [Hz]) and `rows`, one a coarsening with the errors over modes
+    7..60 (`audible`) and 7..`modes` (`all`), or as many as the coarse model has.
     """
+    found = on_root(comm, lambda: trained_or_reason(options.forest, options.poisson))
+    forest, reason = (None, found) if isinstance(found, str) else (found, "")
     problem = on_root(comm, lambda: build_problem(replace(options, coarsen="none")))
     blocks = blocks_from_mesh(problem.fine)
     e = block_moduli(blocks, problem.young)
     truth = _solve(problem.model, modes, comm)
     exact = frequencies(truth.values)
-    names = track((*objectives, *BASELINES), "coarsenings", visible=comm.rank == 0)
-    rows = [_row(name, problem, blocks, e, exact, comm) for name in names]
+    say(reason, visible=bool(reason) and comm.rank == 0)
+    names = [*objectives, *([FOREST] if forest else []), *BASELINES]
+    rows = [
+        _row(name, forest, problem, blocks, e, exact, comm)
+        for name in track(names, "coarsenings", visible=comm.rank == 0)
+    ]
     return {
         "mesh": options.mesh,
         "resolution": options.resolution,
@@ -74,6 +89,8 @@ def rate_objectives(
         "coarse_n_dofs": 3 * blocks.coarse.n_nodes,
         "blocks": len(e),
         "distinct_blocks": len(np.unique(e, axis=0)),
+        "forest": None if forest is None else forest.record(),
+        "without_forest": reason,
         "truth": {
             **truth.evidence,
             "seconds": solve_seconds(truth),
@@ -95,13 +112,19 @@ def _solve(model: ElasticModel, modes: int, comm: MPI.Comm, prove: bool = True) 
 
 
 def _row(
-    name: str, problem: Problem, blocks: Blocks, e: Array, exact: Array, comm: MPI.Comm
+    name: str,
+    forest: Trained | None,
+    problem: Problem,
+    blocks: Blocks,
+    e: Array,
+    exact: Array,
+    comm: MPI.Comm,
 ) -> dict[str, Any]:
     fine = problem.model
     # Compiling, or loading what was compiled, is not part of fitting.
-    on_root(comm, partial(_material, name, e[:1], fine.poisson))
+    on_root(comm, partial(_material, name, forest, e[:1], fine.poisson))
     begin = time.perf_counter()
-    material, converged = on_root(comm, partial(_material, name, e, fine.poisson))
+    material, converged = on_root(comm, partial(_material, name, forest, e, fine.poisson))
     fitted = time.perf_counter() - begin
     model = coarse_model(
         blocks, material, poisson=fine.poisson, density=fine.density, lumped=fine.lumped
@@ -123,9 +146,11 @@ def _row(
     }
 
 
-def _material(name: str, e: Array, poisson: float) -> tuple[CoarseMaterial, float | None]:
+def _material(
+    name: str, forest: Trained | None, e: Array, poisson: float
+) -> tuple[CoarseMaterial, float | None]:
     """Coarse material and the share of blocks whose fit converged, None without a fit."""
-    if name in BASELINES:
-        return coarse_material(e, name, poisson), None
+    if name in (FOREST, *BASELINES):
+        return coarse_material(e, name, poisson, forest), None
     fits = fit_distinct(name, e, poisson)
     return CoarseMaterial(fits.moduli, lumped_share(name)), float(fits.converged.mean())

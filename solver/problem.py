@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from solver.geometry import (
 )
 from solver.materials import young_modulus
 from solver.model import DEFAULT_DENSITY, ElasticModel
+from solver.trained import load_trained
 
 Array = NDArray[np.float64]
 
@@ -41,7 +42,7 @@ class ProblemOptions:
     coarsen
         `none`, `average`, `galerkin`, `ddfem` or `fit`.
     forest
-        Forests for `ddfem`.
+        File of forests for `ddfem`; None takes the default ones.
     objective
         Objective for `fit`.
     unit
@@ -77,12 +78,16 @@ class ProblemOptions:
 
 @dataclass(frozen=True)
 class Problem:
-    """Fine mesh, its moduli (m,) [Pa], the model to solve, and how long making them took."""
+    """Fine mesh, its moduli (m,) [Pa], the model to solve, and how long making them took.
+
+    `forest` tells which forests coarsened it; nothing if none did.
+    """
 
     fine: HexMesh
     young: Array
     model: ElasticModel
     seconds: dict[str, float]
+    forest: dict[str, str] = field(default_factory=dict)
 
 
 def build_problem(options: ProblemOptions) -> Problem:
@@ -103,11 +108,13 @@ def build_problem(options: ProblemOptions) -> Problem:
     label = f"mesh '{name}', resolution {options.resolution}"
     young = young_modulus(options.material, fine, options.seed, label)
     assigned = time.perf_counter()
+    needs_forest = options.coarsen == "ddfem"
+    forest = load_trained(options.forest, options.poisson) if needs_forest else None
     model = build_model(
         fine,
         young,
         options.coarsen,
-        options.forest,
+        forest,
         options.objective,
         poisson=options.poisson,
         density=options.density,
@@ -116,7 +123,7 @@ def build_problem(options: ProblemOptions) -> Problem:
     seconds = {"mesh": meshed - begin, "material": assigned - meshed}
     if options.coarsen != "none":
         seconds["coarsening"] = time.perf_counter() - assigned
-    return Problem(fine, young, model, seconds)
+    return Problem(fine, young, model, seconds, forest.record() if forest else {})
 
 
 def _check(options: ProblemOptions) -> None:

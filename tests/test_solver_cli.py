@@ -148,7 +148,6 @@ def test_material_array_of_the_right_length_is_used(tmp_path, run_cli, n_voxels)
         ([*BAR, "--tol", "-1"], "--tol"),
         ([*BAR, "--degree", "0"], "--degree"),
         ([*BAR, "--corrections", "-1"], "--corrections"),
-        ([*BAR, "--coarsen", "ddfem"], "needs trained forests"),
         ([*BAR, "--coarsen", "ddfem", "--forest", "absent.h5"], "absent.h5"),
         ([*BAR, "--poisson", "0.5"], "Poisson's ratio 0.5"),
         ([*BAR, "--density", "-1"], "density -1"),

@@ -14,7 +14,7 @@ from solver.comparison import frequency_errors
 from solver.geometry import hexmesh_from_voxels, load_surface, voxelize
 from solver.materials import NAMES, young_modulus
 from solver.modes_file import frequencies, read_modes
-from solver.objectives import BASELINES, rate_objectives
+from solver.objectives import BASELINES, FOREST, rate_objectives
 from solver.problem import ProblemOptions, build_problem
 from tests import solids
 
@@ -24,7 +24,10 @@ CHOSEN = ("chen2015", "oversampled")
 
 @pytest.fixture(scope="module")
 def rated():
-    return rate_objectives(BOX, 256, CHOSEN)
+    found = rate_objectives(BOX, 256, CHOSEN)
+    # The row of the forests is there if there are default ones: tests/test_solver_forests.py.
+    found["rows"] = [row for row in found["rows"] if row["coarsening"] != FOREST]
+    return found
 
 
 @pytest.mark.parametrize("resolution", [16, 24])

@@ -1,0 +1,108 @@
+"""Which forests `ddfem` takes: those that are named, or those that come with the package."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+
+import numpy as np
+import pytest
+
+from carillon.errors import UserError
+from forests import coarsen
+from forests import model as forest_model
+from solver.benchmark import benchmark_row
+from solver.coarsening import block_moduli
+from solver.geometry import blocks_from_mesh
+from solver.modes_file import read_modes
+from solver.objectives import BASELINES, rate_objectives
+from solver.problem import ProblemOptions, build_problem
+from solver.trained import load_trained, trained_or_reason
+from tests.small_forests import train_small_forests
+
+BOX = ProblemOptions("builtin:box", 8, "noise")
+
+
+@pytest.fixture(scope="module")
+def forests(tmp_path_factory, run_cli):
+    return train_small_forests(tmp_path_factory.mktemp("forests"), run_cli)
+
+
+@pytest.fixture
+def as_default(forests, monkeypatch):
+    """The small forests in the place of those of the package."""
+    monkeypatch.setattr(forest_model, "default_path", lambda: forests, raising=False)
+
+
+@pytest.fixture
+def no_default(monkeypatch):
+    def absent():
+        raise UserError("default.h5: no such file")
+
+    monkeypatch.setattr(forest_model, "default_path", absent, raising=False)
+
+
+def options(**changes) -> ProblemOptions:
+    return ProblemOptions(**{**BOX.as_dict(), "coarsen": "ddfem", **changes})
+
+
+def test_named_and_default_forests_coarsen_by_the_model_they_hold(forests, as_default):
+    named = build_problem(options(forest=str(forests)))
+    default = build_problem(options())
+    e = block_moduli(blocks_from_mesh(named.fine), named.young)
+    assert np.array_equal(named.model.young, coarsen(load_trained(forests, 0.25).model, e))
+    assert np.array_equal(named.model.young, default.model.young)
+    digest = hashlib.sha256(forests.read_bytes()).hexdigest()
+    for problem, name in ((named, str(forests)), (default, "default")):
+        assert problem.forest["forest"] == name
+        assert digest.startswith(problem.forest["forest_sha256"])
+    assert build_problem(BOX).forest == {}
+
+
+def test_another_poisson_ratio_is_answered_with_what_to_train(forests, as_default):
+    with pytest.raises(UserError, match=r"forests\.h5: trained for Poisson's ratio 0\.25"):
+        build_problem(options(forest=str(forests), poisson=0.3))
+    with pytest.raises(UserError) as caught:
+        build_problem(options(poisson=0.3))
+    for words in ("Poisson's ratio 0.25, the model has 0.3", "--poisson 0.3", "--forest"):
+        assert words in str(caught.value)
+
+
+def test_absent_default_forests_are_left_out_with_a_sentence(no_default, capsys):
+    assert trained_or_reason(None, 0.25) == "without ddfem: default.h5: no such file"
+    benchmark_row(BOX, 20, runs=1, arpack=False)
+    assert capsys.readouterr().err.startswith("without ddfem: default.h5: no such file\n")
+    with pytest.raises(UserError):
+        trained_or_reason("absent.h5", 0.25)
+
+
+def test_modes_tell_which_forests_coarsened(forests, tmp_path, run_cli):
+    out, copy = tmp_path / "modes.h5", tmp_path / "copy.h5"
+    shutil.copy(forests, copy)
+    command = ["modes", "builtin:box", "--resolution", 8, "--modes", 12, "--out", out]
+    run_cli("solver", *command, "--coarsen", "ddfem", "--forest", copy, check=True)
+    found = read_modes(out).attributes
+    assert found["forest"] == str(copy) and found["forest_objective"] == "calibrated"
+    run_cli("solver", *command, "--coarsen", "average", check=True)
+    assert "forest" not in read_modes(out).attributes
+
+
+def test_forests_stand_beside_the_fit_they_learned(forests):
+    found = rate_objectives(options(forest=str(forests)), 60, ("calibrated",))
+    assert [row["coarsening"] for row in found["rows"]] == ["calibrated", "ddfem", *BASELINES]
+    assert found["forest"]["forest_objective"] == "calibrated"
+    fit, forest, galerkin, _ = (row["audible"]["rms"] for row in found["rows"])
+    assert fit != forest < 0.5 * galerkin
+    assert forest == pytest.approx(fit, rel=0.5)
+
+
+def test_without_forests_their_row_is_left_out(no_default, capsys):
+    found = rate_objectives(BOX, 20, ("chen2015",))
+    assert found["forest"] is None and "default.h5" in found["without_forest"]
+    assert [row["coarsening"] for row in found["rows"]] == ["chen2015", *BASELINES]
+    assert "without ddfem: default.h5" in capsys.readouterr().err
+
+
+def test_benchmark_times_the_default_forests(as_default):
+    row = benchmark_row(BOX, 20, runs=1, arpack=False)
+    assert {"ddfem_slepc", "ddfem_hcms_ec"} <= set(row["methods"])
