@@ -10,12 +10,14 @@ import yaml
 from carillon.errors import UserError
 from dataset_gen.objectives import OBJECTIVES
 from tests.pages import Page, assert_same_numbers, assert_self_contained
+from tests.small_forests import train_small_forests
 from tests.workflow_runs import CHECKOUT, PROFILE, TINY, planned, snakemake
 from workflow import settings
 from workflow.report.table import read_table
 from workflow.study.cases import Study, absent_meshes, cases_of, without
 from workflow.study.errors_tables import errors, summary
 from workflow.study.evidence_tables import description
+from workflow.study.forest_tables import forest
 from workflow.study.goals import goals_of, judge
 from workflow.study.goals_tables import goal_cases, goals
 from workflow.study.page import shortened
@@ -34,9 +36,15 @@ STUDY = {
         {"model": "box", "quantity": "rms_of_galerkin", "limit": 0.5, "resolutions": [16]},
         {"model": "box", "quantity": "worst", "limit": 0.04, "materials": ["noise"]},
         {"model": "bust", "quantity": "rms", "limit": 0.05},
+        {"quantity": "rms_of_fit", "limit": 1.1},
     ],
 }
-RMS = {"good": {"uniform": 0.03, "noise": 0.04}, "galerkin": {"uniform": 0.06, "noise": 0.1}}
+RMS = {
+    "good": {"uniform": 0.03, "noise": 0.04},
+    "ddfem": {"uniform": 0.03, "noise": 0.048},
+    "galerkin": {"uniform": 0.06, "noise": 0.1},
+}
+FOREST = {"forest": "default", "forest_objective": "good", "forest_sha256": "0123456789abcdef"}
 
 
 def rated(material: str, resolution: int) -> dict:
@@ -56,17 +64,18 @@ def rated(material: str, resolution: int) -> dict:
                 "coarsening": name,
                 "audible": part(rms, 60),
                 "all": part(2 * rms, last),
-                "converged": None if name == "galerkin" else 1.0,
+                "converged": 1.0 if name == "good" else None,
                 **times,
             }
         )
-    return {"n_dofs": 300, "coarse_n_dofs": 66, "modes": 70, "rows": rows}
+    return {"n_dofs": 300, "coarse_n_dofs": 66, "modes": 70, "rows": rows, "forest": FOREST}
 
 
 @pytest.fixture
 def study(tmp_path) -> Study:
     """A study of a box, whose other solid has no mesh."""
-    goals = [{"resolutions": None, "materials": None, **goal} for goal in STUDY["goals"]]
+    any_case = {"model": None, "resolutions": None, "materials": None}
+    goals = [{**any_case, **goal} for goal in STUDY["goals"]]
     config = {"mesh_folder": str(tmp_path), "objectives": {**STUDY, "goals": goals}}
     (tmp_path / "config.yaml").write_text(yaml.safe_dump(config))
     study = Study(tmp_path / "objectives")
@@ -79,7 +88,7 @@ def study(tmp_path) -> Study:
 
 def test_errors_are_pooled_as_root_mean_square_and_the_best_comes_first(study):
     rows = summary(study).rows
-    assert [row["coarsening"] for row in rows] == ["good", "galerkin"]
+    assert [row["coarsening"] for row in rows] == ["good", "ddfem", "galerkin"]
     assert rows[0]["uniform_rms"] == pytest.approx(((0.03**2 + 0.015**2) / 2) ** 0.5)
     squares = [0.03**2, 0.015**2, 0.04**2, 0.02**2]
     assert rows[0]["all_rms"] == pytest.approx((sum(squares) / 4) ** 0.5)
@@ -90,22 +99,50 @@ def test_errors_are_pooled_as_root_mean_square_and_the_best_comes_first(study):
 
 def test_the_full_table_has_a_row_for_every_coarsening_of_every_case(study):
     rows = errors(study).rows
-    assert len(rows) == 2 * 2 * 2
+    assert len(rows) == 2 * 2 * 3
     assert rows[0]["audible_worst_mode"] == 9
     assert (rows[0]["last"], rows[-1]["last"]) == (66, 70)
 
 
 def test_goals_are_met_only_if_every_case_keeps_the_limit(study):
-    rms, share, worst, absent = (judge(study, goal, "good") for goal in goals_of(study))
+    rms, share, worst, absent, _ = (judge(study, goal, "good") for goal in goals_of(study))
     assert (rms.met, rms.cases, rms.value) == (3, 4, 0.04) and not rms.passed
     assert str(rms).replace("\N{NO-BREAK SPACE}", " ") == "missed, 3 of 4 met"
     assert (share.met, share.cases) == (2, 2) and str(share) == "met"
     assert share.value == pytest.approx(0.5)
     assert (worst.met, worst.cases) == (1, 2) and worst.value == pytest.approx(0.06)
     assert str(absent) == "not studied" and not absent.passed
-    good, galerkin = goals(study).rows
+    good, _, galerkin = goals(study).rows
     assert good["met"] == "1 of 3" and galerkin["met"] == "0 of 3"
-    assert len(goal_cases(study).rows) == 4 + 2 + 2
+    assert len(goal_cases(study).rows) == 4 + 2 + 2 + 4
+
+
+def test_forests_are_judged_by_the_fit_they_learned_on_every_solid(study):
+    goal = goals_of(study)[-1]
+    verdict = judge(study, goal, "ddfem")
+    assert (verdict.met, verdict.cases, verdict.where) == (2, 4, "Box 8, noise")
+    assert verdict.value == pytest.approx(1.2)
+    assert goal.sentence.startswith("All solids: rms of the forests")
+    for name in ("good", "galerkin"):
+        assert str(judge(study, goal, name)) == "not studied"
+    (box,) = forest(study).rows
+    assert (box["cases"], box["where"]) == (4, "Box 8, noise")
+    assert (box["median"], box["worst"]) == pytest.approx((1.1, 1.2))
+    assert box["fit_rms"] == pytest.approx(summary(study).rows[0]["all_rms"])
+    assert "good; default, SHA-256 0123" in description("ddfem", study.forest)
+
+
+def test_without_forests_their_table_is_empty_and_the_reason_is_kept(study):
+    for path in study.folder.rglob("*.json"):
+        found = json.loads(path.read_text())
+        rows = [row for row in found["rows"] if row["coarsening"] != "ddfem"]
+        reason = "without ddfem: default.h5: no such file"
+        path.write_text(
+            json.dumps({**found, "rows": rows, "forest": None, "without_forest": reason})
+        )
+    assert forest(study).rows == []
+    assert study.without_forest == "without ddfem: default.h5: no such file"
+    assert str(judge(study, goals_of(study)[-1], "good")) == "not studied"
 
 
 def test_a_solid_without_its_mesh_is_left_out_and_named(study, tmp_path):
@@ -146,11 +183,16 @@ def test_the_study_is_no_part_of_the_default_run(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory):
-    """Folder of the tiny study."""
+def finished(tmp_path_factory, run_cli):
+    """Folder of the tiny study, with forests in it."""
     folder = tmp_path_factory.mktemp("study")
-    options = ["--profile", PROFILE, "objectives", "--configfile", TINY]
-    done = snakemake(folder, *options, "--config", "results_dir=results", timeout=300)
+    config = yaml.safe_load(TINY.read_text())
+    config["results_dir"] = "results"
+    config["objectives"]["forest"] = str(train_small_forests(folder, run_cli))
+    config["objectives"]["objectives"].append("calibrated")
+    (folder / "config.yaml").write_text(yaml.safe_dump(config))
+    options = ["--profile", PROFILE, "objectives", "--configfile", folder / "config.yaml"]
+    done = snakemake(folder, *options, timeout=300)
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-6000:]
     return folder / "results" / "objectives"
 
@@ -171,7 +213,9 @@ def test_the_page_of_a_miniature_study_holds_its_tables(finished):
 def test_a_miniature_study_finds_that_a_fit_beats_galerkin(finished):
     rows = {row["coarsening"]: row for row in read_table(finished / "tables/summary.json").rows}
     assert rows["oversampled"]["all_rms"] < rows["galerkin"]["all_rms"]
-    assert set(rows) == {"chen2015", "oversampled", "galerkin", "average"}
+    assert set(rows) == {"chen2015", "oversampled", "calibrated", "ddfem", "galerkin", "average"}
+    (box,) = read_table(finished / "tables/forest.json").rows
+    assert 0.5 < box["median"] <= box["worst"] < 2.0
     for row in read_table(finished / "tables/truths.json").rows:
         found, counted = row["inertia"].split(" / ")
         assert found == counted

@@ -13,6 +13,7 @@ from jsonschema.exceptions import ValidationError, best_match
 from carillon.errors import UserError
 from dataset_gen.objectives import OBJECTIVES, require_objective
 from solver.materials import NAMES as MATERIALS
+from solver.trained import default_file
 
 SCHEMA = Path(__file__).parent / "schemas" / "config.schema.yaml"
 BUILTIN = "builtin:"
@@ -98,6 +99,15 @@ def studied_mesh(config: Mapping[str, Any], solid: str) -> str:
 def studied_objectives(config: Mapping[str, Any]) -> list[str]:
     """Names of the objectives that the study compares."""
     return list(config["objectives"]["objectives"] or OBJECTIVES)
+
+
+def studied_forest_files(config: Mapping[str, Any]) -> list[str]:
+    """Forests that the study sets beside the fits; none if there are no default ones either."""
+    named = config["objectives"]["forest"]
+    try:
+        return [named or str(default_file())]
+    except UserError:
+        return []
 
 
 def _located(config: Mapping[str, Any], mesh: str) -> str:

@@ -8,7 +8,8 @@ rule objectives:
 
 rule rate_objectives:
     input:
-        case_mesh,
+        mesh=case_mesh,
+        forest=settings.studied_forest_files(config),
     output:
         f"{STUDY}/cases/{{solid}}/{{resolution}}-{{material}}.json",
     log:
@@ -23,8 +24,9 @@ rule rate_objectives:
         case=case_arguments,
         modes=config["objectives"]["modes"],
         objectives=",".join(settings.studied_objectives(config)),
+        forest=FOREST_ARGUMENT,
     shell:
-        "OMP_NUM_THREADS={threads} python -m solver objectives {params.case}"
+        "OMP_NUM_THREADS={threads} python -m solver objectives {params.case} {params.forest}"
         " --modes {params.modes} --objectives {params.objectives} --out {output} > {log} 2>&1"
 
 

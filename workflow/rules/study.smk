@@ -3,6 +3,8 @@ from workflow.study import cases
 from workflow.study.tables import BUILDERS
 
 STUDY = f"{RESULTS}/objectives"
+NAMED_FOREST = config["objectives"]["forest"]
+FOREST_ARGUMENT = f"--forest {NAMED_FOREST}" if NAMED_FOREST else ""
 
 
 wildcard_constraints:

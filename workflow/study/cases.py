@@ -11,6 +11,7 @@ from typing import Any
 
 import yaml
 
+from solver.objectives import FOREST
 from workflow import settings
 
 
@@ -100,6 +101,18 @@ class Study:
         return [row["coarsening"] for row in next(iter(self.found.values()))["rows"]]
 
     @property
+    def forest(self) -> dict[str, str] | None:
+        """Which forests are compared: `forest`, `forest_objective`, `forest_sha256`; or None."""
+        found: dict[str, str] | None = next(iter(self.found.values())).get("forest")
+        return found
+
+    @property
+    def without_forest(self) -> str:
+        """One sentence about why no forests are among the coarsenings; empty if they are."""
+        reason: str = next(iter(self.found.values())).get("without_forest", "")
+        return reason
+
+    @property
     def last_audible(self) -> int:
         """Last mode of the range 7..60, which ends earlier if fewer modes were asked for."""
         return max(self._last("audible"))
@@ -121,6 +134,16 @@ class Study:
         """Row of a case that belongs to a coarsening."""
         rows: list[dict[str, Any]] = self.found[case]["rows"]
         return next(row for row in rows if row["coarsening"] == coarsening)
+
+    def rms(self, case: Case, coarsening: str) -> float:
+        """Root mean square of the errors of modes 7..60."""
+        return float(self.errors(case, coarsening)["audible"]["rms"])
+
+    def forest_over_fit(self, case: Case) -> float | None:
+        """Rms error of the forests over that of the fit they learned; None unless both are here."""
+        if self.forest is None or self.forest["forest_objective"] not in self.coarsenings:
+            return None
+        return self.rms(case, FOREST) / self.rms(case, self.forest["forest_objective"])
 
 
 def study_beside(config: str | Path) -> Study:

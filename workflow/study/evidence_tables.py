@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Mapping
 from typing import Any
 
 import solver.materials
 from dataset_gen.objectives import OBJECTIVES
+from solver.objectives import FOREST
 from workflow.report import evidence_tables
 from workflow.report.table import Column, Table
 from workflow.study.cases import Case, Study
@@ -60,14 +62,23 @@ def objectives(study: Study) -> Table:
         "objectives",
         "What is fitted, block by block; the last two coarsen without a fit.",
         [Column("coarsening", "Objective"), Column("description", "What it is")],
-        [{"coarsening": name, "description": description(name)} for name in study.coarsenings],
+        [
+            {"coarsening": name, "description": description(name, study.forest)}
+            for name in study.coarsenings
+        ],
     )
 
 
-def description(coarsening: str) -> str:
-    """What a baseline is, or the first line of the documentation of an objective's module."""
+def description(coarsening: str, forest: Mapping[str, str] | None = None) -> str:
+    """What a baseline or the forests are, or the first line of an objective's documentation."""
     if coarsening in BASELINES:
         return BASELINES[coarsening]
+    if coarsening == FOREST:
+        assert forest is not None
+        return (
+            f"No fit: regression forests that have learned {forest['forest_objective']}; "
+            f"{forest['forest']}, SHA-256 {forest['forest_sha256']}…"
+        )
     documentation = inspect.getdoc(inspect.getmodule(OBJECTIVES[coarsening])) or ""
     first = documentation.split("\n", 1)[0].removeprefix(f"Objective `{coarsening}`:")
     text = first.replace("`", "").strip()

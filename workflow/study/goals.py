@@ -4,17 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from solver.objectives import FOREST
 from workflow.study.cases import Case, Study
+from workflow.study.identity import label
 
 NBSP = "\N{NO-BREAK SPACE}"
-LABELS = {"rms": "rms", "rms_of_galerkin": "rms over Galerkin’s", "worst": "worst frequency"}
+LABELS = {
+    "rms": "rms",
+    "rms_of_galerkin": "rms over Galerkin’s",
+    "rms_of_fit": "rms of the forests over that of the fit they learned",
+    "worst": "worst frequency",
+}
 
 
 @dataclass(frozen=True)
 class Goal:
     """One limit on modes 7..60, see `objectives.goals` in the configuration."""
 
-    model: str
+    model: str | None
     quantity: str
     limit: float
     resolutions: list[int] | None
@@ -25,25 +32,25 @@ class Goal:
         return [
             case
             for case in study.found
-            if case.solid == self.model
+            if self.model in (None, case.solid)
             and (self.resolutions is None or case.resolution in self.resolutions)
             and (self.materials is None or case.material in self.materials)
         ]
 
-    def value(self, study: Study, case: Case, coarsening: str) -> float:
-        """What is to stay below the limit."""
-        errors = study.errors(case, coarsening)["audible"]
+    def value(self, study: Study, case: Case, coarsening: str) -> float | None:
+        """What is to stay below the limit; None if the goal is not about this coarsening."""
         if self.quantity == "worst":
-            return abs(float(errors["worst"]))
-        rms = float(errors["rms"])
+            return abs(float(study.errors(case, coarsening)["audible"]["worst"]))
         if self.quantity == "rms":
-            return rms
-        return rms / float(study.errors(case, "galerkin")["audible"]["rms"])
+            return study.rms(case, coarsening)
+        if self.quantity == "rms_of_galerkin":
+            return study.rms(case, coarsening) / study.rms(case, "galerkin")
+        return study.forest_over_fit(case) if coarsening == FOREST else None
 
     @property
     def sentence(self) -> str:
         """The goal in a few words."""
-        where = self.model.replace("-", " ").capitalize()
+        where = self.model.replace("-", " ").capitalize() if self.model else "All solids"
         if self.resolutions:
             where += f" {', '.join(map(str, self.resolutions))}"
         return f"{where}: {LABELS[self.quantity]} ≤{NBSP}{100 * self.limit:.3g}{NBSP}%"
@@ -51,9 +58,10 @@ class Goal:
 
 @dataclass(frozen=True)
 class Verdict:
-    """How a coarsening does on a goal: its largest value, and in how many cases it is met."""
+    """How a coarsening does on a goal: the largest value, where, and how many cases meet it."""
 
     value: float | None
+    where: str | None
     met: int
     cases: int
 
@@ -75,12 +83,16 @@ def goals_of(study: Study) -> list[Goal]:
 
 def judge(study: Study, goal: Goal, coarsening: str) -> Verdict:
     """Verdict on one coarsening."""
-    values = [goal.value(study, case, coarsening) for case in goal.cases(study)]
-    met = sum(value <= goal.limit for value in values)
-    return Verdict(max(values, default=None), met, len(values))
+    found = ((goal.value(study, case, coarsening), case) for case in goal.cases(study))
+    values = {case: value for value, case in found if value is not None}
+    if not values:
+        return Verdict(None, None, 0, 0)
+    worst = max(values, key=values.__getitem__)
+    met = sum(value <= goal.limit for value in values.values())
+    return Verdict(values[worst], label(study, worst), met, len(values))
 
 
 def rms_limits(study: Study, solid: str) -> list[float]:
     """Limits on the rms error of a solid."""
     goals = goals_of(study)
-    return [goal.limit for goal in goals if (goal.model, goal.quantity) == (solid, "rms")]
+    return [goal.limit for goal in goals if goal.quantity == "rms" and goal.model in (None, solid)]

@@ -18,10 +18,12 @@ def goals(study: Study) -> Table:
     for index, goal in enumerate(wanted):
         columns.append(Column(f"goal{index}_value", goal.sentence, "percent"))
         columns.append(Column(f"goal{index}", "verdict"))
+        columns.append(Column(f"goal{index}_where", "worst at", shown=goal.model is None))
     return Table(
         "goals",
         f"Goals on modes {FIRST}–{study.last_audible}: the largest value among the cases that a "
-        "goal is about, and whether all of them keep the limit.",
+        "goal is about, and whether all of them keep the limit. A goal of the forests says nothing "
+        "of the fits.",
         columns,
         [_goals_row(study, coarsening) for coarsening in study.coarsenings],
     )
@@ -36,6 +38,7 @@ def _goals_row(study: Study, coarsening: str) -> dict[str, Any]:
     }
     for index, verdict in enumerate(verdicts):
         row |= {f"goal{index}_value": verdict.value, f"goal{index}": str(verdict)}
+        row[f"goal{index}_where"] = verdict.where
     return row
 
 

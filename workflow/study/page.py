@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from solver.objectives import FOREST
 from workflow.report.page import inline, page_template
 from workflow.report.table import Table, read_table
 from workflow.study.cases import Study, without
@@ -16,12 +17,14 @@ from workflow.study.tables import BUILDERS
 def render(study: Study) -> str:
     """Build the page from the tables and figures of a study; nothing is computed anew."""
     tables = {name: read_table(study.folder / "tables" / f"{name}.json") for name in BUILDERS}
-    best = tables["summary"].rows[0]
+    fits = [row for row in tables["summary"].rows if row["coarsening"] != FOREST]
     return page_template("study/page.html.j2").render(
         title="Which objective has the best spectra?",
         config=study.config,
         tables=tables,
-        best=best,
+        best=fits[0],
+        forest=study.forest,
+        without_forest=study.without_forest,
         baselines={row["coarsening"]: row for row in tables["summary"].rows},
         goals={row["coarsening"]: row for row in tables["goals"].rows},
         without=without(study.config),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from workflow.report.table import Table
-from workflow.study import errors_tables, evidence_tables, goals_tables
+from workflow.study import errors_tables, evidence_tables, forest_tables, goals_tables
 from workflow.study.cases import Study
 
 BUILDERS: dict[str, Callable[[Study], Table]] = {
@@ -13,6 +13,7 @@ BUILDERS: dict[str, Callable[[Study], Table]] = {
     "summary-all": errors_tables.summary_all,
     "goals": goals_tables.goals,
     "goal-cases": goals_tables.goal_cases,
+    "forest": forest_tables.forest,
     "errors": errors_tables.errors,
     "truths": evidence_tables.truths,
     "objectives": evidence_tables.objectives,
