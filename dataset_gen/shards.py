@@ -84,6 +84,12 @@ class Shard:
         """Where the fine moduli were drawn from."""
         return self.settings.moduli
 
+    def part(self, first: int, past: int) -> Shard:
+        """The samples `first` up to `past`, counted from the shard's own start."""
+        part = replace(self.settings, start=self.start + first, stop=self.start + past)
+        columns = {name: getattr(self, name)[first:past] for name in _LONG_NAMES}
+        return Shard(settings=part, provenance=self.provenance, **columns)
+
 
 def shard_of(settings: Settings, rows: NDArray[np.void], origin: dict[str, Any]) -> Shard:
     """Shard or piece from rows of type `dataset_gen.tasks.ROW`."""

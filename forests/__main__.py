@@ -1,45 +1,41 @@
-"""Command line: `python -m forests train | table | inspect`."""
+"""Command line: `python -m forests grow | train | inspect | table | variants | curve`."""
 
 from __future__ import annotations
 
 import argparse
 import json
 import sys
-from dataclasses import replace
 
 from carillon import cli
-from carillon.arguments import Parser, positive_number, whole_number
+from carillon.arguments import Parser, whole_number
+from carillon.errors import UserError
 from carillon.files import require_writable
-from carillon.progress import say
-from dataset_gen.shards import read_shards
-from forests import summary, table
-from forests.cases import CASES
-from forests.database import MATERIALS
-from forests.methods import common_poisson, databases_of, load_models
-from forests.model import save_model
-from forests.scaling import TRANSFORMS
-from forests.structure import GROWERS
-from forests.table_plot import plot, require_plottable
-from forests.train import Training, parameters_of, train
+from dataset_gen.ranks import refuse, world
+from forests import summary
+from forests.comparison import table
+from forests.comparison.cases import CASES
+from forests.comparison.database import MATERIALS
+from forests.comparison.methods import common_poisson, databases_of, load_models
+from forests.comparison.plot import plot, require_plottable
+from forests.training import command, studies
+from forests.training.command import PROGRAM
+from forests.training.dataset import open_dataset
 
 
 def _parser() -> Parser:
-    default = Training()
     parser = Parser(prog="forests", description="Regression forests that coarsen 2x2x2 blocks.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    learn = commands.add_parser("train", help="train on shards, write the model")
-    learn.add_argument("datasets", nargs="+", metavar="DATASET", help="shards of dataset_gen")
-    learn.add_argument("--out", required=True, help="HDF5 file to write")
-    learn.add_argument("--trees", type=whole_number(1), default=default.trees)
-    learn.add_argument("--depth", type=whole_number(1), default=default.depth)
-    learn.add_argument("--min-leaf", type=whole_number(1), default=default.min_leaf)
-    learn.add_argument("--structure-rows", type=whole_number(1), default=default.structure_rows)
-    learn.add_argument("--prior", type=positive_number, default=default.prior)
-    learn.add_argument("--uniform-weight", type=positive_number, default=default.uniform_weight)
-    learn.add_argument("--transform", choices=TRANSFORMS, default=default.transform)
-    learn.add_argument("--grower", choices=tuple(GROWERS), default=default.grower)
-    learn.add_argument("--seed", type=whole_number(0), default=default.seed)
-    learn.add_argument("--workers", type=whole_number(1), default=1, help="threads")
+    command.add_parsers(commands)
+    alternatives = commands.add_parser("variants", help="other ways to train, of equal storage")
+    command.add_training(alternatives)
+    alternatives.add_argument("--only", action="append", metavar="NAME", help="may be repeated")
+    curve = commands.add_parser("curve", help="error over the rows trained on")
+    command.add_training(curve)
+    curve.add_argument("--rows", default="1e5,3e5,1e6,3e6,1e7", help="(default %(default)s)")
+    curve.add_argument("--plot", metavar="FILE", help="the curve, as .png, .svg or .pdf")
+    for study in (alternatives, curve):
+        study.add_argument("--workers", type=whole_number(1), default=1, help="threads")
+        study.add_argument("--json", action="store_true")
     compare = commands.add_parser("table", help="error, cost and storage of every coarsening")
     compare.add_argument("--model", action="append", help="forests to compare, may be repeated")
     compare.add_argument("--blocks", type=whole_number(1), default=10_000, help="of each range")
@@ -54,15 +50,19 @@ def _parser() -> Parser:
     return parser
 
 
-def _train(arguments: argparse.Namespace) -> None:
-    require_writable(arguments.out)
-    names = [name for name in vars(Training()) if hasattr(arguments, name)]
-    training = replace(Training(), **{name: getattr(arguments, name) for name in names})
-    shards = read_shards(arguments.datasets)
-    model = train(shards, training, workers=arguments.workers)
-    save_model(arguments.out, model, parameters_of(shards, training))
-    scores = "".join(f", {name} {value:.4f}" for name, value in model.scores.items())
-    say(f"{arguments.out}: {len(model.forests.low):,} leaves{scores}")
+def _studied(arguments: argparse.Namespace) -> list[studies.Row]:
+    training = command.training_of(arguments)
+    dataset = open_dataset(arguments.datasets)
+    if arguments.command == "variants":
+        names = arguments.only or tuple(studies.VARIANTS)
+        return studies.variants(dataset, training, arguments.workers, names)
+    if arguments.plot:
+        require_writable(require_plottable(arguments.plot))
+    counts = studies.require_counts(arguments.rows)
+    rows = studies.learning_curve(dataset, training, counts, arguments.workers)
+    if arguments.plot:
+        studies.error_over_rows(rows, arguments.plot)
+    return rows
 
 
 def _table(arguments: argparse.Namespace) -> list[table.Row]:
@@ -77,21 +77,47 @@ def _table(arguments: argparse.Namespace) -> list[table.Row]:
     return rows
 
 
-def main(argv: list[str] | None = None) -> None:
+def _arguments(argv: list[str] | None) -> argparse.Namespace | None:
+    """The command line; None if it is wrong and this is one of several ranks, which has said so."""
+    comm = world()
+    try:
+        arguments = _parser().parse_args(argv)
+        if comm is not None and arguments.command != "train":
+            raise UserError(
+                f"{arguments.command} on {comm.size} ranks: only train runs on several, start it "
+                "as one process"
+            )
+    except UserError as error:
+        if comm is None:
+            raise
+        refuse(comm, PROGRAM, error)
+        return None
+    return arguments
+
+
+def main(argv: list[str] | None = None) -> int:
     """Run one command."""
-    arguments = _parser().parse_args(argv)
-    if arguments.command == "train":
-        _train(arguments)
-        return
+    arguments = _arguments(argv)
+    if arguments is None:
+        return cli.EXIT_BAD_INPUT
     result: object
-    if arguments.command == "table":
-        result = rows = _table(arguments)
-        text = table.as_text(rows)
-    else:
-        result = found = summary.describe(arguments.file)
-        text = summary.as_text(found)
+    match arguments.command:
+        case "grow":
+            return command.run_grow(arguments)
+        case "train":
+            return command.run_train(arguments)
+        case "table":
+            result = rows = _table(arguments)
+            text = table.as_text(rows)
+        case "variants" | "curve":
+            result = studied = _studied(arguments)
+            text = studies.as_text(studied)
+        case _:
+            result = found = summary.describe(arguments.file)
+            text = summary.as_text(found)
     print(json.dumps(result, indent=2) if arguments.json else text)
+    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(cli.run("forests", main))
+    sys.exit(cli.run(PROGRAM, main))

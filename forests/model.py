@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from carillon import provenance
 from carillon.errors import UserError
 from carillon.files import create_h5, open_h5
-from forests.leaves import Leaves
 from forests.scaling import FEATURES, TRANSFORMS
-from forests.structure import Tree
+from forests.training.leaves import Leaves
+from forests.training.structure import Tree
 
 KIND = "forests"
 SCHEMA = 1

@@ -35,18 +35,47 @@ def test_inspect_tells_what_was_trained(folder, capsys):
 
 
 def test_table_compares_every_method_inside_and_outside_the_trained_range(folder, capsys):
-    assert run("table", "--model", folder / "forests.h5", "--blocks", 30, "--json") == 0
-    rows = json.loads(capsys.readouterr().out)["rows"]
-    assert len(rows) == 10
-    errors = {(row["range_gpa"][0], row["method"]): row["mean_error_inertial"] for row in rows}
-    for low in (0.0, 100.0):
-        assert (
-            errors[low, f"{DEFAULT_OBJECTIVE}, forests"]
-            < errors[low, "Galerkin"]
-            < errors[low, "average"]
-        )
-    assert run("table", "--model", folder / "forests.h5", "--blocks", 5) == 0
+    few = ("--model", folder / "forests.h5", "--blocks", 30, "--materials", 2)
+    assert run("table", *few, "--json") == 0
+    rows = json.loads(capsys.readouterr().out)
+    for range_gpa in ([0.0, 10.0], [100.0, 10_000.0]):
+        error = {
+            row["method"]: row["mean_error_inertial"]
+            for row in rows
+            if row["range_gpa"] == range_gpa
+            and row["fill"] == "solid"
+            and row["distribution"] == "uniform"
+            and row["scaled_by"] == 1
+        }
+        forests = error[f"{DEFAULT_OBJECTIVE}, forests"]
+        assert forests < error["Galerkin"] < error["average"]
+    assert run("table", *few) == 0
     assert f"{DEFAULT_OBJECTIVE}, forests" in capsys.readouterr().out
+
+
+def test_variants_are_compared_under_equal_storage(folder, capsys):
+    few = ("--max-leaves", 60, "--min-leaf", 10)
+    names = ("logarithms, linear splits", "ratios, variance splits (paper)", "the same, 1 tree")
+    only = [word for name in names for word in ("--only", name)]
+    assert run("variants", folder / "0.h5", folder / "1.h5", *few, *only, "--json") == 0
+    rows = json.loads(capsys.readouterr().out)
+    assert [row["variant"] for row in rows] == list(names)
+    assert all(100 < row["leaves"] <= 6 * 60 for row in rows)
+    ours, paper, _ = (row["scores"]["uniform 0..10 GPa"]["r2_log"] for row in rows)
+    assert ours > paper
+
+
+def test_learning_curve_falls_with_the_rows(folder, capsys):
+    shards = (folder / "0.h5", folder / "1.h5")
+    plot = folder / "curve.svg"
+    assert run("curve", *shards, "--rows", "1e3,1e4", "--plot", plot, "--json") == 0
+    few, more = json.loads(capsys.readouterr().out)
+    assert (few["rows"], more["rows"]) == (1008, 10_000)
+    errors = [row["scores"]["uniform 0..10 GPa"]["rms_log_solid"] for row in (few, more)]
+    assert errors[1] < errors[0]
+    assert plot.stat().st_size > 1000
+    assert run("curve", *shards, "--rows", "1e3") == 0
+    assert "rms error of log E" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -60,7 +89,13 @@ def test_table_compares_every_method_inside_and_outside_the_trained_range(folder
         ("train", "0.h5", "--out", "new.h5", "--depth", "0"),
         ("train", "0.h5", "--out", "new.h5", "--transform", "cube"),
         ("train", "0.h5", "--out", "new.h5", "--prior", "-1"),
+        ("train", "0.h5", "--out", "new.h5", "--max-leaves", "many"),
+        ("train", "0.h5", "--out", "new.h5", "--structure", "0.h5"),
         ("train", "forests.h5", "--out", "new.h5"),
+        ("grow", "0.h5", "--out", "new.h5", "--tree", "6"),
+        ("curve", "0.h5", "--rows", "1e9"),
+        ("curve", "0.h5", "--rows", "many"),
+        ("variants", "0.h5", "--only", "oak"),
         ("table", "--model", "0.h5"),
         ("inspect", "0.h5"),
     ],

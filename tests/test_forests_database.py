@@ -7,17 +7,17 @@ from carillon.errors import UserError
 from dataset_gen.block import symmetries
 from dataset_gen.objectives import fit
 from dataset_gen.sampling import moduli
-from forests.cases import CASES
-from forests.combinations import cells_of, combination_keys, combinations
-from forests.database import (
+from forests.comparison.cases import CASES
+from forests.comparison.combinations import cells_of, combination_keys, combinations
+from forests.comparison.database import (
     base_materials,
     build,
     load_databases,
     look_up,
     save_databases,
 )
-from forests.farthest_points import farthest_points
-from forests.methods import database_methods, databases_of
+from forests.comparison.farthest_points import farthest_points
+from forests.comparison.methods import database_methods, databases_of
 
 BASE = np.array([0.5, 2.0, 9.0])
 WITH_VOID = np.array([0.0, 1.0, 6.0])

@@ -15,10 +15,10 @@ from dataset_gen.sampling import samples
 from forests import coarsen, load_model, save_model
 from forests.baselines import average, galerkin
 from forests.evaluate import coarsen_reference
-from forests.leaves import fit_leaves, leaf_of
 from forests.model import Forests
-from forests.structure import Tree, flatten
-from forests.train import Training, train
+from forests.training.leaves import fit_leaves, leaf_of
+from forests.training.structure import Tree, flatten
+from forests.training.train import Training, train
 
 TRANSFORMS = ("log", "ratio")
 

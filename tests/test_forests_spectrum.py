@@ -7,7 +7,7 @@ from dataset_gen.generate import generate
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, fit, lumped_share
 from forests import coarsen
 from forests.baselines import average, galerkin
-from forests.train import Training, train
+from forests.training.train import Training, train
 from tests.dataset_spectra import box_fields, coarse_frequencies, fine_frequencies, rms_error
 
 MODES = 30

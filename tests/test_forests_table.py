@@ -21,22 +21,22 @@ from dataset_gen.generate import generate
 from dataset_gen.objectives import fit
 from dataset_gen.objectives.patterns import straining_motions
 from dataset_gen.shards import write_shard
-from forests import methods as methods_module
 from forests.__main__ import main
 from forests.baselines import average, galerkin
-from forests.block_error import LOADS, coarse_flexibility, displacement_errors, tables_of
-from forests.cases import CASES
-from forests.condensation import condense, corner_flexibility
-from forests.methods import (
+from forests.comparison import methods as methods_module
+from forests.comparison.block_error import LOADS, coarse_flexibility, displacement_errors, tables_of
+from forests.comparison.cases import CASES
+from forests.comparison.condensation import condense, corner_flexibility
+from forests.comparison.methods import (
     common_poisson,
     databases_of,
     direct_fit,
     load_models,
     static_condensation,
 )
+from forests.comparison.plot import plot
+from forests.comparison.table import as_text, table
 from forests.model import Model, load_model
-from forests.table import as_text, table
-from forests.table_plot import plot
 
 POISSON = 0.25
 SOLID = (True,) * 8

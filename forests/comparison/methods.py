@@ -14,9 +14,9 @@ from dataset_gen.element import Array
 from dataset_gen.objectives import fit
 from forests import model as forest_model
 from forests.baselines import average, galerkin
-from forests.cases import Case
-from forests.condensation import condense, corner_flexibility
-from forests.database import (
+from forests.comparison.cases import Case
+from forests.comparison.condensation import condense, corner_flexibility
+from forests.comparison.database import (
     MATERIALS,
     REPRESENTATIVES,
     Database,
@@ -52,7 +52,7 @@ class Method:
     clamped: bool = False
 
     def response(self, young: Array) -> Array:
-        """What `forests.block_error` wants: moduli (n, 8) or flexibilities (n, 18, 18)."""
+        """What `block_error` wants: moduli (n, 8) or flexibilities (n, 18, 18)."""
         return (self.flexibility or self.coarsen)(young)
 
 

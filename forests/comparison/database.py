@@ -29,8 +29,8 @@ from dataset_gen.block import symmetries
 from dataset_gen.element import DEFAULT_POISSON, Array
 from dataset_gen.objectives import fit, require_poisson
 from dataset_gen.sampling import Moduli
-from forests.combinations import cells_of, combination_keys, places
-from forests.farthest_points import farthest_points
+from forests.comparison.combinations import cells_of, combination_keys, places
+from forests.comparison.farthest_points import farthest_points
 
 OBJECTIVE = "chen2015"
 
@@ -56,7 +56,7 @@ class Database:
     Attributes
     ----------
     materials : (m,) Young's moduli in ascending order, any unit; the first may be 0, void.
-    keys : (k,) of combinations, see `forests.combinations`; ascending.
+    keys : (k,) of combinations, see `forests.comparison.combinations`; ascending.
     entries : (k,) representative of each combination.
     moduli : (r, 8) coarse moduli of the representatives, in the unit of the materials.
     poisson : Poisson's ratio of all materials.

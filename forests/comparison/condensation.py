@@ -25,7 +25,7 @@ from dataset_gen.objectives.kernel import (
 from dataset_gen.objectives.lanes import LANES, compiled, empty
 from dataset_gen.objectives.patterns import straining_motions
 from dataset_gen.serial import serial_blas
-from forests.block_error import pattern_rows
+from forests.comparison.block_error import pattern_rows
 
 
 @compiled

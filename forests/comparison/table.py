@@ -1,6 +1,6 @@
 """Fig. 9: displacement error on random blocks, cost per block and storage of every coarsening.
 
-The error of a block is that of `forests.block_error`: the mean square distance between the fine
+The error of a block is that of `block_error`: the mean square distance between the fine
 displacements and those of its coarse element, interpolated trilinearly to the block's nodes, over
 the mean square of the fine displacements, exact for all random forces. A row has its mean and
 median over the blocks. It is a ratio of squares: 0 is exact, 1 is what a rigid element does, and
@@ -18,10 +18,16 @@ import numpy as np
 from carillon.progress import track
 from dataset_gen.element import Array
 from dataset_gen.serial import serial_blas
-from forests.block_error import AT_ONCE, Errors, displacement_errors
-from forests.cases import CASES, Case
-from forests.database import Database
-from forests.methods import Method, common_poisson, database_methods, databases_of, methods_of
+from forests.comparison.block_error import AT_ONCE, Errors, displacement_errors
+from forests.comparison.cases import CASES, Case
+from forests.comparison.database import Database
+from forests.comparison.methods import (
+    Method,
+    common_poisson,
+    database_methods,
+    databases_of,
+    methods_of,
+)
 from forests.model import Model
 
 TIMED_BLOCKS = 2000
@@ -31,7 +37,7 @@ TIMED_RUNS = 5
 """Runs whose median is the cost per block, after one that warms up."""
 
 SQUARE_METRES = 1e-18
-"""Square of the displacement [m^2] that `forests.block_error` calls 1 when moduli are in GPa.
+"""Square of the displacement [m^2] that `block_error` calls 1 when moduli are in GPa.
 
 Forces of variance 1 N^2 in every component, cells of edge 1 m: a displacement is 1 N / (1 GPa m).
 Where moduli may come close to zero, a few blocks with the softest cells make up most of this mean,
@@ -101,7 +107,7 @@ def table(
     Parameters
     ----------
     models : forests by the names of their files, all of one Poisson's ratio.
-    databases : of metamaterials, see `forests.methods.databases_of`; built if not given.
+    databases : of metamaterials, see `forests.comparison.methods.databases_of`; built if not given.
 
     Returns
     -------

@@ -1,0 +1,90 @@
+"""The ranks that train one model together, or one process alone."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from carillon.cli import EXIT_BAD_INPUT
+from carillon.errors import UserError
+from dataset_gen.shards import PIECE_ROWS
+from forests.training.leaves import Sums
+
+T = TypeVar("T")
+
+
+class Ranks:
+    """All ranks of a job; without a communicator, this process is the only one."""
+
+    def __init__(self, comm: Any = None) -> None:
+        self._comm = comm
+        self.rank = 0 if comm is None else int(comm.rank)
+        self.size = 1 if comm is None else int(comm.size)
+
+    @property
+    def first(self) -> bool:
+        """Whether this rank writes the result and speaks for all."""
+        return self.rank == 0
+
+    def deal(self, jobs: range) -> range:
+        """This rank's share of independent jobs, one after the other to all ranks."""
+        return jobs[self.rank :: self.size]
+
+    def share(self, samples: int) -> tuple[int, int]:
+        """First and past-the-last position of this rank's samples: whole pieces, in order."""
+        pieces = -(-samples // PIECE_ROWS)
+        begin, end = (pieces * (self.rank + k) // self.size * PIECE_ROWS for k in (0, 1))
+        return min(begin, samples), min(end, samples)
+
+    def together(self, mine: dict[int, T]) -> dict[int, T]:
+        """What all ranks have, on every rank."""
+        if self._comm is None:
+            return mine
+        parts: list[dict[int, T]] = self._comm.allgather(mine)
+        return {key: value for part in parts for key, value in part.items()}
+
+    def in_order(self, mine: list[T]) -> list[T]:
+        """The lists of all ranks one after the other, on the first rank; its own elsewhere."""
+        if self._comm is None:
+            return mine
+        parts: list[list[T]] | None = self._comm.gather(mine)
+        return mine if parts is None else [item for part in parts for item in part]
+
+    def add_up(self, sums: Sums) -> None:
+        """Add the sums of all ranks on the first one."""
+        if self._comm is None:
+            return
+        from mpi4py import MPI
+
+        names = {"moments": MPI.SUM, "rows": MPI.SUM, "low": MPI.MIN, "high": MPI.MAX}
+        for name, operation in names.items():
+            values = getattr(sums, name)
+            if self.first:
+                self._comm.Reduce(MPI.IN_PLACE, values, operation)
+            else:
+                self._comm.Reduce(values, None, operation)
+
+    def agree(self, program: str, action: Callable[[], T]) -> T | None:
+        """The result of `action`; None on every rank if it was refused input on any of them.
+
+        What was wrong is printed once.
+        """
+        if self._comm is None:
+            return action()
+        result, complaint = None, None
+        try:
+            result = action()
+        except UserError as error:
+            complaint = str(error)
+        complaints = [found for found in self._comm.allgather(complaint) if found is not None]
+        if not complaints:
+            return result
+        if self.first:
+            print(f"{program}: {complaints[0]}", file=sys.stderr, flush=True)
+        return None
+
+    def end_all(self, program: str, error: UserError) -> None:
+        """Print a mistake that only this rank knows of, and end all of them."""
+        print(f"{program}: {error}", file=sys.stderr, flush=True)
+        self._comm.Abort(EXIT_BAD_INPUT)

@@ -1,0 +1,185 @@
+"""How the error depends on the rows trained on, and on how the trees are made."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from carillon.errors import UserError
+from carillon.progress import say
+from dataset_gen.generate import generate
+from forests.model import Model
+from forests.training.dataset import Dataset
+from forests.training.scores import held_out_scores
+from forests.training.train import Training, train
+
+TEST_SAMPLES = 20_000
+"""Fresh samples of each distribution that the studies are scored on."""
+
+Row = dict[str, Any]
+
+VARIANTS: dict[str, dict[str, Any]] = {
+    "ratios, variance splits (paper)": {"transform": "ratio", "grower": "best"},
+    "ratios, log target": {"transform": "ratio-log", "grower": "best"},
+    "bounded ratios, log target": {"transform": "bounded", "grower": "best"},
+    "logarithms": {"grower": "best"},
+    "logarithms, extra-trees": {"grower": "extra"},
+    "ratios, log target, linear splits": {"transform": "ratio-log"},
+    "bounded ratios, linear splits": {"transform": "bounded"},
+    "logarithms, linear splits": {},
+    "the same, 1 tree": {"trees": 1},
+    "the same, 6 trees": {"trees": 6},
+}
+"""Trainings that are compared, as what they change of the default one."""
+
+
+def fresh_samples(dataset: Dataset, samples: int = TEST_SAMPLES) -> dict[str, Any]:
+    """Fitted samples by distribution, of a seed that the dataset does not have."""
+    seed = 1 + max(part.seed for part in dataset.settings)
+    drawn = dict.fromkeys(part.moduli for part in dataset.settings)
+    return {
+        f"{each.distribution} {each.low:g}..{each.high:g} GPa": generate(
+            samples,
+            seed,
+            objective=dataset.objective,
+            poisson=dataset.poisson,
+            progress=False,
+            distribution=each.distribution,
+            low=each.low,
+            high=each.high,
+        )
+        for each in drawn
+    }
+
+
+def _scored(model: Model, test: dict[str, Any]) -> Row:
+    scores = {name: held_out_scores(model, s.fine, s.coarse) for name, s in test.items()}
+    return {
+        "leaves": int(model.scores["leaves"]),
+        "storage_bytes": model.nbytes,
+        "structure_seconds": model.provenance["structure_seconds"],
+        "leaves_seconds": model.provenance["leaves_seconds"],
+        "training_seconds": model.provenance["training_seconds"],
+        "training_rows": model.provenance["training_rows"],
+        "scores": scores,
+    }
+
+
+def _trained(dataset: Dataset, training: Training, workers: int, name: str) -> Model:
+    say(name)
+    return train(dataset, training, workers)
+
+
+def variants(
+    dataset: Dataset,
+    training: Training,
+    workers: int = 1,
+    names: Sequence[str] = tuple(VARIANTS),
+) -> list[Row]:
+    """Trainings of `VARIANTS` with the storage that `training` may take, scored on fresh samples.
+
+    Raises
+    ------
+    UserError
+        For a variant that is not known.
+    """
+    if unknown := [name for name in names if name not in VARIANTS]:
+        raise UserError(f"variant {unknown[0]!r} is unknown, choose from {', '.join(VARIANTS)}")
+    test = fresh_samples(dataset)
+    leaves = training.max_leaves * training.trees
+    rows = []
+    for name in names:
+        changed = replace(training, **VARIANTS[name])
+        changed = replace(changed, max_leaves=max(1, leaves // changed.trees))
+        rows.append({"variant": name, **_scored(_trained(dataset, changed, workers, name), test)})
+    return rows
+
+
+def learning_curve(
+    dataset: Dataset, training: Training, rows: Sequence[int], workers: int = 1
+) -> list[Row]:
+    """Trainings on about so many rows of the dataset each, scored on fresh samples.
+
+    Raises
+    ------
+    UserError
+        If the dataset has fewer rows than asked for.
+    """
+    most = 8 * dataset.count
+    if max(rows) > most:
+        raise UserError(
+            f"a curve up to {max(rows):,} rows: the dataset has {most:,}, name more shards"
+        )
+    test = fresh_samples(dataset)
+    found = []
+    for count in rows:
+        part = dataset.thinned(-(-count // 8))
+        model = _trained(part, training, workers, f"{8 * part.count:,} rows")
+        found.append({"rows": 8 * part.count, **_scored(model, test)})
+    return found
+
+
+def as_text(rows: Sequence[Row]) -> str:
+    """Either study as a table."""
+    head = "variant" if "variant" in rows[0] else "rows"
+    tests = list(rows[0]["scores"])
+    width = max(len(f"{row[head]}") for row in rows) + 2
+    lines = [
+        "rms error of log E on fresh solid and partly void blocks, median relative error, R^2",
+        " " * (width + 25) + "".join(f"{name:<34}" for name in tests),
+        f"{head:<{width}}{'leaves':>8}{'MB':>7}{'s':>8}  "
+        + "".join(f"{'solid':>9}{'void':>9}{'median':>10}{'R^2':>6}" for _ in tests),
+    ]
+    for row in rows:
+        scores = "".join(
+            f"{s['rms_log_solid']:>9.4f}{s['rms_log_partly_void']:>9.4f}"
+            f"{s['median_error']:>10.5f}{s['r2_log']:>6.3f}"
+            for s in row["scores"].values()
+        )
+        lines.append(
+            f"{row[head]:<{width}}{row['leaves']:>8}{row['storage_bytes'] / 1e6:>7.1f}"
+            f"{row['training_seconds']:>8.1f}  {scores}"
+        )
+    return "\n".join(lines)
+
+
+def error_over_rows(rows: Sequence[Row], path: str) -> None:
+    """Plot a learning curve."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(6.4, 4.0), layout="constrained")
+    for name in rows[0]["scores"]:
+        for score, label, line in (
+            ("rms_log_solid", "solid", "-o"),
+            ("rms_log_partly_void", "partly void", "--s"),
+        ):
+            values = [row["scores"][name][score] for row in rows]
+            axes.loglog([row["rows"] for row in rows], values, line, label=f"{name}, {label}")
+    axes.set(xlabel="training rows", ylabel="rms error of log E on fresh samples")
+    axes.grid(True, which="both", alpha=0.3)
+    axes.legend()
+    figure.savefig(path)
+    plt.close(figure)
+
+
+def require_counts(text: str) -> list[int]:
+    """Row counts like `1e5,1e6` in ascending order.
+
+    Raises
+    ------
+    UserError
+        If there is anything else.
+    """
+    try:
+        counts = sorted({int(float(part)) for part in text.split(",")})
+    except ValueError:
+        counts = []
+    if not counts or counts[0] < 1 or not np.isfinite(counts[-1]):
+        raise UserError(f"rows {text!r}: expected counts like 1e5,1e6,1e7")
+    return counts

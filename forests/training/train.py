@@ -1,0 +1,293 @@
+"""Train both forests on fitted blocks and score them on blocks held out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass, replace
+from typing import Any, TypeVar
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from carillon import provenance
+from carillon.errors import UserError
+from carillon.progress import say, track
+from dataset_gen.shards import Shard
+from forests.model import FILLED, VOID, Model, join
+from forests.scaling import TRANSFORMS
+from forests.training.dataset import Dataset, Samples, dataset_of, joined
+from forests.training.leaves import Leaves, Sums, add_rows, solve_leaves
+from forests.training.ranks import Ranks
+from forests.training.rows import rows_of
+from forests.training.scores import held_out_scores, uniform_scores
+from forests.training.structure import GROWERS, Limits, Rows, Tree
+
+T = TypeVar("T")
+
+KINDS = {VOID: "void", FILLED: "filled"}
+
+
+@dataclass(frozen=True)
+class Training:
+    """Parameters of the training.
+
+    Attributes
+    ----------
+    trees, depth : trees a forest, their largest depth.
+    max_leaves : most leaves of a tree; 56 bytes each in the model.
+    min_leaf : rows of the subset that a leaf needs.
+    structure_rows : rows of the subset that the splits of both forests are chosen from.
+    prior : see `forests.training.leaves.solve_leaves`.
+    uniform_weight : weight of blocks of one material; they are few but fill most real objects.
+    transform, grower : see `forests.scaling`, `forests.training.structure`.
+    """
+
+    trees: int = 3
+    depth: int = 20
+    max_leaves: int = 30_000
+    min_leaf: int = 30
+    structure_rows: int = 5_000_000
+    prior: float = 0.5
+    uniform_weight: float = 400.0
+    transform: str = "log"
+    grower: str = "linear"
+    seed: int = 0
+
+    @property
+    def limits(self) -> Limits:
+        """What a tree may grow to."""
+        return Limits(self.max_leaves, self.min_leaf, self.depth)
+
+    @property
+    def jobs(self) -> range:
+        """Numbers of all trees: those of the forest of void origins, then the others."""
+        return range(2 * self.trees)
+
+    def kind(self, job: int) -> int:
+        """Forest that a tree belongs to."""
+        return job // self.trees
+
+    def validate(self) -> None:
+        """Raise UserError when a parameter makes no sense."""
+        for name in ("trees", "depth", "max_leaves", "min_leaf", "structure_rows"):
+            if getattr(self, name) < 1:
+                raise UserError(f"{name} is {getattr(self, name)}, expected at least 1")
+        if self.prior <= 0.0 or self.uniform_weight <= 0.0:
+            raise UserError("prior and uniform weight must be positive")
+        if self.seed < 0:
+            raise UserError(f"seed is {self.seed}, expected 0 or more")
+        for name, known in (("transform", TRANSFORMS), ("grower", tuple(GROWERS))):
+            if getattr(self, name) not in known:
+                raise UserError(
+                    f"{name} {getattr(self, name)!r} is unknown, choose {' or '.join(known)}"
+                )
+
+
+def grow_trees(
+    dataset: Dataset,
+    training: Training,
+    jobs: range,
+    workers: int = 1,
+    progress: bool = True,
+) -> dict[int, Tree]:
+    """First step: the splits of some of the trees, one tree a thread.
+
+    A tree depends on the dataset, the parameters and its number alone.
+
+    Raises
+    ------
+    UserError
+        If there are too few rows with a void or with a filled origin.
+    """
+    if not jobs:
+        return {}
+    subset = dataset.subset(training.structure_rows // 8)
+    rows = rows_of(subset, training.transform, training.uniform_weight)
+    for kind in sorted({training.kind(job) for job in jobs}):
+        _require_rows(rows[kind], kind, training, progress and jobs[0] == kind * training.trees)
+
+    def grow(job: int) -> Tree:
+        kind = training.kind(job)
+        sequence = np.random.SeedSequence([training.seed, kind, job % training.trees])
+        seed = int(sequence.generate_state(1)[0] >> 1)
+        return GROWERS[training.grower](rows[kind], training.limits, seed)
+
+    # Started one by one, so that the progress is that of trees finished.
+    grown = Parallel(n_jobs=workers, prefer="threads", return_as="generator")(
+        delayed(grow)(job) for job in jobs
+    )
+    found = track(grown, "growing", total=len(jobs), unit="trees", visible=progress)
+    return dict(zip(jobs, found, strict=True))
+
+
+def _require_rows(rows: Rows, kind: int, training: Training, tell: bool) -> None:
+    if len(rows) < 2 * training.min_leaf:
+        raise UserError(
+            f"{len(rows)} rows with a {KINDS[kind]} origin, expected at least "
+            f"{2 * training.min_leaf}; generate more samples"
+        )
+    leaves = min(training.max_leaves, 1 << min(training.depth, 62))
+    if len(rows) < leaves * training.min_leaf:
+        say(
+            f"{len(rows):,} rows with a {KINDS[kind]} origin are too few for trees of depth "
+            f"{training.depth} with {leaves:,} leaves of {training.min_leaf} rows each: they stop "
+            f"at {len(rows) // training.min_leaf:,} leaves or less",
+            tell,
+        )
+
+
+def fit_leaves(
+    dataset: Dataset,
+    training: Training,
+    trees: dict[int, Tree],
+    ranks: Ranks,
+    workers: int = 1,
+    progress: bool = True,
+) -> tuple[dict[int, Leaves], Samples, int]:
+    """Second step: the leaves' functions from all samples, read once and in pieces.
+
+    Returns
+    -------
+    Leaves of every tree, samples held out, and how many were trained on; on the first rank.
+    """
+    sums = {job: Sums.nothing(tree.leaves) for job, tree in trees.items()}
+    held: list[Samples] = []
+    begin, end = ranks.share(dataset.count)
+
+    def prepared() -> Iterator[tuple[tuple[Rows, Rows], int]]:
+        for piece in dataset.read(begin, end):
+            out = dataset.is_held_out(piece.position)
+            held.append(piece.where(out))
+            learned = piece.where(~out)
+            yield rows_of(learned, training.transform, training.uniform_weight), len(piece.young)
+
+    used = 0
+    label = "fitting leaves" if ranks.size == 1 else f"fitting leaves, first of {ranks.size} ranks"
+    with ThreadPoolExecutor(workers) as pool:
+        for rows, _ in track(
+            _ahead(pool, prepared()),
+            label,
+            total=end - begin,
+            unit="samples",
+            visible=progress and ranks.first,
+            weight=lambda item: item[1],
+        ):
+            jobs = [
+                pool.submit(add_rows, sums[job], tree, rows[training.kind(job)])
+                for job, tree in trees.items()
+            ]
+            for running in jobs:
+                running.result()
+            used += (len(rows[VOID]) + len(rows[FILLED])) // 8
+    for part in sums.values():
+        ranks.add_up(part)
+    everything = ranks.in_order([(held, used)])
+    if not ranks.first:
+        return {}, joined(held), used
+    solved = {job: solve_leaves(trees[job], sums[job], training.prior) for job in trees}
+    left_out = joined(piece for pieces, _ in everything for piece in pieces)
+    return solved, left_out, sum(count for _, count in everything)
+
+
+def _ahead(pool: ThreadPoolExecutor, items: Iterator[T]) -> Iterator[T]:
+    """The items, the next one being made while one is used."""
+    following = pool.submit(next, items, None)
+    while (item := following.result()) is not None:
+        following = pool.submit(next, items, None)
+        yield item
+
+
+def train(
+    dataset: Dataset | Sequence[Shard],
+    training: Training | None = None,
+    workers: int = 1,
+    progress: bool = True,
+) -> Model:
+    """Train the forests of void and of filled origins on a dataset's converged samples.
+
+    Parameters
+    ----------
+    workers : threads; the result does not depend on it.
+
+    Raises
+    ------
+    UserError
+        For impossible parameters, shards that do not belong together, or too few samples of either
+        kind.
+    """
+    data = dataset if isinstance(dataset, Dataset) else dataset_of(dataset)
+    model = train_on_ranks(data, training or Training(), Ranks(), workers, progress)
+    assert model is not None
+    return model
+
+
+def train_on_ranks(
+    dataset: Dataset,
+    training: Training,
+    ranks: Ranks,
+    workers: int = 1,
+    progress: bool = True,
+    trees: dict[int, Tree] | None = None,
+) -> Model | None:
+    """The same on several ranks, each with its share of the trees and of the samples.
+
+    Parameters
+    ----------
+    workers : threads of every rank.
+    trees : splits by tree number from `grow_trees`, if they are there already.
+
+    Returns
+    -------
+    The model on the first rank, None on the others. It depends on the number of ranks to rounding.
+    """
+    training.validate()
+    begin = time.perf_counter()
+    if trees is None:
+        shown = progress and ranks.first
+        mine = grow_trees(dataset, training, ranks.deal(training.jobs), workers, shown)
+        trees = ranks.together(mine)
+    trees = {job: trees[job] for job in training.jobs}
+    grown = time.perf_counter()
+    leaves, held, used = fit_leaves(dataset, training, trees, ranks, workers, progress)
+    if not ranks.first:
+        return None
+    fitted = time.perf_counter()
+    void, filled = (
+        [(trees[job], leaves[job]) for job in training.jobs if training.kind(job) == kind]
+        for kind in KINDS
+    )
+    facts = {
+        "structure_seconds": grown - begin,
+        "leaves_seconds": fitted - grown,
+        "training_seconds": fitted - begin,
+        "training_rows": 8 * used,
+        "rows_per_second": 8 * used / (fitted - grown),
+        "ranks": ranks.size,
+        "workers": workers,
+    }
+    model = Model(
+        objective=dataset.objective,
+        poisson=dataset.poisson,
+        transform=training.transform,
+        forests=join(void, filled),
+        scores={},
+        provenance=provenance.record(parameters_of(dataset, training)) | facts,
+    )
+    scores = held_out_scores(model, held.young, held.moduli) | uniform_scores(model)
+    scores |= {
+        "training_samples": float(used),
+        "leaves": float(sum(tree.leaves for tree in trees.values())),
+        "depth": float(max(tree.depth for tree in trees.values())),
+    }
+    return replace(model, scores=scores)
+
+
+def parameters_of(dataset: Dataset, training: Training) -> dict[str, Any]:
+    """What a training depends on, for the provenance."""
+    ranges = [
+        [part.seed, part.distribution, part.low, part.high, part.start, part.stop]
+        for part in dataset.settings
+    ]
+    return {**asdict(training), "objective": dataset.objective, "samples": ranges}

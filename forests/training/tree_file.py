@@ -1,0 +1,90 @@
+"""One grown tree in a file, for trainings whose trees are grown by jobs of their own."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from carillon import provenance
+from carillon.errors import UserError
+from carillon.files import create_h5, open_h5
+from forests.scaling import FEATURES
+from forests.training.structure import PATTERNS, Tree
+
+KIND = "tree"
+SCHEMA = 1
+
+
+def save_tree(path: str | Path, tree: Tree, job: int, parameters: dict[str, Any]) -> None:
+    """Write tree number `job` of a training with these parameters, atomically."""
+    with create_h5(path, KIND, SCHEMA, sealed=True) as file:
+        file.attrs["tree"] = job
+        file.attrs["parameters"] = json.dumps(parameters, sort_keys=True)
+        for field in fields(Tree):
+            file.create_dataset(field.name, data=getattr(tree, field.name))
+        provenance.write(file, parameters)
+
+
+def load_trees(paths: Sequence[str | Path], parameters: dict[str, Any]) -> dict[int, Tree]:
+    """Trees by number.
+
+    Raises
+    ------
+    UserError
+        If a file is missing, damaged or of another training, or the trees are not each there once.
+    """
+    expected = json.dumps(parameters, sort_keys=True)
+    found: dict[int, Tree] = {}
+    for path in paths:
+        with open_h5(path, KIND, SCHEMA, sealed=True) as file:
+            job = int(file.attrs["tree"])
+            theirs = str(file.attrs["parameters"])
+            tree = Tree(**{field.name: np.asarray(file[field.name][()]) for field in fields(Tree)})
+        if theirs != expected:
+            raise UserError(f"{path}: {_difference(json.loads(theirs), json.loads(expected))}")
+        if job in found:
+            raise UserError(f"{path}: is tree {job}, which another file holds too")
+        _require_sound(path, tree)
+        found[job] = tree
+    wanted = set(range(2 * parameters["trees"]))
+    if missing := sorted(wanted - set(found)):
+        raise UserError(
+            f"tree {missing[0]} is missing, {len(found)} of {len(wanted)} trees are named; grow it "
+            f"with python -m forests grow --tree {missing[0]}"
+        )
+    return found
+
+
+def _difference(theirs: dict[str, Any], expected: dict[str, Any]) -> str:
+    name = next(key for key in expected | theirs if theirs.get(key) != expected.get(key))
+    if name == "samples":
+        return "was grown on other shards; name the same ones, or grow it again"
+    return (
+        f"was grown with {name} {theirs.get(name)} where {expected.get(name)} is asked for; grow "
+        "it again"
+    )
+
+
+def _require_sound(path: str | Path, tree: Tree) -> None:
+    """Indices must stay inside the arrays and lead downwards: what walks a tree does not look."""
+    nodes = len(tree.left)
+    inner = tree.left >= 0
+    number = np.arange(nodes)
+    shapes = (tree.feature, tree.threshold, tree.right, tree.leaf)
+    sound = (
+        nodes > 0
+        and all(values.shape == (nodes,) for values in shapes)
+        and tree.roots.shape == (PATTERNS,)
+        and bool(((tree.roots >= 0) & (tree.roots < nodes)).all())
+        and bool(((tree.feature >= 0) & (tree.feature < FEATURES)).all())
+        and bool(((tree.left > number) & (tree.left < nodes))[inner].all())
+        and bool(((tree.right > number) & (tree.right < nodes))[inner].all())
+        and bool((tree.leaf[~inner] == np.arange((~inner).sum())).all())
+    )
+    if not sound:
+        raise UserError(f"{path}: its tree is inconsistent; grow it again")

@@ -1,0 +1,117 @@
+"""Training on several MPI ranks: the same forests, and no rank left waiting after an error."""
+
+import h5py
+import numpy as np
+import pytest
+
+from dataset_gen.generate import generate
+from dataset_gen.shards import write_shard
+from forests import coarsen, load_model
+
+pytestmark = pytest.mark.mpi
+
+OPTIONS = ("--trees", 2, "--max-leaves", 200, "--structure-rows", 20_000)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("ranks")
+    whole = generate(140_000, 1, progress=False, objective="chen2015")
+    write_shard(folder / "0.h5", whole.part(0, 70_000))
+    write_shard(folder / "1.h5", whole.part(70_000, 140_000))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def reference(folder, run_cli):
+    run_cli("forests", *command(folder, "alone.h5"), check=True)
+    return load_model(folder / "alone.h5")
+
+
+def command(folder, name):
+    return ("train", folder / "0.h5", folder / "1.h5", *OPTIONS, "--out", folder / name)
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3])
+def test_forests_do_not_depend_on_the_number_of_ranks(ranks, folder, reference, mpiexec):
+    path = folder / f"{ranks}.h5.model"
+    mpiexec(ranks, "forests", *command(folder, path.name), check=True)
+    found = load_model(path)
+    for name, values in vars(reference.forests).items():
+        if values.dtype.kind != "f":
+            np.testing.assert_array_equal(getattr(found.forests, name), values)
+    young = np.random.default_rng(0).uniform(0, 10, (500, 8))
+    np.testing.assert_allclose(coarsen(found, young), coarsen(reference, young), rtol=1e-5)
+    assert found.scores["training_samples"] == reference.scores["training_samples"]
+    assert found.provenance["ranks"] == ranks
+
+
+def test_trees_grown_by_jobs_of_their_own_make_the_same_forests(folder, reference, run_cli):
+    shards = (folder / "0.h5", folder / "1.h5")
+    trees = [folder / f"tree-{job}.h5" for job in range(4)]
+    for job, path in enumerate(trees):
+        run_cli("forests", "grow", *shards, *OPTIONS, "--tree", job, "--out", path, check=True)
+    run_cli("forests", *command(folder, "jobs.h5"), "--structure", *trees, check=True)
+    found = load_model(folder / "jobs.h5")
+    for name, values in vars(reference.forests).items():
+        np.testing.assert_array_equal(getattr(found.forests, name), values)
+
+
+def sentences(done):
+    return [line for line in done.stderr.splitlines() if line.startswith("forests: ")]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("train", "missing.h5", "--out", "new.h5"), "missing.h5"),
+        (("train", "0.h5", "0.h5", "--out", "new.h5"), "overlap"),
+        (("train", "0.h5", "--depth", "0", "--out", "new.h5"), "depth"),
+        (("grow", "0.h5", "--tree", "0", "--out", "new.h5"), "only train"),
+    ],
+)
+def test_bad_input_is_one_sentence_on_all_ranks(arguments, message, folder, mpiexec):
+    done = mpiexec(3, "forests", *arguments, cwd=folder, timeout=60)
+    assert done.returncode == 2
+    (line,) = sentences(done)
+    assert message in line
+    assert not (folder / "new.h5").exists()
+
+
+PROGRAM = """
+import sys
+from carillon.errors import UserError
+from dataset_gen import ranks
+from forests import __main__ as program
+from forests import dataset
+
+def read(*arguments, whole=dataset.iterate_shard):
+    if ranks.world().rank == {rank}:
+        raise UserError("planted")
+    return whole(*arguments)
+
+dataset.iterate_shard = read
+sys.exit(program.cli.run("forests", program.main))
+"""
+
+
+@pytest.mark.parametrize("rank", [0, 2])
+def test_an_error_on_one_rank_ends_all(rank, folder, tmp_path, mpiexec):
+    path = tmp_path / "program.py"
+    path.write_text(PROGRAM.format(rank=rank))
+    done = mpiexec(3, path, *command(folder, "new.h5"), timeout=60)
+    assert done.returncode == 2
+    assert sentences(done) == ["forests: planted"]
+    assert not (folder / "new.h5").exists()
+
+
+def test_a_damaged_shard_is_named_and_nothing_is_written(folder, tmp_path, mpiexec):
+    path = tmp_path / "damaged.h5"
+    path.write_bytes((folder / "0.h5").read_bytes())
+    with h5py.File(path, "r+") as file:
+        file["coarse"][5] = 1.0
+    done = mpiexec(2, "forests", "train", path, "--out", tmp_path / "new.h5", timeout=60)
+    assert done.returncode == 2
+    (line,) = sentences(done)
+    assert "damaged.h5" in line
+    assert not (tmp_path / "new.h5").exists()
