@@ -14,6 +14,7 @@ from carillon.errors import UserError
 from dataset_gen.objectives import OBJECTIVES, require_objective
 from solver.materials import NAMES as MATERIALS
 from solver.trained import default_file
+from workflow import training
 
 SCHEMA = Path(__file__).parent / "schemas" / "config.schema.yaml"
 BUILTIN = "builtin:"
@@ -44,8 +45,8 @@ def check_links(config: Mapping[str, Any]) -> None:
     Raises
     ------
     UserError
-        If a model's mesh or material does not exist, `convergence.models` names no model, or
-        `objectives.objectives` no objective.
+        If a model's mesh or material does not exist, `convergence.models` names no model,
+        `objectives.objectives` no objective, or training data make no sense.
     """
     for name in config["models"]:
         for path in model_files(config, name):
@@ -60,6 +61,8 @@ def check_links(config: Mapping[str, Any]) -> None:
                 f"convergence.models: {name!r} is not among the models "
                 f"{', '.join(config['models'])}"
             )
+    for plan in (training.own(config), training.default(config)):
+        plan.check()
     for name in studied_objectives(config):
         try:
             require_objective(name)

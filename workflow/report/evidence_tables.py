@@ -60,10 +60,7 @@ def _evidence_row(model: str, variant: str, spectrum: ModesFile) -> dict[str, An
 
 def provenance(results: Results) -> Table:
     """Command, code and machine behind every result file."""
-    origins = {
-        f"dataset/shard-{index}.h5": shard["provenance"]
-        for index, shard in enumerate(results.shards)
-    }
+    origins = {f"dataset/{name}.h5": shard["provenance"] for name, shard in results.shards.items()}
     origins["forests/forests.h5"] = results.forests["provenance"]
     for model, spectra in results.spectra.items():
         for variant, spectrum in spectra.items():

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from workflow.report.blocks_tables import overview
 from workflow.report.numbers import show
 from workflow.report.results import Results
 from workflow.report.table import Column, Table
@@ -19,22 +20,28 @@ LABELS = {
     "r2_log": "R² of the logarithm of the modulus, held-out blocks",
     "r2_log_solid": "… of solid blocks",
     "r2_log_partly_void": "… of partly void blocks",
+    "rms_log": "Rms error of the logarithm of the modulus, held-out blocks",
+    "rms_log_solid": "… of solid blocks",
+    "rms_log_partly_void": "… of partly void blocks",
     "uniform_solid": "Error on uniform solid blocks",
     "uniform_partly_void": "Error on uniform partly void blocks",
+    "depth": "Largest depth of a tree",
 }
 """Scores of `forests inspect` for people; a score without a label is shown by its own name."""
 
 
 def training(results: Results) -> Table:
     """Counts and held-out scores."""
-    shards, forests = results.shards, results.forests
+    shards, forests = list(results.shards.values()), results.forests
     rows = [
+        _row("distributions", "Distributions of the moduli", "text", _distributions(results)),
         _row("fits", "Blocks drawn and fitted", "count", _fits(shards)),
         _row("converged", "… whose fit converged", "percent", _mean(shards, "converged")),
         _row("partly_void", "… that are partly void", "percent", _mean(shards, "partly_void")),
         _row("at_floor", "… moduli that ended at the floor", "percent", _mean(shards, "at_floor")),
     ]
-    scores = forests["scores"]
+    # The number of leaves stands beside the memory, below.
+    scores = {name: value for name, value in forests["scores"].items() if name != "leaves"}
     known = [name for name in LABELS if name in scores]
     others = [name for name in scores if name not in LABELS]
     rows += [_score(name, scores[name]) for name in known + others]
@@ -59,25 +66,7 @@ def training(results: Results) -> Table:
 
 def blocks(results: Results) -> Table:
     """Error, cost and storage on single blocks, as in Fig. 9 of the paper."""
-    found = results.blocks
-    return Table(
-        "blocks",
-        f"Coarsening of {found['blocks']:,} random solid blocks, {found['forces']} random forces "
-        "each: relative displacement error against the fine block, under forces on all nodes as "
-        "in the paper and under the inertia that vibration brings; cost on one core; storage. "
-        "The first range is the trained one.",
-        [
-            Column("range_gpa", "Moduli [GPa]", "range", "GPa"),
-            Column("method", "Coarsening"),
-            Column("mean_error_nodal", "Nodal forces, mean", "percent"),
-            Column("median_error_nodal", "median", "percent"),
-            Column("mean_error_inertial", "Inertia, mean", "percent"),
-            Column("median_error_inertial", "median", "percent"),
-            Column("seconds_per_block", "Cost per block", "seconds", "s"),
-            Column("storage_bytes", "Storage", "bytes", "B"),
-        ],
-        found["rows"],
-    )
+    return overview(results.blocks)
 
 
 def _row(key: str, label: str, kind: str, value: Any) -> dict[str, Any]:
@@ -90,11 +79,19 @@ def _row(key: str, label: str, kind: str, value: Any) -> dict[str, Any]:
 
 
 def _score(name: str, value: float) -> dict[str, Any]:
-    if name.endswith("samples"):
+    if name.endswith("samples") or name == "depth":
         kind = "count"
     else:
-        kind = "fraction" if name.startswith("r2") else "percent"
+        kind = "fraction" if name.startswith(("r2", "rms_log")) else "percent"
     return _row(name, LABELS.get(name, name.replace("_", " ")), kind, value)
+
+
+def _distributions(results: Results) -> str:
+    drawn = {
+        f"{shard['distribution']} {shard['range'][0]:g}…{shard['range'][1]:g} GPa"
+        for shard in results.shards.values()
+    }
+    return ", ".join(sorted(drawn))
 
 
 def _fits(shards: list[dict[str, Any]]) -> int:

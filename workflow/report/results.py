@@ -11,6 +11,7 @@ from typing import Any
 import yaml
 
 from solver.modes_file import ModesFile, read_modes
+from workflow import training
 from workflow.variants import CANDIDATES, VARIANTS
 
 
@@ -81,10 +82,10 @@ class Results:
         }
 
     @cached_property
-    def shards(self) -> list[dict[str, Any]]:
-        """Summaries of the training data, shard by shard."""
-        shards = range(self.config["dataset"]["shards"])
-        return [self._json("dataset", f"shard-{shard}.json") for shard in shards]
+    def shards(self) -> dict[str, dict[str, Any]]:
+        """Summaries of the training data by shard."""
+        names = training.own(self.config).shards
+        return {name: self._json("dataset", f"{name}.json") for name in names}
 
     @cached_property
     def forests(self) -> dict[str, Any]:
@@ -93,9 +94,9 @@ class Results:
         return loaded
 
     @cached_property
-    def blocks(self) -> dict[str, Any]:
+    def blocks(self) -> list[dict[str, Any]]:
         """Output of `forests table`: how the coarsenings do on single blocks."""
-        loaded: dict[str, Any] = self._json("forests", "table.json")
+        loaded: list[dict[str, Any]] = self._json("forests", "table.json")
         return loaded
 
     def _json(self, *parts: str) -> Any:

@@ -3,7 +3,7 @@ import os
 import sys
 from pathlib import Path
 
-from workflow import variants
+from workflow import training, variants
 
 RESULTS = config["results_dir"].rstrip("/")
 LOGS = f"{RESULTS}/logs"
@@ -22,6 +22,7 @@ ON_RANKS = f"-n {RANKS} python -m mpi4py" if RANKS > 1 else "python"
 wildcard_constraints:
     model="|".join(MODELS),
     variant="|".join(variants.VARIANTS),
+    distribution="uniform|log-uniform",
     shard=r"\d+",
 
 

@@ -3,10 +3,7 @@
 
 rule train_forests:
     input:
-        expand(
-            f"{RESULTS}/dataset/shard-{{shard}}.h5",
-            shard=range(config["dataset"]["shards"]),
-        ),
+        expand(f"{RESULTS}/dataset/{{name}}.h5", name=OWN.shards),
     output:
         f"{RESULTS}/forests/forests.h5",
     log:
@@ -18,12 +15,10 @@ rule train_forests:
         mem_mb=4000,
         runtime="4h",
     params:
-        trees=config["forests"]["trees"],
-        depth=config["forests"]["depth"],
-        seed=config["forests"]["seed"],
+        training=OWN.train_arguments,
     shell:
-        "python -m forests train {input} --trees {params.trees} --depth {params.depth}"
-        " --seed {params.seed} --workers {threads} --out {output} > {log} 2>&1"
+        "python -m forests train {input} {params.training} --workers {threads} --out {output}"
+        " > {log} 2>&1"
 
 
 rule describe_forests:
@@ -55,6 +50,10 @@ rule rate_forests:
     resources:
         mem_mb=2000,
         runtime="30m",
+    params:
+        blocks=OWN.forests["blocks"],
+        materials=OWN.forests["materials"],
     shell:
-        "python -m forests table --model {input} --json > {output}.partial 2> {log}"
+        "python -m forests table --model {input} --blocks {params.blocks}"
+        " --materials {params.materials} --json > {output}.partial 2> {log}"
         " && mv {output}.partial {output}"

@@ -31,10 +31,7 @@ rule save_config:
 rule tabulate_results:
     input:
         config=f"{RESULTS}/config.yaml",
-        shards=expand(
-            f"{RESULTS}/dataset/shard-{{shard}}.json",
-            shard=range(config["dataset"]["shards"]),
-        ),
+        shards=expand(f"{RESULTS}/dataset/{{name}}.json", name=OWN.shards),
         forests=f"{RESULTS}/forests/forests.json",
         blocks=f"{RESULTS}/forests/table.json",
         modes=expand(

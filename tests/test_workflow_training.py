@@ -1,0 +1,87 @@
+"""Training data of the workflow's forests: how samples are divided, and mistakes in that."""
+
+from __future__ import annotations
+
+import pytest
+import yaml
+
+from carillon.errors import UserError
+from tests.workflow_runs import CHECKOUT, planned, snakemake
+from workflow import settings, training
+
+
+def config(**dataset) -> dict:
+    loaded = yaml.safe_load((CHECKOUT / "workflow" / "config" / "default.yaml").read_text())
+    loaded["dataset"] |= dataset
+    return loaded
+
+
+def test_distributions_share_the_samples_and_name_the_shards():
+    plan = training.own(config(samples=1001, shards=2))
+    assert plan.shards == ["uniform-0", "uniform-1", "log-uniform-0", "log-uniform-1"]
+    assert [plan.samples_of(name) for name in plan.distributions] == [501, 500]
+    arguments = plan.generate_arguments("log-uniform", 1)
+    assert arguments.startswith("--samples 500 --shard 1 --shards 2 --seed 0")
+    assert arguments.endswith("--distribution log-uniform")
+    assert plan.first_shards(1) == ["uniform-0", "log-uniform-0"]
+
+
+def test_a_range_is_that_of_its_distribution_alone():
+    plan = training.own(config(ranges={"uniform": [1, 20]}))
+    assert plan.generate_arguments("uniform", 0).endswith("--low 1 --high 20")
+    assert "--low" not in plan.generate_arguments("log-uniform", 0)
+
+
+def test_every_parameter_of_the_training_is_passed_on():
+    plan = training.default(config())
+    for option in ("trees", "depth", "max-leaves", "min-leaf", "structure-rows", "seed"):
+        assert f"--{option} " in plan.train_arguments
+    assert plan.trees == range(6)
+    assert plan.dataset["samples"] == 6_000_000
+
+
+@pytest.mark.parametrize(
+    ("dataset", "says"),
+    [
+        (
+            {"distributions": ["uniform"], "ranges": {"log-uniform": [1, 2]}},
+            "dataset.ranges: 'log-uniform' is not among the distributions uniform",
+        ),
+        ({"ranges": {"log-uniform": [0, 2]}}, "dataset.ranges: "),
+        ({"ranges": {"uniform": [3, 2]}}, "dataset.ranges: "),
+        ({"samples": 100, "shards": 51}, "dataset.shards: 50 samples of a distribution"),
+    ],
+)
+def test_data_that_make_no_sense_are_answered_in_one_sentence(dataset, says):
+    wrong = config(**dataset)
+    settings.check(wrong)
+    with pytest.raises(UserError) as caught:
+        settings.check_links(wrong)
+    assert says in str(caught.value) and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "says"),
+    [
+        ("distributions", ["normal"], ["dataset.distributions.0", "normal"]),
+        ("distributions", [], ["dataset.distributions"]),
+        ("ranges", {"uniform": [1]}, ["dataset.ranges.uniform", "least and largest modulus"]),
+        ("low", 1, ["dataset", "low"]),
+    ],
+)
+def test_the_schema_knows_distributions_and_ranges(key, value, says):
+    with pytest.raises(UserError) as caught:
+        settings.check(config(**{key: value}))
+    for words in says:
+        assert words in str(caught.value)
+
+
+def test_one_distribution_has_all_samples(tmp_path):
+    loaded = config(distributions=["uniform"], shards=3)
+    (tmp_path / "config.yaml").write_text(yaml.safe_dump(loaded))
+    options = ["--dry-run", "-p", "--cores", 1, "--configfile", "config.yaml"]
+    done = snakemake(tmp_path, *options)
+    assert planned(done)["generate_shard"] == 3
+    output = done.stdout + done.stderr
+    assert "--samples 120000 --shard 2 --shards 3" in output
+    assert "results/dataset/uniform-2.h5" in output and "log-uniform" not in output

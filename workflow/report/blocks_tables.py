@@ -1,0 +1,139 @@
+"""Tables of errors, cost and storage on single blocks, as in Fig. 9 of the paper."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Sequence
+from typing import Any
+
+from workflow.report.numbers import show
+from workflow.report.table import Column, Table
+
+Row = dict[str, Any]
+
+LEAST = "least of any element"
+
+MEASURE = (
+    "E|u_c − u|² / E|u|², the mean square distance between fine displacements and those of the "
+    "coarse element, over the mean square of the fine ones: 0 is exact, 1 is what a rigid element "
+    "does, softer elements can exceed it. Nodal: random forces on all nodes, as in the paper; "
+    "inertia: that of trilinear motions, which vibration brings."
+)
+
+
+def overview(rows: Sequence[Row], name: str = "blocks") -> Table:
+    """One row a coarsening, two columns a kind of blocks.
+
+    Kinds that only scale others are left out, as their errors are the same, and so are methods
+    beyond the range that they were made for.
+
+    Parameters
+    ----------
+    rows : output of `forests table`.
+    """
+    used = [row for row in rows if row["scaled_by"] == 1.0 and not row["clamped"]]
+    kinds = list(dict.fromkeys(map(_kind, used)))
+    columns = [Column("method", "Coarsening")]
+    for number, kind in enumerate(kinds):
+        columns += [
+            Column(f"kind{number}_nodal", f"{kind}: nodal", "fraction"),
+            Column(f"kind{number}_nodal_median", f"{kind}: nodal, median", "fraction", shown=False),
+            Column(f"kind{number}_inertial", "inertia", "fraction"),
+            Column(
+                f"kind{number}_inertial_median", f"{kind}: inertia, median", "fraction", shown=False
+            ),
+        ]
+    columns += [
+        Column("seconds_per_block", "Cost per block", "seconds", "s"),
+        Column("storage_bytes", "Storage", "bytes", "B"),
+        Column("training_seconds", "Made in", "seconds", "s"),
+    ]
+    methods = dict.fromkeys(map(_method, used))
+    return Table(
+        name,
+        f"Relative squared displacement error on {rows[0]['blocks']:,} random blocks of each kind, "
+        f"mean over the blocks: {MEASURE} Medians are in the CSV file. A database is made for "
+        "each kind, its storage and time are those of one; cost on one core.",
+        columns,
+        [
+            *(
+                _overview_row(method, [r for r in used if _method(r) == method], kinds)
+                for method in methods
+            ),
+            _least_row(used, kinds),
+        ],
+    )
+
+
+def _kind(row: Row) -> str:
+    return f"{_range(row)} {row['distribution']}, {row['fill']}"
+
+
+def _range(row: Row) -> str:
+    low, high = row["range_gpa"]
+    return f"{low:,g}…{high:,g} GPa"
+
+
+def _method(row: Row) -> str:
+    """Name without the range that a database is made for."""
+    low, high = row["range_gpa"]
+    name: str = row["method"]
+    return name.removesuffix(f" {low:g}..{high:g} GPa")
+
+
+def _overview_row(method: str, rows: Sequence[Row], kinds: Sequence[str]) -> Row:
+    found: Row = {"method": method}
+    for row in rows:
+        key = f"kind{kinds.index(_kind(row))}"
+        found |= {
+            f"{key}_nodal": row["mean_error"],
+            f"{key}_nodal_median": row["median_error"],
+            f"{key}_inertial": row["mean_error_inertial"],
+            f"{key}_inertial_median": row["median_error_inertial"],
+        }
+    found["seconds_per_block"] = statistics.median(row["seconds_per_block"] for row in rows)
+    found["storage_bytes"] = max(row["storage_bytes"] for row in rows)
+    seconds = [row["training_seconds"] for row in rows if row["training_seconds"] is not None]
+    found["training_seconds"] = max(seconds, default=None)
+    return found
+
+
+def _least_row(rows: Sequence[Row], kinds: Sequence[str]) -> Row:
+    found: Row = {"method": LEAST}
+    for row in rows:
+        key = f"kind{kinds.index(_kind(row))}"
+        found |= {
+            f"{key}_nodal": row["least_mean_error"],
+            f"{key}_nodal_median": row["least_median_error"],
+        }
+    return found
+
+
+def every_row(rows: Sequence[Row], name: str = "every-block") -> Table:
+    """All that `forests table` found, row by row."""
+    return Table(
+        name,
+        f"Every coarsening on {rows[0]['blocks']:,} random blocks of each kind, on one core. "
+        f"Errors: {MEASURE} Corner: forces on the corners only. Databases beyond the range that "
+        "they were made for take their stiffest material.",
+        [
+            Column("blocks", "Blocks"),
+            Column("method", "Coarsening"),
+            *(
+                Column(f"{kind}_error{load}", label, "small")
+                for load, force in (("", "Nodal"), ("_inertial", "Inertia"), ("_corner", "Corner"))
+                for kind, label in (("mean", f"{force}, mean"), ("median", "median"))
+            ),
+            Column("mean_squared_m2", "Nodal, absolute", "small", "m^2"),
+            Column("seconds_per_block", "Cost per block", "seconds", "s"),
+            Column("storage_bytes", "Storage", "bytes", "B"),
+            Column("training_seconds", "Made in", "seconds", "s"),
+        ],
+        [{**row, "blocks": _kind(row) + _scaled(row)} for row in rows],
+    )
+
+
+def _scaled(row: Row) -> str:
+    if row["scaled_by"] == 1.0:
+        return ""
+    return f" (others times {show(row['scaled_by'], 'count')})"

@@ -1,0 +1,111 @@
+"""Forests that the workflow trains: their data, shard by shard, and how they are trained."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from carillon.errors import UserError
+from dataset_gen.sampling import moduli
+
+
+@dataclass(frozen=True)
+class Training:
+    """Data and training of one model.
+
+    Attributes
+    ----------
+    section : where it stands in the configuration, for messages; empty for the run's own.
+    folder : where its files are, below the folder of the results.
+    dataset, forests : its sections of the configuration.
+    poisson : Poisson's ratio of the blocks.
+    """
+
+    section: str
+    folder: str
+    dataset: Mapping[str, Any]
+    forests: Mapping[str, Any]
+    poisson: float
+
+    @property
+    def distributions(self) -> list[str]:
+        """Distributions of the fine moduli."""
+        return list(self.dataset["distributions"])
+
+    @property
+    def shards(self) -> list[str]:
+        """Names of all shards, without folder and ending."""
+        return self.first_shards(self.dataset["shards"])
+
+    def first_shards(self, count: int) -> list[str]:
+        """Names of the first shards of each distribution."""
+        return [f"{name}-{shard}" for name in self.distributions for shard in range(count)]
+
+    def samples_of(self, distribution: str) -> int:
+        """Samples of a distribution: an equal part of all, the first ones take what is left."""
+        share, left = divmod(self.dataset["samples"], len(self.distributions))
+        return int(share) + (self.distributions.index(distribution) < left)
+
+    def generate_arguments(self, distribution: str, shard: int | str) -> str:
+        """Arguments of `dataset_gen generate` for one shard."""
+        ends = zip(("low", "high"), self.dataset["ranges"].get(distribution, ()))
+        return " ".join(
+            [
+                f"--samples {self.samples_of(distribution)} --shard {shard}",
+                f"--shards {self.dataset['shards']} --seed {self.dataset['seed']}",
+                f"--objective {self.dataset['objective']} --poisson {self.poisson}",
+                f"--distribution {distribution}",
+                *(f"--{end} {value}" for end, value in ends),
+            ]
+        )
+
+    @property
+    def train_arguments(self) -> str:
+        """Arguments of `forests grow` and `forests train` that say how."""
+        names = ("trees", "depth", "max_leaves", "min_leaf", "structure_rows", "seed")
+        return " ".join(f"--{name.replace('_', '-')} {self.forests[name]}" for name in names)
+
+    @property
+    def trees(self) -> range:
+        """Numbers of the trees of both forests."""
+        return range(2 * self.forests["trees"])
+
+    def check(self) -> None:
+        """Check what a schema cannot say.
+
+        Raises
+        ------
+        UserError
+            If a range is of no distribution in use or is none, or shards would be empty.
+        """
+        where = f"{self.section}dataset"
+        for name, (low, high) in self.dataset["ranges"].items():
+            if name not in self.distributions:
+                raise UserError(
+                    f"{where}.ranges: {name!r} is not among the distributions "
+                    f"{', '.join(self.distributions)}"
+                )
+            try:
+                moduli(name, low, high)
+            except UserError as error:
+                raise UserError(f"{where}.ranges: {error}") from None
+        fewest = min(map(self.samples_of, self.distributions))
+        if fewest < self.dataset["shards"]:
+            raise UserError(
+                f"{where}.shards: {fewest} samples of a distribution cannot be split into "
+                f"{self.dataset['shards']} shards"
+            )
+
+
+def own(config: Mapping[str, Any]) -> Training:
+    """The forests of the run."""
+    return Training("", "", config["dataset"], config["forests"], config["poisson"])
+
+
+def default(config: Mapping[str, Any]) -> Training:
+    """The forests that come with the package."""
+    part = config["default_forest"]
+    return Training(
+        "default_forest.", "default_forest/", part["dataset"], part["forests"], config["poisson"]
+    )
