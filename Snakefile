@@ -33,6 +33,8 @@ include: "workflow/rules/tables.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/study.smk"
 include: "workflow/rules/objectives.smk"
+include: "workflow/rules/default_forest.smk"
+include: "workflow/rules/forests_study.smk"
 
 
 rule all:

@@ -125,6 +125,9 @@ def test_forests_are_judged_by_the_fit_they_learned_on_every_solid(study):
     assert goal.sentence.startswith("All solids: rms of the forests")
     for name in ("good", "galerkin"):
         assert str(judge(study, goal, name)) == "not studied"
+    good, forests, _ = goals(study).rows
+    assert good["goal4"] is None and good["goal3"] == "not studied"
+    assert forests["goal4_where"] == "Box 8, noise"
     (box,) = forest(study).rows
     assert (box["cases"], box["where"]) == (4, "Box 8, noise")
     assert (box["median"], box["worst"]) == pytest.approx((1.1, 1.2))

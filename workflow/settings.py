@@ -63,6 +63,7 @@ def check_links(config: Mapping[str, Any]) -> None:
             )
     for plan in (training.own(config), training.default(config)):
         plan.check()
+    training.check_study(config)
     for name in studied_objectives(config):
         try:
             require_objective(name)
@@ -106,11 +107,20 @@ def studied_objectives(config: Mapping[str, Any]) -> list[str]:
 
 def studied_forest_files(config: Mapping[str, Any]) -> list[str]:
     """Forests that the study sets beside the fits; none if there are no default ones either."""
-    named = config["objectives"]["forest"]
+    found = _named_or_default(config["objectives"]["forest"])
+    return [] if found is None else [found]
+
+
+def studied_model(config: Mapping[str, Any]) -> str | None:
+    """Forests that are studied block by block; None if there are no default ones either."""
+    return _named_or_default(config["forests_study"]["model"])
+
+
+def _named_or_default(named: str | None) -> str | None:
     try:
-        return [named or str(default_file())]
+        return named or str(default_file())
     except UserError:
-        return []
+        return None
 
 
 def _located(config: Mapping[str, Any], mesh: str) -> str:

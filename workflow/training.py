@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from carillon.errors import UserError
 from dataset_gen.sampling import moduli
+from forests.training.studies import VARIANTS
 
 
 @dataclass(frozen=True)
@@ -101,6 +102,39 @@ class Training:
 def own(config: Mapping[str, Any]) -> Training:
     """The forests of the run."""
     return Training("", "", config["dataset"], config["forests"], config["poisson"])
+
+
+def study(config: Mapping[str, Any]) -> Training:
+    """The trainings that the study of the forests compares: on data of the default forests."""
+    plan = default(config)
+    rows = config["forests_study"]["structure_rows"]
+    return replace(plan, forests={**plan.forests, "structure_rows": rows})
+
+
+def check_study(config: Mapping[str, Any]) -> None:
+    """Check that the default forests' data suffice for the study, and that its trainings exist.
+
+    Raises
+    ------
+    UserError
+        If they do not.
+    """
+    wanted, data = config["forests_study"], config["default_forest"]["dataset"]
+    if wanted["shards"] > data["shards"]:
+        raise UserError(
+            f"forests_study.shards: {wanted['shards']} of {data['shards']} shards of a "
+            "distribution, see default_forest.dataset.shards"
+        )
+    if max(wanted["curve_rows"]) > 8 * data["samples"]:
+        raise UserError(
+            f"forests_study.curve_rows: {max(wanted['curve_rows']):,} rows, but "
+            f"default_forest.dataset.samples gives {8 * data['samples']:,}"
+        )
+    for name in wanted["variants"] or ():
+        if name not in VARIANTS:
+            raise UserError(
+                f"forests_study.variants: {name!r} is unknown, choose from {', '.join(VARIANTS)}"
+            )
 
 
 def default(config: Mapping[str, Any]) -> Training:

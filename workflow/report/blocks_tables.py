@@ -31,8 +31,8 @@ def overview(rows: Sequence[Row], name: str = "blocks") -> Table:
     ----------
     rows : output of `forests table`.
     """
-    used = [row for row in rows if row["scaled_by"] == 1.0 and not row["clamped"]]
-    kinds = list(dict.fromkeys(map(_kind, used)))
+    used = compared(rows)
+    kinds = list(dict.fromkeys(map(kind_of, used)))
     columns = [Column("method", "Coarsening")]
     for number, kind in enumerate(kinds):
         columns += [
@@ -48,7 +48,7 @@ def overview(rows: Sequence[Row], name: str = "blocks") -> Table:
         Column("storage_bytes", "Storage", "bytes", "B"),
         Column("training_seconds", "Made in", "seconds", "s"),
     ]
-    methods = dict.fromkeys(map(_method, used))
+    methods = dict.fromkeys(map(method_of, used))
     return Table(
         name,
         f"Relative squared displacement error on {rows[0]['blocks']:,} random blocks of each kind, "
@@ -57,7 +57,7 @@ def overview(rows: Sequence[Row], name: str = "blocks") -> Table:
         columns,
         [
             *(
-                _overview_row(method, [r for r in used if _method(r) == method], kinds)
+                _overview_row(method, [r for r in used if method_of(r) == method], kinds)
                 for method in methods
             ),
             _least_row(used, kinds),
@@ -65,7 +65,13 @@ def overview(rows: Sequence[Row], name: str = "blocks") -> Table:
     )
 
 
-def _kind(row: Row) -> str:
+def compared(rows: Sequence[Row]) -> list[Row]:
+    """Rows whose kind of blocks scales no other, of methods within the range they were made for."""
+    return [row for row in rows if row["scaled_by"] == 1.0 and not row["clamped"]]
+
+
+def kind_of(row: Row) -> str:
+    """Range, distribution and fill of the blocks in words."""
     return f"{_range(row)} {row['distribution']}, {row['fill']}"
 
 
@@ -74,8 +80,8 @@ def _range(row: Row) -> str:
     return f"{low:,g}…{high:,g} GPa"
 
 
-def _method(row: Row) -> str:
-    """Name without the range that a database is made for."""
+def method_of(row: Row) -> str:
+    """Name of the coarsening without the range that a database is made for."""
     low, high = row["range_gpa"]
     name: str = row["method"]
     return name.removesuffix(f" {low:g}..{high:g} GPa")
@@ -84,7 +90,7 @@ def _method(row: Row) -> str:
 def _overview_row(method: str, rows: Sequence[Row], kinds: Sequence[str]) -> Row:
     found: Row = {"method": method}
     for row in rows:
-        key = f"kind{kinds.index(_kind(row))}"
+        key = f"kind{kinds.index(kind_of(row))}"
         found |= {
             f"{key}_nodal": row["mean_error"],
             f"{key}_nodal_median": row["median_error"],
@@ -101,7 +107,7 @@ def _overview_row(method: str, rows: Sequence[Row], kinds: Sequence[str]) -> Row
 def _least_row(rows: Sequence[Row], kinds: Sequence[str]) -> Row:
     found: Row = {"method": LEAST}
     for row in rows:
-        key = f"kind{kinds.index(_kind(row))}"
+        key = f"kind{kinds.index(kind_of(row))}"
         found |= {
             f"{key}_nodal": row["least_mean_error"],
             f"{key}_nodal_median": row["least_median_error"],
@@ -124,12 +130,12 @@ def every_row(rows: Sequence[Row], name: str = "every-block") -> Table:
                 for load, force in (("", "Nodal"), ("_inertial", "Inertia"), ("_corner", "Corner"))
                 for kind, label in (("mean", f"{force}, mean"), ("median", "median"))
             ),
-            Column("mean_squared_m2", "Nodal, absolute", "small", "m^2"),
+            Column("mean_squared_m2", "Nodal, absolute [m²]", "small", "m^2"),
             Column("seconds_per_block", "Cost per block", "seconds", "s"),
             Column("storage_bytes", "Storage", "bytes", "B"),
             Column("training_seconds", "Made in", "seconds", "s"),
         ],
-        [{**row, "blocks": _kind(row) + _scaled(row)} for row in rows],
+        [{**row, "blocks": kind_of(row) + _scaled(row)} for row in rows],
     )
 
 

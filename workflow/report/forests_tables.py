@@ -40,20 +40,33 @@ def training(results: Results) -> Table:
         _row("partly_void", "… that are partly void", "percent", _mean(shards, "partly_void")),
         _row("at_floor", "… moduli that ended at the floor", "percent", _mean(shards, "at_floor")),
     ]
+    return scores_table(
+        "training",
+        f"Training data (objective {forests['objective']}) and forests. Held-out blocks were not "
+        "used in training.",
+        rows + scores_rows(forests),
+    )
+
+
+def scores_rows(forests: dict[str, Any]) -> list[dict[str, Any]]:
+    """Scores and size of forests, from the output of `forests inspect`."""
     # The number of leaves stands beside the memory, below.
     scores = {name: value for name, value in forests["scores"].items() if name != "leaves"}
     known = [name for name in LABELS if name in scores]
     others = [name for name in scores if name not in LABELS]
-    rows += [_score(name, scores[name]) for name in known + others]
-    rows += [
+    return [
+        *(_score(name, scores[name]) for name in known + others),
         _row("trees", "Trees of each of the two forests", "count", forests["trees"]),
         _row("leaves", "Leaves", "count", forests["leaves"]),
         _row("memory_bytes", "Memory", "bytes", forests["memory_bytes"]),
     ]
+
+
+def scores_table(name: str, caption: str, rows: list[dict[str, Any]]) -> Table:
+    """Table of quantities, one a row."""
     return Table(
-        "training",
-        f"Training data (objective {forests['objective']}) and forests. Held-out blocks were not "
-        "used in training.",
+        name,
+        caption,
         [
             Column("key", "Key", shown=False),
             Column("quantity", "Quantity"),

@@ -45,7 +45,7 @@ def _small(value: float) -> str:
 
 
 def _seconds(value: float) -> str:
-    if abs(value) < 1e-3:
+    if 0 < abs(value) < 1e-3:
         return f"{_digits(1e6 * value, 2)} µs"
     return f"{_digits(value, 3 if value >= 1 else 2)} s"
 

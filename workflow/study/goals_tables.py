@@ -36,8 +36,12 @@ def _goals_row(study: Study, coarsening: str) -> dict[str, Any]:
         "coarsening": coarsening,
         "met": f"{sum(verdict.passed for verdict in judged)} of {len(judged)}",
     }
-    for index, verdict in enumerate(verdicts):
-        row |= {f"goal{index}_value": verdict.value, f"goal{index}": str(verdict)}
+    for index, (goal, verdict) in enumerate(zip(goals_of(study), verdicts)):
+        about = verdict.cases or not goal.cases(study)
+        row |= {
+            f"goal{index}_value": verdict.value,
+            f"goal{index}": str(verdict) if about else None,
+        }
         row[f"goal{index}_where"] = verdict.where
     return row
 

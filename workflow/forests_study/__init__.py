@@ -1,0 +1,1 @@
+"""The study of the forests: errors on single blocks, ways to train, rows, speed."""

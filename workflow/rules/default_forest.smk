@@ -1,0 +1,83 @@
+# The forests that come with the package: `snakemake default_forest`, no part of the default run.
+# Its result is put into the package by hand: cp results/default_forest/forests.h5 forests/default.h5
+DEFAULT = training.default(config)
+DEFAULT_FOLDER = f"{RESULTS}/default_forest"
+DEFAULT_SHARDS = expand(f"{DEFAULT_FOLDER}/dataset/{{name}}.h5", name=DEFAULT.shards)
+
+
+wildcard_constraints:
+    tree=r"\d+",
+
+
+rule default_forest:
+    input:
+        f"{DEFAULT_FOLDER}/forests.h5",
+        f"{DEFAULT_FOLDER}/forests.json",
+
+
+use rule generate_shard as generate_default_shard with:
+    output:
+        f"{DEFAULT_FOLDER}/dataset/{{distribution}}-{{shard}}.h5",
+    log:
+        f"{LOGS}/default_forest/dataset/{{distribution}}-{{shard}}.log",
+    benchmark:
+        f"{BENCHMARKS}/default_forest/dataset/{{distribution}}-{{shard}}.tsv"
+    threads: DEFAULT.dataset["workers"]
+    resources:
+        mem_mb=500 + 500 * DEFAULT.dataset["workers"],
+        runtime="4h",
+    params:
+        samples=lambda wildcards: DEFAULT.generate_arguments(
+            wildcards.distribution, wildcards.shard
+        ),
+
+
+# Splits are chosen from a subset, tree by tree; leaves are fitted to all rows in one job.
+rule grow_tree:
+    input:
+        DEFAULT_SHARDS,
+    output:
+        f"{DEFAULT_FOLDER}/trees/{{tree}}.h5",
+    log:
+        f"{LOGS}/default_forest/trees/{{tree}}.log",
+    benchmark:
+        f"{BENCHMARKS}/default_forest/trees/{{tree}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000 + DEFAULT.forests["structure_rows"] // 2000,
+        runtime="4h",
+    params:
+        training=DEFAULT.train_arguments,
+    shell:
+        "python -m forests grow {input} {params.training} --tree {wildcards.tree} --out {output}"
+        " > {log} 2>&1"
+
+
+rule train_default_forest:
+    input:
+        shards=DEFAULT_SHARDS,
+        trees=expand(f"{DEFAULT_FOLDER}/trees/{{tree}}.h5", tree=DEFAULT.trees),
+    output:
+        f"{DEFAULT_FOLDER}/forests.h5",
+    log:
+        f"{LOGS}/default_forest/train.log",
+    benchmark:
+        f"{BENCHMARKS}/default_forest/train.tsv"
+    threads: SOLVER_CORES
+    resources:
+        mem_mb=8000,
+        runtime="4h",
+    params:
+        training=DEFAULT.train_arguments,
+    shell:
+        "python -m forests train {input.shards} {params.training} --structure {input.trees}"
+        " --workers {threads} --out {output} > {log} 2>&1"
+
+
+use rule describe_forests as describe_default_forest with:
+    input:
+        f"{DEFAULT_FOLDER}/forests.h5",
+    output:
+        f"{DEFAULT_FOLDER}/forests.json",
+    log:
+        f"{LOGS}/default_forest/describe.log",

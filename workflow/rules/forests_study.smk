@@ -1,0 +1,165 @@
+# What the default forests are worth, block by block: `snakemake forests_study`, no part of the
+# default run.
+import shlex
+
+from workflow.forests_study import plots as study_plots
+from workflow.forests_study import tables as study_tables
+
+FORESTS_STUDY = f"{RESULTS}/forests_study"
+STUDIED_FORESTS = settings.studied_model(config) or f"{DEFAULT_FOLDER}/forests.h5"
+STUDY_TRAINING = training.study(config)
+
+
+rule forests_study:
+    input:
+        f"{FORESTS_STUDY}/report.html",
+
+
+use rule describe_forests as describe_studied_forests with:
+    input:
+        STUDIED_FORESTS,
+    output:
+        f"{FORESTS_STUDY}/model.json",
+    log:
+        f"{LOGS}/forests_study/describe.log",
+
+
+# The rules below take all cores, although some use one, since they time what they do.
+use rule rate_forests as compare_on_blocks with:
+    input:
+        STUDIED_FORESTS,
+    output:
+        f"{FORESTS_STUDY}/blocks.json",
+    log:
+        f"{LOGS}/forests_study/blocks.log",
+    benchmark:
+        f"{BENCHMARKS}/forests_study/blocks.tsv"
+    params:
+        blocks=config["forests_study"]["blocks"],
+        materials=config["forests_study"]["materials"],
+
+
+rule benchmark_forests:
+    input:
+        STUDIED_FORESTS,
+    output:
+        f"{FORESTS_STUDY}/benchmark.json",
+    log:
+        f"{LOGS}/forests_study/benchmark.log",
+    threads: SOLVER_CORES
+    resources:
+        mem_mb=2000,
+        runtime="30m",
+    shell:
+        "python -m forests benchmark --model {input} --json > {output}.partial 2> {log}"
+        " && mv {output}.partial {output}"
+
+
+rule compare_trainings:
+    input:
+        expand(
+            f"{DEFAULT_FOLDER}/dataset/{{name}}.h5",
+            name=DEFAULT.first_shards(config["forests_study"]["shards"]),
+        ),
+    output:
+        f"{FORESTS_STUDY}/variants.json",
+    log:
+        f"{LOGS}/forests_study/variants.log",
+    benchmark:
+        f"{BENCHMARKS}/forests_study/variants.tsv"
+    threads: SOLVER_CORES
+    resources:
+        mem_mb=8000,
+        runtime="4h",
+    params:
+        training=STUDY_TRAINING.train_arguments,
+        variants=" ".join(
+            f"--only {shlex.quote(name)}" for name in config["forests_study"]["variants"] or []
+        ),
+    shell:
+        "python -m forests variants {input} {params.training} {params.variants}"
+        " --workers {threads} --json > {output}.partial 2> {log} && mv {output}.partial {output}"
+
+
+rule follow_learning:
+    input:
+        DEFAULT_SHARDS,
+    output:
+        f"{FORESTS_STUDY}/curve.json",
+    log:
+        f"{LOGS}/forests_study/curve.log",
+    benchmark:
+        f"{BENCHMARKS}/forests_study/curve.tsv"
+    threads: SOLVER_CORES
+    resources:
+        mem_mb=8000,
+        runtime="4h",
+    params:
+        training=STUDY_TRAINING.train_arguments,
+        rows=",".join(map(str, config["forests_study"]["curve_rows"])),
+    shell:
+        "python -m forests curve {input} {params.training} --rows {params.rows}"
+        " --workers {threads} --json > {output}.partial 2> {log} && mv {output}.partial {output}"
+
+
+rule tabulate_forests_study:
+    input:
+        config=f"{RESULTS}/config.yaml",
+        found=expand(
+            f"{FORESTS_STUDY}/{{part}}.json",
+            part=["model", "blocks", "variants", "curve"],
+        ),
+    output:
+        expand(
+            f"{FORESTS_STUDY}/tables/{{table}}.{{kind}}",
+            table=list(study_tables.BUILDERS),
+            kind=["csv", "md", "json"],
+        ),
+    log:
+        f"{LOGS}/forests_study/tables.log",
+    resources:
+        mem_mb=1000,
+        runtime="10m",
+    script:
+        "../scripts/tabulate_forests_study.py"
+
+
+rule plot_forests_study:
+    input:
+        config=f"{RESULTS}/config.yaml",
+        found=expand(f"{FORESTS_STUDY}/{{part}}.json", part=["blocks", "variants", "curve"]),
+    output:
+        svg=f"{FORESTS_STUDY}/figures/{{figure}}.svg",
+        png=f"{FORESTS_STUDY}/figures/{{figure}}.png",
+    log:
+        f"{LOGS}/forests_study/{{figure}}.log",
+    resources:
+        mem_mb=1000,
+        runtime="10m",
+    script:
+        "../scripts/plot_forests_study.py"
+
+
+rule build_forests_report:
+    input:
+        config=f"{RESULTS}/config.yaml",
+        tables=expand(f"{FORESTS_STUDY}/tables/{{table}}.json", table=list(study_tables.BUILDERS)),
+        figures=expand(f"{FORESTS_STUDY}/figures/{{figure}}.svg", figure=list(study_plots.FIGURES)),
+        templates=[
+            Path(workflow.basedir, "workflow", name)
+            for name in (
+                "forests_study/page.html.j2",
+                "report/base.html.j2",
+                "report/macros.html.j2",
+                "report/page.css",
+            )
+        ],
+    output:
+        f"{FORESTS_STUDY}/report.html",
+    log:
+        f"{LOGS}/forests_study/report.log",
+    resources:
+        mem_mb=1000,
+        runtime="10m",
+    script:
+        "../scripts/build_forests_report.py"
