@@ -83,7 +83,7 @@ import sys
 from carillon.errors import UserError
 from dataset_gen import ranks
 from forests import __main__ as program
-from forests import dataset
+from forests.training import dataset
 
 def read(*arguments, whole=dataset.iterate_shard):
     if ranks.world().rank == {rank}:

@@ -8,10 +8,11 @@ import pytest
 from carillon.errors import UserError
 from dataset_gen.generate import generate
 from dataset_gen.shards import write_shard
+from forests.scaling import PATTERNS
 from forests.training.dataset import dataset_of, open_dataset
 from forests.training.leaves import ANCESTOR_ROWS, Sums, add_rows, leaf_of, solve_leaves
 from forests.training.moments import ENTRIES, fit_error, solve
-from forests.training.structure import GROWERS, PATTERNS, Limits, Rows, tree_of
+from forests.training.structure import GROWERS, Limits, Rows, tree_of
 from forests.training.train import Training, grow_trees, parameters_of, train
 from forests.training.tree_file import load_trees, save_tree
 

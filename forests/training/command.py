@@ -17,7 +17,7 @@ from forests.scaling import TRANSFORMS
 from forests.training.dataset import Dataset, open_dataset
 from forests.training.ranks import Ranks
 from forests.training.structure import GROWERS, Tree
-from forests.training.train import Training, grow_trees, parameters_of, train_on_ranks
+from forests.training.train import Training, grow_trees, model_of, parameters_of, train_trees
 from forests.training.tree_file import load_trees, save_tree
 
 PROGRAM = "forests"
@@ -125,11 +125,12 @@ def _train(
     dataset: Dataset,
     trees: dict[int, Tree] | None,
 ) -> None:
-    model = train_on_ranks(dataset, training, ranks, arguments.workers, trees=trees)
-    if model is None:
+    trained = train_trees(dataset, training, ranks, arguments.workers, trees=trees)
+    if trained is None:
         return
+    model = model_of(dataset, training, trained)
     save_model(arguments.out, model, parameters_of(dataset, training))
-    told = model.provenance
+    told = trained.facts
     scores = "".join(f", {name} {value:.4g}" for name, value in model.scores.items())
     say(
         f"{arguments.out}: {told['training_rows']:,} rows; structure "

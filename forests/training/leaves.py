@@ -201,3 +201,11 @@ def solve_leaves(tree: Tree, sums: Sums, prior: float) -> Leaves:
     low = np.where(nodes.rows[bounds] > 0, nodes.low[bounds], 0.0)
     high = np.where(nodes.rows[bounds] > 0, nodes.high[bounds], 0.0)
     return Leaves(coefficients, low, high)
+
+
+def answers_of(tree: Tree, leaves: Leaves, rows: Rows) -> Array:
+    """Answers (n,) of a tree to rows, bounded."""
+    found = leaf_of(tree, rows.features, rows.pattern)
+    coefficients = leaves.coefficients[found]
+    linear = (rows.features * coefficients[:, :FEATURES]).sum(axis=1) + coefficients[:, FEATURES]
+    return np.asarray(np.clip(linear, leaves.low[found], leaves.high[found]))

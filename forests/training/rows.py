@@ -6,17 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dataset_gen.element import Array
-from forests.scaling import FEATURES, LOG_VOID, Features, features_of, separate, target_of
+from forests.scaling import TRANSFORMS, Features, prepare
 from forests.training.dataset import Samples
 from forests.training.structure import Rows
 
-VOID_FEATURE = {"log": LOG_VOID, "ratio": 0.0}
-
-
-def void_pattern(features: Features, transform: str) -> NDArray[np.uint8]:
-    """Void cells among e'2..e'8 as bits, from features (..., 7); shape (...)."""
-    void = features == np.float32(VOID_FEATURE[transform])
-    return np.asarray((void << np.arange(FEATURES)).sum(axis=-1).astype(np.uint8))
+STUDIED = ("ratio-log", "bounded")
+"""Transforms that can be trained to compare them, but not evaluated: the paper's ratios r with the
+logarithm of the target, and r brought to -1..1 as (r - 1) / (r + 1) with the same target."""
 
 
 def is_uniform(young: Array) -> NDArray[np.bool_]:
@@ -24,16 +20,32 @@ def is_uniform(young: Array) -> NDArray[np.bool_]:
     return np.asarray(young.max(axis=1) == np.where(young > 0, young, np.inf).min(axis=1))
 
 
-def rows_of(samples: Samples, transform: str, uniform_weight: float) -> tuple[Rows, Rows]:
+def modulus_over_scale(target: Array, transform: str) -> Array:
+    """Ratios E / scale from what the trees learn."""
+    return target if transform == "ratio" else np.exp(target)
+
+
+def _transformed(features: Features, transform: str) -> Features:
+    if transform != "bounded":
+        return features
+    ratio = features.astype(float)
+    return np.asarray(((ratio - 1.0) / (ratio + 1.0)).astype(np.float32))
+
+
+def rows_of(samples: Samples, transform: str, uniform_weight: float = 1.0) -> tuple[Rows, Rows]:
     """Rows with a void and with a filled origin."""
-    scaled = separate(samples.young, transform)
-    features = features_of(scaled, samples.young, transform)
-    pattern = void_pattern(features, transform)
-    target = target_of(samples.moduli, scaled.scale, transform)
+    prepared = prepare(samples.young, transform if transform in TRANSFORMS else "ratio")
+    ratios = samples.moduli / prepared.scale
+    target = ratios if transform == "ratio" else np.log(ratios)
     weight = np.where(is_uniform(samples.young), uniform_weight, 1.0)
     weight = np.broadcast_to(weight[:, None], target.shape)
     void, filled = (
-        Rows(features[kind], pattern[kind], target[kind], weight[kind])
-        for kind in (~scaled.filled, scaled.filled)
+        Rows(
+            _transformed(prepared.features[kind], transform),
+            prepared.pattern[kind],
+            target[kind],
+            weight[kind],
+        )
+        for kind in (~prepared.filled, prepared.filled)
     )
     return void, filled

@@ -11,11 +11,8 @@ from numpy.typing import NDArray
 from sklearn.tree import DecisionTreeRegressor, ExtraTreeRegressor
 
 from dataset_gen.element import Array
-from forests.scaling import FEATURES, Features
+from forests.scaling import FEATURES, PATTERNS, Features
 from forests.training.linear_splits import grow_linear
-
-PATTERNS = 1 << FEATURES
-"""Void patterns of the seven other cells, seen from an origin: bit k is set if e'(k+2) is void."""
 
 SPLIT_FEATURES = 5
 """Features that a split of the grower `best` chooses from, so that its trees differ."""

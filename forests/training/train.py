@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -20,7 +20,7 @@ from forests.scaling import TRANSFORMS
 from forests.training.dataset import Dataset, Samples, dataset_of, joined
 from forests.training.leaves import Leaves, Sums, add_rows, solve_leaves
 from forests.training.ranks import Ranks
-from forests.training.rows import rows_of
+from forests.training.rows import STUDIED, rows_of
 from forests.training.scores import held_out_scores, uniform_scores
 from forests.training.structure import GROWERS, Limits, Rows, Tree
 
@@ -78,7 +78,7 @@ class Training:
             raise UserError("prior and uniform weight must be positive")
         if self.seed < 0:
             raise UserError(f"seed is {self.seed}, expected 0 or more")
-        for name, known in (("transform", TRANSFORMS), ("grower", tuple(GROWERS))):
+        for name, known in (("transform", (*TRANSFORMS, *STUDIED)), ("grower", tuple(GROWERS))):
             if getattr(self, name) not in known:
                 raise UserError(
                     f"{name} {getattr(self, name)!r} is unknown, choose {' or '.join(known)}"
@@ -199,6 +199,85 @@ def _ahead(pool: ThreadPoolExecutor, items: Iterator[T]) -> Iterator[T]:
         yield item
 
 
+class Trained(NamedTuple):
+    """Both steps' result.
+
+    trees and leaves by tree number; samples held out; facts: seconds, rows, ranks, workers.
+    """
+
+    trees: dict[int, Tree]
+    leaves: dict[int, Leaves]
+    held_out: Samples
+    facts: dict[str, Any]
+
+
+def train_trees(
+    dataset: Dataset,
+    training: Training,
+    ranks: Ranks,
+    workers: int = 1,
+    progress: bool = True,
+    trees: dict[int, Tree] | None = None,
+) -> Trained | None:
+    """Both steps on several ranks, each with its share of the trees and of the samples.
+
+    Parameters
+    ----------
+    workers : threads of every rank.
+    trees : splits by tree number from `grow_trees`, if they are there already.
+
+    Returns
+    -------
+    The trees on the first rank, None on the others. They depend on the number of ranks to rounding.
+    """
+    training.validate()
+    begin = time.perf_counter()
+    if trees is None:
+        shown = progress and ranks.first
+        mine = grow_trees(dataset, training, ranks.deal(training.jobs), workers, shown)
+        trees = ranks.together(mine)
+    trees = {job: trees[job] for job in training.jobs}
+    grown = time.perf_counter()
+    leaves, held, used = fit_leaves(dataset, training, trees, ranks, workers, progress)
+    if not ranks.first:
+        return None
+    fitted = time.perf_counter()
+    facts = {
+        "structure_seconds": grown - begin,
+        "leaves_seconds": fitted - grown,
+        "training_seconds": fitted - begin,
+        "training_rows": 8 * used,
+        "rows_per_second": 8 * used / (fitted - grown),
+        "ranks": ranks.size,
+        "workers": workers,
+    }
+    return Trained(trees, leaves, held, facts)
+
+
+def model_of(dataset: Dataset, training: Training, trained: Trained) -> Model:
+    """The model that evaluates trained trees, with its scores and its provenance."""
+    void, filled = (
+        [(trained.trees[j], trained.leaves[j]) for j in training.jobs if training.kind(j) == kind]
+        for kind in KINDS
+    )
+    model = Model(
+        objective=dataset.objective,
+        poisson=dataset.poisson,
+        transform=training.transform,
+        forests=join(void, filled),
+        scores={},
+        provenance=provenance.record(parameters_of(dataset, training)) | trained.facts,
+    )
+    held = trained.held_out
+    scores = held_out_scores(model, held.young, held.moduli) | uniform_scores(model)
+    scores |= {
+        "training_samples": trained.facts["training_rows"] / 8,
+        "leaves": float(sum(tree.leaves for tree in trained.trees.values())),
+        "depth": float(max(tree.depth for tree in trained.trees.values())),
+    }
+    return replace(model, scores=scores)
+
+
 def train(
     dataset: Dataset | Sequence[Shard],
     training: Training | None = None,
@@ -217,71 +296,11 @@ def train(
         For impossible parameters, shards that do not belong together, or too few samples of either
         kind.
     """
+    training = training or Training()
     data = dataset if isinstance(dataset, Dataset) else dataset_of(dataset)
-    model = train_on_ranks(data, training or Training(), Ranks(), workers, progress)
-    assert model is not None
-    return model
-
-
-def train_on_ranks(
-    dataset: Dataset,
-    training: Training,
-    ranks: Ranks,
-    workers: int = 1,
-    progress: bool = True,
-    trees: dict[int, Tree] | None = None,
-) -> Model | None:
-    """The same on several ranks, each with its share of the trees and of the samples.
-
-    Parameters
-    ----------
-    workers : threads of every rank.
-    trees : splits by tree number from `grow_trees`, if they are there already.
-
-    Returns
-    -------
-    The model on the first rank, None on the others. It depends on the number of ranks to rounding.
-    """
-    training.validate()
-    begin = time.perf_counter()
-    if trees is None:
-        shown = progress and ranks.first
-        mine = grow_trees(dataset, training, ranks.deal(training.jobs), workers, shown)
-        trees = ranks.together(mine)
-    trees = {job: trees[job] for job in training.jobs}
-    grown = time.perf_counter()
-    leaves, held, used = fit_leaves(dataset, training, trees, ranks, workers, progress)
-    if not ranks.first:
-        return None
-    fitted = time.perf_counter()
-    void, filled = (
-        [(trees[job], leaves[job]) for job in training.jobs if training.kind(job) == kind]
-        for kind in KINDS
-    )
-    facts = {
-        "structure_seconds": grown - begin,
-        "leaves_seconds": fitted - grown,
-        "training_seconds": fitted - begin,
-        "training_rows": 8 * used,
-        "rows_per_second": 8 * used / (fitted - grown),
-        "ranks": ranks.size,
-        "workers": workers,
-    }
-    model = Model(
-        objective=dataset.objective,
-        poisson=dataset.poisson,
-        transform=training.transform,
-        forests=join(void, filled),
-        scores={},
-        provenance=provenance.record(parameters_of(dataset, training)) | facts,
-    )
-    scores = held_out_scores(model, held.young, held.moduli) | uniform_scores(model)
-    scores |= {
-        "training_samples": float(used),
-        "leaves": float(sum(tree.leaves for tree in trees.values())),
-        "depth": float(max(tree.depth for tree in trees.values())),
-    }
-    return replace(model, scores=scores)
+    trained = train_trees(data, training, Ranks(), workers, progress)
+    assert trained is not None
+    return model_of(data, training, trained)
 
 
 def parameters_of(dataset: Dataset, training: Training) -> dict[str, Any]:

@@ -13,8 +13,8 @@ import numpy as np
 from carillon import provenance
 from carillon.errors import UserError
 from carillon.files import create_h5, open_h5
-from forests.scaling import FEATURES
-from forests.training.structure import PATTERNS, Tree
+from forests.scaling import FEATURES, PATTERNS
+from forests.training.structure import Tree
 
 KIND = "tree"
 SCHEMA = 1
