@@ -17,6 +17,7 @@ from forests.comparison.cases import CASES
 from forests.comparison.database import MATERIALS
 from forests.comparison.methods import common_poisson, databases_of, load_models
 from forests.comparison.plot import plot, require_plottable
+from forests.model import default_path
 from forests.training import command, studies
 from forests.training.command import PROGRAM
 from forests.training.dataset import open_dataset
@@ -45,7 +46,7 @@ def _parser() -> Parser:
     compare.add_argument("--plot", metavar="FILE", help="error over cost, as .png, .svg or .pdf")
     compare.add_argument("--json", action="store_true")
     show = commands.add_parser("inspect", help="validate and summarise a model")
-    show.add_argument("file")
+    show.add_argument("file", nargs="?", help="by default that of the forests of Carillon")
     show.add_argument("--json", action="store_true")
     return parser
 
@@ -113,7 +114,7 @@ def main(argv: list[str] | None = None) -> int:
             result = studied = _studied(arguments)
             text = studies.as_text(studied)
         case _:
-            result = found = summary.describe(arguments.file)
+            result = found = summary.describe(arguments.file or default_path())
             text = summary.as_text(found)
     print(json.dumps(result, indent=2) if arguments.json else text)
     return 0
