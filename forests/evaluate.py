@@ -1,112 +1,328 @@
-"""Coarse moduli of a whole mesh at once: compiled, and in plain numpy as its reference."""
+"""Coarse moduli of a whole mesh, and their derivatives, in one compiled pass."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numba
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from carillon.errors import UserError
 from dataset_gen.element import Array
-from forests.model import Forests, Model
+from forests.layout import FEATURE_BITS, FEATURE_MASK
+from forests.model import CONSTANT, HIGH, LOW, Model
+from forests.ordering import FLIPS, order_code
+from forests.prefetch import prefetch
+from forests.reference import coarsen_reference
 from forests.scaling import (
     FEATURES,
-    LOG_FLOOR,
-    LOG_VOID,
+    LARGEST_MODULUS,
+    PATTERNS,
     Features,
-    Scaled,
-    features_of,
+    is_free,
+    is_logarithmic,
     modulus_of,
-    separate,
+    prepare_block,
 )
 
+__all__ = ["coarsen", "coarsen_reference", "coarsen_with_derivatives", "leaf_numbers"]
 
-@numba.njit(cache=True, nogil=True, inline="always")
-def _order(young: Array, origin: int, cells: np.ndarray) -> None:
-    """Cells e'2..e'8 seen from `origin`; the rule is that of `forests.ordering`."""
-    a, b, c = 1, 2, 4
-    if _after(young, origin, a, b):
-        a, b = b, a
-    if _after(young, origin, b, c):
-        b, c = c, b
-    if _after(young, origin, a, b):
-        a, b = b, a
-    cells[0], cells[1], cells[2] = origin ^ a, origin ^ b, origin ^ c
-    cells[3], cells[4], cells[5] = origin ^ a ^ b, origin ^ b ^ c, origin ^ a ^ c
-    cells[6] = origin ^ 7
+STRIDE = 8
+"""Features of an origin with padding, which saves a multiplication."""
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
-def _after(young: Array, origin: int, a: int, b: int) -> bool:
-    """Whether axis a, the earlier one, comes after axis b."""
-    one, two = young[origin ^ a], young[origin ^ b]
-    if one != two:
-        return bool(one > two)
-    one, two = young[origin ^ 7 ^ a], young[origin ^ 7 ^ b]
-    if one != two:
-        return bool(one > two)
-    return a > b
+@numba.njit(inline="always")
+def _step(
+    thresholds: NDArray[np.float32],
+    links: NDArray[np.int32],
+    features: Features,
+    origin: int,
+    node: np.uint32,
+    link: np.int32,
+) -> np.uint32:
+    """The next node on the way of an origin; a leaf is its own."""
+    feature = features[np.uint32(STRIDE * origin + (link & FEATURE_MASK))]
+    right = np.int32(feature > thresholds[node, 0])
+    return np.uint32((link >> FEATURE_BITS) + right) if link >= 0 else node
+
+
+@numba.njit(inline="always")
+def _walk(
+    roots: NDArray[np.int32],
+    thresholds: NDArray[np.float32],
+    links: NDArray[np.int32],
+    tree: int,
+    features: Features,
+    pattern: NDArray[np.int64],
+    found: NDArray[np.int64],
+) -> None:
+    """Leaves found[:, tree] of the eight origins of a block.
+
+    The eight walk in step, without a branch that depends on the data: so the processor waits for
+    the memory of all of them at once and guesses wrong once a tree at most.
+    """
+    a = np.uint32(roots[tree, pattern[0]])
+    b = np.uint32(roots[tree, pattern[1]])
+    c = np.uint32(roots[tree, pattern[2]])
+    d = np.uint32(roots[tree, pattern[3]])
+    e = np.uint32(roots[tree, pattern[4]])
+    f = np.uint32(roots[tree, pattern[5]])
+    g = np.uint32(roots[tree, pattern[6]])
+    h = np.uint32(roots[tree, pattern[7]])
+    while True:
+        to_a, to_b, to_c, to_d = links[a, 1], links[b, 1], links[c, 1], links[d, 1]
+        to_e, to_f, to_g, to_h = links[e, 1], links[f, 1], links[g, 1], links[h, 1]
+        if (to_a & to_b & to_c & to_d & to_e & to_f & to_g & to_h) < 0:
+            break
+        a = _step(thresholds, links, features, 0, a, to_a)
+        b = _step(thresholds, links, features, 1, b, to_b)
+        c = _step(thresholds, links, features, 2, c, to_c)
+        d = _step(thresholds, links, features, 3, d, to_d)
+        e = _step(thresholds, links, features, 4, e, to_e)
+        f = _step(thresholds, links, features, 5, f, to_f)
+        g = _step(thresholds, links, features, 6, g, to_g)
+        h = _step(thresholds, links, features, 7, h, to_h)
+    found[0, tree], found[1, tree], found[2, tree], found[3, tree] = ~to_a, ~to_b, ~to_c, ~to_d
+    found[4, tree], found[5, tree], found[6, tree], found[7, tree] = ~to_e, ~to_f, ~to_g, ~to_h
+
+
+@numba.njit(inline="always")
+def _find(
+    roots: NDArray[np.int32],
+    thresholds: NDArray[np.float32],
+    links: NDArray[np.int32],
+    leaves: NDArray[np.float32],
+    features: Features,
+    pattern: NDArray[np.int64],
+    found: NDArray[np.int64],
+) -> None:
+    """Leaves found (8, trees) of a block; their memory is asked for while the next trees run."""
+    for tree in range(len(roots)):
+        _walk(roots, thresholds, links, tree, features, pattern, found)
+        for origin in range(8):
+            prefetch(leaves, found[origin, tree])
+
+
+@numba.njit(inline="always")
+def _linear(leaf: NDArray[np.float32], features: Features, origin: int) -> float:
+    """Linear function of a leaf's record, not yet bounded."""
+    answer = np.float64(leaf[CONSTANT])
+    for k in range(FEATURES):
+        answer += np.float64(leaf[k]) * np.float64(features[STRIDE * origin + k])
+    return float(answer)
+
+
+@numba.njit(inline="always")
+def _target(
+    leaves: NDArray[np.float32], found: NDArray[np.int64], features: Features, origin: int
+) -> float:
+    """Mean answer of the trees whose leaves are `found` (trees,)."""
+    total = 0.0
+    for tree in range(len(found)):
+        leaf = leaves[found[tree]]
+        answer = _linear(leaf, features, origin)
+        low, high = float(leaf[LOW]), float(leaf[HIGH])
+        total += min(max(answer, low), high)
+    return total / len(found)
 
 
 @numba.njit(cache=True, nogil=True)
-def _evaluate(
+def _moduli(
     young: Array,
-    value: Array,
-    reference: Array,
     logarithmic: bool,
-    roots: np.ndarray,
-    feature: np.ndarray,
-    threshold: np.ndarray,
-    left: np.ndarray,
-    right: np.ndarray,
-    leaf: np.ndarray,
-    coefficients: np.ndarray,
-    low: np.ndarray,
-    high: np.ndarray,
-    target: Array,
+    roots: NDArray[np.int32],
+    thresholds: NDArray[np.float32],
+    links: NDArray[np.int32],
+    leaves: NDArray[np.float32],
+    moduli: Array,
 ) -> None:
-    """Mean answer of the trees for each origin of each block, written to `target` (n, 8)."""
-    cells = np.empty(FEATURES, dtype=np.int64)
-    x = np.empty(FEATURES, dtype=np.float32)
-    trees = roots.shape[1]
+    """Coarse moduli (n, 8) of blocks (n, 8)."""
+    values, scale, references = np.empty(8), np.empty(8), np.empty(8)
+    features = np.zeros(8 * STRIDE, dtype=np.float32)
+    table = features.reshape(8, STRIDE)
+    pattern = np.empty(8, dtype=np.int64)
+    found = np.empty((8, len(roots)), dtype=np.int64)
     for block in range(len(young)):
+        prepare_block(young[block], logarithmic, values, table, pattern, scale, references)
+        _find(roots, thresholds, links, leaves, features, pattern, found)
         for origin in range(8):
-            _order(young[block], origin, cells)
+            target = _target(leaves, found[origin], features, origin)
+            moduli[block, origin] = modulus_of(target, scale[origin], logarithmic)
+
+
+@numba.njit(cache=True, nogil=True)
+def _leaf_numbers(
+    young: Array,
+    logarithmic: bool,
+    roots: NDArray[np.int32],
+    thresholds: NDArray[np.float32],
+    links: NDArray[np.int32],
+    leaves: NDArray[np.float32],
+    numbers: NDArray[np.int32],
+) -> None:
+    """Leaves (n, 8, trees) of blocks (n, 8)."""
+    values, scale, references = np.empty(8), np.empty(8), np.empty(8)
+    features = np.zeros(8 * STRIDE, dtype=np.float32)
+    table = features.reshape(8, STRIDE)
+    pattern = np.empty(8, dtype=np.int64)
+    found = np.empty((8, len(roots)), dtype=np.int64)
+    for block in range(len(young)):
+        prepare_block(young[block], logarithmic, values, table, pattern, scale, references)
+        _find(roots, thresholds, links, leaves, features, pattern, found)
+        numbers[block] = found
+
+
+@numba.njit(inline="always")
+def _slopes(
+    leaves: NDArray[np.float32],
+    found: NDArray[np.int64],
+    features: Features,
+    origin: int,
+    slopes: Array,
+) -> None:
+    """Mean slopes (7,) of the trees' answers, zero where an answer is at its bounds."""
+    slopes[:] = 0.0
+    for tree in range(len(found)):
+        leaf = leaves[found[tree]]
+        answer = _linear(leaf, features, origin)
+        if leaf[LOW] <= answer <= leaf[HIGH]:
             for k in range(FEATURES):
-                near = value[block, cells[k]]
-                if not logarithmic:
-                    x[k] = near / reference[block, origin]
-                elif near == -np.inf:
-                    x[k] = LOG_VOID
-                else:
-                    x[k] = max(near - reference[block, origin], LOG_FLOOR)
-            forest = 1 if young[block, origin] > 0.0 else 0
-            total = 0.0
-            for tree in range(trees):
-                node = roots[forest, tree]
-                while left[node] >= 0:
-                    node = left[node] if x[feature[node]] <= threshold[node] else right[node]
-                number = leaf[node]
-                answer = np.float64(coefficients[number, FEATURES])
-                for k in range(FEATURES):
-                    answer += np.float64(coefficients[number, k]) * np.float64(x[k])
-                bottom, top = np.float64(low[number]), np.float64(high[number])
-                total += float(min(max(answer, bottom), top))
-            target[block, origin] = total / trees
+                slopes[k] += np.float64(leaf[k]) / len(found)
 
 
-def _require_blocks(e: ArrayLike) -> Array:
+@numba.njit(inline="always")
+def _gradient(
+    young: Array,
+    logarithmic: bool,
+    values: Array,
+    features: Features,
+    pattern: int,
+    scale: float,
+    reference: float,
+    origin: int,
+    modulus: float,
+    slopes: Array,
+    gradient: Array,
+) -> None:
+    """Derivatives (8,) of the modulus of an origin by the chain rule."""
+    gradient[:] = 0.0
+    outer = modulus if logarithmic else scale
+    through_scale = modulus / scale
+    code = order_code(young, origin)
+    for k in range(FEATURES):
+        cell = origin ^ FLIPS[code, k]
+        if pattern >> k & 1 or not is_free(values[cell], reference, logarithmic):
+            continue
+        share = outer * slopes[k]
+        gradient[cell] += share / (young[cell] if logarithmic else scale)
+        through_scale -= share * (1.0 if logarithmic else features[STRIDE * origin + k]) / scale
+    if pattern >> FEATURES:
+        gradient[origin] += through_scale
+        return
+    for cell in range(8):
+        if young[cell] > 0.0:
+            gradient[cell] += through_scale / 8.0
+
+
+@numba.njit(cache=True, nogil=True)
+def _derivatives(
+    young: Array,
+    logarithmic: bool,
+    roots: NDArray[np.int32],
+    thresholds: NDArray[np.float32],
+    links: NDArray[np.int32],
+    leaves: NDArray[np.float32],
+    moduli: Array,
+    derivatives: Array,
+) -> None:
+    """Coarse moduli (n, 8) of blocks (n, 8) and their derivatives (n, 8, 8)."""
+    values, scale, references = np.empty(8), np.empty(8), np.empty(8)
+    features = np.zeros(8 * STRIDE, dtype=np.float32)
+    table = features.reshape(8, STRIDE)
+    pattern = np.empty(8, dtype=np.int64)
+    found = np.empty((8, len(roots)), dtype=np.int64)
+    slopes = np.empty(FEATURES)
+    for block in range(len(young)):
+        prepare_block(young[block], logarithmic, values, table, pattern, scale, references)
+        _find(roots, thresholds, links, leaves, features, pattern, found)
+        for origin in range(8):
+            target = _target(leaves, found[origin], features, origin)
+            modulus = modulus_of(target, scale[origin], logarithmic)
+            moduli[block, origin] = modulus
+            _slopes(leaves, found[origin], features, origin, slopes)
+            _gradient(
+                young[block],
+                logarithmic,
+                values,
+                features,
+                pattern[origin],
+                scale[origin],
+                references[origin],
+                origin,
+                modulus,
+                slopes,
+                derivatives[block, origin],
+            )
+
+
+@numba.njit(cache=True, nogil=True)
+def _first_unfit(young: Array) -> tuple[int, bool]:
+    """First block (8,) that has no coarse moduli, -1 if none, and whether it is void altogether."""
+    for block in range(len(young)):
+        largest, fit = 0.0, True
+        for cell in range(8):
+            fit &= 0.0 <= young[block, cell] <= LARGEST_MODULUS
+            largest = max(largest, young[block, cell])
+        if not fit or largest == 0.0:
+            return block, fit
+    return -1, True
+
+
+def require_blocks(e: ArrayLike) -> Array:
+    """Blocks (m, 8) as a contiguous array of float64.
+
+    Raises
+    ------
+    UserError
+        For a bad shape, a modulus that is negative, not finite or above `LARGEST_MODULUS`, or a
+        block that is void altogether.
+    """
     young = np.ascontiguousarray(e, dtype=float)
     if young.ndim != 2 or young.shape[1] != 8:
         raise UserError(f"fine moduli have shape {young.shape}, expected (blocks, 8)")
-    if not np.isfinite(young).all() or (young < 0.0).any():
-        raise UserError("fine moduli must be finite and not negative")
-    empty = np.flatnonzero(~young.any(axis=1))
-    if len(empty):
-        raise UserError(f"block {empty[0]} is void in all eight cells: leave it out of the mesh")
-    return young
+    block, fit = _first_unfit(young)
+    if block < 0:
+        return young
+    if fit:
+        raise UserError(f"block {block} is void in all eight cells: leave it out of the mesh")
+    raise UserError(
+        f"fine moduli of block {block} must be finite, not negative and at most "
+        f"{LARGEST_MODULUS:g}: they are {', '.join(f'{each:g}' for each in young[block])}"
+    )
+
+
+def _run(
+    kernel: Callable[..., None], model: Model, young: Array, threads: int, *results: NDArray[Any]
+) -> None:
+    """Apply a compiled function to the blocks, in as many parts as there are threads."""
+    forests = model.forests
+    roots = np.ascontiguousarray(forests.roots.transpose(1, 0, 2).reshape(-1, 2 * PATTERNS))
+    arrays = (roots, forests.thresholds, forests.links, forests.leaves)
+    logarithmic = is_logarithmic(model.transform)
+    bounds = np.linspace(0, len(young), max(1, threads) + 1).astype(int)
+
+    def run(begin: int, end: int) -> None:
+        kernel(young[begin:end], logarithmic, *arrays, *(part[begin:end] for part in results))
+
+    if threads <= 1:
+        run(0, len(young))
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        for finished in [pool.submit(run, *pair) for pair in zip(bounds[:-1], bounds[1:])]:
+            finished.result()
 
 
 def coarsen(model: Model, e: ArrayLike, threads: int = 1) -> Array:
@@ -124,66 +340,40 @@ def coarsen(model: Model, e: ArrayLike, threads: int = 1) -> Array:
     Raises
     ------
     UserError
-        For a bad shape, a negative or non-finite modulus, or a block that is void altogether.
+        See `require_blocks`.
     """
-    young = _require_blocks(e)
-    scaled = separate(young, model.transform)
-    target = np.empty_like(young)
-    forests = model.forests
-    bounds = np.linspace(0, len(young), max(1, threads) + 1).astype(int)
-
-    def run(part: slice) -> None:
-        _evaluate(
-            young[part],
-            scaled.value[part],
-            scaled.reference[part],
-            model.transform == "log",
-            forests.roots,
-            forests.feature,
-            forests.threshold,
-            forests.left,
-            forests.right,
-            forests.leaf,
-            forests.coefficients,
-            forests.low,
-            forests.high,
-            target[part],
-        )
-
-    parts = [slice(*pair) for pair in zip(bounds[:-1], bounds[1:], strict=True)]
-    if len(parts) == 1:
-        run(parts[0])
-    else:
-        with ThreadPoolExecutor(len(parts)) as pool:
-            list(pool.map(run, parts))
-    return modulus_of(target, scaled.scale, model.transform)
+    young = require_blocks(e)
+    moduli = np.empty_like(young)
+    _run(_moduli, model, young, threads, moduli)
+    return moduli
 
 
-def coarsen_reference(model: Model, e: ArrayLike) -> Array:
-    """The same as `coarsen` in plain numpy, bit for bit; slower, for checks."""
-    young = _require_blocks(e)
-    scaled = separate(young, model.transform)
-    features = features_of(scaled, young, model.transform)
-    target = _reference_target(model.forests, features, scaled)
-    return modulus_of(target, scaled.scale, model.transform)
+def coarsen_with_derivatives(model: Model, e: ArrayLike, threads: int = 1) -> tuple[Array, Array]:
+    """Coarse moduli E (m, 8), bit for bit those of `coarsen`, and dE_i/de_j (m, 8 i, 8 j).
+
+    The derivative is that of the current piece: order of the cells, leaf of every tree and what is
+    at its bounds stay as they are. Across their borders E jumps or bends, which no derivative
+    tells. Answers at a leaf's bounds and features at theirs have slope zero, and nothing depends on
+    void cells. E is homogeneous of degree one: `sum_j e_j dE_i/de_j = E_i`.
+
+    With the transform `ratio` dE_i/de_j is constant in a piece. With `log` the elasticities
+    `(e_j / E_i) dE_i/de_j` of filled origins are; those of void origins also have the part
+    `(1 - sum of the slopes) e_j / (8 mean(e))` of the scale.
+
+    Parameters and errors are those of `coarsen`.
+    """
+    young = require_blocks(e)
+    moduli, derivatives = np.empty_like(young), np.empty((len(young), 8, 8))
+    _run(_derivatives, model, young, threads, moduli, derivatives)
+    return moduli, derivatives
 
 
-def _reference_target(forests: Forests, features: Features, scaled: Scaled) -> Array:
-    total = np.zeros(scaled.scale.shape)
-    trees = forests.roots.shape[1]
-    for tree in range(trees):
-        node = forests.roots[scaled.filled.astype(int), tree]
-        while (inner := forests.left[node] >= 0).any():
-            chosen = np.take_along_axis(features, forests.feature[node][..., None], axis=-1)[..., 0]
-            below = np.where(
-                chosen <= forests.threshold[node], forests.left[node], forests.right[node]
-            )
-            node = np.where(inner, below, node)
-        number = forests.leaf[node]
-        coefficients = forests.coefficients[number].astype(float)
-        answer = coefficients[..., FEATURES]
-        for k in range(FEATURES):
-            answer = answer + coefficients[..., k] * features[..., k].astype(float)
-        bottom, top = forests.low[number].astype(float), forests.high[number].astype(float)
-        total = total + np.minimum(np.maximum(answer, bottom), top)
-    return total / trees
+def leaf_numbers(model: Model, e: ArrayLike, threads: int = 1) -> NDArray[np.int32]:
+    """Leaves (m, 8, trees), rows of `Forests.leaves`, that the origins of blocks (m, 8) come to.
+
+    Parameters and errors are those of `coarsen`.
+    """
+    young = require_blocks(e)
+    numbers = np.empty((*young.shape, model.forests.trees), dtype=np.int32)
+    _run(_leaf_numbers, model, young, threads, numbers)
+    return numbers

@@ -3,26 +3,39 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from carillon import provenance
 from carillon.errors import UserError
 from carillon.files import create_h5, open_h5
-from forests.scaling import FEATURES, TRANSFORMS
-from forests.training.leaves import Leaves
-from forests.training.structure import Tree
+from forests.layout import FEATURE_BITS, FEATURE_MASK, NODE, aligned, pack
+from forests.scaling import FEATURES, PATTERNS, TRANSFORMS
+
+if TYPE_CHECKING:  # The training needs scikit-learn, whose import takes long; models do without.
+    from forests.training.leaves import Leaves
+    from forests.training.structure import Tree
 
 KIND = "forests"
-SCHEMA = 1
+SCHEMA = 2
+
+DEFAULT_FILE = Path(__file__).parent / "default.h5"
+"""Trained forests that come with the package."""
 
 VOID, FILLED = 0, 1
 """Forest of void origins (Reg1 of Eq. 12) and of filled origins (Reg2)."""
+
+CONSTANT, LOW, HIGH = FEATURES, FEATURES + 1, FEATURES + 2
+"""Columns of a leaf's record behind its slopes."""
+
+RECORD = FEATURES + 3
 
 
 @dataclass(frozen=True)
@@ -31,22 +44,29 @@ class Forests:
 
     Attributes
     ----------
-    roots : (2, trees) root nodes of the void and the filled forest.
-    feature, threshold, left, right, leaf : (nodes,) splits; `left` is -1 in leaves, where `leaf`
-        numbers the row of the leaf arrays.
-    coefficients : (leaves, 8) slopes of the seven features and the constant.
-    low, high : (leaves,) bounds of a leaf's answer.
+    roots : (2, trees, 128) root nodes of the void and the filled forest, one for each void pattern.
+    nodes : (nodes,) of type `forests.layout.NODE`; links lead to later nodes only.
+    leaves : (leaves, 10) slopes of the seven features, constant, bounds of the answer.
     """
 
     roots: NDArray[np.int32]
-    feature: NDArray[np.int32]
-    threshold: NDArray[np.float64]
-    left: NDArray[np.int32]
-    right: NDArray[np.int32]
-    leaf: NDArray[np.int32]
-    coefficients: NDArray[np.float32]
-    low: NDArray[np.float32]
-    high: NDArray[np.float32]
+    nodes: NDArray[Any]
+    leaves: NDArray[np.float32]
+
+    @property
+    def trees(self) -> int:
+        """Trees of each forest."""
+        return int(self.roots.shape[1])
+
+    @property
+    def thresholds(self) -> NDArray[np.float32]:
+        """View of the nodes: thresholds in column 0."""
+        return self.nodes.view(np.float32).reshape(-1, 2)
+
+    @property
+    def links(self) -> NDArray[np.int32]:
+        """View of the nodes: links in column 1."""
+        return self.nodes.view(np.int32).reshape(-1, 2)
 
 
 @dataclass(frozen=True)
@@ -70,85 +90,132 @@ class Model:
         return sum(getattr(self.forests, f.name).nbytes for f in fields(Forests))
 
 
-def join(void: list[tuple[Tree, Leaves]], filled: list[tuple[Tree, Leaves]]) -> Forests:
-    """Put the trees of both forests, equally many, into one set of arrays."""
-    trees = [*void, *filled]
-    nodes = np.cumsum([0] + [len(tree.left) for tree, _ in trees])
-    leaves = np.cumsum([0] + [tree.leaves for tree, _ in trees])
+def join(void: Sequence[tuple[Tree, Leaves]], filled: Sequence[tuple[Tree, Leaves]]) -> Forests:
+    """Put the trees of both forests, equally many, into one set of arrays.
+
+    Raises
+    ------
+    UserError
+        See `forests.layout.pack`.
+    """
+    trees = [tree for tree, _ in (*void, *filled)]
+    leaves = [part for _, part in (*void, *filled)]
+    nodes = np.cumsum([0] + [len(tree.left) for tree in trees])
+    count = np.cumsum([0] + [tree.leaves for tree in trees])
 
     def shifted(name: str, offsets: NDArray[np.int64]) -> NDArray[np.int32]:
-        parts = [getattr(tree, name) for tree, _ in trees]
-        moved = [np.where(p < 0, -1, p + o) for p, o in zip(parts, offsets, strict=False)]
+        parts = [getattr(tree, name) for tree in trees]
+        moved = [np.where(part < 0, -1, part + o) for part, o in zip(parts, offsets)]
         return np.concatenate(moved).astype(np.int32)
 
-    return Forests(
-        roots=nodes[:-1].reshape(2, -1).astype(np.int32),
-        feature=np.concatenate([tree.feature for tree, _ in trees]),
-        threshold=np.concatenate([tree.threshold for tree, _ in trees]),
-        left=shifted("left", nodes),
-        right=shifted("right", nodes),
-        leaf=shifted("leaf", leaves),
-        coefficients=np.concatenate([part.coefficients for _, part in trees]).astype(np.float32),
-        low=np.concatenate([part.low for _, part in trees]).astype(np.float32),
-        high=np.concatenate([part.high for _, part in trees]).astype(np.float32),
+    records = [np.column_stack([part.coefficients, part.low, part.high]) for part in leaves]
+    roots, packed, ordered = pack(
+        np.concatenate([tree.feature for tree in trees]),
+        np.concatenate([tree.threshold for tree in trees]),
+        shifted("left", nodes),
+        shifted("right", nodes),
+        shifted("leaf", count),
+        shifted("roots", nodes).reshape(2, len(void), PATTERNS),
+        np.concatenate(records).astype(np.float32),
     )
+    return Forests(roots, packed, ordered)
 
 
 def save_model(path: str | Path, model: Model, parameters: dict[str, Any]) -> None:
-    """Write the model atomically, with checksums and provenance."""
-    with create_h5(path, KIND, SCHEMA) as file:
+    """Write the model atomically, with a checksum and provenance.
+
+    What the model's provenance has beyond that of `parameters` is kept.
+    """
+    with create_h5(path, KIND, SCHEMA, sealed=True) as file:
         file.attrs["objective"] = model.objective
         file.attrs["poisson"] = model.poisson
         file.attrs["transform"] = model.transform
         file.attrs["scores"] = json.dumps(model.scores)
         for field in fields(Forests):
-            file.create_dataset(
-                field.name,
-                data=getattr(model.forests, field.name),
-                compression="gzip",
-                shuffle=True,
-                fletcher32=True,
-            )
+            file.create_dataset(field.name, data=getattr(model.forests, field.name))
         provenance.write(file, parameters)
+        attributes = file["provenance"].attrs
+        for name in model.provenance.keys() - attributes.keys():
+            attributes[name] = model.provenance[name]
+
+
+@numba.njit(cache=True)
+def _leads_down(
+    roots: NDArray[np.int32], links: NDArray[np.int32], thresholds: NDArray[np.float32], leaves: int
+) -> bool:
+    """Whether all indices stay inside the arrays and lead onwards, so that every walk ends."""
+    nodes = len(links)
+    sound = True
+    for root in roots.ravel():
+        sound &= 0 <= root < nodes
+    for node in range(nodes):
+        link = links[node, 1]
+        if link < 0:
+            sound &= ~link < leaves
+        else:
+            child = link >> FEATURE_BITS
+            sound &= node < child < nodes - 1 and link & FEATURE_MASK < FEATURES
+            sound &= not np.isnan(thresholds[node, 0])
+    return sound
+
+
+@numba.njit(cache=True)
+def _answers_are_finite(leaves: NDArray[np.float32]) -> bool:
+    sound = True
+    for leaf in leaves:
+        for value in leaf:
+            sound &= np.isfinite(value)
+        sound &= leaf[LOW] <= leaf[HIGH]
+    return sound
 
 
 def _require_sound(path: Path, forests: Forests) -> None:
-    """Indices must stay inside the arrays and lead downwards: the evaluator does not check them."""
-    nodes, leaves = len(forests.left), len(forests.coefficients)
-    number = np.arange(nodes)
-    inner = forests.left >= 0
-    per_node = (forests.feature, forests.threshold, forests.right, forests.leaf)
+    """The evaluation does not check what it is given."""
     sound = (
-        forests.roots.ndim == 2
-        and forests.roots.shape[0] == 2
-        and forests.roots.size > 0
-        and all(values.shape == (nodes,) for values in per_node)
-        and forests.coefficients.shape == (leaves, FEATURES + 1)
-        and forests.low.shape == forests.high.shape == (leaves,)
-        and bool(((forests.roots >= 0) & (forests.roots < nodes)).all())
-        and bool(((forests.feature >= 0) & (forests.feature < FEATURES)).all())
-        and bool(((forests.left > number) & (forests.left < nodes))[inner].all())
-        and bool(((forests.right > number) & (forests.right < nodes))[inner].all())
-        and bool(((forests.leaf >= 0) & (forests.leaf < leaves))[~inner].all())
-        and bool(np.isfinite(forests.coefficients).all() and np.isfinite(forests.low).all())
-        and bool((forests.low <= forests.high).all() and np.isfinite(forests.high).all())
+        forests.roots.ndim == 3
+        and forests.roots.shape[::2] == (2, PATTERNS)
+        and forests.trees > 0
+        and forests.nodes.ndim == 1
+        and forests.leaves.ndim == 2
+        and forests.leaves.shape[1] == RECORD
+        and _leads_down(forests.roots, forests.links, forests.thresholds, len(forests.leaves))
+        and _answers_are_finite(forests.leaves)
     )
     if not sound:
         raise UserError(f"{path}: its trees are inconsistent; train the forests again")
 
 
-def load_model(path: str | Path) -> Model:
-    """Read and validate a model.
+def default_path() -> Path:
+    """File of the forests that come with the package.
+
+    Raises
+    ------
+    UserError
+        If it is not there.
+    """
+    if not DEFAULT_FILE.is_file():
+        raise UserError(
+            f"{DEFAULT_FILE}: the forests that come with Carillon are not there; install it again, "
+            "or train forests and name their file"
+        )
+    return DEFAULT_FILE
+
+
+def load_model(path: str | Path | None = None) -> Model:
+    """Read and validate a model, by default the one that comes with the package.
 
     Raises
     ------
     UserError
         If the file is missing, damaged, of another kind or schema, or inconsistent.
     """
-    path = Path(path)
-    with open_h5(path, KIND, SCHEMA) as file:
-        arrays = {field.name: _array(path, file, field.name) for field in fields(Forests)}
-        forests = Forests(**arrays)
+    path = default_path() if path is None else Path(path)
+    with open_h5(path, KIND, SCHEMA, sealed=True) as file:
+        forests = Forests(
+            roots=_array(path, file, "roots", np.dtype(np.int32)),
+            nodes=_array(path, file, "nodes", NODE),
+            leaves=_array(path, file, "leaves", np.dtype(np.float32)),
+        )
         transform = str(file.attrs["transform"])
         model = Model(
             objective=str(file.attrs["objective"]),
@@ -164,7 +231,11 @@ def load_model(path: str | Path) -> Model:
     return model
 
 
-def _array(path: Path, file: h5py.File, name: str) -> NDArray[Any]:
+def _array(path: Path, file: h5py.File, name: str, dtype: np.dtype) -> NDArray[Any]:
     if name not in file:
         raise UserError(f"{path}: has no dataset {name!r}; train the forests again")
-    return np.asarray(file[name][()])
+    if file[name].dtype != dtype or file[name].size == 0:
+        raise UserError(f"{path}: dataset {name!r} is not what it should be; train again")
+    array = aligned(file[name].shape, dtype)
+    file[name].read_direct(array)
+    return array

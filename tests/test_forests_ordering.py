@@ -7,6 +7,7 @@ import numpy as np
 from dataset_gen.block import symmetries
 from dataset_gen.sampling import samples
 from forests.ordering import cell_order, ordered_moduli
+from forests.reference import cell_order_reference
 
 
 def test_order_seen_from_every_origin_for_every_ranking_of_the_axes():
@@ -37,3 +38,9 @@ def test_the_48_images_of_a_block_are_ordered_alike_ties_and_void_included():
         moved = np.empty_like(young)
         moved[:, image] = young
         np.testing.assert_array_equal(ordered_moduli(moved)[:, image], expected)
+
+
+def test_compiled_order_is_that_of_sorting():
+    young = np.round(samples(5, 0, 2000))
+    young = young[young.any(axis=1)]
+    np.testing.assert_array_equal(cell_order(young), cell_order_reference(young))
