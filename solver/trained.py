@@ -47,7 +47,7 @@ def load_trained(path: str | Path | None, poisson: float) -> Trained:
         If there are none, the file is not a model, or they are for another Poisson's ratio.
     """
     name = DEFAULT if path is None else str(path)
-    file = default_file() if path is None else Path(path)
+    file = forest_model.default_path() if path is None else Path(path)
     model = load_model(file)
     if abs(model.poisson - poisson) > 1e-12:
         raise UserError(_mismatch(path, model.poisson, poisson))
@@ -64,20 +64,6 @@ def trained_or_reason(path: str | Path | None, poisson: float) -> Trained | str:
         if path is not None:
             raise
         return f"without ddfem: {error}"
-
-
-def default_file() -> Path:
-    """File of the default forests.
-
-    Raises
-    ------
-    UserError
-        If they are not there.
-    """
-    find = getattr(forest_model, "default_path", None)
-    if find is None:
-        raise UserError("there are no default forests: name trained ones with --forest")
-    return Path(find())
 
 
 def _mismatch(path: str | Path | None, trained: float, wanted: float) -> str:

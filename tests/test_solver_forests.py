@@ -31,7 +31,7 @@ def forests(tmp_path_factory, run_cli):
 @pytest.fixture
 def as_default(forests, monkeypatch):
     """The small forests in the place of those of the package."""
-    monkeypatch.setattr(forest_model, "default_path", lambda: forests, raising=False)
+    monkeypatch.setattr(forest_model, "default_path", lambda: forests)
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def no_default(monkeypatch):
     def absent():
         raise UserError("default.h5: no such file")
 
-    monkeypatch.setattr(forest_model, "default_path", absent, raising=False)
+    monkeypatch.setattr(forest_model, "default_path", absent)
 
 
 def options(**changes) -> ProblemOptions:

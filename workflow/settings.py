@@ -12,8 +12,8 @@ from jsonschema.exceptions import ValidationError, best_match
 
 from carillon.errors import UserError
 from dataset_gen.objectives import OBJECTIVES, require_objective
+from forests import model as forest_model
 from solver.materials import NAMES as MATERIALS
-from solver.trained import default_file
 from workflow import training
 
 SCHEMA = Path(__file__).parent / "schemas" / "config.schema.yaml"
@@ -118,7 +118,7 @@ def studied_model(config: Mapping[str, Any]) -> str | None:
 
 def _named_or_default(named: str | None) -> str | None:
     try:
-        return named or str(default_file())
+        return named or str(forest_model.default_path())
     except UserError:
         return None
 
