@@ -7,11 +7,11 @@ import json
 import sys
 
 from carillon import cli
-from carillon.arguments import Parser, whole_number
+from carillon.arguments import Parser, positive_number, whole_number
 from carillon.errors import UserError
 from carillon.files import require_writable
 from dataset_gen.ranks import refuse, world
-from forests import summary
+from forests import benchmark, summary
 from forests.comparison import table
 from forests.comparison.cases import CASES
 from forests.comparison.database import MATERIALS
@@ -45,6 +45,11 @@ def _parser() -> Parser:
     compare.add_argument("--database", metavar="FILE", help="read databases, or build and write")
     compare.add_argument("--plot", metavar="FILE", help="error over cost, as .png, .svg or .pdf")
     compare.add_argument("--json", action="store_true")
+    cost = commands.add_parser("benchmark", help="time of a block, of loading, over the size")
+    cost.add_argument("--model", help="forests to measure (default: the packaged ones)")
+    cost.add_argument("--blocks", type=whole_number(1), default=100_000)
+    cost.add_argument("--largest", type=positive_number, default=600.0, metavar="MB")
+    cost.add_argument("--json", action="store_true")
     show = commands.add_parser("inspect", help="validate and summarise a model")
     show.add_argument("file", nargs="?", help="by default that of the forests of Carillon")
     show.add_argument("--json", action="store_true")
@@ -110,6 +115,9 @@ def main(argv: list[str] | None = None) -> int:
         case "table":
             result = rows = _table(arguments)
             text = table.as_text(rows)
+        case "benchmark":
+            measured = benchmark.benchmark(arguments.model, arguments.blocks, arguments.largest)
+            result, text = benchmark.as_json(measured), benchmark.as_text(measured)
         case "variants" | "curve":
             result = studied = _studied(arguments)
             text = studies.as_text(studied)
