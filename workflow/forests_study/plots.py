@@ -36,6 +36,9 @@ PARTS = (
 )
 """Scores that are drawn: key, label, look."""
 
+SIZED = {"random": "random blocks", "coherent": "blocks of a mesh"}
+"""Blocks that forests of growing size are timed on."""
+
 
 def blocks_figure(study: ForestsStudy) -> Figure:
     """Error over cost of every coarsening, a panel a kind of blocks (Fig. 9)."""
@@ -135,6 +138,26 @@ def variants_figure(study: ForestsStudy) -> Figure:
     return figure
 
 
+def sizes_figure(study: ForestsStudy) -> Figure:
+    """Time of a block over the size of forests."""
+    found = study.benchmark["sizes"]
+    ours = study.benchmark["megabytes"]
+    with plt.rc_context(SETTINGS):
+        figure, axes = plt.subplots(figsize=(7.6, 3.4))
+        for (key, label), colour in zip(SIZED.items(), DISTRIBUTIONS):
+            values = [size[key]["median"] for size in found]
+            megabytes = [size["megabytes"] for size in found]
+            axes.loglog(megabytes, values, "o-", markersize=4.5, color=colour, label=label)
+        axes.axvline(
+            ours, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)), label="the forests studied"
+        )
+        _plain(axes.xaxis)
+        _plain(axes.yaxis)
+        axes.set(xlabel="storage of the forests [MB]", ylabel="time of a block [µs], one core")
+        figure.legend(loc="outside upper left", ncols=3, columnspacing=1.2)
+    return figure
+
+
 def _plain(axis: Any) -> None:
     """Ticks of a logarithmic axis as plain numbers."""
     axis.set_major_locator(LogLocator(10, subs=(1.0, 2.0, 5.0)))
@@ -146,4 +169,5 @@ FIGURES: dict[str, Callable[[ForestsStudy], Figure]] = {
     "blocks": blocks_figure,
     "variants": variants_figure,
     "curve": curve_figure,
+    "sizes": sizes_figure,
 }

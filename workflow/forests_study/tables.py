@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from carillon import provenance as origin
+from workflow.forests_study import cost_tables
 from workflow.forests_study.results import ForestsStudy, Row
 from workflow.report import blocks_tables
 from workflow.report.evidence_tables import provenance_table
@@ -114,6 +115,8 @@ BUILDERS: dict[str, Callable[[ForestsStudy], Table]] = {
     "every-block": every_block,
     "variants": variants,
     "curve": curve,
+    "cost": cost_tables.cost,
+    "sizes": cost_tables.sizes,
     "provenance": provenance,
 }
 

@@ -50,8 +50,12 @@ rule benchmark_forests:
     resources:
         mem_mb=2000,
         runtime="30m",
+    params:
+        blocks=config["forests_study"]["timed_blocks"],
+        largest=config["forests_study"]["largest"],
     shell:
-        "python -m forests benchmark --model {input} --json > {output}.partial 2> {log}"
+        "python -m forests benchmark --model {input} --blocks {params.blocks}"
+        " --largest {params.largest} --json > {output}.partial 2> {log}"
         " && mv {output}.partial {output}"
 
 
@@ -107,7 +111,7 @@ rule tabulate_forests_study:
         config=f"{RESULTS}/config.yaml",
         found=expand(
             f"{FORESTS_STUDY}/{{part}}.json",
-            part=["model", "blocks", "variants", "curve"],
+            part=["model", "blocks", "benchmark", "variants", "curve"],
         ),
     output:
         expand(
@@ -127,7 +131,9 @@ rule tabulate_forests_study:
 rule plot_forests_study:
     input:
         config=f"{RESULTS}/config.yaml",
-        found=expand(f"{FORESTS_STUDY}/{{part}}.json", part=["blocks", "variants", "curve"]),
+        found=expand(
+            f"{FORESTS_STUDY}/{{part}}.json", part=["blocks", "benchmark", "variants", "curve"]
+        ),
     output:
         svg=f"{FORESTS_STUDY}/figures/{{figure}}.svg",
         png=f"{FORESTS_STUDY}/figures/{{figure}}.png",
