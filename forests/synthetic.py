@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from dataset_gen.element import Array
 from forests.layout import FEATURE_BITS, NODE, aligned, pack
-from forests.model import HIGH, LOW, RECORD, Forests, Model
+from forests.model import FILLED, HIGH, LOW, RECORD, VOID, Forests, Model
 from forests.scaling import FEATURES, PATTERNS, Features, prepare
 
 LARGEST_GPA = 10.0
@@ -94,11 +94,16 @@ def complete_forests(trees: int, depth: int, seed: int = 0, rows: int = 1 << 20)
 
     Parameters
     ----------
-    rows : features that the splits are chosen from; as many as leaves are enough.
+    rows : origins of either kind that the splits are chosen from, at most; as many as leaves do.
     """
     generator = np.random.default_rng(seed)
-    rows = min(rows, 4 << depth)
-    prepared = prepare(random_blocks(rows, seed + 1), "log")
+    rows = min(rows, 8 << depth)
+    # A quarter of the origins is void.
+    prepared = prepare(random_blocks(rows // 2, seed + 1), "log")
+    by_kind = [
+        prepared.features[prepared.filled == bool(kind)][:rows].copy() for kind in (VOID, FILLED)
+    ]
+    del prepared
     leaves = 1 << depth
     number = np.arange(2 * leaves - 1, dtype=np.int32)
     inner = number < leaves - 1
@@ -115,8 +120,7 @@ def complete_forests(trees: int, depth: int, seed: int = 0, rows: int = 1 << 20)
     nodes = aligned((2 * trees * size,), NODE)
     for tree in range(2 * trees):
         kind = tree // trees
-        features = prepared.features[prepared.filled == bool(kind)][:rows]
-        splits = _splits(features, depth, generator)
+        splits = _splits(by_kind[kind], depth, generator)
         feature = np.zeros(len(number), dtype=np.int32)
         threshold = np.zeros(len(number))
         feature[inner], threshold[inner] = splits
