@@ -59,6 +59,12 @@ def scores_rows(forests: dict[str, Any]) -> list[dict[str, Any]]:
         _row("trees", "Trees of each of the two forests", "count", forests["trees"]),
         _row("leaves", "Leaves", "count", forests["leaves"]),
         _row("memory_bytes", "Memory", "bytes", forests["memory_bytes"]),
+        _row(
+            "training_seconds",
+            "Time of the training",
+            "seconds",
+            forests["provenance"].get("training_seconds"),
+        ),
     ]
 
 
