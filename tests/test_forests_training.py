@@ -258,8 +258,9 @@ def test_trees_grown_apart_are_refused_where_they_do_not_fit(shards, tmp_path):
     parameters = parameters_of(data, QUICK)
     paths = [tmp_path / f"{job}.h5" for job in QUICK.jobs]
     for job, path in zip(QUICK.jobs, paths, strict=True):
-        save_tree(path, trees[job], job, parameters)
-    found = load_trees(paths[::-1], parameters)
+        save_tree(path, trees[job], job, parameters, seconds=2.0)
+    found, seconds = load_trees(paths[::-1], parameters)
+    assert seconds == 8.0
     for job in QUICK.jobs:
         for name, values in vars(trees[job]).items():
             np.testing.assert_array_equal(values, getattr(found[job], name))

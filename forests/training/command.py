@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import time
 from dataclasses import replace
 from typing import Any
 
@@ -87,13 +88,18 @@ def run_grow(arguments: argparse.Namespace) -> int:
     if job not in training.jobs:
         raise UserError(f"tree {job} of 2 x {training.trees}: expected 0 to {training.jobs[-1]}")
     dataset = open_dataset(arguments.datasets)
+    begin = time.perf_counter()
     tree = grow_trees(dataset, training, training.jobs[job : job + 1])[job]
-    save_tree(arguments.out, tree, job, parameters_of(dataset, training))
+    seconds = time.perf_counter() - begin
+    save_tree(arguments.out, tree, job, parameters_of(dataset, training), seconds)
     say(f"{arguments.out}: tree {job}, {tree.leaves:,} leaves, depth {tree.depth}")
     return 0
 
 
-def _opened(arguments: argparse.Namespace) -> tuple[Training, Dataset, dict[int, Tree] | None]:
+Grown = tuple[dict[int, Tree], float]
+
+
+def _opened(arguments: argparse.Namespace) -> tuple[Training, Dataset, Grown | None]:
     require_writable(arguments.out)
     training = training_of(arguments)
     dataset = open_dataset(arguments.datasets)
@@ -123,9 +129,9 @@ def _train(
     ranks: Ranks,
     training: Training,
     dataset: Dataset,
-    trees: dict[int, Tree] | None,
+    grown: Grown | None,
 ) -> None:
-    trained = train_trees(dataset, training, ranks, arguments.workers, trees=trees)
+    trained = train_trees(dataset, training, ranks, arguments.workers, grown=grown)
     if trained is None:
         return
     model = model_of(dataset, training, trained)

@@ -217,14 +217,14 @@ def train_trees(
     ranks: Ranks,
     workers: int = 1,
     progress: bool = True,
-    trees: dict[int, Tree] | None = None,
+    grown: tuple[dict[int, Tree], float] | None = None,
 ) -> Trained | None:
     """Both steps on several ranks, each with its share of the trees and of the samples.
 
     Parameters
     ----------
     workers : threads of every rank.
-    trees : splits by tree number from `grow_trees`, if they are there already.
+    grown : splits by tree number from `grow_trees` and the seconds they took, if they are there.
 
     Returns
     -------
@@ -232,22 +232,23 @@ def train_trees(
     """
     training.validate()
     begin = time.perf_counter()
-    if trees is None:
+    if grown is None:
         shown = progress and ranks.first
         mine = grow_trees(dataset, training, ranks.deal(training.jobs), workers, shown)
-        trees = ranks.together(mine)
-    trees = {job: trees[job] for job in training.jobs}
-    grown = time.perf_counter()
+        grown = ranks.together(mine), time.perf_counter() - begin
+    found, structure_seconds = grown
+    trees = {job: found[job] for job in training.jobs}
+    begin = time.perf_counter()
     leaves, held, used = fit_leaves(dataset, training, trees, ranks, workers, progress)
     if not ranks.first:
         return None
-    fitted = time.perf_counter()
+    leaves_seconds = time.perf_counter() - begin
     facts = {
-        "structure_seconds": grown - begin,
-        "leaves_seconds": fitted - grown,
-        "training_seconds": fitted - begin,
+        "structure_seconds": structure_seconds,
+        "leaves_seconds": leaves_seconds,
+        "training_seconds": structure_seconds + leaves_seconds,
         "training_rows": 8 * used,
-        "rows_per_second": 8 * used / (fitted - grown),
+        "rows_per_second": 8 * used / leaves_seconds,
         "ranks": ranks.size,
         "workers": workers,
     }

@@ -20,18 +20,26 @@ KIND = "tree"
 SCHEMA = 1
 
 
-def save_tree(path: str | Path, tree: Tree, job: int, parameters: dict[str, Any]) -> None:
-    """Write tree number `job` of a training with these parameters, atomically."""
+def save_tree(
+    path: str | Path, tree: Tree, job: int, parameters: dict[str, Any], seconds: float
+) -> None:
+    """Write tree number `job` of a training with these parameters, atomically.
+
+    `seconds` is the wall time that it took to grow.
+    """
     with create_h5(path, KIND, SCHEMA, sealed=True) as file:
         file.attrs["tree"] = job
+        file.attrs["seconds"] = seconds
         file.attrs["parameters"] = json.dumps(parameters, sort_keys=True)
         for field in fields(Tree):
             file.create_dataset(field.name, data=getattr(tree, field.name))
         provenance.write(file, parameters)
 
 
-def load_trees(paths: Sequence[str | Path], parameters: dict[str, Any]) -> dict[int, Tree]:
-    """Trees by number.
+def load_trees(
+    paths: Sequence[str | Path], parameters: dict[str, Any]
+) -> tuple[dict[int, Tree], float]:
+    """Trees by number, and the seconds that growing them took in all.
 
     Raises
     ------
@@ -40,9 +48,11 @@ def load_trees(paths: Sequence[str | Path], parameters: dict[str, Any]) -> dict[
     """
     expected = json.dumps(parameters, sort_keys=True)
     found: dict[int, Tree] = {}
+    seconds = 0.0
     for path in paths:
         with open_h5(path, KIND, SCHEMA, sealed=True) as file:
             job = int(file.attrs["tree"])
+            seconds += float(file.attrs["seconds"])
             theirs = str(file.attrs["parameters"])
             tree = Tree(**{field.name: np.asarray(file[field.name][()]) for field in fields(Tree)})
         if theirs != expected:
@@ -57,7 +67,7 @@ def load_trees(paths: Sequence[str | Path], parameters: dict[str, Any]) -> dict[
             f"tree {missing[0]} is missing, {len(found)} of {len(wanted)} trees are named; grow it "
             f"with python -m forests grow --tree {missing[0]}"
         )
-    return found
+    return found, seconds
 
 
 def _difference(theirs: dict[str, Any], expected: dict[str, Any]) -> str:
