@@ -194,23 +194,7 @@ def prepare(young: Array, transform: str) -> Prepared:
     return prepared
 
 
-def separate(young: Array, transform: str) -> Prepared:
-    """The same as `prepare`."""
-    return prepare(young, transform)
-
-
-def features_of(prepared: Prepared, young: Array, transform: str) -> Features:
-    """Features (n, 8 origins, 7) of e'2..e'8."""
-    return prepared.features
-
-
-def target_of(moduli: Array, scale: Array, transform: str) -> Array:
-    """What a forest learns: `E / scale`, or its logarithm."""
-    ratios = moduli / scale
-    return np.asarray(np.log(ratios) if is_logarithmic(transform) else ratios)
-
-
 @numba.njit(inline="always")
 def modulus_of(target: float, scale: float, logarithmic: bool) -> float:
-    """Inverse of `target_of`, for one origin."""
+    """Modulus of an origin from what the trees answer: `E / scale`, or its logarithm."""
     return scale * (math.exp(target) if logarithmic else target)
