@@ -53,7 +53,7 @@ def variants(study: ForestsStudy) -> Table:
     """Ways to train."""
     return _scored(
         "variants",
-        "Ways to train, on the same rows and with the same storage at most; “the same” refers to "
+        "Ways to train, on the same rows and with the same storage, which few leaves fill up; “the same” refers to "
         f"the training of the default forests. {SCORED}",
         Column("variant", "Training"),
         study.variants,

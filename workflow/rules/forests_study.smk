@@ -77,12 +77,13 @@ rule compare_trainings:
         runtime="4h",
     params:
         training=STUDY_TRAINING.train_arguments,
+        leaves=config["forests_study"]["variant_leaves"],
         variants=" ".join(
             f"--only {shlex.quote(name)}" for name in config["forests_study"]["variants"] or []
         ),
     shell:
-        "python -m forests variants {input} {params.training} {params.variants}"
-        " --workers {threads} --json > {output}.partial 2> {log} && mv {output}.partial {output}"
+        "python -m forests variants {input} {params.training} --max-leaves {params.leaves}"
+        " {params.variants} --workers {threads} --json > {output}.partial 2> {log} && mv {output}.partial {output}"
 
 
 rule follow_learning:
