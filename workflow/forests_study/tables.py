@@ -53,8 +53,8 @@ def variants(study: ForestsStudy) -> Table:
     """Ways to train."""
     return _scored(
         "variants",
-        "Ways to train, on the same rows and with the same storage, which few leaves fill up; “the same” refers to "
-        f"the training of the default forests. {SCORED}",
+        "Ways to train, on the same rows and with the same storage, so little that all fill it; "
+        f"“the same” refers to the training of the default forests. {SCORED}",
         Column("variant", "Training"),
         study.variants,
     )
