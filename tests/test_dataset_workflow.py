@@ -14,20 +14,21 @@ MODELS = "models: {bar: {mesh: 'builtin:bar', resolution: 16}}\n"
 
 
 @pytest.mark.parametrize(
-    ("dataset", "expected"),
+    ("dataset", "distribution", "expected"),
     [
-        ("{}", "--distribution uniform --workers 1 --out"),
+        ("{}", "uniform", "--distribution uniform --workers 1 --out"),
         (
-            "{distribution: log-uniform, low: 0.1, workers: 2}",
-            "--distribution log-uniform --low 0.1 --workers 2 --out",
+            "{distributions: [log-uniform], ranges: {log-uniform: [0.1, 50]}, workers: 2}",
+            "log-uniform",
+            "--distribution log-uniform --low 0.1 --high 50 --workers 2 --out",
         ),
     ],
 )
-def test_moduli_and_workers_reach_the_command(tmp_path, dataset, expected):
+def test_moduli_and_workers_reach_the_command(tmp_path, dataset, distribution, expected):
     config = tmp_path / "config.yaml"
     config.write_text(f"{MODELS}dataset: {dataset}\n")
     command = [sys.executable, "-m", "snakemake", "-s", CHECKOUT / "Snakefile", "-n", "-p"]
-    command += ["results/dataset/shard-0.h5", "--cores", 2, "--configfile", config]
+    command += [f"results/dataset/{distribution}-0.h5", "--cores", 2, "--configfile", config]
     done = subprocess.run(
         [str(part) for part in command],
         cwd=tmp_path,
