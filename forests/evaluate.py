@@ -129,6 +129,23 @@ def _target(
     return total / len(found)
 
 
+@numba.njit(inline="always")
+def _scratch(
+    trees: int,
+) -> tuple[Array, Array, Array, Features, Features, NDArray[np.int64], NDArray[np.int64]]:
+    """Arrays that one block after the other is worked out in.
+
+    Its values, scales and references (8,), features in a row and as a table (8, `STRIDE`), patterns
+    (8,) and leaves (8, trees).
+    """
+    values, scale, references = np.empty(8), np.empty(8), np.empty(8)
+    features = np.zeros(8 * STRIDE, dtype=np.float32)
+    table = features.reshape(8, STRIDE)
+    pattern = np.empty(8, dtype=np.int64)
+    found = np.empty((8, trees), dtype=np.int64)
+    return values, scale, references, features, table, pattern, found
+
+
 @numba.njit(cache=True, nogil=True)
 def _moduli(
     young: Array,
@@ -140,11 +157,7 @@ def _moduli(
     moduli: Array,
 ) -> None:
     """Coarse moduli (n, 8) of blocks (n, 8)."""
-    values, scale, references = np.empty(8), np.empty(8), np.empty(8)
-    features = np.zeros(8 * STRIDE, dtype=np.float32)
-    table = features.reshape(8, STRIDE)
-    pattern = np.empty(8, dtype=np.int64)
-    found = np.empty((8, len(roots)), dtype=np.int64)
+    values, scale, references, features, table, pattern, found = _scratch(len(roots))
     for block in range(len(young)):
         prepare_block(young[block], logarithmic, values, table, pattern, scale, references)
         _find(roots, thresholds, links, leaves, features, pattern, found)
@@ -164,11 +177,7 @@ def _leaf_numbers(
     numbers: NDArray[np.int32],
 ) -> None:
     """Leaves (n, 8, trees) of blocks (n, 8)."""
-    values, scale, references = np.empty(8), np.empty(8), np.empty(8)
-    features = np.zeros(8 * STRIDE, dtype=np.float32)
-    table = features.reshape(8, STRIDE)
-    pattern = np.empty(8, dtype=np.int64)
-    found = np.empty((8, len(roots)), dtype=np.int64)
+    values, scale, references, features, table, pattern, found = _scratch(len(roots))
     for block in range(len(young)):
         prepare_block(young[block], logarithmic, values, table, pattern, scale, references)
         _find(roots, thresholds, links, leaves, features, pattern, found)
@@ -239,11 +248,7 @@ def _derivatives(
     derivatives: Array,
 ) -> None:
     """Coarse moduli (n, 8) of blocks (n, 8) and their derivatives (n, 8, 8)."""
-    values, scale, references = np.empty(8), np.empty(8), np.empty(8)
-    features = np.zeros(8 * STRIDE, dtype=np.float32)
-    table = features.reshape(8, STRIDE)
-    pattern = np.empty(8, dtype=np.int64)
-    found = np.empty((8, len(roots)), dtype=np.int64)
+    values, scale, references, features, table, pattern, found = _scratch(len(roots))
     slopes = np.empty(FEATURES)
     for block in range(len(young)):
         prepare_block(young[block], logarithmic, values, table, pattern, scale, references)
