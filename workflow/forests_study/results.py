@@ -2,67 +2,47 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import yaml
+from workflow.study_folder import StudyFolder
 
 Row = dict[str, Any]
 
 
-@dataclass(frozen=True)
-class ForestsStudy:
-    """The folder of the study; files are read when asked for.
-
-    Attributes
-    ----------
-    folder
-        Folder of the study, below the one that holds the run's `config.yaml`.
-    """
-
-    folder: Path
-
-    @cached_property
-    def config(self) -> dict[str, Any]:
-        """The resolved configuration of the run."""
-        loaded: dict[str, Any] = yaml.safe_load((self.folder.parent / "config.yaml").read_text())
-        return loaded
+class ForestsStudy(StudyFolder):
+    """The folder of the study of the forests."""
 
     @cached_property
     def model(self) -> dict[str, Any]:
         """Summary of the forests studied, from `forests inspect`."""
-        loaded: dict[str, Any] = self._json("model")
+        loaded: dict[str, Any] = self.read_json("model.json")
         return loaded
 
     @cached_property
     def blocks(self) -> list[Row]:
         """Output of `forests table`."""
-        loaded: list[Row] = self._json("blocks")
+        loaded: list[Row] = self.read_json("blocks.json")
         return loaded
 
     @cached_property
     def benchmark(self) -> dict[str, Any]:
         """Output of `forests benchmark`."""
-        loaded: dict[str, Any] = self._json("benchmark")
+        loaded: dict[str, Any] = self.read_json("benchmark.json")
         return loaded
 
     @cached_property
     def variants(self) -> list[Row]:
         """Output of `forests variants`."""
-        loaded: list[Row] = self._json("variants")
+        loaded: list[Row] = self.read_json("variants.json")
         return loaded
 
     @cached_property
     def curve(self) -> list[Row]:
         """Output of `forests curve`."""
-        loaded: list[Row] = self._json("curve")
+        loaded: list[Row] = self.read_json("curve.json")
         return loaded
-
-    def _json(self, name: str) -> Any:
-        return json.loads((self.folder / f"{name}.json").read_text())
 
 
 def study_beside(config: str | Path) -> ForestsStudy:

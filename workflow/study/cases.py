@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from solver.objectives import FOREST
 from workflow import settings
+from workflow.study_folder import StudyFolder
 
 
 @dataclass(frozen=True)
@@ -58,31 +56,13 @@ def solids_of(config: Mapping[str, Any]) -> list[str]:
     return list(dict.fromkeys(case.solid for case in cases_of(config)))
 
 
-@dataclass(frozen=True)
-class Study:
-    """The folder of a study; files are read when asked for.
-
-    Attributes
-    ----------
-    folder
-        Folder of the study, below the one that holds the run's `config.yaml`.
-    """
-
-    folder: Path
-
-    @cached_property
-    def config(self) -> dict[str, Any]:
-        """The resolved configuration of the run."""
-        loaded: dict[str, Any] = yaml.safe_load((self.folder.parent / "config.yaml").read_text())
-        return loaded
+class Study(StudyFolder):
+    """The folder of the objectives' study."""
 
     @cached_property
     def found(self) -> dict[Case, dict[str, Any]]:
         """Output of `solver objectives` by case."""
-        return {
-            case: json.loads((self.folder / "cases" / case.path).read_text())
-            for case in cases_of(self.config)
-        }
+        return {case: self.read_json(f"cases/{case.path}") for case in cases_of(self.config)}
 
     @property
     def solids(self) -> list[str]:
