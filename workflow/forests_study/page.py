@@ -37,6 +37,5 @@ def findings(study: ForestsStudy) -> dict[str, Any]:
     return {
         "forest": forest,
         "fit": fit,
-        "excess": forest["mean_error"] / fit["mean_error"] - 1.0,
         "speed_up": fit["seconds_per_block"] / forest["seconds_per_block"],
     }
