@@ -98,14 +98,20 @@ class Result:
     processor: str
 
 
-def timed(function: Callable[[], object], blocks: int) -> Timing:
-    """Time a function that works on so many blocks."""
+def _warm_seconds(function: Callable[[], object]) -> list[float]:
+    """Seconds of each of the timed runs of a function."""
     function()
     seconds = []
     for _ in range(RUNS):
         start = time.perf_counter()
         function()
         seconds.append(time.perf_counter() - start)
+    return seconds
+
+
+def timed(function: Callable[[], object], blocks: int) -> Timing:
+    """Time a function that works on so many blocks."""
+    seconds = _warm_seconds(function)
     low, middle, high = (1e6 * pick(seconds) / blocks for pick in (min, statistics.median, max))
     return Timing(middle, low, high, RUNS)
 
@@ -192,15 +198,6 @@ def over_size(sizes: Sequence[tuple[int, int]], young: Array, mesh: Array) -> li
     return found
 
 
-def _milliseconds_to_load(path: Path) -> float:
-    seconds = []
-    for _ in range(RUNS + 1):
-        start = time.perf_counter()
-        load_model(path)
-        seconds.append(time.perf_counter() - start)
-    return 1e3 * statistics.median(seconds[1:])
-
-
 def benchmark(
     path: str | Path | None = None, blocks: int = 100_000, largest: float = 600.0
 ) -> Result:
@@ -242,7 +239,7 @@ def benchmark(
         trees=model.forests.trees,
         leaves=leaves,
         blocks=blocks,
-        load_ms=_milliseconds_to_load(path),
+        load_ms=1e3 * statistics.median(_warm_seconds(partial(load_model, path))),
         evaluation=evaluation,
         rival=rival,
         sizes=over_size(sizes, young, mesh),
