@@ -1,4 +1,4 @@
-"""Command line: `python -m forests grow | train | inspect | table | variants | curve`."""
+"""Command line: `python -m forests COMMAND`; `--help` lists the commands."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def _parser() -> Parser:
     curve.add_argument("--rows", default="1e5,3e5,1e6,3e6,1e7", help="(default %(default)s)")
     curve.add_argument("--plot", metavar="FILE", help="the curve, as .png, .svg or .pdf")
     for study in (alternatives, curve):
-        study.add_argument("--workers", type=whole_number(1), default=1, help="threads")
+        command.add_workers(study)
         study.add_argument("--json", action="store_true")
     compare = commands.add_parser("table", help="error, cost and storage of every coarsening")
     compare.add_argument("--model", action="append", help="forests to compare, may be repeated")

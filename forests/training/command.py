@@ -36,7 +36,7 @@ def add_parsers(commands: Any) -> None:
     learn.add_argument(
         "--structure", nargs="+", metavar="TREE", help="all trees, made by grow with equal options"
     )
-    learn.add_argument("--workers", type=whole_number(1), default=1, help="threads, of each rank")
+    add_workers(learn, "threads, of each rank")
 
 
 def add_training(parser: Parser) -> None:
@@ -70,6 +70,11 @@ def add_training(parser: Parser) -> None:
     parser.add_argument("--transform", choices=TRANSFORMS, default=default.transform)
     parser.add_argument("--grower", choices=tuple(GROWERS), default=default.grower)
     parser.add_argument("--seed", type=whole_number(0), default=default.seed)
+
+
+def add_workers(parser: Parser, meaning: str = "threads") -> None:
+    """Add the number of threads of a training to a command."""
+    parser.add_argument("--workers", type=whole_number(1), default=1, help=meaning)
 
 
 def training_of(arguments: argparse.Namespace) -> Training:
