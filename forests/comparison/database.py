@@ -31,6 +31,7 @@ from dataset_gen.objectives import fit, require_poisson
 from dataset_gen.sampling import Moduli
 from forests.comparison.combinations import cells_of, combination_keys, places
 from forests.comparison.farthest_points import farthest_points
+from forests.evaluate import require_blocks
 
 OBJECTIVE = "chen2015"
 
@@ -219,14 +220,9 @@ def look_up(database: Database, young: ArrayLike) -> Array:
     Raises
     ------
     UserError
-        For a bad shape, a modulus that is negative or not finite, void cells in a database without
-        void, or a block that is void altogether.
+        See `forests.evaluate.require_blocks`, and for void cells in a database without void.
     """
-    blocks = np.ascontiguousarray(young, dtype=float)
-    if blocks.ndim != 2 or blocks.shape[1] != 8:
-        raise UserError(f"fine moduli have shape {blocks.shape}, expected (n, 8)")
-    if not np.isfinite(blocks).all() or (blocks < 0.0).any():
-        raise UserError("fine moduli must be finite and not negative")
+    blocks = require_blocks(young)
     void = int(database.has_void)
     solid = database.materials[void:]
     out = np.empty_like(blocks)
@@ -243,8 +239,8 @@ def look_up(database: Database, young: ArrayLike) -> Array:
     )
     if missing >= 0:
         raise UserError(
-            f"block {missing} is not in the database: it has void cells, or nothing else; build "
-            "one with void among its materials, and leave out blocks that are void altogether"
+            f"block {missing} is not in the database: it has void cells; build one with void among "
+            "its materials"
         )
     return out
 
