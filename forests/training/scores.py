@@ -12,18 +12,15 @@ from forests.evaluate import coarsen
 from forests.model import Model
 
 
-def held_out_scores(model: Model, fine: Array, coarse: Array) -> dict[str, float]:
-    """Errors on fits (n, 8) the training has not seen.
+def scores_of(error: Array, fine: Array, coarse: Array) -> dict[str, float]:
+    """Scores of errors (n, 8) of log E against the fits (n, 8) of blocks (n, 8).
 
     Over all points, over the blocks without void cells, and over those with: R^2 of
-    `log(E / mean(e))`, root mean square of the error of log E, median relative error of E.
+    `log(E / mean(e))`, root mean square of the error of log E, median relative error of E. Kinds of
+    less than two blocks have none.
     """
-    scores: dict[str, float] = {"held_out_samples": float(len(fine))}
-    if not len(fine):
-        return scores
-    found = coarsen(model, fine)
+    scores = {}
     relative = np.log(coarse / fine.mean(axis=1, keepdims=True))
-    error = np.log(found / coarse)
     solid = (fine > 0).all(axis=1)
     for name, rows in (("", solid | True), ("_solid", solid), ("_partly_void", ~solid)):
         if rows.sum() > 1:
@@ -32,6 +29,14 @@ def held_out_scores(model: Model, fine: Array, coarse: Array) -> dict[str, float
             scores[f"rms_log{name}"] = mean_square**0.5
             scores[f"median_error{name}"] = float(np.median(np.abs(np.expm1(error[rows]))))
     return scores
+
+
+def held_out_scores(model: Model, fine: Array, coarse: Array) -> dict[str, float]:
+    """Number of fits (n, 8) that the training has not seen, and the model's scores on them."""
+    scores = {"held_out_samples": float(len(fine))}
+    if not len(fine):
+        return scores
+    return scores | scores_of(np.log(coarsen(model, fine) / coarse), fine, coarse)
 
 
 def uniform_scores(model: Model) -> dict[str, float]:

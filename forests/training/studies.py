@@ -7,18 +7,18 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from carillon.errors import UserError
 from carillon.progress import say
 from dataset_gen.element import Array
 from dataset_gen.generate import generate
 from forests.layout import NODE
-from forests.model import FILLED, RECORD
+from forests.model import RECORD
 from forests.training.dataset import Dataset, Samples, dataset_of, joined
 from forests.training.leaves import answers_of
 from forests.training.ranks import Ranks
 from forests.training.rows import modulus_over_scale, rows_of
+from forests.training.scores import scores_of
 from forests.training.structure import Tree
 from forests.training.train import Trained, Training, train_trees
 
@@ -66,13 +66,11 @@ def fresh_samples(dataset: Dataset, samples: int = TEST_SAMPLES) -> dict[str, Sa
     return found
 
 
-def _errors(
-    trained: Trained, samples: Samples, training: Training
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Errors of log E of all rows, those with a void origin first, and whether blocks are solid."""
-    errors, solid = [], []
-    kinds = rows_of(samples, training.transform)
-    for kind, rows in enumerate(kinds):
+def _errors(trained: Trained, samples: Samples, training: Training) -> Array:
+    """Errors (n, 8) of log E, also with transforms that cannot be evaluated on a mesh."""
+    errors = np.empty_like(samples.moduli)
+    filled = samples.young > 0
+    for kind, rows in enumerate(rows_of(samples, training.transform)):
         answers = [
             answers_of(trained.trees[job], trained.leaves[job], rows)
             for job in training.jobs
@@ -80,19 +78,8 @@ def _errors(
         ]
         mean = np.mean(answers, axis=0)
         ratio, exact = (modulus_over_scale(t, training.transform) for t in (mean, rows.target))
-        errors.append(np.log(np.maximum(ratio, LEAST_RATIO)) - np.log(exact))
-        solid.append(rows.pattern == 0 if kind == FILLED else np.zeros(len(rows), dtype=bool))
-    return np.concatenate(errors), np.concatenate(solid)
-
-
-def _scores(errors: Array, solid: NDArray[np.bool_], spread: float) -> dict[str, float]:
-    return {
-        "rms_log_solid": float(np.sqrt((errors[solid] ** 2).mean())),
-        "rms_log_partly_void": float(np.sqrt((errors[~solid] ** 2).mean())),
-        "median_error": float(np.median(np.abs(np.expm1(errors)))),
-        "median_error_solid": float(np.median(np.abs(np.expm1(errors[solid])))),
-        "r2_log": 1.0 - float((errors**2).mean()) / spread,
-    }
+        errors[filled == bool(kind)] = np.log(np.maximum(ratio, LEAST_RATIO)) - np.log(exact)
+    return errors
 
 
 def storage_of(trees: Iterable[Tree]) -> int:
@@ -104,10 +91,10 @@ def _row(dataset: Dataset, training: Training, workers: int, test: dict[str, Sam
     trained = train_trees(dataset, training, Ranks(), workers)
     assert trained is not None
     leaves = sum(tree.leaves for tree in trained.trees.values())
-    scores = {}
-    for name, samples in test.items():
-        relative = np.log(samples.moduli / samples.young.mean(axis=1, keepdims=True))
-        scores[name] = _scores(*_errors(trained, samples, training), float(relative.var()))
+    scores = {
+        name: scores_of(_errors(trained, samples, training), samples.young, samples.moduli)
+        for name, samples in test.items()
+    }
     return {
         "leaves": leaves,
         "storage_bytes": storage_of(trained.trees.values()),
