@@ -121,11 +121,8 @@ def join(void: Sequence[tuple[Tree, Leaves]], filled: Sequence[tuple[Tree, Leave
     return Forests(roots, packed, ordered)
 
 
-def save_model(path: str | Path, model: Model, parameters: dict[str, Any]) -> None:
-    """Write the model atomically, with a checksum and provenance.
-
-    What the model's provenance has beyond that of `parameters` is kept.
-    """
+def save_model(path: str | Path, model: Model) -> None:
+    """Write the model atomically, with a checksum and the provenance of its training."""
     with create_h5(path, KIND, SCHEMA, sealed=True) as file:
         file.attrs["objective"] = model.objective
         file.attrs["poisson"] = model.poisson
@@ -133,10 +130,7 @@ def save_model(path: str | Path, model: Model, parameters: dict[str, Any]) -> No
         file.attrs["scores"] = json.dumps(model.scores)
         for field in fields(Forests):
             file.create_dataset(field.name, data=getattr(model.forests, field.name))
-        provenance.write(file, parameters)
-        attributes = file["provenance"].attrs
-        for name in model.provenance.keys() - attributes.keys():
-            attributes[name] = model.provenance[name]
+        file.create_group("provenance").attrs.update(model.provenance)
 
 
 @numba.njit(cache=True)

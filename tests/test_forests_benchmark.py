@@ -19,7 +19,7 @@ from forests.synthetic import coherent_blocks, complete_forests, random_blocks
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
     path = tmp_path_factory.mktemp("benchmark") / "forests.h5"
-    save_model(path, complete_forests(2, 6), {})
+    save_model(path, complete_forests(2, 6))
     return path
 
 

@@ -100,7 +100,7 @@ def test_held_out_fits_are_predicted(models):
 @EVERY
 def test_file_round_trip_is_exact(models, transform, blocks, tmp_path):
     model = models[transform]
-    save_model(tmp_path / "forests.h5", model, {"seed": 1})
+    save_model(tmp_path / "forests.h5", model)
     found = load_model(tmp_path / "forests.h5")
     for field in fields(Forests):
         saved, kept = getattr(found.forests, field.name), getattr(model.forests, field.name)
@@ -112,6 +112,7 @@ def test_file_round_trip_is_exact(models, transform, blocks, tmp_path):
         transform,
     )
     assert found.scores == model.scores
+    assert found.provenance == model.provenance
     np.testing.assert_array_equal(coarsen(found, blocks), coarsen(model, blocks))
 
 
@@ -159,7 +160,7 @@ def last_link(value):
 )
 def test_inconsistent_trees_are_refused(models, change, tmp_path):
     path = tmp_path / "forests.h5"
-    save_model(path, change(models["log"]), {})
+    save_model(path, change(models["log"]))
     with pytest.raises(UserError, match="inconsistent") as error:
         load_model(path)
     assert "\n" not in str(error.value)
@@ -200,7 +201,7 @@ def retype(name, dtype):
 )
 def test_files_of_another_kind_are_refused(models, change, message, tmp_path):
     path = tmp_path / "forests.h5"
-    save_model(path, models["log"], {})
+    save_model(path, models["log"])
     with pytest.raises(UserError, match=message) as error:
         load_model(rewrite(path, change))
     assert "\n" not in str(error.value)
@@ -209,7 +210,7 @@ def test_files_of_another_kind_are_refused(models, change, message, tmp_path):
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.999])
 def test_a_flipped_byte_is_found(models, share, tmp_path):
     path = tmp_path / "forests.h5"
-    save_model(path, models["log"], {})
+    save_model(path, models["log"])
     content = bytearray(path.read_bytes())
     content[int(share * len(content))] ^= 1
     path.write_bytes(content)
@@ -218,7 +219,7 @@ def test_a_flipped_byte_is_found(models, share, tmp_path):
 
 
 def test_arrays_lie_in_the_file_as_they_are(models, tmp_path):
-    save_model(tmp_path / "forests.h5", models["log"], {})
+    save_model(tmp_path / "forests.h5", models["log"])
     with h5py.File(tmp_path / "forests.h5") as file:
         for field in fields(Forests):
             data = file[field.name]
@@ -234,13 +235,13 @@ def test_missing_default_forests_are_told(monkeypatch, tmp_path):
 
 def test_default_forests_are_loaded_without_a_name(monkeypatch, models, tmp_path):
     monkeypatch.setattr(forests_model, "DEFAULT_FILE", tmp_path / "default.h5")
-    save_model(tmp_path / "default.h5", models["log"], {})
+    save_model(tmp_path / "default.h5", models["log"])
     assert load_model().nbytes == models["log"].nbytes
     assert forests_model.default_path() == tmp_path / "default.h5"
 
 
 def test_inspect_counts_what_is_there(models, tmp_path):
-    save_model(tmp_path / "forests.h5", models["log"], {})
+    save_model(tmp_path / "forests.h5", models["log"])
     found = describe(tmp_path / "forests.h5")
     arrays = models["log"].forests
     assert (found["trees"], found["leaves"]) == (arrays.trees, len(arrays.leaves))

@@ -140,7 +140,7 @@ def _train(
     if trained is None:
         return
     model = model_of(dataset, training, trained)
-    save_model(arguments.out, model, parameters_of(dataset, training))
+    save_model(arguments.out, model)
     told = trained.facts
     scores = "".join(f", {name} {value:.4g}" for name, value in model.scores.items())
     say(
