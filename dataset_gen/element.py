@@ -100,9 +100,14 @@ def nodal_mass(lumped: bool = False) -> Array:
     return matrix
 
 
-def rigid_motions(nodes: Array) -> Array:
-    """Three translations, three rotations about the centroid of `nodes` (n, 3); (3n, 6)."""
-    centred = nodes - nodes.mean(axis=0)
+def rigid_motions(nodes: Array, centre: Array | None = None) -> Array:
+    """Three translations, three rotations about `centre`, or the centroid of `nodes` (n, 3).
+
+    Returns
+    -------
+    (3n, 6) displacements of the nodes.
+    """
+    centred = nodes - (nodes.mean(axis=0) if centre is None else centre)
     motions = np.zeros((len(nodes), 3, 6))
     motions[:, np.arange(3), np.arange(3)] = 1.0
     for axis in range(3):

@@ -6,10 +6,13 @@ import argparse
 import json
 import sys
 import traceback
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from carillon.arguments import Parser, non_negative_number, whole_number
 from carillon.cli import EXIT_BAD_INPUT, EXIT_NOT_CONVERGED
@@ -19,12 +22,12 @@ from carillon.runtime import limit_threads, warn_about_reference_blas
 from dataset_gen.element import DEFAULT_POISSON
 from dataset_gen.objectives import OBJECTIVES, require_objective
 from solver import coarsening, materials
-from solver.analysis import METHODS, SolverOptions, modal_analysis
+from solver.analysis import METHODS, Modes, SolverOptions, modal_analysis
 from solver.correction import EIGENVALUE_TOLERANCE
-from solver.decomposition import on_root
+from solver.decomposition import keep_on_root, on_root
 from solver.geometry import FILLS, PIECES
 from solver.hcms.condense import INTERFACES
-from solver.problem import ProblemOptions, build_problem
+from solver.problem import Problem, ProblemOptions, build_problem
 from solver.truth import RESIDUAL_TOLERANCE
 
 _PROBLEM_FIELDS = tuple(ProblemOptions.__dataclass_fields__)
@@ -77,9 +80,31 @@ def _modes(options: argparse.Namespace, comm: MPI.Comm) -> None:
         options.interface,
         options.seed,
     )
-    problem = on_root(comm, lambda: build_problem(parameters))
-    result = modal_analysis(problem.model, solver, comm, verbose=sys.stderr.isatty())
-    vectors = result.system.gather(result.vectors)
+    problem = keep_on_root(comm, lambda: build_problem(parameters))
+    model = None if problem is None else problem.model
+    result = modal_analysis(model, solver, comm, verbose=sys.stderr.isatty())
+    attributes = {} if problem is None else _modes_attributes(options, problem, result)
+
+    def write(blocks: Iterator[NDArray[np.float64]]) -> None:
+        assert model is not None
+        write_modes(
+            options.out,
+            model,
+            result.values,
+            blocks,
+            result.residuals,
+            attributes,
+            _command_parameters(options),
+        )
+
+    result.system.pour(result.vectors, write)
+    if comm.rank == 0:
+        _print_summary(attributes, result.values, options)
+
+
+def _modes_attributes(
+    options: argparse.Namespace, problem: Problem, result: Modes
+) -> dict[str, Any]:
     attributes: dict[str, Any] = {
         "method": options.method,
         "coarsen": options.coarsen,
@@ -97,22 +122,7 @@ def _modes(options: argparse.Namespace, comm: MPI.Comm) -> None:
         attributes["objective"] = options.objective
     if options.tol is not None:
         attributes["tolerance"] = options.tol
-
-    def write() -> None:
-        assert vectors is not None
-        write_modes(
-            options.out,
-            problem.model,
-            result.values,
-            vectors,
-            result.residuals,
-            attributes,
-            _command_parameters(options),
-        )
-
-    on_root(comm, write)
-    if comm.rank == 0:
-        _print_summary(attributes, result.values, options)
+    return attributes
 
 
 def _print_summary(attributes: dict[str, Any], values: Any, options: argparse.Namespace) -> None:
@@ -162,9 +172,10 @@ def _convergence(options: argparse.Namespace, comm: MPI.Comm) -> None:
     from solver.convergence import correction_history
 
     on_root(comm, lambda: require_writable(options.out))
-    problem = on_root(comm, lambda: build_problem(_problem_options(options)))
+    problem = keep_on_root(comm, lambda: build_problem(_problem_options(options)))
+    model = None if problem is None else problem.model
     history = correction_history(
-        problem.model, options.modes, options.steps, options.degree, options.seed, comm
+        model, options.modes, options.steps, options.degree, options.seed, comm
     )
     _write_json(options, {**history, "provenance": record(_command_parameters(options))}, comm)
 

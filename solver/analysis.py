@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from mpi4py import MPI
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from carillon.errors import ConvergenceError, UserError
 from carillon.progress import say
 from solver.correction import EIGENVALUE_TOLERANCE, correct, default_guard
-from solver.decomposition import Decomposition, decompose
+from solver.decomposition import on_root
+from solver.distribution import Share, distribute
 from solver.eigensolver import TYPES
 from solver.hcms.synthesis import synthesize
 from solver.model import RIGID_MODES, ElasticModel
@@ -102,14 +103,23 @@ class Modes:
 
 
 def modal_analysis(
-    model: ElasticModel,
+    model: ElasticModel | None,
     options: SolverOptions,
     comm: MPI.Comm = MPI.COMM_WORLD,
     verbose: bool = False,
 ) -> Modes:
     """Compute the lowest modes of `model`.
 
-    All ranks of `comm` pass the same model and options and get the same values.
+    All ranks of `comm` pass the same options and get the same values.
+
+    Parameters
+    ----------
+    model
+        The solid; only rank 0's is looked at, and dealt out to the others, who may pass None.
+    options
+        What to compute and how.
+    verbose
+        Whether to show each phase and its time.
 
     Raises
     ------
@@ -119,19 +129,19 @@ def modal_analysis(
         If a tolerance was missed, the modes are not orthonormal, or the body does not have six
         zero-frequency modes.
     """
-    check_mode_count(options.modes, model.n_dofs)
+    on_root(comm, lambda: check_mode_count(options.modes, cast(ElasticModel, model).n_dofs))
     phases = Phases(comm, verbose)
     with phases("partition"):
-        decomposition = decompose(model.mesh, options.subdomains, options.seed, comm)
+        share = distribute(model, options.subdomains, options.seed, comm)
     with phases("assembly"):
-        system = assemble(model, decomposition, comm)
+        system = assemble(share, comm)
     evidence: dict[str, Any] = {
         "ranks": comm.size,
-        "subdomains": decomposition.tree.parts,
-        "n_dofs": model.n_dofs,
+        "subdomains": share.decomposition.tree.parts,
+        "n_dofs": share.n_dofs,
     }
     if options.method == "hcms":
-        values, vectors = _hcms(model, decomposition, system, options, phases, evidence, verbose)
+        values, vectors = _hcms(share, system, options, phases, evidence, verbose)
     else:
         values, vectors = _general_solver(system, options, phases, evidence)
     with phases("verification"):
@@ -183,8 +193,7 @@ def _general_solver(
 
 
 def _hcms(
-    model: ElasticModel,
-    decomposition: Decomposition,
+    share: Share,
     system: System,
     options: SolverOptions,
     phases: Phases,
@@ -193,13 +202,14 @@ def _hcms(
 ) -> tuple[Array, Array]:
     keep = default_keep(options.modes) if options.keep is None else options.keep
     least = options.modes + (FEWEST_SPARE if options.corrections else 0)
-    if keep < min(least, model.n_dofs):
+    if keep < min(least, share.n_dofs):
         raise UserError(
             f"--keep {keep} is too few for {options.modes} modes; expected at least {least}, and a "
             f"third more for fast convergence"
         )
     with phases("hcms"):
-        start = synthesize(model, decomposition, keep, options.interface, system.comm)
+        start = synthesize(share, keep, options.interface, system.comm)
+    evidence["hcms"] = start.counts.summary(system.comm)
     if options.corrections == 0:
         if len(start.values) < options.modes:
             raise UserError(

@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from carillon.progress import say
 from solver.analysis import RIGID_MODES, SolverOptions, modal_analysis
-from solver.decomposition import on_root
+from solver.decomposition import keep_on_root, on_root
 from solver.modes_file import frequencies
 from solver.problem import Problem, ProblemOptions, build_problem
 from solver.trained import trained_or_reason
@@ -47,9 +47,12 @@ def benchmark_row(
     else:
         methods["ddfem_slepc"] = ("ddfem", replace(plain, method="slepc", prove=False))
         methods["ddfem_hcms_ec"] = ("ddfem", plain)
-    problems: dict[str, Problem] = {}
+    problems: dict[str, Problem | None] = {}
+    seconds_before: dict[str, dict[str, float]] = {}
     for coarsen in dict.fromkeys(coarsen for coarsen, _ in methods.values()):
-        problems[coarsen] = on_root(comm, partial(build_problem, replace(options, coarsen=coarsen)))
+        problem = keep_on_root(comm, partial(build_problem, replace(options, coarsen=coarsen)))
+        problems[coarsen] = problem
+        seconds_before[coarsen] = comm.bcast(problem.seconds if problem else None)
     row: dict[str, Any] = {
         "mesh": options.mesh,
         "resolution": options.resolution,
@@ -58,28 +61,29 @@ def benchmark_row(
         "ranks": comm.size,
         "runs": runs,
         "precomputation_seconds": sum(
-            problems["none"].seconds[phase] for phase in ("mesh", "material")
+            seconds_before["none"][phase] for phase in ("mesh", "material")
         ),
         "methods": {},
     }
     exact = None
     for name, (coarsen, solver) in methods.items():
         problem = problems[coarsen]
-        modal_analysis(problem.model, replace(solver, modes=min(20, modes)), comm).system.destroy()
+        model = problem.model if problem else None
+        modal_analysis(model, replace(solver, modes=min(20, modes)), comm).system.destroy()
         seconds = []
         for _ in range(runs):
             comm.barrier()
             begin = time.perf_counter()
-            result = modal_analysis(problem.model, solver, comm)
+            result = modal_analysis(model, solver, comm)
             comm.barrier()
             elapsed = time.perf_counter() - begin - result.seconds["verification"]
-            seconds.append(elapsed + problem.seconds.get("coarsening", 0.0))
+            seconds.append(elapsed + seconds_before[coarsen].get("coarsening", 0.0))
             result.system.destroy()
         found = frequencies(result.values)[RIGID_MODES:]
         exact = found if exact is None else exact
         error = found / exact - 1.0
         entry = {
-            "n_dofs": problem.model.n_dofs,
+            "n_dofs": result.system.n_dofs,
             "seconds_median": float(np.median(seconds)),
             "seconds_min": min(seconds),
             "seconds_max": max(seconds),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from mpi4py import MPI
@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from solver.analysis import RIGID_MODES, check_mode_count, default_keep
 from solver.correction import correct
-from solver.decomposition import Decomposition, decompose
+from solver.decomposition import on_root
+from solver.distribution import Share, distribute
 from solver.hcms.synthesis import synthesize
 from solver.model import ElasticModel
-from solver.system import System, assemble
+from solver.system import assemble
 
 Array = NDArray[np.float64]
 
@@ -23,7 +24,7 @@ PAPER_DEGREE = 1
 
 
 def correction_history(
-    model: ElasticModel,
+    model: ElasticModel | None,
     modes: int,
     steps: int,
     degree: int = PAPER_DEGREE,
@@ -33,15 +34,15 @@ def correction_history(
     """Elastic eigenvalues [rad^2/s^2] after each correction, by start.
 
     The starts are HCMS with free and with fixed interfaces, and random Gaussian vectors,
-    orthogonalised, as many as HCMS keeps.
+    orthogonalised, as many as HCMS keeps.  Only rank 0's `model` is looked at.
     """
-    check_mode_count(modes, model.n_dofs)
-    decomposition = decompose(model.mesh, None, seed, comm)
-    system = assemble(model, decomposition, comm)
+    on_root(comm, lambda: check_mode_count(modes, cast(ElasticModel, model).n_dofs))
+    share = distribute(model, None, seed, comm)
+    system = assemble(share, comm)
     wanted = modes - RIGID_MODES
     curves = {}
     for start in STARTS:
-        block = _start_block(start, model, decomposition, system, default_keep(modes), seed)
+        block = _start_block(start, share, default_keep(modes), seed, comm)
         history: list[list[float]] = []
 
         def note(step: int, values: Array, rows: list[list[float]] = history) -> None:
@@ -57,20 +58,25 @@ def correction_history(
             observe=note,
         )
         curves[start] = history
-    return {"modes": modes, "degree": degree, "n_dofs": model.n_dofs, "start": curves}
+    return {"modes": modes, "degree": degree, "n_dofs": share.n_dofs, "start": curves}
 
 
-def _start_block(
-    start: str,
-    model: ElasticModel,
-    decomposition: Decomposition,
-    system: System,
-    keep: int,
-    seed: int,
-) -> Array:
+def _start_block(start: str, share: Share, keep: int, seed: int, comm: MPI.Comm) -> Array:
     if start == "random":
-        # Drawn whole and cut by node, so that it does not depend on the number of ranks.
-        whole = np.random.default_rng(seed).standard_normal((system.n_dofs, keep))
-        return system.local_rows(whole)
-    treatment = start.removeprefix("hcms-")
-    return synthesize(model, decomposition, keep, treatment, system.comm).vectors
+        return random_block(share, keep, seed, comm)
+    return synthesize(share, keep, start.removeprefix("hcms-"), comm).vectors
+
+
+def random_block(share: Share, columns: int, seed: int, comm: MPI.Comm) -> Array:
+    """This rank's rows (local unknowns, columns) of a Gaussian block.
+
+    Drawn by subdomain, so that it does not depend on who owns which.
+    """
+    offsets = share.decomposition.offsets
+    drawn = [
+        np.random.default_rng([seed, part]).standard_normal(
+            (3 * int(offsets[part + 1] - offsets[part]), columns)
+        )
+        for part in share.decomposition.subdomains_of(comm.rank)
+    ]
+    return np.asfortranarray(np.concatenate(drawn))

@@ -12,93 +12,113 @@ from numpy.typing import NDArray
 
 from solver.geometry import HexMesh
 from solver.hcms.tree import MergeTree, assign_ranks, build_tree
-from solver.partition import default_subdomains, partition_cells, partition_nodes
+from solver.partition import default_subdomains, partition_mesh
 
 T = TypeVar("T")
+
+COST_EXPONENT = 1.5
+"""Work on a subdomain grows like this power of its unknowns: so many modes of so many unknowns."""
 
 
 @dataclass(frozen=True)
 class Decomposition:
-    """Subdomains of a mesh and their owners; identical on every rank.
+    """Subdomains and their owners: small, and identical on every rank.
+
+    Nodes are numbered by subdomain; the number of a node in this order is its row.
 
     Attributes
     ----------
     tree
         The merge tree, whose leaves are the subdomains from left to right.
-    node_part
-        (n,) subdomain of each node.
     owner
         (parts,) rank of each subdomain; contiguous.
-    order
-        (n,) nodes in distributed order: by subdomain, then by number.
     offsets
-        (parts + 1,) first row of each subdomain in `order`.
+        (parts + 1,) first row of each subdomain.
     """
 
     tree: MergeTree
-    node_part: NDArray[np.int32]
     owner: NDArray[np.int32]
-    order: NDArray[np.int64]
     offsets: NDArray[np.int64]
 
-    def nodes_of(self, part: int) -> NDArray[np.int64]:
-        """Sorted nodes of one subdomain."""
-        return self.order[self.offsets[part] : self.offsets[part + 1]]
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes of the whole mesh."""
+        return int(self.offsets[-1])
+
+    def subdomains_of(self, rank: int) -> range:
+        """Subdomains that `rank` owns."""
+        first, last = np.searchsorted(self.owner, [rank, rank + 1])
+        return range(int(first), int(last))
 
     def local_range(self, rank: int) -> tuple[int, int]:
-        """Half-open range of node rows that `rank` owns in the distributed order."""
-        owned = np.flatnonzero(self.owner == rank)
-        return int(self.offsets[owned[0]]), int(self.offsets[owned[-1] + 1])
+        """Half-open range of rows that `rank` owns."""
+        owned = self.subdomains_of(rank)
+        return int(self.offsets[owned.start]), int(self.offsets[owned.stop])
 
-    def group_sizes(self) -> list[int]:
-        """Unknowns of every group of the tree."""
+    def row_ranges(self) -> list[tuple[int, int]]:
+        """Half-open range of rows of every group of the tree."""
         return [
-            3 * int(self.offsets[stop] - self.offsets[start]) for start, stop in self.tree.ranges()
+            (int(self.offsets[start]), int(self.offsets[stop]))
+            for start, stop in self.tree.ranges()
         ]
 
-    def sides(self, left: tuple[int, int], right: tuple[int, int]) -> NDArray[np.int8]:
-        """1 for nodes in the subdomain range `left`, 2 for `right`, 0 elsewhere; shape (n,)."""
-        part = self.node_part
-        in_left = (part >= left[0]) & (part < left[1])
-        in_right = (part >= right[0]) & (part < right[1])
-        return (in_left + 2 * in_right).astype(np.int8)
+    def leaders(self) -> list[int]:
+        """Rank of every group of the tree: the owner of its first subdomain."""
+        return [int(self.owner[start]) for start, _ in self.tree.ranges()]
 
 
 def decompose(
-    mesh: HexMesh, subdomains: int | None = None, seed: int = 0, comm: MPI.Comm = MPI.COMM_WORLD
-) -> Decomposition:
+    mesh: HexMesh, subdomains: int | None = None, seed: int = 0, ranks: int = 1
+) -> tuple[Decomposition, NDArray[np.int64]]:
     """Cut `mesh` into subdomains, build the merge tree and deal subdomains to the ranks.
 
-    The cut and the tree do not depend on the number of ranks; they are computed once and
-    broadcast, so that rounding cannot make ranks disagree.
+    The cut and the tree depend on the number of ranks only where there are more ranks than
+    subdomains by default.
+
+    Returns
+    -------
+    The decomposition and the nodes (n,) in its order: by subdomain, then by number.
+
+    Raises
+    ------
+    UserError
+        If there are more subdomains than cells, or more ranks than subdomains.
     """
-
-    def cut() -> tuple[MergeTree, NDArray[np.int32]]:
-        parts = subdomains
-        if parts is None:
-            parts = min(max(default_subdomains(3 * mesh.n_nodes), comm.size), mesh.n_cells)
-        node_part = partition_nodes(mesh, partition_cells(mesh, parts, seed))
-        tree, renumbered = build_tree(node_part[mesh.cells])
-        return tree, renumbered[node_part]
-
-    tree, node_part = on_root(comm, cut)
+    if subdomains is None:
+        subdomains = min(max(default_subdomains(3 * mesh.n_nodes), ranks), mesh.n_cells)
+    node_part = partition_mesh(mesh, subdomains, seed)
+    tree, renumbered = build_tree(node_part[mesh.cells], np.bincount(node_part))
+    node_part = renumbered[node_part]
     order = np.argsort(node_part, kind="stable").astype(np.int64)
     sizes = np.bincount(node_part, minlength=tree.parts)
     offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-    return Decomposition(tree, node_part, assign_ranks(sizes, comm.size), order, offsets)
+    owner = assign_ranks(sizes.astype(float) ** COST_EXPONENT, ranks)
+    return Decomposition(tree, owner, offsets), order
 
 
 def on_root(comm: MPI.Comm, compute: Callable[[], T]) -> T:
     """Call `compute` on rank 0 and give every rank its result, or its exception."""
-    result: T | None = None
-    failure: Exception | None = None
-    if comm.rank == 0:
-        try:
-            result = compute()
-        except Exception as error:
-            failure = error
+    result, failure = _attempt(comm, compute)
     result, failure = comm.bcast((result, failure), root=0)
     if failure is not None:
         # Every rank raises it, so that no rank is left waiting for the others.
         raise failure
     return cast(T, result)
+
+
+def keep_on_root(comm: MPI.Comm, compute: Callable[[], T]) -> T | None:
+    """Call `compute` on rank 0, which keeps the result; its exception is raised on every rank."""
+    result, failure = _attempt(comm, compute)
+    failure = comm.bcast(failure, root=0)
+    if failure is not None:
+        raise failure
+    return result
+
+
+def _attempt(comm: MPI.Comm, compute: Callable[[], T]) -> tuple[T | None, Exception | None]:
+    if comm.rank == 0:
+        try:
+            return compute(), None
+        except Exception as error:
+            return None, error
+    return None, None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ Array = NDArray[np.float64]
 KIND = "modes"
 SCHEMA = 1
 _COLUMNS_PER_CHUNK = 16
+_ROWS_PER_CHUNK = 1 << 20
 
 
 @dataclass
@@ -60,21 +62,32 @@ def write_modes(
     path: str | Path,
     model: ElasticModel,
     eigenvalues: Array,
-    modes: Array,
+    modes: Iterable[Array],
     residuals: Array,
     attributes: dict[str, Any],
     parameters: dict[str, Any],
 ) -> None:
-    """Write a modes file atomically; `modes` is (n_dofs, k) in mesh node order."""
+    """Write a modes file atomically.
+
+    Parameters
+    ----------
+    modes
+        Blocks (n_dofs, c) of the modes in mesh node order, from the lowest up, as
+        `System.pour` gives them; each is on its way to disk before the next one is asked for.
+    attributes, parameters
+        Evidence and timings; the parameters of the command, for the provenance.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be written.
+    """
     mesh = model.mesh
     uniform = bool((model.young == model.young[:, :1]).all())
     with create_h5(path, KIND, SCHEMA) as file:
         _put(file, "eigenvalues", eigenvalues, "rad^2/s^2", "eigenvalues of K u = lambda M u")
         _put(file, "frequencies", frequencies(eigenvalues), "Hz", "natural frequencies")
-        chunks = (modes.shape[0], min(_COLUMNS_PER_CHUNK, modes.shape[1]))
-        dataset = file.create_dataset("modes", data=modes, chunks=chunks, fletcher32=True)
-        dataset.attrs["units"] = "kg^-1/2"
-        dataset.attrs["long_name"] = "mass-normalised modes; row 3 n + i is node n along axis i"
+        _put_modes(file, modes, (mesh.n_dofs, len(eigenvalues)))
         _put(file, "residuals", residuals, "1", "|K x - lambda M x| / (lambda |M x|)")
         _put(file, "nodes", mesh.nodes, "m", "positions of the nodes")
         _put(file, "node_grid", mesh.node_grid, "1", "integer coordinates of the nodes")
@@ -92,6 +105,19 @@ def write_modes(
         for key, value in attributes.items():
             file.attrs[key] = json.dumps(value) if isinstance(value, dict) else value
         provenance.write(file, parameters)
+
+
+def _put_modes(file: h5py.File, blocks: Iterable[Array], shape: tuple[int, int]) -> None:
+    chunks = (min(_ROWS_PER_CHUNK, shape[0]), min(_COLUMNS_PER_CHUNK, shape[1]))
+    dataset = file.create_dataset("modes", shape, float, chunks=chunks, fletcher32=True)
+    dataset.attrs["units"] = "kg^-1/2"
+    dataset.attrs["long_name"] = "mass-normalised modes; row 3 n + i is node n along axis i"
+    first = 0
+    for block in blocks:
+        dataset[:, first : first + block.shape[1]] = block
+        first += block.shape[1]
+    if first != shape[1]:
+        raise ValueError(f"{first} modes for {shape[1]} eigenvalues")
 
 
 def read_modes(path: str | Path, with_modes: bool = True) -> ModesFile:

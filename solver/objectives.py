@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, replace
-from functools import partial
-from typing import Any
+from dataclasses import asdict, dataclass, replace
+from typing import Any, cast
 
 import numpy as np
 from mpi4py import MPI
@@ -27,7 +26,7 @@ from solver.coarsening import (
     fit_distinct,
 )
 from solver.comparison import AUDIBLE_LAST, frequency_errors
-from solver.decomposition import on_root
+from solver.decomposition import keep_on_root, on_root
 from solver.geometry import Blocks, blocks_from_mesh
 from solver.model import RIGID_MODES, ElasticModel
 from solver.modes_file import frequencies
@@ -65,17 +64,14 @@ def rate_objectives(
     (evidence, seconds, frequencies [Hz]) and `rows`, one a coarsening with the errors over modes
     7..60 (`audible`) and 7..`modes` (`all`), or as many as the coarse model has.
     """
-    found = on_root(comm, lambda: trained_or_reason(options.forest, options.poisson))
-    forest, reason = (None, found) if isinstance(found, str) else (found, "")
-    problem = on_root(comm, lambda: build_problem(replace(options, coarsen="none")))
-    blocks = blocks_from_mesh(problem.fine)
-    e = block_moduli(blocks, problem.young)
-    truth = _solve(problem.model, modes, comm)
+    solid = keep_on_root(comm, lambda: _read(options))
+    truth = _solve(None if solid is None else solid.problem.model, modes, comm)
     exact = frequencies(truth.values)
-    say(reason, visible=bool(reason) and comm.rank == 0)
-    names = [*objectives, *([FOREST] if forest else []), *BASELINES]
+    names = on_root(comm, lambda: _names(cast(_Solid, solid), objectives))
+    if solid is not None:
+        say(solid.reason, visible=bool(solid.reason))
     rows = [
-        _row(name, forest, problem, blocks, e, exact, comm)
+        _row(name, solid, exact, comm)
         for name in track(names, "coarsenings", visible=comm.rank == 0)
     ]
     return {
@@ -85,12 +81,7 @@ def rate_objectives(
         "seed": options.seed,
         "poisson": options.poisson,
         "modes": modes,
-        "n_dofs": problem.model.n_dofs,
-        "coarse_n_dofs": 3 * blocks.coarse.n_nodes,
-        "blocks": len(e),
-        "distinct_blocks": len(np.unique(e, axis=0)),
-        "forest": None if forest is None else forest.record(),
-        "without_forest": reason,
+        **on_root(comm, lambda: _sizes(cast(_Solid, solid))),
         "truth": {
             **truth.evidence,
             "seconds": solve_seconds(truth),
@@ -100,37 +91,89 @@ def rate_objectives(
     }
 
 
+@dataclass(frozen=True)
+class _Solid:
+    """The solid to coarsen, on rank 0 alone.
+
+    Attributes
+    ----------
+    e
+        (mc, 8) fine moduli of the blocks.
+    forest, reason
+        The forests, or None and why.
+    """
+
+    problem: Problem
+    blocks: Blocks
+    e: Array
+    forest: Trained | None
+    reason: str
+
+
+def _read(options: ProblemOptions) -> _Solid:
+    found = trained_or_reason(options.forest, options.poisson)
+    forest, reason = (None, found) if isinstance(found, str) else (found, "")
+    problem = build_problem(replace(options, coarsen="none"))
+    blocks = blocks_from_mesh(problem.fine)
+    return _Solid(problem, blocks, block_moduli(blocks, problem.young), forest, reason)
+
+
+def _names(solid: _Solid, objectives: Sequence[str]) -> list[str]:
+    return [*objectives, *([FOREST] if solid.forest else []), *BASELINES]
+
+
+def _sizes(solid: _Solid) -> dict[str, Any]:
+    return {
+        "n_dofs": solid.problem.model.n_dofs,
+        "coarse_n_dofs": 3 * solid.blocks.coarse.n_nodes,
+        "blocks": len(solid.e),
+        "distinct_blocks": len(np.unique(solid.e, axis=0)),
+        "forest": None if solid.forest is None else solid.forest.record(),
+        "without_forest": solid.reason,
+    }
+
+
 def solve_seconds(result: Modes) -> float:
     """Wall time [s] from the model to its modes, without the checks."""
     return sum(seconds for phase, seconds in result.seconds.items() if phase not in CHECKS)
 
 
-def _solve(model: ElasticModel, modes: int, comm: MPI.Comm, prove: bool = True) -> Modes:
+def _solve(model: ElasticModel | None, modes: int, comm: MPI.Comm, prove: bool = True) -> Modes:
     result = modal_analysis(model, SolverOptions(method="slepc", modes=modes, prove=prove), comm)
     result.system.destroy()
     return result
 
 
-def _row(
-    name: str,
-    forest: Trained | None,
-    problem: Problem,
-    blocks: Blocks,
-    e: Array,
-    exact: Array,
-    comm: MPI.Comm,
-) -> dict[str, Any]:
-    fine = problem.model
+@dataclass(frozen=True)
+class _Coarsened:
+    """A coarse model, the seconds its material took, and the share of fits that converged."""
+
+    model: ElasticModel
+    seconds: float
+    converged: float | None
+
+
+def _coarsen(name: str, solid: _Solid) -> _Coarsened:
+    fine = solid.problem.model
     # Compiling, or loading what was compiled, is not part of fitting.
-    on_root(comm, partial(_material, name, forest, e[:1], fine.poisson))
+    _material(name, solid.forest, solid.e[:1], fine.poisson)
     begin = time.perf_counter()
-    material, converged = on_root(comm, partial(_material, name, forest, e, fine.poisson))
+    material, converged = _material(name, solid.forest, solid.e, fine.poisson)
     fitted = time.perf_counter() - begin
     model = coarse_model(
-        blocks, material, poisson=fine.poisson, density=fine.density, lumped=fine.lumped
+        solid.blocks, material, poisson=fine.poisson, density=fine.density, lumped=fine.lumped
+    )
+    return _Coarsened(model, fitted, converged)
+
+
+def _row(name: str, solid: _Solid | None, exact: Array, comm: MPI.Comm) -> dict[str, Any]:
+    coarse = keep_on_root(comm, lambda: _coarsen(name, cast(_Solid, solid)))
+    model = None if coarse is None else coarse.model
+    modes, fitted, converged = comm.bcast(
+        coarse and (min(len(exact), coarse.model.n_dofs), coarse.seconds, coarse.converged)
     )
     try:
-        result = _solve(model, min(len(exact), model.n_dofs), comm, prove=False)
+        result = _solve(model, modes, comm, prove=False)
     except ConvergenceError as error:
         raise ConvergenceError(f"{name}: {error}") from None
     found = frequencies(result.values)

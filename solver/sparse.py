@@ -45,30 +45,30 @@ def assemble_elements(
     mass: Array,
     n_rows: int,
     n_columns: int | None = None,
-    row_of: NDArray[np.integer] | None = None,
+    first_row: int = 0,
 ) -> tuple[sp.csr_matrix, sp.csr_matrix]:
     """Stiffness and mass (both on displacement unknowns) from element matrices.
 
     Parameters
     ----------
     cells
-        (c, 8) column number of each corner.
+        (c, 8) number of each corner.
     stiffness, mass
         (c, 24, 24) and (c, 8, 8) element matrices.
     n_rows, n_columns
         Number of node rows and node columns (equal if not given).
-    row_of
-        Row number of each column number, -1 for rows to leave out; the identity if not given.
+    first_row
+        The number of the first row; numbers outside the `n_rows` from there on have no row.
     """
     columns = n_rows if n_columns is None else n_columns
-    row = cells if row_of is None else row_of[cells]
-    rows = np.repeat(row, 8, axis=1).ravel()
+    rows = np.repeat(cells - first_row, 8, axis=1).ravel()
     cols = np.tile(cells, (1, 8)).ravel()
-    kept = slice(None) if row_of is None else np.flatnonzero(rows >= 0)
-    rows, cols = rows[kept], cols[kept]
+    kept = np.flatnonzero((rows >= 0) & (rows < n_rows))
+    chosen = slice(None) if len(kept) == len(rows) else kept
+    rows, cols = rows[chosen], cols[chosen]
     shape = (n_rows, columns)
-    stiff = sum_blocks(rows, cols, node_blocks(stiffness).reshape(-1, 3, 3)[kept], shape)
-    nodal = sum_blocks(rows, cols, mass.reshape(-1, 1, 1)[kept], shape)
+    stiff = sum_blocks(rows, cols, node_blocks(stiffness).reshape(-1, 3, 3)[chosen], shape)
+    nodal = sum_blocks(rows, cols, mass.reshape(-1, 1, 1)[chosen], shape)
     return stiff, sp.kron(nodal, sp.identity(3), format="csr")
 
 

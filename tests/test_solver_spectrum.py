@@ -14,7 +14,7 @@ from dataset_gen.element import rigid_motions
 from solver.analysis import RIGID_MODES, SolverOptions, modal_analysis
 from solver.comparison import clusters, subspace_angles
 from solver.correction import correct
-from solver.decomposition import decompose
+from solver.distribution import distribute
 from solver.hcms.condense import restrict_stiffness
 from solver.hcms.synthesis import synthesize
 from solver.model import fine_model
@@ -37,10 +37,10 @@ def spectrum(model, **options) -> np.ndarray:
 def test_ritz_values_bound_the_spectrum_and_fall_with_more_modes(lumped):
     model = solids.random_box(8, 5, 3, lumped=lumped)
     exact = solids.dense_eigenvalues(model)
-    decomposition = decompose(model.mesh, 5, comm=COMM)
+    share = distribute(model, 5, comm=COMM)
     before = np.full(40, np.inf)
     for keep in (60, 110, 200):
-        values = synthesize(model, decomposition, keep, "free", COMM).values[:40]
+        values = synthesize(share, keep, "free", COMM).values[:40]
         slack = 1e-9 * exact[40]
         assert (values >= exact[:40] - slack).all()
         assert (values <= before + slack).all()
@@ -53,12 +53,12 @@ def test_ritz_values_bound_the_spectrum_and_fall_with_more_modes(lumped):
 def test_all_modes_kept_equal_the_full_solve(interface, subdomains, lumped):
     model = solids.random_box(6, 4, 3, lumped=lumped)
     exact = solids.dense_eigenvalues(model)
-    decomposition = decompose(model.mesh, subdomains, comm=COMM)
-    result = synthesize(model, decomposition, 10**6, interface, COMM)
+    share = distribute(model, subdomains, comm=COMM)
+    result = synthesize(share, 10**6, interface, COMM)
     # The eigenvalues of a backward stable solver are off by rounding of the largest one.
     assert np.abs(result.values - exact).max() <= 1e-12 * exact[-1]
     K, M = assembled(model)
-    order = degrees_of_freedom(decomposition.order)
+    order = degrees_of_freedom(share.nodes)
     vectors = np.empty_like(result.vectors)
     vectors[order] = result.vectors
     gram = vectors.T @ (M @ vectors)
@@ -104,9 +104,9 @@ def test_corrected_modes_are_as_accurate_as_the_solver_says(interface, degree):
 def test_error_estimate_follows_the_true_error():
     model = solids.random_box(12, 6, 5)
     exact = solids.dense_eigenvalues(model)
-    decomposition = decompose(model.mesh, 6, comm=COMM)
-    system = assemble(model, decomposition, COMM)
-    start = synthesize(model, decomposition, 110, "free", COMM).vectors
+    share = distribute(model, 6, comm=COMM)
+    system = assemble(share, COMM)
+    start = synthesize(share, 110, "free", COMM).vectors
     steps = {}
     result = correct(
         system,
@@ -141,7 +141,7 @@ def test_ground_truth_equals_lapack_and_is_proven_complete(method):
 def test_inertia_counts_eigenvalues():
     model = solids.random_box(6, 4, 3)
     exact = solids.dense_eigenvalues(model)
-    system = assemble(model, decompose(model.mesh, 2, comm=COMM), COMM)
+    system = assemble(distribute(model, 2, comm=COMM), COMM)
     for count in (6, 7, 30, 100):
         between = 0.5 * (exact[count - 1] + exact[count])
         assert count_below(system, between) == count
@@ -159,7 +159,7 @@ def test_missed_eigenvalue_is_caught(monkeypatch):
 
     monkeypatch.setattr(truth, "smallest_eigenpairs", lose_one)
     model = solids.random_box(6, 4, 3)
-    system = assemble(model, decompose(model.mesh, 2, comm=COMM), COMM)
+    system = assemble(distribute(model, 2, comm=COMM), COMM)
     with pytest.raises(ConvergenceError, match="were missed"):
         prove_complete(system, solve_truth(system, 40))
 

@@ -1,8 +1,17 @@
-"""Joining two groups of subdomains by a reduced eigenproblem (Eq. 13-15)."""
+"""Joining two groups of subdomains by a reduced eigenproblem (Eq. 13-15).
+
+With modes V1, V2 of the two groups and the interface matrices dK, dM that joining them adds,
+
+    K' = [D1 + V1^T dK11 V1, V1^T dK12 V2; ., D2 + V2^T dK22 V2],  M' = [I, V1^T dM12 V2; ., I],
+
+where only rows of V1 and V2 at nodes of straddling cells matter.  The diagonal blocks need one
+group alone, so each is formed where the group lies.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg as la
@@ -10,11 +19,17 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from dataset_gen.block import degrees_of_freedom
+from solver.distribution import Cells
 from solver.hcms.condense import restrict_stiffness
-from solver.model import ElasticModel
+from solver.hcms.counts import Tally, eigen_flops, product_flops, sparse_product_flops
+from solver.messages import AnyArray
 from solver.sparse import assemble_elements
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
+
+ZERO_FRACTION = 1e-10
+"""A reduced eigenvalue below this fraction of the largest is a rigid motion's."""
 
 
 @dataclass
@@ -23,92 +38,208 @@ class Group:
 
     Attributes
     ----------
+    start, stop
+        Half-open range of the group's rows (one a node).
     values
-        (k,) eigenvalues of the kept modes.
+        (k,) eigenvalues of the kept modes [rad^2/s^2].
     boundary
-        Sorted nodes that share a cell with a node outside the group.
-    rows
-        (3 * len(boundary), k) rows of the kept modes at these nodes.
+        (b,) ascending rows that share a cell with a node outside the group.
+    modes
+        (3 b, k) the kept modes there.
+    cells
+        The cells with corners both inside and outside the group.
     """
 
+    start: int
+    stop: int
     values: Array
-    boundary: NDArray[np.int64]
-    rows: Array
+    boundary: Rows
+    modes: Array
+    cells: Cells
+
+    def modes_at(self, rows: Rows) -> Array:
+        """The kept modes (3 len(rows), k) at some rows of the boundary."""
+        if len(rows) == len(self.boundary):
+            return self.modes
+        return self.modes[degrees_of_freedom(np.searchsorted(self.boundary, rows))]
+
+    def arrays(self) -> list[AnyArray]:
+        """All arrays, for a message; the inverse of `group_from_arrays`."""
+        return [self.values, self.boundary, self.modes, *self.cells.arrays()]
+
+
+def group_from_arrays(arrays: list[AnyArray], start: int, stop: int, like: Cells) -> Group:
+    """Group from the arrays of a message; `like` are other cells of the same solid."""
+    values, boundary, modes, *cells = arrays
+    return Group(start, stop, values, boundary, modes, like.from_arrays(cells))
+
+
+def boundary_of(cells: Cells, start: int, stop: int) -> tuple[Rows, Cells]:
+    """Rows of [start, stop) with a neighbour outside, and the cells in which they have it.
+
+    `cells` are at least those that straddle the boundary, each once.
+    """
+    inside = cells.inside(start, stop)
+    crossing = inside.any(axis=1) & ~inside.all(axis=1)
+    cells = cells.take(crossing)
+    return np.unique(cells.corners[inside[crossing]]), cells
 
 
 @dataclass
 class Interface:
-    """The matrices that a merge adds back, on the nodes of the cells that straddle both groups.
+    """The matrices that joining two groups adds, on the nodes of the cells that straddle both.
 
     The stiffness is K(left + right) - K(left) - K(right), each restricted to its own nodes, and the
     mass is the coupling that the two groups' masses leave out.
+
+    Attributes
+    ----------
+    left, right
+        Ascending rows of the left and of the right group in these cells.
+    stiffness, mass
+        On the unknowns of `left`, then those of `right`.
     """
 
-    nodes: NDArray[np.int64]
-    in_left: NDArray[np.bool_]
+    left: Rows
+    right: Rows
     stiffness: sp.csr_matrix
     mass: sp.csr_matrix
 
+    @property
+    def stiffness_left(self) -> sp.csr_matrix:
+        """Block dK11."""
+        return self.stiffness[: 3 * len(self.left), : 3 * len(self.left)]
 
-def interface(model: ElasticModel, group_of: NDArray[np.int8], treatment: str) -> Interface:
-    """Interface between left (1) and right (2) nodes; `group_of` (n,) is 0 for nodes in neither."""
-    corner_group = group_of[model.mesh.cells]
-    straddling = np.flatnonzero((corner_group == 1).any(axis=1) & (corner_group == 2).any(axis=1))
-    left, right = corner_group[straddling] == 1, corner_group[straddling] == 2
-    element = model.stiffness(straddling)
+    @property
+    def stiffness_right(self) -> sp.csr_matrix:
+        """Block dK22."""
+        return self.stiffness[3 * len(self.left) :, 3 * len(self.left) :]
+
+    @property
+    def stiffness_across(self) -> sp.csr_matrix:
+        """Block dK21, rows of the right group."""
+        return self.stiffness[3 * len(self.left) :, : 3 * len(self.left)]
+
+    @property
+    def mass_across(self) -> sp.csr_matrix:
+        """Block dM21, rows of the right group."""
+        return self.mass[3 * len(self.left) :, : 3 * len(self.left)]
+
+
+def interface(cells: Cells, start: int, middle: int, stop: int, treatment: str) -> Interface:
+    """Interface between the groups of rows [start, middle) and [middle, stop).
+
+    Either group's boundary cells will do for `cells`: those that touch both are in both sets.
+    """
+    left, right = cells.inside(start, middle), cells.inside(middle, stop)
+    straddling = np.flatnonzero(left.any(axis=1) & right.any(axis=1))
+    # No two cells have the same first corner: the sums do not depend on where they are made.
+    straddling = straddling[np.argsort(cells.corners[straddling, 0])]
+    left, right, cells = left[straddling], right[straddling], cells.take(straddling)
+    element = cells.elements.stiffness()
     stiffness = (
         restrict_stiffness(element, left | right, treatment)
         - restrict_stiffness(element, left, treatment)
         - restrict_stiffness(element, right, treatment)
     )
     across = left[:, :, None] & right[:, None, :]
-    mass = model.nodal_mass(straddling) * (across | across.transpose(0, 2, 1))
-    cells = model.mesh.cells[straddling]
-    nodes = np.unique(cells[left | right]).astype(np.int64)
-    position = np.zeros(model.mesh.n_nodes, dtype=np.int64)
-    position[nodes] = np.arange(len(nodes))
-    K, M = assemble_elements(position[cells], stiffness, mass, len(nodes))
-    return Interface(nodes, group_of[nodes] == 1, K, M)
+    mass = cells.elements.nodal_mass() * (across | across.transpose(0, 2, 1))
+    rows = np.unique(cells.corners[left | right])
+    # Matrices of outside corners are zero, so any row may stand for them.
+    position = np.searchsorted(rows, np.where(left | right, cells.corners, rows[:1]))
+    K, M = assemble_elements(position, stiffness, mass, len(rows))
+    K.eliminate_zeros()
+    M.eliminate_zeros()
+    count = int(np.searchsorted(rows, middle))
+    return Interface(rows[:count], rows[count:], K, M)
 
 
-def merge(left: Group, right: Group, between: Interface, keep: int) -> tuple[Array, Array]:
-    """Lowest eigenpairs of the joined groups in the space of their kept modes.
+def project(modes: Array, matrix: sp.csr_matrix, others: Array, tally: Tally) -> Array:
+    """modes^T matrix others, for a sparse matrix; counted in `tally`."""
+    if matrix.nnz == 0:
+        return np.zeros((modes.shape[1], others.shape[1]))
+    tally.flops += sparse_product_flops(matrix.nnz, others.shape[1])
+    tally.flops += product_flops(modes.shape[1], len(modes), others.shape[1])
+    return np.asarray(modes.T @ (matrix @ others))
+
+
+def left_projection(left: Group, between: Interface, tally: Tally) -> Array:
+    """V1^T dK11 V1 (k1, k1)."""
+    modes = left.modes_at(between.left)
+    return project(modes, between.stiffness_left, modes, tally)
+
+
+def right_projection(right: Group, between: Interface, tally: Tally) -> Array:
+    """V2^T dK22 V2 (k2, k2)."""
+    modes = right.modes_at(between.right)
+    return project(modes, between.stiffness_right, modes, tally)
+
+
+class Reduced(NamedTuple):
+    """Lower triangles of the reduced pencil K', M' (k1 + k2, k1 + k2); M' is None if it is I."""
+
+    stiffness: Array
+    mass: Array | None
+
+
+def reduced_pencil(
+    left: Group,
+    right: Group,
+    between: Interface,
+    projections: tuple[Array, Array],
+    tally: Tally,
+) -> Reduced:
+    """Pencil of the joined groups in the space of their kept modes.
+
+    `projections` are those of the left and of the right group.
+    """
+    split = len(left.values)
+    size = split + len(right.values)
+    modes_left, modes_right = left.modes_at(between.left), right.modes_at(between.right)
+    K = np.zeros((size, size), order="F")
+    K[:split, :split], K[split:, split:] = projections
+    K[split:, :split] = project(modes_right, between.stiffness_across, modes_left, tally)
+    K[np.diag_indices(size)] += np.concatenate([left.values, right.values])
+    if between.mass.nnz == 0:
+        return Reduced(K, None)
+    M = np.zeros((size, size), order="F")
+    M[split:, :split] = project(modes_right, between.mass_across, modes_left, tally)
+    M[np.diag_indices(size)] = 1.0
+    return Reduced(K, M)
+
+
+def lowest_pairs(reduced: Reduced, keep: int, tally: Tally) -> tuple[Array, Array]:
+    """Lowest eigenpairs of the reduced pencil: `keep`, or more if more values are zero.
 
     Returns
     -------
-    values (k,) and coefficients Q (len(left.values) + len(right.values), k).
+    values (k,) and coefficients Q (k1 + k2, k).
     """
-    n_left = len(left.values)
-    size = n_left + len(right.values)
-    rows = np.zeros((3 * len(between.nodes), size))
-    in_left = np.repeat(between.in_left, 3)
-    rows[in_left, :n_left] = _rows_at(left, between.nodes[between.in_left])
-    rows[~in_left, n_left:] = _rows_at(right, between.nodes[~between.in_left])
-    K = rows.T @ (between.stiffness @ rows)
-    K[np.diag_indices(size)] += np.concatenate([left.values, right.values])
-    keep = min(keep, size)
-    if between.mass.count_nonzero():
-        M = rows.T @ (between.mass @ rows)
-        M[np.diag_indices(size)] += 1.0
-        values, vectors = la.eigh(_symmetric(K), _symmetric(M), driver="gvd", check_finite=False)
-    else:
-        values, vectors = la.eigh(_symmetric(K), driver="evd", check_finite=False)
-    return values[:keep], vectors[:, :keep]
+    K, M = reduced
+    tally.flops += eigen_flops(len(K), M is not None)
+    values, Q = la.eigh(
+        K,
+        M,
+        driver="evd" if M is None else "gvd",
+        overwrite_a=True,
+        overwrite_b=True,
+        check_finite=False,
+    )
+    zeros = int(np.searchsorted(values, ZERO_FRACTION * values[-1]))
+    keep = min(max(keep, zeros), len(values))
+    return values[:keep], Q[:, :keep]
 
 
-def joined_rows(left: Group, right: Group, Q: Array, boundary: NDArray[np.int64]) -> Array:
-    """Rows of the joined modes at the nodes `boundary`, which each group holds a part of."""
-    n_left = len(left.values)
-    joined = np.empty((3 * len(boundary), Q.shape[1]))
-    is_left = np.isin(boundary, left.boundary)
-    joined[np.repeat(is_left, 3)] = _rows_at(left, boundary[is_left]) @ Q[:n_left]
-    joined[np.repeat(~is_left, 3)] = _rows_at(right, boundary[~is_left]) @ Q[n_left:]
-    return joined
-
-
-def _rows_at(group: Group, nodes: NDArray[np.int64]) -> Array:
-    return group.rows[degrees_of_freedom(np.searchsorted(group.boundary, nodes))]
-
-
-def _symmetric(matrix: Array) -> Array:
-    return np.asarray(0.5 * (matrix + matrix.T))
+def join(left: Group, right: Group, values: Array, Q: Array, tally: Tally) -> Group:
+    """The joined group, given the eigenpairs of its reduced pencil."""
+    split = len(left.values)
+    # Cells that touch both groups and a third are in both sets.
+    third = right.cells.take(~right.cells.inside(left.start, left.stop).any(axis=1))
+    boundary, cells = boundary_of(left.cells.join(third), left.start, right.stop)
+    count = int(np.searchsorted(boundary, left.stop))
+    modes = np.empty((3 * len(boundary), Q.shape[1]))
+    np.matmul(left.modes_at(boundary[:count]), Q[:split], out=modes[: 3 * count])
+    np.matmul(right.modes_at(boundary[count:]), Q[split:], out=modes[3 * count :])
+    tally.flops += product_flops(3 * count, split, Q.shape[1])
+    tally.flops += product_flops(len(modes) - 3 * count, len(Q) - split, Q.shape[1])
+    return Group(left.start, right.stop, values, boundary, modes, cells)

@@ -1,9 +1,10 @@
 """Hierarchical component mode synthesis over MPI ranks (section 7.2).
 
-Upward, every merge happens on one rank, the owner of its left group; the right group sends its
-eigenvalues and the rows of its modes at nodes that later merges touch, and nothing else.  Downward,
-the coefficients of the final modes travel back along the tree, so that the full basis is formed
-once, from the small local bases, and stays distributed by rows.
+Upward, every merge happens on the rank that leads its left group.  The right group's leader forms
+its part of the reduced pencil and sends it with the group's eigenvalues, its boundary cells and the
+rows of its modes there; nothing else is ever needed of it.  Downward, the coefficients of the final
+modes travel back along the tree, so that the full basis is formed once, from the small local bases,
+and stays distributed by rows.
 """
 
 from __future__ import annotations
@@ -15,11 +16,24 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from dataset_gen.block import degrees_of_freedom
-from solver.decomposition import Decomposition
+from solver.distribution import Cells, Share
+from solver.hcms.counts import Counts, Tally, lanczos_flops, product_flops
 from solver.hcms.local import local_modes
-from solver.hcms.merge import Group, interface, joined_rows, merge
+from solver.hcms.merge import (
+    Group,
+    Interface,
+    boundary_of,
+    group_from_arrays,
+    interface,
+    join,
+    left_projection,
+    lowest_pairs,
+    reduced_pencil,
+    right_projection,
+)
 from solver.hcms.tree import Merge
-from solver.model import ElasticModel
+from solver.messages import Sent, receive_arrays, send_arrays
+from solver.model import RIGID_MODES
 
 Array = NDArray[np.float64]
 
@@ -35,37 +49,35 @@ class Synthesis:
     values
         (k,) Ritz values [rad^2/s^2], ascending, on every rank.
     vectors
-        (local unknowns, k) this rank's rows in the decomposition's order, Fortran-contiguous.
+        (local unknowns, k) this rank's rows, Fortran-contiguous.
+    counts
+        What this rank did for them.
     """
 
     values: Array
     vectors: Array
+    counts: Counts
 
 
 def modes_to_keep(share: float, keep: int) -> int:
     """Modes that a group with `share` of the unknowns keeps when the whole keeps `keep`.
 
     Modes below a common frequency scale with the volume; those that carry the interface with its
-    surface.  The square root lies between and grows by 1.4 at each merge.
+    surface.  The square root lies between and grows by 1.4 at each merge.  The rigid motions are
+    always among them.
     """
-    return int(np.ceil(keep * np.sqrt(share)))
+    return max(RIGID_MODES, int(np.ceil(keep * np.sqrt(share))))
 
 
 def synthesize(
-    model: ElasticModel,
-    decomposition: Decomposition,
-    keep: int = 512,
-    treatment: str = "free",
-    comm: MPI.Comm = MPI.COMM_WORLD,
+    share: Share, keep: int = 512, treatment: str = "free", comm: MPI.Comm = MPI.COMM_WORLD
 ) -> Synthesis:
     """Approximate the `keep` lowest modes by merging subdomains pairwise up the tree.
 
     Parameters
     ----------
-    model
-        The solid.
-    decomposition
-        Subdomains, merge tree and owners, the same on all ranks.
+    share
+        This rank's share of the solid.
     keep
         Modes kept at the root; groups below keep `modes_to_keep`.
     treatment
@@ -76,96 +88,164 @@ def synthesize(
     With `free` interfaces the stiffness at the root is the whole K, so this is a Rayleigh-Ritz
     method there and the values bound the exact eigenvalues from above.
     """
-    tree, owner = decomposition.tree, decomposition.owner
-    ranges = tree.ranges()
-    leader = list(owner)
-    for step in tree.merges:
-        leader.append(leader[step.left])
-    sizes = decomposition.group_sizes()
-    total = sizes[-1]
-    rank = comm.rank
-    neighbours = _OutsideNeighbours(model, decomposition)
-
-    bases: dict[int, Array] = {}
-    groups: dict[int, Group] = {}
-    for part in np.flatnonzero(owner == rank):
-        nodes = decomposition.nodes_of(part)
-        wanted = modes_to_keep(3 * len(nodes) / total, keep)
-        values, bases[part] = local_modes(model, nodes, wanted, treatment)
-        boundary = neighbours.boundary(part, part + 1)
-        rows = degrees_of_freedom(np.searchsorted(nodes, boundary))
-        groups[part] = Group(values, boundary, bases[part][rows])
-
-    coefficients: dict[int, Array] = {}
-    left_sizes: dict[int, int] = {}
-    for step in tree.merges:
-        here, there = leader[step.left], leader[step.right]
-        if rank == there and here != there:
-            comm.send(groups.pop(step.right), dest=here, tag=_UP)
-        if rank != here:
-            continue
-        left = groups.pop(step.left)
-        right = groups.pop(step.right) if here == there else comm.recv(source=there, tag=_UP)
-        between = interface(
-            model, decomposition.sides(ranges[step.left], ranges[step.right]), treatment
-        )
-        wanted = modes_to_keep(sizes[step.group] / total, keep)
-        values, Q = merge(left, right, between, wanted)
-        boundary = neighbours.boundary(*ranges[step.group])
-        groups[step.group] = Group(values, boundary, joined_rows(left, right, Q, boundary))
-        coefficients[step.group] = Q
-        left_sizes[step.group] = len(left.values)
-
-    root = 2 * tree.parts - 2
-    values = comm.bcast(groups[root].values if rank == leader[root] else None, root=leader[root])
-    weights = _push_down(tree.merges, leader, coefficients, left_sizes, comm)
-    if tree.parts == 1:
-        weights = {0: np.eye(len(values))}
-    blocks = [bases[part] @ weights[part] for part in np.flatnonzero(owner == rank)]
-    vectors = np.asfortranarray(np.concatenate(blocks))
-    return Synthesis(values, vectors)
+    climb = _Climb(share, keep, treatment, comm)
+    with climb.counts.local.running():
+        climb.solve_subdomains()
+    climb.merge_groups()
+    with climb.counts.down.running():
+        values = climb.root_values()
+        weights = climb.push_down()
+    with climb.counts.basis.running():
+        vectors = climb.form_basis(weights)
+    return Synthesis(values, vectors, climb.counts)
 
 
-def _push_down(
-    merges: tuple[Merge, ...],
-    leader: list[int],
-    coefficients: dict[int, Array],
-    left_sizes: dict[int, int],
-    comm: MPI.Comm,
-) -> dict[int, Array]:
-    """Coefficients of the final modes in every local basis of this rank."""
-    rank = comm.rank
-    weights: dict[int, Array] = {}
-    for step in reversed(merges):
-        here, there = leader[step.left], leader[step.right]
-        if rank == here:
-            Q = coefficients.pop(step.group)
-            split = left_sizes[step.group]
-            above = weights.pop(step.group, None)
-            for child, part in ((step.left, Q[:split]), (step.right, Q[split:])):
-                block = part if above is None else part @ above
-                if leader[child] == rank:
-                    weights[child] = block
-                else:
-                    comm.send(np.ascontiguousarray(block), dest=there, tag=_DOWN)
-        elif rank == there:
-            weights[step.right] = comm.recv(source=here, tag=_DOWN)
-    return weights
+class _Climb:
+    """One rank's way up the merge tree and down again.
 
+    Attributes
+    ----------
+    groups
+        Groups that this rank leads and that have not been merged yet.
+    bases
+        (3 nodes, k) local modes of this rank's subdomains.
+    coefficients
+        Q of the merges that this rank made, split between left and right.
+    """
 
-class _OutsideNeighbours:
-    """Finds the nodes of a contiguous range of subdomains that share a cell with the outside."""
+    def __init__(self, share: Share, keep: int, treatment: str, comm: MPI.Comm) -> None:
+        self.share = share
+        self.keep = keep
+        self.treatment = treatment
+        self.comm = comm
+        self.tree = share.decomposition.tree
+        self.leader = share.decomposition.leaders()
+        self.ranges = share.decomposition.row_ranges()
+        self.levels = self.tree.levels()
+        self.counts = Counts(self.levels[-1])
+        self.groups: dict[int, Group] = {}
+        self.bases: dict[int, Array] = {}
+        self.coefficients: dict[int, tuple[Array, Array]] = {}
 
-    def __init__(self, model: ElasticModel, decomposition: Decomposition) -> None:
-        self._cells = model.mesh.cells
-        corner = decomposition.node_part[self._cells]
-        self._lowest = corner.min(axis=1)
-        self._highest = corner.max(axis=1)
-        self._corner = corner
+    def solve_subdomains(self) -> None:
+        """Lowest modes of every subdomain of this rank."""
+        parts = self.share.decomposition.subdomains_of(self.comm.rank)
+        cells_of = self.share.cells_by_subdomain(parts)
+        for part in parts:
+            start, stop = self.ranges[part]
+            cells = self.share.cells.take(cells_of[part])
+            values, basis = local_modes(cells, start, stop, self._wanted(part), self.treatment)
+            self.counts.local.flops += lanczos_flops(3 * (stop - start), len(values))
+            boundary, crossing = boundary_of(cells, start, stop)
+            modes = np.ascontiguousarray(basis[degrees_of_freedom(boundary - start)])
+            self.bases[part] = basis
+            self.groups[part] = Group(start, stop, values, boundary, modes, crossing)
 
-    def boundary(self, start: int, stop: int) -> NDArray[np.int64]:
-        """Sorted nodes in subdomains [start, stop) with a neighbour outside."""
-        crossing = (self._lowest < start) | (self._highest >= stop)
-        corner = self._corner[crossing]
-        inside = (corner >= start) & (corner < stop)
-        return np.unique(self._cells[crossing][inside]).astype(np.int64)
+    def merge_groups(self) -> None:
+        """Merge the groups that this rank leads, and send those that another rank merges."""
+        sent = []
+        for step in self.tree.merges:
+            tally = self.counts.merges[self.levels[step.group] - 1]
+            here, there = self.leader[step.left], self.leader[step.right]
+            with tally.running():
+                if self.comm.rank == here:
+                    self._merge(step, tally)
+                elif self.comm.rank == there:
+                    sent.append(self._send_up(step, tally))
+        with self.counts.down.idle():
+            for messages in sent:
+                messages.wait()
+
+    def _merge(self, step: Merge, tally: Tally) -> None:
+        left = self.groups.pop(step.left)
+        between = self._interface(step, left.cells)
+        projected = left_projection(left, between, tally)
+        if step.right in self.groups:
+            right = self.groups.pop(step.right)
+            projected_right = right_projection(right, between, tally)
+        else:
+            with tally.idle():
+                arrays = receive_arrays(self.comm, self.leader[step.right], _UP)
+            projected_right = arrays.pop()
+            right = group_from_arrays(arrays, *self.ranges[step.right], left.cells)
+        reduced = reduced_pencil(left, right, between, (projected, projected_right), tally)
+        values, Q = lowest_pairs(reduced, self._wanted(step.group), tally)
+        self.groups[step.group] = join(left, right, values, Q, tally)
+        split = len(left.values)
+        self.coefficients[step.group] = Q[:split], Q[split:]
+
+    def _send_up(self, step: Merge, tally: Tally) -> Sent:
+        right = self.groups.pop(step.right)
+        projected = right_projection(right, self._interface(step, right.cells), tally)
+        arrays = [*right.arrays(), projected]
+        return tally.sent(send_arrays(self.comm, arrays, self.leader[step.left], _UP))
+
+    def _interface(self, step: Merge, cells: Cells) -> Interface:
+        start, middle = self.ranges[step.left]
+        _, stop = self.ranges[step.right]
+        return interface(cells, start, middle, stop, self.treatment)
+
+    def _wanted(self, group: int) -> int:
+        start, stop = self.ranges[group]
+        return modes_to_keep((stop - start) / self.ranges[-1][1], self.keep)
+
+    def root_values(self) -> Array:
+        """Eigenvalues of the whole, on every rank."""
+        comm, root, leader = self.comm, len(self.ranges) - 1, self.leader[-1]
+        count = np.zeros(1, dtype=np.int64)
+        values = np.empty(0)
+        if comm.rank == leader:
+            values = self.groups.pop(root).values
+            count[0] = len(values)
+        with self.counts.down.idle():
+            comm.Bcast(count, root=leader)
+            if comm.rank != leader:
+                values = np.empty(count[0])
+            comm.Bcast(values, root=leader)
+        if comm.rank == leader:
+            self.counts.down.broadcast(count, comm.size)
+            self.counts.down.broadcast(values, comm.size)
+        return values
+
+    def push_down(self) -> dict[int, Array]:
+        """Coefficients of the final modes in every local basis of this rank; none if undivided."""
+        tally = self.counts.down
+        weights: dict[int, Array] = {}
+        sent = []
+        for step in reversed(self.tree.merges):
+            here, there = self.leader[step.left], self.leader[step.right]
+            if self.comm.rank == here:
+                above = weights.pop(step.group, None)
+                sides = self.coefficients.pop(step.group)
+                # The right side first: another rank may be waiting for it.
+                for child, side in zip((step.right, step.left), reversed(sides)):
+                    block = side if above is None else side @ above
+                    if above is not None:
+                        tally.flops += product_flops(len(side), len(above), above.shape[1])
+                    if self.leader[child] == here:
+                        weights[child] = block
+                    else:
+                        sent.append(tally.sent(send_arrays(self.comm, [block], there, _DOWN)))
+            elif self.comm.rank == there:
+                with tally.idle():
+                    (weights[step.right],) = receive_arrays(self.comm, here, _DOWN)
+        with tally.idle():
+            for messages in sent:
+                messages.wait()
+        return weights
+
+    def form_basis(self, weights: dict[int, Array]) -> Array:
+        """This rank's rows of the final modes; frees the local bases."""
+        start, stop = self.share.start, self.share.stop
+        if not weights:
+            return np.asfortranarray(self.bases.pop(0))
+        count = next(iter(weights.values())).shape[1]
+        vectors = np.empty((3 * (stop - start), count), order="F")
+        for part, weight in weights.items():
+            basis = self.bases.pop(part)
+            first, last = self.ranges[part]
+            rows = slice(3 * (first - start), 3 * (last - start))
+            # Formed transposed, so that it is written column by column.
+            vectors[rows] = (weight.T @ basis.T).T
+            self.counts.basis.flops += product_flops(len(basis), len(weight), count)
+        return vectors

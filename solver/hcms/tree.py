@@ -5,9 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
+
+LIGHTEST = 0.4
+"""Least share of the nodes of two partners that the lighter should have."""
+_HALVINGS = 50
 
 
 @dataclass(frozen=True)
@@ -30,6 +35,13 @@ class MergeTree:
     parts: int
     merges: tuple[Merge, ...]
 
+    def levels(self) -> list[int]:
+        """Level of every group: 0 for subdomains, one more than the higher child for a merge."""
+        levels = [0] * self.parts
+        for merge in self.merges:
+            levels.append(1 + max(levels[merge.left], levels[merge.right]))
+        return levels
+
     def ranges(self) -> list[tuple[int, int]]:
         """Half-open range of subdomains of every group."""
         ranges = [(part, part + 1) for part in range(self.parts)]
@@ -38,96 +50,138 @@ class MergeTree:
         return ranges
 
 
-def build_tree(cell_nodes_part: NDArray[np.int32]) -> tuple[MergeTree, NDArray[np.int32]]:
-    """Merge tree that joins groups with large shared interfaces first, level by level.
+def build_tree(
+    corner_part: NDArray[np.int32], sizes: NDArray[np.integer]
+) -> tuple[MergeTree, NDArray[np.int32]]:
+    """Merge tree whose partners are of comparable size and share large interfaces low in the tree.
+
+    The subdomains are bisected recursively where they share few cells: what is cut first is merged
+    last.
 
     Parameters
     ----------
-    cell_nodes_part
+    corner_part
         (m, 8) subdomain of every corner of every cell.
+    sizes
+        (parts,) nodes of every subdomain.
 
     Returns
     -------
     The tree, and the new number (parts,) of each subdomain: leaves of the tree from left to right.
+
+    Notes
+    -----
+    The lighter of two partners has at least `LIGHTEST` of their nodes where subdomains are small
+    enough, and is as heavy as the spectral order allows otherwise; so the number of levels grows
+    with the logarithm of the number of subdomains unless their sizes differ widely.
     """
-    parts = int(cell_nodes_part.max()) + 1
-    shared = _shared_cells(cell_nodes_part, parts)
-    groups: dict[int, list[int]] = {part: [part] for part in range(parts)}
-    merges: list[tuple[int, int, int]] = []
-    following = parts
-    while len(groups) > 1:
-        names = sorted(groups)
-        membership = np.zeros((len(names), parts))
-        for row, name in enumerate(names):
-            membership[row, groups[name]] = 1.0
-        weight = membership @ shared @ membership.T
-        merged: dict[int, list[int]] = {}
-        for a, b in _heaviest_matching(weight):
-            left, right = names[a], names[b]
-            merges.append((following, left, right))
-            merged[following] = groups.pop(left) + groups.pop(right)
-            following += 1
-        groups.update(merged)
-    order = next(iter(groups.values()))
+    parts = len(sizes)
+    shared = shared_cells(corner_part, parts)
+    leaves: list[int] = []
+    joins: list[_Branch] = []
+
+    def grow(members: NDArray[np.int64]) -> _Branch:
+        if len(members) == 1:
+            leaves.append(int(members[0]))
+            return _Branch(group=len(leaves) - 1)
+        within = shared[members][:, members].toarray()
+        left = _bisect(within, sizes[members].astype(float))
+        branch = _Branch((grow(members[left]), grow(members[~left])))
+        joins.append(branch)
+        return branch
+
+    grow(np.arange(parts))
+    joins.sort(key=lambda branch: branch.height)
+    merges = []
+    for group, branch in enumerate(joins, start=parts):
+        branch.group = group
+        left, right = branch.children
+        merges.append(Merge(group, left.group, right.group))
     renumbered = np.empty(parts, dtype=np.int32)
-    renumbered[order] = np.arange(parts, dtype=np.int32)
-
-    def rename(group: int) -> int:
-        return int(renumbered[group]) if group < parts else group
-
-    tree = MergeTree(
-        parts, tuple(Merge(group, rename(left), rename(right)) for group, left, right in merges)
-    )
-    return tree, renumbered
+    renumbered[leaves] = np.arange(parts, dtype=np.int32)
+    return MergeTree(parts, tuple(merges)), renumbered
 
 
-def _shared_cells(cell_nodes_part: NDArray[np.int32], parts: int) -> NDArray[np.float64]:
-    """Number of cells (parts, parts) that straddle each pair of subdomains."""
-    touches = np.zeros((len(cell_nodes_part), parts), dtype=np.float32)
-    touches[np.arange(len(touches))[:, None], cell_nodes_part] = 1.0
-    straddling = touches[touches.sum(axis=1) > 1]
-    shared = (straddling.T @ straddling).astype(float)
-    np.fill_diagonal(shared, 0.0)
+class _Branch:
+    """A group while the tree grows: a subdomain, or the join of two others."""
+
+    def __init__(self, children: tuple[_Branch, ...] = (), group: int = -1) -> None:
+        self.children = children
+        self.group = group
+        self.height: int = 1 + max((child.height for child in children), default=-1)
+
+
+def shared_cells(corner_part: NDArray[np.int32], parts: int) -> sp.csr_matrix:
+    """Number of cells (parts, parts) that straddle each pair of subdomains; zero diagonal."""
+    mixed = corner_part[(corner_part != corner_part[:, :1]).any(axis=1)].astype(np.int64)
+    cell = np.arange(len(mixed))[:, None]
+    cell, part = np.divmod(np.unique(cell * parts + mixed), parts)
+    touches = sp.csr_matrix((np.ones(len(cell)), (cell, part)), shape=(len(mixed), parts))
+    shared = (touches.T @ touches).tocsr()
+    shared.setdiag(0.0)
     return shared
 
 
-def _heaviest_matching(weight: NDArray[np.float64]) -> list[tuple[int, int]]:
-    """Greedy matching by weight; at least one pair even if nothing is shared."""
-    size = len(weight)
-    first, second = np.triu_indices(size, 1)
-    pairs = sorted(zip(-weight[first, second], first, second, strict=True))
-    free = np.ones(size, dtype=bool)
-    matched: list[tuple[int, int]] = []
-    for negative_weight, a, b in pairs:
-        if free[a] and free[b] and (negative_weight < 0.0 or not matched):
-            free[a] = free[b] = False
-            matched.append((int(a), int(b)))
-    return matched
+def _bisect(weight: NDArray[np.float64], sizes: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """One side (k,), the first member's, of a light and even cut through a graph of k members.
+
+    Members are taken in the order of the graph's Fiedler vector, and cut where the edges of summed
+    `weight` (k, k) are least among the cuts that leave `LIGHTEST` of the `sizes` on either side.
+    """
+    degree = weight.sum(axis=1)
+    _, vectors = np.linalg.eigh(np.diag(degree) - weight)
+    order = np.argsort(vectors[:, 1], kind="stable")
+    ordered = weight[order][:, order]
+    # Taking one more member to the left cuts its edges to the right and heals those to the left.
+    cut = np.cumsum(degree[order] - 2.0 * np.tril(ordered, -1).sum(axis=1))[:-1]
+    share = np.cumsum(sizes[order])[:-1] / sizes.sum()
+    evenness = np.minimum(share, 1.0 - share)
+    even = evenness >= min(LIGHTEST, evenness.max())
+    position = int(np.argmin(np.where(even, cut, np.inf)))
+    side = np.zeros(len(sizes), dtype=bool)
+    side[order[: position + 1]] = True
+    return side if side[0] else ~side
 
 
-def assign_ranks(sizes: NDArray[np.int64], ranks: int) -> NDArray[np.int32]:
-    """Owner rank of each subdomain: contiguous ranges of about equal total size, none empty.
+def assign_ranks(costs: NDArray[np.float64], ranks: int) -> NDArray[np.int32]:
+    """Owner rank of each subdomain: contiguous ranges, none empty, the costliest least so.
 
     Raises
     ------
     UserError
         If there are more ranks than subdomains.
+
+    Examples
+    --------
+    >>> assign_ranks(np.array([1.0, 1.0, 1.0, 3.0, 2.0]), 3)
+    array([0, 0, 0, 1, 2], dtype=int32)
     """
-    parts = len(sizes)
+    parts = len(costs)
     if ranks > parts:
         raise UserError(
             f"{ranks} ranks for {parts} subdomains: every rank needs one; start at most {parts} "
             f"ranks or pass --subdomains {ranks} or more"
         )
-    ends = np.cumsum(sizes)
-    owner = np.empty(parts, dtype=np.int32)
-    start = 0
+    ends = np.concatenate([[0.0], np.cumsum(costs)])
+    low, high = max(float(costs.max()), ends[-1] / ranks), float(ends[-1])
+    best = _filled(ends, ranks, high)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        stops = _filled(ends, ranks, middle)
+        if stops[-1] == parts:
+            best, high = stops, middle
+        else:
+            low = middle
+    counts = np.diff([0, *best[:-1], parts])
+    return np.repeat(np.arange(ranks, dtype=np.int32), counts)
+
+
+def _filled(ends: NDArray[np.float64], ranks: int, limit: float) -> list[int]:
+    """End of each rank's range when every rank takes as much as `limit`, leaving one each."""
+    stops: list[int] = []
+    stop = 0
     for rank in range(ranks):
-        target = ends[-1] * (rank + 1) / ranks
-        stop = int(np.searchsorted(ends, target - 0.5 * sizes.mean())) + 1
-        stop = min(max(stop, start + 1), parts - (ranks - 1 - rank))
-        if rank == ranks - 1:
-            stop = parts
-        owner[start:stop] = rank
-        start = stop
-    return owner
+        fitting = int(np.searchsorted(ends, ends[stop] + limit, side="right")) - 1
+        stop = min(max(fitting, stop + 1), len(ends) - ranks + rank)
+        stops.append(stop)
+    return stops

@@ -1,0 +1,177 @@
+"""Each rank's share of the solid, dealt out once by rank 0, which alone reads and cuts the mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from solver.decomposition import Decomposition, decompose, on_root
+from solver.messages import AnyArray, receive_arrays, send_arrays
+from solver.model import Chosen, ElasticModel, Elements
+
+Array = NDArray[np.float64]
+
+_SHARE = 10
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Some cells of the mesh with their material.
+
+    Attributes
+    ----------
+    corners
+        (c, 8) rows of the corners, see `Decomposition`.
+    elements
+        Size and material of the cells.
+    """
+
+    corners: NDArray[np.int64]
+    elements: Elements
+
+    def __len__(self) -> int:
+        return len(self.corners)
+
+    def take(self, chosen: Chosen) -> Cells:
+        """The chosen cells."""
+        elements = self.elements.with_material(
+            self.elements.young[chosen], self.elements.fill[chosen]
+        )
+        return Cells(self.corners[chosen], elements)
+
+    def join(self, others: Cells) -> Cells:
+        """These cells, then the others."""
+        young = np.concatenate([self.elements.young, others.elements.young])
+        fill = np.concatenate([self.elements.fill, others.elements.fill])
+        corners = np.concatenate([self.corners, others.corners])
+        return Cells(corners, self.elements.with_material(young, fill))
+
+    def inside(self, start: int, stop: int) -> NDArray[np.bool_]:
+        """Whether each corner (c, 8) is one of the rows [start, stop)."""
+        return (self.corners >= start) & (self.corners < stop)
+
+    def arrays(self) -> list[AnyArray]:
+        """What differs from cell to cell, for a message; the inverse of `from_arrays`."""
+        return [self.corners, self.elements.young, self.elements.fill]
+
+    def from_arrays(self, arrays: list[AnyArray]) -> Cells:
+        """Cells of the same solid from the arrays of a message."""
+        corners, young, fill = arrays
+        return Cells(corners, self.elements.with_material(young, fill))
+
+
+@dataclass(frozen=True)
+class Share:
+    """What one rank knows of the solid.
+
+    Attributes
+    ----------
+    decomposition
+        Subdomains and owners, the same on every rank.
+    start, stop
+        Half-open range of this rank's rows.
+    cells
+        The cells that touch them, by ascending number.
+    nodes
+        (stop - start,) numbers of this rank's nodes in the mesh.
+    positions
+        (stop - start, 3) their positions [m].
+    """
+
+    decomposition: Decomposition
+    start: int
+    stop: int
+    cells: Cells
+    nodes: NDArray[np.int64]
+    positions: Array
+
+    @property
+    def n_dofs(self) -> int:
+        """Number of unknowns of the whole solid."""
+        return 3 * self.decomposition.n_nodes
+
+    def cells_by_subdomain(self, parts: range) -> dict[int, NDArray[np.int64]]:
+        """Positions in `cells` of those that touch each subdomain in `parts`, ascending."""
+        corner_part = np.searchsorted(self.decomposition.offsets, self.cells.corners, side="right")
+        part, cell = _incidences(corner_part - 1)
+        ends = np.searchsorted(part, [*parts, parts.stop])
+        return {part: cell[ends[i] : ends[i + 1]] for i, part in enumerate(parts)}
+
+
+def distribute(
+    model: ElasticModel | None,
+    subdomains: int | None = None,
+    seed: int = 0,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+) -> Share:
+    """Cut the solid on rank 0 and give every rank its share.
+
+    Parameters
+    ----------
+    model
+        The solid; only rank 0's is looked at, the others may pass None.
+    subdomains
+        Number of subdomains; from the number of unknowns if not given.
+    seed
+        Seed of the partition.
+
+    Raises
+    ------
+    UserError
+        On every rank, if there are more subdomains than cells or more ranks than subdomains.
+    """
+    order = np.empty(0, dtype=np.int64)
+
+    def cut() -> tuple[Decomposition, Elements]:
+        nonlocal order
+        assert model is not None
+        decomposition, order = decompose(model.mesh, subdomains, seed, comm.size)
+        nothing = model.elements.with_material(np.empty((0, 8)), np.empty(0, dtype=np.uint8))
+        return decomposition, nothing
+
+    decomposition, constants = on_root(comm, cut)
+    if comm.rank == 0:
+        assert model is not None
+        nodes, positions, cells = _deal(model, decomposition, order, comm)
+    else:
+        nodes, positions, *arrays = receive_arrays(comm, 0, _SHARE)
+        cells = Cells(np.empty((0, 8), dtype=np.int64), constants).from_arrays(arrays)
+    start, stop = decomposition.local_range(comm.rank)
+    return Share(decomposition, start, stop, cells, nodes, positions)
+
+
+def _deal(
+    model: ElasticModel, decomposition: Decomposition, order: NDArray[np.int64], comm: MPI.Comm
+) -> tuple[NDArray[np.int64], Array, Cells]:
+    """Send every other rank its nodes, their positions and its cells; return rank 0's own."""
+    row = np.empty(len(order), dtype=np.int64)
+    row[order] = np.arange(len(order))
+    corners = row[model.mesh.cells]
+    whole = Cells(corners, model.elements)
+    ends = [decomposition.local_range(rank)[1] for rank in range(comm.size)]
+    rank_of, cell = _incidences(np.searchsorted(ends, corners, side="right"))
+    first = np.searchsorted(rank_of, np.arange(comm.size + 1))
+
+    def share(rank: int) -> tuple[NDArray[np.int64], Array, Cells]:
+        start, stop = decomposition.local_range(rank)
+        nodes = order[start:stop].copy()
+        cells = whole.take(cell[first[rank] : first[rank + 1]])
+        return nodes, model.mesh.nodes[nodes], cells
+
+    for rank in range(1, comm.size):
+        nodes, positions, cells = share(rank)
+        send_arrays(comm, [nodes, positions, *cells.arrays()], rank, _SHARE).wait()
+    return share(0)
+
+
+def _incidences(
+    corner_owner: NDArray[np.integer],
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs (owner, cell) from the owner (c, 8) of each corner, each once, sorted."""
+    count = max(len(corner_owner), 1)
+    cell = np.arange(len(corner_owner), dtype=np.int64)[:, None]
+    owner, cells = np.divmod(np.unique(corner_owner.astype(np.int64) * count + cell), count)
+    return owner, cells

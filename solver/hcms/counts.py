@@ -1,0 +1,160 @@
+"""What the synthesis does, phase by phase: messages, bytes, floating-point operations, seconds.
+
+Operations are counted by formulae where they are started, not measured; they feed a model of how
+the synthesis scales.  Phases are `local` (modes of the subdomains), `merge 1`, `merge 2`, ... (by
+level of the merge tree), `down` (coefficients on their way back) and `basis` (the final vectors).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import astuple, dataclass, fields
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from solver.messages import Sent
+
+Array = NDArray[np.float64]
+
+LANCZOS_SPARE = 2.0
+"""Lanczos vectors made for each mode wanted."""
+
+
+@dataclass
+class Tally:
+    """One rank's part in one phase.
+
+    Attributes
+    ----------
+    messages, bytes
+        Messages sent by this rank and the bytes in them; a broadcast is one to every other rank.
+    flops
+        Floating-point operations of the dense and sparse algebra, estimated.
+    seconds
+        Wall time, waiting included.
+    waiting
+        Wall time [s] spent waiting for messages.
+    """
+
+    messages: float = 0.0
+    bytes: float = 0.0
+    flops: float = 0.0
+    seconds: float = 0.0
+    waiting: float = 0.0
+
+    def sent(self, sent: Sent) -> Sent:
+        """Add messages under way; returns them."""
+        self.messages += sent.messages
+        self.bytes += sent.bytes
+        return sent
+
+    def broadcast(self, array: NDArray[np.generic], ranks: int) -> None:
+        """Add a broadcast of `array` from this rank."""
+        self.messages += ranks - 1
+        self.bytes += (ranks - 1) * array.nbytes
+
+    @contextmanager
+    def running(self) -> Iterator[None]:
+        """Add the wall time of the body."""
+        begin = time.perf_counter()
+        yield
+        self.seconds += time.perf_counter() - begin
+
+    @contextmanager
+    def idle(self) -> Iterator[None]:
+        """Add the wall time of the body, which waits for a message."""
+        begin = time.perf_counter()
+        yield
+        self.waiting += time.perf_counter() - begin
+
+
+class Counts:
+    """Tallies of one rank, by phase; the phases are the same on every rank.
+
+    Attributes
+    ----------
+    local, down, basis
+        Tallies of these phases.
+    merges
+        Tally of each level of the merge tree, from the subdomains up.
+    """
+
+    def __init__(self, levels: int) -> None:
+        self.local = Tally()
+        self.merges = [Tally() for _ in range(levels)]
+        self.down = Tally()
+        self.basis = Tally()
+
+    def phases(self) -> dict[str, Tally]:
+        """Tallies by name, in the order of the work."""
+        merges = {f"merge {level}": tally for level, tally in enumerate(self.merges, start=1)}
+        return {"local": self.local, **merges, "down": self.down, "basis": self.basis}
+
+    def per_rank(self, comm: MPI.Comm) -> dict[str, dict[str, Array]]:
+        """Every phase's quantities as arrays (ranks,), the same on every rank; collective."""
+        phases = self.phases()
+        mine = np.array([astuple(tally) for tally in phases.values()])
+        everyone = np.empty((comm.size, *mine.shape))
+        comm.Allgather(mine, everyone)
+        names = [field.name for field in fields(Tally)]
+        return {
+            phase: {name: everyone[:, row, column] for column, name in enumerate(names)}
+            for row, phase in enumerate(phases)
+        }
+
+    def summary(self, comm: MPI.Comm) -> dict[str, dict[str, float]]:
+        """Every phase's sums over the ranks, and the largest of one rank as `..._max`; collective.
+
+        Times are the slowest rank's; `busy` [s] is the longest that a rank did not wait.
+        """
+        summary = {}
+        for phase, found in self.per_rank(comm).items():
+            summary[phase] = {
+                **{name: float(found[name].sum()) for name in ("messages", "bytes", "flops")},
+                **{f"{name}_max": float(found[name].max()) for name in ("bytes", "flops")},
+                "seconds": float(found["seconds"].max()),
+                "busy": float((found["seconds"] - found["waiting"]).max()),
+            }
+        return summary
+
+
+def product_flops(rows: int, inner: int, columns: int) -> float:
+    """Product of dense matrices (rows, inner) and (inner, columns).
+
+    Examples
+    --------
+    >>> product_flops(10, 20, 30)
+    12000.0
+    """
+    return 2.0 * rows * inner * columns
+
+
+def sparse_product_flops(entries: int, columns: int) -> float:
+    """Product of a sparse matrix of so many `entries` with `columns` dense columns."""
+    return 2.0 * entries * columns
+
+
+def eigen_flops(size: int, generalised: bool) -> float:
+    """All eigenpairs of a dense symmetric matrix, or pencil, by divide and conquer.
+
+    Tridiagonalisation and divide and conquer take 4/3 n^3 each, transforming back 2 n^3; a pencil
+    adds Cholesky (1/3), the reduction to standard form (1) and the vectors' (1).
+    """
+    return (14.0 / 3.0 + (7.0 / 3.0 if generalised else 0.0)) * float(size) ** 3
+
+
+def lanczos_flops(size: int, modes: int) -> float:
+    """Lowest `modes` of a compact solid of `size` unknowns, by Lanczos with a sparse factorisation.
+
+    Nested dissection of a cube of N nodes has a separator of s = 3 N^(2/3) unknowns at the top;
+    summed over the levels, factorisation takes about s^3 and the factor has about 2 s^2 entries.
+    Every Lanczos vector takes one solve (four operations an entry) and its orthogonalisation.
+    """
+    separator = 3.0 * (size / 3.0) ** (2.0 / 3.0)
+    vectors = min(LANCZOS_SPARE * modes, float(size))
+    solves = 8.0 * separator**2 * vectors
+    return separator**3 + solves + 4.0 * size * vectors**2
