@@ -146,7 +146,7 @@ def interface(cells: Cells, start: int, middle: int, stop: int, treatment: str) 
     mass = cells.elements.nodal_mass() * (across | across.transpose(0, 2, 1))
     rows = np.unique(cells.corners[left | right])
     # Matrices of outside corners are zero, so any row may stand for them.
-    position = np.searchsorted(rows, np.where(left | right, cells.corners, rows[:1]))
+    position = np.where(left | right, np.searchsorted(rows, cells.corners), 0)
     K, M = assemble_elements(position, stiffness, mass, len(rows))
     K.eliminate_zeros()
     M.eliminate_zeros()

@@ -7,11 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 
 from carillon.errors import UserError
 
 LIGHTEST = 0.4
 """Least share of the nodes of two partners that the lighter should have."""
+LIGHTEST_CONNECTED = 0.25
+"""The same where only so uneven a cut leaves both partners connected."""
+EIGENVECTORS = 3
+"""Eigenvectors of the graph of the subdomains that cuts are looked for in."""
 _HALVINGS = 50
 
 
@@ -71,9 +76,9 @@ def build_tree(
 
     Notes
     -----
-    The lighter of two partners has at least `LIGHTEST` of their nodes where subdomains are small
-    enough, and is as heavy as the spectral order allows otherwise; so the number of levels grows
-    with the logarithm of the number of subdomains unless their sizes differ widely.
+    The lighter of two partners has at least `LIGHTEST_CONNECTED` of their nodes where subdomains
+    are small enough, and is as heavy as the spectral order allows otherwise; so the number of
+    levels grows with the logarithm of the number of subdomains unless their sizes differ widely.
     """
     parts = len(sizes)
     shared = shared_cells(corner_part, parts)
@@ -84,8 +89,7 @@ def build_tree(
         if len(members) == 1:
             leaves.append(int(members[0]))
             return _Branch(group=len(leaves) - 1)
-        within = shared[members][:, members].toarray()
-        left = _bisect(within, sizes[members].astype(float))
+        left = _bisect(shared[members][:, members], sizes[members].astype(float))
         branch = _Branch((grow(members[left]), grow(members[~left])))
         joins.append(branch)
         return branch
@@ -122,25 +126,62 @@ def shared_cells(corner_part: NDArray[np.int32], parts: int) -> sp.csr_matrix:
     return shared
 
 
-def _bisect(weight: NDArray[np.float64], sizes: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _bisect(weight: sp.csr_matrix, sizes: NDArray[np.float64]) -> NDArray[np.bool_]:
     """One side (k,), the first member's, of a light and even cut through a graph of k members.
 
-    Members are taken in the order of the graph's Fiedler vector, and cut where the edges of summed
-    `weight` (k, k) are least among the cuts that leave `LIGHTEST` of the `sizes` on either side.
+    Members are taken in the order of each of the graph's lowest eigenvectors, and cut where the
+    edges of summed `weight` (k, k) are least: first among the cuts that leave `LIGHTEST` of the
+    `sizes` on either side and both sides connected, then among less even ones, then among the most
+    even of all.
     """
+    cuts = _cuts(weight.toarray(), sizes)
+    fewest = max(2, _pieces(weight))
+    for least in (LIGHTEST, LIGHTEST_CONNECTED):
+        for cut in cuts:
+            left, right = cut.left, cut.right
+            if cut.evenness < least:
+                continue
+            if _pieces(weight[left][:, left]) + _pieces(weight[right][:, right]) <= fewest:
+                return cut.side()
+    even = min(LIGHTEST, max(cut.evenness for cut in cuts))
+    return next(cut.side() for cut in cuts if cut.evenness >= even)
+
+
+@dataclass(frozen=True)
+class _Cut:
+    """Members `left` and `right` of a graph, the edges between them, and the lighter one's share."""
+
+    left: NDArray[np.int64]
+    right: NDArray[np.int64]
+    edges: float
+    evenness: float
+
+    def side(self) -> NDArray[np.bool_]:
+        """Mask of the members on the side of the first."""
+        side = np.zeros(len(self.left) + len(self.right), dtype=bool)
+        side[self.left] = True
+        return side if side[0] else ~side
+
+
+def _cuts(weight: NDArray[np.float64], sizes: NDArray[np.float64]) -> list[_Cut]:
+    """Cuts through the orders of the graph's lowest eigenvectors, those of fewest edges first."""
     degree = weight.sum(axis=1)
     _, vectors = np.linalg.eigh(np.diag(degree) - weight)
-    order = np.argsort(vectors[:, 1], kind="stable")
-    ordered = weight[order][:, order]
-    # Taking one more member to the left cuts its edges to the right and heals those to the left.
-    cut = np.cumsum(degree[order] - 2.0 * np.tril(ordered, -1).sum(axis=1))[:-1]
-    share = np.cumsum(sizes[order])[:-1] / sizes.sum()
-    evenness = np.minimum(share, 1.0 - share)
-    even = evenness >= min(LIGHTEST, evenness.max())
-    position = int(np.argmin(np.where(even, cut, np.inf)))
-    side = np.zeros(len(sizes), dtype=bool)
-    side[order[: position + 1]] = True
-    return side if side[0] else ~side
+    cuts = []
+    for vector in vectors.T[1 : 1 + EIGENVECTORS]:
+        order = np.argsort(vector, kind="stable")
+        # Taking one more member to the left cuts its edges to the right and heals those to the left.
+        healed = np.tril(weight[order][:, order], -1).sum(axis=1)
+        edges = np.cumsum(degree[order] - 2.0 * healed)
+        share = np.cumsum(sizes[order]) / sizes.sum()
+        for stop in range(1, len(order)):
+            evenness = min(share[stop - 1], 1.0 - share[stop - 1])
+            cuts.append(_Cut(order[:stop], order[stop:], edges[stop - 1], evenness))
+    return sorted(cuts, key=lambda cut: cut.edges)
+
+
+def _pieces(graph: sp.csr_matrix) -> int:
+    return int(connected_components(graph, directed=False, return_labels=False))
 
 
 def assign_ranks(costs: NDArray[np.float64], ranks: int) -> NDArray[np.int32]:
