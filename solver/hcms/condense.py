@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.integer]
 
 INTERFACES = ("free", "fixed")
 
@@ -33,27 +34,32 @@ def restrict_stiffness(stiffness: Array, inside: NDArray[np.bool_], interface: s
     if interface == "fixed":
         return np.asarray(stiffness * keep[:, :, None] * keep[:, None, :])
     restricted = np.zeros_like(stiffness)
-    pattern = np.packbits(inside, axis=1, bitorder="little").ravel()
-    for code in np.unique(pattern):
-        chosen = np.flatnonzero(pattern == code)
-        kept = np.flatnonzero(keep[chosen[0]])
-        relaxed = np.flatnonzero(~keep[chosen[0]])
-        if len(relaxed) == 0:
-            restricted[chosen] = stiffness[chosen]
-        elif len(kept) > 3:
-            restricted[np.ix_(chosen, kept, kept)] = _schur(stiffness[chosen], kept, relaxed)
+    corners = inside.sum(axis=1)
+    restricted[corners == 8] = stiffness[corners == 8]
+    # One corner alone has no stiffness of its own.
+    for count in range(2, 8):
+        chosen = np.flatnonzero(corners == count)
+        if len(chosen):
+            # Unknowns to keep first, each cell in its own order.
+            order = np.argsort(~keep[chosen], axis=1, kind="stable")
+            kept, relaxed = order[:, : 3 * count], order[:, 3 * count :]
+            schur = _schur(stiffness, chosen, kept, relaxed)
+            restricted[chosen[:, None, None], kept[:, :, None], kept[:, None, :]] = schur
     return restricted
 
 
-def _schur(matrices: Array, kept: NDArray[np.integer], relaxed: NDArray[np.integer]) -> Array:
-    inner = matrices[:, relaxed[:, None], relaxed]
-    coupling = matrices[:, relaxed[:, None], kept]
-    if len(kept) >= 3 * _NON_COLLINEAR:
+def _schur(matrices: Array, chosen: Indices, kept: Indices, relaxed: Indices) -> Array:
+    """Schur complements (c, k, k) of the `chosen` matrices onto the unknowns `kept` (c, k)."""
+    cell = chosen[:, None, None]
+    inner = matrices[cell, relaxed[:, :, None], relaxed[:, None, :]]
+    coupling = matrices[cell, relaxed[:, :, None], kept[:, None, :]]
+    if kept.shape[1] >= 3 * _NON_COLLINEAR:
         relaxation = np.linalg.solve(inner, coupling)
     else:
         # Two nodes leave the element free to turn about the line through them.
         relaxation = np.linalg.pinv(inner, rcond=_RANK_TOLERANCE, hermitian=True) @ coupling
-    schur = matrices[:, kept[:, None], kept] - coupling.transpose(0, 2, 1) @ relaxation
+    schur = matrices[cell, kept[:, :, None], kept[:, None, :]]
+    schur -= coupling.transpose(0, 2, 1) @ relaxation
     return np.asarray(0.5 * (schur + schur.transpose(0, 2, 1)))
 
 

@@ -149,7 +149,7 @@ def _bisect(weight: sp.csr_matrix, sizes: NDArray[np.float64]) -> NDArray[np.boo
 
 @dataclass(frozen=True)
 class _Cut:
-    """Members `left` and `right` of a graph, the edges between them, and the lighter one's share."""
+    """Two sides of a graph, the edges between them, and the share of the lighter one."""
 
     left: NDArray[np.int64]
     right: NDArray[np.int64]
@@ -170,7 +170,7 @@ def _cuts(weight: NDArray[np.float64], sizes: NDArray[np.float64]) -> list[_Cut]
     cuts = []
     for vector in vectors.T[1 : 1 + EIGENVECTORS]:
         order = np.argsort(vector, kind="stable")
-        # Taking one more member to the left cuts its edges to the right and heals those to the left.
+        # One more member on the left cuts its edges to the right and heals those to the left.
         healed = np.tril(weight[order][:, order], -1).sum(axis=1)
         edges = np.cumsum(degree[order] - 2.0 * healed)
         share = np.cumsum(sizes[order]) / sizes.sum()
