@@ -13,7 +13,7 @@ from solver.modes_file import read_modes
 
 pytestmark = pytest.mark.mpi
 
-MODEL = ("builtin:bar", "--resolution", "24", "--material", "smooth", "--subdomains", "6")
+MODEL = ("builtin:bar", "--resolution", "24", "--material", "smooth", "--subdomains", "7")
 MODES = ("--modes", "50")
 
 
@@ -24,7 +24,7 @@ def truth(tmp_path_factory, run_cli) -> Path:
     return path
 
 
-@pytest.mark.parametrize("ranks", [1, 2, 3, 4])
+@pytest.mark.parametrize("ranks", [1, 2, 3, 4, pytest.param(7, marks=pytest.mark.slow)])
 def test_corrected_modes_on_any_number_of_ranks(ranks, truth, tmp_path, mpiexec):
     out = tmp_path / "modes.h5"
     options = ("--tol", "1e-11", "--out", out)

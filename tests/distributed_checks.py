@@ -1,0 +1,241 @@
+"""Checks on several ranks: `python -m mpi4py tests/distributed_checks.py NAME[,NAME] [PATH]`.
+
+Every rank makes the same checks, and one that fails ends them all.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from carillon.errors import UserError
+from dataset_gen.block import degrees_of_freedom
+from solver.analysis import SolverOptions, modal_analysis
+from solver.distribution import Share, distribute
+from solver.geometry import hexmesh_from_grid
+from solver.hcms.synthesis import synthesize
+from solver.messages import receive_arrays, send_arrays
+from solver.model import ElasticModel
+from solver.modes_file import write_modes
+from solver.sparse import assembled
+from solver.system import assemble
+from tests import solids
+
+COMM = MPI.COMM_WORLD
+PARTS = 8
+
+
+def on_first(model: ElasticModel) -> ElasticModel | None:
+    """The model on rank 0 alone."""
+    return model if COMM.rank == 0 else None
+
+
+def shares_make_up_the_solid() -> None:
+    model = solids.random_box(9, 6, 5)
+    share = distribute(on_first(model), PARTS, comm=COMM)
+    touching = np.isin(model.mesh.cells, share.nodes).any(axis=1)
+    assert len(share.cells) == touching.sum()
+    assert (share.cells.elements.young == model.young[touching]).all()
+    assert (share.positions == model.mesh.nodes[share.nodes]).all()
+    own = share.cells.inside(share.start, share.stop)
+    corners = model.mesh.cells[touching]
+    assert (share.nodes[share.cells.corners[own] - share.start] == corners[own]).all()
+    assert COMM.allreduce(len(share.nodes)) == model.mesh.n_nodes == share.decomposition.n_nodes
+
+
+def products_are_those_of_the_whole_matrices() -> None:
+    model = solids.random_box(9, 6, 5)
+    system = assemble(distribute(on_first(model), PARTS, comm=COMM), COMM)
+    block = np.random.default_rng(0).standard_normal((model.n_dofs, 3))
+    for whole, matrix in zip(assembled(model), (system.K, system.M)):
+        found = system.gather(system.multiply(matrix, system.local_rows(block)))
+        if COMM.rank == 0:
+            expected = whole @ block
+            assert np.abs(found - expected).max() < 1e-13 * np.abs(expected).max()
+        else:
+            assert found is None
+    stiffness = system.multiply(system.K, system.rigid)
+    assert np.abs(stiffness).max() < 1e-10 * system.K.norm() * np.abs(system.rigid).max()
+    gram = system.inner(system.rigid, system.multiply(system.M, system.rigid))
+    assert np.abs(gram - np.eye(6)).max() < 1e-12
+
+
+def only_the_first_rank_holds_arrays_of_the_length_of_the_mesh() -> None:
+    # No other length in the analysis happens to be one of these: 9 x 5 x 31 nodes.
+    model = solids.random_box(8, 4, 30)
+    forbidden = {model.mesh.n_nodes, model.n_dofs, model.mesh.n_cells}
+    seen: list[str] = []
+
+    def spy(frame: FrameType, event: str, argument: Any) -> None:
+        if event != "return" or "/solver/" not in frame.f_code.co_filename:
+            return
+        for name, value in [*frame.f_locals.items(), ("the result", argument)]:
+            fields = vars(value).values() if hasattr(value, "__dict__") else (value,)
+            for item in fields:
+                if isinstance(item, np.ndarray) and forbidden & set(item.shape):
+                    seen.append(f"{name} {item.shape} in {frame.f_code.co_qualname}")
+
+    modes = 40
+    mine = on_first(model)
+    sys.setprofile(spy)
+    result = modal_analysis(mine, SolverOptions(modes=modes, subdomains=PARTS), COMM)
+    result.system.pour(result.vectors, lambda blocks: [None for _ in blocks] and None)
+    sys.setprofile(None)
+    assert bool(seen) == (COMM.rank == 0), seen[:5]
+    whole = (model.n_dofs, modes)
+    assert not any(f"{whole} " in line for line in seen)
+
+
+def modes_are_the_same_however_many_columns_travel_together(folder: Path) -> None:
+    model = on_first(solids.random_box(9, 6, 5))
+    result = modal_analysis(model, SolverOptions(modes=20, subdomains=PARTS), COMM)
+    whole = result.system.gather(result.vectors)
+    for columns in (1, 7, 16, 50):
+
+        def write(blocks: Any, columns: int = columns) -> None:
+            assert model is not None
+            blocks = list(blocks)
+            assert max(block.shape[1] for block in blocks) == min(columns, 20)
+            assert (np.concatenate(blocks, axis=1) == whole).all()
+            path = folder / f"{columns}.h5"
+            write_modes(path, model, result.values, blocks, result.residuals, {}, {})
+
+        result.system.pour(result.vectors, write, columns)
+
+
+def failure_of_the_writer_is_everyones() -> None:
+    model = solids.random_box(4, 3, 8)
+    system = assemble(distribute(on_first(model), PARTS, comm=COMM), COMM)
+    block = system.local_rows(np.ones((model.n_dofs, 40)))
+
+    def fail(blocks: Any) -> None:
+        next(blocks)
+        raise UserError("planted")
+
+    try:
+        system.pour(block, fail, columns=3)
+    except UserError as error:
+        assert str(error) == "planted"
+    else:
+        raise AssertionError("no error")
+    # Nothing is left under way.
+    assert system.inner(block, block)[0, 0] == model.n_dofs
+
+
+def bad_input_is_everyones() -> None:
+    model = on_first(solids.random_box(2, 2, 2))
+    for parts, sentence in ((COMM.size - 1, "ranks for"), (1000, "1000 subdomains asked for")):
+        try:
+            distribute(model, max(parts, 1), comm=COMM)
+        except UserError as error:
+            assert sentence in str(error)
+        else:
+            assert COMM.size == 1 and parts < 1
+
+
+def a_share_is_no_larger_than_its_part_of_the_mesh() -> None:
+    # A long bar: what a rank holds beyond its part is one layer of cells at either end.
+    model = solids.random_box(2, 2, 20 * COMM.size)
+    share = distribute(on_first(model), COMM.size, comm=COMM)
+    assert len(share.cells) < 0.8 * model.mesh.n_cells
+    assert len(share.nodes) < 0.8 * model.mesh.n_nodes
+
+
+class CountingComm:
+    """A communicator that counts what leaves this rank by its buffers."""
+
+    def __init__(self, comm: MPI.Comm) -> None:
+        self._comm = comm
+        self.sent: Counter[str] = Counter()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._comm, name)
+
+    def Isend(self, array: Any, dest: int, tag: int) -> MPI.Request:  # noqa: N802
+        self.sent.update(messages=1, bytes=array.nbytes)
+        return self._comm.Isend(array, dest=dest, tag=tag)
+
+    def Bcast(self, array: Any, root: int) -> None:  # noqa: N802
+        if root == self._comm.rank:
+            others = self._comm.size - 1
+            self.sent.update(messages=others, bytes=others * array.nbytes)
+        self._comm.Bcast(array, root=root)
+
+
+def messages_counted_are_messages_sent() -> None:
+    share = distribute(on_first(solids.random_box(9, 6, 5)), PARTS, comm=COMM)
+    counting = CountingComm(COMM)
+    result = synthesize(share, 60, "free", counting)
+    tallies = result.counts.phases().values()
+    for quantity in ("messages", "bytes"):
+        assert sum(getattr(tally, quantity) for tally in tallies) == counting.sent[quantity]
+    per_rank = result.counts.per_rank(COMM)
+    sent = sum(phase["messages"] for phase in per_rank.values())
+    assert sent[COMM.rank] == counting.sent["messages"]
+    assert (COMM.size == 1) == (sent.sum() == 0)
+    # Each merge of two ranks: an announcement and at most seven arrays up, two messages down.
+    crossing = _crossing_merges(share)
+    assert sent.sum() <= 10 * crossing + 2 * (COMM.size - 1)
+    flops = sum(phase["flops"] for phase in per_rank.values())
+    assert (flops > 0).all()
+
+
+def _crossing_merges(share: Share) -> int:
+    leader = share.decomposition.leaders()
+    merges = share.decomposition.tree.merges
+    return sum(leader[merge.left] != leader[merge.right] for merge in merges)
+
+
+def arrays_arrive_as_they_were() -> None:
+    arrays = [
+        np.arange(12.0).reshape(3, 4).T,
+        np.empty((0, 8)),
+        np.arange(5, dtype=np.int64),
+        np.arange(6, dtype=np.uint8).reshape(1, 2, 3),
+    ]
+    after = (COMM.rank + 1) % COMM.size
+    sent = send_arrays(COMM, arrays, after, 5)
+    received = receive_arrays(COMM, (COMM.rank - 1) % COMM.size, 5)
+    sent.wait()
+    assert sent.messages == 4
+    for before, now in zip(arrays, received, strict=True):
+        assert now.dtype == before.dtype
+        assert now.shape == before.shape
+        assert (now == before).all()
+
+
+def synthesis_bounds_the_spectrum() -> None:
+    model = solids.random_box(7, 5, 4)
+    exact = solids.dense_eigenvalues(model)[:40]
+    share = distribute(on_first(model), PARTS, comm=COMM)
+    result = synthesize(share, 80, "free", COMM)
+    assert (result.values[:40] >= exact - 1e-9 * exact[-1]).all()
+    system = assemble(share, COMM)
+    vectors = result.vectors
+    gram = system.inner(vectors, system.multiply(system.M, vectors))
+    assert np.abs(gram - np.eye(len(gram))).max() < 1e-9
+    stiff = system.inner(vectors, system.multiply(system.K, vectors))
+    assert np.abs(stiff - np.diag(result.values)).max() < 1e-7 * result.values[-1]
+
+
+def groups_that_do_not_touch_can_be_merged() -> None:
+    grid = np.array([[x, 0, 0] for x in (*range(4), *range(10, 14))])
+    mesh = hexmesh_from_grid(grid, np.zeros(3), 0.01)
+    model = solids.fine_model(mesh, np.full(len(grid), 1e9))
+    share = distribute(on_first(model), 4, comm=COMM)
+    result = synthesize(share, 40, "free", COMM)
+    exact = solids.dense_eigenvalues(model)
+    assert (result.values[:12] < 1e-9 * exact[-1]).all()
+    assert result.values[12] > 1e-9 * exact[-1]
+    assert len(degrees_of_freedom(share.nodes)) == len(result.vectors)
+
+
+if __name__ == "__main__":
+    for name in sys.argv[1].split(","):
+        globals()[name](*map(Path, sys.argv[2:]))
