@@ -94,6 +94,8 @@ def smallest_eigenpairs(
         preconditioner = linear.getPC()
         preconditioner.setType(PETSc.PC.Type.CHOLESKY)
         preconditioner.setFactorSolverType(factor_package(K.getComm().size))
+        # Everything above may be overruled by PETSc's options database.
+        solver.setFromOptions()
         solver.solve()
         values, vectors = _collect(K, solver, min(solver.getConverged(), count))
         return values, vectors, int(solver.getIterationNumber())

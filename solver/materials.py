@@ -41,16 +41,19 @@ def two_region(mesh: HexMesh) -> Array:
 
 
 def smooth(mesh: HexMesh, seed: int = 0) -> Array:
-    """0.1 to 10 GPa: a random sum of the lowest Laplacian eigenvectors, as log10 of the modulus."""
+    """0.1 to 10 GPa: a smooth random field as log10 of the modulus."""
+    return UNIFORM_YOUNG * 10.0 ** (SMOOTH_DECADES * smooth_field(mesh, seed))
+
+
+def smooth_field(mesh: HexMesh, seed: int = 0) -> Array:
+    """Values (m,) within -1 and 1: a random sum of the lowest Laplacian eigenvectors."""
     _, modes = laplacian_modes(mesh, SMOOTH_MODES + 1)
     modes = modes[:, 1:]
     weights = np.random.default_rng(seed).standard_normal(modes.shape[1])
     weights /= np.arange(1, modes.shape[1] + 1)
     field = modes @ weights
     peak = np.abs(field).max()
-    if peak > 0.0:
-        field = field / peak
-    return UNIFORM_YOUNG * 10.0 ** (SMOOTH_DECADES * field)
+    return np.asarray(field / peak if peak > 0.0 else field)
 
 
 def random(mesh: HexMesh, seed: int = 0) -> Array:
