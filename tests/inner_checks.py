@@ -1,0 +1,135 @@
+"""Checks of the inner solvers on any number of ranks: `tests/inner_checks.py NAME[,NAME]`.
+
+Every rank makes the same checks, and one that fails ends them all.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import scipy.sparse.linalg as spla
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from carillon.errors import ConvergenceError
+from solver.distribution import distribute
+from solver.inner.block_rows import BlockRows
+from solver.inner.iterative import METHODS, IterativeInverse
+from solver.inner.multigrid import Multigrid
+from solver.model import ElasticModel
+from solver.rayleigh_ritz import safe_shift
+from solver.sparse import assembled
+from solver.system import System, assemble
+from tests import solids
+
+COMM = MPI.COMM_WORLD
+PARTS = 8
+
+
+def system_of(model: ElasticModel) -> System:
+    """The model, which only the first rank looks at, on all ranks."""
+    return assemble(distribute(model if COMM.rank == 0 else None, PARTS, comm=COMM), COMM)
+
+
+def right_hand_sides(system: System, columns: int) -> np.ndarray:
+    """Random loads, the same on any number of ranks; one holds nothing but a rigid motion."""
+    block = np.random.default_rng(7).standard_normal((system.n_dofs, columns))
+    rhs = system.local_rows(block)
+    rhs[:, 1:2] = system.times_mass(np.ascontiguousarray(system.rigid[:, 2:3]))
+    rhs[:, 2] = 0.0
+    return rhs
+
+
+def relative_residuals(
+    system: System, inverse: IterativeInverse, rhs: np.ndarray, solution: np.ndarray
+) -> np.ndarray:
+    image = system.times_stiffness(solution) - inverse.shift * system.times_mass(solution)
+    left = system.column_products(rhs - image, rhs - image)
+    scale = system.column_products(rhs, rhs)
+    return np.sqrt(np.divide(left, scale, out=left, where=scale > 0.0))
+
+
+def solutions_are_those_of_a_direct_solve() -> None:
+    model = solids.random_box(9, 6, 5)
+    system = system_of(model)
+    shift = -safe_shift(system)
+    rhs = right_hand_sides(system, 7)
+    whole = system.gather(rhs)
+    if COMM.rank == 0:
+        K, M = assembled(model)
+        expected = spla.splu((K - shift * M).tocsc()).solve(np.ascontiguousarray(whole))
+    for method in METHODS:
+        for tolerance in (1e-2, 1e-10):
+            inverse = IterativeInverse(system, shift, method, tolerance)
+            solution = inverse.solve(rhs)
+            assert solution.flags.c_contiguous
+            assert relative_residuals(system, inverse, rhs, solution).max() <= 1.01 * tolerance
+            assert not solution[:, 2].any()
+            found = system.gather(solution)
+            inverse.destroy()
+        if COMM.rank == 0:
+            # The error exceeds the residual by the condition number at most, here 1e5.
+            distance = np.linalg.norm(found - expected, axis=0)
+            assert (distance <= 1e-7 * np.linalg.norm(expected, axis=0)).all()
+
+
+def columns_are_solved_each_on_its_own() -> None:
+    system = system_of(solids.random_box(7, 5, 4))
+    rhs = right_hand_sides(system, 6)
+    for method in METHODS:
+        together = IterativeInverse(system, -safe_shift(system), method, 1e-6)
+        one_by_one = IterativeInverse(system, -safe_shift(system), method, 1e-6, columns=1)
+        solution, other = together.solve(rhs), one_by_one.solve(rhs)
+        assert np.abs(solution - other).max() < 1e-5 * np.abs(solution).max()
+        assert together.right_hand_sides == one_by_one.right_hand_sides == 6
+        # Converged columns cost nothing more; rounding may move the last step.
+        assert abs(together.iterations - one_by_one.iterations) <= 6
+        together.destroy()
+        one_by_one.destroy()
+
+
+def rows_multiply_as_the_matrix_does() -> None:
+    system = system_of(solids.random_box(6, 5, 4))
+    block = right_hand_sides(system, 5)
+    rows = BlockRows(system.K, COMM, np.float64, threads=2)
+    expected = system.times_stiffness(block)
+    assert np.abs(rows.times(block) - expected).max() < 1e-12 * np.abs(expected).max()
+    first, _ = system.K.getOwnershipRange()
+    diagonal = system.K.getDiagonal().getArray()
+    assert len(diagonal) == 3 * (system.stop - system.start) and first == 3 * system.start
+    assert (rows.diagonal() == diagonal).all()
+
+
+def multigrid_is_symmetric_positive_definite() -> None:
+    system = system_of(solids.random_box(16, 9, 8))
+    matrix = system.K.copy()
+    matrix.axpy(safe_shift(system), system.M, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+    grid = Multigrid(matrix, system.rigid, COMM, dtype=np.float64)
+    assert len(grid.sizes) > 1 and grid.sizes[-1] == system.n_dofs
+    rhs = system.local_rows(np.random.default_rng(0).standard_normal((system.n_dofs, 12)))
+    gram = system.inner(rhs, grid.apply(rhs))
+    assert np.abs(gram - gram.T).max() < 1e-12 * np.abs(gram).max()
+    assert np.linalg.eigvalsh(gram)[0] > 0.0
+    grid.destroy()
+    matrix.destroy()
+
+
+def failure_is_everyones() -> None:
+    system = system_of(solids.random_box(7, 5, 4))
+    for method in METHODS:
+        inverse = IterativeInverse(system, -safe_shift(system), method, 1e-8, max_iterations=2)
+        try:
+            inverse.solve(right_hand_sides(system, 5))
+        except ConvergenceError as error:
+            assert method in str(error) and "after 2 iterations, 1.0e-08 was asked" in str(error)
+        else:
+            raise AssertionError("no error")
+        inverse.destroy()
+    # Nothing is left under way.
+    assert system.inner(system.rigid, system.times_mass(system.rigid)).shape == (6, 6)
+
+
+if __name__ == "__main__":
+    for name in sys.argv[1].split(","):
+        globals()[name]()
