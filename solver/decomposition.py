@@ -84,9 +84,7 @@ def decompose(
     UserError
         If there are more subdomains than cells, or more ranks than subdomains.
     """
-    if subdomains is None:
-        subdomains = min(max(default_subdomains(3 * mesh.n_nodes), ranks), mesh.n_cells)
-    node_part = partition_mesh(mesh, subdomains, seed)
+    node_part = _partition(mesh, subdomains, seed, ranks)
     tree, renumbered = build_tree(node_part[mesh.cells], np.bincount(node_part))
     node_part = renumbered[node_part]
     order = np.argsort(node_part, kind="stable").astype(np.int64)
@@ -94,6 +92,20 @@ def decompose(
     offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
     owner = assign_ranks(sizes.astype(float) ** COST_EXPONENT, ranks)
     return Decomposition(tree, owner, offsets), order
+
+
+def _partition(mesh: HexMesh, subdomains: int | None, seed: int, ranks: int) -> NDArray[np.int32]:
+    """Subdomain (n,) of each node; as many as the ranks at least, unless told how many."""
+    if subdomains is not None:
+        return partition_mesh(mesh, subdomains, seed)
+    asked = min(max(default_subdomains(3 * mesh.n_nodes), ranks), mesh.n_cells)
+    while True:
+        node_part = partition_mesh(mesh, asked, seed)
+        # Parts of a few cells may lose all their nodes to their neighbours.
+        missing = ranks - int(node_part.max()) - 1
+        if missing <= 0 or asked == mesh.n_cells:
+            return node_part
+        asked = min(asked + missing, mesh.n_cells)
 
 
 def on_root(comm: MPI.Comm, compute: Callable[[], T]) -> T:

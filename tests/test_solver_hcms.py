@@ -140,6 +140,14 @@ def test_default_partition_hangs_together():
     assert pieces.max() == node_part.max()
 
 
+def test_default_partition_has_a_subdomain_for_every_rank():
+    mesh = solids.box_mesh(3, 3, 2)
+    found, order = decomposition.decompose(mesh, ranks=13)
+    assert sorted(set(found.owner)) == list(range(13))
+    assert sorted(order) == list(range(mesh.n_nodes))
+    assert (np.diff(found.offsets) > 0).all()
+
+
 @pytest.fixture
 def in_pieces(monkeypatch):
     """A bar with a subdomain in two pieces, left as it is."""
