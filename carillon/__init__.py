@@ -4,4 +4,11 @@ Errors meant for the user, atomic HDF5 files, provenance, progress, and the chec
 runtime (BLAS, threads).  Nothing in here knows any mathematics of the method.
 """
 
+import os as _os
+
+from carillon import openblas as _openblas
+
+# Before anything loads numpy, and with it OpenBLAS.
+_openblas.configure(_os.environ)
+
 __version__ = "0.1.0"

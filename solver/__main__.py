@@ -7,6 +7,7 @@ import json
 import sys
 import traceback
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,16 +15,16 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.arguments import Parser, non_negative_number, whole_number
+from carillon.arguments import Parser, non_negative_number, positive_number, whole_number
 from carillon.cli import EXIT_BAD_INPUT, EXIT_NOT_CONVERGED
 from carillon.errors import ConvergenceError, UserError
 from carillon.files import atomic_path, require_writable
 from carillon.runtime import limit_threads, warn_about_reference_blas
 from dataset_gen.element import DEFAULT_POISSON
 from dataset_gen.objectives import OBJECTIVES, require_objective
-from solver import coarsening, materials
+from solver import coarsening, inner, materials
 from solver.analysis import METHODS, Modes, SolverOptions, modal_analysis
-from solver.correction import EIGENVALUE_TOLERANCE
+from solver.correction import ACCELERATIONS, EIGENVALUE_TOLERANCE, INTERACTIVE_TOLERANCE
 from solver.decomposition import keep_on_root, on_root
 from solver.geometry import FILLS, PIECES
 from solver.hcms.condense import INTERFACES
@@ -70,15 +71,17 @@ def _modes(options: argparse.Namespace, comm: MPI.Comm) -> None:
     on_root(comm, lambda: require_writable(options.out))
     parameters = _problem_options(options)
     solver = SolverOptions(
-        options.method,
-        options.modes,
-        options.tol,
-        options.corrections,
-        options.degree,
-        options.keep,
-        options.subdomains,
-        options.interface,
-        options.seed,
+        method=options.method,
+        modes=options.modes,
+        tolerance=options.tol,
+        corrections=options.corrections,
+        keep=options.keep,
+        subdomains=options.subdomains,
+        interface=options.interface,
+        seed=options.seed,
+        prove=options.prove,
+        inner=options.inner,
+        acceleration=options.acceleration,
     )
     problem = keep_on_root(comm, lambda: build_problem(parameters))
     model = None if problem is None else problem.model
@@ -175,25 +178,83 @@ def _convergence(options: argparse.Namespace, comm: MPI.Comm) -> None:
     problem = keep_on_root(comm, lambda: build_problem(_problem_options(options)))
     model = None if problem is None else problem.model
     history = correction_history(
-        model, options.modes, options.steps, options.degree, options.seed, comm
+        model, options.modes, options.steps, options.seed, options.truth, comm
     )
     _write_json(options, {**history, "provenance": record(_command_parameters(options))}, comm)
 
 
 def _benchmark(options: argparse.Namespace, comm: MPI.Comm) -> None:
     from carillon.provenance import record
-    from solver.benchmark import benchmark_row
+    from solver.benchmark import BenchmarkOptions, benchmark_row, row_lines
 
     if options.out is not None:
         on_root(comm, lambda: require_writable(options.out))
-    row = benchmark_row(
-        _problem_options(options), options.modes, options.runs, not options.skip_arpack, comm
+    benchmark = BenchmarkOptions(
+        options.modes,
+        options.runs,
+        options.slow_runs,
+        not options.skip_arpack,
+        options.arpack_regular,
+        options.tune,
     )
+    row = benchmark_row(_problem_options(options), benchmark, comm)
     row["provenance"] = record(_command_parameters(options))
     if options.out is not None:
         _write_json(options, row, comm)
-    if options.json and comm.rank == 0:
-        print(json.dumps(row, indent=2))
+    if comm.rank == 0:
+        print(json.dumps(row, indent=2) if options.json else "\n".join(row_lines(row)))
+
+
+def _scaling(options: argparse.Namespace, comm: MPI.Comm) -> None:
+    from carillon.provenance import record
+    from solver.scaling import ScalingOptions, measure, scaling_study, study_lines
+
+    for path in (options.out, options.plot):
+        if path is not None:
+            on_root(comm, partial(require_writable, path))
+    if options.here or comm.size > 1:
+        problem = keep_on_root(comm, lambda: build_problem(_problem_options(options)))
+        model = None if problem is None else problem.model
+        solver = SolverOptions(
+            modes=options.modes, tolerance=options.tol, seed=options.seed, inner=options.inner
+        )
+        found = measure(model, solver, comm)
+        lines = [f"{comm.size} ranks: {found['seconds']:.2f} s"]
+    else:
+        study = ScalingOptions(
+            options.modes,
+            options.tol,
+            tuple(options.ranks),
+            options.weak,
+            options.inner,
+            options.latency,
+            options.bandwidth,
+        )
+        found = scaling_study(_problem_options(options), study, _repeated(options))
+        lines = study_lines(found)
+    found["provenance"] = record(_command_parameters(options))
+    if options.out is not None:
+        _write_json(options, found, comm)
+    if comm.rank:
+        return
+    if options.plot is not None and "strong" in found:
+        from solver.scaling.plot import save_plot
+
+        save_plot(found, options.plot)
+    print(json.dumps(found, indent=2) if options.json else "\n".join(lines))
+
+
+def _repeated(options: argparse.Namespace) -> list[str]:
+    """Arguments with which the same solid is solved again, but for mesh and resolution."""
+    names = [name for name in _PROBLEM_FIELDS if name not in ("mesh", "resolution")]
+    arguments: list[str] = []
+    for name in (*names, "modes", "tol", "inner"):
+        value = getattr(options, name)
+        if value is True:
+            arguments.append(f"--{name}")
+        elif value is not None and value is not False:
+            arguments += [f"--{name}", str(value)]
+    return arguments
 
 
 def _objectives(options: argparse.Namespace, comm: MPI.Comm) -> None:
@@ -298,6 +359,11 @@ def _objective_names(text: str) -> list[str]:
     return names
 
 
+def _rank_counts(text: str) -> list[int]:
+    """Argument type: numbers of ranks, separated by commas, each once and ascending."""
+    return sorted({whole_number(1)(part) for part in text.split(",")})
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="solver",
@@ -326,10 +392,24 @@ def _parser() -> argparse.ArgumentParser:
         help="largest number of correction steps; 0 is plain HCMS (default %(default)s)",
     )
     modes.add_argument(
-        "--degree",
-        type=whole_number(1),
-        default=SolverOptions.degree,
-        help="polynomial degree of a correction; 1 is the paper's (default %(default)s)",
+        "--inner",
+        choices=inner.METHODS,
+        default=SolverOptions.inner,
+        help="inner solver of the corrections (default: the fastest direct one)",
+    )
+    modes.add_argument(
+        "--acceleration",
+        choices=ACCELERATIONS,
+        default=SolverOptions.acceleration,
+        help="of the corrections; relaxation is the paper's (default %(default)s)",
+    )
+    modes.add_argument(
+        "--start", metavar="MODES", help="modes file of a similar material to start from"
+    )
+    modes.add_argument(
+        "--prove",
+        action=argparse.BooleanOptionalAction,
+        help="count the eigenvalues by inertia (default: for slepc and arpack)",
     )
     modes.add_argument(
         "--keep", type=whole_number(1), help="modes kept at the root of the merge tree"
@@ -354,21 +434,71 @@ def _parser() -> argparse.ArgumentParser:
         "--steps", type=whole_number(0), default=3, help="corrections (default 3)"
     )
     convergence.add_argument(
-        "--degree", type=whole_number(1), default=1, help="see modes (default 1)"
+        "--truth", help="modes file with the exact eigenvalues (default: SLEPc finds them)"
     )
     convergence.add_argument("--out", required=True, help="JSON file to write")
     convergence.set_defaults(run=_convergence)
 
     benchmark = commands.add_parser("benchmark", help="time all methods on one solid (Fig. 11)")
-    _add_problem(benchmark)
+    _add_solid(benchmark)
+    benchmark.add_argument("--forest", help="forests to coarsen by (HDF5; default: packaged)")
     benchmark.add_argument("--modes", type=int, default=256, help="rigid included (default 256)")
     benchmark.add_argument(
-        "--runs", type=whole_number(1), default=3, help="timed runs a method (default 3)"
+        "--runs", type=whole_number(1), default=5, help="rounds of all methods (default 5)"
+    )
+    benchmark.add_argument(
+        "--slow-runs", type=whole_number(1), help="rounds that ARPACK runs in (default: all)"
     )
     benchmark.add_argument("--skip-arpack", action="store_true", help="leave the slowest one out")
+    benchmark.add_argument(
+        "--arpack-regular",
+        action="store_true",
+        help="also ARPACK without a factorisation, on a lumped mass",
+    )
+    benchmark.add_argument(
+        "--tune", action="store_true", help="SLEPc in the fastest of several configurations"
+    )
     benchmark.add_argument("--out", help="also write the row to this JSON file")
     benchmark.add_argument("--json", action="store_true", help="print JSON")
     benchmark.set_defaults(run=_benchmark)
+
+    scaling = commands.add_parser(
+        "scaling", help="wall time over the number of ranks, measured and modelled"
+    )
+    _add_problem(scaling)
+    scaling.add_argument("--modes", type=int, default=256, help="rigid included (default 256)")
+    scaling.add_argument(
+        "--ranks",
+        type=_rank_counts,
+        default=[1, 2],
+        help="numbers of ranks to run on, separated by commas (default 1,2)",
+    )
+    scaling.add_argument(
+        "--weak", action="store_true", help="also a solid that grows with the ranks"
+    )
+    scaling.add_argument(
+        "--tol",
+        type=positive_number,
+        default=INTERACTIVE_TOLERANCE,
+        help="relative eigenvalue error to correct to (default %(default)g)",
+    )
+    scaling.add_argument(
+        "--inner",
+        choices=inner.METHODS,
+        default="mumps",
+        help="inner solver, the same on any number of ranks (default %(default)s)",
+    )
+    scaling.add_argument(
+        "--latency", type=positive_number, help="of the modelled network [s] (default: measured)"
+    )
+    scaling.add_argument(
+        "--bandwidth", type=positive_number, help="of the modelled network [B/s] (the same)"
+    )
+    scaling.add_argument("--here", action="store_true", help=argparse.SUPPRESS)
+    scaling.add_argument("--out", help="also write the result to this JSON file")
+    scaling.add_argument("--plot", help="figure to draw (PNG, SVG or PDF)")
+    scaling.add_argument("--json", action="store_true", help="print JSON")
+    scaling.set_defaults(run=_scaling)
 
     objectives = commands.add_parser(
         "objectives", help="spectra of one solid coarsened by every fit objective, and by forests"

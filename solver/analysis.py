@@ -3,35 +3,50 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.errors import ConvergenceError, UserError
+from carillon.errors import UserError
 from carillon.progress import say
+from carillon.runtime import limit_threads, reuse_freed_memory
 from solver.correction import EIGENVALUE_TOLERANCE, correct, default_guard
 from solver.decomposition import on_root
-from solver.distribution import Share, distribute
+from solver.distribution import Share, deal_moduli, distribute
 from solver.eigensolver import TYPES
-from solver.hcms.synthesis import synthesize
+from solver.hcms.synthesis import Synthesis, synthesize
+from solver.inner import InnerSolver
 from solver.model import RIGID_MODES, ElasticModel
-from solver.system import System, assemble
+from solver.system import Layout, System, assemble
 from solver.timing import Phases, peak_memory
-from solver.truth import RESIDUAL_TOLERANCE, can_count, prove_complete, solve_truth
+from solver.truth import (
+    RESIDUAL_TOLERANCE,
+    SPARE_MODES,
+    Truth,
+    can_count,
+    prove_complete,
+    solve_truth,
+)
+from solver.verification import (
+    count_rigid,
+    require_orthonormal,
+    require_six_rigid,
+    verify,
+)
 
 Array = NDArray[np.float64]
 
 METHODS = ("hcms", *TYPES)
-RIGID_TOLERANCE = 1e-9
-"""Eigenvalues below this fraction of the largest computed one count as zero."""
-ORTHOGONALITY_TOLERANCE = 1e-8
-"""Largest accepted entry of X^T M X - I."""
 MAX_CORRECTIONS = 40
-FEWEST_SPARE = 8
+FEWEST_SPARE = SPARE_MODES
 """Vectors that the correction needs beyond the modes asked for, to tell the last from the rest."""
+KEPT_SHARE = 1.6
+"""Modes kept at the root of the merge tree, as a share of those asked for."""
+ORTHOGONAL_TO_RIGID = 1e-10
+"""Largest overlap of HCMS modes with the rigid motions that needs no correction."""
 
 
 @dataclass(frozen=True)
@@ -49,30 +64,34 @@ class SolverOptions:
         `corrections` steps.  Ground truth: relative residual of the eigensolver.
     corrections
         Largest number of correction steps; 0 is plain HCMS.
-    degree
-        Polynomial degree of a correction step, see `solver.correction.correct`.
     keep
         Modes kept at the root of the merge tree; a margin above `modes` if not given.
     subdomains
         Number of subdomains; from the number of unknowns if not given.
     interface
-        `free` or `fixed`, see `solver.hcms.condense`.
+        Interface treatment, see `solver.hcms.condense`.
     seed
         Seed of the partition.
     prove
-        Whether ground truth is proven complete by an inertia count.
+        Whether an inertia count proves that no eigenvalue was missed; by default for ground truth
+        alone.
+    inner
+        Inner solver of the correction, see `solver.inner.InnerSolver`.
+    acceleration
+        `krylov` or `relaxation`, see `solver.correction.correct`.
     """
 
     method: str = "hcms"
     modes: int = 256
     tolerance: float | None = None
     corrections: int = MAX_CORRECTIONS
-    degree: int = 3
     keep: int | None = None
     subdomains: int | None = None
     interface: str = "free"
     seed: int = 0
-    prove: bool = True
+    prove: bool | None = None
+    inner: str = "auto"
+    acceleration: str = "krylov"
 
 
 @dataclass
@@ -84,9 +103,9 @@ class Modes:
     values
         (k,) eigenvalues [rad^2/s^2], ascending.
     vectors
-        (local, k) mass-normalised modes, this rank's rows of `system`.
+        (local, k) mass-normalised modes, this rank's rows of `system`, row-major.
     residuals
-        (k,) residual ratios, see `residual_ratios`.
+        (k,) residual ratios, see `solver.verification.residual_ratios`.
     evidence
         What the solver achieved: orthogonality, error estimate, steps, inertia, rigid modes, ranks,
         peak memory.
@@ -102,15 +121,8 @@ class Modes:
     seconds: dict[str, float] = field(default_factory=dict)
 
 
-def modal_analysis(
-    model: ElasticModel | None,
-    options: SolverOptions,
-    comm: MPI.Comm = MPI.COMM_WORLD,
-    verbose: bool = False,
-) -> Modes:
-    """Compute the lowest modes of `model`.
-
-    All ranks of `comm` pass the same options and get the same values.
+class ModalSolver:
+    """Modes of one mesh for any material on it.
 
     Parameters
     ----------
@@ -118,40 +130,214 @@ def modal_analysis(
         The solid; only rank 0's is looked at, and dealt out to the others, who may pass None.
     options
         What to compute and how.
+    comm
+        Ranks that share the work.
     verbose
         Whether to show each phase and its time.
+
+    Attributes
+    ----------
+    seconds
+        Wall time of what depends on the mesh alone, by phase.
 
     Raises
     ------
     UserError
         If more modes are wanted than there are unknowns, or more ranks than subdomains.
-    ConvergenceError
-        If a tolerance was missed, the modes are not orthonormal, or the body does not have six
-        zero-frequency modes.
+
+    Examples
+    --------
+    A material that changes little by little is followed from one solution to the next::
+
+        solver = ModalSolver(model, SolverOptions(modes=60, tolerance=1e-2))
+        modes = solver.solve()
+        modes = solver.solve(young, start=modes)
     """
-    on_root(comm, lambda: check_mode_count(options.modes, cast(ElasticModel, model).n_dofs))
-    phases = Phases(comm, verbose)
-    with phases("partition"):
-        share = distribute(model, options.subdomains, options.seed, comm)
-    with phases("assembly"):
-        system = assemble(share, comm)
-    evidence: dict[str, Any] = {
-        "ranks": comm.size,
-        "subdomains": share.decomposition.tree.parts,
-        "n_dofs": share.n_dofs,
-    }
-    if options.method == "hcms":
-        values, vectors = _hcms(share, system, options, phases, evidence, verbose)
-    else:
-        values, vectors = _general_solver(system, options, phases, evidence)
-    with phases("verification"):
-        residuals, orthogonality = verify(system, values, vectors)
-    evidence["orthogonality"] = orthogonality
-    evidence["residual_max"] = float(residuals.max())
-    evidence["rigid_modes"] = count_rigid(values)
-    evidence["peak_memory_bytes"] = peak_memory(comm)
-    _judge(options, evidence)
-    return Modes(values, vectors, residuals, system, evidence, phases.seconds)
+
+    def __init__(
+        self,
+        model: ElasticModel | None,
+        options: SolverOptions,
+        comm: MPI.Comm = MPI.COMM_WORLD,
+        verbose: bool = False,
+    ) -> None:
+        on_root(comm, lambda: check_mode_count(options.modes, cast(ElasticModel, model).n_dofs))
+        self.options = options
+        self.comm = comm
+        self._verbose = verbose
+        self._threads = _threads_of_rank(comm)
+        reuse_freed_memory()
+        phases = Phases(comm, verbose)
+        with phases("partition"):
+            self._share = distribute(model, options.subdomains, options.seed, comm)
+        self._keep = self._modes_to_keep()
+        with phases("analysis"):
+            self._layout = Layout.of_share(self._share, comm)
+            self._inner = InnerSolver(options.inner, self._layout)
+        self.seconds = phases.seconds
+
+    def solve(self, young: Array | None = None, start: Modes | Array | None = None) -> Modes:
+        """Compute the lowest modes.
+
+        All ranks call it and get the same values.
+
+        Parameters
+        ----------
+        young
+            (m, 8) Young's modulus [Pa] at the cells' quadrature points, on rank 0; that of the
+            model if not given.
+        start
+            Modes of a similar material on the same mesh, or this rank's rows (local, k) of such:
+            they are corrected instead of those of HCMS.
+
+        Raises
+        ------
+        ConvergenceError
+            If a tolerance was missed, the modes are not orthonormal, or the body does not have six
+            zero-frequency modes.
+        """
+        phases = Phases(self.comm, self._verbose)
+        with phases("assembly"):
+            share = self._share
+            if young is not None:
+                share = deal_moduli(share, young, self.comm)
+            elements = share.cells.elements
+            system = assemble(share, self.comm, self._layout, elements, self._threads)
+        evidence: dict[str, Any] = {
+            "ranks": self.comm.size,
+            "threads": self._threads,
+            "subdomains": share.decomposition.tree.parts,
+            "n_dofs": share.n_dofs,
+        }
+        if self.options.method == "hcms":
+            vectors = start.vectors if isinstance(start, Modes) else start
+            found = self._hcms(share, system, vectors, phases, evidence)
+        else:
+            found = self._general_solver(system, phases, evidence)
+        with phases("verification"):
+            residuals, orthogonality = verify(system, *found)
+        evidence["orthogonality"] = orthogonality
+        evidence["residual_max"] = float(residuals.max())
+        evidence["rigid_modes"] = count_rigid(found[0])
+        evidence["peak_memory_bytes"] = peak_memory(self.comm)
+        require_orthonormal(orthogonality)
+        if self._exact:
+            require_six_rigid(evidence["rigid_modes"])
+        return Modes(*found, residuals, system, evidence, phases.seconds)
+
+    @property
+    def _exact(self) -> bool:
+        """Whether eigenpairs are wanted, not just approximations of them."""
+        options = self.options
+        corrected = options.corrections > 0 and options.tolerance != 0.0
+        return options.method != "hcms" or corrected
+
+    def _modes_to_keep(self) -> int:
+        options, n_dofs = self.options, self._share.n_dofs
+        keep = default_keep(options.modes) if options.keep is None else options.keep
+        least = options.modes + (FEWEST_SPARE if options.corrections else 0)
+        if options.method == "hcms" and keep < min(least, n_dofs):
+            raise UserError(
+                f"--keep {keep} is too few for {options.modes} modes; expected at least {least}, "
+                "and half more for fast convergence"
+            )
+        return keep
+
+    def _general_solver(
+        self, system: System, phases: Phases, evidence: dict[str, Any]
+    ) -> tuple[Array, Array]:
+        options = self.options
+        with phases("eigensolver"):
+            truth = solve_truth(
+                system, options.modes, options.method, options.tolerance or RESIDUAL_TOLERANCE
+            )
+        evidence["eigensolver_iterations"] = truth.iterations
+        if options.prove is not False and can_count():
+            self._prove(system, truth, phases, evidence)
+        count = options.modes
+        return truth.values[:count], np.ascontiguousarray(truth.vectors[:, :count])
+
+    def _prove(
+        self, system: System, truth: Truth, phases: Phases, evidence: dict[str, Any]
+    ) -> None:
+        with phases("inertia"):
+            inertia = prove_complete(system, truth)
+        evidence |= {
+            "inertia_at": inertia.value,
+            "inertia_count": inertia.counted,
+            "inertia_expected": inertia.computed,
+        }
+
+    def _hcms(
+        self,
+        share: Share,
+        system: System,
+        start: Array | None,
+        phases: Phases,
+        evidence: dict[str, Any],
+    ) -> tuple[Array, Array]:
+        options = self.options
+        values: Array | None = None
+        if start is None:
+            with phases("hcms"):
+                synthesis = synthesize(share, self._keep, options.interface, self.comm)
+            evidence["hcms"] = synthesis.counts.summary(self.comm)
+            if options.corrections == 0:
+                return self._uncorrected(synthesis)
+            values, start = _elastic_part(system, synthesis)
+        wanted = options.modes - RIGID_MODES
+        spare = SPARE_MODES if options.prove else 0
+        with phases("correction"):
+            result = correct(
+                system,
+                start,
+                wanted + spare,
+                self._inner,
+                values,
+                EIGENVALUE_TOLERANCE if options.tolerance is None else options.tolerance,
+                options.corrections,
+                options.acceleration,
+                report=_reporter(self._verbose and self.comm.rank == 0),
+            )
+            stiff = system.inner(system.rigid, system.times_stiffness(system.rigid))
+        evidence |= {
+            "inner": self._inner.method,
+            "corrections": result.steps,
+            "right_hand_sides": result.solves,
+            "eigenvalue_error_estimate": float(result.errors[:wanted].max()),
+        }
+        found = np.concatenate([np.maximum(np.diag(stiff), 0.0), result.values])
+        vectors = np.concatenate([system.rigid, result.vectors], axis=1)
+        if options.prove and can_count():
+            truth = Truth(found, vectors, options.modes, result.steps)
+            self._prove(system, truth, phases, evidence)
+        count = options.modes
+        return found[:count], np.ascontiguousarray(vectors[:, :count])
+
+    def _uncorrected(self, synthesis: Synthesis) -> tuple[Array, Array]:
+        count = self.options.modes
+        if len(synthesis.values) < count:
+            raise UserError(
+                f"HCMS kept {len(synthesis.values)} modes, {count} are wanted; raise --keep or "
+                "lower --subdomains"
+            )
+        return synthesis.values[:count], np.ascontiguousarray(synthesis.vectors[:, :count])
+
+
+def modal_analysis(
+    model: ElasticModel | None,
+    options: SolverOptions,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    verbose: bool = False,
+    start: Modes | Array | None = None,
+) -> Modes:
+    """Compute the lowest modes of `model` once, see `ModalSolver`.
+
+    The seconds of the result hold those of the preparation too.
+    """
+    prepared = ModalSolver(model, options, comm, verbose)
+    modes = prepared.solve(start=start)
+    return replace(modes, seconds={**prepared.seconds, **modes.seconds})
 
 
 def check_mode_count(modes: int, n_dofs: int) -> None:
@@ -169,123 +355,29 @@ def check_mode_count(modes: int, n_dofs: int) -> None:
 
 
 def default_keep(modes: int) -> int:
-    """Modes kept at the root: those that the correction iterates, and a few to choose from."""
-    return modes + default_guard(modes) + 16
+    """Modes kept at the root: those that the correction iterates, and some to choose from."""
+    return max(int(KEPT_SHARE * modes), modes + default_guard(modes) + FEWEST_SPARE)
 
 
-def _general_solver(
-    system: System, options: SolverOptions, phases: Phases, evidence: dict[str, Any]
-) -> tuple[Array, Array]:
-    with phases("eigensolver"):
-        truth = solve_truth(
-            system, options.modes, options.method, options.tolerance or RESIDUAL_TOLERANCE
-        )
-    evidence["eigensolver_iterations"] = truth.iterations
-    if options.prove and can_count():
-        with phases("inertia"):
-            inertia = prove_complete(system, truth)
-        evidence |= {
-            "inertia_at": inertia.value,
-            "inertia_count": inertia.counted,
-            "inertia_expected": inertia.computed,
-        }
-    return truth.values[: options.modes], np.asfortranarray(truth.vectors[:, : options.modes])
+def _elastic_part(system: System, synthesis: Synthesis) -> tuple[Array | None, Array]:
+    """Ritz values and vectors without the rigid motions; no values if they are not clean of them."""
+    elastic = np.ascontiguousarray(synthesis.vectors[:, RIGID_MODES:])
+    overlap = system.inner(system.times_mass(system.rigid), elastic)
+    if overlap.size and np.abs(overlap).max() > ORTHOGONAL_TO_RIGID:
+        return None, synthesis.vectors
+    return synthesis.values[RIGID_MODES:], elastic
 
 
-def _hcms(
-    share: Share,
-    system: System,
-    options: SolverOptions,
-    phases: Phases,
-    evidence: dict[str, Any],
-    verbose: bool,
-) -> tuple[Array, Array]:
-    keep = default_keep(options.modes) if options.keep is None else options.keep
-    least = options.modes + (FEWEST_SPARE if options.corrections else 0)
-    if keep < min(least, share.n_dofs):
-        raise UserError(
-            f"--keep {keep} is too few for {options.modes} modes; expected at least {least}, and a "
-            f"third more for fast convergence"
-        )
-    with phases("hcms"):
-        start = synthesize(share, keep, options.interface, system.comm)
-    evidence["hcms"] = start.counts.summary(system.comm)
-    if options.corrections == 0:
-        if len(start.values) < options.modes:
-            raise UserError(
-                f"HCMS kept {len(start.values)} modes, {options.modes} are wanted; raise --keep or "
-                "lower --subdomains"
-            )
-        return start.values[: options.modes], start.vectors[:, : options.modes]
-    with phases("correction"):
-        result = correct(
-            system,
-            start.vectors,
-            options.modes - RIGID_MODES,
-            EIGENVALUE_TOLERANCE if options.tolerance is None else options.tolerance,
-            options.corrections,
-            options.degree,
-            report=_reporter(verbose and system.comm.rank == 0),
-        )
-        stiff = system.inner(system.rigid, system.multiply(system.K, system.rigid))
-    evidence |= {
-        "corrections": result.steps,
-        "right_hand_sides": result.solves,
-        "eigenvalue_error_estimate": float(result.errors.max()),
-    }
-    values = np.concatenate([np.maximum(np.diag(stiff), 0.0), result.values])
-    vectors = np.concatenate([system.rigid, result.vectors], axis=1)
-    return values, np.asfortranarray(vectors)
+def _threads_of_rank(comm: MPI.Comm) -> int:
+    """Threads of this rank, so that ranks x threads do not exceed the cores of its machine."""
+    node = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    try:
+        return limit_threads(node.size)
+    finally:
+        node.Free()
 
 
 def _reporter(visible: bool) -> Callable[[int, float], None] | None:
     if not visible:
         return None
     return lambda step, worst: say(f"  after {step} corrections: eigenvalue error {worst:.1e}")
-
-
-def verify(system: System, values: Array, vectors: Array) -> tuple[Array, float]:
-    """Residual ratios of the pairs, and the largest entry of X^T M X - I.
-
-    Products are taken with the assembled matrices; nothing is believed of the solver.
-    """
-    mass_vectors = system.multiply(system.M, vectors)
-    gram = system.inner(vectors, mass_vectors)
-    orthogonality = float(np.abs(gram - np.eye(len(values))).max())
-    return residual_ratios(system, values, vectors, mass_vectors), orthogonality
-
-
-def residual_ratios(system: System, values: Array, vectors: Array, mass_vectors: Array) -> Array:
-    """|K x - lambda M x| / (lambda |M x|) of each pair, in the 2-norm.
-
-    Rigid modes, whose lambda is zero, are measured with the first elastic eigenvalue instead.
-    """
-    residual = system.multiply(system.K, vectors) - mass_vectors * values
-    norms = np.sqrt(system.column_products(residual, residual))
-    mass_norms = np.sqrt(system.column_products(mass_vectors, mass_vectors))
-    tiny = np.finfo(float).tiny
-    return np.asarray(norms / np.maximum(residual_scale(values) * mass_norms, tiny))
-
-
-def residual_scale(values: Array) -> Array:
-    """What residuals are measured with: each eigenvalue, the first elastic one for rigid modes."""
-    return np.maximum(values, values[RIGID_MODES])
-
-
-def count_rigid(values: Array) -> int:
-    """Number of eigenvalues that are zero to rounding."""
-    return int(np.sum(values < RIGID_TOLERANCE * values[-1]))
-
-
-def _judge(options: SolverOptions, evidence: dict[str, Any]) -> None:
-    if evidence["orthogonality"] > ORTHOGONALITY_TOLERANCE:
-        raise ConvergenceError(
-            f"the modes are mass-orthonormal to {evidence['orthogonality']:.1e} only, "
-            f"{ORTHOGONALITY_TOLERANCE:.0e} is required"
-        )
-    exact = options.method != "hcms" or (options.corrections > 0 and options.tolerance != 0.0)
-    if exact and evidence["rigid_modes"] != RIGID_MODES:
-        raise ConvergenceError(
-            f"{evidence['rigid_modes']} zero-frequency modes found, a connected free body has "
-            f"{RIGID_MODES}; part of the model hangs on a hinge or has almost no stiffness"
-        )

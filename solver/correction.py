@@ -3,22 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
+from solver.decomposition import on_root
+from solver.enrichment import Ritz, Step, enrich, relax
+from solver.inner import Inverse, InnerSolver
 from solver.rayleigh_ritz import rayleigh_ritz, safe_shift
-from solver.system import ShiftedInverse, System
+from solver.system import System
 
 Array = NDArray[np.float64]
 
 EIGENVALUE_TOLERANCE = 1e-7
 """Relative eigenvalue error that a correction stops at unless told otherwise."""
-MAX_AMPLIFICATION = 1e5
-"""Largest growth of the lowest active mode over the highest in one polynomial; more would let the
-low modes drown the others in rounding."""
+INTERACTIVE_TOLERANCE = 1e-2
+"""Relative eigenvalue error of the worst mode that is good enough while a material is designed."""
+ACCELERATIONS = ("krylov", "relaxation")
+SHIFT_SHARE = 0.55
+"""Shift of an indefinite factorisation, as a share of the last wanted eigenvalue."""
+GUARD_SHARE, FEWEST_GUARDS = 0.22, 12
+"""Vectors carried beyond the wanted ones, as a share of these, and the fewest of them."""
+IMPROVED_GUARDS = 0.4
+"""Share of the guard vectors that are improved too, for the sake of the last wanted modes."""
+STAGNATION = 3
+"""Steps without any progress after which a correction gives up."""
 
 
 @dataclass
@@ -28,57 +39,62 @@ class Correction:
     Attributes
     ----------
     values
-        (k,) Ritz values [rad^2/s^2].
+        (k,) Ritz values [rad^2/s^2], ascending.
     vectors
-        (local, k) mass-orthonormal, orthogonal to the rigid motions.
+        (local, k) mass-orthonormal, orthogonal to the rigid motions, row-major.
     errors
-        (k,) estimated relative error of each value, from its residual; NaN without an iteration.
+        (k,) estimated relative error of each value, from its residual.
     steps
         Number of corrections made.
     solves
         Number of right-hand sides solved.
     history
-        Largest estimated error before each step.
+        Largest estimated error before each step, and at the end.
     """
 
     values: Array
     vectors: Array
     errors: Array
-    steps: int
-    solves: int
-    history: list[float]
+    steps: int = 0
+    solves: int = 0
+    history: list[float] = field(default_factory=list)
 
 
 def correct(
     system: System,
     start: Array,
     wanted: int,
+    inner: InnerSolver,
+    values: Array | None = None,
     tolerance: float = EIGENVALUE_TOLERANCE,
     max_steps: int = 30,
-    degree: int = 3,
-    guard: int | None = None,
+    acceleration: str = "krylov",
     report: Callable[[int, float], None] | None = None,
     observe: Callable[[int, Array], None] | None = None,
 ) -> Correction:
     """Improve the `wanted` lowest elastic modes from the block `start` until they are accurate.
 
-    One step applies a polynomial of degree `degree` in (K + sigma M)^-1 M to every mode that is not
-    yet accurate, and takes Ritz vectors.  Degree 1 is the over-relaxed iteration of Eq. (16)-(21)
-    with the weights of Bathe & Ramaswamy (1980); higher degrees are the Chebyshev polynomials that
-    damp everything beyond the iterated subspace.
+    A step solves (K - mu M) Z = K X - X Theta M for every mode that is not yet accurate.  With
+    `krylov` the Rayleigh-Ritz method then runs in the span of X and Z together, which holds what
+    the subspace iteration of Eq. (16)-(21) would reach with the best weights; with `relaxation` in
+    the span of X - w Z with the over-relaxation w of Bathe & Ramaswamy (1980), as in the paper.
+    Accurate modes are locked.
 
     Parameters
     ----------
     start
-        (local, q) approximate modes, q > wanted for a margin; rigid motions are removed.
+        (local, q) approximate modes, q > wanted for a margin.
     wanted
         Number of elastic modes to correct.
+    inner
+        Solver of the linear systems.
+    values
+        (q,) Ritz values of `start`, if its columns are mass-orthonormal Ritz vectors orthogonal to
+        the rigid motions; otherwise a Rayleigh-Ritz step makes such of them first.
     tolerance
         Largest accepted relative eigenvalue error, as estimated from the residual.
     max_steps
         Steps allowed; reaching `tolerance` within them is not required when `tolerance` is zero.
-    guard
-        Extra vectors iterated beyond `wanted`; `default_guard` if not given.
     report
         Called with the step and the largest estimated error of the wanted modes.
     observe
@@ -91,14 +107,16 @@ def correct(
 
     Notes
     -----
-    For a Ritz pair (theta, x) with residual r = K x - theta M x, the relative error of theta is
-    estimated as `r^T (K + sigma M)^-1 r / (theta + sigma)`, which equals
-    `(theta + sigma) x^T M (K + sigma M)^-1 M x - 1`, times `theta_p / (theta_p - theta)` since what
-    x lacks lies beyond the last iterated value theta_p.  The solve is the one that the step makes
-    anyway.
+    The residual r = K x - theta M x of a Ritz pair bounds the relative error of theta, to second
+    order, by r^T M^-1 r / (theta (theta_p - theta)), where theta_p is the last value that the
+    subspace holds; M is replaced by its row sums, whose inverse is the smaller.
+
+    With `krylov` and a direct solver the shift mu lies in the middle of the wanted spectrum: the
+    last modes converge like (theta - mu) / (theta_p - mu), and the first are accurate early.
+    Otherwise it lies below the spectrum.
     """
-    guard = default_guard(wanted) if guard is None else guard
-    values, vectors = rayleigh_ritz(system, start, wanted + guard)
+    if values is None:
+        values, start = rayleigh_ritz(system, start)
     if len(values) < wanted:
         raise ConvergenceError(
             f"the start block spans {len(values)} elastic modes, {wanted} are wanted; keep more"
@@ -108,117 +126,116 @@ def correct(
     if len(values) == system.n_dofs - system.rigid.shape[1]:
         # The subspace is the whole space, where Ritz pairs are eigenpairs.
         exact = np.full(wanted, np.finfo(float).eps)
-        return Correction(values[:wanted], vectors[:, :wanted], exact, 0, 0, [])
-    inverse = ShiftedInverse(system, safe_shift(system))
-    errors = np.full(len(values), np.nan)
-    history: list[float] = []
-    solves = 0
-    step = 0
-    active = 0
+        return Correction(values[:wanted], np.ascontiguousarray(start[:, :wanted]), exact)
+    inside = acceleration == "krylov" and inner.indefinite
+    shift = SHIFT_SHARE * values[wanted - 1] if inside else -safe_shift(system)
+    inverse = inner.inverse(system, shift)
     try:
-        while True:
-            block = np.asfortranarray(vectors[:, active:])
-            mass_block = system.multiply(system.M, block)
-            image = inverse.solve(mass_block)
-            solves += block.shape[1]
-            errors[active:] = _estimate(
-                values[active:],
-                system.column_products(mass_block, image),
-                inverse.shift,
-                values[-1],
-            )
-            # All ranks decide by the same bits when to stop and what to lock.
-            errors = system.comm.bcast(errors)
-            worst = float(np.max(errors[:wanted]))
-            history.append(worst)
-            if report is not None:
-                report(step, worst)
-            if step >= max_steps and worst > tolerance:
-                break
-            first = _first_inaccurate(errors, wanted, tolerance)
-            # Accurate modes are locked as their images, which have lost what was left of the
-            # highest frequencies: the residual falls by orders of magnitude at no further solve.
-            new = first - active
-            locked = np.concatenate([vectors[:, :active], image[:, :new]], axis=1)
-            if worst <= tolerance:
-                values, vectors = rayleigh_ritz(system, locked, wanted)
-                break
-            filtered, used = _chebyshev(
-                system, inverse, block[:, new:], image[:, new:], values[first:], degree
-            )
-            solves += filtered.shape[1] * (used - 1)
-            values, vectors = rayleigh_ritz(
-                system, np.concatenate([locked, filtered], axis=1), wanted + guard
-            )
-            if len(values) < wanted:
-                raise ConvergenceError(
-                    f"the iterated vectors collapsed to {len(values)} independent ones after "
-                    f"{step + 1} steps, {wanted} modes are wanted; lower the degree or keep more"
-                )
-            active = min(first, len(values) - 1)
-            errors = np.concatenate([errors[:active], np.full(len(values) - active, np.nan)])
-            step += 1
-            if observe is not None:
-                observe(step, values[:wanted])
+        iteration = _Iteration(system, inverse, Ritz(system, values, start), wanted, acceleration)
+        return iteration.run(tolerance, max_steps, report, observe)
     finally:
         inverse.destroy()
-    if tolerance > 0.0 and worst > tolerance:
-        raise ConvergenceError(
-            f"error correction reached an eigenvalue error of {worst:.1e} after {step} steps, "
-            f"{tolerance:.1e} was asked for; allow more steps or keep more modes"
-        )
-    return Correction(
-        values[:wanted],
-        np.asfortranarray(vectors[:, :wanted]),
-        errors[:wanted],
-        step,
-        solves,
-        history,
-    )
 
 
 def default_guard(wanted: int) -> int:
     """Extra vectors that the iteration carries; the more, the faster the last modes converge."""
-    return wanted // 3 + 16
+    return max(FEWEST_GUARDS, int(GUARD_SHARE * wanted))
 
 
-def _first_inaccurate(errors: Array, wanted: int, tolerance: float) -> int:
-    """Number of leading modes that need no further correction; `wanted` if none does."""
-    accurate = errors[:wanted] <= tolerance
-    return wanted if accurate.all() else int(np.argmin(accurate))
+class _Iteration:
+    """State of the subspace iteration."""
 
+    def __init__(
+        self, system: System, inverse: Inverse, ritz: Ritz, wanted: int, acceleration: str
+    ) -> None:
+        self.system = system
+        self.inverse = inverse
+        self.ritz = ritz
+        self.wanted = wanted
+        guard = default_guard(wanted)
+        self.width = wanted + guard
+        self.improved = wanted + int(IMPROVED_GUARDS * guard)
+        self.step: Step = enrich
+        if acceleration == "relaxation":
+            self.width = self.improved = len(ritz.values)
+            self.step = relax
+        self.solves = 0
+        self.history: list[float] = []
 
-def _estimate(values: Array, inverse_quotient: Array, shift: float, last: float) -> Array:
-    residual = (values + shift) * inverse_quotient - 1.0
-    rounding = np.finfo(float).eps
-    distance = np.maximum(last - values, rounding * last)
-    return np.maximum(residual, rounding) * (last + shift) / distance
+    def run(
+        self,
+        tolerance: float,
+        max_steps: int,
+        report: Callable[[int, float], None] | None,
+        observe: Callable[[int, Array], None] | None,
+    ) -> Correction:
+        """Correct until the tolerance, or the last step allowed, is reached."""
+        step = 0
+        while True:
+            errors, residual, active = self._residuals(tolerance)
+            worst = float(errors.max(initial=0.0))
+            self.history.append(worst)
+            if report is not None:
+                report(step, worst)
+            if worst <= tolerance or step >= max_steps:
+                break
+            if tolerance > 0.0:
+                self._require_progress(step, tolerance)
+            correction = self.inverse.solve(np.ascontiguousarray(residual))
+            self.solves += correction.shape[1]
+            self.step(self.system, self.ritz, correction, active, self.inverse, self.width)
+            step += 1
+            if len(self.ritz.values) < self.wanted:
+                raise ConvergenceError(
+                    f"the iterated vectors collapsed to {len(self.ritz.values)} independent ones "
+                    f"after {step} steps, {self.wanted} modes are wanted; keep more"
+                )
+            if observe is not None:
+                observe(step, np.sort(self.ritz.values)[: self.wanted])
+        if tolerance > 0.0 and worst > tolerance:
+            raise ConvergenceError(
+                f"error correction reached an eigenvalue error of {worst:.1e} after {step} steps, "
+                f"{tolerance:.1e} was asked for; allow more steps or keep more modes"
+            )
+        values, vectors, found = self.ritz.lowest(self.wanted)
+        return Correction(values, vectors, found, step, self.solves, self.history)
 
+    def _residuals(self, tolerance: float) -> tuple[Array, Array, NDArray[np.int64]]:
+        """Errors of the wanted modes, and residuals of those to improve with their numbers.
 
-def _chebyshev(
-    system: System,
-    inverse: ShiftedInverse,
-    block: Array,
-    image: Array,
-    values: Array,
-    degree: int,
-) -> tuple[Array, int]:
-    """Apply the Chebyshev polynomial that damps inverse eigenvalues below the last iterated one.
+        Wanted modes that have become accurate are locked.
+        """
+        ritz = self.ritz
+        candidates = ritz.active[: max(0, self.improved - ritz.locked)]
+        residual = ritz.residual(candidates)
+        ritz.errors[candidates] = on_root(
+            self.system.comm, lambda found=self._estimate(candidates, residual): found
+        )
+        inside = candidates[: max(0, self.wanted - ritz.locked)]
+        errors = ritz.errors[inside]
+        accurate = inside[errors <= tolerance]
+        chosen = ~np.isin(candidates, accurate)
+        ritz.lock(accurate)
+        return errors, residual[:, chosen], candidates[chosen]
 
-    `image` is the inverse applied to `block`.  Columns are scaled by the polynomial at their own
-    Ritz value, so that all keep about unit length.  Returns the columns and the degree used, which
-    is lower while the lowest active mode would grow by more than `MAX_AMPLIFICATION`.
-    """
-    edge = 1.0 / (values[-1] + inverse.shift)
-    argument = 2.0 / (edge * (values + inverse.shift)) - 1.0
-    image = np.asfortranarray(image)
-    before, current = block, (2.0 / edge) * image - block
-    size_before, size = np.ones_like(argument), argument
-    used = 1
-    while used < degree and 2.0 * argument[0] * size[0] <= MAX_AMPLIFICATION * size[-1]:
-        used += 1
-        image = inverse.solve(system.multiply(system.M, current))
-        following = 2.0 * ((2.0 / edge) * image - current) - before
-        before, current = current, following
-        size_before, size = size, 2.0 * argument * size - size_before
-    return np.asfortranarray(current / size), used
+    def _estimate(self, candidates: NDArray[np.int64], residual: Array) -> Array:
+        values = self.ritz.values[candidates]
+        last = np.sort(self.ritz.values)[self._reach()]
+        weighted = residual / np.repeat(self.system.rows.lumped_mass, 3)[:, None]
+        square = self.system.column_products(residual, weighted)
+        distance = np.maximum(last - values, np.finfo(float).eps * last)
+        return np.maximum(square / (values * distance), np.finfo(float).eps)
+
+    def _reach(self) -> int:
+        """Number of the value that bounds what the subspace holds well."""
+        held = len(self.ritz.values)
+        return held - 1 if self.step is enrich else (3 * self.wanted + held) // 4
+
+    def _require_progress(self, step: int, tolerance: float) -> None:
+        recent = self.history[-STAGNATION - 1 :]
+        if len(recent) > STAGNATION and min(recent[1:]) >= recent[0]:
+            raise ConvergenceError(
+                f"error correction stagnates at an eigenvalue error of {min(self.history):.1e} "
+                f"after {step} steps, {tolerance:.1e} was asked for; use another inner solver "
+                "(--inner) or a looser tolerance"
+            )

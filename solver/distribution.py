@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from carillon.errors import UserError
 from solver.decomposition import Decomposition, decompose, on_root
 from solver.messages import AnyArray, receive_arrays, send_arrays
 from solver.model import Chosen, ElasticModel, Elements
 
 Array = NDArray[np.float64]
 
-_SHARE = 10
+_SHARE, _MODULI = 10, 12
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,8 @@ class Share:
         (stop - start,) numbers of this rank's nodes in the mesh.
     positions
         (stop - start, 3) their positions [m].
+    numbers
+        (c,) numbers of `cells` in the mesh.
     """
 
     decomposition: Decomposition
@@ -87,6 +90,7 @@ class Share:
     cells: Cells
     nodes: NDArray[np.int64]
     positions: Array
+    numbers: NDArray[np.int64]
 
     @property
     def n_dofs(self) -> int:
@@ -135,18 +139,54 @@ def distribute(
     decomposition, constants = on_root(comm, cut)
     if comm.rank == 0:
         assert model is not None
-        nodes, positions, cells = _deal(model, decomposition, order, comm)
+        nodes, positions, numbers, cells = _deal(model, decomposition, order, comm)
     else:
-        nodes, positions, *arrays = receive_arrays(comm, 0, _SHARE)
+        nodes, positions, numbers, *arrays = receive_arrays(comm, 0, _SHARE)
         cells = Cells(np.empty((0, 8), dtype=np.int64), constants).from_arrays(arrays)
     start, stop = decomposition.local_range(comm.rank)
-    return Share(decomposition, start, stop, cells, nodes, positions)
+    return Share(decomposition, start, stop, cells, nodes, positions, numbers)
+
+
+def deal_moduli(share: Share, young: Array | None, comm: MPI.Comm) -> Share:
+    """The same share of a solid with other moduli.
+
+    Parameters
+    ----------
+    young
+        (m, 8) moduli [Pa] of all cells of the mesh; only rank 0's are looked at.
+
+    Raises
+    ------
+    UserError
+        On every rank, if there are not as many as cells, or one is not a positive number.
+    """
+    everyone = comm.gather(share.numbers)
+
+    def check() -> None:
+        assert young is not None and everyone is not None
+        cells = 1 + max(int(numbers.max()) for numbers in everyone)
+        if young.shape != (cells, 8):
+            raise UserError(f"moduli of shape {young.shape}, expected ({cells}, 8)")
+        if not (np.isfinite(young).all() and (young >= 0.0).all() and young.any()):
+            raise UserError("moduli [Pa]: found negative or no numbers, expected positive ones")
+
+    on_root(comm, check)
+    if comm.rank == 0:
+        assert young is not None and everyone is not None
+        for rank in range(1, comm.size):
+            send_arrays(comm, [young[everyone[rank]]], rank, _MODULI).wait()
+        mine = young[share.numbers]
+    else:
+        (mine,) = receive_arrays(comm, 0, _MODULI)
+    elements = share.cells.elements
+    cells = replace(share.cells, elements=elements.with_material(mine, elements.fill))
+    return replace(share, cells=cells)
 
 
 def _deal(
     model: ElasticModel, decomposition: Decomposition, order: NDArray[np.int64], comm: MPI.Comm
-) -> tuple[NDArray[np.int64], Array, Cells]:
-    """Send every other rank its nodes, their positions and its cells; return rank 0's own."""
+) -> tuple[NDArray[np.int64], Array, NDArray[np.int64], Cells]:
+    """Send every rank its nodes, their positions, its cells' numbers and cells; return rank 0's."""
     row = np.empty(len(order), dtype=np.int64)
     row[order] = np.arange(len(order))
     corners = row[model.mesh.cells]
@@ -155,15 +195,15 @@ def _deal(
     rank_of, cell = _incidences(np.searchsorted(ends, corners, side="right"))
     first = np.searchsorted(rank_of, np.arange(comm.size + 1))
 
-    def share(rank: int) -> tuple[NDArray[np.int64], Array, Cells]:
+    def share(rank: int) -> tuple[NDArray[np.int64], Array, NDArray[np.int64], Cells]:
         start, stop = decomposition.local_range(rank)
         nodes = order[start:stop].copy()
-        cells = whole.take(cell[first[rank] : first[rank + 1]])
-        return nodes, model.mesh.nodes[nodes], cells
+        numbers = cell[first[rank] : first[rank + 1]].copy()
+        return nodes, model.mesh.nodes[nodes], numbers, whole.take(numbers)
 
     for rank in range(1, comm.size):
-        nodes, positions, cells = share(rank)
-        send_arrays(comm, [nodes, positions, *cells.arrays()], rank, _SHARE).wait()
+        *arrays, cells = share(rank)
+        send_arrays(comm, [*arrays, *cells.arrays()], rank, _SHARE).wait()
     return share(0)
 
 

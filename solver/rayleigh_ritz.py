@@ -31,13 +31,13 @@ def rayleigh_ritz(system: System, block: Array, count: int | None = None) -> tup
 
     Linearly dependent directions are dropped, so fewer than `count` pairs may come back.
     """
-    block, mass_block = remove_rigid(system, np.asfortranarray(block))
+    block, mass_block = remove_rigid(system, np.ascontiguousarray(block))
     gram = system.inner(block, mass_block)
-    stiff = system.inner(block, system.multiply(system.K, block))
+    stiff = system.inner(block, system.times_stiffness(block))
     # Solved once: two processors may round apart, and an eigenvector's sign hangs on rounding.
     values, weights = on_root(system.comm, lambda: _reduced_eigenpairs(stiff, gram))
     count = len(values) if count is None else min(count, len(values))
-    return values[:count], _times(block, weights[:, :count])
+    return values[:count], block @ weights[:, :count]
 
 
 def _reduced_eigenpairs(stiff: Array, gram: Array) -> tuple[Array, Array]:
@@ -63,22 +63,17 @@ def remove_rigid(system: System, block: Array) -> tuple[Array, Array]:
     Columns that were rigid motions, of which only rounding is left, are dropped.
     """
     rigid = system.rigid
-    mass_rigid = system.multiply(system.M, rigid)
-    mass_block = system.multiply(system.M, block)
+    mass_rigid = system.times_mass(rigid)
+    mass_block = system.times_mass(block)
     before = system.column_products(block, mass_block)
     share = system.inner(mass_rigid, block)
-    block = block - _times(rigid, share)
-    mass_block -= _times(mass_rigid, share)
+    block = block - rigid @ share
+    mass_block -= mass_rigid @ share
     after = system.column_products(block, mass_block)
     elastic = after > RIGID_TOLERANCE**2 * before
     if not elastic.all():
         block, mass_block = block[:, elastic], mass_block[:, elastic]
-    return np.asfortranarray(block), np.asfortranarray(mass_block)
-
-
-def _times(block: Array, weights: Array) -> Array:
-    """Product of a block of vectors with a small matrix, in Fortran order without a copy."""
-    return (weights.T @ block.T).T
+    return np.ascontiguousarray(block), np.ascontiguousarray(mass_block)
 
 
 def first_elastic_estimate(system: System) -> float:
@@ -96,7 +91,7 @@ def first_elastic_estimate(system: System) -> float:
     powers = [power for power in powers if sum(power) <= POLYNOMIAL_DEGREE]
     fields = np.stack([(system.coordinates**power).prod(axis=1) for power in powers], axis=1)
     block = np.einsum("np,ij->nipj", fields, np.eye(3)).reshape(3 * len(fields), -1)
-    values, _ = rayleigh_ritz(system, np.asfortranarray(block))
+    values, _ = rayleigh_ritz(system, np.ascontiguousarray(block))
     if values[0] <= HINGE_TOLERANCE * values[-1]:
         raise ConvergenceError(
             "a seventh zero-frequency mode found, a connected free body has six; part of the model "

@@ -1,27 +1,28 @@
 """The assembled eigenvalue problem on distributed rows, and dense blocks of vectors over it.
 
 Rows follow a `Decomposition`: each rank owns the unknowns of its subdomains, and holds nothing of
-the others'.  A block of vectors is a Fortran-ordered numpy array with this rank's rows; products
-and solves take and return them.
+the others'.  A block of vectors is a row-major numpy array with this rank's rows; products and
+solves take and return them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, TypeVar, cast
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
 from dataset_gen.block import degrees_of_freedom
 from dataset_gen.element import rigid_motions
 from solver.decomposition import keep_on_root
 from solver.distribution import Share
-from solver.eigensolver import distributed_matrix, factor_package
-from solver.sparse import assemble_elements
+from solver.eigensolver import distributed_matrix
+from solver.model import Elements
+from solver.node_rows import Halo, NodeRows, Pattern
 
 Array = NDArray[np.float64]
 Number = TypeVar("Number", np.float64, np.int64)
@@ -31,13 +32,47 @@ COLUMNS_GATHERED = 16
 
 
 @dataclass(frozen=True)
+class Layout:
+    """What the rows of a mesh have to do with each other, whatever the material.
+
+    Attributes
+    ----------
+    share
+        This rank's share of the solid.
+    pattern, halo
+        Node graph of its rows, and the exchange of rows with its neighbours.
+    coordinates
+        (local nodes, 3) positions relative to the centroid, in units of the largest half extent.
+    """
+
+    share: Share
+    pattern: Pattern
+    halo: Halo
+    coordinates: Array
+    comm: MPI.Comm
+
+    @classmethod
+    def of_share(cls, share: Share, comm: MPI.Comm = MPI.COMM_WORLD) -> Layout:
+        """Layout of a share; collective."""
+        pattern = Pattern.of_cells(share.cells.corners, share.start, share.stop)
+        starts = [share.decomposition.local_range(rank)[0] for rank in range(comm.size)]
+        halo = Halo(pattern, np.array([*starts, share.decomposition.n_nodes]), comm)
+        return cls(share, pattern, halo, _centred(share, comm), comm)
+
+    def planes(self) -> NDArray[np.int64]:
+        """Integer coordinates (local nodes, 3) of this rank's nodes, in elements' edges."""
+        positions = self.share.positions / self.share.cells.elements.edge
+        return np.rint(positions - positions.min(axis=0)).astype(np.int64)
+
+
+@dataclass(frozen=True)
 class System:
     """K u = lambda M u over the ranks of `comm`.
 
     Attributes
     ----------
-    K, M
-        PETSc matrices [N/m], [kg].
+    rows
+        This rank's rows of K [N/m] and M [kg].
     rigid
         (local, 6) this rank's rows of the mass-orthonormal rigid motions.
     coordinates
@@ -50,8 +85,7 @@ class System:
         Number of unknowns over all ranks.
     """
 
-    K: Any
-    M: Any
+    rows: NodeRows
     rigid: Array
     coordinates: Array
     nodes: NDArray[np.int64]
@@ -60,14 +94,23 @@ class System:
     n_dofs: int
     comm: MPI.Comm
 
-    def multiply(self, matrix: Any, block: Array) -> Array:
-        """Product of a PETSc matrix with a block of vectors."""
-        dense = _wrap(block, self.n_dofs, self.comm)
-        product = matrix.matMult(dense)
-        result = np.array(product.getDenseArray(readonly=True), order="F")
-        product.destroy()
-        dense.destroy()
-        return result
+    def times_stiffness(self, block: Array) -> Array:
+        """Product of K with a block of vectors; collective."""
+        return self.rows.times_stiffness(block)
+
+    def times_mass(self, block: Array) -> Array:
+        """Product of M with a block of vectors; collective."""
+        return self.rows.times_mass(block)
+
+    @cached_property
+    def K(self) -> Any:
+        """Stiffness as a PETSc matrix, made when first asked for; collective."""
+        return distributed_matrix(self.rows.stiffness_csr(self.n_dofs), self.comm)
+
+    @cached_property
+    def M(self) -> Any:
+        """Mass as a PETSc matrix, made when first asked for; collective."""
+        return distributed_matrix(self.rows.mass_csr(self.n_dofs), self.comm)
 
     def inner(self, left: Array, right: Array) -> Array:
         """left^T right summed over the ranks; equal on all ranks."""
@@ -85,7 +128,7 @@ class System:
 
     def local_rows(self, block: Array) -> Array:
         """This rank's rows of a replicated block (n_dofs, k) given in mesh node order."""
-        return np.asfortranarray(block[degrees_of_freedom(self.nodes)])
+        return np.ascontiguousarray(block[degrees_of_freedom(self.nodes)])
 
     def pour(
         self,
@@ -156,32 +199,50 @@ class System:
         return whole
 
     def destroy(self) -> None:
-        """Free the PETSc matrices."""
-        self.K.destroy()
-        self.M.destroy()
+        """Free the PETSc matrices, if there are any."""
+        for name in ("K", "M"):
+            matrix = self.__dict__.pop(name, None)
+            if matrix is not None:
+                matrix.destroy()
 
 
-def assemble(share: Share, comm: MPI.Comm = MPI.COMM_WORLD) -> System:
-    """Assemble stiffness and mass; every rank assembles the rows of the nodes that it owns."""
-    cells = share.cells
-    K_rows, M_rows = assemble_elements(
-        cells.corners,
-        cells.elements.stiffness(),
-        cells.elements.nodal_mass(),
-        share.stop - share.start,
-        share.n_dofs // 3,
-        share.start,
-    )
-    K = distributed_matrix(K_rows, comm)
-    M = distributed_matrix(M_rows, comm)
-    coordinates = _centred(share, comm)
+def assemble(
+    share: Share,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    layout: Layout | None = None,
+    elements: Elements | None = None,
+    threads: int = 1,
+) -> System:
+    """Assemble stiffness and mass; every rank assembles the rows of the nodes that it owns.
+
+    Parameters
+    ----------
+    share
+        This rank's share of the solid.
+    layout
+        Its layout, if that was made before.
+    elements
+        Its cells with other moduli than the share's.
+    threads
+        Threads for products with blocks of vectors.
+    """
+    layout = Layout.of_share(share, comm) if layout is None else layout
+    elements = share.cells.elements if elements is None else elements
+    rows = NodeRows(layout.pattern, layout.halo, elements, threads)
     # About the centroid of the whole body: every rank must hold rows of the same six motions.
-    motions = np.asfortranarray(rigid_motions(coordinates, np.zeros(3)))
+    motions = np.ascontiguousarray(rigid_motions(layout.coordinates, np.zeros(3)))
     system = System(
-        K, M, motions, coordinates, share.nodes, share.start, share.stop, share.n_dofs, comm
+        rows,
+        motions,
+        layout.coordinates,
+        share.nodes,
+        share.start,
+        share.stop,
+        share.n_dofs,
+        comm,
     )
-    gram = system.inner(motions, system.multiply(M, motions))
-    rigid = np.asfortranarray(np.linalg.solve(np.linalg.cholesky(gram), motions.T).T)
+    gram = system.inner(motions, system.times_mass(motions))
+    rigid = np.ascontiguousarray(np.linalg.solve(np.linalg.cholesky(gram), motions.T).T)
     return replace(system, rigid=rigid)
 
 
@@ -193,47 +254,3 @@ def _centred(share: Share, comm: MPI.Comm) -> Array:
     extent = np.abs(centred).max(keepdims=True)
     comm.Allreduce(MPI.IN_PLACE, extent, op=MPI.MAX)
     return np.asarray(centred / extent)
-
-
-class ShiftedInverse:
-    """Solves (K + shift M) X = B for blocks of right-hand sides by sparse Cholesky."""
-
-    def __init__(self, system: System, shift: float) -> None:
-        if shift <= 0.0:
-            raise ValueError("a free body has a singular stiffness; the shift must be positive")
-        self._system = system
-        self.shift = shift
-        self._matrix = system.K.copy()
-        self._matrix.axpy(shift, system.M, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        self._matrix.setOption(PETSc.Mat.Option.SPD, True)
-        self._pc = PETSc.PC().create(system.comm)
-        self._pc.setOperators(self._matrix)
-        self._pc.setType(PETSc.PC.Type.CHOLESKY)
-        self._pc.setFactorSolverType(factor_package(system.comm.size))
-        self._pc.setUp()
-        self._factor = self._pc.getFactorMatrix()
-
-    def solve(self, block: Array) -> Array:
-        """Solution for a block of right-hand sides (local, k)."""
-        solution = np.zeros_like(block, order="F")
-        rhs = _wrap(block, self._system.n_dofs, self._system.comm)
-        out = _wrap(solution, self._system.n_dofs, self._system.comm)
-        self._factor.matSolve(rhs, out)
-        rhs.destroy()
-        out.destroy()
-        return solution
-
-    def destroy(self) -> None:
-        """Free the factorisation."""
-        self._pc.destroy()
-        self._matrix.destroy()
-
-
-def _wrap(block: Array, rows: int, comm: MPI.Comm) -> Any:
-    """PETSc view of a Fortran-ordered block, without a copy."""
-    if not block.flags.f_contiguous:
-        raise ValueError("blocks of vectors must be Fortran-contiguous")
-    size = ((block.shape[0], rows), (None, block.shape[1]))
-    dense = PETSc.Mat().createDense(size, array=block, comm=comm)
-    dense.assemble()
-    return dense

@@ -147,7 +147,7 @@ def test_material_array_of_the_right_length_is_used(tmp_path, run_cli, n_voxels)
         ([*BAR, "--modes", "30", "--keep", "30"], "--keep 30 is too few for 30 modes"),
         ([*BAR, "--seed", "-1"], "--seed"),
         ([*BAR, "--tol", "-1"], "--tol"),
-        ([*BAR, "--degree", "0"], "--degree"),
+        ([*BAR, "--inner", "guess"], "--inner"),
         ([*BAR, "--corrections", "-1"], "--corrections"),
         ([*BAR, "--coarsen", "ddfem", "--forest", "absent.h5"], "absent.h5"),
         ([*BAR, "--poisson", "0.5"], "Poisson's ratio 0.5"),

@@ -49,7 +49,7 @@ class Synthesis:
     values
         (k,) Ritz values [rad^2/s^2], ascending, on every rank.
     vectors
-        (local unknowns, k) this rank's rows, Fortran-contiguous.
+        (local unknowns, k) this rank's rows, row-major.
     counts
         What this rank did for them.
     """
@@ -238,14 +238,13 @@ class _Climb:
         """This rank's rows of the final modes; frees the local bases."""
         start, stop = self.share.start, self.share.stop
         if not weights:
-            return np.asfortranarray(self.bases.pop(0))
+            return np.ascontiguousarray(self.bases.pop(0))
         count = next(iter(weights.values())).shape[1]
-        vectors = np.empty((3 * (stop - start), count), order="F")
+        vectors = np.empty((3 * (stop - start), count))
         for part, weight in weights.items():
             basis = self.bases.pop(part)
             first, last = self.ranges[part]
             rows = slice(3 * (first - start), 3 * (last - start))
-            # Formed transposed, so that it is written column by column.
-            vectors[rows] = (weight.T @ basis.T).T
+            np.matmul(basis, weight, out=vectors[rows])
             self.counts.basis.flops += product_flops(len(basis), len(weight), count)
         return vectors

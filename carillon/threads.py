@@ -1,0 +1,55 @@
+"""Sharing work among the threads of one process, each with a single-threaded BLAS."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from functools import cache
+
+from threadpoolctl import ThreadpoolController
+
+
+def split(count: int, threads: int, largest: int) -> list[tuple[int, int]]:
+    """Half-open ranges that cut `count` items evenly: a multiple of `threads`, none over `largest`.
+
+    Examples
+    --------
+    >>> split(10, 2, 3)
+    [(0, 3), (3, 5), (5, 8), (8, 10)]
+    """
+    rounds = max(1, -(-count // (threads * largest)))
+    pieces = min(count, threads * rounds)
+    bounds = [-(-count * piece // pieces) for piece in range(pieces + 1)] if pieces else []
+    return list(zip(bounds[:-1], bounds[1:], strict=True))
+
+
+def in_parallel(
+    work: Callable[..., object], arguments: Sequence[tuple[object, ...]], threads: int
+) -> list[object]:
+    """Call `work` with each of `arguments` on up to `threads` threads; results in their order.
+
+    `work` must release the global interpreter lock for most of its time.  BLAS runs on one thread
+    within each call.
+    """
+    if threads == 1 or len(arguments) == 1:
+        return [work(*each) for each in arguments]
+    with single_threaded_blas():
+        return list(_pool(threads).map(lambda each: work(*each), arguments))
+
+
+@contextmanager
+def single_threaded_blas() -> Iterator[None]:
+    """Every BLAS of this process on one thread within the body."""
+    with _controller().limit(limits=1, user_api="blas"):
+        yield
+
+
+@cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(threads, thread_name_prefix="carillon")
+
+
+@cache
+def _controller() -> ThreadpoolController:
+    return ThreadpoolController()

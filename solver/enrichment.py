@@ -1,0 +1,234 @@
+"""One step of the error correction: a better subspace from corrections of the Ritz vectors."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+import scipy.linalg as la
+from numpy.typing import NDArray
+
+from solver.decomposition import on_root
+from solver.inner import Inverse
+from solver.rayleigh_ritz import rayleigh_ritz
+from solver.system import System
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+DEPENDENT = 1e-11
+"""Directions whose share (squared) of the corrections is below this are dropped."""
+WELL_CONDITIONED = 1e-3
+"""Least diagonal entry of the Cholesky factor of the scaled Gram matrix to rely on it."""
+MOST_PASSES = 3
+"""Times that the corrections are orthogonalised; twice is enough but for rounding."""
+
+
+class Ritz:
+    """Ritz vectors of a subspace, some of them locked.
+
+    Attributes
+    ----------
+    values
+        (m,) Ritz values [rad^2/s^2].
+    vectors, mass_vectors
+        (local, m) mass-orthonormal X, orthogonal to the rigid motions, and M X; row-major.
+    errors
+        (m,) last estimate of each value's relative error.
+    active
+        Numbers of the vectors that are not locked, by ascending value.
+    """
+
+    def __init__(self, system: System, values: Array, vectors: Array) -> None:
+        self.system = system
+        self.values = values.copy()
+        self.vectors = np.ascontiguousarray(vectors)
+        self.mass_vectors = system.times_mass(self.vectors)
+        self.mass_rigid = system.times_mass(system.rigid)
+        self.errors = np.full(len(values), np.nan)
+        self.active: Index = np.arange(len(values))
+
+    @property
+    def locked(self) -> int:
+        """Number of locked vectors."""
+        return len(self.values) - len(self.active)
+
+    def lock(self, numbers: Index) -> None:
+        """Leave these vectors as they are from now on."""
+        self.active = self.active[~np.isin(self.active, numbers)]
+
+    def residual(self, numbers: Index) -> Array:
+        """K X - M X Theta of some vectors."""
+        residual = self.system.times_stiffness(self.vectors[:, numbers])
+        residual -= self.mass_vectors[:, numbers] * self.values[numbers]
+        return residual
+
+    def replace_active(self, values: Array, vectors: Array) -> None:
+        """Put new vectors in the place of the active ones; locked ones come first."""
+        locked = np.ones(len(self.values), dtype=bool)
+        locked[self.active] = False
+        mass_vectors = self.system.times_mass(vectors)
+        if locked.any():
+            vectors = np.concatenate([self.vectors[:, locked], vectors], axis=1)
+            mass_vectors = np.concatenate([self.mass_vectors[:, locked], mass_vectors], axis=1)
+        self.vectors, self.mass_vectors = vectors, mass_vectors
+        count = int(locked.sum())
+        self.values = np.concatenate([self.values[locked], values])
+        self.errors = np.concatenate([self.errors[locked], np.full(len(values), np.nan)])
+        self.active = np.arange(count, len(self.values))
+
+    def lowest(self, count: int) -> tuple[Array, Array, Array]:
+        """Values, vectors and errors of the lowest `count`, ascending."""
+        order = np.argsort(self.values, kind="stable")[:count]
+        vectors = np.ascontiguousarray(self.vectors[:, order])
+        return self.values[order], vectors, self.errors[order]
+
+
+class Step(Protocol):
+    """A step of the iteration: improves the active Ritz vectors in place."""
+
+    def __call__(
+        self,
+        system: System,
+        ritz: Ritz,
+        corrections: Array,
+        numbers: Index,
+        inverse: Inverse,
+        width: int,
+    ) -> None:
+        """`corrections` (local, a) solve for the residuals of the vectors `numbers`."""
+
+
+def enrich(
+    system: System, ritz: Ritz, corrections: Array, numbers: Index, inverse: Inverse, width: int
+) -> None:
+    """Rayleigh-Ritz in the span of the active vectors and their corrections.
+
+    Of the result as many vectors stay that the whole has `width`.
+
+    Notes
+    -----
+    With exact solves K Z = R + mu M Z, and X^T R = 0 for Ritz vectors, so the projections of K
+    follow from those of M alone: X^T K Z = mu X^T M Z, and Z^T R = X^T M Z (mu - Theta), transposed.
+    Inexact solutions are multiplied by K.
+    """
+    Z, overlap, gram, untouched = _independent(system, ritz, corrections)
+    if inverse.exact and untouched:
+        mu = inverse.shift
+        across = mu * overlap
+        half = (mu - ritz.values[numbers]) * overlap[numbers].T
+        stiff = mu * gram + 0.5 * (half + half.T)
+    else:
+        KZ = system.times_stiffness(Z)
+        across = system.inner(ritz.vectors, KZ)
+        stiff = system.inner(Z, KZ)
+        del KZ
+    keep = max(0, width - ritz.locked)
+
+    # Solved once: two processors may round apart, and an eigenvector's sign hangs on rounding.
+    values, of_all, of_corrections = on_root(
+        system.comm,
+        lambda: _lowest(ritz.values, ritz.active, overlap, gram, across, stiff, keep),
+    )
+    vectors = ritz.vectors @ of_all
+    vectors += Z @ of_corrections
+    ritz.replace_active(values, vectors)
+
+
+def _independent(system: System, ritz: Ritz, Z: Array) -> tuple[Array, Array, Array, bool]:
+    """Z, or a basis of what it adds to X, well-conditioned enough to orthonormalise by Cholesky.
+
+    Returns
+    -------
+    The columns (local, a), X^T M Z, Z^T M Z, and whether Z was good as it is.
+    """
+    for passes in range(MOST_PASSES):
+        Z -= system.rigid @ system.inner(ritz.mass_rigid, Z)
+        overlap = system.inner(ritz.mass_vectors, Z)
+        gram = system.inner(Z, system.times_mass(Z))
+        basis, condition = on_root(
+            system.comm, lambda found=_outside(overlap, gram): _orthonormal(found)
+        )
+        if condition > WELL_CONDITIONED or passes == MOST_PASSES - 1:
+            break
+        # Small differences of large numbers: what is outside X is formed, then judged again.
+        Z = Z @ basis
+        Z -= ritz.vectors @ (overlap @ basis)
+    return Z, overlap, gram, passes == 0
+
+
+def _outside(overlap: Array, gram: Array) -> Array:
+    """Gram matrix of the part of Z outside X."""
+    return _symmetric(gram - overlap.T @ overlap)
+
+
+def _lowest(
+    theta: Array, active: Index, overlap: Array, gram: Array, across: Array, stiff: Array, keep: int
+) -> tuple[Array, Array, Array]:
+    """Lowest pairs of the pencil projected on the active X and the part of Z outside X.
+
+    Returns
+    -------
+    values (k,), and coefficients of X (m, k) and of Z (a, k).
+    """
+    basis, _ = _orthonormal(_outside(overlap, gram))
+    # Q = (Z - X C) T is orthonormal and orthogonal to X; K X is Theta M X within the subspace.
+    coupling = (across[active] - theta[active, None] * overlap[active]) @ basis
+    inner = stiff - overlap.T @ across - across.T @ overlap + overlap.T @ (theta[:, None] * overlap)
+    size, extra = len(active), basis.shape[1]
+    H = np.zeros((size + extra, size + extra), order="F")
+    H[np.arange(size), np.arange(size)] = theta[active]
+    H[size:, :size] = coupling.T
+    H[size:, size:] = basis.T @ inner @ basis
+    values, vectors = la.eigh(
+        H, driver="evd", lower=True, overwrite_a=True, check_finite=False
+    )
+    keep = min(keep, len(values))
+    of_basis = basis @ vectors[size:, :keep]
+    of_all = -overlap @ of_basis
+    of_all[active] += vectors[:size, :keep]
+    return values[:keep], of_all, of_basis
+
+
+def _orthonormal(gram: Array) -> tuple[Array, float]:
+    """Coefficients T that make vectors with this Gram matrix orthonormal, dependent ones dropped.
+
+    Also returns the least diagonal entry of the Cholesky factor of the scaled matrix, 0 if there is
+    none.
+    """
+    size = np.diag(gram)
+    usable = size > 0.0
+    scale = np.where(usable, 1.0 / np.sqrt(np.where(usable, size, 1.0)), 0.0)
+    gram = gram * scale * scale[:, None]
+    factor, failed = la.lapack.dpotrf(gram, lower=True, clean=True)
+    condition = 0.0 if failed else float(np.diag(factor).min(initial=1.0))
+    if condition > WELL_CONDITIONED:
+        inverse, _ = la.lapack.dtrtri(factor, lower=True)
+        return scale[:, None] * inverse.T, condition
+    spread, directions = la.eigh(gram, driver="evd", check_finite=False)
+    independent = spread > DEPENDENT * max(spread[-1], 0.0)
+    whitening = directions[:, independent] / np.sqrt(spread[independent])
+    return scale[:, None] * whitening, condition
+
+
+def relax(
+    system: System, ritz: Ritz, corrections: Array, numbers: Index, inverse: Inverse, width: int
+) -> None:
+    """Rayleigh-Ritz in the span of X - w Z, the over-relaxed subspace iteration of the paper.
+
+    The weight w = 1 + theta / (theta + theta_p) / 2 grows from 1 for the lowest modes, which
+    converge fast, towards 1.25 for the last (a mild choice of Bathe & Ramaswamy 1980).
+    """
+    values = ritz.values[numbers]
+    weight = 1.0 + 0.5 * np.abs(values) / (np.abs(values) + ritz.values.max())
+    iterated = ritz.vectors[:, ritz.active]
+    position = np.searchsorted(ritz.active, numbers)
+    iterated[:, position] -= corrections * weight
+    locked = np.setdiff1d(np.arange(len(ritz.values)), ritz.active)
+    iterated -= ritz.vectors[:, locked] @ system.inner(ritz.mass_vectors[:, locked], iterated)
+    found, vectors = rayleigh_ritz(system, iterated, max(0, width - ritz.locked))
+    ritz.replace_active(found, vectors)
+
+
+def _symmetric(matrix: Array) -> Array:
+    return np.asarray(0.5 * (matrix + matrix.T))
