@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
+import numba
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -171,17 +172,18 @@ class IterativeInverse:
     def _iterate(self, residual: Array, target: Array) -> Array:
         """Conjugate gradients from zero (Hestenes & Stiefel 1952) until |residual| <= target."""
         products = self._operators.column_products
+        residual = residual.copy()
         found = np.empty_like(residual)
         solution = np.zeros_like(residual)
         progress = _Progress(self._norms(residual))
         active = np.arange(residual.shape[1])
-        direction = self._precondition(residual)
-        energy = products(residual, direction)
+        direction = np.zeros_like(residual)
+        energy = np.ones(len(active))
         for step in range(1, self._max_iterations + 1):
+            energy = self._turn(direction, residual, energy)
             image = self._apply(direction)
             length = energy / products(direction, image)
-            solution += direction * length
-            residual = residual - image * length
+            _advance(solution, residual, direction, image, length)
             self.iterations += len(active)
             norms = self._norms(residual)
             # Written so that a length that is not a number counts as a breakdown, too.
@@ -197,23 +199,26 @@ class IterativeInverse:
                     np.ascontiguousarray(each[:, left]) for each in (solution, residual, direction)
                 )
                 energy = energy[left]
-            preconditioned = self._precondition(residual)
-            before, energy = energy, products(residual, preconditioned)
-            direction *= energy / before
-            direction += preconditioned
         raise self._failure(norms, target[active], step)
 
     def _apply(self, block: Array) -> Array:
         """(K - shift M) X."""
-        image = self._operators.times_stiffness(block)
-        image -= self.shift * self._operators.times_mass(block)
+        image = self._operators.times_mass(block)
+        image *= -self.shift
+        image += self._operators.times_stiffness(block)
         return image
 
-    def _precondition(self, residual: Array) -> Array:
-        """Preconditioned residual without its rigid part, which the residual does not have."""
-        result = self._preconditioner.apply(residual)
-        result -= self._rigid @ self._operators.inner(self._mass_rigid, result)
-        return result
+    def _turn(self, direction: Array, residual: Array, before: Array) -> Array:
+        """Make `direction` conjugate again, in place; returns the residual's energy.
+
+        The preconditioned residual loses its rigid part, which the residual does not have: the
+        search then never meets the smallest eigenvalues, those of the rigid motions.
+        """
+        preconditioned = self._preconditioner.apply(residual)
+        energy = self._operators.column_products(residual, preconditioned)
+        share = self._operators.inner(self._mass_rigid, preconditioned)
+        _conjugate(direction, preconditioned, energy / before, self._rigid, share)
+        return energy
 
     def _norms(self, block: Array) -> Array:
         return np.sqrt(self._operators.column_products(block, block))
@@ -246,3 +251,27 @@ class _Progress:
         self._best[active[better]] = norms[better]
         self._since[active[better]] = step
         return bool((step - self._since[active] >= STALL_ITERATIONS).any())
+
+
+@numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
+def _advance(solution, residual, direction, image, length):  # type: ignore[no-untyped-def]
+    """Step of `length` along `direction`, in one pass over the memory."""
+    for row in range(solution.shape[0]):
+        x, r, p, q = solution[row], residual[row], direction[row], image[row]
+        for k in range(len(length)):
+            x[k] += length[k] * p[k]
+            r[k] -= length[k] * q[k]
+
+
+@numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
+def _conjugate(direction, ahead, ratio, rigid, share):  # type: ignore[no-untyped-def]
+    """direction = ratio * direction + ahead - rigid share, in one pass over the memory."""
+    for row in range(direction.shape[0]):
+        p, z = direction[row], ahead[row]
+        for k in range(len(ratio)):
+            p[k] = ratio[k] * p[k] + z[k]
+        for i in range(rigid.shape[1]):
+            weight = rigid[row, i]
+            motion = share[i]
+            for k in range(len(ratio)):
+                p[k] -= weight * motion[k]

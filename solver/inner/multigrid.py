@@ -11,6 +11,7 @@ from typing import Any
 
 import numba
 import numpy as np
+import scipy.linalg as la
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
@@ -27,9 +28,10 @@ COARSEST_UNKNOWNS = 600
 SMOOTHED_SPECTRUM = (0.1, 1.1)
 """Interval that the smoother damps, as fractions of the largest eigenvalue's estimate; above one,
 since the estimate comes from below."""
-POWER_STEPS = 12
-POWER_COLUMNS = 8
-"""Steps and vectors of the power iteration that estimates the largest eigenvalue."""
+LANCZOS_STEPS = 20
+"""Steps of the estimate."""
+EXHAUSTED = 1e-6
+"""A next Lanczos vector that is this small, relative to the matrix, is nothing but rounding."""
 _PREFIX = "carillon_amg_"
 
 
@@ -94,9 +96,7 @@ class Multigrid:
         # interpolated from the others is zero.
         used = diagonal > 0.0
         scale = np.divide(1.0, diagonal, out=np.zeros_like(diagonal), where=used)
-        return _Level(
-            rows, prolong, restrict, scale, _largest_eigenvalue(rows, diagonal, scale, comm)
-        )
+        return _Level(rows, prolong, restrict, scale, _largest_eigenvalue(rows, scale, comm))
 
     def _cycle(self, number: int, rhs: Array) -> Array:
         if number == len(self._levels):
@@ -206,24 +206,32 @@ def _aggregate(matrix: Any, near_null: Array, comm: MPI.Comm, threshold: float) 
     return pc
 
 
-def _largest_eigenvalue(rows: BlockRows, diagonal: Array, scale: Array, comm: MPI.Comm) -> float:
-    """Estimate, from below, of the largest eigenvalue of D^-1 A, equal on all ranks."""
-    rng = np.random.default_rng(comm.rank)
-    block = rng.standard_normal((len(scale), POWER_COLUMNS)).astype(scale.dtype)
-    quotient = 0.0
-    for _ in range(POWER_STEPS):
-        image = rows.times(block)
-        products = np.stack(
-            [
-                np.einsum("ij,ij->j", block, image, dtype=np.float64),
-                np.einsum("ij,ij,i->j", block, block, diagonal, dtype=np.float64),
-            ]
-        )
-        comm.Allreduce(MPI.IN_PLACE, products)
-        quotient = float((products[0] / products[1]).max())
-        block = scale[:, None] * image
-        block /= scale.dtype.type(quotient)
-    return quotient
+def _largest_eigenvalue(rows: BlockRows, scale: Array, comm: MPI.Comm) -> float:
+    """Estimate by Lanczos' method, from below, of the largest eigenvalue of D^-1 A.
+
+    `scale` is the diagonal of D^-1.  All ranks get the same bits.
+    """
+    root = np.sqrt(scale)[:, None]
+
+    def product(left: Array, right: Array) -> float:
+        return float(comm.allreduce(np.vdot(left, right)))
+
+    vector = np.random.default_rng(comm.rank).standard_normal(root.shape).astype(root.dtype)
+    vector *= root > 0.0
+    before = np.zeros_like(vector)
+    diagonal: list[float] = []
+    beside = [np.sqrt(product(vector, vector))]
+    for _ in range(LANCZOS_STEPS):
+        vector /= root.dtype.type(beside[-1])
+        image = root * rows.times(root * vector)
+        diagonal.append(product(vector, image))
+        image -= root.dtype.type(diagonal[-1]) * vector
+        image -= root.dtype.type(beside[-1] if len(diagonal) > 1 else 0.0) * before
+        before, vector = vector, image
+        beside.append(np.sqrt(product(vector, vector)))
+        if beside[-1] <= EXHAUSTED * diagonal[0]:
+            break
+    return float(la.eigvalsh_tridiagonal(diagonal, beside[1 : len(diagonal)])[-1])
 
 
 @numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
