@@ -2,67 +2,143 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from solver.analysis import RIGID_MODES, check_mode_count, default_keep
-from solver.correction import correct
+from carillon.errors import UserError
+from carillon.progress import track
+from solver.analysis import SolverOptions, check_mode_count, default_keep, modal_analysis
+from solver.comparison import eigenvalue_errors
+from solver.correction import ACCELERATIONS, correct
 from solver.decomposition import on_root
 from solver.distribution import Share, distribute
+from solver.hcms.condense import INTERFACES
 from solver.hcms.synthesis import synthesize
-from solver.model import ElasticModel
-from solver.system import assemble
+from solver.inner import InnerSolver
+from solver.model import RIGID_MODES, ElasticModel
+from solver.modes_file import read_modes
+from solver.system import Layout, System, assemble
 
 Array = NDArray[np.float64]
 
-STARTS = ("hcms-free", "hcms-fixed", "random")
-PAPER_DEGREE = 1
-"""Polynomial degree of a correction as in the paper: one solve a step, over-relaxed."""
+RANDOM = "random"
+STARTS = (*(f"hcms-{interface}" for interface in INTERFACES), RANDOM)
+"""HCMS by each interface treatment, and random vectors."""
 
 
 def correction_history(
     model: ElasticModel | None,
     modes: int,
     steps: int,
-    degree: int = PAPER_DEGREE,
     seed: int = 0,
+    truth: str | Path | None = None,
     comm: MPI.Comm = MPI.COMM_WORLD,
 ) -> dict[str, Any]:
-    """Elastic eigenvalues [rad^2/s^2] after each correction, by start.
+    """Elastic eigenvalues [rad^2/s^2] after each correction, by start and acceleration.
 
-    The starts are HCMS with free and with fixed interfaces, and random Gaussian vectors,
-    orthogonalised, as many as HCMS keeps.  Only rank 0's `model` is looked at.
+    The starts are HCMS with every interface treatment, and random Gaussian vectors,
+    orthogonalised, as many as HCMS keeps.
+
+    Parameters
+    ----------
+    model
+        The solid; only rank 0's is looked at.
+    modes
+        Number of modes, rigid ones included.
+    steps
+        Corrections made.
+    truth
+        Modes file of the same solid with its exact eigenvalues; SLEPc finds them if not given.
+
+    Returns
+    -------
+    Plain values: `exact` (modes - 6,), and `histories`, each with `start`, `acceleration`, `values`
+    (steps + 1, modes - 6) and their errors, `eigenvalue_error`.
+
+    Raises
+    ------
+    UserError
+        If there are too few unknowns for so many modes, or `truth` is not of this solid.
     """
     on_root(comm, lambda: check_mode_count(modes, cast(ElasticModel, model).n_dofs))
+    exact = _exact(model, modes, truth, comm)[RIGID_MODES:]
     share = distribute(model, None, seed, comm)
-    system = assemble(share, comm)
-    wanted = modes - RIGID_MODES
-    curves = {}
-    for start in STARTS:
+    layout = Layout.of_share(share, comm)
+    system = assemble(share, comm, layout)
+    inner = InnerSolver("auto", layout)
+    histories = []
+    for start in track(STARTS, "starts", visible=comm.rank == 0):
         block = _start_block(start, share, default_keep(modes), seed, comm)
-        history: list[list[float]] = []
+        for acceleration in ACCELERATIONS:
+            values = _correct(system, inner, block, modes - RIGID_MODES, steps, acceleration)
+            histories.append(
+                {
+                    "start": start,
+                    "acceleration": acceleration,
+                    "values": [step.tolist() for step in values],
+                    "eigenvalue_error": [eigenvalue_errors(step, exact) for step in values],
+                }
+            )
+    return {
+        "modes": modes,
+        "steps": steps,
+        "n_dofs": share.n_dofs,
+        "exact": exact.tolist(),
+        "histories": histories,
+    }
 
-        def note(step: int, values: Array, rows: list[list[float]] = history) -> None:
-            rows.append(values.tolist())
 
-        correct(
-            system,
-            block,
-            wanted,
-            tolerance=0.0,
-            max_steps=steps,
-            degree=degree,
-            observe=note,
+def _exact(
+    model: ElasticModel | None, modes: int, truth: str | Path | None, comm: MPI.Comm
+) -> Array:
+    """The lowest eigenvalues (modes,) from the file `truth` or by SLEPc."""
+    if truth is not None:
+        return on_root(comm, lambda: _read_exact(cast(ElasticModel, model), modes, truth))
+    result = modal_analysis(model, SolverOptions(method="slepc", modes=modes, prove=False), comm)
+    result.system.destroy()
+    return result.values
+
+
+def _read_exact(model: ElasticModel, modes: int, truth: str | Path) -> Array:
+    file = read_modes(truth, with_modes=False)
+    found, unknowns = len(file.eigenvalues), file.mesh.n_dofs
+    if found < modes or unknowns != model.n_dofs:
+        raise UserError(
+            f"{truth}: {found:,} modes of {unknowns:,} unknowns, expected {modes:,} or more of "
+            f"{model.n_dofs:,}"
         )
-        curves[start] = history
-    return {"modes": modes, "degree": degree, "n_dofs": share.n_dofs, "start": curves}
+    return file.eigenvalues[:modes]
+
+
+def _correct(
+    system: System,
+    inner: InnerSolver,
+    block: Array,
+    wanted: int,
+    steps: int,
+    acceleration: str,
+) -> list[Array]:
+    """Ritz values (wanted,) before the first correction and after each."""
+    history: list[Array] = []
+    correct(
+        system,
+        block,
+        wanted,
+        inner,
+        tolerance=0.0,
+        max_steps=steps,
+        acceleration=acceleration,
+        observe=lambda step, values: history.append(values.copy()),
+    )
+    return history
 
 
 def _start_block(start: str, share: Share, keep: int, seed: int, comm: MPI.Comm) -> Array:
-    if start == "random":
+    if start == RANDOM:
         return random_block(share, keep, seed, comm)
     return synthesize(share, keep, start.removeprefix("hcms-"), comm).vectors
 
@@ -79,4 +155,4 @@ def random_block(share: Share, columns: int, seed: int, comm: MPI.Comm) -> Array
         )
         for part in share.decomposition.subdomains_of(comm.rank)
     ]
-    return np.asfortranarray(np.concatenate(drawn))
+    return np.concatenate(drawn)

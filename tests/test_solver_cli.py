@@ -75,28 +75,6 @@ def test_summary_as_json(tmp_path, run_cli):
     assert len(summary["frequencies_hz"]) == 12
 
 
-def test_benchmark_row_names_every_method(tmp_path, run_cli):
-    out = tmp_path / "row.json"
-    done = run_cli(
-        "solver",
-        "benchmark",
-        *BAR,
-        "--modes",
-        "20",
-        "--runs",
-        "1",
-        "--json",
-        "--out",
-        out,
-        check=True,
-    )
-    row = json.loads(done.stdout)
-    assert row["methods"] == json.loads(out.read_text())["methods"]
-    alone = {"slepc", "arpack", "hcms", "hcms_ec", "average_hcms_ec"}
-    assert set(row["methods"]) == alone | {"ddfem_slepc", "ddfem_hcms_ec"}
-    assert row["methods"]["hcms_ec"]["frequency_rms_relative_error"] < 1e-6
-
-
 def arrays(n: int) -> dict[str, np.ndarray]:
     return {
         "short": np.ones(n - 1),

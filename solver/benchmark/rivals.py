@@ -1,0 +1,128 @@
+"""The general eigensolvers that the method is timed against, set up as well as they can be."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from slepc4py import SLEPc
+
+from carillon.errors import ConvergenceError
+from solver.distribution import distribute
+from solver.eigensolver import factor_package
+from solver.model import ElasticModel
+from solver.rayleigh_ritz import safe_shift
+from solver.system import assemble
+
+Array = NDArray[np.float64]
+
+PACKAGES = {"cholmod": "suitesparse", "mumps": "mumps"}
+"""Sparse Cholesky factorisations that are tried, and the packages that PETSc has them from."""
+SUBSPACES = (1.25, 1.5, 2.0)
+"""Lanczos vectors for each mode wanted that are tried."""
+FEWEST_MORE = 24
+"""Lanczos vectors beyond the modes wanted, however few these are."""
+MOST_RESTARTS = 2000
+"""Restarts that ARPACK may make without a factorisation."""
+
+
+@dataclass(frozen=True)
+class SlepcConfiguration:
+    """How SLEPc's shift-and-invert Krylov-Schur is set up.
+
+    Attributes
+    ----------
+    package
+        Sparse Cholesky factorisation, as PETSc calls it.
+    subspace
+        Lanczos vectors for each mode wanted.
+    """
+
+    package: str
+    subspace: float
+
+    @classmethod
+    def default(cls, ranks: int) -> SlepcConfiguration:
+        """What `solver modes --method slepc` does: MUMPS and twice as many vectors as modes."""
+        return cls(factor_package(ranks), 2.0)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain dictionary, ready for JSON."""
+        return asdict(self)
+
+    def __str__(self) -> str:
+        return f"{self.package}, {self.subspace:g} vectors a mode"
+
+    @contextmanager
+    def in_force(self, modes: int) -> Iterator[None]:
+        """Every SLEPc solver made in the body is set up so, by PETSc's options database."""
+        chosen = {
+            "eps_ncv": max(round(self.subspace * modes), modes + FEWEST_MORE),
+            "st_pc_factor_mat_solver_type": self.package,
+        }
+        options = PETSc.Options()
+        for name, value in chosen.items():
+            options[name] = value
+        try:
+            yield
+        finally:
+            for name in chosen:
+                options.delValue(name)
+
+
+def configurations(ranks: int) -> list[SlepcConfiguration]:
+    """Every configuration that is tried in tuning; CHOLMOD runs on one rank alone."""
+    present = [
+        package
+        for package, bundle in PACKAGES.items()
+        if PETSc.Sys.hasExternalPackage(bundle) and (ranks == 1 or package == "mumps")
+    ]
+    return [SlepcConfiguration(*chosen) for chosen in product(present, SUBSPACES)]
+
+
+def smallest_without_factor(
+    model: ElasticModel | None, modes: int, tolerance: float, seed: int, comm: MPI.Comm
+) -> Array:
+    """Lowest eigenvalues (modes,) [rad^2/s^2] by ARPACK in regular mode: products alone.
+
+    With a diagonal mass the problem is D x' = lambda x', D = M^-1/2 K M^-1/2.  A small shift keeps
+    the rigid motions' zeros away from ARPACK's test, which is relative to the eigenvalue.
+
+    Raises
+    ------
+    ConvergenceError
+        If too few pairs converge.
+    """
+    system = assemble(distribute(model, None, seed, comm), comm)
+    scale = system.M.getDiagonal()
+    scale.sqrtabs()
+    scale.reciprocal()
+    operator = system.K.copy()
+    operator.diagonalScale(scale, scale)
+    shift = safe_shift(system)
+    operator.shift(shift)
+    operator.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    solver = SLEPc.EPS().create(comm)
+    solver.setType(SLEPc.EPS.Type.ARPACK)
+    solver.setOperators(operator)
+    solver.setProblemType(SLEPc.EPS.ProblemType.HEP)
+    solver.setWhichEigenpairs(SLEPc.EPS.Which.SMALLEST_REAL)
+    solver.setDimensions(modes)
+    solver.setTolerances(tolerance, MOST_RESTARTS)
+    solver.solve()
+    found = solver.getConverged()
+    values = np.sort([solver.getEigenvalue(index).real for index in range(found)]) - shift
+    for used in (solver, operator, scale, system):
+        used.destroy()
+    if found < modes:
+        raise ConvergenceError(
+            f"ARPACK in regular mode converged {found} of {modes} modes in {MOST_RESTARTS} restarts"
+        )
+    return values[:modes]

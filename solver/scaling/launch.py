@@ -1,0 +1,66 @@
+"""Runs on several numbers of ranks, each started under mpiexec."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from carillon.errors import UserError
+from carillon.progress import say, track
+
+LAUNCHER = "mpiexec"
+_ALLOWED = {
+    # Open MPI binds ranks to cores, refuses root and more ranks than cores, unless told otherwise.
+    "OMPI_MCA_hwloc_base_binding_policy": "none",
+    "PRTE_MCA_hwloc_default_binding_policy": "none",
+    "OMPI_MCA_rmaps_base_oversubscribe": "1",
+    "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+}
+"""What lets any number of ranks run; other MPIs take no notice."""
+
+
+def measure_each(
+    arguments: Mapping[int, Sequence[str]], environment: Mapping[str, str] = os.environ
+) -> list[dict[str, Any]]:
+    """Run `solver scaling ARGUMENTS` on each number of ranks, with one thread a rank.
+
+    Parameters
+    ----------
+    arguments
+        By number of ranks; of a run that measures the ranks it is started on.
+
+    Raises
+    ------
+    UserError
+        If there is no mpiexec, or a run fails; with what the run said.
+    """
+    launcher = shutil.which(LAUNCHER)
+    if launcher is None:
+        raise UserError(f"no {LAUNCHER} on PATH; install MPI, or start the ranks by hand")
+    found = []
+    with tempfile.TemporaryDirectory() as folder:
+        for ranks, given in track(arguments.items(), "ranks", total=len(arguments)):
+            out = Path(folder) / f"{ranks}.json"
+            command = [launcher, "-n", str(ranks), sys.executable, "-m", "mpi4py", "-m", "solver"]
+            command += ["scaling", *given, "--here", "--out", str(out)]
+            _run(command, {**_ALLOWED, **environment, "OMP_NUM_THREADS": "1"}, ranks)
+            found.append(json.loads(out.read_text()))
+            say(f"{ranks} ranks: {found[-1]['seconds']:.2f} s", visible=sys.stderr.isatty())
+    return found
+
+
+def _run(command: list[str], environment: dict[str, str], ranks: int) -> None:
+    done = subprocess.run(command, env=environment, capture_output=True, text=True)
+    if done.returncode != 0:
+        said = [line for line in done.stderr.splitlines() if line.startswith("solver")]
+        reason = said[0] if said else f"exit status {done.returncode}\n{done.stderr.strip()}"
+        raise UserError(f"the run on {ranks} ranks failed: {reason}")
