@@ -284,7 +284,7 @@ class ModalSolver:
             evidence["hcms"] = synthesis.counts.summary(self.comm)
             if options.corrections == 0:
                 return self._uncorrected(synthesis)
-            values, start = _elastic_part(system, synthesis)
+            values, start = elastic_part(system, synthesis)
         wanted = options.modes - RIGID_MODES
         spare = SPARE_MODES if options.prove else 0
         with phases("correction"):
@@ -359,7 +359,7 @@ def default_keep(modes: int) -> int:
     return max(int(KEPT_SHARE * modes), modes + default_guard(modes) + FEWEST_SPARE)
 
 
-def _elastic_part(system: System, synthesis: Synthesis) -> tuple[Array | None, Array]:
+def elastic_part(system: System, synthesis: Synthesis) -> tuple[Array | None, Array]:
     """Ritz values and vectors without the rigid motions; no values if they are not clean of them."""
     elastic = np.ascontiguousarray(synthesis.vectors[:, RIGID_MODES:])
     overlap = system.inner(system.times_mass(system.rigid), elastic)
