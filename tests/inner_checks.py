@@ -61,7 +61,7 @@ def solutions_are_those_of_a_direct_solve() -> None:
         expected = spla.splu((K - shift * M).tocsc()).solve(np.ascontiguousarray(whole))
     for method in METHODS:
         for tolerance in (1e-2, 1e-10):
-            inverse = IterativeInverse(system, shift, method, tolerance)
+            inverse = IterativeInverse(system, shift, method, tolerance, threads=2)
             solution = inverse.solve(rhs)
             assert solution.flags.c_contiguous
             assert relative_residuals(system, inverse, rhs, solution).max() <= 1.01 * tolerance
