@@ -57,8 +57,9 @@ def test_default_configuration_states_the_defaults_of_the_schema():
     del config["models"]
     expected = defaults_of(settings.schema())
     # Which model is shown depends on the models, which have no default.
-    assert config["convergence"].pop("models")
-    expected["convergence"].pop("models")
+    for part in ("convergence", "times"):
+        assert config[part].pop("models")
+        expected[part].pop("models")
     assert config == expected
 
 
@@ -107,6 +108,22 @@ def test_a_missing_mesh_file_and_an_unknown_model_are_named(tmp_path):
         settings.check_links(config)
     config["models"] = {"bell": config["models"]["bell"]}
     with pytest.raises(UserError, match="'bunny' is not among the models bell"):
+        settings.check_links(config)
+
+
+@pytest.mark.parametrize(
+    ("part", "key"),
+    [
+        ("convergence", "models"),
+        ("times", "models"),
+        ("figures", "convergence"),
+        ("figures", "scaling"),
+    ],
+)
+def test_lists_of_models_name_models(part, key):
+    config = load("default")
+    config[part][key] = ["gong"]
+    with pytest.raises(UserError, match=rf"{part}\.{key}: 'gong' is not among the models"):
         settings.check_links(config)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -45,8 +45,8 @@ def check_links(config: Mapping[str, Any]) -> None:
     Raises
     ------
     UserError
-        If a model's mesh or material does not exist, `convergence.models` names no model,
-        `objectives.objectives` no objective, or training data make no sense.
+        If a model's mesh or material does not exist, a list of models names none,
+        `objectives.objectives` names no objective, or training data make no sense.
     """
     for name in config["models"]:
         for path in model_files(config, name):
@@ -55,12 +55,11 @@ def check_links(config: Mapping[str, Any]) -> None:
                     f"models.{name}: there is no file {path}; put it there, or set mesh_folder to "
                     "the folder that holds it"
                 )
-    for name in config["convergence"]["models"]:
-        if name not in config["models"]:
-            raise UserError(
-                f"convergence.models: {name!r} is not among the models "
-                f"{', '.join(config['models'])}"
-            )
+    for part in ("convergence", "times"):
+        _require_models(f"{part}.models", config[part]["models"], config["models"])
+    for part in ("convergence", "scaling"):
+        figures = config["figures"]
+        _require_models(f"figures.{part}", figures[part], figures["models"])
     for plan in (training.own(config), training.default(config)):
         plan.check()
     training.check_study(config)
@@ -100,6 +99,11 @@ def studied_mesh(config: Mapping[str, Any], solid: str) -> str:
     return _located(config, config["objectives"]["models"][solid]["mesh"])
 
 
+def figured_mesh(config: Mapping[str, Any], solid: str) -> str:
+    """Mesh argument of the solver for a solid of the figures."""
+    return _located(config, config["figures"]["models"][solid]["mesh"])
+
+
 def studied_objectives(config: Mapping[str, Any]) -> list[str]:
     """Names of the objectives that the study compares."""
     return list(config["objectives"]["objectives"] or OBJECTIVES)
@@ -108,6 +112,12 @@ def studied_objectives(config: Mapping[str, Any]) -> list[str]:
 def studied_forest_files(config: Mapping[str, Any]) -> list[str]:
     """Forests that the study sets beside the fits; none if there are no default ones either."""
     found = _named_or_default(config["objectives"]["forest"])
+    return [] if found is None else [found]
+
+
+def default_forest_files() -> list[str]:
+    """Forests that come with the package; none if there are none."""
+    found = _named_or_default(None)
     return [] if found is None else [found]
 
 
@@ -121,6 +131,13 @@ def _named_or_default(named: str | None) -> str | None:
         return named or str(forest_model.default_path())
     except UserError:
         return None
+
+
+def _require_models(where: str, names: Iterable[str], models: Iterable[str]) -> None:
+    known = list(models)
+    for name in names:
+        if name not in known:
+            raise UserError(f"{where}: {name!r} is not among the models {', '.join(known)}")
 
 
 def _located(config: Mapping[str, Any], mesh: str) -> str:

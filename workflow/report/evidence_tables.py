@@ -68,6 +68,8 @@ def provenance(results: Results) -> Table:
         if model in results.convergence:
             history = results.convergence[model]
             origins[f"models/{model}/convergence.json"] = history.get("provenance", {})
+        if model in results.methods:
+            origins[f"models/{model}/methods.json"] = results.methods[model]["provenance"]
     return provenance_table(origins)
 
 

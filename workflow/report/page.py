@@ -10,6 +10,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup
 
+from workflow.report.convergence_tables import convergence_sentences
 from workflow.report.findings import findings
 from workflow.report.numbers import show
 from workflow.report.results import Results
@@ -47,7 +48,9 @@ def render(results: Results) -> str:
             }
             for model in results.config["convergence"]["models"]
         ],
+        convergence_sentences=convergence_sentences(tables["convergence"]),
         times=inline(results.figure("times.svg")),
+        methods=inline(results.figure("methods.svg")) if tables["methods"].rows else "",
     )
 
 

@@ -82,6 +82,19 @@ class Results:
         }
 
     @cached_property
+    def methods(self) -> dict[str, dict[str, Any]]:
+        """Output of `solver benchmark` for the models that have one."""
+        return {
+            model: self._json("models", model, "methods.json")
+            for model in self.config["times"]["models"]
+        }
+
+    @property
+    def titles(self) -> dict[str, str]:
+        """Names of the models for people."""
+        return {model: self.title(model) for model in self.models}
+
+    @cached_property
     def shards(self) -> dict[str, dict[str, Any]]:
         """Summaries of the training data by shard."""
         names = training.own(self.config).shards

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from workflow.report import evidence_tables, forests_tables, spectra_tables, times_tables
+from workflow.report import (
+    convergence_tables,
+    evidence_tables,
+    forests_tables,
+    methods_tables,
+    spectra_tables,
+    times_tables,
+)
 from workflow.report.results import Results
 from workflow.report.table import Table
 
@@ -14,6 +21,11 @@ BUILDERS: dict[str, Callable[[Results], Table]] = {
     "errors": spectra_tables.errors,
     "coarsening": spectra_tables.coarsening,
     "times": times_tables.times,
+    "methods": lambda results: methods_tables.methods(results.methods, results.titles),
+    "ratios": lambda results: methods_tables.ratios(results.methods, results.titles),
+    "convergence": lambda results: convergence_tables.convergence(
+        results.convergence, results.titles
+    ),
     "phases": times_tables.phases,
     "training": forests_tables.training,
     "blocks": forests_tables.blocks,

@@ -6,11 +6,12 @@ def model_files(wildcards):
     return settings.model_files(config, wildcards.model)
 
 
-def model_arguments(wildcards):
-    """What the solid is: mesh, resolution, material."""
+def model_arguments(wildcards, resolution=None):
+    """What the solid is: mesh, resolution (the model's own if None), material."""
     model = config["models"][wildcards.model]
     return (
-        f"{settings.mesh_of(config, wildcards.model)} --resolution {model['resolution']}"
+        f"{settings.mesh_of(config, wildcards.model)}"
+        f" --resolution {resolution or model['resolution']}"
         f" --material {settings.material_of(config, wildcards.model)} --unit {model['unit']}"
         f" --density {model['density']} --poisson {config['poisson']} --seed {model['seed']}"
         f" --pieces {model['pieces']}"
@@ -23,12 +24,16 @@ def variant_files(wildcards):
     return [f"{RESULTS}/forests/forests.h5"] if needs_forests else []
 
 
+def forest_argument(wildcards, input):
+    """The forests to coarsen with, if any are named."""
+    return f"--forest {input.forests}" if input.forests else ""
+
+
 def variant_arguments(wildcards, input):
     """How the solid is coarsened and solved."""
     variant = variants.VARIANTS[wildcards.variant]
     arguments = [f"--coarsen {variant.coarsen} --method {variant.method}"]
-    if input.forests:
-        arguments.append(f"--forest {input.forests}")
+    arguments.append(forest_argument(wildcards, input))
     if variant.method == "hcms":
         arguments.append(hcms_arguments(variant.corrected))
     return " ".join(arguments)
@@ -44,6 +49,18 @@ def hcms_arguments(corrected):
     else:
         arguments.append("--corrections 0")
     return " ".join(arguments)
+
+
+def timed_arguments(wildcards):
+    """The solid on which all methods are timed."""
+    return model_arguments(wildcards, config["times"]["resolution"])
+
+
+def times_arguments(part):
+    """How methods are timed, from a part of the configuration."""
+    flags = [f"--{key.replace('_', '-')}" for key in ("tune", "arpack_regular") if part.get(key)]
+    numbers = [f"--{key.replace('_', '-')} {part[key]}" for key in ("modes", "runs", "slow_runs")]
+    return " ".join([*numbers, *flags])
 
 
 def model_modes(wildcards):

@@ -38,7 +38,6 @@ rule plot_spectrum:
 rule plot_convergence:
     input:
         history=f"{RESULTS}/models/{{model}}/convergence.json",
-        truth=f"{RESULTS}/models/{{model}}/{variants.TRUTH}.h5",
     output:
         svg=f"{RESULTS}/figures/{{model}}-convergence.svg",
         png=f"{RESULTS}/figures/{{model}}-convergence.png",
@@ -64,6 +63,21 @@ rule plot_times:
         runtime="10m",
     script:
         "../scripts/plot_times.py"
+
+
+rule plot_methods:
+    input:
+        methods=f"{RESULTS}/tables/methods.json",
+    output:
+        svg=f"{RESULTS}/figures/methods.svg",
+        png=f"{RESULTS}/figures/methods.png",
+    log:
+        f"{LOGS}/figures/methods.log",
+    resources:
+        mem_mb=1000,
+        runtime="10m",
+    script:
+        "../scripts/plot_methods.py"
 
 
 # A picture for a README or a slide: one mode and the spectrum against the truth.
@@ -100,6 +114,7 @@ rule build_report:
             model=config["convergence"]["models"],
         ),
         times=f"{RESULTS}/figures/times.svg",
+        methods=[f"{RESULTS}/figures/methods.svg"] if config["times"]["models"] else [],
         templates=[
             Path(workflow.basedir, "workflow/report", name)
             for name in ("page.html.j2", "base.html.j2", "macros.html.j2", "page.css")

@@ -33,6 +33,7 @@ rule find_modes:
 rule follow_convergence:
     input:
         model=model_files,
+        truth=f"{RESULTS}/models/{{model}}/{variants.TRUTH}.h5",
     output:
         f"{RESULTS}/models/{{model}}/convergence.json",
     log:
@@ -49,7 +50,8 @@ rule follow_convergence:
         steps=config["convergence"]["steps"],
     shell:
         "OMP_NUM_THREADS={threads} python -m solver convergence {params.model}"
-        " --modes {params.modes} --steps {params.steps} --out {output} > {log} 2>&1"
+        " --modes {params.modes} --steps {params.steps} --truth {input.truth} --out {output}"
+        " > {log} 2>&1"
 
 
 rule compare_with_truth:
@@ -67,3 +69,32 @@ rule compare_with_truth:
     shell:
         "OMP_NUM_THREADS={threads} python -m solver compare {input.candidate} {input.truth} --json"
         " > {output}.partial 2> {log} && mv {output}.partial {output}"
+
+
+# All methods in alternating runs, on a solid that may be coarser than the model itself.
+rule time_methods:
+    input:
+        model=model_files,
+        forests=f"{RESULTS}/forests/forests.h5",
+    output:
+        f"{RESULTS}/models/{{model}}/methods.json",
+    log:
+        f"{LOGS}/models/{{model}}/methods.log",
+    benchmark:
+        f"{BENCHMARKS}/models/{{model}}/methods.tsv"
+    threads: SOLVER_CORES
+    resources:
+        mpi=LAUNCHER,
+        tasks=RANKS,
+        mem_mb=8000,
+        runtime="4h",
+    params:
+        ranks=RANKS,
+        on_ranks=ON_RANKS,
+        model=timed_arguments,
+        how=times_arguments(config["times"]),
+        forest=forest_argument,
+    shell:
+        "OMP_NUM_THREADS=$(( {threads} > {params.ranks} ? {threads} / {params.ranks} : 1 ))"
+        " {resources.mpi} {params.on_ranks} -m solver benchmark"
+        " {params.model} {params.how} {params.forest} --out {output} > {log} 2>&1"

@@ -6,6 +6,9 @@ TABLES = [
     "errors",
     "coarsening",
     "times",
+    "methods",
+    "ratios",
+    "convergence",
     "phases",
     "training",
     "blocks",
@@ -48,6 +51,7 @@ rule tabulate_results:
             f"{RESULTS}/models/{{model}}/convergence.json",
             model=config["convergence"]["models"],
         ),
+        methods=expand(f"{RESULTS}/models/{{model}}/methods.json", model=config["times"]["models"]),
     output:
         expand(
             f"{RESULTS}/tables/{{table}}.{{kind}}",

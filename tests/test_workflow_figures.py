@@ -1,0 +1,112 @@
+"""The paper's figures in full: what is planned, and a miniature end to end."""
+
+from __future__ import annotations
+
+import pytest
+import yaml
+
+from tests.pages import Page, assert_same_numbers, assert_self_contained
+from tests.workflow_runs import CHECKOUT, PROFILE, TINY, planned, snakemake
+from workflow.figures import results
+from workflow.figures.tables import BUILDERS
+from workflow.report.convergence_tables import convergence, convergence_sentences
+from workflow.report.methods_tables import methods, ratios
+from workflow.report.table import read_table
+
+CONFIG = yaml.safe_load((CHECKOUT / "workflow" / "config" / "default.yaml").read_text())
+
+
+def test_figures_are_no_part_of_the_default_run(tmp_path):
+    jobs = planned(snakemake(tmp_path, "figures", "--dry-run", "--cores", 1))
+    # Bunny and teapot have no mesh here.
+    assert jobs["time_methods_in_full"] == 4
+    assert jobs["follow_convergence_in_full"] == jobs["measure_scaling"] == 1
+    assert "find_modes" not in jobs and "time_methods" not in jobs
+    default = planned(snakemake(tmp_path, "--dry-run", "--cores", 1))
+    assert default["time_methods"] == 1
+    assert not {"time_methods_in_full", "measure_scaling"} & set(default)
+
+
+def test_meshes_that_exist_take_part_and_others_are_named(tmp_path):
+    (tmp_path / "teapot.obj").touch()
+    config = {**CONFIG, "mesh_folder": str(tmp_path)}
+    assert "teapot" in results.present(config) and "bunny" not in results.present(config)
+    assert results.present(config, "convergence") == ["frying-pan"]
+    sentence = results.without(config)
+    assert "Without bunny:" in sentence and "stanford-bunny.obj" in sentence
+
+
+def row(**seconds) -> dict:
+    """Output of `solver benchmark`, as far as tables need it."""
+    return {
+        "modes": 30,
+        "dof_fine": 900,
+        "dof_coarse": 300,
+        "seconds": {"precompute": 0.1, "slepc": 4.0, "hcms": None, **seconds},
+        "spread": {name: {"min": 0.5, "max": 5.0} for name in ("slepc", *seconds)},
+        "runs": {"slepc": 5, "hcms_ec": 5, "arpack": 1},
+        "eigenvalue_error": {"hcms": {"max": 0.1}, "hcms_ec": {"max": 1e-7}},
+        "frequency_error": {"average": {"rms_7_60": 0.3}},
+        "speedup": {"hcms_ec": {"slepc": 2.0}},
+        "speedup_with_precompute": {"hcms_ec": {"slepc": 1.5}},
+        "slepc_configuration": {"package": "cholmod", "subspace": 1.5},
+        "slepc_configurations_tried": [{}] * 6,
+    }
+
+
+def test_the_table_of_methods_has_what_was_timed_and_says_how():
+    table = methods({"bar": row(hcms_ec=2.0)}, {"bar": "A bar"})
+    keys = [column.key for column in table.columns]
+    assert "hcms_ec" in keys and "arpack" not in keys and "hcms_ec_min" in keys
+    assert "CHOLMOD, 1.5 Lanczos vectors a mode, the fastest of 6 tried" in table.caption
+    assert "5 rounds (ARPACK 1)" in table.caption
+    assert table.rows[0]["hcms_ec_max"] == 5.0 and table.rows[0]["ddfem_error"] is None
+
+
+def test_ratios_name_their_base():
+    (found,) = ratios({"bar": row(hcms_ec=2.0)}, {"bar": "A bar"}).rows
+    assert (found["method"], found["base"], found["ratio"]) == ("HCMS + EC", "SLEPc", 2.0)
+    assert found["with_precompute"] == 1.5
+
+
+def test_tables_of_nothing_have_no_rows():
+    assert methods({}, {}).rows == ratios({}, {}).rows == []
+    assert convergence_sentences(convergence({}, {})) == []
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """Folder of the results of the miniature figures."""
+    folder = tmp_path_factory.mktemp("figures")
+    done = snakemake(folder, "figures", "--profile", PROFILE, "--configfile", TINY, timeout=600)
+    assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-6000:]
+    return folder / "results-tiny" / results.FOLDER
+
+
+@pytest.mark.slow
+@pytest.mark.mpi
+def test_the_page_of_miniature_figures_holds_its_tables_and_plots(finished):
+    page = Page(finished / "report.html")
+    assert_self_contained(page)
+    assert {"plot-times", "plot-bar-convergence", "plot-bar-scaling"} <= set(page.ids)
+    for name in BUILDERS:
+        assert_same_numbers(page, finished / "tables", name)
+    for name in ("times", "bar-convergence", "bar-scaling"):
+        assert (finished / "figures" / f"{name}.png").stat().st_size > 5000
+    assert "takes for granted" in page.source
+
+
+@pytest.mark.slow
+@pytest.mark.mpi
+def test_miniature_figures_find_what_the_paper_found(finished):
+    found = read_table(finished / "tables" / "convergence.json").rows
+    last = {
+        row["start"]: row["median"]
+        for row in found
+        if row["corrections"] == 3 and "paper" in row["acceleration"]
+    }
+    assert last["HCMS, free interfaces"] < last["random vectors"]
+    scaling = read_table(finished / "tables" / "scaling.json").rows
+    strong = {row["ranks"]: row for row in scaling if row["kind"] == "strong"}
+    assert strong[1]["note"] == "measured" and strong[1]["measured"] > 0.0
+    assert max(strong) > 2 and strong[max(strong)]["note"] == "model alone"

@@ -1,0 +1,173 @@
+"""Tables of all methods timed in alternating runs (Fig. 11)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from workflow.report.table import Column, Table
+
+Row = dict[str, Any]
+
+METHODS = {
+    "arpack": "ARPACK",
+    "slepc": "SLEPc",
+    "ddfem": "DDFEM*",
+    "hcms": "HCMS",
+    "hcms_ec": "HCMS + EC",
+    "ddfem_hcms_ec": "DDFEM* + HCMS + EC",
+    "ddfem_hcms_ec_warm": "the same, warm",
+    "arpack_regular": "ARPACK, no factorisation",
+}
+"""Methods of `solver benchmark` and their names for people, in the table's order."""
+
+_IDENTITY = [Column("model", "Model", shown=False), Column("title", "Solid")]
+
+
+def methods(found: Mapping[str, Row], titles: Mapping[str, str]) -> Table:
+    """Fig. 11: a row a solid, a column a method.
+
+    Parameters
+    ----------
+    found : output of `solver benchmark` by model.
+    titles : names for people by model.
+    """
+    timed = [name for name in METHODS if any(row["seconds"].get(name) for row in found.values())]
+    extremes = [
+        Column(f"{name}_{end}", f"{METHODS[name]}, {end}", "seconds", "s", shown=False)
+        for name in timed
+        for end in ("min", "max")
+    ]
+    return Table(
+        "methods",
+        _caption(found),
+        [
+            *_IDENTITY,
+            Column("modes", "Modes", "count"),
+            Column("dof_fine", "Unknowns", "count"),
+            Column("dof_coarse", "coarsened", "count"),
+            Column("precompute", "Precomputation", "seconds", "s"),
+            *(Column(name, METHODS[name], "seconds", "s") for name in timed),
+            Column("hcms_error", "HCMS, worst eigenvalue", "percent"),
+            Column("hcms_ec_error", "HCMS + EC, worst", "percent"),
+            Column("ddfem_error", "DDFEM*, frequencies 7–60", "percent"),
+            Column("average_error", "Average, 7–60", "percent"),
+            *extremes,
+        ],
+        [_methods_row(model, titles[model], row) for model, row in found.items()],
+    )
+
+
+def _caption(found: Mapping[str, Row]) -> str:
+    runs = sorted({row["runs"]["hcms_ec"] for row in found.values()})
+    slow = sorted({row["runs"]["arpack"] for row in found.values() if "arpack" in row["runs"]})
+    rounds = " or ".join(map(str, runs))
+    less = f" (ARPACK {' or '.join(map(str, slow))})" if slow and slow != runs else ""
+    return (
+        f"Median wall seconds of {rounds} rounds{less} in which every method runs once, from "
+        "moduli to modes: coarsening, assembly and solution. Precomputation is what the meshes "
+        "need once for any material, fine and coarse. Checks of the results are not timed. DDFEM* "
+        "alone is coarsening and SLEPc on the coarse mesh. The warm run follows moduli that "
+        "differ by a smooth field of 5 %, from the modes of the unchanged ones. HCMS + EC is "
+        "corrected to an eigenvalue error of 10⁻⁶, coarsened to 10⁻². Errors are against SLEPc on "
+        "the fine mesh: the largest of an eigenvalue, and the rms of frequencies 7 to 60. SLEPc: "
+        + ("; ".join(f"{model} {_configuration(row)}" for model, row in found.items()) or "none")
+        + "."
+    )
+
+
+def _configuration(row: Row) -> str:
+    chosen = row["slepc_configuration"]
+    of = len(row["slepc_configurations_tried"])
+    tuned = f", the fastest of {of} tried" if of else ", its default"
+    return f"{chosen['package'].upper()}, {chosen['subspace']:g} Lanczos vectors a mode{tuned}"
+
+
+def _methods_row(model: str, title: str, row: Row) -> Row:
+    coarse = row["frequency_error"].get("ddfem", {})
+    extremes = {
+        f"{name}_{end}": between[end]
+        for name, between in row["spread"].items()
+        for end in ("min", "max")
+    }
+    return {
+        "model": model,
+        "title": title,
+        **{key: row[key] for key in ("modes", "dof_fine", "dof_coarse")},
+        **row["seconds"],
+        "hcms_error": row["eigenvalue_error"]["hcms"]["max"],
+        "hcms_ec_error": row["eigenvalue_error"]["hcms_ec"]["max"],
+        "ddfem_error": coarse.get("rms_7_60"),
+        "average_error": row["frequency_error"]["average"]["rms_7_60"],
+        **extremes,
+    }
+
+
+def spreads(found: Mapping[str, Row], titles: Mapping[str, str]) -> Table:
+    """Median, least and greatest time of every method, and its eigenvalue errors."""
+    return Table(
+        "spreads",
+        "The same runs one by one: median, least and greatest wall seconds, and errors of the "
+        "elastic eigenvalues against SLEPc’s of the same operator, fine or coarse.",
+        [
+            *_IDENTITY,
+            Column("method", "Method"),
+            Column("runs", "Runs", "count"),
+            Column("median", "Median", "seconds", "s"),
+            Column("least", "least", "seconds", "s"),
+            Column("most", "most", "seconds", "s"),
+            Column("error_median", "Error, median", "percent"),
+            Column("error_p90", "90 % below", "percent"),
+            Column("error_max", "worst", "percent"),
+        ],
+        [
+            _spread_row(model, titles[model], name, row)
+            for model, row in found.items()
+            for name in METHODS
+            if name in row["spread"]
+        ],
+    )
+
+
+def _spread_row(model: str, title: str, name: str, row: Row) -> Row:
+    errors = row["eigenvalue_error"].get(name, {})
+    return {
+        "model": model,
+        "title": title,
+        "method": METHODS[name],
+        "runs": row["runs"][name],
+        "median": row["seconds"][name],
+        "least": row["spread"][name]["min"],
+        "most": row["spread"][name]["max"],
+        **{f"error_{key}": value for key, value in errors.items()},
+    }
+
+
+def ratios(found: Mapping[str, Row], titles: Mapping[str, str]) -> Table:
+    """Speed-ups, each with its base."""
+    return Table(
+        "ratios",
+        "Speed-ups: median time of the base over that of the method; with precomputation, the "
+        "method’s partition, sparsity and elimination plan are added to its time, and nothing to "
+        "that of the base.",
+        [
+            *_IDENTITY,
+            Column("method", "Method"),
+            Column("base", "Base"),
+            Column("ratio", "Speed-up", "times"),
+            Column("with_precompute", "with precomputation", "times"),
+        ],
+        [
+            {
+                "model": model,
+                "title": titles[model],
+                "method": METHODS[method],
+                "base": METHODS[base],
+                "ratio": ratio,
+                "with_precompute": row["speedup_with_precompute"][method][base],
+            }
+            for model, row in found.items()
+            for method, bases in row["speedup"].items()
+            for base, ratio in bases.items()
+        ],
+    )
