@@ -25,6 +25,7 @@ from tests import solids
 
 COMM = MPI.COMM_WORLD
 PARTS = 8
+THREADS = 2 if COMM.size == 1 else 1
 
 
 def system_of(model: ElasticModel) -> System:
@@ -60,8 +61,8 @@ def solutions_are_those_of_a_direct_solve() -> None:
         K, M = assembled(model)
         expected = spla.splu((K - shift * M).tocsc()).solve(np.ascontiguousarray(whole))
     for method in METHODS:
-        for tolerance in (1e-2, 1e-10):
-            inverse = IterativeInverse(system, shift, method, tolerance, threads=2)
+        for tolerance in (1e-2, 1e-9):
+            inverse = IterativeInverse(system, shift, method, tolerance, threads=THREADS)
             solution = inverse.solve(rhs)
             assert solution.flags.c_contiguous
             assert relative_residuals(system, inverse, rhs, solution).max() <= 1.01 * tolerance
@@ -69,22 +70,22 @@ def solutions_are_those_of_a_direct_solve() -> None:
             found = system.gather(solution)
             inverse.destroy()
         if COMM.rank == 0:
-            # The error exceeds the residual by the condition number at most, here 1e5.
+            # The residual bounds it by the condition number, 1e5; what is left is far smaller.
             distance = np.linalg.norm(found - expected, axis=0)
             assert (distance <= 1e-7 * np.linalg.norm(expected, axis=0)).all()
 
 
 def columns_are_solved_each_on_its_own() -> None:
     system = system_of(solids.random_box(7, 5, 4))
-    rhs = right_hand_sides(system, 6)
+    rhs = right_hand_sides(system, 4)
     for method in METHODS:
-        together = IterativeInverse(system, -safe_shift(system), method, 1e-6)
-        one_by_one = IterativeInverse(system, -safe_shift(system), method, 1e-6, columns=1)
+        together = IterativeInverse(system, -safe_shift(system), method, 1e-5)
+        one_by_one = IterativeInverse(system, -safe_shift(system), method, 1e-5, columns=1)
         solution, other = together.solve(rhs), one_by_one.solve(rhs)
-        assert np.abs(solution - other).max() < 1e-5 * np.abs(solution).max()
-        assert together.right_hand_sides == one_by_one.right_hand_sides == 6
+        assert np.abs(solution - other).max() < 1e-4 * np.abs(solution).max()
+        assert together.right_hand_sides == one_by_one.right_hand_sides == 4
         # Converged columns cost nothing more; rounding may move the last step.
-        assert abs(together.iterations - one_by_one.iterations) <= 6
+        assert abs(together.iterations - one_by_one.iterations) <= 4
         together.destroy()
         one_by_one.destroy()
 
@@ -92,7 +93,7 @@ def columns_are_solved_each_on_its_own() -> None:
 def rows_multiply_as_the_matrix_does() -> None:
     system = system_of(solids.random_box(6, 5, 4))
     block = right_hand_sides(system, 5)
-    rows = BlockRows(system.K, COMM, np.float64, threads=2)
+    rows = BlockRows(system.K, COMM, np.float64, threads=THREADS)
     expected = system.times_stiffness(block)
     assert np.abs(rows.times(block) - expected).max() < 1e-12 * np.abs(expected).max()
     first, _ = system.K.getOwnershipRange()

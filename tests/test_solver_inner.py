@@ -32,7 +32,7 @@ def test_on_one_rank(name):
 @pytest.mark.mpi
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_on_several_ranks(ranks, mpiexec):
-    mpiexec(ranks, PROGRAM, ",".join(CHECKS), check=True)
+    mpiexec(ranks, PROGRAM, ",".join(CHECKS), timeout=300, check=True)
 
 
 def nearly_void(young: np.ndarray, ratio: float) -> np.ndarray:
@@ -65,11 +65,9 @@ def test_contrast_converges_or_says_that_it_does_not(change, ratio, method):
         solution = inverse.solve(rhs)
     except ConvergenceError as error:
         assert "inner solver" in str(error)
-        print(error)
     else:
         residuals = inner_checks.relative_residuals(system, inverse, rhs, solution)
         assert residuals.max() <= 1.01 * tolerance
-        print(inverse.iterations / 6)
 
 
 def test_stagnation_is_an_error(monkeypatch):

@@ -171,7 +171,7 @@ class IterativeInverse:
             solution[:, missed] += self._iterate(residual[:, missed], target[missed])
         norms = self._norms(rhs - self._apply(solution))
         if (norms > target).any():
-            raise self._failure(norms, target, self.iterations - before)
+            raise self._failure(norms, target, (self.iterations - before) // len(target))
         return solution
 
     def _iterate(self, residual: Array, target: Array) -> Array:
@@ -243,7 +243,7 @@ class IterativeInverse:
         others = [name for name in METHODS if name != self._method]
         return ConvergenceError(
             f"{self._method} stopped at a relative residual of {worst:.1e} after {steps:,} "
-            f"iterations, {self._tolerance:.1e} was asked for ({(norms > target).sum()} of "
+            f"iterations, {self._tolerance:.1e} was asked for ({(~(norms <= target)).sum()} of "
             f"{len(norms)} right-hand sides left); take {' or '.join(others)} or a sparse "
             "factorisation as inner solver"
         )
