@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from carillon.files import atomic_path
 from solver.scaling.model import MODELLED, kind
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 COLOURS = dict(
     zip(
@@ -16,7 +20,7 @@ COLOURS = dict(
     )
 )
 INK = "#23211d"
-TITLES = {"strong": "Strong scaling: one solid", "weak": "Weak scaling: unknowns grow with ranks"}
+TITLES = {"strong": "Strong: one solid", "weak": "Weak: unknowns grow with ranks"}
 SMALLEST = 1e-4
 """Seconds at which the axis ends."""
 
@@ -26,20 +30,32 @@ def save_plot(result: dict[str, Any], path: str | Path) -> None:
     import matplotlib
 
     matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    shown = [name for name in TITLES if result[name] is not None]
-    figure, axes = plt.subplots(
-        1, len(shown), figsize=(6.2 * len(shown), 4.6), squeeze=False, layout="constrained"
-    )
-    for axis, name in zip(axes[0], shown, strict=True):
-        _draw(axis, result[name])
-        axis.set_title(TITLES[name])
-    axes[0][-1].legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
-    figure.suptitle("lines: model; dots: measured, hollow on more ranks than cores", fontsize=9)
+    figure = scaling_figure(result)
     with atomic_path(path) as temporary:
         figure.savefig(temporary, format=Path(path).suffix[1:] or "png", dpi=160)
+
+
+def scaling_figure(result: dict[str, Any], settings: Mapping[str, Any] | None = None) -> Figure:
+    """Wall time over ranks, a panel for strong and one for weak scaling.
+
+    Parameters
+    ----------
+    result : output of `solver scaling`.
+    settings : matplotlib's, to be drawn with.
+    """
+    from matplotlib import pyplot as plt  # slow to import, and only needed here
+
+    shown = [name for name in TITLES if result[name] is not None]
+    chosen: Any = {"figure.constrained_layout.use": True, **(settings or {})}
+    with plt.rc_context(chosen):
+        figure, axes = plt.subplots(1, len(shown), figsize=(4.2 * len(shown), 4.2), squeeze=False)
+        for axis, name in zip(axes[0], shown, strict=True):
+            _draw(axis, result[name])
+            axis.set_title(TITLES[name])
+        handles, labels = axes[0][0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper left", ncols=5)
     plt.close(figure)
+    return figure
 
 
 def _draw(axis: Any, part: dict[str, Any]) -> None:
@@ -73,4 +89,5 @@ def _dot(axis: Any, run: dict[str, Any], seconds: float, colour: str) -> None:
 
 
 def _of_kind(seconds: dict[str, float], name: str) -> float:
-    return sum(time for phase, time in seconds.items() if kind(phase) == name)
+    """Seconds of a kind of phases; nothing to draw if there are none."""
+    return sum(time for phase, time in seconds.items() if kind(phase) == name) or float("nan")

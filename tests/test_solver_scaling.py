@@ -1,0 +1,210 @@
+"""Scaling over ranks: what is counted without running is what runs do, and the model is a model."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from carillon.errors import UserError
+from solver.decomposition import decompose
+from solver.geometry import hexmesh_from_voxels, load_surface, voxelize
+from solver.hcms.counts import Tally
+from solver.scaling import launch
+from solver.scaling.model import (
+    ASSUMED_BANDWIDTH,
+    Correction,
+    Machine,
+    fit_machine,
+    kind,
+    predict,
+    work_of_busiest,
+)
+from solver.scaling.plan import planned_counts, tally_arrays
+from solver.scaling.plot import save_plot
+from solver.scaling.sizes import sizes_of_box, sizes_of_mesh
+from solver.scaling.study import PREDICTED, study_lines
+from solver.scaling.work import elimination
+
+BAR = ("builtin:bar", "--resolution", 24, "--material", "smooth")
+COUNT = """
+import json
+from mpi4py import MPI
+from solver.distribution import distribute
+from solver.hcms.synthesis import synthesize
+from solver.problem import ProblemOptions, build_problem
+from solver.scaling.plan import planned_counts, tally_arrays
+from solver.scaling.sizes import sizes_of_mesh
+from solver.decomposition import decompose
+
+comm, keep = MPI.COMM_WORLD, 60
+model = build_problem(ProblemOptions("builtin:bar", 24, "smooth")).model
+share = distribute(model, 6, 0, comm)
+found = synthesize(share, keep, "free", comm).counts.per_rank(comm)
+if comm.rank == 0:
+    decomposition, order = decompose(model.mesh, 6, 0, comm.size)
+    sizes = sizes_of_mesh(model.mesh, decomposition, order)
+    planned = tally_arrays(planned_counts(sizes, decomposition.owner, keep))
+    assert list(planned) == list(found)
+    for phase, expected in planned.items():
+        for name, values in expected.items():
+            print(json.dumps([phase, name, values.tolist(), found[phase][name].tolist()]))
+"""
+
+
+def bar():
+    return hexmesh_from_voxels(voxelize(load_surface("builtin:bar"), 24))
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("ranks", [1, 2, 3])
+def test_planned_counts_are_those_of_a_run(ranks, tmp_path, mpiexec):
+    program = tmp_path / "count.py"
+    program.write_text(COUNT)
+    done = mpiexec(ranks, program, check=True)
+    rows = [json.loads(line) for line in done.stdout.splitlines()]
+    assert {phase for phase, *_ in rows} >= {"local", "merge 1", "down", "basis"}
+    for phase, name, planned, found in rows:
+        # Operations of sparse products are counted by entries, some of which may cancel to zero.
+        assert planned == pytest.approx(found, rel=0.01), (phase, name)
+
+
+def test_a_box_of_cubes_is_as_large_as_it_should_be():
+    sizes = sizes_of_box(8, 1000.0)
+    assert sizes.nodes[:8] == pytest.approx(1000.0) and sizes.nodes[-1] == pytest.approx(8000.0)
+    assert sizes.boundary[0] == pytest.approx(10**3 - 8**3) and sizes.boundary[-1] == 0.0
+    # Cubes meet in a face, pairs of them in two, fours of them in four.
+    assert sizes.rows_left == pytest.approx([100.0] * 4 + [200.0] * 2 + [400.0])
+    with pytest.raises(ValueError, match="power of two"):
+        sizes_of_box(6, 1000.0)
+
+
+def test_more_ranks_have_less_to_do_each_and_more_to_say():
+    mesh = bar()
+    decomposition, order = decompose(mesh, 8, 0, 1)
+    sizes = sizes_of_mesh(mesh, decomposition, order)
+    work = elimination(mesh)
+    correction = Correction(steps=2, solves=100, width=70)
+    alone, many = (work_of_busiest(sizes, work, 60, correction, ranks) for ranks in (1, 8))
+    for phase in ("local", "basis", "factor", "solve"):
+        assert many[phase].flops < alone[phase].flops
+    assert sum(tally.messages for tally in alone.values()) == 0.0
+    assert all(many[phase].messages > 0.0 for phase in ("merge 1", "down", "factor", "dense"))
+    counts = tally_arrays(planned_counts(sizes, np.zeros(8, dtype=int), 60))
+    assert alone["local"].flops == counts["local"]["flops"].sum()
+
+
+def run(ranks: int, seconds: float, oversubscribed: bool = False) -> dict:
+    """A measured run in which every rank does a gigaflop in every phase."""
+    quantities = {"seconds": seconds, "waiting": 0.0, "flops": 1e9, "bytes": 0.0, "messages": 0.0}
+    phase = {name: [value] * ranks for name, value in quantities.items()}
+    return {
+        "ranks": ranks,
+        "oversubscribed": oversubscribed,
+        "phases": {"local": phase, "merge 1": phase, "merge 2": phase},
+        "link": {"latency": 1e-6, "bandwidth": 1e9} if ranks > 1 else None,
+    }
+
+
+def test_rates_are_fitted_to_runs_that_have_their_cores():
+    machine = fit_machine([run(1, 0.5), run(2, 0.5), run(8, 50.0, oversubscribed=True)])
+    assert machine.rates["local"] == machine.rates["merge"] == pytest.approx(2e9)
+    assert (machine.latency, machine.bandwidth) == (1e-6, 1e9)
+    assert fit_machine([run(1, 0.5)]).bandwidth == ASSUMED_BANDWIDTH
+    assert fit_machine([run(1, 0.5)], latency=5e-6, bandwidth=1e10).latency == 5e-6
+
+
+def test_time_is_that_of_operations_bytes_and_messages():
+    machine = Machine({"merge": 1e9}, latency=1e-3, bandwidth=1e6)
+    seconds = predict(machine, {"merge 3": Tally(messages=10, bytes=2e6, flops=3e9)})
+    assert seconds == {"merge 3": pytest.approx(3.0 + 2.0 + 0.01)}
+    assert kind("merge 3") == "merge"
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory, run_cli):
+    """Result of the command and its plot."""
+    folder = tmp_path_factory.mktemp("scaling")
+    out, plot = folder / "scaling.json", folder / "scaling.png"
+    options = ("--modes", 30, "--ranks", "2,1,3", "--weak", "--out", out, "--plot", plot)
+    run_cli("solver", "scaling", *BAR, *options, check=True, timeout=300)
+    return json.loads(out.read_text()), plot
+
+
+@pytest.mark.mpi
+@pytest.mark.slow
+def test_study_measures_and_models_and_says_which(study):
+    found, plot = study
+    assert plot.stat().st_size > 10_000
+    strong = found["strong"]
+    assert [run["ranks"] for run in strong["runs"]] == [1, 2, 3]
+    for each in strong["runs"]:
+        phases = each["phases"]
+        assert {"assembly", "local", "merge 1", "down", "factor", "solve", "dense"} <= set(phases)
+        assert all(len(values) == each["ranks"] for values in phases["local"].values())
+        assert len(each["peak_memory_bytes"]) == each["ranks"]
+        assert each["oversubscribed"] == (each["ranks"] > each["cores"])
+        assert each["slowest_seconds"] >= each["seconds"] > 0.0
+    assert sum(strong["runs"][0]["phases"]["merge 1"]["messages"]) == 0.0
+    assert sum(strong["runs"][2]["phases"]["down"]["messages"]) > 0.0
+    model = strong["model"]
+    assert "not a measurement" in model["note"] and len(model["assumptions"]) > 5
+    assert {1, 2, 3, 16} <= {row["ranks"] for row in model["rows"]}
+    weak = found["weak"]["runs"]
+    assert weak[2]["n_dofs"] > 2 * weak[0]["n_dofs"]
+    assert [row["ranks"] for row in found["weak"]["model"]["rows"]] == list(PREDICTED)
+
+
+@pytest.mark.mpi
+@pytest.mark.slow
+def test_people_read_what_is_measured_and_what_is_modelled(study, tmp_path):
+    found, _ = study
+    lines = study_lines(found)
+    assert lines[0].startswith("strong scaling")
+    assert any("1024 ranks" in line and "model" in line for line in lines)
+    save_plot({**found, "weak": None}, tmp_path / "strong.svg")
+    assert (tmp_path / "strong.svg").read_text().startswith("<?xml")
+
+
+@pytest.mark.mpi
+def test_started_under_mpiexec_it_measures_the_ranks_it_has(mpiexec):
+    done = mpiexec(2, "solver", "scaling", *BAR, "--modes", 30, "--json", check=True)
+    found = json.loads(done.stdout)
+    assert found["ranks"] == 2 and found["link"]["bandwidth"] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["nothing.obj", "--resolution", 16], "nothing.obj"),
+        ([*BAR, "--ranks", "0"], "--ranks"),
+        ([*BAR, "--ranks", "one"], "--ranks"),
+        ([*BAR, "--tol", "0"], "--tol"),
+        ([*BAR, "--bandwidth", "-1"], "--bandwidth"),
+        ([*BAR, "--plot", "absent/plot.png"], "absent"),
+    ],
+)
+def test_bad_arguments_are_answered_in_one_sentence(arguments, sentence, tmp_path, run_cli):
+    done = run_cli("solver", "scaling", *arguments, cwd=tmp_path)
+    assert done.returncode == 2, done.stderr
+    assert sentence in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_run_that_fails_says_why(monkeypatch):
+    def unable(*_):
+        raise UserError("the run on 2 ranks failed: no memory")
+
+    monkeypatch.setattr(launch, "_run", unable)
+    with pytest.raises(UserError, match="on 2 ranks"):
+        launch.measure_each({2: ["builtin:bar"]})
+    monkeypatch.setattr(launch.shutil, "which", lambda _: None)
+    with pytest.raises(UserError, match="no mpiexec on PATH"):
+        launch.measure_each({2: ["builtin:bar"]})
+
+
+def test_absent_folders_are_not_made(tmp_path, run_cli):
+    run_cli("solver", "scaling", *BAR, "--out", Path("absent") / "x.json", cwd=tmp_path)
+    assert list(tmp_path.iterdir()) == []
