@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -35,7 +34,7 @@ def test_corrected_modes_on_any_number_of_ranks(ranks, truth, tmp_path, mpiexec)
     assert read_modes(out).attributes["ranks"] == ranks
 
 
-@pytest.mark.parametrize("interface", ["free", "fixed"])
+@pytest.mark.parametrize("interface", ["overlapping", "free", "fixed"])
 def test_synthesis_is_the_same_on_1_2_and_3_ranks(interface, tmp_path, mpiexec):
     values = []
     for ranks in (1, 2, 3):
@@ -82,33 +81,17 @@ def test_failure_of_one_rank_ends_the_others(tmp_path, mpiexec):
     program.write_text(
         "import sys\n"
         "from mpi4py import MPI\n"
-        "import solver.hcms.synthesis as synthesis\n"
+        "from solver.hcms.local import Subdomain\n"
         "from carillon.errors import LocalConvergenceError\n"
         "from solver.__main__ import main\n"
         "def fail(*arguments):\n"
         "    if MPI.COMM_WORLD.rank == 1:\n"
         "        raise LocalConvergenceError('planted')\n"
         "    return original(*arguments)\n"
-        "original, synthesis.local_modes = synthesis.local_modes, fail\n"
+        "original, Subdomain.modes = Subdomain.modes, fail\n"
         f"sys.exit(main(['modes', *{MODEL!r}, '--modes', '30', '--out', 'x.h5']))\n"
     )
     done = mpiexec(3, program, timeout=60, cwd=tmp_path)
     assert done.returncode != 0
     assert "solver modes: planted" in done.stderr
     assert not (tmp_path / "x.h5").exists()
-
-
-def test_convergence_command_shows_that_synthesis_is_the_better_start(tmp_path, mpiexec):
-    histories = []
-    for ranks in (1, 2):
-        out = tmp_path / f"{ranks}.json"
-        mpiexec(ranks, "solver", "convergence", *MODEL[:5], *MODES, "--out", out, check=True)
-        histories.append(json.loads(out.read_text())["start"])
-    for start in ("hcms-free", "hcms-fixed", "random"):
-        one, two = (np.array(history[start]) for history in histories)
-        assert one.shape == (4, 44)
-        assert (np.diff(one, axis=0) <= 1e-9 * one[-1, -1]).all()
-        # The lowest modes have settled, whatever the number of ranks.
-        assert np.allclose(one[-1, :5], two[-1, :5], rtol=1e-4)
-    synthesised, drawn = (np.array(histories[0][start]) for start in ("hcms-free", "random"))
-    assert (synthesised[1] <= drawn[1]).all()

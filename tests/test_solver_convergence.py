@@ -1,0 +1,110 @@
+"""Convergence of corrections by start and acceleration (Fig. 10)."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from solver.convergence import ACCELERATIONS, STARTS
+from solver.correction import ACCELERATIONS as KNOWN
+from solver.hcms.condense import INTERFACES
+
+BAR = ("builtin:bar", "--resolution", "24", "--material", "smooth")
+MODES = 50
+STEPS = 3
+
+
+def curves(history: dict, acceleration: str) -> dict[str, np.ndarray]:
+    """Values (steps + 1, modes - 6) by start."""
+    return {
+        curve["start"]: np.array(curve["values"])
+        for curve in history["histories"]
+        if curve["acceleration"] == acceleration
+    }
+
+
+@pytest.fixture(scope="module")
+def truth(tmp_path_factory, run_cli):
+    path = tmp_path_factory.mktemp("truth") / "truth.h5"
+    options = ("--modes", MODES, "--method", "slepc", "--out", path)
+    run_cli("solver", "modes", *BAR, *options, check=True)
+    return path
+
+
+@pytest.fixture(scope="module")
+def histories(truth, tmp_path_factory, mpiexec) -> list[dict]:
+    """What the command finds on one rank and on two; the second run finds the truth by itself."""
+    folder = tmp_path_factory.mktemp("histories")
+    found = []
+    for ranks in (1, 2):
+        out = folder / f"{ranks}.json"
+        known = ("--truth", truth) if ranks == 1 else ()
+        options = ("--modes", MODES, "--steps", STEPS, *known, "--out", out)
+        mpiexec(ranks, "solver", "convergence", *BAR, *options, check=True)
+        found.append(json.loads(out.read_text()))
+    return found
+
+
+def test_every_interface_and_acceleration_is_followed():
+    assert set(STARTS) == {*(f"hcms-{interface}" for interface in INTERFACES), "random"}
+    assert set(ACCELERATIONS) == set(KNOWN) == {"krylov", "relaxation"}
+
+
+@pytest.mark.mpi
+def test_histories_are_complete_and_errors_those_of_the_values(histories):
+    history = histories[0]
+    exact = np.array(history["exact"])
+    assert len(history["histories"]) == len(STARTS) * len(ACCELERATIONS)
+    for curve in history["histories"]:
+        values = np.array(curve["values"])
+        assert values.shape == (STEPS + 1, MODES - 6)
+        worst = [errors["max"] for errors in curve["eigenvalue_error"]]
+        assert np.abs(values / exact - 1.0).max(axis=1) == pytest.approx(worst)
+
+
+@pytest.mark.mpi
+def test_ritz_values_never_fall_below_the_exact_ones(histories):
+    exact = np.array(histories[0]["exact"])
+    for acceleration in ACCELERATIONS:
+        for values in curves(histories[0], acceleration).values():
+            assert (values >= exact * (1.0 - 1e-8)).all()
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("acceleration", ACCELERATIONS)
+def test_synthesis_is_the_better_start(histories, acceleration):
+    found = curves(histories[0], acceleration)
+    for start in STARTS:
+        assert (found[start][1] <= found["random"][1] * (1.0 + 1e-9)).all()
+    free = [errors["median"] for errors in _errors(histories[0], "hcms-free", acceleration)]
+    assert free[-1] < 1e-2 * free[0]
+
+
+@pytest.mark.mpi
+def test_truth_and_lowest_values_do_not_depend_on_the_number_of_ranks(histories):
+    one, two = histories
+    assert one["exact"] == pytest.approx(two["exact"], rel=1e-8)
+    for acceleration in ACCELERATIONS:
+        ours, theirs = (curves(history, acceleration) for history in histories)
+        for interface in INTERFACES:
+            lowest = slice(0, 5)
+            start = f"hcms-{interface}"
+            assert np.allclose(ours[start][-1, lowest], theirs[start][-1, lowest], rtol=1e-4)
+
+
+def _errors(history: dict, start: str, acceleration: str) -> list[dict]:
+    for curve in history["histories"]:
+        if (curve["start"], curve["acceleration"]) == (start, acceleration):
+            return curve["eigenvalue_error"]
+    raise KeyError((start, acceleration))
+
+
+def test_a_truth_of_another_solid_is_refused(truth, tmp_path, run_cli):
+    out = tmp_path / "history.json"
+    command = ["convergence", "builtin:bar", "--resolution", 16, "--out", out, "--truth", truth]
+    done = run_cli("solver", *command, "--modes", 40)
+    assert done.returncode == 2
+    assert "expected 40 or more of" in done.stderr and done.stderr.count("\n") == 1
+    assert not out.exists()
