@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -63,6 +64,8 @@ class Methods:
         Of SLEPc's Krylov-Schur, wherever it is used.
     seed
         Of the partition.
+    brief
+        Whether one correction will do, as it does to compile and load everything.
     """
 
     def __init__(
@@ -72,12 +75,14 @@ class Methods:
         configuration: SlepcConfiguration,
         seed: int = 0,
         comm: MPI.Comm = MPI.COMM_WORLD,
+        brief: bool = False,
     ) -> None:
         self.solid = solid
         self.modes = modes
         self.configuration = configuration
         self.seed = seed
         self.comm = comm
+        self.brief = brief
         self._warm: tuple[ModalSolver, Modes] | None = None
 
     def slepc(self, coarsening: str = "none", changed: bool = False) -> Run:
@@ -135,8 +140,11 @@ class Methods:
     def _interactive(self) -> SolverOptions:
         return self._options(tolerance=INTERACTIVE_TOLERANCE)
 
-    def _options(self, **changes: object) -> SolverOptions:
-        return SolverOptions(modes=self.modes, seed=self.seed, **changes)  # type: ignore[arg-type]
+    def _options(self, **changes: Any) -> SolverOptions:
+        options = SolverOptions(modes=self.modes, seed=self.seed, **changes)
+        if self.brief and options.method == "hcms":
+            options = replace(options, tolerance=0.0, corrections=min(1, options.corrections))
+        return options
 
     @property
     def _root(self) -> Solid:

@@ -122,7 +122,7 @@ def benchmark_row(
     say(reason, visible=comm.rank == 0 and bool(reason))
     left_out = benchmark.left_out + (NEED_FORESTS if reason else ())
     default = SlepcConfiguration.default(comm.size)
-    _run_once(Methods(solid, _few(benchmark.modes), default, options.seed, comm), left_out)
+    _run_once(Methods(solid, _few(benchmark.modes), default, options.seed, comm, True), left_out)
     methods = Methods(solid, benchmark.modes, default, options.seed, comm)
     tried = _tune(methods) if benchmark.tune else {}
     if tried:
