@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from carillon.errors import ConvergenceError
 from solver.benchmark import BenchmarkOptions, benchmark_row, row_lines
 from solver.benchmark.methods import Methods, Run
 from solver.benchmark.rivals import SlepcConfiguration, configurations
@@ -97,11 +98,25 @@ def test_methods_alternate():
 
     noted = Noted(None, MODES, SlepcConfiguration.default(1))
     options = BenchmarkOptions(MODES, runs=3, slow_runs=1)
-    runs = _alternate(noted, options, options.left_out)
+    runs, failed = _alternate(noted, options, options.left_out)
     assert order[:2] == ["arpack", "slepc"] and order.count("arpack") == 1
     rounds = [name for name in order if name != "arpack"]
     assert rounds == rounds[: len(rounds) // 3] * 3
-    assert len(runs["hcms"]) == 3
+    assert len(runs["hcms"]) == 3 and failed == {}
+
+
+def test_a_method_that_fails_is_told_and_the_others_go_on(monkeypatch):
+    def fail(_):
+        raise ConvergenceError("planted")
+
+    monkeypatch.setattr(Methods, "ddfem_hcms_ec", fail)
+    monkeypatch.setattr("solver.benchmark.row._run_once", lambda *_: None)
+    found = benchmark_row(BAR, BenchmarkOptions(MODES, runs=2, arpack=False))
+    assert found["failed"] == {"ddfem_hcms_ec": "planted"}
+    assert found["seconds"]["ddfem_hcms_ec"] is None
+    assert "ddfem_hcms_ec" not in found["eigenvalue_error"]
+    assert found["runs"]["ddfem_hcms_ec_warm"] == 2
+    assert "planted" in "\n".join(row_lines(found))
 
 
 def test_moduli_of_the_warm_start_differ_smoothly_and_little():

@@ -9,6 +9,7 @@ from typing import Any, cast
 
 from mpi4py import MPI
 
+from carillon.errors import ConvergenceError
 from carillon.progress import say, track
 from carillon.runtime import blas_name, loaded_blas
 from solver.benchmark.methods import Methods, Run, named
@@ -116,6 +117,8 @@ def benchmark_row(
     ------
     UserError
         For anything wrong with the solid, the forests or the number of modes.
+    ConvergenceError
+        If SLEPc fails; another method that does is told in `failed` and has no figures.
     """
     solid = keep_on_root(comm, partial(make_solid, options, benchmark.modes))
     reason = comm.bcast(None if solid is None else solid.reason)
@@ -127,7 +130,7 @@ def benchmark_row(
     tried = _tune(methods) if benchmark.tune else {}
     if tried:
         methods.configuration = min(tried, key=tried.__getitem__)
-    runs = _alternate(methods, benchmark, left_out)
+    runs, failed = _alternate(methods, benchmark, left_out)
     spectra = _references(methods, runs, with_forests=not reason)
     row = {
         **on_root(comm, lambda: _describe(options, cast(Solid, solid))),
@@ -140,6 +143,7 @@ def benchmark_row(
             for configuration, seconds in tried.items()
         ],
         "runs": {name: len(found) for name, found in runs.items()},
+        "failed": failed,
         "ranks": comm.size,
         "threads": max((int(found["num_threads"]) for found in loaded_blas()), default=1),
         "blas": blas_name(),
@@ -161,6 +165,7 @@ def row_lines(row: Mapping[str, Any]) -> list[str]:
         error = row["eigenvalue_error"].get(name)
         worst = f"  worst eigenvalue error {error['max']:.1e}" if error else ""
         lines.append(f"{name:<20s}{seconds:8.2f} s{shown}{worst}")
+    lines += [f"{name:<20s}failed: {reason}" for name, reason in row["failed"].items()]
     last = min(AUDIBLE_LAST, row["modes"])
     for name, error in row["frequency_error"].items():
         lines.append(
@@ -195,8 +200,10 @@ def _tune(methods: Methods) -> dict[SlepcConfiguration, float]:
     return tried
 
 
-def _alternate(methods: Methods, benchmark: BenchmarkOptions, left_out: tuple[str, ...]) -> Runs:
-    """Runs of every method, one a round."""
+def _alternate(
+    methods: Methods, benchmark: BenchmarkOptions, left_out: tuple[str, ...]
+) -> tuple[Runs, dict[str, str]]:
+    """Runs of every method, one a round, and why a method has none."""
     chosen = _chosen(methods, left_out)
     runs: Runs = {name: [] for name in chosen}
     plan = [
@@ -205,16 +212,27 @@ def _alternate(methods: Methods, benchmark: BenchmarkOptions, left_out: tuple[st
         for name in chosen
         if number < benchmark.rounds(name)
     ]
+    failed: dict[str, str] = {}
     for name in track(plan, "runs", visible=methods.comm.rank == 0):
-        runs[name].append(chosen[name]())
-    return runs
+        if name in failed:
+            continue
+        try:
+            runs[name].append(chosen[name]())
+        except ConvergenceError as error:
+            # The others are worth knowing; without SLEPc's there is nothing to compare with.
+            if name == "slepc" or not error.collective:
+                raise
+            failed[name] = str(error)
+            runs.pop(name)
+            say(f"{name}: {error}", visible=methods.comm.rank == 0)
+    return runs, failed
 
 
 def _references(methods: Methods, runs: Runs, with_forests: bool) -> dict[str, Run]:
     """Spectra by SLEPc that the others are compared with."""
     spectra = {"fine": runs["slepc"][0], "average": methods.slepc("average")}
     if with_forests:
-        spectra["coarse"] = runs["ddfem"][0]
+        spectra["coarse"] = runs["ddfem"][0] if "ddfem" in runs else methods.slepc("ddfem")
         spectra["coarse_changed"] = methods.slepc("ddfem", changed=True)
     return spectra
 
@@ -239,7 +257,7 @@ def _times(runs: Runs, before: dict[str, float]) -> dict[str, Any]:
     planned = {name: median([run.before for run in found]) or 0.0 for name, found in runs.items()}
     parts = {
         **before,
-        "fine_solver": planned["hcms_ec"],
+        "fine_solver": planned.get("hcms_ec", 0.0),
         "coarse_solver": planned.get("ddfem_hcms_ec", 0.0),
     }
     names = ["arpack", "slepc", *BASES]

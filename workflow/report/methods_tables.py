@@ -59,7 +59,7 @@ def methods(found: Mapping[str, Row], titles: Mapping[str, str]) -> Table:
 
 
 def _caption(found: Mapping[str, Row]) -> str:
-    runs = sorted({row["runs"]["hcms_ec"] for row in found.values()})
+    runs = sorted({row["runs"]["slepc"] for row in found.values()})
     slow = sorted({row["runs"]["arpack"] for row in found.values() if "arpack" in row["runs"]})
     rounds = " or ".join(map(str, runs))
     less = f" (ARPACK {' or '.join(map(str, slow))})" if slow and slow != runs else ""
@@ -73,6 +73,11 @@ def _caption(found: Mapping[str, Row]) -> str:
         "the fine mesh: the largest of an eigenvalue, and the rms of frequencies 7 to 60. SLEPc: "
         + ("; ".join(f"{model} {_configuration(row)}" for model, row in found.items()) or "none")
         + "."
+        + "".join(
+            f" {model}, {METHODS[name]}: {reason}."
+            for model, row in found.items()
+            for name, reason in row["failed"].items()
+        )
     )
 
 
@@ -95,8 +100,8 @@ def _methods_row(model: str, title: str, row: Row) -> Row:
         "title": title,
         **{key: row[key] for key in ("modes", "dof_fine", "dof_coarse")},
         **row["seconds"],
-        "hcms_error": row["eigenvalue_error"]["hcms"]["max"],
-        "hcms_ec_error": row["eigenvalue_error"]["hcms_ec"]["max"],
+        "hcms_error": row["eigenvalue_error"].get("hcms", {}).get("max"),
+        "hcms_ec_error": row["eigenvalue_error"].get("hcms_ec", {}).get("max"),
         "ddfem_error": coarse.get("rms_7_60"),
         "average_error": row["frequency_error"]["average"]["rms_7_60"],
         **extremes,
