@@ -6,8 +6,11 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
+from typing import Any, TypeVar
 
 from threadpoolctl import ThreadpoolController
+
+Result = TypeVar("Result")
 
 
 def split(count: int, threads: int, largest: int) -> list[tuple[int, int]]:
@@ -25,8 +28,8 @@ def split(count: int, threads: int, largest: int) -> list[tuple[int, int]]:
 
 
 def in_parallel(
-    work: Callable[..., object], arguments: Sequence[tuple[object, ...]], threads: int
-) -> list[object]:
+    work: Callable[..., Result], arguments: Sequence[tuple[Any, ...]], threads: int
+) -> list[Result]:
     """Call `work` with each of `arguments` on up to `threads` threads; results in their order.
 
     `work` must release the global interpreter lock for most of its time.  BLAS runs on one thread

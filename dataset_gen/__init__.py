@@ -1,3 +1,3 @@
 """Training set of the data-driven coarsening: hexahedron, 2x2x2 block, fits, shards."""
 
-import carillon  # noqa: F401
+import carillon

@@ -1,3 +1,3 @@
 """Modal analysis of voxel solids, from the mesh file to the modes file."""
 
-import carillon  # noqa: F401
+import carillon

@@ -415,7 +415,12 @@ def _parser() -> argparse.ArgumentParser:
         "--keep", type=whole_number(1), help="modes kept at the root of the merge tree"
     )
     modes.add_argument("--subdomains", type=whole_number(1), help="number of subdomains")
-    modes.add_argument("--interface", choices=INTERFACES, default="free", help="default: free")
+    modes.add_argument(
+        "--interface",
+        choices=INTERFACES,
+        default=SolverOptions.interface,
+        help="treatment of interfaces by HCMS (default %(default)s)",
+    )
     modes.add_argument("--json", action="store_true", help="print a summary as JSON")
     modes.set_defaults(run=_modes)
 

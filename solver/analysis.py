@@ -17,7 +17,8 @@ from solver.correction import EIGENVALUE_TOLERANCE, correct, default_guard
 from solver.decomposition import on_root
 from solver.distribution import Share, deal_moduli, distribute
 from solver.eigensolver import TYPES
-from solver.hcms.synthesis import Synthesis, synthesize
+from solver.hcms.condense import DEFAULT_INTERFACE
+from solver.hcms.synthesis import Synthesis, make_subdomains, synthesize
 from solver.inner import InnerSolver
 from solver.model import RIGID_MODES, ElasticModel
 from solver.system import Layout, System, assemble
@@ -87,7 +88,7 @@ class SolverOptions:
     corrections: int = MAX_CORRECTIONS
     keep: int | None = None
     subdomains: int | None = None
-    interface: str = "free"
+    interface: str = DEFAULT_INTERFACE
     seed: int = 0
     prove: bool | None = None
     inner: str = "auto"
@@ -174,6 +175,8 @@ class ModalSolver:
         with phases("analysis"):
             self._layout = Layout.of_share(self._share, comm)
             self._inner = InnerSolver(options.inner, self._layout)
+            if options.method == "hcms":
+                self._subdomains = make_subdomains(self._share, options.interface, comm)
         self.seconds = phases.seconds
 
     def solve(self, young: Array | None = None, start: Modes | Array | None = None) -> Modes:
@@ -280,7 +283,14 @@ class ModalSolver:
         values: Array | None = None
         if start is None:
             with phases("hcms"):
-                synthesis = synthesize(share, self._keep, options.interface, self.comm)
+                synthesis = synthesize(
+                    share,
+                    self._keep,
+                    options.interface,
+                    self.comm,
+                    self._subdomains,
+                    self._threads,
+                )
             evidence["hcms"] = synthesis.counts.summary(self.comm)
             if options.corrections == 0:
                 return self._uncorrected(synthesis)
@@ -360,7 +370,7 @@ def default_keep(modes: int) -> int:
 
 
 def elastic_part(system: System, synthesis: Synthesis) -> tuple[Array | None, Array]:
-    """Ritz values and vectors without the rigid motions; no values if they are not clean of them."""
+    """Ritz values and vectors without the rigid motions; no values if the two are not apart."""
     elastic = np.ascontiguousarray(synthesis.vectors[:, RIGID_MODES:])
     overlap = system.inner(system.times_mass(system.rigid), elastic)
     if overlap.size and np.abs(overlap).max() > ORTHOGONAL_TO_RIGID:

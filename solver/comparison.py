@@ -11,11 +11,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from solver.model import RIGID_MODES
-from solver.verification import residual_scale
 from solver.geometry import prolongation
+from solver.model import RIGID_MODES
 from solver.modes_file import ModesFile, read_modes
 from solver.sparse import assembled
+from solver.verification import residual_scale
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from carillon.errors import ConvergenceError
 from solver.decomposition import on_root
 from solver.enrichment import Ritz, Step, enrich, relax
-from solver.inner import Inverse, InnerSolver
+from solver.inner import InnerSolver, Inverse
 from solver.rayleigh_ritz import rayleigh_ritz, safe_shift
 from solver.system import System
 
@@ -24,6 +24,8 @@ INTERACTIVE_TOLERANCE = 1e-2
 ACCELERATIONS = ("krylov", "relaxation")
 SHIFT_SHARE = 0.55
 """Shift of an indefinite factorisation, as a share of the last wanted eigenvalue."""
+HIGHEST_SHIFT = 0.8
+"""Share at which the shift is moved, when better Ritz values have left it too high."""
 GUARD_SHARE, FEWEST_GUARDS = 0.22, 12
 """Vectors carried beyond the wanted ones, as a share of these, and the fewest of them."""
 IMPROVED_GUARDS = 0.4
@@ -127,14 +129,11 @@ def correct(
         # The subspace is the whole space, where Ritz pairs are eigenpairs.
         exact = np.full(wanted, np.finfo(float).eps)
         return Correction(values[:wanted], np.ascontiguousarray(start[:, :wanted]), exact)
-    inside = acceleration == "krylov" and inner.indefinite
-    shift = SHIFT_SHARE * values[wanted - 1] if inside else -safe_shift(system)
-    inverse = inner.inverse(system, shift)
+    iteration = _Iteration(system, inner, Ritz(system, values, start), wanted, acceleration)
     try:
-        iteration = _Iteration(system, inverse, Ritz(system, values, start), wanted, acceleration)
         return iteration.run(tolerance, max_steps, report, observe)
     finally:
-        inverse.destroy()
+        iteration.inverse.destroy()
 
 
 def default_guard(wanted: int) -> int:
@@ -146,12 +145,14 @@ class _Iteration:
     """State of the subspace iteration."""
 
     def __init__(
-        self, system: System, inverse: Inverse, ritz: Ritz, wanted: int, acceleration: str
+        self, system: System, inner: InnerSolver, ritz: Ritz, wanted: int, acceleration: str
     ) -> None:
         self.system = system
-        self.inverse = inverse
+        self.inner = inner
         self.ritz = ritz
         self.wanted = wanted
+        self.inside = acceleration == "krylov" and inner.indefinite
+        self.inverse: Inverse = inner.inverse(system, self._shift())
         guard = default_guard(wanted)
         self.width = wanted + guard
         self.improved = wanted + int(IMPROVED_GUARDS * guard)
@@ -181,9 +182,13 @@ class _Iteration:
                 break
             if tolerance > 0.0:
                 self._require_progress(step, tolerance)
-            correction = self.inverse.solve(np.ascontiguousarray(residual))
+            self._follow_spectrum()
+            residual = np.ascontiguousarray(residual)
+            correction = self.inverse.solve(residual)
             self.solves += correction.shape[1]
-            self.step(self.system, self.ritz, correction, active, self.inverse, self.width)
+            self.step(
+                self.system, self.ritz, correction, residual, active, self.inverse, self.width
+            )
             step += 1
             if len(self.ritz.values) < self.wanted:
                 raise ConvergenceError(
@@ -200,6 +205,19 @@ class _Iteration:
         values, vectors, found = self.ritz.lowest(self.wanted)
         return Correction(values, vectors, found, step, self.solves, self.history)
 
+    def _last(self) -> float:
+        """Ritz value of the last wanted mode, the same on all ranks."""
+        return float(np.sort(self.ritz.values)[self.wanted - 1])
+
+    def _shift(self) -> float:
+        return SHIFT_SHARE * self._last() if self.inside else -safe_shift(self.system)
+
+    def _follow_spectrum(self) -> None:
+        """Factorise anew if a start far off has put the shift too high."""
+        if self.inside and self.inverse.shift > HIGHEST_SHIFT * self._last():
+            self.inverse.destroy()
+            self.inverse = self.inner.inverse(self.system, self._shift())
+
     def _residuals(self, tolerance: float) -> tuple[Array, Array, NDArray[np.int64]]:
         """Errors of the wanted modes, and residuals of those to improve with their numbers.
 
@@ -208,9 +226,8 @@ class _Iteration:
         ritz = self.ritz
         candidates = ritz.active[: max(0, self.improved - ritz.locked)]
         residual = ritz.residual(candidates)
-        ritz.errors[candidates] = on_root(
-            self.system.comm, lambda found=self._estimate(candidates, residual): found
-        )
+        estimate = self._estimate(candidates, residual)
+        ritz.errors[candidates] = on_root(self.system.comm, lambda: estimate)
         inside = candidates[: max(0, self.wanted - ritz.locked)]
         errors = ritz.errors[inside]
         accurate = inside[errors <= tolerance]

@@ -97,6 +97,11 @@ class Share:
         """Number of unknowns of the whole solid."""
         return 3 * self.decomposition.n_nodes
 
+    def planes(self) -> NDArray[np.int64]:
+        """Integer coordinates (stop - start, 3) of this rank's nodes, in elements' edges."""
+        positions = self.positions / self.cells.elements.edge
+        return np.rint(positions - positions.min(axis=0)).astype(np.int64)
+
     def cells_by_subdomain(self, parts: range) -> dict[int, NDArray[np.int64]]:
         """Positions in `cells` of those that touch each subdomain in `parts`, ascending."""
         corner_part = np.searchsorted(self.decomposition.offsets, self.cells.corners, side="right")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Protocol
 
 import numpy as np
 import scipy.linalg as la
 from numpy.typing import NDArray
 
+from carillon.errors import ConvergenceError
 from solver.decomposition import on_root
 from solver.inner import Inverse
 from solver.rayleigh_ritz import rayleigh_ritz
@@ -18,6 +20,10 @@ Index = NDArray[np.int64]
 
 DEPENDENT = 1e-11
 """Directions whose share (squared) of the corrections is below this are dropped."""
+SMALL_CORRECTION = 1e-6
+"""Length (squared) of corrections of unit vectors below which rounding spoils the identities."""
+NEARLY_INSIDE = 1e-2
+"""Share (squared) of a correction outside the subspace below which that part is formed first."""
 WELL_CONDITIONED = 1e-3
 """Least diagonal entry of the Cholesky factor of the scaled Gram matrix to rely on it."""
 MOST_PASSES = 3
@@ -53,13 +59,24 @@ class Ritz:
         """Number of locked vectors."""
         return len(self.values) - len(self.active)
 
+    @property
+    def locked_numbers(self) -> Index:
+        """Numbers of the locked vectors."""
+        return np.setdiff1d(np.arange(len(self.values)), self.active)
+
     def lock(self, numbers: Index) -> None:
         """Leave these vectors as they are from now on."""
         self.active = self.active[~np.isin(self.active, numbers)]
 
     def residual(self, numbers: Index) -> Array:
-        """K X - M X Theta of some vectors."""
-        residual = self.system.times_stiffness(self.vectors[:, numbers])
+        """K X - M X Theta of some vectors, whose values become their Rayleigh quotients.
+
+        An error of a value shows in the residual to second order only, so none may creep in.
+        """
+        vectors = np.ascontiguousarray(self.vectors[:, numbers])
+        residual = self.system.times_stiffness(vectors)
+        quotients = self.system.column_products(vectors, residual)
+        self.values[numbers] = on_root(self.system.comm, lambda: quotients)
         residual -= self.mass_vectors[:, numbers] * self.values[numbers]
         return residual
 
@@ -92,15 +109,22 @@ class Step(Protocol):
         system: System,
         ritz: Ritz,
         corrections: Array,
+        residual: Array,
         numbers: Index,
         inverse: Inverse,
         width: int,
     ) -> None:
-        """`corrections` (local, a) solve for the residuals of the vectors `numbers`."""
+        """`corrections` (local, a) solve for the `residual` of the vectors `numbers`."""
 
 
 def enrich(
-    system: System, ritz: Ritz, corrections: Array, numbers: Index, inverse: Inverse, width: int
+    system: System,
+    ritz: Ritz,
+    corrections: Array,
+    residual: Array,
+    numbers: Index,
+    inverse: Inverse,
+    width: int,
 ) -> None:
     """Rayleigh-Ritz in the span of the active vectors and their corrections.
 
@@ -108,14 +132,23 @@ def enrich(
 
     Notes
     -----
-    With exact solves K Z = R + mu M Z, and X^T R = 0 for Ritz vectors, so the projections of K
-    follow from those of M alone: X^T K Z = mu X^T M Z, and Z^T R = X^T M Z (mu - Theta), transposed.
-    Inexact solutions are multiplied by K.
+    With exact solves K Z = R + mu M Z, and X^T R = 0 for active X, which are Ritz vectors of their
+    span, so the projections of K follow from those of M: X^T K Z = mu X^T M Z + X^T R, and
+    R^T Z = (mu - Theta) X^T M Z.
+    Inexact or very small solutions are multiplied by K.
+
+    Raises
+    ------
+    ConvergenceError
+        If a Ritz value is not positive, which rounding alone can cause.
     """
     Z, overlap, gram, untouched = _independent(system, ritz, corrections)
-    if inverse.exact and untouched:
+    if inverse.exact and untouched and np.diag(gram).min(initial=1.0) > SMALL_CORRECTION:
         mu = inverse.shift
         across = mu * overlap
+        if ritz.locked:
+            locked = ritz.locked_numbers
+            across[locked] += system.inner(ritz.vectors[:, locked], residual)
         half = (mu - ritz.values[numbers]) * overlap[numbers].T
         stiff = mu * gram + 0.5 * (half + half.T)
     else:
@@ -130,6 +163,11 @@ def enrich(
         system.comm,
         lambda: _lowest(ritz.values, ritz.active, overlap, gram, across, stiff, keep),
     )
+    if len(values) and values[0] <= 0.0:
+        raise ConvergenceError(
+            f"error correction found an eigenvalue of {values[0]:.3g} rad^2/s^2 for a stiffness "
+            "that has none below zero: rounding spoils it; ask for a looser tolerance"
+        )
     vectors = ritz.vectors @ of_all
     vectors += Z @ of_corrections
     ritz.replace_active(values, vectors)
@@ -146,10 +184,10 @@ def _independent(system: System, ritz: Ritz, Z: Array) -> tuple[Array, Array, Ar
         Z -= system.rigid @ system.inner(ritz.mass_rigid, Z)
         overlap = system.inner(ritz.mass_vectors, Z)
         gram = system.inner(Z, system.times_mass(Z))
-        basis, condition = on_root(
-            system.comm, lambda found=_outside(overlap, gram): _orthonormal(found)
-        )
-        if condition > WELL_CONDITIONED or passes == MOST_PASSES - 1:
+        outside = _outside(overlap, gram)
+        basis, condition = on_root(system.comm, partial(_orthonormal, outside))
+        alone = bool((np.diag(outside) > NEARLY_INSIDE * np.diag(gram)).all())
+        if (alone and condition > WELL_CONDITIONED) or passes == MOST_PASSES - 1:
             break
         # Small differences of large numbers: what is outside X is formed, then judged again.
         Z = Z @ basis
@@ -180,9 +218,7 @@ def _lowest(
     H[np.arange(size), np.arange(size)] = theta[active]
     H[size:, :size] = coupling.T
     H[size:, size:] = basis.T @ inner @ basis
-    values, vectors = la.eigh(
-        H, driver="evd", lower=True, overwrite_a=True, check_finite=False
-    )
+    values, vectors = la.eigh(H, driver="evd", lower=True, overwrite_a=True, check_finite=False)
     keep = min(keep, len(values))
     of_basis = basis @ vectors[size:, :keep]
     of_all = -overlap @ of_basis
@@ -212,7 +248,13 @@ def _orthonormal(gram: Array) -> tuple[Array, float]:
 
 
 def relax(
-    system: System, ritz: Ritz, corrections: Array, numbers: Index, inverse: Inverse, width: int
+    system: System,
+    ritz: Ritz,
+    corrections: Array,
+    residual: Array,
+    numbers: Index,
+    inverse: Inverse,
+    width: int,
 ) -> None:
     """Rayleigh-Ritz in the span of X - w Z, the over-relaxed subspace iteration of the paper.
 
@@ -224,7 +266,7 @@ def relax(
     iterated = ritz.vectors[:, ritz.active]
     position = np.searchsorted(ritz.active, numbers)
     iterated[:, position] -= corrections * weight
-    locked = np.setdiff1d(np.arange(len(ritz.values)), ritz.active)
+    locked = ritz.locked_numbers
     iterated -= ritz.vectors[:, locked] @ system.inner(ritz.mass_vectors[:, locked], iterated)
     found, vectors = rayleigh_ritz(system, iterated, max(0, width - ritz.locked))
     ritz.replace_active(found, vectors)

@@ -52,21 +52,25 @@ class Pattern:
     stop: int
 
     @classmethod
-    def of_cells(cls, corners: Index, start: int, stop: int) -> Pattern:
-        """Pattern of the cells `corners` (c, 8), which touch the rows [start, stop)."""
+    def of_cells(cls, corners: Index, start: int, stop: int, ghosts: bool = True) -> Pattern:
+        """Pattern of the cells `corners` (c, 8), which touch the rows [start, stop).
+
+        Without `ghosts` the columns outside are left out as the rows are.
+        """
         own = (corners >= start) & (corners < stop)
-        ghosts = np.unique(corners[~own])
+        ghosts_there = np.unique(corners[~own]) if ghosts else np.empty(0, dtype=np.int64)
         n_own = stop - start
-        local = np.where(own, corners - start, n_own + np.searchsorted(ghosts, corners))
-        width = n_own + len(ghosts)
+        local = np.where(own, corners - start, n_own + np.searchsorted(ghosts_there, corners))
+        width = n_own + len(ghosts_there)
         key = local[:, :, None] * width + local[:, None, :]
-        key = np.where(own[:, :, None], key, -1)
+        kept = own[:, :, None] if ghosts else own[:, :, None] & own[:, None, :]
+        key = np.where(kept, key, -1)
         present = np.unique(key)
         present = present[np.searchsorted(present, 0) :]
         row, columns = np.divmod(present, width)
         indptr = np.searchsorted(row, np.arange(n_own + 1))
         entry = np.where(key >= 0, np.searchsorted(present, key), -1).astype(np.int32)
-        return cls(indptr, columns, entry, ghosts, start, stop)
+        return cls(indptr, columns, entry, ghosts_there, start, stop)
 
     @property
     def global_columns(self) -> Index:
@@ -93,9 +97,7 @@ class Halo:
         wanted = [pattern.ghosts[bounds[rank] : bounds[rank + 1]] for rank in range(comm.size)]
         self._ghosts = len(pattern.ghosts)
         asked = comm.alltoall(wanted) if comm.size > 1 else [wanted[0]]
-        self._sent = [
-            (rank, rows - pattern.start) for rank, rows in enumerate(asked) if len(rows)
-        ]
+        self._sent = [(rank, rows - pattern.start) for rank, rows in enumerate(asked) if len(rows)]
 
     @property
     def neighbours(self) -> int:
@@ -137,21 +139,23 @@ class NodeRows:
         (e,) entries of M [kg], the same for the three components.
     """
 
-    def __init__(self, pattern: Pattern, halo: Halo, elements: Elements, threads: int) -> None:
+    def __init__(self, pattern: Pattern, halo: Halo | None = None, threads: int = 1) -> None:
+        """Rows of zeros; without `halo` no other rank has a part in the matrix."""
         self.pattern = pattern
         self.halo = halo
         self.threads = threads
         self.stiffness = np.zeros((len(pattern.columns), 3, 3))
         self.mass = np.zeros(len(pattern.columns))
+
+    def add(self, cells: slice, stiffness: Array, mass: Array) -> None:
+        """Add element matrices (c, 24, 24) and (c, 8, 8) of some of the pattern's cells."""
+        _add_cells(self.pattern.entry[cells], stiffness, mass, self.stiffness, self.mass)
+
+    def add_elements(self, elements: Elements) -> None:
+        """Add the matrices of the pattern's cells, a few at a time."""
         for first in range(0, len(elements), CELLS_AT_ONCE):
             chosen = slice(first, first + CELLS_AT_ONCE)
-            _add_cells(
-                pattern.entry[chosen],
-                elements.stiffness(chosen),
-                elements.nodal_mass(chosen),
-                self.stiffness,
-                self.mass,
-            )
+            self.add(chosen, elements.stiffness(chosen), elements.nodal_mass(chosen))
 
     @cached_property
     def lumped_mass(self) -> Array:
@@ -183,7 +187,7 @@ class NodeRows:
 
     def _product(self, block: Array, stiffness: bool) -> Array:
         block = np.ascontiguousarray(block)
-        ghosts = self.halo.exchange(block)
+        ghosts = block[:0] if self.halo is None else self.halo.exchange(block)
         result = np.empty_like(block)
         pattern = self.pattern
         kernel, entries = (

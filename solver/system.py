@@ -59,11 +59,6 @@ class Layout:
         halo = Halo(pattern, np.array([*starts, share.decomposition.n_nodes]), comm)
         return cls(share, pattern, halo, _centred(share, comm), comm)
 
-    def planes(self) -> NDArray[np.int64]:
-        """Integer coordinates (local nodes, 3) of this rank's nodes, in elements' edges."""
-        positions = self.share.positions / self.share.cells.elements.edge
-        return np.rint(positions - positions.min(axis=0)).astype(np.int64)
-
 
 @dataclass(frozen=True)
 class System:
@@ -103,12 +98,12 @@ class System:
         return self.rows.times_mass(block)
 
     @cached_property
-    def K(self) -> Any:
+    def K(self) -> Any:  # noqa: N802
         """Stiffness as a PETSc matrix, made when first asked for; collective."""
         return distributed_matrix(self.rows.stiffness_csr(self.n_dofs), self.comm)
 
     @cached_property
-    def M(self) -> Any:
+    def M(self) -> Any:  # noqa: N802
         """Mass as a PETSc matrix, made when first asked for; collective."""
         return distributed_matrix(self.rows.mass_csr(self.n_dofs), self.comm)
 
@@ -228,7 +223,8 @@ def assemble(
     """
     layout = Layout.of_share(share, comm) if layout is None else layout
     elements = share.cells.elements if elements is None else elements
-    rows = NodeRows(layout.pattern, layout.halo, elements, threads)
+    rows = NodeRows(layout.pattern, layout.halo, threads)
+    rows.add_elements(elements)
     # About the centroid of the whole body: every rank must hold rows of the same six motions.
     motions = np.ascontiguousarray(rigid_motions(layout.coordinates, np.zeros(3)))
     system = System(

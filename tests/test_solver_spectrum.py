@@ -17,9 +17,9 @@ from solver.correction import correct
 from solver.distribution import distribute
 from solver.hcms.condense import restrict_stiffness
 from solver.hcms.synthesis import synthesize
+from solver.inner import InnerSolver
 from solver.model import fine_model
 from solver.sparse import assembled
-from solver.inner import InnerSolver
 from solver.system import Layout, assemble
 from solver.truth import count_below, prove_complete, solve_truth
 from tests import solids
@@ -48,7 +48,7 @@ def test_ritz_values_bound_the_spectrum_and_fall_with_more_modes(lumped):
         before = values
 
 
-@pytest.mark.parametrize("interface", ["free", "fixed"])
+@pytest.mark.parametrize("interface", ["overlapping", "free", "fixed"])
 @pytest.mark.parametrize("subdomains", [1, 2, 5])
 @pytest.mark.parametrize("lumped", [False, True])
 def test_all_modes_kept_equal_the_full_solve(interface, subdomains, lumped):
@@ -87,7 +87,7 @@ def test_element_restricted_to_its_nodes_relaxes_or_holds_the_others():
         assert np.abs(relaxed @ motion).max() < 1e-9 * scale * np.abs(motion).max()
 
 
-@pytest.mark.parametrize("interface", ["free", "fixed"])
+@pytest.mark.parametrize("interface", ["overlapping", "free", "fixed"])
 @pytest.mark.parametrize("acceleration", ["krylov", "relaxation"])
 def test_corrected_modes_are_as_accurate_as_the_solver_says(interface, acceleration):
     model = solids.random_box(12, 6, 5)

@@ -83,7 +83,7 @@ def test_default_run_needs_no_file_and_four_models_or_more():
         (("models",), {}, ["models"]),
         (("poisson",), 0.5, ["poisson", "0.5"]),
         (("solver", "modes"), 3, ["solver.modes", "12"]),
-        (("solver", "interface"), "loose", ["solver.interface", "free", "fixed"]),
+        (("solver", "interface"), "loose", ["solver.interface", "overlapping", "free", "fixed"]),
         (("dataset", "objective"), "guess", ["dataset.objective", "hybrid"]),
     ],
 )

@@ -1,12 +1,15 @@
 """Element matrices restricted to the nodes that lie inside a group of subdomains.
 
-Both interface treatments are a restriction of the elements that straddle a group's boundary:
+Every interface treatment is a restriction of the elements that straddle a group's boundary:
 
 `fixed`
     the principal sub-matrix, as Eq. (13) literally reads: nodes outside are held;
 `free`
     the Schur complement: nodes outside are relaxed, so that every group is free-standing and keeps
-    its rigid modes.
+    its rigid modes;
+`overlapping`
+    as `free`, but the modes of a subdomain are those of the body that it forms with the straddling
+    elements in full, taken at its own nodes (see `solver.hcms.local`).
 """
 
 from __future__ import annotations
@@ -17,7 +20,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Indices = NDArray[np.integer]
 
-INTERFACES = ("free", "fixed")
+INTERFACES = ("overlapping", "free", "fixed")
+DEFAULT_INTERFACE = "overlapping"
 
 _RANK_TOLERANCE = 1e-12
 _NON_COLLINEAR = 3

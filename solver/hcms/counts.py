@@ -16,12 +16,10 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from solver.lowest import BLOCK_SHARE, STEPS
 from solver.messages import Sent
 
 Array = NDArray[np.float64]
-
-LANCZOS_SPARE = 2.0
-"""Lanczos vectors made for each mode wanted."""
 
 
 @dataclass
@@ -147,14 +145,16 @@ def eigen_flops(size: int, generalised: bool) -> float:
     return (14.0 / 3.0 + (7.0 / 3.0 if generalised else 0.0)) * float(size) ** 3
 
 
-def lanczos_flops(size: int, modes: int) -> float:
-    """Lowest `modes` of a compact solid of `size` unknowns, by Lanczos with a sparse factorisation.
+def krylov_flops(size: int, modes: int) -> float:
+    """Lowest `modes` of a compact solid of `size` unknowns by block Krylov, see `solver.lowest`.
 
     Nested dissection of a cube of N nodes has a separator of s = 3 N^(2/3) unknowns at the top;
-    summed over the levels, factorisation takes about s^3 and the factor has about 2 s^2 entries.
-    Every Lanczos vector takes one solve (four operations an entry) and its orthogonalisation.
+    summed over the levels, the factorisation by dense products takes about 4 s^3 and the factor has
+    about 2 s^2 entries.  Every vector takes a solve and its part in four products of the basis with
+    itself or coefficients; the reduced problem is dense.
     """
     separator = 3.0 * (size / 3.0) ** (2.0 / 3.0)
-    vectors = min(LANCZOS_SPARE * modes, float(size))
+    vectors = min((1 + STEPS) * BLOCK_SHARE * modes, float(size))
     solves = 8.0 * separator**2 * vectors
-    return separator**3 + solves + 4.0 * size * vectors**2
+    products = 8.0 * size * vectors**2
+    return 4.0 * separator**3 + solves + products + 2.0 * eigen_flops(int(vectors), False)

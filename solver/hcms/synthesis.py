@@ -15,10 +15,12 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from carillon.threads import in_parallel
 from dataset_gen.block import degrees_of_freedom
 from solver.distribution import Cells, Share
-from solver.hcms.counts import Counts, Tally, lanczos_flops, product_flops
-from solver.hcms.local import local_modes
+from solver.hcms.condense import DEFAULT_INTERFACE
+from solver.hcms.counts import Counts, Tally, krylov_flops, product_flops
+from solver.hcms.local import Subdomain
 from solver.hcms.merge import (
     Group,
     Interface,
@@ -69,8 +71,27 @@ def modes_to_keep(share: float, keep: int) -> int:
     return max(RIGID_MODES, int(np.ceil(keep * np.sqrt(share))))
 
 
+def make_subdomains(share: Share, treatment: str, comm: MPI.Comm) -> dict[int, Subdomain]:
+    """Geometry of this rank's subdomains, by number; `treatment` is that of the interfaces."""
+    planes = share.planes()
+    ranges = share.decomposition.row_ranges()
+    found = {}
+    for part, cells in share.cells_by_subdomain(
+        share.decomposition.subdomains_of(comm.rank)
+    ).items():
+        start, stop = ranges[part]
+        own = planes[start - share.start : stop - share.start]
+        found[part] = Subdomain(share.cells.corners[cells], start, stop, own, treatment)
+    return found
+
+
 def synthesize(
-    share: Share, keep: int = 512, treatment: str = "free", comm: MPI.Comm = MPI.COMM_WORLD
+    share: Share,
+    keep: int = 512,
+    treatment: str = DEFAULT_INTERFACE,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    subdomains: dict[int, Subdomain] | None = None,
+    threads: int = 1,
 ) -> Synthesis:
     """Approximate the `keep` lowest modes by merging subdomains pairwise up the tree.
 
@@ -81,16 +102,22 @@ def synthesize(
     keep
         Modes kept at the root; groups below keep `modes_to_keep`.
     treatment
-        Interface treatment, `free` or `fixed`.
+        Interface treatment, see `solver.hcms.condense`.
+    subdomains
+        Their geometry, if `make_subdomains` was called before with the same treatment.
+    threads
+        Threads that share the subdomains of this rank.
 
     Notes
     -----
-    With `free` interfaces the stiffness at the root is the whole K, so this is a Rayleigh-Ritz
+    With any treatment the stiffness at the root is the whole K, so this is a Rayleigh-Ritz
     method there and the values bound the exact eigenvalues from above.
     """
+    if subdomains is None:
+        subdomains = make_subdomains(share, treatment, comm)
     climb = _Climb(share, keep, treatment, comm)
     with climb.counts.local.running():
-        climb.solve_subdomains()
+        climb.solve_subdomains(subdomains, threads)
     climb.merge_groups()
     with climb.counts.down.running():
         values = climb.root_values()
@@ -127,19 +154,28 @@ class _Climb:
         self.bases: dict[int, Array] = {}
         self.coefficients: dict[int, tuple[Array, Array]] = {}
 
-    def solve_subdomains(self) -> None:
+    def solve_subdomains(self, subdomains: dict[int, Subdomain], threads: int) -> None:
         """Lowest modes of every subdomain of this rank."""
-        parts = self.share.decomposition.subdomains_of(self.comm.rank)
-        cells_of = self.share.cells_by_subdomain(parts)
-        for part in parts:
+        cells_of = self.share.cells_by_subdomain(
+            self.share.decomposition.subdomains_of(self.comm.rank)
+        )
+
+        def solve(part: int) -> tuple[Array, Array]:
+            elements = self.share.cells.take(cells_of[part]).elements
+            return subdomains[part].modes(elements, self._wanted(part))
+
+        # The largest first, so that no thread is left with one at the end.
+        order = sorted(subdomains, key=lambda part: self.ranges[part][0] - self.ranges[part][1])
+        modes = dict(zip(order, in_parallel(solve, [(part,) for part in order], threads)))
+        for part in sorted(subdomains):
             start, stop = self.ranges[part]
             cells = self.share.cells.take(cells_of[part])
-            values, basis = local_modes(cells, start, stop, self._wanted(part), self.treatment)
-            self.counts.local.flops += lanczos_flops(3 * (stop - start), len(values))
+            values, basis = modes[part]
+            self.counts.local.flops += krylov_flops(3 * (stop - start), len(values))
             boundary, crossing = boundary_of(cells, start, stop)
-            modes = np.ascontiguousarray(basis[degrees_of_freedom(boundary - start)])
+            rows = np.ascontiguousarray(basis[degrees_of_freedom(boundary - start)])
             self.bases[part] = basis
-            self.groups[part] = Group(start, stop, values, boundary, modes, crossing)
+            self.groups[part] = Group(start, stop, values, boundary, rows, crossing)
 
     def merge_groups(self) -> None:
         """Merge the groups that this rank leads, and send those that another rank merges."""

@@ -77,7 +77,7 @@ class InnerSolver:
         if method == "multifrontal":
             from solver.inner.multifrontal import Plan
 
-            self._plan = Plan(layout.planes(), layout.pattern.indptr, layout.pattern.columns)
+            self._plan = Plan(layout.share.planes(), layout.pattern.indptr, layout.pattern.columns)
 
     @property
     def indefinite(self) -> bool:
@@ -97,4 +97,4 @@ class InnerSolver:
             return MumpsInverse(system, shift)
         from solver.inner.iterative import IterativeInverse
 
-        return IterativeInverse(system, shift, self.method)
+        return IterativeInverse(system, shift, self.method, threads=system.rows.threads)

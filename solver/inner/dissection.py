@@ -83,9 +83,7 @@ def dissect(planes: Index, indptr: Index, indices: Index, leaf_nodes: int = LEAF
     return Fronts(order, first, np.array(parent, dtype=np.int64), boundary)
 
 
-def _cut(
-    planes: Index, nodes: Index, leaf_nodes: int, owns: list[Index], parent: list[int]
-) -> int:
+def _cut(planes: Index, nodes: Index, leaf_nodes: int, owns: list[Index], parent: list[int]) -> int:
     """Append the fronts of `nodes`, children first; returns the number of the last, their root."""
     plane = _best_plane(planes[nodes]) if len(nodes) > leaf_nodes else None
     children = []

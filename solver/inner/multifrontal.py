@@ -57,7 +57,9 @@ class Plan:
         start, stop = self.fronts.first[front : front + 2]
         rows = self.fronts.order[start:stop]
         counts = indptr[rows + 1] - indptr[rows]
-        number = np.repeat(indptr[rows] - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
+        number = np.repeat(indptr[rows] - np.cumsum(counts) + counts, counts) + np.arange(
+            counts.sum()
+        )
         row = np.repeat(np.arange(stop - start), counts)
         position = column[number]
         later = position >= start
@@ -123,7 +125,9 @@ class Factor:
             matrix = np.zeros((n + b, n + b))
             _add_entries(matrix, plan.entries[front], stiffness, mass, self.shift)
             for child in plan.children[front]:
-                _add_update(matrix, plan.places[child], update.pop(child))
+                # A piece that nothing connects to the rest has no update.
+                if child in update:
+                    _add_update(matrix, plan.places[child], update.pop(child))
             own = np.ascontiguousarray(matrix[:n, :n])
             inverse.reshape(n, n)[:] = np.linalg.inv(own)
             if n and b:

@@ -1,4 +1,4 @@
-"""Sparse LDL^T of K - shift M by MUMPS through PETSc, for blocks of right-hand sides on any ranks."""
+"""Sparse LDL^T of K - shift M by MUMPS through PETSc, on any number of ranks."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ class MumpsInverse:
             self._pc.setUp()
         except PETSc.Error as error:
             raise ConvergenceError(
-                f"the sparse factorisation of {system.n_dofs:,} unknowns failed ({error}); with too "
-                "little memory use more ranks on more machines, or --inner amg-cg"
+                f"the sparse factorisation of {system.n_dofs:,} unknowns failed ({error}); with "
+                "too little memory use more ranks on more machines, or --inner amg-cg"
             ) from None
         self._factor = self._pc.getFactorMatrix()
 

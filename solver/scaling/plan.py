@@ -12,7 +12,7 @@ from solver.hcms.counts import (
     Counts,
     Tally,
     eigen_flops,
-    lanczos_flops,
+    krylov_flops,
     product_flops,
     sparse_product_flops,
 )
@@ -54,7 +54,7 @@ def planned_counts(
     root = modes[-1]
     for part in range(tree.parts):
         rank, unknowns = counts[int(owner[part])], 3 * sizes.nodes[part]
-        rank.local.flops += lanczos_flops(int(unknowns), modes[part])
+        rank.local.flops += krylov_flops(int(unknowns), modes[part])
         if tree.merges:
             rank.basis.flops += product_flops(int(unknowns), modes[part], root)
     for number, step in enumerate(tree.merges):
