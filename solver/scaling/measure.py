@@ -17,7 +17,7 @@ from solver.correction import Correction, correct, default_guard
 from solver.decomposition import on_root
 from solver.distribution import Share, distribute
 from solver.hcms.counts import Counts, Tally
-from solver.hcms.synthesis import synthesize
+from solver.hcms.synthesis import make_subdomains, synthesize
 from solver.inner import InnerSolver
 from solver.model import RIGID_MODES, ElasticModel
 from solver.scaling.counting import CountingComm, TimedInner
@@ -92,12 +92,15 @@ class _Run:
         with self._phase() as self.partition:
             self.share: Share = distribute(model, None, options.seed, self.comm)
             layout = Layout.of_share(self.share, self.comm)
+            subdomains = make_subdomains(self.share, options.interface, self.comm)
             self.inner = TimedInner.of(InnerSolver(options.inner, layout))
         begin = self._together()
         with self._phase() as self.assembly:
             system: System = assemble(self.share, self.comm, layout)
         self.comm.barrier()
-        synthesis = synthesize(self.share, self.keep, options.interface, self.comm)
+        synthesis = synthesize(
+            self.share, self.keep, options.interface, self.comm, subdomains, system.rows.threads
+        )
         self.counts: Counts = synthesis.counts
         self.comm.barrier()
         with self._phase() as self.correction:
