@@ -23,8 +23,9 @@ Array = NDArray[np.float64]
 
 CORRECTED_TOLERANCE = 1e-6
 """Eigenvalue error of HCMS with error correction on the fine mesh."""
-RIVAL_TOLERANCE = 1e-8
-"""Relative residual of SLEPc and ARPACK: what SLEPc itself takes by default."""
+RIVAL_TOLERANCE = 1e-9
+"""Relative residual of SLEPc and ARPACK: the loosest power of ten at which their modes are always as
+orthonormal as the modes of every method have to be."""
 CHECKS = ("inertia", "verification")
 """Phases that check modes instead of computing them; no method is charged for them."""
 

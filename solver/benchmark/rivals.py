@@ -16,7 +16,7 @@ from slepc4py import SLEPc
 
 from carillon.errors import ConvergenceError
 from solver.distribution import distribute
-from solver.eigensolver import factor_package
+from solver.eigensolver import OPTIONS_PREFIX, factor_package
 from solver.model import ElasticModel
 from solver.rayleigh_ritz import safe_shift
 from solver.system import assemble
@@ -64,8 +64,8 @@ class SlepcConfiguration:
     def in_force(self, modes: int) -> Iterator[None]:
         """Every SLEPc solver made in the body is set up so, by PETSc's options database."""
         chosen = {
-            "eps_ncv": max(round(self.subspace * modes), modes + FEWEST_MORE),
-            "st_pc_factor_mat_solver_type": self.package,
+            f"{OPTIONS_PREFIX}eps_ncv": max(round(self.subspace * modes), modes + FEWEST_MORE),
+            f"{OPTIONS_PREFIX}st_pc_factor_mat_solver_type": self.package,
         }
         options = PETSc.Options()
         for name, value in chosen.items():

@@ -37,7 +37,7 @@ def convergence_figure(history: dict[str, Any]) -> Figure:
     starts = list(dict.fromkeys(start for _, start in curves))
     colours = _colours(starts)
     with plt.rc_context(SETTINGS):
-        figure = plt.figure(figsize=(7.6, 8.2))
+        figure = plt.figure(figsize=(1.2 + 2.15 * len(starts), 8.2))
         grid = figure.add_gridspec(
             1 + len(ACCELERATIONS), len(starts), height_ratios=(1.2, *(1 for _ in ACCELERATIONS))
         )
@@ -49,7 +49,7 @@ def convergence_figure(history: dict[str, Any]) -> Figure:
                 axes = figure.add_subplot(grid[row, column], sharey=shared, sharex=shared)
                 _plot_errors(axes, curves[acceleration, start], exact, colours[start])
                 if row == 1:
-                    axes.set_title(f"From {start_label(start)}")
+                    axes.set_title(start_label(start).removesuffix(" interfaces"))
                 if row == len(ACCELERATIONS):
                     axes.set_xlabel("mode number")
                 if column:
@@ -97,7 +97,7 @@ def _plot_errors(axes: Any, steps: Array, exact: Array, colour: str) -> None:
             linewidth=1.4,
             label=str(step),
         )
-    axes.legend(title="corrections", title_fontsize=8.5, ncols=len(steps), handlelength=1.0)
+    axes.legend(title="corrections", title_fontsize=8.5, ncols=2, handlelength=1.0)
 
 
 def visible(errors: ArrayLike) -> Array:
