@@ -23,9 +23,10 @@ from carillon.runtime import limit_threads, warn_about_reference_blas
 from dataset_gen.element import DEFAULT_POISSON
 from dataset_gen.objectives import OBJECTIVES, require_objective
 from solver import coarsening, inner, materials
-from solver.analysis import METHODS, Modes, SolverOptions, modal_analysis
+from solver.analysis import METHODS, ModalSolver, Modes, SolverOptions
 from solver.correction import ACCELERATIONS, EIGENVALUE_TOLERANCE, INTERACTIVE_TOLERANCE
 from solver.decomposition import keep_on_root, on_root
+from solver.eigensolver import insert_options
 from solver.geometry import FILLS, PIECES
 from solver.hcms.condense import INTERFACES
 from solver.problem import Problem, ProblemOptions, build_problem
@@ -67,6 +68,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _modes(options: argparse.Namespace, comm: MPI.Comm) -> None:
     from solver.modes_file import write_modes
+    from solver.start import start_from_file
 
     on_root(comm, lambda: require_writable(options.out))
     parameters = _problem_options(options)
@@ -85,7 +87,13 @@ def _modes(options: argparse.Namespace, comm: MPI.Comm) -> None:
     )
     problem = keep_on_root(comm, lambda: build_problem(parameters))
     model = None if problem is None else problem.model
-    result = modal_analysis(model, solver, comm, verbose=sys.stderr.isatty())
+    insert_options(options.petsc)
+    prepared = ModalSolver(model, solver, comm, verbose=sys.stderr.isatty())
+    start = None
+    if options.start is not None:
+        start = start_from_file(options.start, model, options.modes, prepared.share, comm)
+    result = prepared.solve(start=start)
+    result.seconds = {**prepared.seconds, **result.seconds}
     attributes = {} if problem is None else _modes_attributes(options, problem, result)
 
     def write(blocks: Iterator[NDArray[np.float64]]) -> None:
@@ -405,6 +413,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     modes.add_argument(
         "--start", metavar="MODES", help="modes file of a similar material to start from"
+    )
+    modes.add_argument(
+        "--petsc",
+        metavar="OPTIONS",
+        help='options for PETSc and SLEPc with the prefix carillon_, as in "-carillon_eps_ncv 400"',
     )
     modes.add_argument(
         "--prove",

@@ -112,6 +112,9 @@ class Modes:
         peak memory.
     seconds
         Wall time by phase.
+    guard
+        (local, g) less accurate vectors beyond, which a warm start makes use of; None if there are
+        none.
     """
 
     values: Array
@@ -120,6 +123,12 @@ class Modes:
     system: System
     evidence: dict[str, Any] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
+    guard: Array | None = None
+
+    def start(self) -> Array:
+        """Elastic modes and guard vectors (local, k - 6 + g), to start a correction from."""
+        blocks = [self.vectors[:, RIGID_MODES:], *([] if self.guard is None else [self.guard])]
+        return np.concatenate(blocks, axis=1)
 
 
 class ModalSolver:
@@ -138,6 +147,8 @@ class ModalSolver:
 
     Attributes
     ----------
+    share
+        This rank's share of the solid.
     seconds
         Wall time of what depends on the mesh alone, by phase.
 
@@ -170,13 +181,13 @@ class ModalSolver:
         reuse_freed_memory()
         phases = Phases(comm, verbose)
         with phases("partition"):
-            self._share = distribute(model, options.subdomains, options.seed, comm)
+            self.share = distribute(model, options.subdomains, options.seed, comm)
         self._keep = self._modes_to_keep()
         with phases("analysis"):
-            self._layout = Layout.of_share(self._share, comm)
+            self._layout = Layout.of_share(self.share, comm)
             self._inner = InnerSolver(options.inner, self._layout)
             if options.method == "hcms":
-                self._subdomains = make_subdomains(self._share, options.interface, comm)
+                self._subdomains = make_subdomains(self.share, options.interface, comm)
         self.seconds = phases.seconds
 
     def solve(self, young: Array | None = None, start: Modes | Array | None = None) -> Modes:
@@ -201,7 +212,7 @@ class ModalSolver:
         """
         phases = Phases(self.comm, self._verbose)
         with phases("assembly"):
-            share = self._share
+            share = self.share
             if young is not None:
                 share = deal_moduli(share, young, self.comm)
             elements = share.cells.elements
@@ -213,20 +224,21 @@ class ModalSolver:
             "n_dofs": share.n_dofs,
         }
         if self.options.method == "hcms":
-            vectors = start.vectors if isinstance(start, Modes) else start
-            found = self._hcms(share, system, vectors, phases, evidence)
+            begin = start.start() if isinstance(start, Modes) else start
+            values, vectors, guard = self._hcms(share, system, begin, phases, evidence)
         else:
-            found = self._general_solver(system, phases, evidence)
+            values, vectors = self._general_solver(system, phases, evidence)
+            guard = None
         with phases("verification"):
-            residuals, orthogonality = verify(system, *found)
+            residuals, orthogonality = verify(system, values, vectors)
         evidence["orthogonality"] = orthogonality
         evidence["residual_max"] = float(residuals.max())
-        evidence["rigid_modes"] = count_rigid(found[0])
+        evidence["rigid_modes"] = count_rigid(values)
         evidence["peak_memory_bytes"] = peak_memory(self.comm)
         require_orthonormal(orthogonality)
         if self._exact:
             require_six_rigid(evidence["rigid_modes"])
-        return Modes(*found, residuals, system, evidence, phases.seconds)
+        return Modes(values, vectors, residuals, system, evidence, phases.seconds, guard)
 
     @property
     def _exact(self) -> bool:
@@ -236,7 +248,7 @@ class ModalSolver:
         return options.method != "hcms" or corrected
 
     def _modes_to_keep(self) -> int:
-        options, n_dofs = self.options, self._share.n_dofs
+        options, n_dofs = self.options, self.share.n_dofs
         keep = default_keep(options.modes) if options.keep is None else options.keep
         least = options.modes + (FEWEST_SPARE if options.corrections else 0)
         if options.method == "hcms" and keep < min(least, n_dofs):
@@ -278,7 +290,7 @@ class ModalSolver:
         start: Array | None,
         phases: Phases,
         evidence: dict[str, Any],
-    ) -> tuple[Array, Array]:
+    ) -> tuple[Array, Array, Array | None]:
         options = self.options
         values: Array | None = None
         if start is None:
@@ -293,7 +305,7 @@ class ModalSolver:
                 )
             evidence["hcms"] = synthesis.counts.summary(self.comm)
             if options.corrections == 0:
-                return self._uncorrected(synthesis)
+                return *self._uncorrected(synthesis), None
             values, start = elastic_part(system, synthesis)
         wanted = options.modes - RIGID_MODES
         spare = SPARE_MODES if options.prove else 0
@@ -322,7 +334,7 @@ class ModalSolver:
             truth = Truth(found, vectors, options.modes, result.steps)
             self._prove(system, truth, phases, evidence)
         count = options.modes
-        return found[:count], np.ascontiguousarray(vectors[:, :count])
+        return found[:count], np.ascontiguousarray(vectors[:, :count]), result.guard
 
     def _uncorrected(self, synthesis: Synthesis) -> tuple[Array, Array]:
         count = self.options.modes

@@ -26,12 +26,14 @@ SHIFT_SHARE = 0.55
 """Shift of an indefinite factorisation, as a share of the last wanted eigenvalue."""
 HIGHEST_SHIFT = 0.8
 """Share at which the shift is moved, when better Ritz values have left it too high."""
-GUARD_SHARE, FEWEST_GUARDS = 0.22, 12
+GUARD_SHARE, FEWEST_GUARDS = 0.22, 20
 """Vectors carried beyond the wanted ones, as a share of these, and the fewest of them."""
 IMPROVED_GUARDS = 0.4
 """Share of the guard vectors that are improved too, for the sake of the last wanted modes."""
-STAGNATION = 3
-"""Steps without any progress after which a correction gives up."""
+STAGNATION, PROGRESS = 6, 0.8
+"""Steps after which a correction gives up, if the error is not below this share of their worst."""
+ROUGH_MASS = 0.5
+"""Consistent mass of a rough residual, as a share of what the row sums make of it."""
 
 
 @dataclass
@@ -46,6 +48,8 @@ class Correction:
         (local, k) mass-orthonormal, orthogonal to the rigid motions, row-major.
     errors
         (k,) estimated relative error of each value, from its residual.
+    guard
+        (local, g) what the iteration carried beyond; useful to start again from.
     steps
         Number of corrections made.
     solves
@@ -57,6 +61,7 @@ class Correction:
     values: Array
     vectors: Array
     errors: Array
+    guard: Array
     steps: int = 0
     solves: int = 0
     history: list[float] = field(default_factory=list)
@@ -110,8 +115,8 @@ def correct(
     Notes
     -----
     The residual r = K x - theta M x of a Ritz pair bounds the relative error of theta, to second
-    order, by r^T M^-1 r / (theta (theta_p - theta)), where theta_p is the last value that the
-    subspace holds; M is replaced by its row sums, whose inverse is the smaller.
+    order, by r^T M^-1 r / (theta (theta_p - theta)), where theta_p is the last value that is
+    improved.  M is replaced by its row sums, of a consistent mass by half of them.
 
     With `krylov` and a direct solver the shift mu lies in the middle of the wanted spectrum: the
     last modes converge like (theta - mu) / (theta_p - mu), and the first are accurate early.
@@ -128,7 +133,8 @@ def correct(
     if len(values) == system.n_dofs - system.rigid.shape[1]:
         # The subspace is the whole space, where Ritz pairs are eigenpairs.
         exact = np.full(wanted, np.finfo(float).eps)
-        return Correction(values[:wanted], np.ascontiguousarray(start[:, :wanted]), exact)
+        found = np.ascontiguousarray(start[:, :wanted])
+        return Correction(values[:wanted], found, exact, start[:, wanted:])
     iteration = _Iteration(system, inner, Ritz(system, values, start), wanted, acceleration)
     try:
         return iteration.run(tolerance, max_steps, report, observe)
@@ -202,8 +208,16 @@ class _Iteration:
                 f"error correction reached an eigenvalue error of {worst:.1e} after {step} steps, "
                 f"{tolerance:.1e} was asked for; allow more steps or keep more modes"
             )
-        values, vectors, found = self.ritz.lowest(self.wanted)
-        return Correction(values, vectors, found, step, self.solves, self.history)
+        values, vectors, found = self.ritz.lowest(len(self.ritz.values))
+        return Correction(
+            values[: self.wanted],
+            np.ascontiguousarray(vectors[:, : self.wanted]),
+            found[: self.wanted],
+            vectors[:, self.wanted :],
+            step,
+            self.solves,
+            self.history,
+        )
 
     def _last(self) -> float:
         """Ritz value of the last wanted mode, the same on all ranks."""
@@ -238,19 +252,23 @@ class _Iteration:
     def _estimate(self, candidates: NDArray[np.int64], residual: Array) -> Array:
         values = self.ritz.values[candidates]
         last = np.sort(self.ritz.values)[self._reach()]
-        weighted = residual / np.repeat(self.system.rows.lumped_mass, 3)[:, None]
+        rows = self.system.rows
+        mass = rows.lumped_mass if rows.has_diagonal_mass else ROUGH_MASS * rows.lumped_mass
+        weighted = residual / np.repeat(mass, 3)[:, None]
         square = self.system.column_products(residual, weighted)
         distance = np.maximum(last - values, np.finfo(float).eps * last)
         return np.maximum(square / (values * distance), np.finfo(float).eps)
 
     def _reach(self) -> int:
-        """Number of the value that bounds what the subspace holds well."""
+        """Number of the value up to which the subspace holds all that is there."""
         held = len(self.ritz.values)
-        return held - 1 if self.step is enrich else (3 * self.wanted + held) // 4
+        if self.step is enrich:
+            return min(self.improved, held) - 1
+        return (3 * self.wanted + held) // 4
 
     def _require_progress(self, step: int, tolerance: float) -> None:
         recent = self.history[-STAGNATION - 1 :]
-        if len(recent) > STAGNATION and min(recent[1:]) >= recent[0]:
+        if len(recent) > STAGNATION and recent[-1] > PROGRESS * max(recent[:-1]):
             raise ConvergenceError(
                 f"error correction stagnates at an eigenvalue error of {min(self.history):.1e} "
                 f"after {step} steps, {tolerance:.1e} was asked for; use another inner solver "

@@ -16,6 +16,30 @@ Array = NDArray[np.float64]
 
 TYPES = {"slepc": SLEPc.EPS.Type.KRYLOVSCHUR, "arpack": SLEPc.EPS.Type.ARPACK}
 MAX_ITERATIONS = 500
+OPTIONS_PREFIX = "carillon_"
+"""What the names of PETSc's options for this program begin with."""
+
+
+def insert_options(text: str | None) -> None:
+    """Put options like `-carillon_eps_ncv 400` into PETSc's options database.
+
+    Raises
+    ------
+    UserError
+        If an option lacks the prefix, and would be ignored.
+    """
+    if text is None:
+        return
+    words = text.split()
+    strangers = [
+        word
+        for word in words
+        if word[:1] == "-" and word[1:2].isalpha() and not word.startswith(f"-{OPTIONS_PREFIX}")
+    ]
+    if strangers or not words or words[0][0] != "-":
+        found = strangers[0] if strangers else text
+        raise UserError(f"PETSc option {found!r}: expected names like -{OPTIONS_PREFIX}eps_ncv")
+    PETSc.Options().insertString(text)
 
 
 def factor_package(ranks: int) -> str:
@@ -95,6 +119,7 @@ def smallest_eigenpairs(
         preconditioner.setType(PETSc.PC.Type.CHOLESKY)
         preconditioner.setFactorSolverType(factor_package(K.getComm().size))
         # Everything above may be overruled by PETSc's options database.
+        solver.setOptionsPrefix(OPTIONS_PREFIX)
         solver.setFromOptions()
         solver.solve()
         values, vectors = _collect(K, solver, min(solver.getConverged(), count))

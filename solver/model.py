@@ -123,6 +123,10 @@ class ElasticModel:
             self.lumped_share,
         )
 
+    def with_young(self, young: Array) -> ElasticModel:
+        """The same solid with other moduli (m, 8) [Pa]."""
+        return replace(self, young=np.ascontiguousarray(young))
+
     def stiffness(self, cells: Chosen = slice(None)) -> Array:
         """Element stiffness matrices (c, 24, 24) [N/m] of the chosen cells."""
         return self.elements.stiffness(cells)

@@ -177,6 +177,11 @@ class NodeRows:
     def _own(self) -> int:
         return self.pattern.stop - self.pattern.start
 
+    @cached_property
+    def has_diagonal_mass(self) -> bool:
+        """Whether this rank's part of M is diagonal."""
+        return bool(np.count_nonzero(self.mass) == self._own)
+
     def times_stiffness(self, block: Array) -> Array:
         """K X for a row-major block (3 local nodes, k); collective."""
         return self._product(block, True)

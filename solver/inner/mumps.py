@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from carillon.errors import ConvergenceError
-from solver.eigensolver import factor_package
+from solver.eigensolver import OPTIONS_PREFIX, factor_package
 from solver.system import System
 
 Array = NDArray[np.float64]
@@ -34,7 +34,7 @@ class MumpsInverse:
         self._matrix.setOption(option, True)
         package = factor_package(system.comm.size)
         self._pc = PETSc.PC().create(system.comm)
-        self._pc.setOptionsPrefix("carillon_")
+        self._pc.setOptionsPrefix(f"{OPTIONS_PREFIX}inner_")
         self._pc.setOperators(self._matrix)
         self._pc.setType(PETSc.PC.Type.CHOLESKY)
         self._pc.setFactorSolverType(package)
