@@ -123,7 +123,7 @@ def test_error_estimate_follows_the_true_error(acceleration):
     )
     for step, estimate in enumerate(result.history):
         true = (steps[step] / exact[6:56] - 1.0).max()
-        assert 0.2 * true <= estimate <= 20.0 * true
+        assert true <= estimate <= 100.0 * true
 
 
 def test_correction_that_misses_its_tolerance_says_so():
