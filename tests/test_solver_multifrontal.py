@@ -1,0 +1,82 @@
+"""Nested dissection and the multifrontal solver against a direct solve by scipy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
+
+from solver.inner.dissection import dissect
+from solver.inner.multifrontal import Factor, Plan
+from solver.model import fine_model
+from solver.node_rows import NodeRows, Pattern
+from tests import solids
+
+
+def problem(mesh, seed=0):
+    """Rows, plan and integer coordinates of a mesh with random moduli, in mesh node order."""
+    young = 1e9 * 10.0 ** np.random.default_rng(seed).uniform(-2.0, 0.0, mesh.n_cells)
+    pattern = Pattern.of_cells(mesh.cells.astype(np.int64), 0, mesh.n_nodes)
+    rows = NodeRows(pattern)
+    rows.add_elements(fine_model(mesh, young).elements)
+    planes = mesh.node_grid.astype(np.int64)
+    return rows, Plan(planes, pattern.indptr, pattern.columns, leaf_nodes=10), planes
+
+
+def two_bars():
+    """Two bars that do not touch: no front couples them, and a gap is no plane of nodes."""
+    near = np.stack(np.meshgrid(range(6), range(2), range(2), indexing="ij"), axis=-1).reshape(
+        -1, 3
+    )
+    grid = np.concatenate([near, near + [0, 0, 6]])
+    return solids.hexmesh_from_grid(grid, np.zeros(3), 0.01)
+
+
+MESHES = {
+    "box": lambda: solids.box_mesh(7, 5, 4),
+    "bar": lambda: solids.box_mesh(20, 1, 1),
+    "one cell": lambda: solids.box_mesh(1, 1, 1),
+    "two bars": two_bars,
+}
+
+
+@pytest.mark.parametrize("mesh", MESHES)
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("inside", [False, True])
+def test_solutions_are_those_of_a_direct_solver(mesh, threads, inside):
+    rows, plan, planes = problem(MESHES[mesh]())
+    size = 3 * len(planes)
+    K, M = rows.stiffness_csr(size), rows.mass_csr(size)
+    # Below the spectrum, where the matrix is definite, and amid it.
+    typical = K.diagonal().mean() / M.diagonal().mean()
+    shift = 0.37 * typical if inside else -0.01 * typical
+    block = np.random.default_rng(1).standard_normal((size, 7))
+    found = Factor(plan, rows.stiffness, rows.mass, shift, threads).solve(block)
+    expected = splu(sp.csc_matrix(K - shift * M)).solve(block)
+    assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("mesh", MESHES)
+def test_every_node_is_eliminated_once_and_fronts_hold_what_they_are_coupled_to(mesh):
+    rows, plan, planes = problem(MESHES[mesh]())
+    fronts = plan.fronts
+    assert sorted(fronts.order) == list(range(len(planes)))
+    assert fronts.first[-1] == len(planes)
+    for front, parent in enumerate(fronts.parent):
+        assert parent == -1 or parent > front
+        boundary = fronts.boundary[front]
+        assert (np.diff(boundary) > 0).all()
+        assert (boundary >= fronts.first[front + 1]).all()
+        if parent >= 0:
+            # What a front passes on lies in its parent or in what the parent passes on.
+            above = boundary[boundary >= fronts.first[parent + 1]]
+            assert np.isin(above, fronts.boundary[parent]).all()
+
+
+def test_dissection_saves_work():
+    _, plan, planes = problem(solids.box_mesh(12, 12, 12))
+    whole = dissect(
+        planes, np.zeros(len(planes) + 1, dtype=np.int64), np.empty(0, dtype=np.int64), 10**6
+    )
+    assert plan.fronts.solve_flops() < 0.3 * whole.solve_flops()
