@@ -192,9 +192,7 @@ class _Iteration:
             residual = np.ascontiguousarray(residual)
             correction = self.inverse.solve(residual)
             self.solves += correction.shape[1]
-            self.step(
-                self.system, self.ritz, correction, residual, active, self.inverse, self.width
-            )
+            self.step(self.system, self.ritz, correction, active, self.inverse, self.width)
             step += 1
             if len(self.ritz.values) < self.wanted:
                 raise ConvergenceError(

@@ -109,19 +109,17 @@ class Step(Protocol):
         system: System,
         ritz: Ritz,
         corrections: Array,
-        residual: Array,
         numbers: Index,
         inverse: Inverse,
         width: int,
     ) -> None:
-        """`corrections` (local, a) solve for the `residual` of the vectors `numbers`."""
+        """`corrections` (local, a) solve for the residuals of the vectors `numbers`."""
 
 
 def enrich(
     system: System,
     ritz: Ritz,
     corrections: Array,
-    residual: Array,
     numbers: Index,
     inverse: Inverse,
     width: int,
@@ -133,9 +131,9 @@ def enrich(
     Notes
     -----
     With exact solves K Z = R + mu M Z, and X^T R = 0 for active X, which are Ritz vectors of their
-    span, so the projections of K follow from those of M: X^T K Z = mu X^T M Z + X^T R, and
-    R^T Z = (mu - Theta) X^T M Z.
-    Inexact or very small solutions are multiplied by K.
+    span, so the projections of K follow from those of M: X^T K Z = mu X^T M Z, and
+    R^T Z = (mu - Theta) X^T M Z.  Where some X are locked, or solutions are inexact or very small, Z is
+    multiplied by K.
 
     Raises
     ------
@@ -146,9 +144,6 @@ def enrich(
     if inverse.exact and untouched and np.diag(gram).min(initial=1.0) > SMALL_CORRECTION:
         mu = inverse.shift
         across = mu * overlap
-        if ritz.locked:
-            locked = ritz.locked_numbers
-            across[locked] += system.inner(ritz.vectors[:, locked], residual)
         half = (mu - ritz.values[numbers]) * overlap[numbers].T
         stiff = mu * gram + 0.5 * (half + half.T)
     else:
@@ -187,7 +182,9 @@ def _independent(system: System, ritz: Ritz, Z: Array) -> tuple[Array, Array, Ar
         outside = _outside(overlap, gram)
         basis, condition = on_root(system.comm, partial(_orthonormal, outside))
         alone = bool((np.diag(outside) > NEARLY_INSIDE * np.diag(gram)).all())
-        if (alone and condition > WELL_CONDITIONED) or passes == MOST_PASSES - 1:
+        # Locked vectors are coupled to the active ones by K, which no formula below accounts for.
+        good = alone and condition > WELL_CONDITIONED and not (ritz.locked and passes == 0)
+        if good or passes == MOST_PASSES - 1:
             break
         # Small differences of large numbers: what is outside X is formed, then judged again.
         Z = Z @ basis
@@ -251,7 +248,6 @@ def relax(
     system: System,
     ritz: Ritz,
     corrections: Array,
-    residual: Array,
     numbers: Index,
     inverse: Inverse,
     width: int,
