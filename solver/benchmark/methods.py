@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 CORRECTED_TOLERANCE = 1e-6
 """Eigenvalue error of HCMS with error correction on the fine mesh."""
 RIVAL_TOLERANCE = 1e-9
-"""Relative residual of SLEPc and ARPACK: the loosest power of ten at which their modes are always as
+"""Relative residual of SLEPc and ARPACK: the loosest power of ten at which their modes are as
 orthonormal as the modes of every method have to be."""
 CHECKS = ("inertia", "verification")
 """Phases that check modes instead of computing them; no method is charged for them."""
