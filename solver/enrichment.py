@@ -132,8 +132,8 @@ def enrich(
     -----
     With exact solves K Z = R + mu M Z, and X^T R = 0 for active X, which are Ritz vectors of their
     span, so the projections of K follow from those of M: X^T K Z = mu X^T M Z, and
-    R^T Z = (mu - Theta) X^T M Z.  Where some X are locked, or solutions are inexact or very small, Z is
-    multiplied by K.
+    R^T Z = (mu - Theta) X^T M Z.  Where some X are locked, or solutions are inexact or very small,
+    Z is multiplied by K.
 
     Raises
     ------
