@@ -139,7 +139,7 @@ def test_study_measures_and_models_and_says_which(study):
     found, plot = study
     assert plot.stat().st_size > 10_000
     strong = found["strong"]
-    assert [run["ranks"] for run in strong["runs"]] == [1, 2, 3]
+    assert [run["ranks"] for run in strong["runs"]] == [1, 2, 3] and strong["failed"] == {}
     for each in strong["runs"]:
         phases = each["phases"]
         assert {"assembly", "local", "merge 1", "down", "factor", "solve", "dense"} <= set(phases)
@@ -193,12 +193,17 @@ def test_bad_arguments_are_answered_in_one_sentence(arguments, sentence, tmp_pat
     assert done.stderr.count("\n") == 1
 
 
-def test_a_run_that_fails_says_why(monkeypatch):
-    def unable(*_):
-        raise UserError("the run on 2 ranks failed: no memory")
+def test_a_run_that_fails_is_told_and_the_others_go_on(monkeypatch):
+    def run_on_one(command, _):
+        if command[command.index("-n") + 1] != "1":
+            return "no memory"
+        Path(command[-1]).write_text('{"ranks": 1, "seconds": 1.0}')
+        return None
 
-    monkeypatch.setattr(launch, "_run", unable)
-    with pytest.raises(UserError, match="on 2 ranks"):
+    monkeypatch.setattr(launch, "_run", run_on_one)
+    found, failed = launch.measure_each({1: ["builtin:bar"], 2: ["builtin:bar"]})
+    assert [run["ranks"] for run in found] == [1] and failed == {2: "no memory"}
+    with pytest.raises(UserError, match="the run on 2 ranks failed: no memory"):
         launch.measure_each({2: ["builtin:bar"]})
     monkeypatch.setattr(launch.shutil, "which", lambda _: None)
     with pytest.raises(UserError, match="no mpiexec on PATH"):

@@ -30,7 +30,7 @@ _ALLOWED = {
 
 def measure_each(
     arguments: Mapping[int, Sequence[str]], environment: Mapping[str, str] = os.environ
-) -> list[dict[str, Any]]:
+) -> tuple[list[dict[str, Any]], dict[int, str]]:
     """Run `solver scaling ARGUMENTS` on each number of ranks, with one thread a rank.
 
     Parameters
@@ -38,29 +38,42 @@ def measure_each(
     arguments
         By number of ranks; of a run that measures the ranks it is started on.
 
+    Returns
+    -------
+    What the runs found, and what those that failed said, by number of ranks.
+
     Raises
     ------
     UserError
-        If there is no mpiexec, or a run fails; with what the run said.
+        If there is no mpiexec, or all runs fail.
     """
     launcher = shutil.which(LAUNCHER)
     if launcher is None:
         raise UserError(f"no {LAUNCHER} on PATH; install MPI, or start the ranks by hand")
-    found = []
+    found: list[dict[str, Any]] = []
+    failed: dict[int, str] = {}
     with tempfile.TemporaryDirectory() as folder:
         for ranks, given in track(arguments.items(), "ranks", total=len(arguments)):
             out = Path(folder) / f"{ranks}.json"
             command = [launcher, "-n", str(ranks), sys.executable, "-m", "mpi4py", "-m", "solver"]
             command += ["scaling", *given, "--here", "--out", str(out)]
-            _run(command, {**_ALLOWED, **environment, "OMP_NUM_THREADS": "1"}, ranks)
-            found.append(json.loads(out.read_text()))
-            say(f"{ranks} ranks: {found[-1]['seconds']:.2f} s", visible=sys.stderr.isatty())
-    return found
+            failure = _run(command, {**_ALLOWED, **environment, "OMP_NUM_THREADS": "1"})
+            if failure is None:
+                found.append(json.loads(out.read_text()))
+                say(f"{ranks} ranks: {found[-1]['seconds']:.2f} s", visible=sys.stderr.isatty())
+            else:
+                failed[ranks] = failure
+                say(f"the run on {ranks} ranks failed: {failure}")
+    if not found:
+        ranks, failure = next(iter(failed.items()))
+        raise UserError(f"the run on {ranks} ranks failed: {failure}")
+    return found, failed
 
 
-def _run(command: list[str], environment: dict[str, str], ranks: int) -> None:
+def _run(command: list[str], environment: dict[str, str]) -> str | None:
+    """Run to the end; what it said if it failed."""
     done = subprocess.run(command, env=environment, capture_output=True, text=True)
-    if done.returncode != 0:
-        said = [line for line in done.stderr.splitlines() if line.startswith("solver")]
-        reason = said[0] if said else f"exit status {done.returncode}\n{done.stderr.strip()}"
-        raise UserError(f"the run on {ranks} ranks failed: {reason}")
+    if done.returncode == 0:
+        return None
+    said = [line for line in done.stderr.splitlines() if line.startswith("solver")]
+    return said[0] if said else f"exit status {done.returncode}\n{done.stderr.strip()}"

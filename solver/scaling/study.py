@@ -76,16 +76,17 @@ def scaling_study(
 
     Returns
     -------
-    Plain values: `strong` and `weak` (None unless asked for), each with `runs` and `model`.
+    Plain values: `strong` and `weak` (None unless asked for), each with `runs`, what was said by
+    those that `failed`, and `model`.
 
     Raises
     ------
     UserError
-        For anything wrong with the solid, or if a run fails.
+        For anything wrong with the solid, or if all runs fail.
     """
     problem = build_problem(options)
 
-    def runs(resolutions: dict[int, int]) -> list[Result]:
+    def runs(resolutions: dict[int, int]) -> tuple[list[Result], dict[int, str]]:
         return measure_each(
             {
                 ranks: [options.mesh, "--resolution", str(resolution), *arguments]
@@ -93,7 +94,7 @@ def scaling_study(
             }
         )
 
-    strong = runs(dict.fromkeys(scaling.ranks, options.resolution))
+    strong, failed = runs(dict.fromkeys(scaling.ranks, options.resolution))
     machine = fit_machine(strong, scaling.latency, scaling.bandwidth)
     work = elimination(problem.model.mesh)
     result: Result = {
@@ -103,6 +104,7 @@ def scaling_study(
         "machine": machine.as_dict(),
         "strong": {
             "runs": strong,
+            "failed": failed,
             "model": _modelled(
                 _strong(problem.model, options.seed, machine, work, strong, scaling), ASSUMPTIONS
             ),
@@ -111,9 +113,10 @@ def scaling_study(
     }
     if scaling.weak:
         grown = {ranks: round(options.resolution * ranks ** (1 / 3)) for ranks in scaling.ranks}
-        weak = runs(grown)
+        weak, failed = runs(grown)
         result["weak"] = {
             "runs": weak,
+            "failed": failed,
             "model": _modelled(
                 _weak(machine, work, strong[0], weak), ASSUMPTIONS + WEAK_ASSUMPTIONS
             ),
@@ -139,6 +142,7 @@ def study_lines(result: Result) -> list[str]:
                 f"{run['seconds']:8.2f} s{beside}{note}"
             )
         measured = {run["ranks"] for run in part["runs"]}
+        lines += [f"{ranks:6} ranks failed: {reason}" for ranks, reason in part["failed"].items()]
         lines += [
             f"{ranks:6d} ranks {'':19s} {'':10s}   model {seconds:8.2f} s"
             for ranks, seconds in modelled.items()
