@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from carillon.errors import UserError
 from carillon.progress import say
 from carillon.runtime import limit_threads, reuse_freed_memory
-from solver.correction import EIGENVALUE_TOLERANCE, correct, default_guard
+from solver.correction import EIGENVALUE_TOLERANCE, FEWEST_GUARDS, correct, default_guard
 from solver.decomposition import on_root
 from solver.distribution import Share, deal_moduli, distribute
 from solver.eigensolver import TYPES
 from solver.hcms.condense import DEFAULT_INTERFACE
 from solver.hcms.synthesis import Synthesis, make_subdomains, synthesize
-from solver.inner import InnerSolver
+from solver.inner import InnerSolver, Inverse
 from solver.model import RIGID_MODES, ElasticModel
 from solver.system import Layout, System, assemble
 from solver.timing import Phases, peak_memory
@@ -44,8 +44,9 @@ METHODS = ("hcms", *TYPES)
 MAX_CORRECTIONS = 40
 FEWEST_SPARE = SPARE_MODES
 """Vectors that the correction needs beyond the modes asked for, to tell the last from the rest."""
-KEPT_SHARE = 1.6
-"""Modes kept at the root of the merge tree, as a share of those asked for."""
+KEPT_SHARE, TOGETHER_SHARE = 1.6, 1.17
+"""Modes kept at the root of the merge tree, as a share of those asked for, and where a block
+Lanczos iteration corrects them together."""
 ORTHOGONAL_TO_RIGID = 1e-10
 """Largest overlap of HCMS modes with the rigid motions that needs no correction."""
 
@@ -79,7 +80,7 @@ class SolverOptions:
     inner
         Inner solver of the correction, see `solver.inner.InnerSolver`.
     acceleration
-        `krylov` or `relaxation`, see `solver.correction.correct`.
+        `lanczos`, `krylov` or `relaxation`, see `solver.correction.correct`.
     """
 
     method: str = "hcms"
@@ -92,7 +93,7 @@ class SolverOptions:
     seed: int = 0
     prove: bool | None = None
     inner: str = "auto"
-    acceleration: str = "krylov"
+    acceleration: str = "lanczos"
 
 
 @dataclass
@@ -115,6 +116,8 @@ class Modes:
     guard
         (local, g) less accurate vectors beyond, which a warm start makes use of; None if there are
         none.
+    inverse
+        Inverse that a warm start makes use of, if there is one.
     """
 
     values: Array
@@ -124,11 +127,22 @@ class Modes:
     evidence: dict[str, Any] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     guard: Array | None = None
+    inverse: Inverse | None = None
 
     def start(self) -> Array:
         """Elastic modes and guard vectors (local, k - 6 + g), to start a correction from."""
         blocks = [self.vectors[:, RIGID_MODES:], *([] if self.guard is None else [self.guard])]
         return np.concatenate(blocks, axis=1)
+
+
+@dataclass
+class _Found:
+    """Eigenpairs, and what a warm start makes use of, see `Modes`."""
+
+    values: Array
+    vectors: Array
+    guard: Array | None = None
+    inverse: Inverse | None = None
 
 
 class ModalSolver:
@@ -182,10 +196,10 @@ class ModalSolver:
         phases = Phases(comm, verbose)
         with phases("partition"):
             self.share = distribute(model, options.subdomains, options.seed, comm)
-        self._keep = self._modes_to_keep()
         with phases("analysis"):
             self._layout = Layout.of_share(self.share, comm)
             self._inner = InnerSolver(options.inner, self._layout)
+            self._keep = self._modes_to_keep()
             if options.method == "hcms":
                 self._subdomains = make_subdomains(self.share, options.interface, comm)
         self.seconds = phases.seconds
@@ -224,11 +238,11 @@ class ModalSolver:
             "n_dofs": share.n_dofs,
         }
         if self.options.method == "hcms":
-            begin = start.start() if isinstance(start, Modes) else start
-            values, vectors, guard = self._hcms(share, system, begin, phases, evidence)
+            found = self._hcms(share, system, start, phases, evidence)
+            values, vectors = found.values, found.vectors
         else:
             values, vectors = self._general_solver(system, phases, evidence)
-            guard = None
+            found = _Found(values, vectors)
         with phases("verification"):
             residuals, orthogonality = verify(system, values, vectors)
         evidence["orthogonality"] = orthogonality
@@ -238,7 +252,16 @@ class ModalSolver:
         require_orthonormal(orthogonality)
         if self._exact:
             require_six_rigid(evidence["rigid_modes"])
-        return Modes(values, vectors, residuals, system, evidence, phases.seconds, guard)
+        return Modes(
+            values,
+            vectors,
+            residuals,
+            system,
+            evidence,
+            phases.seconds,
+            found.guard,
+            found.inverse,
+        )
 
     @property
     def _exact(self) -> bool:
@@ -249,7 +272,9 @@ class ModalSolver:
 
     def _modes_to_keep(self) -> int:
         options, n_dofs = self.options, self.share.n_dofs
-        keep = default_keep(options.modes) if options.keep is None else options.keep
+        together = options.acceleration == "lanczos" and self._inner.indefinite
+        together = together and options.corrections > 0 and options.tolerance != 0.0
+        keep = default_keep(options.modes, together) if options.keep is None else options.keep
         least = options.modes + (FEWEST_SPARE if options.corrections else 0)
         if options.method == "hcms" and keep < min(least, n_dofs):
             raise UserError(
@@ -287,12 +312,17 @@ class ModalSolver:
         self,
         share: Share,
         system: System,
-        start: Array | None,
+        start: Modes | Array | None,
         phases: Phases,
         evidence: dict[str, Any],
-    ) -> tuple[Array, Array, Array | None]:
+    ) -> _Found:
         options = self.options
         values: Array | None = None
+        similar: Inverse | None = None
+        if isinstance(start, Modes):
+            if start.system.rows.pattern is self._layout.pattern:
+                similar = start.inverse
+            start = start.start()
         if start is None:
             with phases("hcms"):
                 synthesis = synthesize(
@@ -305,7 +335,7 @@ class ModalSolver:
                 )
             evidence["hcms"] = synthesis.counts.summary(self.comm)
             if options.corrections == 0:
-                return *self._uncorrected(synthesis), None
+                return _Found(*self._uncorrected(synthesis))
             values, start = elastic_part(system, synthesis)
         wanted = options.modes - RIGID_MODES
         spare = SPARE_MODES if options.prove else 0
@@ -320,6 +350,7 @@ class ModalSolver:
                 options.corrections,
                 options.acceleration,
                 report=_reporter(self._verbose and self.comm.rank == 0),
+                similar=similar,
             )
             stiff = system.inner(system.rigid, system.times_stiffness(system.rigid))
         evidence |= {
@@ -334,7 +365,8 @@ class ModalSolver:
             truth = Truth(found, vectors, options.modes, result.steps)
             self._prove(system, truth, phases, evidence)
         count = options.modes
-        return found[:count], np.ascontiguousarray(vectors[:, :count]), result.guard
+        vectors = np.ascontiguousarray(vectors[:, :count])
+        return _Found(found[:count], vectors, result.guard, result.inverse)
 
     def _uncorrected(self, synthesis: Synthesis) -> tuple[Array, Array]:
         count = self.options.modes
@@ -376,8 +408,14 @@ def check_mode_count(modes: int, n_dofs: int) -> None:
         )
 
 
-def default_keep(modes: int) -> int:
-    """Modes kept at the root: those that the correction iterates, and some to choose from."""
+def default_keep(modes: int, together: bool = False) -> int:
+    """Modes kept at the root: those that the correction iterates, and some to choose from.
+
+    More would be a better start, but take longer than they save where modes are corrected
+    `together`.
+    """
+    if together:
+        return max(int(TOGETHER_SHARE * modes), modes + FEWEST_GUARDS + FEWEST_SPARE)
     return max(int(KEPT_SHARE * modes), modes + default_guard(modes) + FEWEST_SPARE)
 
 

@@ -13,7 +13,7 @@ from carillon.errors import UserError
 from carillon.progress import track
 from solver.analysis import SolverOptions, check_mode_count, default_keep, modal_analysis
 from solver.comparison import eigenvalue_errors
-from solver.correction import ACCELERATIONS, correct
+from solver.correction import STEPWISE, correct
 from solver.decomposition import on_root
 from solver.distribution import Share, distribute
 from solver.hcms.condense import INTERFACES
@@ -73,7 +73,7 @@ def correction_history(
     histories = []
     for start in track(STARTS, "starts", visible=comm.rank == 0):
         block = _start_block(start, share, default_keep(modes), seed, comm)
-        for acceleration in ACCELERATIONS:
+        for acceleration in STEPWISE:
             values = _correct(system, inner, block, modes - RIGID_MODES, steps, acceleration)
             histories.append(
                 {

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from carillon.errors import ConvergenceError
 from solver.decomposition import on_root
 from solver.enrichment import Ritz, Step, enrich, relax
-from solver.inner import InnerSolver, Inverse
+from solver.inner import Approximate, InnerSolver, Inverse
+from solver.lanczos import lanczos
 from solver.rayleigh_ritz import rayleigh_ritz, safe_shift
 from solver.system import System
 
@@ -19,10 +20,18 @@ Array = NDArray[np.float64]
 
 EIGENVALUE_TOLERANCE = 1e-7
 """Relative eigenvalue error that a correction stops at unless told otherwise."""
+TYPICAL = 0.1
+"""Share of the tolerance that the median of the errors has to reach."""
 INTERACTIVE_TOLERANCE = 1e-2
 """Relative eigenvalue error of the worst mode that is good enough while a material is designed."""
-ACCELERATIONS = ("krylov", "relaxation")
-SHIFT_SHARE = 0.55
+STEPWISE = ("krylov", "relaxation")
+"""Accelerations that correct every mode by itself, step by step."""
+ACCELERATIONS = ("lanczos", *STEPWISE)
+LOOSE = 1e-3
+"""Tolerance from which on an inverse for a similar material is good enough for a step."""
+NEARLY_ACCURATE = 100.0
+"""Error, as a multiple of the tolerance, below which `lanczos` leaves a start to `krylov`."""
+SHIFT_SHARE = 0.52
 """Shift of an indefinite factorisation, as a share of the last wanted eigenvalue."""
 HIGHEST_SHIFT = 0.8
 """Share at which the shift is moved, when better Ritz values have left it too high."""
@@ -52,10 +61,12 @@ class Correction:
         (local, g) what the iteration carried beyond; useful to start again from.
     steps
         Number of corrections made.
-    solves
-        Number of right-hand sides solved.
+    solves, blocks
+        Number of right-hand sides solved, and of the blocks that they came in.
     history
         Largest estimated error before each step, and at the end.
+    inverse
+        Inverse for this material that a similar one may start with; None if there is none to keep.
     """
 
     values: Array
@@ -64,7 +75,9 @@ class Correction:
     guard: Array
     steps: int = 0
     solves: int = 0
+    blocks: int = 0
     history: list[float] = field(default_factory=list)
+    inverse: Inverse | None = None
 
 
 def correct(
@@ -75,9 +88,10 @@ def correct(
     values: Array | None = None,
     tolerance: float = EIGENVALUE_TOLERANCE,
     max_steps: int = 30,
-    acceleration: str = "krylov",
+    acceleration: str = "lanczos",
     report: Callable[[int, float], None] | None = None,
     observe: Callable[[int, Array], None] | None = None,
+    similar: Inverse | None = None,
 ) -> Correction:
     """Improve the `wanted` lowest elastic modes from the block `start` until they are accurate.
 
@@ -85,7 +99,9 @@ def correct(
     `krylov` the Rayleigh-Ritz method then runs in the span of X and Z together, which holds what
     the subspace iteration of Eq. (16)-(21) would reach with the best weights; with `relaxation` in
     the span of X - w Z with the over-relaxation w of Bathe & Ramaswamy (1980), as in the paper.
-    Accurate modes are locked.
+    Accurate modes are locked.  With `lanczos` the first step is a whole block Lanczos iteration
+    from all modes together, see `solver.lanczos`; what it leaves undone, and any start that is
+    nearly good enough, is for `krylov`, as everything is without an exact inner solver.
 
     Parameters
     ----------
@@ -99,13 +115,16 @@ def correct(
         (q,) Ritz values of `start`, if its columns are mass-orthonormal Ritz vectors orthogonal to
         the rigid motions; otherwise a Rayleigh-Ritz step makes such of them first.
     tolerance
-        Largest accepted relative eigenvalue error, as estimated from the residual.
+        Largest accepted relative eigenvalue error, as estimated from the residual; the median has
+        to reach a tenth of it.
     max_steps
         Steps allowed; reaching `tolerance` within them is not required when `tolerance` is zero.
     report
         Called with the step and the largest estimated error of the wanted modes.
     observe
         Called with the step and the Ritz values of the wanted modes.
+    similar
+        Inverse for a similar material, which does for the first step of a nearly accurate start.
 
     Raises
     ------
@@ -118,10 +137,11 @@ def correct(
     order, by r^T M^-1 r / (theta (theta_p - theta)), where theta_p is the last value that is
     improved.  M is replaced by its row sums, of a consistent mass by half of them.
 
-    With `krylov` and a direct solver the shift mu lies in the middle of the wanted spectrum: the
-    last modes converge like (theta - mu) / (theta_p - mu), and the first are accurate early.
-    Otherwise it lies below the spectrum.
+    With a direct solver and anything but `relaxation` the shift mu lies in the middle of the wanted
+    spectrum: the last modes converge like (theta - mu) / (theta_p - mu), and the first are accurate
+    early.  Otherwise it lies below the spectrum.
     """
+    rough = values is not None
     if values is None:
         values, start = rayleigh_ritz(system, start)
     if len(values) < wanted:
@@ -135,11 +155,14 @@ def correct(
         exact = np.full(wanted, np.finfo(float).eps)
         found = np.ascontiguousarray(start[:, :wanted])
         return Correction(values[:wanted], found, exact, start[:, wanted:])
-    iteration = _Iteration(system, inner, Ritz(system, values, start), wanted, acceleration)
+    ritz = Ritz(system, values, start)
+    iteration = _Iteration(system, inner, ritz, wanted, acceleration, similar)
     try:
-        return iteration.run(tolerance, max_steps, report, observe)
+        result = iteration.run(tolerance, max_steps, rough, report, observe)
+        result.inverse = iteration.lasting(tolerance)
     finally:
-        iteration.inverse.destroy()
+        iteration.destroy()
+    return result
 
 
 def default_guard(wanted: int) -> int:
@@ -151,14 +174,22 @@ class _Iteration:
     """State of the subspace iteration."""
 
     def __init__(
-        self, system: System, inner: InnerSolver, ritz: Ritz, wanted: int, acceleration: str
+        self,
+        system: System,
+        inner: InnerSolver,
+        ritz: Ritz,
+        wanted: int,
+        acceleration: str,
+        similar: Inverse | None,
     ) -> None:
         self.system = system
         self.inner = inner
         self.ritz = ritz
         self.wanted = wanted
-        self.inside = acceleration == "krylov" and inner.indefinite
-        self.inverse: Inverse = inner.inverse(system, self._shift())
+        self.inside = acceleration != "relaxation" and inner.indefinite
+        self.lanczos = acceleration == "lanczos" and inner.indefinite
+        self.similar = similar
+        self.made: Inverse | None = None
         guard = default_guard(wanted)
         self.width = wanted + guard
         self.improved = wanted + int(IMPROVED_GUARDS * guard)
@@ -166,42 +197,48 @@ class _Iteration:
         if acceleration == "relaxation":
             self.width = self.improved = len(ritz.values)
             self.step = relax
-        self.solves = 0
+        self.solves = self.blocks = 0
         self.history: list[float] = []
 
     def run(
         self,
         tolerance: float,
         max_steps: int,
+        rough: bool,
         report: Callable[[int, float], None] | None,
         observe: Callable[[int, Array], None] | None,
     ) -> Correction:
         """Correct until the tolerance, or the last step allowed, is reached."""
         step = 0
+        lanczos_may_run = self.lanczos and tolerance > 0.0 and max_steps > 0
+        if lanczos_may_run and rough:
+            self._run_lanczos(tolerance, observe)
+            step = 1
         while True:
             errors, residual, active = self._residuals(tolerance)
             worst = float(errors.max(initial=0.0))
             self.history.append(worst)
             if report is not None:
                 report(step, worst)
-            if worst <= tolerance or step >= max_steps:
+            accurate = worst <= tolerance and _typical(errors) <= TYPICAL * tolerance
+            if accurate or step >= max_steps:
                 break
+            if step == 0 and lanczos_may_run and worst > NEARLY_ACCURATE * tolerance:
+                self._run_lanczos(tolerance, observe)
+                step = 1
+                continue
             if tolerance > 0.0:
                 self._require_progress(step, tolerance)
-            self._follow_spectrum()
-            residual = np.ascontiguousarray(residual)
-            correction = self.inverse.solve(residual)
+            inverse = self._inverse(step)
+            correction = inverse.solve(np.ascontiguousarray(residual))
             self.solves += correction.shape[1]
-            self.step(self.system, self.ritz, correction, active, self.inverse, self.width)
+            self.blocks += 1
+            self.step(self.system, self.ritz, correction, active, inverse, self.width)
             step += 1
-            if len(self.ritz.values) < self.wanted:
-                raise ConvergenceError(
-                    f"the iterated vectors collapsed to {len(self.ritz.values)} independent ones "
-                    f"after {step} steps, {self.wanted} modes are wanted; keep more"
-                )
+            self._require_independent(step)
             if observe is not None:
                 observe(step, np.sort(self.ritz.values)[: self.wanted])
-        if tolerance > 0.0 and worst > tolerance:
+        if tolerance > 0.0 and not accurate:
             raise ConvergenceError(
                 f"error correction reached an eigenvalue error of {worst:.1e} after {step} steps, "
                 f"{tolerance:.1e} was asked for; allow more steps or keep more modes"
@@ -214,8 +251,58 @@ class _Iteration:
             vectors[:, self.wanted :],
             step,
             self.solves,
+            self.blocks,
             self.history,
         )
+
+    def _run_lanczos(self, tolerance: float, observe: Callable[[int, Array], None] | None) -> None:
+        ritz = self.ritz
+        found = lanczos(
+            self.system,
+            self._inverse(1),
+            ritz.values,
+            ritz.vectors,
+            self.wanted,
+            self.width,
+            tolerance,
+        )
+        self.solves += found.solves
+        self.blocks += found.blocks
+        self.ritz = Ritz(self.system, found.values, found.vectors)
+        self._require_independent(1)
+        if observe is not None:
+            observe(1, found.values[: self.wanted])
+
+    def _require_independent(self, step: int) -> None:
+        if len(self.ritz.values) < self.wanted:
+            raise ConvergenceError(
+                f"the iterated vectors collapsed to {len(self.ritz.values)} independent ones "
+                f"after {step} steps, {self.wanted} modes are wanted; keep more"
+            )
+
+    def _inverse(self, step: int) -> Inverse:
+        """Inverse for a step; factorised anew if a start far off has put the shift too high."""
+        if step == 0 and self.similar is not None and not self._too_high(self.similar):
+            return Approximate(self.similar)
+        if self.made is not None and self.inside and self._too_high(self.made):
+            self.destroy()
+        if self.made is None:
+            self.made = self.inner.inverse(self.system, self._shift())
+        return self.made
+
+    def _too_high(self, inverse: Inverse) -> bool:
+        return inverse.shift > HIGHEST_SHIFT * self._last()
+
+    def lasting(self, tolerance: float) -> Inverse | None:
+        """The inverse to keep for a similar material, which only a loose tolerance makes use of."""
+        kept = self.similar if self.made is None else self.made
+        return kept if kept is not None and kept.lasting and tolerance >= LOOSE else None
+
+    def destroy(self) -> None:
+        """Free what the inverse made here holds, unless it lasts."""
+        if self.made is not None:
+            self.made.destroy()
+            self.made = None
 
     def _last(self) -> float:
         """Ritz value of the last wanted mode, the same on all ranks."""
@@ -223,12 +310,6 @@ class _Iteration:
 
     def _shift(self) -> float:
         return SHIFT_SHARE * self._last() if self.inside else -safe_shift(self.system)
-
-    def _follow_spectrum(self) -> None:
-        """Factorise anew if a start far off has put the shift too high."""
-        if self.inside and self.inverse.shift > HIGHEST_SHIFT * self._last():
-            self.inverse.destroy()
-            self.inverse = self.inner.inverse(self.system, self._shift())
 
     def _residuals(self, tolerance: float) -> tuple[Array, Array, NDArray[np.int64]]:
         """Errors of the wanted modes, and residuals of those to improve with their numbers.
@@ -240,9 +321,10 @@ class _Iteration:
         residual = ritz.residual(candidates)
         estimate = self._estimate(candidates, residual)
         ritz.errors[candidates] = on_root(self.system.comm, lambda: estimate)
+        errors = ritz.errors[np.argsort(ritz.values, kind="stable")[: self.wanted]]
+        limit = tolerance if _typical(errors) <= TYPICAL * tolerance else TYPICAL * tolerance
         inside = candidates[: max(0, self.wanted - ritz.locked)]
-        errors = ritz.errors[inside]
-        accurate = inside[errors <= tolerance]
+        accurate = inside[ritz.errors[inside] <= limit]
         chosen = ~np.isin(candidates, accurate)
         ritz.lock(accurate)
         return errors, residual[:, chosen], candidates[chosen]
@@ -272,3 +354,7 @@ class _Iteration:
                 f"after {step} steps, {tolerance:.1e} was asked for; use another inner solver "
                 "(--inner) or a looser tolerance"
             )
+
+
+def _typical(errors: Array) -> float:
+    return float(np.median(errors)) if len(errors) else 0.0

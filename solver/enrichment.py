@@ -12,20 +12,17 @@ from numpy.typing import NDArray
 from carillon.errors import ConvergenceError
 from solver.decomposition import on_root
 from solver.inner import Inverse
+from solver.orthonormal import WELL_CONDITIONED, orthonormal
 from solver.rayleigh_ritz import rayleigh_ritz
 from solver.system import System
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-DEPENDENT = 1e-11
-"""Directions whose share (squared) of the corrections is below this are dropped."""
 SMALL_CORRECTION = 1e-6
 """Length (squared) of corrections of unit vectors below which rounding spoils the identities."""
 NEARLY_INSIDE = 1e-2
 """Share (squared) of a correction outside the subspace below which that part is formed first."""
-WELL_CONDITIONED = 1e-3
-"""Least diagonal entry of the Cholesky factor of the scaled Gram matrix to rely on it."""
 MOST_PASSES = 3
 """Times that the corrections are orthogonalised; twice is enough but for rounding."""
 
@@ -180,7 +177,7 @@ def _independent(system: System, ritz: Ritz, Z: Array) -> tuple[Array, Array, Ar
         overlap = system.inner(ritz.mass_vectors, Z)
         gram = system.inner(Z, system.times_mass(Z))
         outside = _outside(overlap, gram)
-        basis, condition = on_root(system.comm, partial(_orthonormal, outside))
+        basis, condition = on_root(system.comm, partial(orthonormal, outside))
         alone = bool((np.diag(outside) > NEARLY_INSIDE * np.diag(gram)).all())
         # Locked vectors are coupled to the active ones by K, which no formula below accounts for.
         good = alone and condition > WELL_CONDITIONED and not (ritz.locked and passes == 0)
@@ -206,7 +203,7 @@ def _lowest(
     -------
     values (k,), and coefficients of X (m, k) and of Z (a, k).
     """
-    basis, _ = _orthonormal(_outside(overlap, gram))
+    basis, _ = orthonormal(_outside(overlap, gram))
     # Q = (Z - X C) T is orthonormal and orthogonal to X; K X is Theta M X within the subspace.
     coupling = (across[active] - theta[active, None] * overlap[active]) @ basis
     inner = stiff - overlap.T @ across - across.T @ overlap + overlap.T @ (theta[:, None] * overlap)
@@ -221,27 +218,6 @@ def _lowest(
     of_all = -overlap @ of_basis
     of_all[active] += vectors[:size, :keep]
     return values[:keep], of_all, of_basis
-
-
-def _orthonormal(gram: Array) -> tuple[Array, float]:
-    """Coefficients T that make vectors with this Gram matrix orthonormal, dependent ones dropped.
-
-    Also returns the least diagonal entry of the Cholesky factor of the scaled matrix, 0 if there is
-    none.
-    """
-    size = np.diag(gram)
-    usable = size > 0.0
-    scale = np.where(usable, 1.0 / np.sqrt(np.where(usable, size, 1.0)), 0.0)
-    gram = gram * scale * scale[:, None]
-    factor, failed = la.lapack.dpotrf(gram, lower=True, clean=True)
-    condition = 0.0 if failed else float(np.diag(factor).min(initial=1.0))
-    if condition > WELL_CONDITIONED:
-        inverse, _ = la.lapack.dtrtri(factor, lower=True)
-        return scale[:, None] * inverse.T, condition
-    spread, directions = la.eigh(gram, driver="evd", check_finite=False)
-    independent = spread > DEPENDENT * max(spread[-1], 0.0)
-    whitening = directions[:, independent] / np.sqrt(spread[independent])
-    return scale[:, None] * whitening, condition
 
 
 def relax(

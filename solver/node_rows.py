@@ -254,17 +254,40 @@ def _multiply_stiffness(  # type: ignore[no-untyped-def]
 def _multiply_mass(  # type: ignore[no-untyped-def]
     start, stop, indptr, columns, entries, X, ghosts, result
 ):
+    # The three components of a node follow each other, and all have the same mass.
     own = X.shape[0] // 3
-    width = X.shape[1]
+    width = 3 * X.shape[1]
+    inner = X.reshape(own, width)
+    outer = ghosts.reshape(ghosts.shape[0] // 3, width)
+    y = result.reshape(own, width)
     for row in range(start, stop):
-        result[3 * row : 3 * row + 3] = 0.0
-        for number in range(indptr[row], indptr[row + 1]):
-            column = columns[number]
-            if column < own:
-                x = X[3 * column : 3 * column + 3]
-            else:
-                x = ghosts[3 * (column - own) : 3 * (column - own) + 3]
-            m = entries[number]
-            for i in range(3):
-                for k in range(width):
-                    result[3 * row + i, k] += m * x[i, k]
+        sums = y[row]
+        sums[:] = 0.0
+        number = indptr[row]
+        last = indptr[row + 1]
+        # Four neighbours at a time: most of the time goes into loading and storing the sums.
+        while number + 4 <= last:
+            m0, m1, m2, m3 = (
+                entries[number],
+                entries[number + 1],
+                entries[number + 2],
+                entries[number + 3],
+            )
+            x0 = _row(columns[number], own, inner, outer)
+            x1 = _row(columns[number + 1], own, inner, outer)
+            x2 = _row(columns[number + 2], own, inner, outer)
+            x3 = _row(columns[number + 3], own, inner, outer)
+            for k in range(width):
+                sums[k] += m0 * x0[k] + m1 * x1[k] + m2 * x2[k] + m3 * x3[k]
+            number += 4
+        while number < last:
+            m0 = entries[number]
+            x0 = _row(columns[number], own, inner, outer)
+            for k in range(width):
+                sums[k] += m0 * x0[k]
+            number += 1
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _row(column, own, inner, outer):  # type: ignore[no-untyped-def]
+    return inner[column] if column < own else outer[column - own]

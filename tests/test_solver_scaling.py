@@ -86,7 +86,7 @@ def test_more_ranks_have_less_to_do_each_and_more_to_say():
     decomposition, order = decompose(mesh, 8, 0, 1)
     sizes = sizes_of_mesh(mesh, decomposition, order)
     work = elimination(mesh)
-    correction = Correction(steps=2, solves=100, width=70)
+    correction = Correction(blocks=2, solves=100, width=70)
     alone, many = (work_of_busiest(sizes, work, 60, correction, ranks) for ranks in (1, 8))
     for phase in ("local", "basis", "factor", "solve"):
         assert many[phase].flops < alone[phase].flops

@@ -27,16 +27,37 @@ class Inverse(Protocol):
         (K - shift M) is inverted [rad^2/s^2].
     exact
         Whether solutions are exact to rounding.
+    lasting
+        Whether it is nothing but arrays of this rank, which need not be freed together.
     """
 
     shift: float
     exact: bool
+    lasting: bool
 
     def solve(self, block: Array) -> Array:
         """Solutions for a row-major block of right-hand sides (local unknowns, k); collective."""
 
     def destroy(self) -> None:
         """Free what numpy does not."""
+
+
+class Approximate:
+    """An inverse for a similar material, good for a correction that need not be exact."""
+
+    exact = False
+    lasting = False
+
+    def __init__(self, similar: Inverse) -> None:
+        self._similar = similar
+        self.shift = similar.shift
+
+    def solve(self, block: Array) -> Array:
+        """Solutions of the similar system."""
+        return self._similar.solve(block)
+
+    def destroy(self) -> None:
+        """Leave it to its owner."""
 
 
 class InnerSolver:

@@ -90,6 +90,7 @@ class IterativeInverse:
     """
 
     exact = False
+    lasting = False
 
     def __init__(
         self,

@@ -73,6 +73,7 @@ def measure(
         "width": run.width,
         "subdomains": run.share.decomposition.tree.parts,
         "corrections": run.result.steps,
+        "blocks": run.result.blocks,
         "right_hand_sides": run.result.solves,
         "inner": run.inner.method,
         "phases": run.phases(model),
@@ -86,7 +87,7 @@ class _Run:
 
     def __init__(self, model: ElasticModel | None, options: SolverOptions, comm: MPI.Comm) -> None:
         self.comm = CountingComm.of(comm)
-        self.keep = default_keep(options.modes)
+        self.keep = default_keep(options.modes, together=True)
         wanted = options.modes - RIGID_MODES
         self.width = wanted + default_guard(wanted)
         with self._phase() as self.partition:
@@ -153,7 +154,7 @@ class _Run:
         ranks = self.comm.size
         work = on_root(self.comm, lambda: elimination(cast(ElasticModel, model).mesh))
         shared, alone = dense_flops(
-            self.share.n_dofs, self.result.steps, self.result.solves, self.width
+            self.share.n_dofs, self.result.blocks, self.result.solves, self.width
         )
         self.assembly.flops = ASSEMBLY_FLOPS * len(self.share.cells)
         self.inner.factor.flops = work.flops / ranks

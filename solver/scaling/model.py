@@ -129,20 +129,20 @@ class Correction:
 
     Attributes
     ----------
-    steps, solves
-        Corrections made, and right-hand sides solved in them.
+    blocks, solves
+        Blocks of right-hand sides, and their columns in all.
     width
-        Vectors carried.
+        Modes formed.
     """
 
-    steps: int
+    blocks: int
     solves: int
     width: int
 
     @classmethod
     def measured(cls, run: dict[str, Any]) -> Correction:
         """As a run made it."""
-        return cls(run["corrections"], run["right_hand_sides"], run["width"])
+        return cls(run["blocks"], run["right_hand_sides"], run["width"])
 
 
 def work_of_busiest(
@@ -164,11 +164,12 @@ def work_of_busiest(
     unknowns = 3.0 * float(sizes.nodes[-1])
     largest = float(np.bincount(owner, weights=sizes.nodes[:parts]).max() / sizes.nodes[-1])
     levels = rounds(ranks)
-    passes = max(correction.steps, 1)
-    shared, alone = dense_flops(unknowns, correction.steps, correction.solves, correction.width)
-    improved = correction.solves / passes
-    halo = 16.0 * _surface(sizes, owner, ranks) * 3 * correction.width * correction.steps
-    reduced = 8.0 * levels * correction.steps * improved * (2.0 * improved + correction.width)
+    passes = max(correction.blocks, 1)
+    shared, alone = dense_flops(unknowns, correction.blocks, correction.solves, correction.width)
+    columns = correction.solves / passes
+    # Two products with the mass a block; projections on the basis, and Gram matrices.
+    halo = 2.0 * 16.0 * _surface(sizes, owner, ranks) * 3 * correction.solves
+    reduced = 8.0 * levels * correction.solves * (0.5 * correction.solves + 2.0 * columns)
     return {
         **work,
         "factor": Tally(levels, elimination.update_bytes(levels), elimination.flops / ranks),
@@ -177,7 +178,7 @@ def work_of_busiest(
             elimination.solve_bytes(levels, correction.solves),
             elimination.solve_flops(correction.solves) / ranks,
         ),
-        "dense": Tally(5 * levels * correction.steps, halo + reduced, largest * shared + alone),
+        "dense": Tally(6 * levels * correction.blocks, halo + reduced, largest * shared + alone),
     }
 
 

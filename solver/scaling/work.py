@@ -13,6 +13,8 @@ from solver.node_rows import Pattern
 
 ASSEMBLY_FLOPS = 2.0 * 8 * 24**2
 """Operations of the stiffness of one element: eight matrices, scaled and added."""
+LOOKS = 3
+"""Dense eigenproblems of the Krylov space that a correction solves."""
 
 
 @dataclass(frozen=True)
@@ -71,21 +73,25 @@ def elimination(mesh: HexMesh) -> Elimination:
     )
 
 
-def dense_flops(unknowns: float, steps: int, solves: int, width: int) -> tuple[float, float]:
-    """Operations of Rayleigh-Ritz: those shared by the ranks, and those of rank 0 alone.
+def dense_flops(unknowns: float, blocks: int, solves: int, width: int) -> tuple[float, float]:
+    """Operations of the block Lanczos iteration: those shared by the ranks, and those of rank 0.
+
+    Every block is projected on the basis and freed of it, then made orthonormal; twice the
+    operator's Ritz values are looked at, and in the end the modes are formed.
 
     Parameters
     ----------
     unknowns
         Of the whole solid.
-    steps, solves
-        Corrections made and right-hand sides solved in them.
+    blocks, solves
+        Blocks of right-hand sides and their columns in all.
     width
-        Vectors carried.
+        Vectors formed.
     """
-    if steps == 0:
+    if blocks == 0:
         return 0.0, 0.0
-    improved = round(solves / steps)
-    products = product_flops(width + improved, round(unknowns), improved)
-    vectors = product_flops(round(unknowns), width + improved, width)
-    return steps * (products + vectors), steps * eigen_flops(width + improved, True)
+    columns = solves / blocks
+    basis = 2.0 * unknowns * solves**2
+    orthonormal = 6.0 * unknowns * columns * solves
+    vectors = product_flops(round(unknowns), solves, width)
+    return basis + orthonormal + vectors, LOOKS * eigen_flops(solves, False)

@@ -1,0 +1,35 @@
+"""Orthonormal combinations of vectors, from their Gram matrix."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg as la
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+DEPENDENT = 1e-11
+"""Directions whose share (squared) of the vectors is below this are dropped."""
+WELL_CONDITIONED = 1e-3
+"""Least diagonal entry of the Cholesky factor of the scaled Gram matrix to rely on it."""
+
+
+def orthonormal(gram: Array) -> tuple[Array, float]:
+    """Coefficients T that make vectors with this Gram matrix orthonormal, dependent ones dropped.
+
+    Also returns the least diagonal entry of the Cholesky factor of the scaled matrix, 0 if there is
+    none.
+    """
+    size = np.diag(gram)
+    usable = size > 0.0
+    scale = np.where(usable, 1.0 / np.sqrt(np.where(usable, size, 1.0)), 0.0)
+    gram = gram * scale * scale[:, None]
+    factor, failed = la.lapack.dpotrf(gram, lower=True, clean=True)
+    condition = 0.0 if failed else float(np.diag(factor).min(initial=1.0))
+    if condition > WELL_CONDITIONED:
+        inverse, _ = la.lapack.dtrtri(factor, lower=True)
+        return scale[:, None] * inverse.T, condition
+    spread, directions = la.eigh(gram, driver="evd", check_finite=False)
+    independent = spread > DEPENDENT * max(spread[-1], 0.0)
+    whitening = directions[:, independent] / np.sqrt(spread[independent])
+    return scale[:, None] * whitening, condition
