@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
+from pathlib import Path
 
 from threadpoolctl import ThreadpoolController
 
@@ -132,3 +133,37 @@ def limit_threads(ranks: int) -> int:
     ThreadpoolController().limit(limits=threads)
     os.environ["OMP_NUM_THREADS"] = str(threads)
     return threads
+
+
+def available_memory() -> int | None:
+    """Bytes that this process may still use: of the machine, and of its control group if limited.
+
+    None where the system does not tell.
+    """
+    found = [_memory_of_machine(), _memory_of_group()]
+    known = [each for each in found if each is not None]
+    return min(known) if known else None
+
+
+def _memory_of_machine() -> int | None:
+    try:
+        lines = Path("/proc/meminfo").read_text().splitlines()
+    except OSError:
+        return None
+    for line in lines:
+        if line.startswith("MemAvailable:"):
+            return 1024 * int(line.split()[1])
+    return None
+
+
+def _memory_of_group() -> int | None:
+    """What a limit of version 2 leaves; cached files make room when memory is asked for."""
+    group = Path("/sys/fs/cgroup")
+    try:
+        limit = int((group / "memory.max").read_text())
+        used = int((group / "memory.current").read_text())
+        lines = (group / "memory.stat").read_text().splitlines()
+        cached = next(int(line.split()[1]) for line in lines if line.startswith("file "))
+    except (OSError, ValueError, StopIteration):
+        return None
+    return max(0, limit - used + cached)

@@ -78,6 +78,7 @@ def _modes(options: argparse.Namespace, comm: MPI.Comm) -> None:
         tolerance=options.tol,
         corrections=options.corrections,
         keep=options.keep,
+        cutoff=options.cutoff,
         subdomains=options.subdomains,
         interface=options.interface,
         seed=options.seed,
@@ -426,6 +427,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     modes.add_argument(
         "--keep", type=whole_number(1), help="modes kept at the root of the merge tree"
+    )
+    modes.add_argument(
+        "--cutoff",
+        type=positive_number,
+        metavar="HZ",
+        help="frequency up to which HCMS keeps modes below the root (default: a number of them)",
     )
     modes.add_argument("--subdomains", type=whole_number(1), help="number of subdomains")
     modes.add_argument(

@@ -47,6 +47,8 @@ FEWEST_SPARE = SPARE_MODES
 KEPT_SHARE, TOGETHER_SHARE = 1.6, 1.17
 """Modes kept at the root of the merge tree, as a share of those asked for, and where a block
 Lanczos iteration corrects them together."""
+FEW_PARTS = 16
+"""Subdomains up to which these shares hold; the best ones grow about like the cube root of more."""
 ORTHOGONAL_TO_RIGID = 1e-10
 """Largest overlap of HCMS modes with the rigid motions that needs no correction."""
 
@@ -68,6 +70,9 @@ class SolverOptions:
         Largest number of correction steps; 0 is plain HCMS.
     keep
         Modes kept at the root of the merge tree; a margin above `modes` if not given.
+    cutoff
+        Frequency [Hz] up to which subdomains and groups of them keep their modes; numbers of modes
+        that grow with their size if not given.
     subdomains
         Number of subdomains; from the number of unknowns if not given.
     interface
@@ -88,6 +93,7 @@ class SolverOptions:
     tolerance: float | None = None
     corrections: int = MAX_CORRECTIONS
     keep: int | None = None
+    cutoff: float | None = None
     subdomains: int | None = None
     interface: str = DEFAULT_INTERFACE
     seed: int = 0
@@ -274,7 +280,10 @@ class ModalSolver:
         options, n_dofs = self.options, self.share.n_dofs
         together = options.acceleration == "lanczos" and self._inner.indefinite
         together = together and options.corrections > 0 and options.tolerance != 0.0
-        keep = default_keep(options.modes, together) if options.keep is None else options.keep
+        parts = self.share.decomposition.tree.parts
+        keep = options.keep
+        if keep is None:
+            keep = default_keep(options.modes, parts, together)
         least = options.modes + (FEWEST_SPARE if options.corrections else 0)
         if options.method == "hcms" and keep < min(least, n_dofs):
             raise UserError(
@@ -287,12 +296,17 @@ class ModalSolver:
         self, system: System, phases: Phases, evidence: dict[str, Any]
     ) -> tuple[Array, Array]:
         options = self.options
+        proving = options.prove is not False and can_count()
         with phases("eigensolver"):
             truth = solve_truth(
-                system, options.modes, options.method, options.tolerance or RESIDUAL_TOLERANCE
+                system,
+                options.modes,
+                options.method,
+                options.tolerance or RESIDUAL_TOLERANCE,
+                SPARE_MODES if proving else 0,
             )
         evidence["eigensolver_iterations"] = truth.iterations
-        if options.prove is not False and can_count():
+        if proving:
             self._prove(system, truth, phases, evidence)
         count = options.modes
         return truth.values[:count], np.ascontiguousarray(truth.vectors[:, :count])
@@ -332,6 +346,7 @@ class ModalSolver:
                     self.comm,
                     self._subdomains,
                     self._threads,
+                    None if options.cutoff is None else (2.0 * np.pi * options.cutoff) ** 2,
                 )
             evidence["hcms"] = synthesis.counts.summary(self.comm)
             if options.corrections == 0:
@@ -408,15 +423,16 @@ def check_mode_count(modes: int, n_dofs: int) -> None:
         )
 
 
-def default_keep(modes: int, together: bool = False) -> int:
+def default_keep(modes: int, parts: int, together: bool = False) -> int:
     """Modes kept at the root: those that the correction iterates, and some to choose from.
 
     More would be a better start, but take longer than they save where modes are corrected
-    `together`.
+    `together`.  Modes of many small subdomains need to be more to be as good.
     """
+    grown = max(1.0, parts / FEW_PARTS) ** (1.0 / 3.0)
     if together:
-        return max(int(TOGETHER_SHARE * modes), modes + FEWEST_GUARDS + FEWEST_SPARE)
-    return max(int(KEPT_SHARE * modes), modes + default_guard(modes) + FEWEST_SPARE)
+        return max(int(TOGETHER_SHARE * grown * modes), modes + FEWEST_GUARDS + FEWEST_SPARE)
+    return max(int(KEPT_SHARE * grown * modes), modes + default_guard(modes) + FEWEST_SPARE)
 
 
 def elastic_part(system: System, synthesis: Synthesis) -> tuple[Array | None, Array]:

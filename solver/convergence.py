@@ -71,8 +71,9 @@ def correction_history(
     system = assemble(share, comm, layout)
     inner = InnerSolver("auto", layout)
     histories = []
+    keep = default_keep(modes, share.decomposition.tree.parts)
     for start in track(STARTS, "starts", visible=comm.rank == 0):
-        block = _start_block(start, share, default_keep(modes), seed, comm)
+        block = _start_block(start, share, keep, seed, comm)
         for acceleration in STEPWISE:
             values = _correct(system, inner, block, modes - RIGID_MODES, steps, acceleration)
             histories.append(

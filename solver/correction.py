@@ -12,7 +12,8 @@ from carillon.errors import ConvergenceError
 from solver.decomposition import on_root
 from solver.enrichment import Ritz, Step, enrich, relax
 from solver.inner import Approximate, InnerSolver, Inverse
-from solver.lanczos import lanczos
+from solver.lanczos import HIGHEST_SHIFT, lanczos
+from solver.lowest import WEYL_EXPONENT
 from solver.rayleigh_ritz import rayleigh_ritz, safe_shift
 from solver.system import System
 
@@ -33,8 +34,10 @@ NEARLY_ACCURATE = 100.0
 """Error, as a multiple of the tolerance, below which `lanczos` leaves a start to `krylov`."""
 SHIFT_SHARE = 0.52
 """Shift of an indefinite factorisation, as a share of the last wanted eigenvalue."""
-HIGHEST_SHIFT = 0.8
-"""Share at which the shift is moved, when better Ritz values have left it too high."""
+TOP, TOP_SHARE = 0.8, 0.98
+"""With all modes accurate below one share of the last wanted value, the shift is the other."""
+LANCZOS_RUNS, OFF_RESONANCE = 3, 0.97
+"""Lanczos iterations at most, and by what the shift is moved off an eigenvalue it has hit."""
 GUARD_SHARE, FEWEST_GUARDS = 0.22, 20
 """Vectors carried beyond the wanted ones, as a share of these, and the fewest of them."""
 IMPROVED_GUARDS = 0.4
@@ -188,6 +191,7 @@ class _Iteration:
         self.wanted = wanted
         self.inside = acceleration != "relaxation" and inner.indefinite
         self.lanczos = acceleration == "lanczos" and inner.indefinite
+        self.share = SHIFT_SHARE
         self.similar = similar
         self.made: Inverse | None = None
         guard = default_guard(wanted)
@@ -210,6 +214,9 @@ class _Iteration:
     ) -> Correction:
         """Correct until the tolerance, or the last step allowed, is reached."""
         step = 0
+        if tolerance >= LOOSE:
+            # One step then has to do, for the last modes too.
+            self.improved = self.width
         lanczos_may_run = self.lanczos and tolerance > 0.0 and max_steps > 0
         if lanczos_may_run and rough:
             self._run_lanczos(tolerance, observe)
@@ -256,22 +263,29 @@ class _Iteration:
         )
 
     def _run_lanczos(self, tolerance: float, observe: Callable[[int, Array], None] | None) -> None:
-        ritz = self.ritz
-        found = lanczos(
-            self.system,
-            self._inverse(1),
-            ritz.values,
-            ritz.vectors,
-            self.wanted,
-            self.width,
-            tolerance,
-        )
-        self.solves += found.solves
-        self.blocks += found.blocks
-        self.ritz = Ritz(self.system, found.values, found.vectors)
-        self._require_independent(1)
+        width = self.width if tolerance >= LOOSE else self.improved + 1
+        # Again where a poor start has put the shift too high, or chance on an eigenvalue; a start
+        # that knows nothing of the spectrum needs one from below.
+        for run in range(LANCZOS_RUNS):
+            self.inside = run < LANCZOS_RUNS - 1
+            inverse, ritz = self._inverse(1), self.ritz
+            found = lanczos(
+                self.system, inverse, ritz.values, ritz.vectors, self.wanted, width, tolerance
+            )
+            self.solves += found.solves
+            self.blocks += found.blocks
+            if found.resonant:
+                self.destroy()
+                self.share *= OFF_RESONANCE
+                continue
+            self.ritz = Ritz(self.system, found.values, found.vectors)
+            self._require_independent(1)
+            if not self._too_high(inverse):
+                break
+            self.destroy()
+        self.inside = True
         if observe is not None:
-            observe(1, found.values[: self.wanted])
+            observe(1, self.ritz.values[: self.wanted])
 
     def _require_independent(self, step: int) -> None:
         if len(self.ritz.values) < self.wanted:
@@ -282,8 +296,9 @@ class _Iteration:
 
     def _inverse(self, step: int) -> Inverse:
         """Inverse for a step; factorised anew if a start far off has put the shift too high."""
-        if step == 0 and self.similar is not None and not self._too_high(self.similar):
-            return Approximate(self.similar)
+        similar = None if step or self._only_top_is_left() else self.similar
+        if similar is not None and not self._too_high(similar):
+            return Approximate(similar)
         if self.made is not None and self.inside and self._too_high(self.made):
             self.destroy()
         if self.made is None:
@@ -291,7 +306,8 @@ class _Iteration:
         return self.made
 
     def _too_high(self, inverse: Inverse) -> bool:
-        return inverse.shift > HIGHEST_SHIFT * self._last()
+        highest = 1.1 if self._only_top_is_left() else HIGHEST_SHIFT
+        return inverse.shift > highest * self._last()
 
     def lasting(self, tolerance: float) -> Inverse | None:
         """The inverse to keep for a similar material, which only a loose tolerance makes use of."""
@@ -309,7 +325,14 @@ class _Iteration:
         return float(np.sort(self.ritz.values)[self.wanted - 1])
 
     def _shift(self) -> float:
-        return SHIFT_SHARE * self._last() if self.inside else -safe_shift(self.system)
+        if not self.inside:
+            return -safe_shift(self.system)
+        return self._last() * (TOP_SHARE if self._only_top_is_left() else self.share)
+
+    def _only_top_is_left(self) -> bool:
+        """Whether just modes at the end of those wanted are not accurate yet."""
+        lowest = float(self.ritz.values[self.ritz.active].min(initial=np.inf))
+        return self.ritz.locked > 0 and lowest > TOP * self._last()
 
     def _residuals(self, tolerance: float) -> tuple[Array, Array, NDArray[np.int64]]:
         """Errors of the wanted modes, and residuals of those to improve with their numbers.
@@ -331,7 +354,7 @@ class _Iteration:
 
     def _estimate(self, candidates: NDArray[np.int64], residual: Array) -> Array:
         values = self.ritz.values[candidates]
-        last = np.sort(self.ritz.values)[self._reach()]
+        last = self._first_beyond()
         rows = self.system.rows
         mass = rows.lumped_mass if rows.has_diagonal_mass else ROUGH_MASS * rows.lumped_mass
         weighted = residual / np.repeat(mass, 3)[:, None]
@@ -339,12 +362,22 @@ class _Iteration:
         distance = np.maximum(last - values, np.finfo(float).eps * last)
         return np.maximum(square / (values * distance), np.finfo(float).eps)
 
-    def _reach(self) -> int:
-        """Number of the value up to which the subspace holds all that is there."""
-        held = len(self.ritz.values)
-        if self.step is enrich:
-            return min(self.improved, held) - 1
-        return (3 * self.wanted + held) // 4
+    def _first_beyond(self) -> float:
+        """Value up to which the subspace holds all that is there.
+
+        Those of the guard vectors of another material are far too high: until they are improved
+        they count for no more than Weyl's law says.
+        """
+        values = np.sort(self.ritz.values)
+        if self.step is relax:
+            return float(values[(3 * self.wanted + len(values)) // 4])
+        number = min(self.wanted + int(IMPROVED_GUARDS * default_guard(self.wanted)), len(values))
+        found = float(values[number - 1])
+        if self.blocks == 0 and self.similar is not None:
+            return min(
+                found, float(values[self.wanted - 1]) * (number / self.wanted) ** WEYL_EXPONENT
+            )
+        return found
 
     def _require_progress(self, step: int, tolerance: float) -> None:
         recent = self.history[-STAGNATION - 1 :]

@@ -23,6 +23,8 @@ SMALL_CORRECTION = 1e-6
 """Length (squared) of corrections of unit vectors below which rounding spoils the identities."""
 NEARLY_INSIDE = 1e-2
 """Share (squared) of a correction outside the subspace below which that part is formed first."""
+ROWS_AT_ONCE = 1024
+"""Rows of a block that are scaled together, so that they stay in the cache."""
 MOST_PASSES = 3
 """Times that the corrections are orthogonalised; twice is enough but for rounding."""
 
@@ -70,11 +72,15 @@ class Ritz:
 
         An error of a value shows in the residual to second order only, so none may creep in.
         """
-        vectors = np.ascontiguousarray(self.vectors[:, numbers])
+        chosen = _range(numbers)
+        vectors = np.ascontiguousarray(self.vectors[:, chosen])
         residual = self.system.times_stiffness(vectors)
         quotients = self.system.column_products(vectors, residual)
         self.values[numbers] = on_root(self.system.comm, lambda: quotients)
-        residual -= self.mass_vectors[:, numbers] * self.values[numbers]
+        mass_vectors, values = self.mass_vectors[:, chosen], self.values[numbers]
+        for first in range(0, len(residual), ROWS_AT_ONCE):
+            rows = slice(first, first + ROWS_AT_ONCE)
+            residual[rows] -= mass_vectors[rows] * values
         return residual
 
     def replace_active(self, values: Array, vectors: Array) -> None:
@@ -94,8 +100,15 @@ class Ritz:
     def lowest(self, count: int) -> tuple[Array, Array, Array]:
         """Values, vectors and errors of the lowest `count`, ascending."""
         order = np.argsort(self.values, kind="stable")[:count]
-        vectors = np.ascontiguousarray(self.vectors[:, order])
+        vectors = np.ascontiguousarray(self.vectors[:, _range(order)])
         return self.values[order], vectors, self.errors[order]
+
+
+def _range(numbers: Index) -> Index | slice:
+    """The numbers as a slice, of which numpy makes no copy, if they follow each other."""
+    if len(numbers) and (np.diff(numbers) == 1).all():
+        return slice(int(numbers[0]), int(numbers[-1]) + 1)
+    return numbers
 
 
 class Step(Protocol):

@@ -16,13 +16,15 @@ from numpy.typing import NDArray
 
 from solver.decomposition import on_root
 from solver.inner import Inverse
-from solver.orthonormal import orthonormal
+from solver.orthonormal import WELL_CONDITIONED, orthonormal
 from solver.system import System
 
 Array = NDArray[np.float64]
 
-COLUMNS = 64
-"""Width of a block: the narrower, the fewer right-hand sides; the wider, the faster each."""
+COLUMNS, FEWEST_COLUMNS = 64, 16
+"""Widest and narrowest block: the narrower, the fewer right-hand sides; the wider, the faster."""
+MIXED_IN_COLUMN = 4
+"""Wanted modes in a column of the first block; the space has to tell them apart again."""
 END_WEIGHT = 2.0
 """Exponent of a mode's distance to the shift, by which it enters the first block."""
 MIXED = 1.15
@@ -33,6 +35,8 @@ FIRST_LOOK = 1.25
 """Dimension of the space at the first look at its Ritz values, as a share of the modes mixed."""
 DECADES = 2.0
 """Decades that a block takes off the error at least, until two looks have told."""
+HIGHEST_SHIFT = 0.8
+"""Share of the last wanted eigenvalue above which a shift is too high."""
 LONGEST = 4
 """Dimension at which the iteration ends in any case, as a multiple of the modes wanted."""
 PESSIMISM = 4.0
@@ -55,12 +59,16 @@ class Lanczos:
         (local, k) mass-orthonormal Ritz vectors of their span, row-major.
     solves, blocks
         Number of right-hand sides solved, and of the blocks that they came in.
+    resonant
+        Whether the shift is so close to an eigenvalue that its mode drowns the others: then the
+        values and vectors are those of the start.
     """
 
     values: Array
     vectors: Array
     solves: int
     blocks: int
+    resonant: bool = False
 
 
 def lanczos(
@@ -94,16 +102,31 @@ def lanczos(
     operator follows from that of the last block, so the Ritz values of K itself cost little more.
     """
     mixed = wanted if tolerance > ROUGH else min(len(values), int(MIXED * wanted))
-    longest = min(LONGEST * wanted, system.n_dofs)
-    begin = _mixed(values[:mixed], start[:, :mixed], inverse.shift)
+    columns = min(_columns(wanted), wanted)
+    longest = min(LONGEST * (wanted + columns), system.n_dofs)
+    begin = _mixed(values[:mixed], start[:, :mixed], inverse.shift, columns)
     basis = _Basis(system, inverse, begin, longest + begin.shape[1])
-    looks = _Looks(tolerance, int((1.0 if tolerance > ROUGH else FIRST_LOOK) * mixed))
+    looks = _Looks(tolerance, int((1.0 if tolerance > ROUGH else FIRST_LOOK) * mixed), columns)
     while basis.remainder.shape[1] and basis.size < longest:
         basis.extend()
-        if basis.size >= looks.next and looks.accurate(basis.size, basis.error(wanted)):
+        if basis.blocks == 1 and basis.remainder.shape[1] < min(columns, longest - basis.size):
+            return Lanczos(values, start, basis.size, basis.blocks, resonant=True)
+        if basis.size < looks.next:
+            continue
+        error, last = basis.outlook(wanted)
+        # Beyond most wanted modes the shift would take long to find the first ones.
+        if inverse.shift > HIGHEST_SHIFT * last:
+            break
+        if looks.accurate(basis.size, error):
             break
     found, vectors = basis.ritz_pairs(width)
     return Lanczos(found, vectors, basis.size, basis.blocks)
+
+
+def _columns(wanted: int) -> int:
+    """Width of a block: few modes in each column, and whole vector registers."""
+    narrow = max(-(-wanted // MIXED_IN_COLUMN), FEWEST_COLUMNS)
+    return min(-(-narrow // 8) * 8, COLUMNS)
 
 
 class _Looks:
@@ -115,8 +138,9 @@ class _Looks:
         Dimension at the next look.
     """
 
-    def __init__(self, tolerance: float, first: int) -> None:
+    def __init__(self, tolerance: float, first: int, columns: int) -> None:
         self.next = first
+        self._columns = columns
         self._tolerance = tolerance
         self._before: tuple[int, float] | None = None
 
@@ -128,7 +152,7 @@ class _Looks:
             self.next = size + 1
             return False
         error = min(error, 1.0)
-        rate = DECADES / COLUMNS
+        rate = DECADES / self._columns
         if self._before is not None:
             rate = max(rate / 2.0, np.log10(self._before[1] / error) / (size - self._before[0]))
         self._before = size, error
@@ -197,26 +221,37 @@ class _Basis:
 
     def _continue_with(self, block: Array, mass_block: Array, gram: Array) -> None:
         """Q and M Q with Q^T M Q = I and Q R = `block`, and R, come next."""
-        weights, _ = on_root(self._system.comm, lambda: orthonormal(gram))
+        system = self._system
+        weights, condition = on_root(system.comm, lambda: orthonormal(gram))
         self.remainder = block @ weights
         self._mass_remainder = mass_block @ weights
         self._coupling = weights.T @ gram
+        if condition <= WELL_CONDITIONED:
+            # Twice is enough.
+            again = system.inner(self.remainder, system.times_mass(self.remainder))
+            weights, _ = on_root(system.comm, lambda: orthonormal(again))
+            self.remainder = self.remainder @ weights
+            self._mass_remainder = system.times_mass(self.remainder)
+            self._coupling = system.inner(self._mass_remainder, block)
 
-    def error(self, wanted: int) -> float:
-        """Estimated relative error of the worst of the `wanted` lowest eigenvalues."""
-        inverted, residual = self._operator_pairs()[::2]
+    def outlook(self, wanted: int) -> tuple[float, float]:
+        """Estimated relative error of the worst of the `wanted` lowest eigenvalues, and the last.
+
+        Both are infinite as long as there are too few.
+        """
+        inverted, _, residual = self._operator_pairs()
         mu = self._inverse.shift
         order, values = _lowest(inverted, mu, len(inverted))
+        if len(order) <= wanted:
+            return np.inf, np.inf
         inverted = inverted[order]
         square = np.einsum("ij,ij->j", residual[:, order], residual[:, order])
         unresolved = np.flatnonzero(square > RESOLVED * inverted**2)
-        if len(order) <= wanted:
-            return np.inf
         # What is not resolved yet lies beyond the first such value.
         first = min([*unresolved[unresolved >= wanted], len(order) - 1])
         distance = np.abs(inverted - inverted[first])[:wanted]
         error = square[:wanted] / distance * (values[:wanted] - mu) ** 2 / values[:wanted]
-        return float(error.max()) / PESSIMISM
+        return float(error.max()) / PESSIMISM, float(values[wanted - 1])
 
     def _operator_pairs(self) -> tuple[Array, Array, Array]:
         """Ritz values and coefficients of the operator, and those of the residuals in `remainder`.
@@ -262,7 +297,7 @@ class _Basis:
         return values, found
 
 
-def _mixed(values: Array, modes: Array, shift: float) -> Array:
+def _mixed(values: Array, modes: Array, shift: float, columns: int) -> Array:
     """The modes in few columns (local, b), those next to each other in different ones.
 
     Those far from the shift, which need most steps, enter with most weight.
@@ -270,7 +305,6 @@ def _mixed(values: Array, modes: Array, shift: float) -> Array:
     count = len(values)
     weight = np.abs(values - shift) ** END_WEIGHT
     number = np.arange(count)
-    columns = min(COLUMNS, count)
     mixture = np.zeros((count, columns))
     mixture[number, number % columns] = weight / weight.max()
     return np.asarray(modes @ mixture)

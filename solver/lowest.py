@@ -35,6 +35,8 @@ INDEPENDENT = 1e-10
 """Directions whose share (squared) of the basis is below this are dropped."""
 WELL_CONDITIONED = 1e-4
 """The same share, below which vectors are orthonormalised twice."""
+CANCELLED = 1e-8
+"""Share (squared) of a block outside the basis below which it is made orthogonal twice."""
 LEAST_BLOCK = 24
 
 
@@ -96,10 +98,14 @@ def _krylov(
     block = basis if width is None else np.ascontiguousarray(basis[:, -width:])
     for _ in range(steps):
         block = factor.solve(rows.times_mass(block))
-        # Twice is enough.
-        for _ in range(2):
+        inside = basis.T @ rows.times_mass(block)
+        block -= basis @ inside
+        gram = block.T @ rows.times_mass(block)
+        if (np.diag(gram) < CANCELLED * np.einsum("ij,ij->j", inside, inside)).any():
+            # Twice is enough.
             block -= basis @ (basis.T @ rows.times_mass(block))
-        block, coefficients = _independent(rows, block)
+            gram = block.T @ rows.times_mass(block)
+        block, coefficients = _independent(rows, block, gram)
         block = block @ coefficients
         basis = np.concatenate([basis, block], axis=1)
     return basis
@@ -120,9 +126,11 @@ def ritz_pairs(rows: NodeRows, block: Array) -> tuple[Array, Array]:
     return values, block @ (whitening @ rotation)
 
 
-def _independent(rows: NodeRows, block: Array) -> tuple[Array, Array]:
+def _independent(rows: NodeRows, block: Array, gram: Array | None = None) -> tuple[Array, Array]:
     """Columns that span what `block` does, and coefficients that make them orthonormal."""
-    whitening, condition = _whitening(block.T @ rows.times_mass(block))
+    if gram is None:
+        gram = block.T @ rows.times_mass(block)
+    whitening, condition = _whitening(gram)
     if condition < WELL_CONDITIONED:
         # Twice is enough.
         block = block @ whitening

@@ -51,7 +51,11 @@ class Inertia:
 
 
 def solve_truth(
-    system: System, modes: int, method: str = "slepc", tolerance: float = RESIDUAL_TOLERANCE
+    system: System,
+    modes: int,
+    method: str = "slepc",
+    tolerance: float = RESIDUAL_TOLERANCE,
+    spare: int = SPARE_MODES,
 ) -> Truth:
     """Compute the `modes` lowest eigenpairs of the assembled system, rigid modes included.
 
@@ -61,6 +65,8 @@ def solve_truth(
         `slepc` (Krylov-Schur) or `arpack`, both in shift-and-invert mode.
     tolerance
         Relative residual tolerance of the eigensolver.
+    spare
+        Modes beyond, among which `prove_complete` looks for a gap.
 
     Raises
     ------
@@ -68,7 +74,7 @@ def solve_truth(
         If too few pairs converge.
     """
     shift = safe_shift(system)
-    wanted = min(modes + SPARE_MODES, system.n_dofs)
+    wanted = min(modes + spare, system.n_dofs)
     values, vectors, iterations = smallest_eigenpairs(
         system.K, system.M, wanted, shift, tolerance, method
     )

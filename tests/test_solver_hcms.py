@@ -210,6 +210,22 @@ def test_overlapping_subdomains_give_better_values_than_free_ones_and_these_than
     assert np.median(errors["free"]) < np.median(errors["fixed"])
 
 
+@pytest.mark.parametrize("treatment", ["overlapping", "free", "fixed"])
+def test_a_cutoff_takes_the_place_of_numbers_of_modes(treatment):
+    model = solids.random_box(14, 8, 6)
+    exact = solids.dense_eigenvalues(model)[6:46]
+    share = distribute(model, 4, comm=COMM)
+    errors = []
+    for factor in (2.0, 8.0, 30.0):
+        found = synthesize(share, 60, treatment, COMM, cutoff=factor * exact[-1])
+        assert len(found.values) == 60
+        errors.append(np.median(found.values[6:46] / exact - 1.0))
+    assert errors[0] > errors[1] > errors[2] > -1e-9
+    # With every mode below the root, the result is exact.
+    whole = synthesize(share, 60, treatment, COMM, cutoff=np.inf)
+    assert np.abs(whole.values[6:46] / exact - 1.0).max() < 1e-9
+
+
 def test_rigid_motions_are_kept_of_the_smallest_group():
     assert modes_to_keep(1e-9, 100) == 6
     assert modes_to_keep(1.0, 100) == 100

@@ -7,6 +7,8 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
+from carillon.errors import ConvergenceError
+from solver.inner import multifrontal
 from solver.inner.dissection import dissect
 from solver.inner.multifrontal import Factor, Plan
 from solver.model import fine_model
@@ -80,3 +82,12 @@ def test_dissection_saves_work():
         planes, np.zeros(len(planes) + 1, dtype=np.int64), np.empty(0, dtype=np.int64), 10**6
     )
     assert plan.fronts.solve_flops() < 0.3 * whole.solve_flops()
+
+
+def test_a_factorisation_that_does_not_fit_is_refused(monkeypatch):
+    rows, plan, _ = problem(solids.box_mesh(7, 5, 4))
+    monkeypatch.setattr(multifrontal, "available_memory", lambda: plan.bytes - 1)
+    with pytest.raises(ConvergenceError, match="factorisation of 720 unknowns takes about .* free"):
+        Factor(plan, rows.stiffness, rows.mass, -1.0)
+    monkeypatch.setattr(multifrontal, "available_memory", lambda: None)
+    Factor(plan, rows.stiffness, rows.mass, -1.0)

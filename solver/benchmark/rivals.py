@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, dataclass
 from itertools import product
 from typing import Any
@@ -64,17 +64,29 @@ class SlepcConfiguration:
     def in_force(self, modes: int) -> Iterator[None]:
         """Every SLEPc solver made in the body is set up so, by PETSc's options database."""
         chosen = {
-            f"{OPTIONS_PREFIX}eps_ncv": max(round(self.subspace * modes), modes + FEWEST_MORE),
-            f"{OPTIONS_PREFIX}st_pc_factor_mat_solver_type": self.package,
+            "eps_ncv": max(round(self.subspace * modes), modes + FEWEST_MORE),
+            "st_pc_factor_mat_solver_type": self.package,
         }
-        options = PETSc.Options()
-        for name, value in chosen.items():
-            options[name] = value
-        try:
+        with petsc_options(chosen), without_purification():
             yield
-        finally:
-            for name in chosen:
-                options.delValue(name)
+
+
+def without_purification() -> AbstractContextManager[None]:
+    """SLEPc applies the operator to every eigenvector once more, which a regular mass can spare."""
+    return petsc_options({"eps_purify": 0})
+
+
+@contextmanager
+def petsc_options(chosen: Mapping[str, Any]) -> Iterator[None]:
+    """PETSc options of the eigensolver, without its prefix, that hold within the body."""
+    options = PETSc.Options()
+    for name, value in chosen.items():
+        options[f"{OPTIONS_PREFIX}{name}"] = value
+    try:
+        yield
+    finally:
+        for name in chosen:
+            options.delValue(f"{OPTIONS_PREFIX}{name}")
 
 
 def configurations(ranks: int) -> list[SlepcConfiguration]:

@@ -31,7 +31,7 @@ from solver.problem import ProblemOptions
 Runs = dict[str, list[Run]]
 
 SLOW = ("arpack", "arpack_regular")
-NEED_FORESTS = ("ddfem", "ddfem_hcms_ec", "ddfem_hcms_ec_warm")
+NEED_FORESTS = ("ddfem", "ddfem_hcms_ec_accurate", "ddfem_hcms_ec", "ddfem_hcms_ec_warm")
 WARM_UP_MODES = 20
 """Modes of the runs that compile the kernels and load what they need."""
 
@@ -50,6 +50,8 @@ MEANING = {
     "speedup_with_precompute": "the same, with the partition, sparsity and elimination plan of the "
     "outer name added to its seconds, and nothing to those of the inner name",
     "ddfem": "coarsened by forests, then SLEPc on the coarse model (DDFEM* alone)",
+    "ddfem_hcms_ec_accurate": "coarsened by forests, then HCMS and error correction to the same "
+    "accuracy as on the fine mesh",
     "ddfem_hcms_ec": "coarsened by forests, then HCMS and error correction to the interactive "
     "tolerance, from nothing",
     "ddfem_hcms_ec_warm": "the same for moduli that differ by a smooth field of 5 %, starting from "
@@ -281,6 +283,7 @@ def _errors(runs: Runs, spectra: dict[str, Run]) -> dict[str, Any]:
         "arpack": "fine",
         "hcms": "fine",
         "hcms_ec": "fine",
+        "ddfem_hcms_ec_accurate": "coarse",
         "ddfem_hcms_ec": "coarse",
         "ddfem_hcms_ec_warm": "coarse_changed",
     }

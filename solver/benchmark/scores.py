@@ -18,6 +18,7 @@ BASES = {
     "hcms": ("arpack", "slepc"),
     "hcms_ec": ("arpack", "slepc"),
     "ddfem": ("arpack", "slepc"),
+    "ddfem_hcms_ec_accurate": ("arpack", "slepc", "ddfem"),
     "ddfem_hcms_ec": ("arpack", "slepc", "ddfem", "hcms_ec"),
     "ddfem_hcms_ec_warm": ("arpack", "slepc", "ddfem", "ddfem_hcms_ec"),
 }

@@ -94,7 +94,9 @@ class Subdomain:
             self.own = slice(0, 3 * count)
             self.pattern = self.region.pattern
 
-    def modes(self, elements: Elements, keep: int) -> tuple[Array, Array]:
+    def modes(
+        self, elements: Elements, keep: int, cutoff: float | None = None
+    ) -> tuple[Array, Array]:
         """Lowest modes of the subdomain.
 
         Parameters
@@ -104,6 +106,8 @@ class Subdomain:
         keep
             Wanted number of modes; more come back if there are more motions without strain, all of
             which are kept, and never fewer than the six rigid ones.
+        cutoff
+            Eigenvalue [rad^2/s^2] up to which all modes come back, instead of `keep`.
 
         Returns
         -------
@@ -120,24 +124,32 @@ class Subdomain:
         size = 3 * self.pattern.stop
         count = min(max(keep, RIGID_MODES), size)
         if count == size:
-            return all_modes(alone, size)
+            return _up_to(cutoff, *all_modes(alone, size))
         if self.treatment != "overlapping":
-            return self._all_rigid(alone, count)
+            return self._all_rigid(alone, count, cutoff)
         body = NodeRows(self.region.pattern)
         body.add(slice(None), stiffness, mass)
-        _, vectors = self._all_rigid(body, count)
+        _, vectors = self._all_rigid(body, count, cutoff)
         return ritz_pairs(alone, np.ascontiguousarray(vectors[self.own]))
 
-    def _all_rigid(self, rows: NodeRows, count: int) -> tuple[Array, Array]:
-        """Lowest modes, `count` or as many as there are motions without strain."""
+    def _all_rigid(self, rows: NodeRows, count: int, cutoff: float | None) -> tuple[Array, Array]:
+        """Lowest modes: `count`, or all motions without strain, or all up to the cutoff."""
         size = 3 * len(self.region.planes)
-        zero = ZERO_FRACTION * _ratio_of_diagonals(rows)
+        last = max(ZERO_FRACTION * _ratio_of_diagonals(rows), cutoff or 0.0)
         while True:
             region = self.region
             values, vectors = lowest_modes(rows, region.plan, region.planes, count, region.pieces)
-            if count == size or values[-1] > zero:
-                return values, vectors
+            if count == size or values[-1] > last:
+                return _up_to(cutoff, values, vectors)
             count = min(2 * count, size)
+
+
+def _up_to(cutoff: float | None, values: Array, vectors: Array) -> tuple[Array, Array]:
+    """The modes up to the cutoff, the rigid ones at least; all without one."""
+    if cutoff is None:
+        return values, vectors
+    count = max(RIGID_MODES, int(np.searchsorted(values, cutoff, side="right")))
+    return values[:count], np.ascontiguousarray(vectors[:, :count])
 
 
 def local_modes(

@@ -23,6 +23,7 @@ from solver.distribution import Cells
 from solver.hcms.condense import restrict_stiffness
 from solver.hcms.counts import Tally, eigen_flops, product_flops, sparse_product_flops
 from solver.messages import AnyArray
+from solver.model import RIGID_MODES
 from solver.sparse import assemble_elements
 
 Array = NDArray[np.float64]
@@ -208,8 +209,12 @@ def reduced_pencil(
     return Reduced(K, M)
 
 
-def lowest_pairs(reduced: Reduced, keep: int, tally: Tally) -> tuple[Array, Array]:
+def lowest_pairs(
+    reduced: Reduced, keep: int, tally: Tally, cutoff: float | None = None
+) -> tuple[Array, Array]:
     """Lowest eigenpairs of the reduced pencil: `keep`, or more if more values are zero.
+
+    With a `cutoff`, those up to it instead of `keep`.
 
     Returns
     -------
@@ -226,6 +231,8 @@ def lowest_pairs(reduced: Reduced, keep: int, tally: Tally) -> tuple[Array, Arra
         check_finite=False,
     )
     zeros = int(np.searchsorted(values, ZERO_FRACTION * values[-1]))
+    if cutoff is not None:
+        keep = max(RIGID_MODES, int(np.searchsorted(values, cutoff, side="right")))
     keep = min(max(keep, zeros), len(values))
     return values[:keep], Q[:, :keep]
 

@@ -92,6 +92,7 @@ def synthesize(
     comm: MPI.Comm = MPI.COMM_WORLD,
     subdomains: dict[int, Subdomain] | None = None,
     threads: int = 1,
+    cutoff: float | None = None,
 ) -> Synthesis:
     """Approximate the `keep` lowest modes by merging subdomains pairwise up the tree.
 
@@ -107,6 +108,9 @@ def synthesize(
         Their geometry, if `make_subdomains` was called before with the same treatment.
     threads
         Threads that share the subdomains of this rank.
+    cutoff
+        Eigenvalue [rad^2/s^2] up to which groups below the root keep their modes, instead of a
+        number of them.
 
     Notes
     -----
@@ -115,7 +119,7 @@ def synthesize(
     """
     if subdomains is None:
         subdomains = make_subdomains(share, treatment, comm)
-    climb = _Climb(share, keep, treatment, comm)
+    climb = _Climb(share, keep, treatment, comm, cutoff)
     with climb.counts.local.running():
         climb.solve_subdomains(subdomains, threads)
     climb.merge_groups()
@@ -140,9 +144,12 @@ class _Climb:
         Q of the merges that this rank made, split between left and right.
     """
 
-    def __init__(self, share: Share, keep: int, treatment: str, comm: MPI.Comm) -> None:
+    def __init__(
+        self, share: Share, keep: int, treatment: str, comm: MPI.Comm, cutoff: float | None
+    ) -> None:
         self.share = share
         self.keep = keep
+        self.cutoff = cutoff
         self.treatment = treatment
         self.comm = comm
         self.tree = share.decomposition.tree
@@ -162,7 +169,7 @@ class _Climb:
 
         def solve(part: int) -> tuple[Array, Array]:
             elements = self.share.cells.take(cells_of[part]).elements
-            return subdomains[part].modes(elements, self._wanted(part))
+            return subdomains[part].modes(elements, self._wanted(part), self._cutoff(part))
 
         # The largest first, so that no thread is left with one at the end.
         order = sorted(subdomains, key=lambda part: self.ranges[part][0] - self.ranges[part][1])
@@ -205,7 +212,8 @@ class _Climb:
             projected_right = arrays.pop()
             right = group_from_arrays(arrays, *self.ranges[step.right], left.cells)
         reduced = reduced_pencil(left, right, between, (projected, projected_right), tally)
-        values, Q = lowest_pairs(reduced, self._wanted(step.group), tally)
+        wanted, cutoff = self._wanted(step.group), self._cutoff(step.group)
+        values, Q = lowest_pairs(reduced, wanted, tally, cutoff)
         self.groups[step.group] = join(left, right, values, Q, tally)
         split = len(left.values)
         self.coefficients[step.group] = Q[:split], Q[split:]
@@ -224,6 +232,10 @@ class _Climb:
     def _wanted(self, group: int) -> int:
         start, stop = self.ranges[group]
         return modes_to_keep((stop - start) / self.ranges[-1][1], self.keep)
+
+    def _cutoff(self, group: int) -> float | None:
+        """Eigenvalue up to which a group keeps its modes; the whole keeps a number."""
+        return self.cutoff if group < len(self.ranges) - 1 else None
 
     def root_values(self) -> Array:
         """Eigenvalues of the whole, on every rank."""

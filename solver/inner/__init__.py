@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 METHODS = ("auto", "multifrontal", "mumps", "icc-pcg", "amg-cg")
 ITERATIVE = ("icc-pcg", "amg-cg")
-LARGEST_FRONTS = 60_000
+LARGEST_FRONTS = 120_000
 """Nodes up to which `auto` uses the multifrontal solver, whose fronts are stored in full."""
 
 

@@ -15,6 +15,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.errors import ConvergenceError
+from carillon.runtime import available_memory
 from carillon.threads import in_parallel, split
 from solver.inner.dissection import Fronts, dissect
 
@@ -25,6 +27,8 @@ COLUMNS = 128
 """Right-hand sides that are carried through the fronts together."""
 BRANCHES = 3
 """Branches for each thread, at least: their work is not equal."""
+UPDATES_SHARE = 1.3
+"""Memory at its peak, when updates wait for their parents, as a share of what the factor takes."""
 PANEL = 192
 """Columns of a symmetric product that are formed together."""
 
@@ -109,6 +113,7 @@ class Plan:
         outside = 3 * np.array([len(boundary) for boundary in fronts.boundary])
         self.inverse_offset = np.concatenate([[0], np.cumsum(own**2)])
         self.coupling_offset = np.concatenate([[0], np.cumsum(own * outside)])
+        self.bytes = int(UPDATES_SHARE * 8 * (self.inverse_offset[-1] + self.coupling_offset[-1]))
         self._work = 2 * own**2 + 4 * own * outside
         self._shares: dict[int, Shares] = {}
 
@@ -191,6 +196,11 @@ class Factor:
         Any value that is not an eigenvalue.
     threads
         Threads that share the work.
+
+    Raises
+    ------
+    ConvergenceError
+        If it would not fit in memory.
     """
 
     exact = True
@@ -202,6 +212,7 @@ class Factor:
         self._plan = plan
         self._threads = threads
         self.shift = shift
+        _require_memory(plan)
         self._inverse = np.empty(plan.inverse_offset[-1])
         self._coupling = np.empty(plan.coupling_offset[-1])
         self._factor(stiffness, mass)
@@ -299,6 +310,17 @@ class Factor:
             plan.inverse_offset,
             self._coupling,
             plan.coupling_offset,
+        )
+
+
+def _require_memory(plan: Plan) -> None:
+    """The system lends memory that it has not got, and kills who uses it."""
+    available = available_memory()
+    if available is not None and plan.bytes > available:
+        raise ConvergenceError(
+            f"the sparse factorisation of {3 * len(plan.position):,} unknowns takes about "
+            f"{plan.bytes / 1e9:.1f} GB, {available / 1e9:.1f} GB are free; use --inner amg-cg, or "
+            "mumps on more ranks of more machines"
         )
 
 

@@ -87,11 +87,12 @@ class _Run:
 
     def __init__(self, model: ElasticModel | None, options: SolverOptions, comm: MPI.Comm) -> None:
         self.comm = CountingComm.of(comm)
-        self.keep = default_keep(options.modes, together=True)
         wanted = options.modes - RIGID_MODES
         self.width = wanted + default_guard(wanted)
         with self._phase() as self.partition:
             self.share: Share = distribute(model, None, options.seed, self.comm)
+            parts = self.share.decomposition.tree.parts
+            self.keep = default_keep(options.modes, parts, together=True)
             layout = Layout.of_share(self.share, self.comm)
             subdomains = make_subdomains(self.share, options.interface, self.comm)
             self.inner = TimedInner.of(InnerSolver(options.inner, layout))

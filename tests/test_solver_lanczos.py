@@ -1,0 +1,127 @@
+"""The block Lanczos iteration of the error correction, against LAPACK."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from solver.analysis import ModalSolver, SolverOptions
+from solver.correction import correct
+from solver.distribution import distribute
+from solver.inner import InnerSolver
+from solver.lanczos import lanczos
+from solver.model import fine_model
+from solver.rayleigh_ritz import rayleigh_ritz
+from solver.system import Layout, assemble
+from tests import solids
+
+COMM = MPI.COMM_SELF
+
+
+class Case:
+    """A solid small enough for LAPACK, with a start block of random vectors."""
+
+    def __init__(self, model, width):
+        self.model = model
+        share = distribute(model, 4, comm=COMM)
+        layout = Layout.of_share(share, COMM)
+        self.system = assemble(share, COMM, layout)
+        self.inner = InnerSolver("multifrontal", layout)
+        self.exact = solids.dense_eigenvalues(model)[6:]
+        block = np.random.default_rng(3).standard_normal((model.n_dofs, width))
+        # Once smoothed: a start that knows roughly where the spectrum lies.
+        inverse = self.inner.inverse(self.system, -0.1 * self.exact[0])
+        smoothed = inverse.solve(self.system.times_mass(block))
+        self.values, self.start = rayleigh_ritz(self.system, smoothed)
+
+    def run(self, shift, wanted, tolerance):
+        """Lanczos around `shift`."""
+        inverse = self.inner.inverse(self.system, shift)
+        return lanczos(
+            self.system, inverse, self.values, self.start, wanted, wanted + 10, tolerance
+        )
+
+
+@pytest.fixture(scope="module")
+def box():
+    """Box of random material."""
+    return Case(solids.random_box(10, 6, 5), 90)
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-5, 1e-9])
+def test_wanted_modes_are_as_accurate_as_asked_and_orthonormal(box, tolerance):
+    found = box.run(0.5 * box.exact[59], 60, tolerance)
+    error = found.values[:60] / box.exact[:60] - 1.0
+    assert -1e-10 < error.min() <= error.max() <= tolerance
+    gram = box.system.inner(found.vectors, box.system.times_mass(found.vectors))
+    assert np.abs(gram - np.eye(len(gram))).max() < 1e-9
+    rigid = box.system.inner(box.system.times_mass(box.system.rigid), found.vectors)
+    assert np.abs(rigid).max() < 1e-9
+    stiff = box.system.inner(found.vectors, box.system.times_stiffness(found.vectors))
+    assert np.abs(stiff / found.values - np.eye(len(stiff))).max() < 1e-6
+
+
+@pytest.mark.parametrize("distance", [1e-3, 1e-5])
+def test_a_shift_near_an_eigenvalue_does_no_harm(box, distance):
+    found = box.run(box.exact[25] * (1.0 + distance), 60, 1e-8)
+    assert not found.resonant
+    assert np.abs(found.values[:60] / box.exact[:60] - 1.0).max() < 1e-8
+    gram = box.system.inner(found.vectors, box.system.times_mass(found.vectors))
+    assert np.abs(gram - np.eye(len(gram))).max() < 1e-9
+
+
+def test_a_shift_on_an_eigenvalue_is_moved(box, monkeypatch):
+    on_it = box.exact[25] * (1.0 + 1e-12)
+    assert box.run(on_it, 60, 1e-8).resonant
+    monkeypatch.setattr("solver.correction.SHIFT_SHARE", on_it / box.values[59])
+    result = correct(box.system, box.start, 60, box.inner, box.values, tolerance=1e-8)
+    assert np.abs(result.values / box.exact[:60] - 1.0).max() <= 1e-8
+
+
+def test_repeated_eigenvalues_are_all_found():
+    cube = Case(solids.uniform_box(7, 7, 7, 0.01), 80)
+    # The symmetry of the cube makes two and three modes of most.
+    assert (np.diff(cube.exact[:50]) < 1e-9 * cube.exact[:49]).sum() > 20
+    found = cube.run(0.5 * cube.exact[49], 50, 1e-9)
+    assert np.abs(found.values[:50] / cube.exact[:50] - 1.0).max() < 1e-9
+
+
+def test_the_whole_space_is_exhausted():
+    small = Case(solids.random_box(3, 2, 2), 45)
+    found = small.run(0.5 * small.exact[39], 40, 1e-12)
+    assert np.abs(found.values[:40] / small.exact[:40] - 1.0).max() < 1e-10
+
+
+def test_a_start_far_too_stiff_moves_the_shift(box):
+    rough = np.random.default_rng(5).standard_normal((box.model.n_dofs, 80))
+    values, start = rayleigh_ritz(box.system, rough)
+    assert values[59] > 3.0 * box.exact[59]
+    result = correct(box.system, start, 60, box.inner, values, tolerance=1e-7)
+    assert np.abs(result.values / box.exact[:60] - 1.0).max() <= 1e-7
+    assert result.errors.max() <= 1e-7
+
+
+def test_warm_start_takes_the_inverse_of_the_material_before():
+    model = solids.random_box(10, 7, 6)
+    prepared = ModalSolver(model, SolverOptions(modes=40, tolerance=1e-3), COMM)
+    first = prepared.solve()
+    young = model.young * (1.0 + 0.02 * np.cos(np.arange(len(model.young))))[:, None]
+    warm = prepared.solve(young, start=first)
+    exact = solids.dense_eigenvalues(model.with_young(young))[6:40]
+    error = np.abs(warm.values[6:] / exact - 1.0)
+    assert error.max() <= 1e-3
+    assert np.median(error) <= 1e-4
+    # Where one step was enough, nothing was factorised.
+    assert warm.inverse is first.inverse or warm.evidence["corrections"] > 1
+    other = ModalSolver(model, SolverOptions(modes=40, tolerance=1e-3), COMM)
+    assert other.solve(young, start=first).inverse is not first.inverse
+
+
+def test_a_contrast_of_a_million_and_nearly_void_elements_are_solved():
+    mesh = solids.box_mesh(9, 5, 4)
+    young = np.where(np.arange(mesh.n_cells) % 9 < 5, 1e10, 1e4)
+    exact_model = fine_model(mesh, young)
+    exact = solids.dense_eigenvalues(exact_model)[6:40]
+    found = ModalSolver(exact_model, SolverOptions(modes=40, tolerance=1e-6), COMM).solve()
+    assert np.abs(found.values[6:] / exact - 1.0).max() <= 1e-6
