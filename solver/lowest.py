@@ -25,8 +25,9 @@ DENSE_SHARE = 0.4
 """Above this share of wanted pairs LAPACK is faster too."""
 BLOCK_SHARE = 0.55
 """Width of the start block as a share of the wanted pairs."""
-STEPS = 2
-"""Blocks that are added to the start block and its first correction."""
+STEPS, FEWER_STEPS = 2, 1
+"""Blocks that are added to the start block and its first correction, for modes that have to be good
+by themselves, and where what is done with them errs more."""
 FIRST_SHIFT_SHARE, SHIFT_SHARE = 0.05, 0.3
 """Shifts as shares of the last wanted eigenvalue, estimated from the start and after one step."""
 WEYL_EXPONENT = 2.0 / 3.0
@@ -41,7 +42,12 @@ LEAST_BLOCK = 24
 
 
 def lowest_modes(
-    rows: NodeRows, plan: Plan, planes: Index, count: int, pieces: Index | None = None
+    rows: NodeRows,
+    plan: Plan,
+    planes: Index,
+    count: int,
+    pieces: Index | None = None,
+    steps: int = STEPS,
 ) -> tuple[Array, Array]:
     """About the lowest `count` eigenpairs of K x = lambda M x; K may be singular.
 
@@ -55,6 +61,8 @@ def lowest_modes(
         (n, 3) integer coordinates of the nodes.
     pieces
         (n,) number of the piece that each node belongs to, if there are several.
+    steps
+        Blocks added to the start block and its first correction.
 
     Returns
     -------
@@ -72,7 +80,7 @@ def lowest_modes(
     values = np.linalg.eigvalsh(basis.T @ rows.times_stiffness(basis))
     shift = SHIFT_SHARE * _extrapolated(values, count)
     factor = Factor(plan, rows.stiffness, rows.mass, shift)
-    basis = _krylov(rows, factor, basis, STEPS, start.shape[1])
+    basis = _krylov(rows, factor, basis, steps, start.shape[1])
     if basis.shape[1] < count:
         return all_modes(rows, count)
     # numpy's eigh lets other threads run, scipy's does not.

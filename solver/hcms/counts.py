@@ -145,7 +145,7 @@ def eigen_flops(size: int, generalised: bool) -> float:
     return (14.0 / 3.0 + (7.0 / 3.0 if generalised else 0.0)) * float(size) ** 3
 
 
-def krylov_flops(size: int, modes: int) -> float:
+def krylov_flops(size: int, modes: int, steps: int = STEPS) -> float:
     """Lowest `modes` of a compact solid of `size` unknowns by block Krylov, see `solver.lowest`.
 
     Nested dissection of a cube of N nodes has a separator of s = 3 N^(2/3) unknowns at the top;
@@ -154,7 +154,7 @@ def krylov_flops(size: int, modes: int) -> float:
     itself or coefficients; the reduced problem is dense.
     """
     separator = 3.0 * (size / 3.0) ** (2.0 / 3.0)
-    vectors = min((1 + STEPS) * BLOCK_SHARE * modes, float(size))
+    vectors = min((1 + steps) * BLOCK_SHARE * modes, float(size))
     solves = 8.0 * separator**2 * vectors
     products = 8.0 * size * vectors**2
     return 4.0 * separator**3 + solves + products + 2.0 * eigen_flops(int(vectors), False)

@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from solver.distribution import Cells
 from solver.hcms.condense import restrict_mass, restrict_stiffness
 from solver.inner.multifrontal import Plan
-from solver.lowest import all_modes, lowest_modes, ritz_pairs
+from solver.lowest import STEPS, all_modes, lowest_modes, ritz_pairs
 from solver.model import RIGID_MODES, Elements
 from solver.node_rows import NodeRows, Pattern
 
@@ -95,7 +95,11 @@ class Subdomain:
             self.pattern = self.region.pattern
 
     def modes(
-        self, elements: Elements, keep: int, cutoff: float | None = None
+        self,
+        elements: Elements,
+        keep: int,
+        cutoff: float | None = None,
+        steps: int = STEPS,
     ) -> tuple[Array, Array]:
         """Lowest modes of the subdomain.
 
@@ -108,6 +112,8 @@ class Subdomain:
             which are kept, and never fewer than the six rigid ones.
         cutoff
             Eigenvalue [rad^2/s^2] up to which all modes come back, instead of `keep`.
+        steps
+            Of the eigensolver, see `solver.lowest`.
 
         Returns
         -------
@@ -126,19 +132,23 @@ class Subdomain:
         if count == size:
             return _up_to(cutoff, *all_modes(alone, size))
         if self.treatment != "overlapping":
-            return self._all_rigid(alone, count, cutoff)
+            return self._all_rigid(alone, count, cutoff, steps)
         body = NodeRows(self.region.pattern)
         body.add(slice(None), stiffness, mass)
-        _, vectors = self._all_rigid(body, count, cutoff)
+        _, vectors = self._all_rigid(body, count, cutoff, steps)
         return ritz_pairs(alone, np.ascontiguousarray(vectors[self.own]))
 
-    def _all_rigid(self, rows: NodeRows, count: int, cutoff: float | None) -> tuple[Array, Array]:
+    def _all_rigid(
+        self, rows: NodeRows, count: int, cutoff: float | None, steps: int
+    ) -> tuple[Array, Array]:
         """Lowest modes: `count`, or all motions without strain, or all up to the cutoff."""
         size = 3 * len(self.region.planes)
         last = max(ZERO_FRACTION * _ratio_of_diagonals(rows), cutoff or 0.0)
         while True:
             region = self.region
-            values, vectors = lowest_modes(rows, region.plan, region.planes, count, region.pieces)
+            values, vectors = lowest_modes(
+                rows, region.plan, region.planes, count, region.pieces, steps
+            )
             if count == size or values[-1] > last:
                 return _up_to(cutoff, values, vectors)
             count = min(2 * count, size)

@@ -16,7 +16,7 @@ from solver.hcms.counts import (
     product_flops,
     sparse_product_flops,
 )
-from solver.hcms.synthesis import modes_to_keep
+from solver.hcms.synthesis import local_steps, modes_to_keep
 from solver.messages import MOST_ARRAYS, MOST_DIMENSIONS
 from solver.scaling.sizes import TreeSizes
 
@@ -51,10 +51,10 @@ def planned_counts(
     counts = [Counts(levels[-1]) for _ in range(ranks)]
     leader = [int(owner[start]) for start, _ in tree.ranges()]
     modes = _modes(sizes, keep)
-    root = modes[-1]
+    root, steps = modes[-1], local_steps(tree.parts)
     for part in range(tree.parts):
         rank, unknowns = counts[int(owner[part])], 3 * sizes.nodes[part]
-        rank.local.flops += krylov_flops(int(unknowns), modes[part])
+        rank.local.flops += krylov_flops(int(unknowns), modes[part], steps)
         if tree.merges:
             rank.basis.flops += product_flops(int(unknowns), modes[part], root)
     for number, step in enumerate(tree.merges):
