@@ -12,7 +12,7 @@ from carillon.errors import ConvergenceError
 from solver.decomposition import on_root
 from solver.enrichment import Ritz, Step, enrich, relax
 from solver.inner import Approximate, InnerSolver, Inverse
-from solver.lanczos import HIGHEST_SHIFT, lanczos
+from solver.lanczos import HIGHEST_SHIFT, ZERO_SHARE, lanczos
 from solver.lowest import WEYL_EXPONENT
 from solver.rayleigh_ritz import rayleigh_ritz, safe_shift
 from solver.system import System
@@ -278,9 +278,14 @@ class _Iteration:
                 self.destroy()
                 self.share *= OFF_RESONANCE
                 continue
+            bounds = (1.0 + tolerance) * ritz.values[: self.wanted]
+            missed = len(found.values) < self.wanted or (found.values[: self.wanted] > bounds).any()
             self.ritz = Ritz(self.system, found.values, found.vectors)
             self._require_independent(1)
             if not self._too_high(inverse):
+                if missed:
+                    # No eigenvalue lies above the start's, so `krylov` has to go on from there.
+                    self.ritz = ritz
                 break
             self.destroy()
         self.inside = True
@@ -360,7 +365,8 @@ class _Iteration:
         weighted = residual / np.repeat(mass, 3)[:, None]
         square = self.system.column_products(residual, weighted)
         distance = np.maximum(last - values, np.finfo(float).eps * last)
-        return np.maximum(square / (values * distance), np.finfo(float).eps)
+        size = np.maximum(values, ZERO_SHARE * last)
+        return np.maximum(square / (size * distance), np.finfo(float).eps)
 
     def _first_beyond(self) -> float:
         """Value up to which the subspace holds all that is there.

@@ -43,6 +43,10 @@ PESSIMISM = 4.0
 """What the estimated errors are above those of the Ritz values that the result has, at least."""
 CANCELLED = 1e-8
 """Share (squared) of a block outside the basis below which it is made orthogonal twice."""
+ZERO_SHARE = 1e-8
+"""Share of the last wanted eigenvalue below which one is zero, and its error absolute."""
+ROUNDING_SHARE = 1e-3
+"""Share of the shift by which rounding may take a small eigenvalue below zero."""
 RESOLVED = 1e-2
 """Share (squared) of the residual in the image of a Ritz vector below which it is resolved."""
 
@@ -250,7 +254,9 @@ class _Basis:
         # What is not resolved yet lies beyond the first such value.
         first = min([*unresolved[unresolved >= wanted], len(order) - 1])
         distance = np.abs(inverted - inverted[first])[:wanted]
-        error = square[:wanted] / distance * (values[:wanted] - mu) ** 2 / values[:wanted]
+        values = values[:wanted]
+        size = np.maximum(values, ZERO_SHARE * values[-1])
+        error = square[:wanted] / distance * (values - mu) ** 2 / size
         return float(error.max()) / PESSIMISM, float(values[wanted - 1])
 
     def _operator_pairs(self) -> tuple[Array, Array, Array]:
@@ -311,8 +317,12 @@ def _mixed(values: Array, modes: Array, shift: float, columns: int) -> Array:
 
 
 def _lowest(inverted: Array, shift: float, count: int) -> tuple[NDArray[np.int64], Array]:
-    """Numbers and values of the `count` lowest positive eigenvalues shift + 1 / inverted."""
+    """Numbers and values of the `count` lowest eigenvalues shift + 1 / inverted, none negative.
+
+    Those of motions with hardly any stiffness are zero but for rounding; what they are in truth is
+    for the stiffness to say.
+    """
     values = shift + 1.0 / inverted
-    positive = np.flatnonzero(values > 0.0)
-    order = positive[np.argsort(values[positive])][:count]
+    possible = np.flatnonzero(values > -ROUNDING_SHARE * abs(shift))
+    order = possible[np.argsort(values[possible])][:count]
     return order, values[order]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from carillon.errors import ConvergenceError
 from solver.analysis import ModalSolver, SolverOptions
 from solver.correction import correct
 from solver.distribution import distribute
@@ -102,6 +103,18 @@ def test_a_start_far_too_stiff_moves_the_shift(box):
     assert result.errors.max() <= 1e-7
 
 
+def test_a_mode_that_the_iteration_misses_is_noticed_and_found(box, monkeypatch):
+    def one_missing(*arguments):
+        found = lanczos(*arguments)
+        found.values, found.vectors = np.delete(found.values, 3), np.delete(found.vectors, 3, 1)
+        return found
+
+    start = box.run(0.5 * box.exact[59], 60, 1e-2)
+    monkeypatch.setattr("solver.correction.lanczos", one_missing)
+    result = correct(box.system, start.vectors, 60, box.inner, start.values, tolerance=1e-6)
+    assert np.abs(result.values / box.exact[:60] - 1.0).max() <= 1e-6
+
+
 def test_warm_start_takes_the_inverse_of_the_material_before():
     model = solids.random_box(10, 7, 6)
     prepared = ModalSolver(model, SolverOptions(modes=40, tolerance=1e-3), COMM)
@@ -125,3 +138,19 @@ def test_a_contrast_of_a_million_and_nearly_void_elements_are_solved():
     exact = solids.dense_eigenvalues(exact_model)[6:40]
     found = ModalSolver(exact_model, SolverOptions(modes=40, tolerance=1e-6), COMM).solve()
     assert np.abs(found.values[6:] / exact - 1.0).max() <= 1e-6
+
+
+def test_a_nearly_void_cell_is_solved_and_a_cut_through_the_body_refused():
+    mesh = solids.box_mesh(9, 5, 4)
+    young = np.full(mesh.n_cells, 1e9)
+    young[0] = 1.0
+    model = fine_model(mesh, young)
+    exact = solids.dense_eigenvalues(model)[6:40]
+    options = SolverOptions(modes=40, tolerance=1e-6)
+    found = ModalSolver(model, options, COMM).solve()
+    assert np.abs(found.values[6:] / exact - 1.0).max() <= 1e-6
+    across = mesh.nodes[mesh.cells].mean(axis=1)[:, 0]
+    middle = np.abs(across - across.mean()) < 0.006
+    apart = fine_model(mesh, np.where(middle, 1.0, 1e9))
+    with pytest.raises(ConvergenceError, match="zero-frequency modes found, .* has 6"):
+        ModalSolver(apart, options, COMM).solve()
