@@ -212,11 +212,11 @@ def test_overlapping_subdomains_give_better_values_than_free_ones_and_these_than
 
 @pytest.mark.parametrize("treatment", ["overlapping", "free", "fixed"])
 def test_a_cutoff_takes_the_place_of_numbers_of_modes(treatment):
-    model = solids.random_box(14, 8, 6)
+    model = solids.random_box(9, 5, 4)
     exact = solids.dense_eigenvalues(model)[6:46]
     share = distribute(model, 4, comm=COMM)
     errors = []
-    for factor in (2.0, 8.0, 30.0):
+    for factor in (2.0, 6.0, 15.0):
         found = synthesize(share, 60, treatment, COMM, cutoff=factor * exact[-1])
         assert len(found.values) == 60
         errors.append(np.median(found.values[6:46] / exact - 1.0))
