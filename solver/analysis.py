@@ -245,10 +245,9 @@ class ModalSolver:
         }
         if self.options.method == "hcms":
             found = self._hcms(share, system, start, phases, evidence)
-            values, vectors = found.values, found.vectors
         else:
-            values, vectors = self._general_solver(system, phases, evidence)
-            found = _Found(values, vectors)
+            found = self._general_solver(system, phases, evidence)
+        values, vectors = found.values, found.vectors
         with phases("verification"):
             residuals, orthogonality = verify(system, values, vectors)
         evidence["orthogonality"] = orthogonality
@@ -292,9 +291,7 @@ class ModalSolver:
             )
         return keep
 
-    def _general_solver(
-        self, system: System, phases: Phases, evidence: dict[str, Any]
-    ) -> tuple[Array, Array]:
+    def _general_solver(self, system: System, phases: Phases, evidence: dict[str, Any]) -> _Found:
         options = self.options
         proving = options.prove is not False and can_count()
         with phases("eigensolver"):
@@ -309,7 +306,7 @@ class ModalSolver:
         if proving:
             self._prove(system, truth, phases, evidence)
         count = options.modes
-        return truth.values[:count], np.ascontiguousarray(truth.vectors[:, :count])
+        return _Found(truth.values[:count], np.ascontiguousarray(truth.vectors[:, :count]))
 
     def _prove(
         self, system: System, truth: Truth, phases: Phases, evidence: dict[str, Any]
@@ -350,7 +347,7 @@ class ModalSolver:
                 )
             evidence["hcms"] = synthesis.counts.summary(self.comm)
             if options.corrections == 0:
-                return _Found(*self._uncorrected(synthesis))
+                return self._uncorrected(synthesis)
             values, start = elastic_part(system, synthesis)
         wanted = options.modes - RIGID_MODES
         spare = SPARE_MODES if options.prove else 0
@@ -383,14 +380,14 @@ class ModalSolver:
         vectors = np.ascontiguousarray(vectors[:, :count])
         return _Found(found[:count], vectors, result.guard, result.inverse)
 
-    def _uncorrected(self, synthesis: Synthesis) -> tuple[Array, Array]:
+    def _uncorrected(self, synthesis: Synthesis) -> _Found:
         count = self.options.modes
         if len(synthesis.values) < count:
             raise UserError(
                 f"HCMS kept {len(synthesis.values)} modes, {count} are wanted; raise --keep or "
                 "lower --subdomains"
             )
-        return synthesis.values[:count], np.ascontiguousarray(synthesis.vectors[:, :count])
+        return _Found(synthesis.values[:count], np.ascontiguousarray(synthesis.vectors[:, :count]))
 
 
 def modal_analysis(

@@ -34,8 +34,9 @@ NEARLY_ACCURATE = 100.0
 """Error, as a multiple of the tolerance, below which `lanczos` leaves a start to `krylov`."""
 SHIFT_SHARE = 0.52
 """Shift of an indefinite factorisation, as a share of the last wanted eigenvalue."""
-TOP, TOP_SHARE = 0.8, 0.98
-"""With all modes accurate below one share of the last wanted value, the shift is the other."""
+TOP, TOP_SHARE, HIGHEST_TOP_SHIFT = 0.8, 0.98, 1.1
+"""With all modes accurate below the first share of the last wanted value, the shift is the second,
+and too high above the third."""
 LANCZOS_RUNS, OFF_RESONANCE = 3, 0.97
 """Lanczos iterations at most, and by what the shift is moved off an eigenvalue it has hit."""
 GUARD_SHARE, FEWEST_GUARDS = 0.22, 20
@@ -196,7 +197,7 @@ class _Iteration:
         self.made: Inverse | None = None
         guard = default_guard(wanted)
         self.width = wanted + guard
-        self.improved = wanted + int(IMPROVED_GUARDS * guard)
+        self.reach = self.improved = wanted + int(IMPROVED_GUARDS * guard)
         self.step: Step = enrich
         if acceleration == "relaxation":
             self.width = self.improved = len(ritz.values)
@@ -311,7 +312,7 @@ class _Iteration:
         return self.made
 
     def _too_high(self, inverse: Inverse) -> bool:
-        highest = 1.1 if self._only_top_is_left() else HIGHEST_SHIFT
+        highest = HIGHEST_TOP_SHIFT if self._only_top_is_left() else HIGHEST_SHIFT
         return inverse.shift > highest * self._last()
 
     def lasting(self, tolerance: float) -> Inverse | None:
@@ -320,7 +321,7 @@ class _Iteration:
         return kept if kept is not None and kept.lasting and tolerance >= LOOSE else None
 
     def destroy(self) -> None:
-        """Free what the inverse made here holds, unless it lasts."""
+        """Free what the inverse made here holds; of one that lasts, nothing has to be."""
         if self.made is not None:
             self.made.destroy()
             self.made = None
@@ -377,12 +378,11 @@ class _Iteration:
         values = np.sort(self.ritz.values)
         if self.step is relax:
             return float(values[(3 * self.wanted + len(values)) // 4])
-        number = min(self.wanted + int(IMPROVED_GUARDS * default_guard(self.wanted)), len(values))
+        number = min(self.reach, len(values))
         found = float(values[number - 1])
         if self.blocks == 0 and self.similar is not None:
-            return min(
-                found, float(values[self.wanted - 1]) * (number / self.wanted) ** WEYL_EXPONENT
-            )
+            grown = (number / self.wanted) ** WEYL_EXPONENT
+            return min(found, grown * float(values[self.wanted - 1]))
         return found
 
     def _require_progress(self, step: int, tolerance: float) -> None:

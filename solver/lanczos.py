@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from solver.decomposition import on_root
 from solver.inner import Inverse
-from solver.orthonormal import WELL_CONDITIONED, orthonormal
+from solver.orthonormal import WELL_CONDITIONED, is_cancelled, orthonormal
 from solver.system import System
 
 Array = NDArray[np.float64]
@@ -41,8 +41,6 @@ LONGEST = 4
 """Dimension at which the iteration ends in any case, as a multiple of the modes wanted."""
 PESSIMISM = 4.0
 """What the estimated errors are above those of the Ritz values that the result has, at least."""
-CANCELLED = 1e-8
-"""Share (squared) of a block outside the basis below which it is made orthogonal twice."""
 ZERO_SHARE = 1e-8
 """Share of the last wanted eigenvalue below which one is zero, and its error absolute."""
 ROUNDING_SHARE = 1e-3
@@ -119,9 +117,7 @@ def lanczos(
             continue
         error, last = basis.outlook(wanted)
         # Beyond most wanted modes the shift would take long to find the first ones.
-        if inverse.shift > HIGHEST_SHIFT * last:
-            break
-        if looks.accurate(basis.size, error):
+        if inverse.shift > HIGHEST_SHIFT * last or looks.accurate(basis.size, error):
             break
     found, vectors = basis.ritz_pairs(width)
     return Lanczos(found, vectors, basis.size, basis.blocks)
@@ -204,8 +200,7 @@ class _Basis:
         overlap = self._sweep(image)
         mass_image = system.times_mass(image)
         gram = system.inner(image, mass_image)
-        removed = np.einsum("ij,ij->j", overlap, overlap)
-        if (np.diag(gram) < CANCELLED * removed).any():
+        if is_cancelled(gram, overlap):
             # The shift is close to an eigenvalue; twice is enough.
             overlap += self._sweep(image)
             mass_image = system.times_mass(image)

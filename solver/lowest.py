@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from solver.inner.multifrontal import Factor, Plan
 from solver.node_rows import NodeRows
+from solver.orthonormal import is_cancelled
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -36,8 +37,6 @@ INDEPENDENT = 1e-10
 """Directions whose share (squared) of the basis is below this are dropped."""
 WELL_CONDITIONED = 1e-4
 """The same share, below which vectors are orthonormalised twice."""
-CANCELLED = 1e-8
-"""Share (squared) of a block outside the basis below which it is made orthogonal twice."""
 LEAST_BLOCK = 24
 
 
@@ -109,7 +108,7 @@ def _krylov(
         inside = basis.T @ rows.times_mass(block)
         block -= basis @ inside
         gram = block.T @ rows.times_mass(block)
-        if (np.diag(gram) < CANCELLED * np.einsum("ij,ij->j", inside, inside)).any():
+        if is_cancelled(gram, inside):
             # Twice is enough.
             block -= basis @ (basis.T @ rows.times_mass(block))
             gram = block.T @ rows.times_mass(block)

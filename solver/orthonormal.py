@@ -12,6 +12,8 @@ DEPENDENT = 1e-11
 """Directions whose share (squared) of the vectors is below this are dropped."""
 WELL_CONDITIONED = 1e-3
 """Least diagonal entry of the Cholesky factor of the scaled Gram matrix to rely on it."""
+CANCELLED = 1e-8
+"""Share (squared) of a vector outside a basis below which it is made orthogonal to it twice."""
 
 
 def orthonormal(gram: Array) -> tuple[Array, float]:
@@ -33,3 +35,17 @@ def orthonormal(gram: Array) -> tuple[Array, float]:
     independent = spread > DEPENDENT * max(spread[-1], 0.0)
     whitening = directions[:, independent] / np.sqrt(spread[independent])
     return scale[:, None] * whitening, condition
+
+
+def is_cancelled(gram: Array, removed: Array) -> bool:
+    """Whether so much was taken from vectors that what is left has to be made orthogonal again.
+
+    Parameters
+    ----------
+    gram
+        Gram matrix of what is left.
+    removed
+        Coefficients of what was taken, in an orthonormal basis.
+    """
+    size = np.einsum("ij,ij->j", removed, removed)
+    return bool((np.diag(gram) < CANCELLED * size).any())

@@ -390,16 +390,20 @@ def _add_rows(rows, places, total):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
+def _scratch(first, near_offset, width):  # type: ignore[no-untyped-def]
+    """Room for the own rows of the tallest front, and for those that the widest is coupled to."""
+    tallest = longest = 0
+    for number in range(len(first) - 1):
+        tallest = max(tallest, 3 * (first[number + 1] - first[number]))
+        longest = max(longest, 3 * (near_offset[number + 1] - near_offset[number]))
+    return np.empty((tallest, width)), np.empty((longest, width))
+
+
+@numba.njit(cache=True, nogil=True)
 def _eliminate(  # type: ignore[no-untyped-def]
     work, fronts, first, near, near_offset, inverse, inverse_offset, coupling, coupling_offset
 ):
-    longest = 0
-    tallest = 0
-    for number in range(len(fronts)):
-        longest = max(longest, 3 * (near_offset[number + 1] - near_offset[number]))
-        tallest = max(tallest, 3 * (first[number + 1] - first[number]))
-    outside = np.empty((longest, work.shape[1]))
-    inside = np.empty((tallest, work.shape[1]))
+    inside, outside = _scratch(first, near_offset, work.shape[1])
     for number in range(len(fronts)):
         front = fronts[number]
         n = 3 * (first[number + 1] - first[number])
@@ -423,13 +427,7 @@ def _eliminate(  # type: ignore[no-untyped-def]
 def _substitute(  # type: ignore[no-untyped-def]
     work, fronts, first, near, near_offset, inverse, inverse_offset, coupling, coupling_offset
 ):
-    longest = 0
-    tallest = 0
-    for number in range(len(fronts)):
-        longest = max(longest, 3 * (near_offset[number + 1] - near_offset[number]))
-        tallest = max(tallest, 3 * (first[number + 1] - first[number]))
-    outside = np.empty((longest, work.shape[1]))
-    inside = np.empty((tallest, work.shape[1]))
+    inside, outside = _scratch(first, near_offset, work.shape[1])
     for number in range(len(fronts) - 1, -1, -1):
         front = fronts[number]
         rows = near[near_offset[number] : near_offset[number + 1]]
