@@ -13,7 +13,7 @@ min_version("9.0")
 # otherwise the default models could not be left out.
 if not workflow.overwrite_configfiles:
 
-    configfile: str(Path(workflow.basedir, "workflow/config/default.yaml"))
+    configfile: str(Path(workflow.basedir, "workflow/config/laptop.yaml"))
 
 
 try:
