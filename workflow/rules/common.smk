@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 from workflow import training, variants
+from workflow.sources import fingerprint as source
 
 RESULTS = config["results_dir"].rstrip("/")
 LOGS = f"{RESULTS}/logs"

@@ -16,6 +16,7 @@ rule generate_shard:
         mem_mb=500 + 500 * OWN.dataset["workers"],
         runtime="2h",
     params:
+        source=source("dataset_gen.generate"),
         samples=lambda wildcards: OWN.generate_arguments(wildcards.distribution, wildcards.shard),
     shell:
         "python -m dataset_gen generate {params.samples} --workers {threads} --out {output}"
@@ -32,6 +33,8 @@ rule describe_shard:
     resources:
         mem_mb=1000,
         runtime="10m",
+    params:
+        source=source("dataset_gen.summary"),
     shell:
         "python -m dataset_gen inspect {input} --json > {output}.partial 2> {log}"
         " && mv {output}.partial {output}"

@@ -27,6 +27,7 @@ use rule generate_shard as generate_default_shard with:
         mem_mb=500 + 500 * DEFAULT.dataset["workers"],
         runtime="4h",
     params:
+        source=source("dataset_gen.generate"),
         samples=lambda wildcards: DEFAULT.generate_arguments(
             wildcards.distribution, wildcards.shard
         ),
@@ -47,6 +48,7 @@ rule grow_tree:
         mem_mb=1000 + DEFAULT.forests["structure_rows"] // 2000,
         runtime="4h",
     params:
+        source=source("forests.training.command"),
         training=DEFAULT.train_arguments,
     shell:
         "python -m forests grow {input} {params.training} --tree {wildcards.tree} --out {output}"
@@ -68,6 +70,7 @@ rule train_default_forest:
         mem_mb=8000,
         runtime="4h",
     params:
+        source=source("forests.training.command"),
         training=DEFAULT.train_arguments,
     shell:
         "python -m forests train {input.shards} {params.training} --structure {input.trees}"

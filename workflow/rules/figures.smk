@@ -20,6 +20,7 @@ use rule time_methods as time_methods_in_full with:
     benchmark:
         f"{BENCHMARKS}/{FIGURES_FOLDER}/{{shape}}/methods.tsv"
     params:
+        source=source("solver.benchmark", "solver.__main__"),
         ranks=RANKS,
         on_ranks=ON_RANKS,
         model=shape_arguments,
@@ -41,6 +42,7 @@ rule follow_convergence_in_full:
         mem_mb=8000,
         runtime="2h",
     params:
+        source=source("solver.convergence", "solver.__main__"),
         shape=shape_arguments,
         modes=config["figures"]["modes"],
         steps=config["figures"]["steps"],
@@ -64,6 +66,7 @@ rule measure_scaling:
         mem_mb=8000,
         runtime="2h",
     params:
+        source=source("solver.scaling", "solver.__main__"),
         shape=shape_arguments,
         modes=config["figures"]["modes"],
         ranks=",".join(map(str, config["figures"]["ranks"])),
@@ -90,6 +93,8 @@ rule tabulate_figures:
     resources:
         mem_mb=1000,
         runtime="10m",
+    params:
+        source=source("workflow.scripts.tabulate_figures"),
     script:
         "../scripts/tabulate_figures.py"
 
@@ -125,6 +130,8 @@ rule plot_scaling:
     resources:
         mem_mb=1000,
         runtime="10m",
+    params:
+        source=source("workflow.scripts.plot_scaling"),
     script:
         "../scripts/plot_scaling.py"
 
@@ -154,5 +161,7 @@ rule build_figures_report:
     resources:
         mem_mb=1000,
         runtime="10m",
+    params:
+        source=source("workflow.scripts.build_figures_report"),
     script:
         "../scripts/build_figures_report.py"

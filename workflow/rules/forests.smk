@@ -15,6 +15,7 @@ rule train_forests:
         mem_mb=4000,
         runtime="4h",
     params:
+        source=source("forests.training.command"),
         training=OWN.train_arguments,
     shell:
         "python -m forests train {input} {params.training} --workers {threads} --out {output}"
@@ -31,6 +32,8 @@ rule describe_forests:
     resources:
         mem_mb=1000,
         runtime="10m",
+    params:
+        source=source("forests.summary"),
     shell:
         "python -m forests inspect {input} --json > {output}.partial 2> {log}"
         " && mv {output}.partial {output}"
@@ -51,6 +54,7 @@ rule rate_forests:
         mem_mb=2000,
         runtime="30m",
     params:
+        source=source("forests.comparison.table"),
         blocks=OWN.forests["blocks"],
         materials=OWN.forests["materials"],
     shell:

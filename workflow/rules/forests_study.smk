@@ -35,6 +35,7 @@ use rule rate_forests as compare_on_blocks with:
     benchmark:
         f"{BENCHMARKS}/forests_study/blocks.tsv"
     params:
+        source=source("forests.comparison.table"),
         blocks=config["forests_study"]["blocks"],
         materials=config["forests_study"]["materials"],
 
@@ -51,6 +52,7 @@ rule benchmark_forests:
         mem_mb=2000,
         runtime="30m",
     params:
+        source=source("forests.benchmark"),
         blocks=config["forests_study"]["timed_blocks"],
         largest=config["forests_study"]["largest"],
     shell:
@@ -76,6 +78,7 @@ rule compare_trainings:
         mem_mb=8000,
         runtime="4h",
     params:
+        source=source("forests.training.studies"),
         training=STUDY_TRAINING.train_arguments,
         leaves=config["forests_study"]["variant_leaves"],
         variants=" ".join(
@@ -100,6 +103,7 @@ rule follow_learning:
         mem_mb=8000,
         runtime="4h",
     params:
+        source=source("forests.training.studies"),
         training=STUDY_TRAINING.train_arguments,
         rows=",".join(map(str, config["forests_study"]["curve_rows"])),
     shell:
@@ -125,6 +129,8 @@ rule tabulate_forests_study:
     resources:
         mem_mb=1000,
         runtime="10m",
+    params:
+        source=source("workflow.scripts.tabulate_forests_study"),
     script:
         "../scripts/tabulate_forests_study.py"
 
@@ -143,6 +149,8 @@ rule plot_forests_study:
     resources:
         mem_mb=1000,
         runtime="10m",
+    params:
+        source=source("workflow.scripts.plot_forests_study"),
     script:
         "../scripts/plot_forests_study.py"
 
@@ -168,5 +176,7 @@ rule build_forests_report:
     resources:
         mem_mb=1000,
         runtime="10m",
+    params:
+        source=source("workflow.scripts.build_forests_report"),
     script:
         "../scripts/build_forests_report.py"

@@ -21,6 +21,7 @@ rule rate_objectives:
         mem_mb=3000,
         runtime="1h",
     params:
+        source=source("solver.objectives", "solver.__main__"),
         case=case_arguments,
         modes=config["objectives"]["modes"],
         objectives=",".join(settings.studied_objectives(config)),
@@ -44,6 +45,7 @@ rule tabulate_objectives:
         mem_mb=1000,
         runtime="10m",
     params:
+        source=source("workflow.scripts.tabulate_objectives"),
         goals=config["objectives"]["goals"],
     script:
         "../scripts/tabulate_objectives.py"
@@ -61,6 +63,8 @@ rule plot_objectives:
     resources:
         mem_mb=1000,
         runtime="10m",
+    params:
+        source=source("workflow.scripts.plot_objectives"),
     script:
         "../scripts/plot_objectives.py"
 
@@ -86,5 +90,7 @@ rule build_objectives_report:
     resources:
         mem_mb=1000,
         runtime="10m",
+    params:
+        source=source("workflow.scripts.build_objectives_report"),
     script:
         "../scripts/build_objectives_report.py"

@@ -15,6 +15,8 @@ rule draw_modes:
     resources:
         mem_mb=2000,
         runtime="15m",
+    params:
+        source=source("workflow.scripts.draw_modes"),
     script:
         "../scripts/draw_modes.py"
 
@@ -31,6 +33,8 @@ rule plot_spectrum:
     resources:
         mem_mb=1000,
         runtime="10m",
+    params:
+        source=source("workflow.scripts.plot_spectrum"),
     script:
         "../scripts/plot_spectrum.py"
 
@@ -46,6 +50,8 @@ rule plot_convergence:
     resources:
         mem_mb=1000,
         runtime="10m",
+    params:
+        source=source("workflow.scripts.plot_convergence"),
     script:
         "../scripts/plot_convergence.py"
 
@@ -61,6 +67,8 @@ rule plot_times:
     resources:
         mem_mb=1000,
         runtime="10m",
+    params:
+        source=source("workflow.scripts.plot_times"),
     script:
         "../scripts/plot_times.py"
 
@@ -76,6 +84,8 @@ rule plot_methods:
     resources:
         mem_mb=1000,
         runtime="10m",
+    params:
+        source=source("workflow.scripts.plot_methods"),
     script:
         "../scripts/plot_methods.py"
 
@@ -94,6 +104,8 @@ rule draw_overview:
     resources:
         mem_mb=1000,
         runtime="10m",
+    params:
+        source=source("workflow.scripts.draw_overview"),
     script:
         "../scripts/draw_overview.py"
 
@@ -126,5 +138,7 @@ rule build_report:
     resources:
         mem_mb=1000,
         runtime="10m",
+    params:
+        source=source("workflow.scripts.build_report"),
     script:
         "../scripts/build_report.py"

@@ -18,6 +18,7 @@ rule find_modes:
         mem_mb=8000,
         runtime="2h",
     params:
+        source=source("solver.problem", "solver.modes_file", "solver.__main__"),
         ranks=RANKS,
         on_ranks=ON_RANKS,
         model=model_arguments,
@@ -45,6 +46,7 @@ rule follow_convergence:
         mem_mb=8000,
         runtime="2h",
     params:
+        source=source("solver.convergence", "solver.__main__"),
         model=model_arguments,
         modes=lambda wildcards: min(config["convergence"]["modes"], model_modes(wildcards)),
         steps=config["convergence"]["steps"],
@@ -66,6 +68,8 @@ rule compare_with_truth:
     resources:
         mem_mb=4000,
         runtime="30m",
+    params:
+        source=source("solver.comparison"),
     shell:
         "OMP_NUM_THREADS={threads} python -m solver compare {input.candidate} {input.truth} --json"
         " > {output}.partial 2> {log} && mv {output}.partial {output}"
@@ -89,6 +93,7 @@ rule time_methods:
         mem_mb=8000,
         runtime="4h",
     params:
+        source=source("solver.benchmark", "solver.__main__"),
         ranks=RANKS,
         on_ranks=ON_RANKS,
         model=timed_arguments,

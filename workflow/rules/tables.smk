@@ -26,6 +26,7 @@ rule save_config:
         mem_mb=200,
         runtime="5m",
     params:
+        source=source("workflow.scripts.save_config"),
         config=config,
     script:
         "../scripts/save_config.py"
@@ -64,6 +65,7 @@ rule tabulate_results:
         mem_mb=2000,
         runtime="10m",
     params:
+        source=source("workflow.scripts.tabulate_results"),
         tables=TABLES,
     script:
         "../scripts/tabulate_results.py"

@@ -1,0 +1,160 @@
+"""What is made anew after a change: what depends on it, and nothing else."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.workflow_runs import CHECKOUT, planned
+from workflow import sources
+
+PACKAGES = ("carillon", "dataset_gen", "forests", "solver", "workflow")
+CONFIG = """\
+results_dir: results
+models: {{bar: {{mesh: 'builtin:bar', resolution: 8}}}}
+dataset: {{samples: 200, distributions: [uniform], shards: 1, seed: {seed}}}
+forests: {{trees: 1, structure_rows: 800, blocks: {blocks}}}
+"""
+TARGETS = ("results/dataset/uniform-0.json", "results/forests/forests.json")
+
+
+@pytest.fixture
+def project(tmp_path, monkeypatch):
+    """A project of three modules, whose fingerprints are asked for."""
+    folder = tmp_path / "project"
+    (folder / "room").mkdir(parents=True)
+    (folder / "room" / "__init__.py").write_text("")
+    (folder / "room" / "first.py").write_text("from room.second import VALUE\n")
+    (folder / "room" / "second.py").write_text("VALUE = open('data.json')\n")
+    (folder / "room" / "data.json").write_text("1")
+    (folder / "room" / "third.py").write_text("import room.first\n")
+    monkeypatch.setattr(sources, "ROOT", folder)
+    return folder / "room"
+
+
+def fingerprint(*modules):
+    for cached in (sources._file_of, sources._named_in, sources._content, sources._tree):
+        cached.cache_clear()
+    return sources.fingerprint(*modules)
+
+
+def test_a_module_counts_with_all_that_it_imports(project):
+    before = fingerprint("room.first")
+    (project / "second.py").write_text("VALUE = open('data.json', 'rb')\n")
+    assert fingerprint("room.first") != before
+
+
+def test_a_module_that_is_not_imported_does_not_count(project):
+    before = fingerprint("room.first")
+    (project / "third.py").write_text("import room.second\n")
+    assert fingerprint("room.first") == before
+
+
+def test_data_that_a_module_names_counts(project):
+    before = fingerprint("room.first")
+    (project / "data.json").write_text("2")
+    assert fingerprint("room.first") != before
+
+
+def test_comments_docstrings_and_help_do_not_count(project):
+    before = fingerprint("room.first")
+    (project / "first.py").write_text(
+        '"""Text."""\n# Text.\nfrom room.second import VALUE  # text\n'
+    )
+    assert fingerprint("room.first") == before
+
+
+def test_a_command_line_counts_alone(project):
+    (project / "__main__.py").write_text("import room.second\n")
+    before = fingerprint("room.__main__")
+    (project / "second.py").write_text("VALUE = 3\n")
+    assert fingerprint("room.__main__") == before
+
+
+def test_a_module_that_does_not_exist_is_an_error(project):
+    with pytest.raises(ValueError, match="no module room.fourth"):
+        fingerprint("room.fourth")
+
+
+def test_every_rule_that_runs_a_package_says_which_modules():
+    for path in (CHECKOUT / "workflow" / "rules").glob("*.smk"):
+        for rule in re.split(r"(?m)^(?=(?:use )?rule )", path.read_text())[1:]:
+            runs = "python -m" in rule or "    script:" in rule or "{resources.mpi}" in rule
+            assert not runs or "source=source(" in rule, rule
+            if rule.startswith("use") and "    params:" in rule:
+                assert "source=source(" in rule, rule
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """A copy of the project beside a finished run of some of its rules."""
+    copy = tmp_path_factory.mktemp("copy")
+    for package in PACKAGES:
+        shutil.copytree(
+            CHECKOUT / package, copy / package, ignore=shutil.ignore_patterns("__pycache__")
+        )
+    shutil.copy(CHECKOUT / "Snakefile", copy)
+    write_config(copy)
+    done = snakemake(copy)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return copy
+
+
+def write_config(copy: Path, seed: int = 0, blocks: int = 10) -> None:
+    (copy / "config.yaml").write_text(CONFIG.format(seed=seed, blocks=blocks))
+
+
+def snakemake(copy: Path, *options: str) -> subprocess.CompletedProcess[str]:
+    """Snakemake on the copy."""
+    command = [sys.executable, "-m", "snakemake", *TARGETS, "--cores", "2"]
+    return subprocess.run(
+        [*command, "--configfile", "config.yaml", *options],
+        cwd=copy,
+        env={**os.environ, "PYTHONPATH": str(copy)},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+
+
+def repeated(copy: Path) -> set[str]:
+    """Rules that would run again."""
+    done = snakemake(copy, "--dry-run")
+    if "Nothing to be done" in done.stdout + done.stderr:
+        return set()
+    return set(planned(done)) - {"total"}
+
+
+def change(path: Path, addition: str) -> None:
+    """Put lines in front of the first plain import of a module."""
+    text = path.read_text()
+    place = text.index("\nimport ") + 1
+    path.write_text(text[:place] + addition + text[place:])
+
+
+@pytest.mark.slow
+def test_what_did_not_change_is_not_repeated(run):
+    change(run / "dataset_gen" / "generate.py", "# A remark.\n")
+    change(run / "solver" / "lanczos.py", "CHANGED = True\n")
+    write_config(run, blocks=20)
+    assert repeated(run) == set()
+
+
+@pytest.mark.slow
+def test_a_changed_source_repeats_what_depends_on_it(run):
+    change(run / "forests" / "training" / "leaves.py", "CHANGED = True\n")
+    # The forests' description is made anew because they are.
+    assert repeated(run) == {"train_forests", "describe_forests"}
+
+
+@pytest.mark.slow
+def test_a_changed_parameter_repeats_what_depends_on_it(run):
+    write_config(run, seed=1)
+    everything = {"generate_shard", "describe_shard", "train_forests", "describe_forests"}
+    assert repeated(run) == everything
