@@ -14,10 +14,17 @@ MODELS = list(config["models"])
 # Timed rules take all cores, so that no other job disturbs their wall times.
 SOLVER_CORES = config["solver"]["cores"] or workflow.cores or 1
 RANKS = config["solver"]["ranks"]
-# On several ranks a launcher goes in front, on a cluster the one that the profile names as resource
-# mpi, and -m mpi4py lets one rank's failure end them all. A single rank needs neither.
-LAUNCHER = "mpiexec" if RANKS > 1 else ""
+CORES_OF_RANK = max(1, SOLVER_CORES // RANKS)
+# On several ranks a launcher goes in front, in a job of SLURM its own, and -m mpi4py lets one rank's
+# failure end them all. A single rank needs neither.
+ANY_LAUNCHER = "srun --mpi=pmix" if "SLURM_JOB_ID" in os.environ else "mpiexec"
+LAUNCHER = (config["solver"]["launcher"] or ANY_LAUNCHER) if RANKS > 1 else ""
 ON_RANKS = f"-n {RANKS} python -m mpi4py" if RANKS > 1 else "python"
+
+
+def growing(first):
+    """Resource that doubles with every try: a job that ran out of it gets more."""
+    return lambda wildcards, attempt: first * 2 ** (attempt - 1)
 
 
 wildcard_constraints:

@@ -13,8 +13,8 @@ rule generate_shard:
     retries: 2
     threads: OWN.dataset["workers"]
     resources:
-        mem_mb=500 + 500 * OWN.dataset["workers"],
-        runtime="2h",
+        mem_mb=growing(500 + 500 * OWN.dataset["workers"]),
+        runtime=growing(120),
     params:
         source=source("dataset_gen.generate"),
         samples=lambda wildcards: OWN.generate_arguments(wildcards.distribution, wildcards.shard),
@@ -30,6 +30,7 @@ rule describe_shard:
         f"{RESULTS}/dataset/{{distribution}}-{{shard}}.json",
     log:
         f"{LOGS}/dataset/describe-{{distribution}}-{{shard}}.log",
+    localrule: True
     resources:
         mem_mb=1000,
         runtime="10m",

@@ -24,8 +24,8 @@ use rule generate_shard as generate_default_shard with:
         f"{BENCHMARKS}/default_forest/dataset/{{distribution}}-{{shard}}.tsv"
     threads: DEFAULT.dataset["workers"]
     resources:
-        mem_mb=500 + 500 * DEFAULT.dataset["workers"],
-        runtime="4h",
+        mem_mb=growing(500 + 500 * DEFAULT.dataset["workers"]),
+        runtime=growing(240),
     params:
         source=source("dataset_gen.generate"),
         samples=lambda wildcards: DEFAULT.generate_arguments(
@@ -45,8 +45,8 @@ rule grow_tree:
         f"{BENCHMARKS}/default_forest/trees/{{tree}}.tsv"
     threads: 1
     resources:
-        mem_mb=1000 + DEFAULT.forests["structure_rows"] // 2000,
-        runtime="4h",
+        mem_mb=growing(1000 + DEFAULT.forests["structure_rows"] // 2000),
+        runtime=growing(240),
     params:
         source=source("forests.training.command"),
         training=DEFAULT.train_arguments,
@@ -67,8 +67,8 @@ rule train_default_forest:
         f"{BENCHMARKS}/default_forest/train.tsv"
     threads: SOLVER_CORES
     resources:
-        mem_mb=8000,
-        runtime="4h",
+        mem_mb=growing(8000),
+        runtime=growing(240),
     params:
         source=source("forests.training.command"),
         training=DEFAULT.train_arguments,

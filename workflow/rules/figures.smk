@@ -39,8 +39,8 @@ rule follow_convergence_in_full:
         f"{BENCHMARKS}/{FIGURES_FOLDER}/{{shape}}/convergence.tsv"
     threads: SOLVER_CORES
     resources:
-        mem_mb=8000,
-        runtime="2h",
+        mem_mb=growing(8000),
+        runtime=growing(120),
     params:
         source=source("solver.convergence", "solver.__main__"),
         shape=shape_arguments,
@@ -63,8 +63,8 @@ rule measure_scaling:
         f"{BENCHMARKS}/{FIGURES_FOLDER}/{{shape}}/scaling.tsv"
     threads: SOLVER_CORES
     resources:
-        mem_mb=8000,
-        runtime="2h",
+        mem_mb=growing(8000),
+        runtime=growing(120),
     params:
         source=source("solver.scaling", "solver.__main__"),
         shape=shape_arguments,
@@ -90,6 +90,7 @@ rule tabulate_figures:
         ),
     log:
         f"{LOGS}/{FIGURES_FOLDER}/tables.log",
+    localrule: True
     resources:
         mem_mb=1000,
         runtime="10m",
@@ -127,6 +128,7 @@ rule plot_scaling:
         png=f"{FIGURES}/figures/{{shape}}-scaling.png",
     log:
         f"{LOGS}/{FIGURES_FOLDER}/{{shape}}/plot-scaling.log",
+    localrule: True
     resources:
         mem_mb=1000,
         runtime="10m",
@@ -158,6 +160,7 @@ rule build_figures_report:
         f"{FIGURES}/report.html",
     log:
         f"{LOGS}/{FIGURES_FOLDER}/report.log",
+    localrule: True
     resources:
         mem_mb=1000,
         runtime="10m",

@@ -12,8 +12,8 @@ rule train_forests:
         f"{BENCHMARKS}/forests/train.tsv"
     threads: SOLVER_CORES
     resources:
-        mem_mb=4000,
-        runtime="4h",
+        mem_mb=growing(4000),
+        runtime=growing(240),
     params:
         source=source("forests.training.command"),
         training=OWN.train_arguments,
@@ -29,6 +29,7 @@ rule describe_forests:
         f"{RESULTS}/forests/forests.json",
     log:
         f"{LOGS}/forests/describe.log",
+    localrule: True
     resources:
         mem_mb=1000,
         runtime="10m",
@@ -51,13 +52,12 @@ rule rate_forests:
         f"{BENCHMARKS}/forests/rate.tsv"
     threads: SOLVER_CORES
     resources:
-        mem_mb=2000,
-        runtime="30m",
+        mem_mb=growing(2000),
+        runtime=growing(30),
     params:
         source=source("forests.comparison.table"),
         blocks=OWN.forests["blocks"],
         materials=OWN.forests["materials"],
     shell:
         "python -m forests table --model {input} --blocks {params.blocks}"
-        " --materials {params.materials} --json > {output}.partial 2> {log}"
-        " && mv {output}.partial {output}"
+        " --materials {params.materials} --out {output} > {log} 2>&1"

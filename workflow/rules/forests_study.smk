@@ -49,16 +49,15 @@ rule benchmark_forests:
         f"{LOGS}/forests_study/benchmark.log",
     threads: SOLVER_CORES
     resources:
-        mem_mb=2000,
-        runtime="30m",
+        mem_mb=growing(2000),
+        runtime=growing(30),
     params:
         source=source("forests.benchmark"),
         blocks=config["forests_study"]["timed_blocks"],
         largest=config["forests_study"]["largest"],
     shell:
         "python -m forests benchmark --model {input} --blocks {params.blocks}"
-        " --largest {params.largest} --json > {output}.partial 2> {log}"
-        " && mv {output}.partial {output}"
+        " --largest {params.largest} --out {output} > {log} 2>&1"
 
 
 rule compare_trainings:
@@ -75,8 +74,8 @@ rule compare_trainings:
         f"{BENCHMARKS}/forests_study/variants.tsv"
     threads: SOLVER_CORES
     resources:
-        mem_mb=8000,
-        runtime="4h",
+        mem_mb=growing(8000),
+        runtime=growing(240),
     params:
         source=source("forests.training.studies"),
         training=STUDY_TRAINING.train_arguments,
@@ -86,7 +85,7 @@ rule compare_trainings:
         ),
     shell:
         "python -m forests variants {input} {params.training} --max-leaves {params.leaves}"
-        " {params.variants} --workers {threads} --json > {output}.partial 2> {log} && mv {output}.partial {output}"
+        " {params.variants} --workers {threads} --out {output} > {log} 2>&1"
 
 
 rule follow_learning:
@@ -100,15 +99,15 @@ rule follow_learning:
         f"{BENCHMARKS}/forests_study/curve.tsv"
     threads: SOLVER_CORES
     resources:
-        mem_mb=8000,
-        runtime="4h",
+        mem_mb=growing(8000),
+        runtime=growing(240),
     params:
         source=source("forests.training.studies"),
         training=STUDY_TRAINING.train_arguments,
         rows=",".join(map(str, config["forests_study"]["curve_rows"])),
     shell:
         "python -m forests curve {input} {params.training} --rows {params.rows}"
-        " --workers {threads} --json > {output}.partial 2> {log} && mv {output}.partial {output}"
+        " --workers {threads} --out {output} > {log} 2>&1"
 
 
 rule tabulate_forests_study:
@@ -126,6 +125,7 @@ rule tabulate_forests_study:
         ),
     log:
         f"{LOGS}/forests_study/tables.log",
+    localrule: True
     resources:
         mem_mb=1000,
         runtime="10m",
@@ -146,6 +146,7 @@ rule plot_forests_study:
         png=f"{FORESTS_STUDY}/figures/{{figure}}.png",
     log:
         f"{LOGS}/forests_study/{{figure}}.log",
+    localrule: True
     resources:
         mem_mb=1000,
         runtime="10m",
@@ -173,6 +174,7 @@ rule build_forests_report:
         f"{FORESTS_STUDY}/report.html",
     log:
         f"{LOGS}/forests_study/report.log",
+    localrule: True
     resources:
         mem_mb=1000,
         runtime="10m",

@@ -18,8 +18,8 @@ rule rate_objectives:
         f"{BENCHMARKS}/objectives/{{solid}}/{{resolution}}-{{material}}.tsv"
     threads: 1
     resources:
-        mem_mb=3000,
-        runtime="1h",
+        mem_mb=growing(3000),
+        runtime=growing(60),
     params:
         source=source("solver.objectives", "solver.__main__"),
         case=case_arguments,
@@ -41,6 +41,7 @@ rule tabulate_objectives:
         ),
     log:
         f"{LOGS}/objectives/tables.log",
+    localrule: True
     resources:
         mem_mb=1000,
         runtime="10m",
@@ -60,6 +61,7 @@ rule plot_objectives:
         png=f"{STUDY}/figures/{{solid}}.png",
     log:
         f"{LOGS}/objectives/{{solid}}.log",
+    localrule: True
     resources:
         mem_mb=1000,
         runtime="10m",
@@ -87,6 +89,7 @@ rule build_objectives_report:
         f"{STUDY}/report.html",
     log:
         f"{LOGS}/objectives/report.log",
+    localrule: True
     resources:
         mem_mb=1000,
         runtime="10m",

@@ -12,6 +12,7 @@ rule draw_modes:
         description=f"{RESULTS}/figures/{{model}}-mode.json",
     log:
         f"{LOGS}/figures/{{model}}-mode.log",
+    localrule: True
     resources:
         mem_mb=2000,
         runtime="15m",
@@ -30,6 +31,7 @@ rule plot_spectrum:
         png=f"{RESULTS}/figures/{{model}}-spectrum.png",
     log:
         f"{LOGS}/figures/{{model}}-spectrum.log",
+    localrule: True
     resources:
         mem_mb=1000,
         runtime="10m",
@@ -47,6 +49,7 @@ rule plot_convergence:
         png=f"{RESULTS}/figures/{{model}}-convergence.png",
     log:
         f"{LOGS}/figures/{{model}}-convergence.log",
+    localrule: True
     resources:
         mem_mb=1000,
         runtime="10m",
@@ -64,6 +67,7 @@ rule plot_times:
         png=f"{RESULTS}/figures/times.png",
     log:
         f"{LOGS}/figures/times.log",
+    localrule: True
     resources:
         mem_mb=1000,
         runtime="10m",
@@ -81,6 +85,7 @@ rule plot_methods:
         png=f"{RESULTS}/figures/methods.png",
     log:
         f"{LOGS}/figures/methods.log",
+    localrule: True
     resources:
         mem_mb=1000,
         runtime="10m",
@@ -101,6 +106,7 @@ rule draw_overview:
         f"{RESULTS}/figures/{{model}}-overview.png",
     log:
         f"{LOGS}/figures/{{model}}-overview.log",
+    localrule: True
     resources:
         mem_mb=1000,
         runtime="10m",
@@ -135,6 +141,7 @@ rule build_report:
         f"{RESULTS}/report.html",
     log:
         f"{LOGS}/report.log",
+    localrule: True
     resources:
         mem_mb=1000,
         runtime="10m",

@@ -15,8 +15,9 @@ rule find_modes:
     resources:
         mpi=LAUNCHER,
         tasks=RANKS,
-        mem_mb=8000,
-        runtime="2h",
+        cpus_per_task=CORES_OF_RANK,
+        mem_mb=growing(8000),
+        runtime=growing(120),
     params:
         source=source("solver.problem", "solver.modes_file", "solver.__main__"),
         ranks=RANKS,
@@ -43,8 +44,8 @@ rule follow_convergence:
         f"{BENCHMARKS}/models/{{model}}/convergence.tsv"
     threads: SOLVER_CORES
     resources:
-        mem_mb=8000,
-        runtime="2h",
+        mem_mb=growing(8000),
+        runtime=growing(120),
     params:
         source=source("solver.convergence", "solver.__main__"),
         model=model_arguments,
@@ -66,8 +67,8 @@ rule compare_with_truth:
         f"{LOGS}/models/{{model}}/{{variant}}.comparison.log",
     threads: 1
     resources:
-        mem_mb=4000,
-        runtime="30m",
+        mem_mb=growing(4000),
+        runtime=growing(30),
     params:
         source=source("solver.comparison"),
     shell:
@@ -90,8 +91,9 @@ rule time_methods:
     resources:
         mpi=LAUNCHER,
         tasks=RANKS,
-        mem_mb=8000,
-        runtime="4h",
+        cpus_per_task=CORES_OF_RANK,
+        mem_mb=growing(8000),
+        runtime=growing(240),
     params:
         source=source("solver.benchmark", "solver.__main__"),
         ranks=RANKS,

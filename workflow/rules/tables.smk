@@ -22,6 +22,7 @@ rule save_config:
         f"{RESULTS}/config.yaml",
     log:
         f"{LOGS}/config.log",
+    localrule: True
     resources:
         mem_mb=200,
         runtime="5m",
@@ -61,6 +62,7 @@ rule tabulate_results:
         ),
     log:
         f"{LOGS}/tables.log",
+    localrule: True
     resources:
         mem_mb=2000,
         runtime="10m",
