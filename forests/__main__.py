@@ -9,7 +9,8 @@ import sys
 from carillon import cli
 from carillon.arguments import Parser, positive_number, whole_number
 from carillon.errors import UserError
-from carillon.files import require_writable
+from carillon.files import atomic_path, require_writable
+from carillon.measurement import measured
 from dataset_gen.ranks import refuse, world
 from forests import benchmark, summary
 from forests.comparison import table
@@ -21,6 +22,9 @@ from forests.model import default_path
 from forests.training import command, studies
 from forests.training.command import PROGRAM
 from forests.training.dataset import open_dataset
+
+HIDDEN = ("out", "json", "plot")
+"""Arguments on which a result does not depend."""
 
 
 def _parser() -> Parser:
@@ -36,7 +40,6 @@ def _parser() -> Parser:
     curve.add_argument("--plot", metavar="FILE", help="the curve, as .png, .svg or .pdf")
     for study in (alternatives, curve):
         command.add_workers(study)
-        study.add_argument("--json", action="store_true")
     compare = commands.add_parser("table", help="error, cost and storage of every coarsening")
     compare.add_argument("--model", action="append", help="forests to compare, may be repeated")
     compare.add_argument("--blocks", type=whole_number(1), default=10_000, help="of each range")
@@ -44,12 +47,13 @@ def _parser() -> Parser:
     compare.add_argument("--materials", type=whole_number(2), default=MATERIALS, help="a database")
     compare.add_argument("--database", metavar="FILE", help="read databases, or build and write")
     compare.add_argument("--plot", metavar="FILE", help="error over cost, as .png, .svg or .pdf")
-    compare.add_argument("--json", action="store_true")
     cost = commands.add_parser("benchmark", help="time of a block, of loading, over the size")
     cost.add_argument("--model", help="forests to measure (default: the packaged ones)")
     cost.add_argument("--blocks", type=whole_number(1), default=100_000)
     cost.add_argument("--largest", type=positive_number, default=600.0, metavar="MB")
-    cost.add_argument("--json", action="store_true")
+    for measuring in (alternatives, curve, compare, cost):
+        measuring.add_argument("--json", action="store_true")
+        measuring.add_argument("--out", metavar="FILE", help="result and provenance, as JSON")
     show = commands.add_parser("inspect", help="validate and summarise a model")
     show.add_argument("file", nargs="?", help="by default that of the forests of Carillon")
     show.add_argument("--json", action="store_true")
@@ -83,6 +87,15 @@ def _table(arguments: argparse.Namespace) -> list[table.Row]:
     return rows
 
 
+def _save(result: object, arguments: argparse.Namespace) -> None:
+    """Write a result with its provenance to the file that `--out` names."""
+    threads = {"table": 1, "benchmark": max(benchmark.THREADS)}.get(arguments.command)
+    parameters = {key: value for key, value in vars(arguments).items() if key not in HIDDEN}
+    origin = measured(parameters, threads=threads or arguments.workers)
+    with atomic_path(arguments.out) as temporary:
+        temporary.write_text(json.dumps({"result": result, "provenance": origin}, indent=1))
+
+
 def _arguments(argv: list[str] | None) -> argparse.Namespace | None:
     """The command line; None if it is wrong and this is one of several ranks, which has said so."""
     comm = world()
@@ -101,29 +114,39 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace | None:
     return arguments
 
 
+def _found(arguments: argparse.Namespace) -> tuple[object, str]:
+    """Result of a command as plain values and as text."""
+    match arguments.command:
+        case "table":
+            rows = _table(arguments)
+            return rows, table.as_text(rows)
+        case "benchmark":
+            measurement = benchmark.benchmark(arguments.model, arguments.blocks, arguments.largest)
+            return benchmark.as_json(measurement), benchmark.as_text(measurement)
+        case "variants" | "curve":
+            studied = _studied(arguments)
+            return studied, studies.as_text(studied)
+        case _:
+            found = summary.describe(arguments.file or default_path())
+            return found, summary.as_text(found)
+
+
 def main(argv: list[str] | None = None) -> int:
     """Run one command."""
     arguments = _arguments(argv)
     if arguments is None:
         return cli.EXIT_BAD_INPUT
-    result: object
     match arguments.command:
         case "grow":
             return command.run_grow(arguments)
         case "train":
             return command.run_train(arguments)
-        case "table":
-            result = rows = _table(arguments)
-            text = table.as_text(rows)
-        case "benchmark":
-            measured = benchmark.benchmark(arguments.model, arguments.blocks, arguments.largest)
-            result, text = benchmark.as_json(measured), benchmark.as_text(measured)
-        case "variants" | "curve":
-            result = studied = _studied(arguments)
-            text = studies.as_text(studied)
-        case _:
-            result = found = summary.describe(arguments.file or default_path())
-            text = summary.as_text(found)
+    out = getattr(arguments, "out", None)
+    if out is not None:
+        require_writable(out)
+    result, text = _found(arguments)
+    if out is not None:
+        _save(result, arguments)
     print(json.dumps(result, indent=2) if arguments.json else text)
     return 0
 

@@ -180,7 +180,7 @@ def _compare(options: argparse.Namespace, comm: MPI.Comm) -> None:
 
 
 def _convergence(options: argparse.Namespace, comm: MPI.Comm) -> None:
-    from carillon.provenance import record
+    from carillon.measurement import measured
     from solver.convergence import correction_history
 
     on_root(comm, lambda: require_writable(options.out))
@@ -189,11 +189,12 @@ def _convergence(options: argparse.Namespace, comm: MPI.Comm) -> None:
     history = correction_history(
         model, options.modes, options.steps, options.seed, options.truth, comm
     )
-    _write_json(options, {**history, "provenance": record(_command_parameters(options))}, comm)
+    history["provenance"] = measured(_command_parameters(options), comm.size)
+    _write_json(options, history, comm)
 
 
 def _benchmark(options: argparse.Namespace, comm: MPI.Comm) -> None:
-    from carillon.provenance import record
+    from carillon.measurement import measured
     from solver.benchmark import BenchmarkOptions, benchmark_row, row_lines
 
     if options.out is not None:
@@ -207,7 +208,7 @@ def _benchmark(options: argparse.Namespace, comm: MPI.Comm) -> None:
         options.tune,
     )
     row = benchmark_row(_problem_options(options), benchmark, comm)
-    row["provenance"] = record(_command_parameters(options))
+    row["provenance"] = measured(_command_parameters(options), comm.size)
     if options.out is not None:
         _write_json(options, row, comm)
     if comm.rank == 0:
@@ -215,7 +216,7 @@ def _benchmark(options: argparse.Namespace, comm: MPI.Comm) -> None:
 
 
 def _scaling(options: argparse.Namespace, comm: MPI.Comm) -> None:
-    from carillon.provenance import record
+    from carillon.measurement import measured
     from solver.scaling import ScalingOptions, measure, scaling_study, study_lines
 
     for path in (options.out, options.plot):
@@ -229,6 +230,7 @@ def _scaling(options: argparse.Namespace, comm: MPI.Comm) -> None:
         )
         found = measure(model, solver, comm)
         lines = [f"{comm.size} ranks: {found['seconds']:.2f} s"]
+        found["provenance"] = measured(_command_parameters(options), comm.size)
     else:
         study = ScalingOptions(
             options.modes,
@@ -241,7 +243,7 @@ def _scaling(options: argparse.Namespace, comm: MPI.Comm) -> None:
         )
         found = scaling_study(_problem_options(options), study, _repeated(options))
         lines = study_lines(found)
-    found["provenance"] = record(_command_parameters(options))
+        found["provenance"] = measured(_command_parameters(options), options.ranks, threads=1)
     if options.out is not None:
         _write_json(options, found, comm)
     if comm.rank:

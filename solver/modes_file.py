@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from carillon import provenance
 from carillon.errors import UserError
 from carillon.files import create_h5, open_h5
+from carillon.measurement import measured
 from solver.geometry import HexMesh
 from solver.model import ElasticModel
 
@@ -104,7 +105,8 @@ def write_modes(
         file.attrs["origin"] = mesh.origin
         for key, value in attributes.items():
             file.attrs[key] = json.dumps(value) if isinstance(value, dict) else value
-        provenance.write(file, parameters)
+        origin = measured(parameters, attributes.get("ranks", 1))
+        file.create_group("provenance").attrs.update(origin)
 
 
 def _put_modes(file: h5py.File, blocks: Iterable[Array], shape: tuple[int, int]) -> None:

@@ -53,6 +53,17 @@ def test_table_compares_every_method_inside_and_outside_the_trained_range(folder
     assert f"{DEFAULT_OBJECTIVE}, forests" in capsys.readouterr().out
 
 
+def test_a_result_is_kept_with_its_provenance(folder, tmp_path):
+    few = ("--model", folder / "forests.h5", "--blocks", 5, "--materials", 2)
+    out = tmp_path / "table.json"
+    assert run("table", *few, "--out", out) == 0
+    found = json.loads(out.read_text())
+    assert found["result"][0]["method"] == "average"
+    wanted = {"commit", "config_hash", "processor", "cores", "memory_bytes", "threads", "date"}
+    assert wanted <= found["provenance"].keys()
+    assert run("table", *few, "--out", tmp_path / "nowhere" / "table.json") == 2
+
+
 def test_variants_are_compared_under_equal_storage(folder, capsys):
     few = ("--max-leaves", 60, "--min-leaf", 10)
     names = ("logarithms, linear splits", "ratios, variance splits (paper)", "the same, 1 tree")

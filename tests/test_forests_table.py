@@ -243,7 +243,9 @@ def test_rows_have_every_method_in_every_case(rows):
     for row in rows:
         numbers = [row[key] for key in row if "error" in key or key == "mean_squared_m2"]
         assert len(numbers) == 9 and np.isfinite(numbers).all() and min(numbers) >= 0.0
-        assert row["seconds_per_block"] > 0.0 and row["storage_bytes"] >= 0
+        cost = [row[f"seconds_per_block{end}"] for end in ("_least", "", "_most")]
+        assert cost == sorted(cost) and min(cost) > 0.0 and row["timed_runs"] > 2
+        assert row["storage_bytes"] >= 0
         assert row["mean_error"] >= row["least_mean_error"]
     assert all(row["storage_bytes"] == 0 for row in rows if "fitted" in row["method"])
 

@@ -9,6 +9,7 @@ elements that are too soft can exceed 1.
 
 from __future__ import annotations
 
+import statistics
 import time
 from collections.abc import Sequence
 from typing import Any
@@ -34,7 +35,7 @@ TIMED_BLOCKS = 2000
 """Most blocks that a run for the cost per block takes."""
 
 TIMED_RUNS = 5
-"""Runs whose median is the cost per block, after one that warms up."""
+"""Runs whose median is the cost per block, after one that warms up; least and most are kept too."""
 
 SQUARE_METRES = 1e-18
 """Square of the displacement [m^2] that `block_error` calls 1 when moduli are in GPa.
@@ -47,14 +48,20 @@ and no coarsening reaches their displacements; the relative errors weigh all blo
 Row = dict[str, Any]
 
 
-def seconds_per_block(method: Method, young: Array) -> float:
-    """Cost [s] of blocks (n, 8) that are coarsened together, on one core."""
+def cost_per_block(method: Method, young: Array) -> Row:
+    """Cost [s] of blocks (n, 8) that are coarsened together on one core, and in how many runs."""
     seconds = []
     for _ in range(1 + TIMED_RUNS):
         start = time.perf_counter()
         method.coarsen(young)
-        seconds.append(time.perf_counter() - start)
-    return float(np.median(seconds[1:])) / len(young)
+        seconds.append((time.perf_counter() - start) / len(young))
+    timed = seconds[1:]
+    return {
+        "seconds_per_block": statistics.median(timed),
+        "seconds_per_block_least": min(timed),
+        "seconds_per_block_most": max(timed),
+        "timed_runs": TIMED_RUNS,
+    }
 
 
 def summary(errors: Errors) -> Row:
@@ -114,8 +121,9 @@ def table(
     One row for each case and method: `method`, `range_gpa`, `distribution`, `fill`, `scaled_by`
     (of the case), `mean_error`, `median_error` (nodal forces), the same for inertial and corner
     loads, `least_mean_error`, `least_median_error` (nodal, of any element whatsoever),
-    `mean_squared_m2` (absolute, nodal), `seconds_per_block`, `storage_bytes`, `training_seconds`
-    (None if unknown), `clamped` (made for lower moduli than the blocks have), `blocks`, `seed`.
+    `mean_squared_m2` (absolute, nodal), `seconds_per_block` (median of `timed_runs`, with
+    `seconds_per_block_least` and `_most`), `storage_bytes`, `training_seconds` (None if unknown),
+    `clamped` (made for lower moduli than the blocks have), `blocks`, `seed`.
 
     Raises
     ------
@@ -141,7 +149,7 @@ def _row(case: Case, method: Method, young: Array, errors: Errors) -> Row:
         "method": method.name,
         **case.columns(),
         **summary(errors),
-        "seconds_per_block": seconds_per_block(method, young[:TIMED_BLOCKS]),
+        **cost_per_block(method, young[:TIMED_BLOCKS]),
         "storage_bytes": method.storage_bytes,
         "training_seconds": method.training_seconds,
         "clamped": method.clamped,

@@ -1,0 +1,43 @@
+"""Provenance of what was timed: also memory, ranks, threads and date."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from carillon.provenance import record
+from carillon.runtime import allowed_threads
+
+_GROUP_LIMIT = Path("/sys/fs/cgroup/memory.max")
+
+
+def measured(
+    parameters: dict[str, Any], ranks: int | Sequence[int] = 1, threads: int | None = None
+) -> dict[str, Any]:
+    """Provenance of a measurement made just now: plain values, ready for JSON or HDF5.
+
+    Parameters
+    ----------
+    ranks : MPI ranks, or several numbers of them that were measured one after the other.
+    threads : of each rank; what the process may use if None.
+    """
+    counts = [ranks] if isinstance(ranks, int) else ranks
+    return {
+        **record(parameters),
+        "memory_bytes": memory_bytes(),
+        "ranks": ", ".join(map(str, counts)),
+        "threads": allowed_threads() if threads is None else threads,
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def memory_bytes(group_limit: Path = _GROUP_LIMIT) -> int:
+    """Memory of the machine, or what the control group of this process allows if that is less."""
+    machine = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    try:
+        return min(machine, int(group_limit.read_text()))
+    except (OSError, ValueError):
+        return machine
