@@ -14,12 +14,23 @@ MODELS = list(config["models"])
 # Timed rules take all cores, so that no other job disturbs their wall times.
 SOLVER_CORES = config["solver"]["cores"] or workflow.cores or 1
 RANKS = config["solver"]["ranks"]
-CORES_OF_RANK = max(1, SOLVER_CORES // RANKS)
-# On several ranks a launcher goes in front, in a job of SLURM its own, and -m mpi4py lets one rank's
-# failure end them all. A single rank needs neither.
+# What starts ranks, in a job of SLURM its own.
 ANY_LAUNCHER = "srun --mpi=pmix" if "SLURM_JOB_ID" in os.environ else "mpiexec"
-LAUNCHER = (config["solver"]["launcher"] or ANY_LAUNCHER) if RANKS > 1 else ""
-ON_RANKS = f"-n {RANKS} python -m mpi4py" if RANKS > 1 else "python"
+
+
+def launcher(ranks):
+    """Resource mpi: what goes in front of a program on several ranks; nothing before a single one."""
+    return (config["solver"]["launcher"] or ANY_LAUNCHER) if ranks > 1 else ""
+
+
+def on_ranks(ranks):
+    """What follows: with -m mpi4py one rank's failure ends them all."""
+    return f"-n {ranks} python -m mpi4py" if ranks > 1 else "python"
+
+
+def cores_of(ranks):
+    """Cores of every rank."""
+    return max(1, SOLVER_CORES // ranks)
 
 
 def growing(first):

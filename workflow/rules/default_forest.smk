@@ -67,14 +67,18 @@ rule train_default_forest:
         f"{BENCHMARKS}/default_forest/train.tsv"
     threads: SOLVER_CORES
     resources:
+        mpi=launcher(DEFAULT.forests["ranks"]),
+        tasks=DEFAULT.forests["ranks"],
+        cpus_per_task=cores_of(DEFAULT.forests["ranks"]),
         mem_mb=growing(8000),
         runtime=growing(240),
     params:
         source=source("forests.training.command"),
+        on_ranks=on_ranks(DEFAULT.forests["ranks"]),
         training=DEFAULT.train_arguments,
     shell:
-        "python -m forests train {input.shards} {params.training} --structure {input.trees}"
-        " --workers {threads} --out {output} > {log} 2>&1"
+        "{resources.mpi} {params.on_ranks} -m forests train {input.shards} {params.training}"
+        f" --structure {{input.trees}}{workers(DEFAULT)} --out {{output}} > {{log}} 2>&1"
 
 
 use rule describe_forests as describe_default_forest with:

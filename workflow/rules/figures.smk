@@ -22,7 +22,7 @@ use rule time_methods as time_methods_in_full with:
     params:
         source=source("solver.benchmark", "solver.__main__"),
         ranks=RANKS,
-        on_ranks=ON_RANKS,
+        on_ranks=on_ranks(RANKS),
         model=shape_arguments,
         how=times_arguments(config["figures"]),
         forest=forest_argument,

@@ -1,6 +1,11 @@
 # The two regression forests, and how well they do on blocks they have not seen.
 
 
+def workers(plan):
+    """Argument for the processes that fit leaves on one rank; several ranks are one process each."""
+    return " --workers {threads}" if plan.forests["ranks"] == 1 else ""
+
+
 rule train_forests:
     input:
         expand(f"{RESULTS}/dataset/{{name}}.h5", name=OWN.shards),
@@ -12,14 +17,18 @@ rule train_forests:
         f"{BENCHMARKS}/forests/train.tsv"
     threads: SOLVER_CORES
     resources:
+        mpi=launcher(OWN.forests["ranks"]),
+        tasks=OWN.forests["ranks"],
+        cpus_per_task=cores_of(OWN.forests["ranks"]),
         mem_mb=growing(4000),
         runtime=growing(240),
     params:
         source=source("forests.training.command"),
+        on_ranks=on_ranks(OWN.forests["ranks"]),
         training=OWN.train_arguments,
     shell:
-        "python -m forests train {input} {params.training} --workers {threads} --out {output}"
-        " > {log} 2>&1"
+        "{resources.mpi} {params.on_ranks} -m forests train {input} {params.training}"
+        f"{workers(OWN)} --out {{output}} > {{log}} 2>&1"
 
 
 rule describe_forests:

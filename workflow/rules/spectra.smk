@@ -13,15 +13,15 @@ rule find_modes:
         f"{BENCHMARKS}/models/{{model}}/{{variant}}.tsv"
     threads: SOLVER_CORES
     resources:
-        mpi=LAUNCHER,
+        mpi=launcher(RANKS),
         tasks=RANKS,
-        cpus_per_task=CORES_OF_RANK,
+        cpus_per_task=cores_of(RANKS),
         mem_mb=growing(8000),
         runtime=growing(120),
     params:
         source=source("solver.problem", "solver.modes_file", "solver.__main__"),
         ranks=RANKS,
-        on_ranks=ON_RANKS,
+        on_ranks=on_ranks(RANKS),
         model=model_arguments,
         variant=variant_arguments,
         modes=model_modes,
@@ -89,15 +89,15 @@ rule time_methods:
         f"{BENCHMARKS}/models/{{model}}/methods.tsv"
     threads: SOLVER_CORES
     resources:
-        mpi=LAUNCHER,
+        mpi=launcher(RANKS),
         tasks=RANKS,
-        cpus_per_task=CORES_OF_RANK,
+        cpus_per_task=cores_of(RANKS),
         mem_mb=growing(8000),
         runtime=growing(240),
     params:
         source=source("solver.benchmark", "solver.__main__"),
         ranks=RANKS,
-        on_ranks=ON_RANKS,
+        on_ranks=on_ranks(RANKS),
         model=timed_arguments,
         how=times_arguments(config["times"]),
         forest=forest_argument,

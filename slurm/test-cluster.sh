@@ -1,0 +1,162 @@
+#!/usr/bin/env bash
+# A throw-away SLURM cluster of one node, this machine, for tests and first tries:
+#
+#   slurm/test-cluster.sh install        Debian's or Ubuntu's packages (needs root or sudo)
+#   slurm/test-cluster.sh start FOLDER   munged, slurmctld and slurmd (needs root); then
+#   export SLURM_CONF=FOLDER/slurm.conf  for sbatch, srun, squeue and snakemake --profile slurm
+#   slurm/test-cluster.sh fail FOLDER    the node dies: slurmd and all processes of its jobs
+#   slurm/test-cluster.sh repair FOLDER  it comes back
+#   slurm/test-cluster.sh stop FOLDER
+#
+# Everything it writes is in FOLDER; a SLURM that the machine may have is not touched. CPUS and
+# MEMORY_MB in the environment say what the node has, the machine's cores and three quarters of its
+# memory otherwise. There is no accounting (sacct), so the profile's status command has to be squeue.
+set -euo pipefail
+
+fail() {
+    echo "test-cluster: $*" >&2
+    exit 2
+}
+
+install() {
+    local run=() packages=(slurmctld slurmd slurm-client munge)
+    if command -v slurmctld slurmd sbatch munged >/dev/null; then
+        return
+    fi
+    command -v apt-get >/dev/null ||
+        fail "no SLURM and no apt-get here; install slurmctld, slurmd, the client and munge by hand"
+    if [ "$(id -u)" -ne 0 ]; then
+        sudo -n true 2>/dev/null || fail "installing needs root: sudo apt-get install ${packages[*]}"
+        run=(sudo)
+    fi
+    ${run[@]+"${run[@]}"} apt-get update -qq
+    # The packages would start services for a configuration that does not exist.
+    ${run[@]+"${run[@]}"} env DEBIAN_FRONTEND=noninteractive RUNLEVEL=1 \
+        apt-get install -y -qq --no-install-recommends "${packages[@]}" >/dev/null
+}
+
+free_port() { python3 -c 'import socket; s = socket.socket(); s.bind(("", 0)); print(s.getsockname()[1])'; }
+
+configure() {
+    local node cpus memory
+    node=$(hostname -s)
+    cpus=${CPUS:-$(nproc)}
+    memory=${MEMORY_MB:-$(awk '/MemTotal/ { print int($2 / 1024 * 3 / 4) }' /proc/meminfo)}
+    mkdir -p "$FOLDER/state" "$FOLDER/spool" "$FOLDER/log"
+    cat >"$FOLDER/slurm.conf" <<END
+ClusterName=throwaway
+SlurmctldHost=$node(127.0.0.1)
+SlurmctldPort=$(free_port)
+SlurmdPort=$(free_port)
+AuthType=auth/munge
+AuthInfo=socket=$FOLDER/munge.socket
+CredType=cred/munge
+SlurmUser=root
+SlurmdUser=root
+StateSaveLocation=$FOLDER/state
+SlurmdSpoolDir=$FOLDER/spool
+SlurmctldPidFile=$FOLDER/slurmctld.pid
+SlurmdPidFile=$FOLDER/slurmd.pid
+SlurmctldLogFile=$FOLDER/log/slurmctld.log
+SlurmdLogFile=$FOLDER/log/slurmd.log
+# What containers and plain machines allow: no cgroups.
+ProctrackType=proctrack/linuxproc
+TaskPlugin=task/none
+# A job that takes more memory than it asked for is killed, as by cgroups on a real cluster.
+JobAcctGatherType=jobacct_gather/linux
+JobAcctGatherFrequency=task=1
+JobAcctGatherParams=OverMemoryKill
+AccountingStorageType=accounting_storage/none
+JobCompType=jobcomp/filetxt
+JobCompLoc=$FOLDER/log/jobs.txt
+SelectType=select/cons_tres
+SelectTypeParameters=CR_CPU_Memory
+SlurmdParameters=config_overrides
+SchedulerParameters=batch_sched_delay=0,sched_interval=5
+# A dead node is noticed and taken back within seconds.
+SlurmdTimeout=10
+ReturnToService=2
+JobRequeue=1
+KillWait=5
+MessageTimeout=20
+MinJobAge=600
+NodeName=$node NodeAddr=127.0.0.1 CPUs=$cpus RealMemory=$memory State=UNKNOWN
+PartitionName=compute Nodes=$node Default=YES MaxTime=INFINITE State=UP
+END
+}
+
+start_munge() {
+    # munged insists that nobody else can write to the folders of its key and its socket.
+    head -c 128 /dev/urandom >"$FOLDER/munge.key"
+    chmod 600 "$FOLDER/munge.key"
+    munged --force --socket "$FOLDER/munge.socket" --key-file "$FOLDER/munge.key" \
+        --pid-file "$FOLDER/munge.pid" --seed-file "$FOLDER/munge.seed" \
+        --log-file "$FOLDER/log/munged.log"
+}
+
+start() {
+    local _
+    [ "$(id -u)" -eq 0 ] || fail "the daemons have to be started by root"
+    command -v slurmctld slurmd sbatch munged >/dev/null || fail "no SLURM here; run $0 install"
+    [ ! -e "$FOLDER/slurm.conf" ] || fail "$FOLDER holds a cluster already; stop it, or name another folder"
+    configure
+    start_munge
+    slurmctld
+    slurmd
+    for _ in $(seq 100); do
+        if sinfo --noheader --format %T 2>/dev/null | grep -q idle; then
+            echo "export SLURM_CONF=$SLURM_CONF"
+            return
+        fi
+        sleep 0.2
+    done
+    tail -n 5 "$FOLDER"/log/*.log >&2
+    stop
+    fail "the node did not become idle within 20 seconds; the last lines of the logs are above"
+}
+
+# The process with the number in a file, and all that it has started.
+kill_tree() {
+    local child
+    for child in $(ps -o pid= --ppid "$1" 2>/dev/null); do
+        kill_tree "$child"
+    done
+    kill -KILL "$1" 2>/dev/null || true
+}
+
+fail_node() {
+    local step
+    kill -KILL "$(cat "$FOLDER/slurmd.pid")" 2>/dev/null || true
+    # Every job has a slurmstepd, which outlives slurmd, but not a node.
+    for step in $(pgrep -x slurmstepd || true); do
+        if tr '\0' '\n' <"/proc/$step/environ" 2>/dev/null | grep -qx "SLURM_CONF=$SLURM_CONF"; then
+            kill_tree "$step"
+        fi
+    done
+}
+
+stop() {
+    local name
+    scancel --user root 2>/dev/null || true
+    fail_node
+    for name in slurmctld munge; do
+        [ ! -f "$FOLDER/$name.pid" ] || kill "$(cat "$FOLDER/$name.pid")" 2>/dev/null || true
+    done
+    rm -f "$FOLDER/slurm.conf"
+}
+
+ACTION=${1:-}
+if [ "$ACTION" != install ]; then
+    [ $# -eq 2 ] || fail "usage: $0 install | start FOLDER | fail FOLDER | repair FOLDER | stop FOLDER"
+    mkdir -p "$2"
+    FOLDER=$(cd "$2" && pwd)
+    export SLURM_CONF=$FOLDER/slurm.conf
+fi
+case $ACTION in
+install) install ;;
+start) start ;;
+fail) fail_node ;;
+repair) slurmd ;;
+stop) stop ;;
+*) fail "unknown action '$ACTION': install, start, fail, repair or stop" ;;
+esac
