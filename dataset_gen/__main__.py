@@ -19,7 +19,7 @@ from carillon.progress import say
 from dataset_gen import benchmark, ranks, summary
 from dataset_gen.element import DEFAULT_POISSON
 from dataset_gen.generate import Engine, engine_of, generate_file
-from dataset_gen.objectives import DEFAULT_OBJECTIVE, OBJECTIVES
+from dataset_gen.objectives import DATASET_OBJECTIVES, DEFAULT_OBJECTIVE, OBJECTIVES
 from dataset_gen.sampling import DISTRIBUTIONS
 from dataset_gen.settings import settings_of
 from dataset_gen.shards import origin_of
@@ -38,7 +38,7 @@ def _parser() -> Parser:
     make.add_argument("--seed", type=whole_number(0), default=0)
     make.add_argument("--shard", type=whole_number(0), default=0, help="number of this shard")
     make.add_argument("--shards", type=whole_number(1), default=1, help="number of all shards")
-    make.add_argument("--objective", choices=tuple(OBJECTIVES), default=DEFAULT_OBJECTIVE)
+    make.add_argument("--objective", choices=DATASET_OBJECTIVES, default=DEFAULT_OBJECTIVE)
     make.add_argument("--poisson", type=poisson_ratio, default=DEFAULT_POISSON)
     make.add_argument("--distribution", choices=tuple(DISTRIBUTIONS), default="uniform")
     make.add_argument("--low", type=non_negative_number, help="least modulus in GPa (0 or 0.01)")

@@ -12,7 +12,12 @@ from typing import Any, get_type_hints
 from carillon import __version__
 from carillon.errors import UserError
 from dataset_gen.element import DEFAULT_POISSON
-from dataset_gen.objectives import DEFAULT_OBJECTIVE, require_objective, require_poisson
+from dataset_gen.objectives import (
+    DATASET_OBJECTIVES,
+    DEFAULT_OBJECTIVE,
+    require_objective,
+    require_poisson,
+)
 from dataset_gen.sampling import Moduli, moduli, shard_range
 
 SEED_BITS = 63
@@ -108,7 +113,7 @@ def settings_of(
         For an unknown objective or distribution, an impossible split, seed, range of moduli or
         Poisson's ratio.
     """
-    require_objective(objective)
+    require_objective(objective, DATASET_OBJECTIVES)
     require_poisson(poisson)
     if not 0 <= seed < 1 << SEED_BITS:
         raise UserError(f"seed {seed}: expected 0 or more, and less than 2^{SEED_BITS}")

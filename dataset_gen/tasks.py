@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dataset_gen.objectives import fit
+from dataset_gen.objectives import fit_samples
 from dataset_gen.sampling import samples
 from dataset_gen.settings import Settings
 
@@ -45,7 +45,7 @@ class Plan:
         settings = self.settings
         first, past = (settings.start + self.rows(t) for t in (task, task + 1))
         young = samples(settings.seed, first, past, settings.moduli)
-        fits = fit(settings.objective, young, settings.poisson)
+        fits = fit_samples(settings.objective, young, settings.seed, first, settings.poisson)
         rows = np.empty(len(young), dtype=ROW)
         rows["fine"], rows["coarse"] = young, fits.moduli
         rows["residual"], rows["converged"] = fits.residual, fits.converged

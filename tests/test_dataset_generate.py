@@ -20,9 +20,9 @@ from dataset_gen import generate as generate_module
 from dataset_gen import journal as journal_module
 from dataset_gen import settings as settings_module
 from dataset_gen.crew import Dealer
-from dataset_gen.generate import engine_of, generate_file
+from dataset_gen.generate import engine_of, generate, generate_file
 from dataset_gen.journal import Journal, journal_of
-from dataset_gen.objectives import DEFAULT_OBJECTIVE
+from dataset_gen.objectives import DEFAULT_OBJECTIVE, SAMPLED, fit, fit_samples
 from dataset_gen.settings import settings_of
 from dataset_gen.shards import origin_of, read_shard
 from dataset_gen.tasks import ROW, Plan
@@ -84,6 +84,27 @@ def test_bytes_do_not_depend_on_workers(path, reference, workers):
     assert list(path.parent.iterdir()) == [path]
 
 
+def test_sampled_forces_do_not_depend_on_workers_nor_on_shards(path):
+    plan = plan_of(20, 8, objective=SAMPLED)
+    assert make(path, plan) == 20
+    again = path.with_name("again.h5")
+    assert make(again, plan, engine_of(2)) == 20
+    assert again.read_bytes() == path.read_bytes()
+    parts = [generate(20, 4, shard, 3, SAMPLED, progress=False).coarse for shard in range(3)]
+    np.testing.assert_array_equal(np.concatenate(parts), read_shard(path).coarse)
+
+
+def test_sampled_forces_are_each_samples_own_and_come_near_the_closed_form():
+    block = np.tile(np.linspace(1.0, 8.0, 8), (4, 1))
+    found = fit_samples(SAMPLED, block, 0, 10, 0.25)
+    assert found.converged.all() and len(np.unique(found.moduli[:, 0])) == 4
+    shifted = fit_samples(SAMPLED, block, 0, 11, 0.25)
+    np.testing.assert_array_equal(shifted.moduli[:-1], found.moduli[1:])
+    # Single moduli scatter by tens of percent, what they are together does not.
+    exact = fit("energy", block).moduli.mean(axis=1)
+    np.testing.assert_allclose(found.moduli.mean(axis=1), exact, rtol=0.1)
+
+
 def test_an_interrupted_shard_goes_on_and_has_the_same_bytes(begun, reference, capsys):
     assert make(begun, engine=engine_of(2)) == SAMPLES - 5 * TASK
     assert begun.read_bytes() == reference
@@ -106,7 +127,7 @@ PROGRAM = f"""
 import sys, time
 from carillon import cli, files
 from dataset_gen import journal
-from dataset_gen.generate import engine_of, generate_file
+from dataset_gen.generate import engine_of, generate, generate_file
 from dataset_gen.settings import settings_of
 from dataset_gen.shards import origin_of
 from dataset_gen.tasks import Plan

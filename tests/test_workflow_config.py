@@ -128,9 +128,9 @@ def test_lists_of_models_name_models(part, key):
 
 
 def test_materials_and_objectives_of_the_schema_exist():
-    from dataset_gen.objectives import OBJECTIVES
+    from dataset_gen.objectives import DATASET_OBJECTIVES
 
     schema = settings.schema()["properties"]
-    assert set(schema["dataset"]["properties"]["objective"]["enum"]) == set(OBJECTIVES)
+    assert set(schema["dataset"]["properties"]["objective"]["enum"]) == set(DATASET_OBJECTIVES)
     material = schema["models"]["additionalProperties"]["properties"]["material"]["description"]
     assert all(name in material for name in settings.MATERIALS)

@@ -6,7 +6,7 @@ symmetries. Each lives in a module of its own with a function `fit_pattern`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from typing import NamedTuple
 
@@ -24,6 +24,7 @@ from dataset_gen.objectives import (
     hybrid,
     inertial,
     oversampled,
+    sampled_energy,
 )
 from dataset_gen.objectives.calibration import default_calibration
 from dataset_gen.objectives.quadratic import PatternFits
@@ -38,6 +39,15 @@ OBJECTIVES: dict[str, Callable[[Array, int, float], PatternFits]] = {
     "calibrated": calibrated.fit_pattern,
 }
 """All objectives by name."""
+
+SAMPLED = "sampled-energy"
+"""`energy` by its printed evaluator, forces drawn anew for every sample of a dataset.
+
+It fits datasets alone: what it answers for a block depends on the sample's number as well.
+"""
+
+DATASET_OBJECTIVES = (*OBJECTIVES, SAMPLED)
+"""Names of all that a dataset can be fitted by."""
 
 DEFAULT_OBJECTIVE = "calibrated"
 """The one with the best spectra, see the study that `snakemake objectives` makes."""
@@ -58,12 +68,15 @@ class Fits(NamedTuple):
     converged: NDArray[np.bool_]
 
 
-def require_objective(objective: str) -> None:
-    """Raise UserError unless `objective` is known."""
-    if objective not in OBJECTIVES:
-        raise UserError(
-            f"objective {objective!r} is unknown, choose one of {', '.join(OBJECTIVES)}"
-        )
+def require_objective(objective: str, known: Iterable[str] = OBJECTIVES) -> None:
+    """Raise UserError unless `objective` is one of those known."""
+    if objective not in known:
+        raise UserError(f"objective {objective!r} is unknown, choose one of {', '.join(known)}")
+
+
+def closed_form(objective: str) -> str:
+    """Name in `OBJECTIVES` of what a dataset's objective converges to."""
+    return "energy" if objective == SAMPLED else objective
 
 
 def lumped_share(objective: str) -> float:
@@ -137,3 +150,19 @@ def fit(objective: str, e: ArrayLike, poisson: float = DEFAULT_POISSON) -> Fits:
         fits = OBJECTIVES[objective](turned[rows], int(mask), float(poisson))
         moduli[rows], residual[rows], converged[rows] = fits
     return Fits(np.take_along_axis(moduli, turn, axis=1), residual, converged)
+
+
+def fit_samples(objective: str, e: Array, seed: int, first: int, poisson: float) -> Fits:
+    """Fit the samples `first`, `first` + 1, ... of a dataset, see `fit`.
+
+    Parameters
+    ----------
+    objective : name in `DATASET_OBJECTIVES`.
+    seed : of the dataset; what is drawn for a fit depends on it and on the sample's number alone.
+    """
+    if objective != SAMPLED:
+        return fit(objective, e, poisson)
+    found = [
+        sampled_energy.fit_sample(young, seed, first + row, poisson) for row, young in enumerate(e)
+    ]
+    return Fits(*(np.concatenate(column) for column in zip(*found)))

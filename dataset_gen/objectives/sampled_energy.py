@@ -1,7 +1,7 @@
 """Eq. (8) as it is printed: forces are drawn, both meshes are solved, energies are compared.
 
-Kept to check `energy` and to measure what its closed form saves. One block at a time: here the
-lanes are forces.
+Kept to check `energy`, to measure what its closed form saves, and to fit datasets as the paper did.
+One block at a time: here the lanes are forces.
 """
 
 from __future__ import annotations
@@ -64,6 +64,10 @@ DIRECTIONS = 1000
 
 MAGNITUDES = (0.2, 0.4, 0.6, 0.8, 1.0)
 """Five magnitudes in each direction; they only rescale the energies."""
+
+
+FORCES = (0, 0, 0, 1)
+"""First counter of the forces of a sample, words from the least on; moduli are drawn from zero."""
 
 
 class Loaded(NamedTuple):
@@ -249,3 +253,10 @@ def fit_block(
     )
     moduli = largest * np.exp(logs)
     return PatternFits(moduli[None], np.array([residual]), np.array([settled]))
+
+
+def fit_sample(young: Array, seed: int, number: int, poisson: float) -> PatternFits:
+    """Fit of the block `young` (8,), sample `number` of a dataset, by its own forces: one row."""
+    key = np.array([seed, number], dtype=np.uint64)
+    forces = np.random.Philox(key=key, counter=np.array(FORCES, dtype=np.uint64))
+    return fit_block(young, np.random.Generator(forces), poisson)

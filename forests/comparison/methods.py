@@ -11,7 +11,7 @@ import numpy as np
 from carillon.errors import UserError
 from carillon.files import require_writable
 from dataset_gen.element import Array
-from dataset_gen.objectives import fit
+from dataset_gen.objectives import closed_form, fit
 from forests import model as forest_model
 from forests.baselines import average, galerkin
 from forests.comparison.cases import Case
@@ -98,7 +98,8 @@ def methods_of(models: dict[str, Model]) -> list[Method]:
         See `common_poisson`.
     """
     poisson = common_poisson(models)
-    objectives = dict.fromkeys(["energy", "chen2015", *(m.objective for m in models.values())])
+    learned = (closed_form(model.objective) for model in models.values())
+    objectives = dict.fromkeys(["energy", "chen2015", *learned])
     found = [
         Method("average", average),
         Method("Galerkin", galerkin),

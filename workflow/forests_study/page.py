@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from dataset_gen.objectives import closed_form
 from workflow.forests_study.plots import FIGURES
 from workflow.forests_study.results import ForestsStudy
 from workflow.forests_study.tables import BUILDERS
@@ -33,7 +34,7 @@ def findings(study: ForestsStudy) -> dict[str, Any]:
         if all(row[key] == first[key] for key in ("range_gpa", "distribution", "fill", "scaled_by"))
     }
     forest = next(row for name, row in rows.items() if name.startswith(f"{objective}, forests"))
-    fit = rows[f"{objective}, fitted on the spot"]
+    fit = rows[f"{closed_form(objective)}, fitted on the spot"]
     return {
         "forest": forest,
         "fit": fit,
