@@ -53,7 +53,7 @@ def test_every_key_has_a_description_and_objects_admit_no_unknown_key():
 
 
 def test_default_configuration_states_the_defaults_of_the_schema():
-    config = load("default")
+    config = load("laptop")
     del config["models"]
     expected = defaults_of(settings.schema())
     # Which model is shown depends on the models, which have no default.
@@ -63,13 +63,13 @@ def test_default_configuration_states_the_defaults_of_the_schema():
     assert config == expected
 
 
-@pytest.mark.parametrize("name", ["default", "tiny", "meshes"])
+@pytest.mark.parametrize("name", ["laptop", "cluster", "paper", "tiny", "meshes"])
 def test_every_configuration_fits_the_schema(name):
     settings.check(load(name))
 
 
 def test_default_run_needs_no_file_and_four_models_or_more():
-    config = load("default")
+    config = load("laptop")
     assert len(config["models"]) >= 4
     assert all(model["mesh"].startswith("builtin:") for model in config["models"].values())
 
@@ -88,7 +88,7 @@ def test_default_run_needs_no_file_and_four_models_or_more():
     ],
 )
 def test_a_bad_value_is_answered_in_one_sentence(keys, value, says):
-    config = copy.deepcopy(load("default"))
+    config = copy.deepcopy(load("laptop"))
     target = config
     for key in keys[:-1]:
         target = target[key]
@@ -121,7 +121,7 @@ def test_a_missing_mesh_file_and_an_unknown_model_are_named(tmp_path):
     ],
 )
 def test_lists_of_models_name_models(part, key):
-    config = load("default")
+    config = load("laptop")
     config[part][key] = ["gong"]
     with pytest.raises(UserError, match=rf"{part}\.{key}: 'gong' is not among the models"):
         settings.check_links(config)

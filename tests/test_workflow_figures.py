@@ -13,7 +13,7 @@ from workflow.report.convergence_tables import convergence, convergence_sentence
 from workflow.report.methods_tables import methods, ratios
 from workflow.report.table import read_table
 
-CONFIG = yaml.safe_load((CHECKOUT / "workflow" / "config" / "default.yaml").read_text())
+CONFIG = yaml.safe_load((CHECKOUT / "workflow" / "config" / "laptop.yaml").read_text())
 
 
 def test_figures_are_no_part_of_the_default_run(tmp_path):

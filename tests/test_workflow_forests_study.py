@@ -31,7 +31,7 @@ def test_default_forests_are_trained_tree_by_tree_and_not_in_the_default_run(tmp
 
 @pytest.mark.parametrize("named", [True, False])
 def test_the_study_takes_forests_that_are_named_or_the_default_ones(tmp_path, monkeypatch, named):
-    config = yaml.safe_load((CHECKOUT / "workflow" / "config" / "default.yaml").read_text())
+    config = yaml.safe_load((CHECKOUT / "workflow" / "config" / "laptop.yaml").read_text())
     monkeypatch.setattr(forest_model, "default_path", lambda: tmp_path / "default.h5")
     config["forests_study"]["model"] = "own.h5" if named else None
     assert settings.studied_model(config) == ("own.h5" if named else str(tmp_path / "default.h5"))
@@ -46,7 +46,7 @@ def test_the_study_takes_forests_that_are_named_or_the_default_ones(tmp_path, mo
     ],
 )
 def test_a_study_beyond_its_data_is_answered_in_one_sentence(changes, says):
-    config = yaml.safe_load((CHECKOUT / "workflow" / "config" / "default.yaml").read_text())
+    config = yaml.safe_load((CHECKOUT / "workflow" / "config" / "laptop.yaml").read_text())
     config["forests_study"] |= changes
     settings.check(config)
     with pytest.raises(UserError, match=says):

@@ -11,7 +11,7 @@ from workflow import settings, training
 
 
 def config(**dataset) -> dict:
-    loaded = yaml.safe_load((CHECKOUT / "workflow" / "config" / "default.yaml").read_text())
+    loaded = yaml.safe_load((CHECKOUT / "workflow" / "config" / "laptop.yaml").read_text())
     loaded["dataset"] |= dataset
     return loaded
 
