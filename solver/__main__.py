@@ -156,12 +156,14 @@ def _print_summary(attributes: dict[str, Any], values: Any, options: argparse.Na
 
 
 def _compare(options: argparse.Namespace, comm: MPI.Comm) -> None:
+    from carillon.provenance import record
     from solver.comparison import compare_files
 
     comparison = on_root(comm, lambda: compare_files(options.candidate, options.truth).as_dict())
     if comm.rank:
         return
     if options.json:
+        comparison["provenance"] = record(_command_parameters(options))
         print(json.dumps(comparison, indent=2))
         return
     error = comparison["eigenvalue_relative_error"]
@@ -177,6 +179,57 @@ def _compare(options: argparse.Namespace, comm: MPI.Comm) -> None:
     )
     print(f"largest subspace angle    {comparison['subspace_angle_max']:.2e} rad")
     print(f"largest residual          {comparison['residual_max']:.2e}")
+
+
+def _audit(options: argparse.Namespace, comm: MPI.Comm) -> None:
+    from carillon.provenance import record
+    from solver.audit import audit_files
+
+    _require_one_rank(options, comm)
+    if options.out is not None:
+        require_writable(options.out)
+    audits = {name: found.as_dict() for name, found in audit_files(options.files).items()}
+    content = {"spectra": audits, "provenance": record(_command_parameters(options))}
+    if options.out is not None:
+        _write_json(options, content, comm)
+    if options.json:
+        print(json.dumps(content, indent=2))
+        return
+    for name, found in audits.items():
+        print(
+            f"{name}: {found['modes']} modes of {found['unknowns']:,} unknowns, "
+            f"{found['rigid_modes']} rigid; largest residual {found['residual_max']:.1e}, "
+            f"orthogonal to {found['orthogonality']:.1e}; {found['expected']} below "
+            f"{found['counted_below']:.6g} rad^2/s^2, counted {found['counted']}"
+        )
+
+
+def _respond(options: argparse.Namespace, comm: MPI.Comm) -> None:
+    from solver.response import Damping
+    from solver.response_file import StrikeOptions, respond, write_response
+
+    _require_one_rank(options, comm)
+    require_writable(options.out)
+    strike = StrikeOptions(
+        options.strike,
+        options.observed,
+        Damping(options.mass_damping, options.stiffness_damping),
+        options.contact,
+        options.periods,
+    )
+    candidates = {Path(path).stem: path for path in options.candidates}
+    found = respond(options.truth, candidates, strike)
+    write_response(options.out, found, _command_parameters(options))
+    for name, response in found.responses.items():
+        print(
+            f"{name}: differs from {options.truth} by {response.difference:.2e} in displacement, "
+            f"{response.distance_decibels:.2g} dB in sound"
+        )
+
+
+def _require_one_rank(options: argparse.Namespace, comm: MPI.Comm) -> None:
+    if comm.size > 1:
+        raise UserError(f"{options.command} runs on one rank, {comm.size} were started")
 
 
 def _convergence(options: argparse.Namespace, comm: MPI.Comm) -> None:
@@ -452,6 +505,16 @@ def _parser() -> argparse.ArgumentParser:
     compare.add_argument("--json", action="store_true", help="print JSON")
     compare.set_defaults(run=_compare)
 
+    audit = commands.add_parser(
+        "audit", help="residuals, orthogonality and inertia count anew, from modes files alone"
+    )
+    audit.add_argument("files", nargs="+", metavar="FILE", help="modes files")
+    audit.add_argument("--out", help="also write the result to this JSON file")
+    audit.add_argument("--json", action="store_true", help="print JSON")
+    audit.set_defaults(run=_audit)
+
+    _add_respond(commands.add_parser("respond", help="motion and sound of a strike (Fig. 12, 13)"))
+
     convergence = commands.add_parser(
         "convergence", help="eigenvalues after each correction from several starts (Fig. 10)"
     )
@@ -563,6 +626,51 @@ def _parser() -> argparse.ArgumentParser:
     calibrate.add_argument("--out", required=True, help="JSON file to write")
     calibrate.set_defaults(run=_calibrate)
     return parser
+
+
+def _add_respond(parser: argparse.ArgumentParser) -> None:
+    from solver.response import Damping
+    from solver.response_file import StrikeOptions
+
+    parser.add_argument("truth", help="modes file taken for the truth")
+    parser.add_argument(
+        "candidates", nargs="*", metavar="FILE", help="modes files to set beside it"
+    )
+    parser.add_argument("--out", required=True, help="file to write (HDF5)")
+    for name, what in (("strike", "that is struck"), ("observed", "whose motion is watched")):
+        parser.add_argument(
+            f"--{name}",
+            type=float,
+            nargs=3,
+            metavar=("X", "Y", "Z"),
+            help=f"point of the surface {what} [m] (default: chosen by the truth)",
+        )
+    damping = Damping()
+    parser.add_argument(
+        "--mass-damping",
+        type=non_negative_number,
+        default=damping.mass_per_second,
+        help="coefficient of the mass in Rayleigh damping [1/s] (default %(default)g)",
+    )
+    parser.add_argument(
+        "--stiffness-damping",
+        type=non_negative_number,
+        default=damping.stiffness_seconds,
+        help="coefficient of the stiffness [s] (default %(default)g)",
+    )
+    parser.add_argument(
+        "--contact",
+        type=positive_number,
+        default=StrikeOptions.contact_seconds,
+        help="duration of the force in the sound [s] (default %(default)g)",
+    )
+    parser.add_argument(
+        "--periods",
+        type=positive_number,
+        default=StrikeOptions.periods,
+        help="time watched, in periods of the first elastic mode (default %(default)g)",
+    )
+    parser.set_defaults(run=_respond)
 
 
 def _add_problem(parser: argparse.ArgumentParser) -> None:

@@ -45,6 +45,9 @@ class Comparison:
         Largest residual ratio of the candidate, recomputed from the K and M in its file.
     modes_compared
         Number of elastic modes compared.
+    clusters
+        First and last mode number of every cluster of the truth but the last, and its angle [rad];
+        empty if the meshes are not related.
     """
 
     candidate: str
@@ -56,6 +59,7 @@ class Comparison:
     subspace_angle_max: float
     residual_max: float
     modes_compared: int
+    clusters: list[dict[str, Any]]
 
     def as_dict(self) -> dict[str, Any]:
         """Plain dictionary, ready for JSON."""
@@ -138,6 +142,7 @@ def compare_files(candidate: str | Path, truth: str | Path) -> Comparison:
     values, exact = a.eigenvalues[elastic], b.eigenvalues[elastic]
     shift = a.frequencies[elastic] / b.frequencies[elastic] - 1.0
     audible = frequency_errors(shift, AUDIBLE_LAST)
+    angles = _cluster_angles(a, b, count)
     return Comparison(
         str(candidate),
         str(truth),
@@ -145,16 +150,16 @@ def compare_files(candidate: str | Path, truth: str | Path) -> Comparison:
         frequency_errors(shift, count).rms,
         audible.rms,
         abs(audible.worst),
-        _largest_angle(a, b, count),
-        float(recomputed_residuals(a).max()),
+        max((cluster["angle"] for cluster in angles), default=float("nan")),
+        float(recomputed_residuals(a, *assembled(a.model)).max()),
         count - RIGID_MODES,
+        angles,
     )
 
 
-def recomputed_residuals(file: ModesFile) -> Array:
-    """Residual ratios (k,) from matrices assembled anew, see `solver.analysis.residual_ratios`."""
+def recomputed_residuals(file: ModesFile, K: sp.csr_matrix, M: sp.csr_matrix) -> Array:
+    """Residual ratios (k,) by these matrices, see `solver.verification.residual_ratios`."""
     assert file.modes is not None
-    K, M = assembled(file.model)
     mass_modes = M @ file.modes
     residual = K @ file.modes - mass_modes * file.eigenvalues
     scale = residual_scale(file.eigenvalues) * np.linalg.norm(mass_modes, axis=0)
@@ -183,21 +188,36 @@ def subspace_angles(modes: Array, truth: Array, M: sp.csr_matrix, groups: list[s
     return angles
 
 
-def _largest_angle(a: ModesFile, b: ModesFile, count: int) -> float:
+def _cluster_angles(a: ModesFile, b: ModesFile, count: int) -> list[dict[str, Any]]:
+    """Angle of every cluster of `b` but the last; nothing if the meshes are not related."""
     assert a.modes is not None and b.modes is not None
-    modes = a.modes
     elastic = slice(RIGID_MODES, count)
     groups = clusters(b.eigenvalues[elastic])[:-1]
-    if not groups:
-        return float("nan")
-    if not np.array_equal(a.mesh.node_grid, b.mesh.node_grid):
-        if not np.isclose(a.mesh.edge, 2.0 * b.mesh.edge):
-            return float("nan")
-        try:
-            to_fine = sp.kron(prolongation(b.mesh, a.mesh), sp.identity(3), format="csr")
-        except ValueError:
-            return float("nan")
-        modes = to_fine @ modes
+    modes = _on_mesh_of(b, a)
+    if modes is None or not groups:
+        return []
     _, M = assembled(b.model)
     angles = subspace_angles(modes[:, elastic], b.modes[:, elastic], M, groups)
-    return float(angles.max())
+    return [
+        {
+            "first": RIGID_MODES + 1 + group.start,
+            "last": RIGID_MODES + group.stop,
+            "angle": float(angle),
+        }
+        for group, angle in zip(groups, angles, strict=True)
+    ]
+
+
+def _on_mesh_of(fine: ModesFile, file: ModesFile) -> Array | None:
+    """Modes of `file` on the nodes of `fine`, whose coarsening it may be; else None."""
+    assert file.modes is not None
+    if np.array_equal(file.mesh.node_grid, fine.mesh.node_grid):
+        return file.modes
+    if not np.isclose(file.mesh.edge, 2.0 * fine.mesh.edge):
+        return None
+    try:
+        return np.asarray(
+            sp.kron(prolongation(fine.mesh, file.mesh), sp.identity(3), format="csr") @ file.modes
+        )
+    except ValueError:
+        return None

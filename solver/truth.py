@@ -121,11 +121,16 @@ def _gap(values: Array, modes: int) -> tuple[float, int]:
 
 
 def count_below(system: System, value: float) -> int:
-    """Number of eigenvalues below `value` [rad^2/s^2], by Sylvester's law of inertia and MUMPS."""
-    shifted = system.K.copy()
-    shifted.axpy(-value, system.M, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+    """Number of eigenvalues of an assembled system below `value` [rad^2/s^2]."""
+    return count_negative(system.K, system.M, value)
+
+
+def count_negative(K: PETSc.Mat, M: PETSc.Mat, value: float) -> int:
+    """Negative eigenvalues of K - value M, by Sylvester's law of inertia and MUMPS."""
+    shifted = K.copy()
+    shifted.axpy(-value, M, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
     shifted.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    factorisation = PETSc.PC().create(system.comm)
+    factorisation = PETSc.PC().create(K.comm)
     factorisation.setOperators(shifted)
     factorisation.setType(PETSc.PC.Type.CHOLESKY)
     factorisation.setFactorSolverType("mumps")

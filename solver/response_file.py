@@ -1,0 +1,210 @@
+"""The file `response.h5`: how one solid moves and sounds when struck, by several spectra."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon import provenance
+from carillon.errors import UserError
+from carillon.files import create_h5, open_h5
+from solver.contact import Contact, choose_contacts
+from solver.model import RIGID_MODES
+from solver.modes_file import read_modes
+from solver.response import (
+    SAMPLE_RATE_HERTZ,
+    Contacts,
+    Damping,
+    at_contacts,
+    contact_sound,
+    displacements,
+    is_audible,
+    relative_difference,
+    spectral_distance,
+)
+
+Array = NDArray[np.float64]
+
+KIND = "response"
+SCHEMA = 1
+TRUTH = "truth"
+POINTS = ("strike", "observed", "third")
+INSTANTS = 1500
+
+
+@dataclass(frozen=True)
+class StrikeOptions:
+    """How a solid is struck and watched.
+
+    Attributes
+    ----------
+    strike, observed
+        Points (3,) [m], see `solver.contact.choose_contacts`; chosen by the truth if None.
+    damping
+        Rayleigh damping.
+    contact_seconds
+        Duration of the force in the sound.
+    periods
+        Time that is watched, in periods of the truth's first elastic mode.
+    """
+
+    strike: Sequence[float] | None = None
+    observed: Sequence[float] | None = None
+    damping: Damping = field(default_factory=Damping)
+    contact_seconds: float = 2e-4
+    periods: float = 6.0
+
+
+@dataclass(frozen=True)
+class Response:
+    """What one spectrum makes of a strike.
+
+    Attributes
+    ----------
+    displacement : (t, 3) [m] of the observed point after an impulse of 1 N s at the struck one.
+    sound : (s,) [m/s] at `SAMPLE_RATE_HERTZ`, see `solver.response.contact_sound`.
+    audible : number of modes that sound.
+    difference : relative 2-norm of the displacement's difference from the truth's.
+    distance_decibels : rms difference of the spectrograms; NaN where the truth is not heard.
+    """
+
+    displacement: Array
+    sound: Array
+    audible: int
+    difference: float
+    distance_decibels: float
+
+
+@dataclass(frozen=True)
+class ResponseFile:
+    """Contents of the file.
+
+    Attributes
+    ----------
+    seconds : (t,) instants of the displacements.
+    contacts : the points, by the names `POINTS`.
+    responses : by name of the spectrum, the first being the truth.
+    attributes, provenance : damping and so on; origin of the numbers.
+    """
+
+    seconds: Array
+    contacts: dict[str, Contact]
+    responses: dict[str, Response]
+    attributes: dict[str, Any] = field(default_factory=dict)
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+
+def respond(
+    truth: str | Path, candidates: dict[str, str | Path], options: StrikeOptions
+) -> ResponseFile:
+    """Strike the solid of the modes file `truth`, and what the `candidates` by name take it for.
+
+    Raises
+    ------
+    UserError
+        If a file is unusable or holds no elastic mode, or a point is away from the surface.
+    """
+    reference = read_modes(truth)
+    if len(reference.eigenvalues) <= RIGID_MODES:
+        raise UserError(
+            f"{truth}: holds {len(reference.eigenvalues)} modes, of which {RIGID_MODES} are rigid; "
+            "compute more"
+        )
+    points = choose_contacts(reference, options.strike, options.observed)
+    seen = {TRUTH: at_contacts(reference, points)}
+    seen |= {name: at_contacts(read_modes(path), points) for name, path in candidates.items()}
+    period = 2.0 * np.pi / np.sqrt(seen[TRUTH].eigenvalues[0])
+    seconds = np.linspace(0.0, options.periods * period, INSTANTS)
+    known = _motions(seen[TRUTH], options, seconds)
+    return ResponseFile(
+        seconds,
+        dict(zip(POINTS, points, strict=True)),
+        {name: _response(part, options, seconds, known) for name, part in seen.items()},
+        {
+            "mass_damping": options.damping.mass_per_second,
+            "stiffness_damping": options.damping.stiffness_seconds,
+            "contact_seconds": options.contact_seconds,
+            "periods": options.periods,
+            "sample_rate": SAMPLE_RATE_HERTZ,
+        },
+    )
+
+
+def write_response(path: str | Path, response: ResponseFile, parameters: dict[str, Any]) -> None:
+    """Write the file atomically; `parameters` are those of the command, for the provenance."""
+    with create_h5(path, KIND, SCHEMA) as file:
+        file.attrs.update(response.attributes)
+        _put(file, "seconds", response.seconds, "s")
+        for name, contact in response.contacts.items():
+            _put(file, f"points/{name}/position", contact.position, "m")
+            _put(file, f"points/{name}/inward", contact.inward, "1")
+        for name, part in response.responses.items():
+            _put(file, f"spectra/{name}/displacement", part.displacement, "m")
+            _put(file, f"spectra/{name}/sound", part.sound, "m/s")
+            file[f"spectra/{name}"].attrs.update(
+                audible=part.audible,
+                difference=part.difference,
+                distance_decibels=part.distance_decibels,
+            )
+        file.attrs["order"] = list(response.responses)
+        provenance.write(file, parameters)
+
+
+def read_response(path: str | Path) -> ResponseFile:
+    """Read the file.
+
+    Raises
+    ------
+    UserError
+        If it is missing, damaged or of another kind.
+    """
+    with open_h5(path, KIND, SCHEMA) as file:
+        attributes = dict(file.attrs)
+        contacts = {
+            name: Contact(file[f"points/{name}/position"][()], file[f"points/{name}/inward"][()])
+            for name in POINTS
+        }
+        responses = {}
+        for name in attributes.pop("order"):
+            group = file[f"spectra/{name}"]
+            responses[str(name)] = Response(
+                group["displacement"][()],
+                group["sound"][()],
+                int(group.attrs["audible"]),
+                float(group.attrs["difference"]),
+                float(group.attrs["distance_decibels"]),
+            )
+        return ResponseFile(
+            file["seconds"][()], contacts, responses, attributes, provenance.read(file)
+        )
+
+
+def _motions(seen: Contacts, options: StrikeOptions, seconds: Array) -> tuple[Array, Array]:
+    return (
+        displacements(seen, options.damping, seconds),
+        contact_sound(seen, options.damping, options.contact_seconds),
+    )
+
+
+def _response(
+    seen: Contacts, options: StrikeOptions, seconds: Array, known: tuple[Array, Array]
+) -> Response:
+    displacement, sound = _motions(seen, options, seconds)
+    heard = known[1].any()
+    return Response(
+        displacement,
+        sound,
+        int(is_audible(seen.eigenvalues).sum()),
+        relative_difference(displacement, known[0]),
+        spectral_distance(sound, known[1]) if heard else float("nan"),
+    )
+
+
+def _put(file: Any, name: str, data: Array, units: str) -> None:
+    dataset = file.create_dataset(name, data=data, fletcher32=True, chunks=True)
+    dataset.attrs["units"] = units
