@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from workflow.report.blocks_tables import LEAST, every_row, overview
+from workflow.report.blocks_tables import LOWER_BOUND, every_row, overview, repeats
 
 
 def rated(method: str, high: float = 10.0, **changes) -> dict:
@@ -23,6 +23,9 @@ def rated(method: str, high: float = 10.0, **changes) -> dict:
         "least_median_error": 0.3,
         "mean_squared_m2": 1e-12,
         "seconds_per_block": 1e-6,
+        "seconds_per_block_least": 5e-7,
+        "seconds_per_block_most": 4e-6,
+        "timed_runs": 5,
         "storage_bytes": 100,
         "training_seconds": 2.0,
         "clamped": False,
@@ -45,12 +48,14 @@ ROWS = [
 def test_kinds_of_blocks_are_columns_and_databases_one_row():
     table = overview(ROWS)
     rows = {row["method"]: row for row in table.rows}
-    assert list(rows) == ["average", "database", LEAST]
+    assert list(rows) == ["average", "database", LOWER_BOUND]
     assert (rows["average"]["kind0_nodal"], rows["average"]["kind1_nodal"]) == (0.5, 0.7)
     assert rows["average"]["seconds_per_block"] == 2e-6
+    assert rows["average"]["seconds_per_block_least"] == 5e-7
+    assert repeats(ROWS).runs.startswith("5 ")
     assert rows["database"]["kind1_nodal"] == 0.5, "not that beyond its range"
     assert (rows["database"]["storage_bytes"], rows["database"]["training_seconds"]) == (200, 2.0)
-    assert rows[LEAST]["kind0_nodal"] == 0.4
+    assert rows[LOWER_BOUND]["kind0_nodal"] == 0.4
     labels = [column.label for column in table.shown]
     assert labels[1] == "0…10 GPa uniform, solid: nodal"
     assert not any("10,000,000" in label for label in labels)

@@ -57,7 +57,7 @@ def test_default_configuration_states_the_defaults_of_the_schema():
     del config["models"]
     expected = defaults_of(settings.schema())
     # Which model is shown depends on the models, which have no default.
-    for part in ("convergence", "times"):
+    for part in ("convergence", "times", "scaling"):
         assert config[part].pop("models")
         expected[part].pop("models")
     assert config == expected
@@ -116,6 +116,7 @@ def test_a_missing_mesh_file_and_an_unknown_model_are_named(tmp_path):
     [
         ("convergence", "models"),
         ("times", "models"),
+        ("scaling", "models"),
         ("figures", "convergence"),
         ("figures", "scaling"),
     ],

@@ -10,12 +10,15 @@ import yaml
 from jsonschema import Draft202012Validator
 from jsonschema.exceptions import ValidationError, best_match
 
+from carillon import provenance
 from carillon.errors import UserError
 from dataset_gen.objectives import OBJECTIVES, require_objective
 from forests import model as forest_model
 from solver.materials import NAMES as MATERIALS
 from workflow import training
 
+PLACES = ("results_dir", "mesh_folder", "baseline")
+"""Keys that say where something lies, on which no result depends."""
 SCHEMA = Path(__file__).parent / "schemas" / "config.schema.yaml"
 BUILTIN = "builtin:"
 
@@ -39,6 +42,18 @@ def check(config: Mapping[str, Any]) -> None:
         raise UserError(_sentence(mistake))
 
 
+def resolved(config: Mapping[str, Any]) -> dict[str, Any]:
+    """What describes a run; the baseline that it is compared with does not."""
+    return {key: value for key, value in config.items() if key != "baseline"}
+
+
+def config_hash(config: Mapping[str, Any]) -> str:
+    """Short hash of a resolved configuration, wherever its files lie."""
+    return provenance.config_hash(
+        {key: value for key, value in config.items() if key not in PLACES}
+    )
+
+
 def check_links(config: Mapping[str, Any]) -> None:
     """Check what a schema cannot say: names and files that a complete configuration refers to.
 
@@ -55,7 +70,7 @@ def check_links(config: Mapping[str, Any]) -> None:
                     f"models.{name}: there is no file {path}; put it there, or set mesh_folder to "
                     "the folder that holds it"
                 )
-    for part in ("convergence", "times"):
+    for part in ("convergence", "times", "scaling"):
         _require_models(f"{part}.models", config[part]["models"], config["models"])
     for part in ("convergence", "scaling"):
         figures = config["figures"]

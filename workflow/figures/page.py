@@ -10,13 +10,13 @@ from workflow.figures.results import Figures, present, without
 from workflow.figures.tables import BUILDERS
 from workflow.report.convergence_tables import convergence_sentences
 from workflow.report.page import inline, page_template
+from workflow.report.scaling_tables import assumptions
 from workflow.report.table import read_table
 
 
 def render(figures: Figures) -> str:
     """Build the page from tables and plots; nothing is computed anew."""
     tables = {name: read_table(figures.folder / "tables" / f"{name}.json") for name in BUILDERS}
-    scaling = figures.scaling
     return page_template("figures/page.html.j2").render(
         title="The paper’s figures",
         config=figures.config["figures"],
@@ -26,7 +26,7 @@ def render(figures: Figures) -> str:
         times=_plot(figures, "times"),
         convergence=_plots(figures, "convergence"),
         scaling=_plots(figures, "scaling"),
-        assumptions=_assumptions(list(scaling.values())),
+        assumptions=assumptions(figures.scaling),
     )
 
 
@@ -39,15 +39,3 @@ def _plots(figures: Figures, part: str) -> list[dict[str, Any]]:
 
 def _plot(figures: Figures, name: str) -> Markup:
     return inline(figures.folder / "figures" / f"{name}.svg")
-
-
-def _assumptions(found: list[dict[str, Any]]) -> list[str]:
-    """What the model takes for granted, each once."""
-    stated = [
-        assumption
-        for result in found
-        for kind in ("strong", "weak")
-        if result[kind] is not None
-        for assumption in result[kind]["model"]["assumptions"]
-    ]
-    return list(dict.fromkeys(stated))

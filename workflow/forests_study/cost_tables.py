@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from workflow.forests_study.results import ForestsStudy
+from workflow.report.conditions import IN_COLUMNS, Repeats, conditions
 from workflow.report.numbers import show
-from workflow.report.table import Column, Table
+from workflow.report.table import LEAST, MOST, Column, Table
 
 MICRO, NANO, MEGA = 1e-6, 1e-9, 1e6
 
@@ -22,7 +23,7 @@ def cost(study: ForestsStudy) -> Table:
         "coarsen, the same trees": rival["coarsen"],
     }
     caches = ", ".join(f"{name} {size}" for name, size in found["caches"].items())
-    runs = next(iter(timings.values()))["runs"]
+    runs = _first_timing(study)["runs"]
     return Table(
         "cost",
         f"Wall time of a block by the forests studied, {found['blocks']:,} random blocks at once, "
@@ -31,18 +32,34 @@ def cost(study: ForestsStudy) -> Table:
         f"time of coarsen, both on one core. {found['processor']}, caches {caches}.",
         [
             Column("evaluation", "Evaluation"),
-            Column("median", "Median", "seconds", "s"),
-            Column("least", "least", "seconds", "s"),
-            Column("most", "most", "seconds", "s"),
+            Column("seconds", "Median", "seconds", "s"),
+            Column(f"seconds{LEAST}", "least", "seconds", "s"),
+            Column(f"seconds{MOST}", "most", "seconds", "s"),
         ],
-        [
-            {
-                "evaluation": name,
-                **{key: MICRO * timing[key] for key in ("median", "least", "most")},
-            }
-            for name, timing in timings.items()
-        ],
+        [{"evaluation": name, **_spread("seconds", timing)} for name, timing in timings.items()],
+        conditions=conditions(
+            {"all": study.record("benchmark")},
+            study.config,
+            repeats(study),
+            threads="as the row says",
+        ),
     )
+
+
+def repeats(study: ForestsStudy) -> Repeats:
+    """How often every time was measured."""
+    return Repeats(f"{_first_timing(study)['runs']}, warm", IN_COLUMNS)
+
+
+def _first_timing(study: ForestsStudy) -> dict[str, Any]:
+    timing: dict[str, Any] = next(iter(study.benchmark["evaluation"].values()))
+    return timing
+
+
+def _spread(key: str, timing: dict[str, Any]) -> dict[str, float]:
+    """Median, least and most of a timing [s], as values of the column `key` and its two others."""
+    ends = {"": "median", LEAST: "least", MOST: "most"}
+    return {f"{key}{end}": MICRO * timing[name] for end, name in ends.items()}
 
 
 def sizes(study: ForestsStudy) -> Table:
@@ -56,11 +73,17 @@ def sizes(study: ForestsStudy) -> Table:
             Column("trees", "Trees of each forest", "count"),
             Column("depth", "Depth", "count"),
             Column("random", "Random blocks", "seconds", "s"),
+            Column(f"random{LEAST}", "least", "seconds", "s", shown=False),
+            Column(f"random{MOST}", "most", "seconds", "s", shown=False),
             Column("random_walk", "a walk", "seconds", "s"),
             Column("coherent", "Blocks of a mesh", "seconds", "s"),
+            Column(f"coherent{LEAST}", "least", "seconds", "s", shown=False),
+            Column(f"coherent{MOST}", "most", "seconds", "s", shown=False),
             Column("coherent_walk", "a walk", "seconds", "s"),
         ],
         [_size_row(size) for size in study.benchmark["sizes"]],
+        ["trees", "depth"],
+        conditions({"all": study.record("benchmark")}, study.config, repeats(study), threads="1"),
     )
 
 
@@ -69,6 +92,7 @@ def _size_row(size: dict[str, Any]) -> dict[str, Any]:
         "bytes": MEGA * size["megabytes"],
         "trees": size["trees"],
         "depth": size["depth"],
-        **{kind: MICRO * size[kind]["median"] for kind in ("random", "coherent")},
+        **_spread("random", size["random"]),
+        **_spread("coherent", size["coherent"]),
         **{f"{kind}_walk": NANO * size[f"{kind}_walk_ns"] for kind in ("random", "coherent")},
     }

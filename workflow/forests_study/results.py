@@ -10,6 +10,9 @@ from workflow.study_folder import StudyFolder
 
 Row = dict[str, Any]
 
+MEASUREMENTS = ("blocks", "benchmark", "variants", "curve")
+"""Names of the files of `forests table`, `benchmark`, `variants` and `curve`."""
+
 
 class ForestsStudy(StudyFolder):
     """The folder of the study of the forests."""
@@ -21,28 +24,38 @@ class ForestsStudy(StudyFolder):
         return loaded
 
     @cached_property
-    def blocks(self) -> list[Row]:
-        """Output of `forests table`."""
-        loaded: list[Row] = self.read_json("blocks.json")
-        return loaded
+    def found(self) -> dict[str, Row]:
+        """Files of the measurements, each with `result` and `provenance`, by name."""
+        return {name: self.read_json(f"{name}.json") for name in MEASUREMENTS}
 
-    @cached_property
+    @property
+    def blocks(self) -> list[Row]:
+        """Rows of `forests table`."""
+        rows: list[Row] = self.found["blocks"]["result"]
+        return rows
+
+    @property
     def benchmark(self) -> dict[str, Any]:
         """Output of `forests benchmark`."""
-        loaded: dict[str, Any] = self.read_json("benchmark.json")
-        return loaded
+        result: dict[str, Any] = self.found["benchmark"]["result"]
+        return result
 
-    @cached_property
+    @property
     def variants(self) -> list[Row]:
-        """Output of `forests variants`."""
-        loaded: list[Row] = self.read_json("variants.json")
-        return loaded
+        """Rows of `forests variants`."""
+        rows: list[Row] = self.found["variants"]["result"]
+        return rows
 
-    @cached_property
+    @property
     def curve(self) -> list[Row]:
-        """Output of `forests curve`."""
-        loaded: list[Row] = self.read_json("curve.json")
-        return loaded
+        """Rows of `forests curve`."""
+        rows: list[Row] = self.found["curve"]["result"]
+        return rows
+
+    def record(self, name: str) -> dict[str, Any]:
+        """Provenance of a measurement."""
+        record: dict[str, Any] = self.found[name]["provenance"]
+        return record
 
 
 def study_beside(config: str | Path) -> ForestsStudy:

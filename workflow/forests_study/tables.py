@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
-from carillon import provenance as origin
 from workflow.forests_study import cost_tables
-from workflow.forests_study.results import ForestsStudy, Row
+from workflow.forests_study.results import MEASUREMENTS, ForestsStudy, Row
 from workflow.report import blocks_tables
+from workflow.report.conditions import ONE_COLD_RUN, Conditions, conditions
 from workflow.report.evidence_tables import provenance_table
 from workflow.report.forests_tables import scores_rows, scores_table
 from workflow.report.table import Column, Table
@@ -17,7 +18,7 @@ SCORES = (
     ("rms_log_solid", "rms of log E, solid", "fraction"),
     ("rms_log_partly_void", "rms of log E, partly void", "fraction"),
     ("median_error", "median error of E", "percent"),
-    ("r2_log", "R² of log E", "fraction"),
+    ("r2_log", "R² of log E", "score"),
 )
 """What is shown of the scores on one distribution: key, label, kind."""
 
@@ -41,12 +42,19 @@ def model(study: ForestsStudy) -> Table:
 
 def blocks(study: ForestsStudy) -> Table:
     """Errors on single blocks, a row a coarsening."""
-    return blocks_tables.overview(study.blocks)
+    return _on_blocks(blocks_tables.overview(study.blocks), study)
 
 
 def every_block(study: ForestsStudy) -> Table:
     """Errors on single blocks, a row a coarsening and kind of blocks."""
-    return blocks_tables.every_row(study.blocks)
+    return _on_blocks(blocks_tables.every_row(study.blocks), study)
+
+
+def _on_blocks(table: Table, study: ForestsStudy) -> Table:
+    repeats = blocks_tables.repeats(study.blocks)
+    return replace(
+        table, conditions=conditions({"all": study.record("blocks")}, study.config, repeats)
+    )
 
 
 def variants(study: ForestsStudy) -> Table:
@@ -57,6 +65,7 @@ def variants(study: ForestsStudy) -> Table:
         f"“the same” refers to the training of the default forests. {SCORED}",
         Column("variant", "Training"),
         study.variants,
+        conditions({"all": study.record("variants")}, study.config, ONE_COLD_RUN),
     )
 
 
@@ -67,10 +76,13 @@ def curve(study: ForestsStudy) -> Table:
         f"The same training on more and more rows, eight to a block. {SCORED}",
         Column("rows", "Rows", "count"),
         study.curve,
+        conditions({"all": study.record("curve")}, study.config, ONE_COLD_RUN),
     )
 
 
-def _scored(name: str, caption: str, first: Column, found: Sequence[Row]) -> Table:
+def _scored(
+    name: str, caption: str, first: Column, found: Sequence[Row], measured: Conditions | None
+) -> Table:
     distributions = list(found[0]["scores"])
     columns = [
         first,
@@ -83,7 +95,13 @@ def _scored(name: str, caption: str, first: Column, found: Sequence[Row]) -> Tab
         for index, (key, label, kind) in enumerate(SCORES):
             head = f"{_spelt(distribution)}: {label}" if index == 0 else label
             columns.append(Column(f"scores{number}_{key}", head, kind))
-    return Table(name, caption, columns, [_scored_row(row, distributions) for row in found])
+    return Table(
+        name,
+        caption,
+        columns,
+        [_scored_row(row, distributions) for row in found],
+        conditions=measured,
+    )
 
 
 def _scored_row(row: Row, distributions: Sequence[str]) -> dict[str, Any]:
@@ -100,11 +118,10 @@ def _spelt(distribution: str) -> str:
 
 def provenance(study: ForestsStudy) -> Table:
     """Command, code and machine behind the forests, and behind their study."""
-    ours = origin.record(study.config["forests_study"] | study.config["default_forest"])
     return provenance_table(
         {
             study.model["path"]: study.model["provenance"],
-            "forests_study/*.json": {**ours, "command": "snakemake forests_study"},
+            **{f"forests_study/{name}.json": study.record(name) for name in MEASUREMENTS},
         }
     )
 

@@ -66,6 +66,7 @@ def convergence(found: Mapping[str, dict[str, Any]], titles: Mapping[str, str]) 
             for curve in history["histories"]
             for step, errors in enumerate(curve["eigenvalue_error"])
         ],
+        ["model", "start", "acceleration", "corrections"],
     )
 
 

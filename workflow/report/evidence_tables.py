@@ -37,6 +37,7 @@ def evidence(results: Results) -> Table:
             for model, spectra in results.spectra.items()
             for variant, spectrum in spectra.items()
         ],
+        ["model", "variant"],
     )
 
 
@@ -62,14 +63,17 @@ def provenance(results: Results) -> Table:
     """Command, code and machine behind every result file."""
     origins = {f"dataset/{name}.h5": shard["provenance"] for name, shard in results.shards.items()}
     origins["forests/forests.h5"] = results.forests["provenance"]
+    origins["forests/table.json"] = results.blocks_record
     for model, spectra in results.spectra.items():
         for variant, spectrum in spectra.items():
             origins[f"models/{model}/{variant}.h5"] = spectrum.provenance
         if model in results.convergence:
             history = results.convergence[model]
-            origins[f"models/{model}/convergence.json"] = history.get("provenance", {})
+            origins[f"models/{model}/convergence.json"] = history["provenance"]
         if model in results.methods:
             origins[f"models/{model}/methods.json"] = results.methods[model]["provenance"]
+        if model in results.scaling:
+            origins[f"models/{model}/scaling.json"] = results.scaling[model]["provenance"]
     return provenance_table(origins)
 
 

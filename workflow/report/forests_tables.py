@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from workflow.report.blocks_tables import overview
 from workflow.report.numbers import show
 from workflow.report.results import Results
-from workflow.report.table import Column, Table
+from workflow.report.table import KIND, Column, Table
 
 LABELS = {
     "training_samples": "Blocks trained on",
@@ -30,15 +29,25 @@ LABELS = {
 """Scores of `forests inspect` for people; a score without a label is shown by its own name."""
 
 
+SCORE_KINDS = {
+    "training_samples": "count",
+    "held_out_samples": "count",
+    "depth": "count",
+    "r2": "score",
+    "rms_log": "fraction",
+}
+"""Kinds of scores by how their names begin; the others are errors in per cent."""
+
+
 def training(results: Results) -> Table:
     """Counts and held-out scores."""
     shards, forests = list(results.shards.values()), results.forests
     rows = [
         _row("distributions", "Distributions of the moduli", "text", _distributions(results)),
         _row("fits", "Blocks drawn and fitted", "count", _fits(shards)),
-        _row("converged", "… whose fit converged", "percent", _mean(shards, "converged")),
-        _row("partly_void", "… that are partly void", "percent", _mean(shards, "partly_void")),
-        _row("at_floor", "… moduli that ended at the floor", "percent", _mean(shards, "at_floor")),
+        _row("converged", "… whose fit converged", "share", _mean(shards, "converged")),
+        _row("partly_void", "… that are partly void", "share", _mean(shards, "partly_void")),
+        _row("at_floor", "… moduli that ended at the floor", "share", _mean(shards, "at_floor")),
     ]
     return scores_table(
         "training",
@@ -78,14 +87,10 @@ def scores_table(name: str, caption: str, rows: list[dict[str, Any]]) -> Table:
             Column("quantity", "Quantity"),
             Column("shown", "Value"),
             Column("value", "Raw value", shown=False),
+            Column(f"value{KIND}", "Its kind", shown=False),
         ],
         rows,
     )
-
-
-def blocks(results: Results) -> Table:
-    """Error, cost and storage on single blocks, as in Fig. 9 of the paper."""
-    return overview(results.blocks)
 
 
 def _row(key: str, label: str, kind: str, value: Any) -> dict[str, Any]:
@@ -94,14 +99,12 @@ def _row(key: str, label: str, kind: str, value: Any) -> dict[str, Any]:
         "quantity": label,
         "shown": show(value, kind).replace(" ", "\N{NO-BREAK SPACE}"),
         "value": value,
+        f"value{KIND}": kind,
     }
 
 
 def _score(name: str, value: float) -> dict[str, Any]:
-    if name.endswith("samples") or name == "depth":
-        kind = "count"
-    else:
-        kind = "fraction" if name.startswith(("r2", "rms_log")) else "percent"
+    kind = next((kind for start, kind in SCORE_KINDS.items() if name.startswith(start)), "percent")
     return _row(name, LABELS.get(name, name.replace("_", " ")), kind, value)
 
 

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from workflow.report.methods_tables import METHODS
 from workflow.report.style import COLOURS, FAINT, INK, MUTED, SETTINGS
-from workflow.report.table import Table
+from workflow.report.table import LEAST, MOST, Table
 
 METHOD_COLOURS = {
     "arpack": MUTED,
@@ -36,8 +36,8 @@ def methods_figure(methods: Table) -> Figure:
                 if row.get(name) is not None
             ]
             medians = [row[name] for _, row in rows]
-            below = [row[name] - row[f"{name}_min"] for _, row in rows]
-            above = [row[f"{name}_max"] - row[name] for _, row in rows]
+            below = [row[name] - row[f"{name}{LEAST}"] for _, row in rows]
+            above = [row[f"{name}{MOST}"] - row[name] for _, row in rows]
             axes.barh(
                 [at for at, _ in rows],
                 medians,

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from workflow.report.table import Column, Table
+from workflow.report.conditions import IN_COLUMNS, Repeats
+from workflow.report.table import LEAST, MOST, Column, Table
 
 Row = dict[str, Any]
 
@@ -35,9 +36,9 @@ def methods(found: Mapping[str, Row], titles: Mapping[str, str]) -> Table:
     """
     timed = [name for name in METHODS if any(row["seconds"].get(name) for row in found.values())]
     extremes = [
-        Column(f"{name}_{end}", f"{METHODS[name]}, {end}", "seconds", "s", shown=False)
+        Column(f"{name}{end}", f"{METHODS[name]}, {label}", "seconds", "s", shown=False)
         for name in timed
-        for end in ("min", "max")
+        for end, label in ((LEAST, "least"), (MOST, "most"))
     ]
     return Table(
         "methods",
@@ -59,13 +60,21 @@ def methods(found: Mapping[str, Row], titles: Mapping[str, str]) -> Table:
     )
 
 
-def _caption(found: Mapping[str, Row]) -> str:
+def repeats(found: Mapping[str, Row]) -> Repeats:
+    """How often every method ran."""
+    return Repeats(f"{_rounds(found)}, all methods in turn", IN_COLUMNS)
+
+
+def _rounds(found: Mapping[str, Row], counted: str = "") -> str:
     runs = sorted({row["runs"]["slepc"] for row in found.values()})
     slow = sorted({row["runs"]["arpack"] for row in found.values() if "arpack" in row["runs"]})
-    rounds = " or ".join(map(str, runs))
     less = f" (ARPACK {' or '.join(map(str, slow))})" if slow and slow != runs else ""
+    return f"{' or '.join(map(str, runs))}{counted}{less}"
+
+
+def _caption(found: Mapping[str, Row]) -> str:
     return (
-        f"Median wall seconds of {rounds} rounds{less} in which every method runs once, from "
+        f"Median wall seconds of {_rounds(found, ' rounds')} in which every method runs once, from "
         "moduli to modes: coarsening, assembly and solution. Precomputation is what the meshes "
         "need once for any material, fine and coarse. Checks of the results are not timed. DDFEM* "
         "alone is coarsening and SLEPc on the coarse mesh. The warm run follows moduli that "
@@ -93,9 +102,9 @@ def _configuration(row: Row) -> str:
 def _methods_row(model: str, title: str, row: Row) -> Row:
     coarse = row["frequency_error"].get("ddfem", {})
     extremes = {
-        f"{name}_{end}": between[end]
+        key: value
         for name, between in row["spread"].items()
-        for end in ("min", "max")
+        for key, value in _spread(name, between["min"], between["max"]).items()
     }
     return {
         "model": model,
@@ -120,9 +129,9 @@ def spreads(found: Mapping[str, Row], titles: Mapping[str, str]) -> Table:
             *_IDENTITY,
             Column("method", "Method"),
             Column("runs", "Runs", "count"),
-            Column("median", "Median", "seconds", "s"),
-            Column("least", "least", "seconds", "s"),
-            Column("most", "most", "seconds", "s"),
+            Column("seconds", "Median", "seconds", "s"),
+            Column(f"seconds{LEAST}", "least", "seconds", "s"),
+            Column(f"seconds{MOST}", "most", "seconds", "s"),
             Column("error_median", "Error, median", "percent"),
             Column("error_p90", "90 % below", "percent"),
             Column("error_max", "worst", "percent"),
@@ -133,6 +142,7 @@ def spreads(found: Mapping[str, Row], titles: Mapping[str, str]) -> Table:
             for name in METHODS
             if name in row["spread"]
         ],
+        ["model", "method"],
     )
 
 
@@ -143,9 +153,8 @@ def _spread_row(model: str, title: str, name: str, row: Row) -> Row:
         "title": title,
         "method": METHODS[name],
         "runs": row["runs"][name],
-        "median": row["seconds"][name],
-        "least": row["spread"][name]["min"],
-        "most": row["spread"][name]["max"],
+        "seconds": row["seconds"][name],
+        **_spread("seconds", row["spread"][name]["min"], row["spread"][name]["max"]),
         **{f"error_{key}": value for key, value in errors.items()},
     }
 
@@ -156,13 +165,18 @@ def ratios(found: Mapping[str, Row], titles: Mapping[str, str]) -> Table:
         "ratios",
         "Speed-ups: median time of the base over that of the method; with precomputation, the "
         "method’s partition, sparsity and elimination plan are added to its time, and nothing to "
-        "that of the base.",
+        "that of the base. Least is the fastest run of the base over the slowest of the method, "
+        "most the other way round.",
         [
             *_IDENTITY,
             Column("method", "Method"),
             Column("base", "Base"),
             Column("ratio", "Speed-up", "times"),
+            Column(f"ratio{LEAST}", "least", "times"),
+            Column(f"ratio{MOST}", "most", "times"),
             Column("with_precompute", "with precomputation", "times"),
+            Column(f"with_precompute{LEAST}", "least", "times", shown=False),
+            Column(f"with_precompute{MOST}", "most", "times", shown=False),
         ],
         [
             {
@@ -170,11 +184,36 @@ def ratios(found: Mapping[str, Row], titles: Mapping[str, str]) -> Table:
                 "title": titles[model],
                 "method": METHODS[method],
                 "base": METHODS[base],
-                "ratio": ratio,
-                "with_precompute": row["speedup_with_precompute"][method][base],
+                **_ratio("ratio", row, method, base, row["speedup"]),
+                **_ratio("with_precompute", row, method, base, row["speedup_with_precompute"]),
             }
             for model, row in found.items()
             for method, bases in row["speedup"].items()
-            for base, ratio in bases.items()
+            for base in bases
         ],
+        ["model", "method", "base"],
     )
+
+
+def _ratio(
+    key: str, row: Row, method: str, base: str, ratios: Mapping[str, Mapping[str, float]]
+) -> Row:
+    """A speed-up with its extremes: the fastest base over the slowest method, and vice versa.
+
+    What the method needs beforehand, if that counts, is the same in both.
+    """
+    ratio = ratios[method][base]
+    seconds, spread = row["seconds"], row["spread"]
+    before = seconds[base] / ratio - seconds[method]
+    return {
+        key: ratio,
+        **_spread(
+            key,
+            spread[base]["min"] / (spread[method]["max"] + before),
+            spread[base]["max"] / (spread[method]["min"] + before),
+        ),
+    }
+
+
+def _spread(key: str, least: float, most: float) -> Row:
+    return {f"{key}{LEAST}": least, f"{key}{MOST}": most}

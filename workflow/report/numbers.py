@@ -15,8 +15,10 @@ _SUPERSCRIPTS = dict(zip(map(ord, "-0123456789"), "⁻⁰¹²³⁴⁵⁶⁷⁸�
 def show(value: Any, kind: str = "text") -> str:
     """Format `value` by the kind of its column.
 
-    Kinds: `text`, `count`, `hertz`, `percent` (of a fraction), `seconds`, `times` (a ratio),
-    `small` (an error or residual), `angle` (of radians), `bytes`, `fraction`, `range` (of GPa).
+    Kinds of errors: `percent` (of a fraction), `fraction`, `small` (also residuals), `angle` (of
+    radians). Others: `text`, `count`, `hertz`, `seconds`, `modelled` (seconds that nobody
+    measured), `times` (a ratio, the more the better), `score` (a fraction, likewise), `share` (per
+    cent that are neither good nor bad), `bytes`, `range` (of GPa).
 
     Examples
     --------
@@ -87,6 +89,9 @@ _FORMATS: dict[str, Callable[[Any], str]] = {
     "times": lambda value: f"{_digits(value, 2)}×",
     "small": _small,
     "angle": _angle,
+    "modelled": _seconds,
+    "share": _percent,
+    "score": lambda value: _digits(value, 3),
     "bytes": _bytes,
     "fraction": lambda value: _digits(value, 3),
     "range": lambda value: f"{value[0]:,.0f}…{value[1]:,.0f}",

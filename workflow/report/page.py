@@ -10,10 +10,12 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup
 
+from workflow.report.conditions import LABELS
 from workflow.report.convergence_tables import convergence_sentences
 from workflow.report.findings import findings
 from workflow.report.numbers import show
 from workflow.report.results import Results
+from workflow.report.scaling_tables import assumptions
 from workflow.report.style import themed
 from workflow.report.table import Table, read_table
 from workflow.report.tables import BUILDERS
@@ -49,6 +51,15 @@ def render(results: Results) -> str:
             for model in results.config["convergence"]["models"]
         ],
         convergence_sentences=convergence_sentences(tables["convergence"]),
+        scaling=[
+            {
+                "name": model,
+                "title": results.title(model),
+                "plot": inline(results.figure(f"{model}-scaling.svg")),
+            }
+            for model in results.config["scaling"]["models"]
+        ],
+        assumptions=assumptions(results.scaling),
         times=inline(results.figure("times.svg")),
         methods=inline(results.figure("methods.svg")) if tables["methods"].rows else "",
     )
@@ -64,6 +75,7 @@ def page_template(name: str) -> Template:
         lstrip_blocks=True,
     )
     environment.filters["show"] = unbroken
+    environment.globals["condition_labels"] = LABELS
     environment.globals["style"] = Markup((HERE / "page.css").read_text())
     return environment.get_template(name)
 

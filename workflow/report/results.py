@@ -108,9 +108,27 @@ class Results:
 
     @cached_property
     def blocks(self) -> list[dict[str, Any]]:
-        """Output of `forests table`: how the coarsenings do on single blocks."""
-        loaded: list[dict[str, Any]] = self._json("forests", "table.json")
+        """Rows of `forests table`: how the coarsenings do on single blocks."""
+        loaded: list[dict[str, Any]] = self._blocks_file["result"]
         return loaded
+
+    @property
+    def blocks_record(self) -> dict[str, Any]:
+        """Provenance of `forests table`."""
+        loaded: dict[str, Any] = self._blocks_file["provenance"]
+        return loaded
+
+    @cached_property
+    def _blocks_file(self) -> Any:
+        return self._json("forests", "table.json")
+
+    @cached_property
+    def scaling(self) -> dict[str, dict[str, Any]]:
+        """Output of `solver scaling` for the models that have one."""
+        return {
+            model: self._json("models", model, "scaling.json")
+            for model in self.config["scaling"]["models"]
+        }
 
     def _json(self, *parts: str) -> Any:
         return json.loads(self.folder.joinpath(*parts).read_text())

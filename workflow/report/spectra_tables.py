@@ -65,6 +65,7 @@ def frequencies(results: Results) -> Table:
         "against SLEPc on the fine mesh.",
         columns,
         [row for model in results.models for row in _frequency_rows(results, model)],
+        ["model", "mode"],
     )
 
 
@@ -112,6 +113,7 @@ def errors(results: Results) -> Table:
             for variant, comparison in results.comparisons[model].items()
             if variant in CANDIDATES
         ],
+        ["model", "variant"],
     )
 
 

@@ -1,4 +1,11 @@
-"""A table that is written once and read as CSV, Markdown or HTML."""
+"""A table that is written once and read as CSV, Markdown or HTML.
+
+The CSV file begins with lines `# key: value`: which columns tell rows apart, of what kind each
+column is, and under which conditions the numbers were measured. Readers skip them as comments, for
+instance `pandas.read_csv(path, comment="#")`. Where a number was measured several times, the
+columns `NAME_least` and `NAME_most` hold the spread of the column `NAME`; a column `NAME_kind` says
+of what kind the values of `NAME` are, row by row.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +13,17 @@ import csv
 import io
 import json
 from dataclasses import asdict, dataclass, field
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
 from carillon.files import atomic_path
+from workflow.report.conditions import Conditions, read_conditions
 from workflow.report.numbers import show
+
+LEAST, MOST, KIND = "_least", "_most", "_kind"
+"""Endings of columns that tell something about another column."""
+COMMENT = "# "
 
 
 @dataclass(frozen=True)
@@ -50,12 +63,18 @@ class Table:
         What the table shows, over which modes, against which base.
     columns, rows
         The rows are dictionaries by column key; a missing key is a missing value.
+    keys
+        Columns that tell the rows apart; the first one if empty.
+    conditions
+        Under which the numbers were measured; None if nothing says so.
     """
 
     name: str
     caption: str
     columns: list[Column]
     rows: list[dict[str, Any]] = field(default_factory=list)
+    keys: list[str] = field(default_factory=list)
+    conditions: Conditions | None = None
 
     @property
     def shown(self) -> list[Column]:
@@ -67,8 +86,14 @@ class Table:
         return [show(row.get(column.key), column.kind) for column in self.shown]
 
     def as_csv(self) -> str:
-        """Raw values, SI units in the head."""
+        """Raw values, SI units in the head, below lines about the table."""
+        about = {
+            "keys": ", ".join(self.keys or [self.columns[0].key]),
+            "kinds": ", ".join(column.kind for column in self.columns),
+            **(self.conditions.told if self.conditions else {}),
+        }
         text = io.StringIO()
+        text.writelines(f"{COMMENT}{key}: {value}\n" for key, value in about.items())
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(
             f"{column.key} [{column.unit}]" if column.unit else column.key
@@ -79,13 +104,15 @@ class Table:
         return text.getvalue()
 
     def as_markdown(self) -> str:
-        """Formatted values below the caption."""
+        """Formatted values below the caption, and the conditions below them."""
         heads = [column.label for column in self.shown]
         rules = ["---" if column.kind == "text" else "---:" for column in self.shown]
         lines = [heads, rules, *map(self.cells, self.rows)]
-        return f"{self.caption}\n\n" + "".join(
+        table = "".join(
             f"| {' | '.join(cell.replace('|', '/') for cell in line)} |\n" for line in lines
         )
+        below = f"\n{self.conditions.as_markdown()}" if self.conditions else ""
+        return f"{self.caption}\n\n{table}{below}"
 
 
 def write_table(table: Table, folder: str | Path) -> None:
@@ -104,7 +131,42 @@ def read_table(path: str | Path) -> Table:
     """Read a table back from its JSON file."""
     loaded = json.loads(Path(path).read_text())
     columns = [Column(**column) for column in loaded.pop("columns")]
-    return Table(columns=columns, **loaded)
+    conditions = read_conditions(loaded.pop("conditions", None) or {})
+    return Table(columns=columns, conditions=conditions, **loaded)
+
+
+def read_csv_table(path: str | Path) -> Table:
+    """Read a table back from its CSV file, which has neither caption nor labels."""
+    lines = Path(path).read_text().splitlines()
+    comments = list(takewhile(lambda line: line.startswith(COMMENT), lines))
+    about = dict(line.removeprefix(COMMENT).split(": ", 1) for line in comments)
+    heads, *rows = csv.reader(lines[len(comments) :])
+    kinds = about["kinds"].split(", ")
+    columns = [_column_of(head, kind) for head, kind in zip(heads, kinds, strict=True)]
+    return Table(
+        Path(path).stem,
+        "",
+        columns,
+        [
+            {column.key: _value_of(text, column) for column, text in zip(columns, row)}
+            for row in rows
+        ],
+        about["keys"].split(", "),
+        read_conditions(about),
+    )
+
+
+def _column_of(head: str, kind: str) -> Column:
+    key, _, unit = head.partition(" [")
+    return Column(key, key, kind, unit.removesuffix("]"))
+
+
+def _value_of(text: str, column: Column) -> Any:
+    if not text:
+        return None
+    if column.kind in ("text", "range"):
+        return text
+    return int(text) if text.isdigit() else float(text)
 
 
 def _raw(value: Any) -> Any:

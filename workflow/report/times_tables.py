@@ -80,4 +80,5 @@ def phases(results: Results) -> Table:
             for variant, spectrum in spectra.items()
             for phase, seconds in spectrum.attributes["timings"].items()
         ],
+        ["model", "variant", "phase"],
     )

@@ -133,6 +133,9 @@ rule build_report:
         ),
         times=f"{RESULTS}/figures/times.svg",
         methods=[f"{RESULTS}/figures/methods.svg"] if config["times"]["models"] else [],
+        scaling=expand(
+            f"{RESULTS}/figures/{{model}}-scaling.svg", model=config["scaling"]["models"]
+        ),
         templates=[
             Path(workflow.basedir, "workflow/report", name)
             for name in ("page.html.j2", "base.html.j2", "macros.html.j2", "page.css")

@@ -7,8 +7,10 @@ TABLES = [
     "coarsening",
     "times",
     "methods",
+    "spreads",
     "ratios",
     "convergence",
+    "scaling",
     "phases",
     "training",
     "blocks",
@@ -28,7 +30,7 @@ rule save_config:
         runtime="5m",
     params:
         source=source("workflow.scripts.save_config"),
-        config=config,
+        config=settings.resolved(config),
     script:
         "../scripts/save_config.py"
 
@@ -54,6 +56,9 @@ rule tabulate_results:
             model=config["convergence"]["models"],
         ),
         methods=expand(f"{RESULTS}/models/{{model}}/methods.json", model=config["times"]["models"]),
+        scaling=expand(
+            f"{RESULTS}/models/{{model}}/scaling.json", model=config["scaling"]["models"]
+        ),
     output:
         expand(
             f"{RESULTS}/tables/{{table}}.{{kind}}",

@@ -1,0 +1,29 @@
+# Wall time over MPI ranks, in the report of the run: a small solid on few ranks. More of both are
+# part of target figures.
+
+
+use rule measure_scaling as measure_scaling_of_run with:
+    input:
+        model_files,
+    output:
+        f"{RESULTS}/models/{{model}}/scaling.json",
+    log:
+        f"{LOGS}/models/{{model}}/scaling.log",
+    benchmark:
+        f"{BENCHMARKS}/models/{{model}}/scaling.tsv"
+    params:
+        source=source("solver.scaling", "solver.__main__"),
+        shape=lambda wildcards: model_arguments(wildcards, config["scaling"]["resolution"]),
+        modes=config["scaling"]["modes"],
+        ranks=",".join(map(str, config["scaling"]["ranks"])),
+        weak="",
+
+
+use rule plot_scaling as plot_scaling_of_run with:
+    input:
+        scaling=f"{RESULTS}/models/{{model}}/scaling.json",
+    output:
+        svg=f"{RESULTS}/figures/{{model}}-scaling.svg",
+        png=f"{RESULTS}/figures/{{model}}-scaling.png",
+    log:
+        f"{LOGS}/figures/{{model}}-scaling.log",
