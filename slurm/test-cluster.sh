@@ -2,16 +2,19 @@
 # A throw-away SLURM cluster of one node, this machine, for tests and first tries:
 #
 #   slurm/test-cluster.sh install        Debian's or Ubuntu's packages (needs root or sudo)
-#   slurm/test-cluster.sh start FOLDER   munged, slurmctld and slurmd (needs root); then
-#   export SLURM_CONF=FOLDER/slurm.conf  for sbatch, srun, squeue and snakemake --profile slurm
+#   slurm/test-cluster.sh start FOLDER   munged, slurmctld and slurmd (needs root); from then on
+#                                        sbatch, srun, squeue and snakemake --profile slurm work
 #   slurm/test-cluster.sh fail FOLDER    the node dies: slurmd and all processes of its jobs
 #   slurm/test-cluster.sh repair FOLDER  it comes back
 #   slurm/test-cluster.sh stop FOLDER
 #
-# Everything it writes is in FOLDER; a SLURM that the machine may have is not touched. CPUS and
-# MEMORY_MB in the environment say what the node has, the machine's cores and three quarters of its
-# memory otherwise. There is no accounting (sacct), so the profile's status command has to be squeue.
+# Everything it writes is in FOLDER, but for a link /etc/slurm/slurm.conf while it runs; a machine
+# that has a SLURM of its own is left alone. CPUS and MEMORY_MB in the environment say what the node
+# has, the machine's cores and three quarters of its memory otherwise. There is no accounting (sacct).
 set -euo pipefail
+
+# Where all of SLURM's programs look, also in jobs, whose environment may be another one.
+LINK=/etc/slurm/slurm.conf
 
 fail() {
     echo "test-cluster: $*" >&2
@@ -99,13 +102,15 @@ start() {
     [ "$(id -u)" -eq 0 ] || fail "the daemons have to be started by root"
     command -v slurmctld slurmd sbatch munged >/dev/null || fail "no SLURM here; run $0 install"
     [ ! -e "$FOLDER/slurm.conf" ] || fail "$FOLDER holds a cluster already; stop it, or name another folder"
+    [ ! -e "$LINK" ] || fail "this machine has a SLURM already: $(readlink -f "$LINK")"
     configure
+    mkdir -p "$(dirname "$LINK")"
+    ln -sf "$FOLDER/slurm.conf" "$LINK"
     start_munge
     slurmctld
     slurmd
     for _ in $(seq 100); do
         if sinfo --noheader --format %T 2>/dev/null | grep -q idle; then
-            echo "export SLURM_CONF=$SLURM_CONF"
             return
         fi
         sleep 0.2
@@ -129,28 +134,26 @@ fail_node() {
     kill -KILL "$(cat "$FOLDER/slurmd.pid")" 2>/dev/null || true
     # Every job has a slurmstepd, which outlives slurmd, but not a node.
     for step in $(pgrep -x slurmstepd || true); do
-        if tr '\0' '\n' <"/proc/$step/environ" 2>/dev/null | grep -qx "SLURM_CONF=$SLURM_CONF"; then
-            kill_tree "$step"
-        fi
+        kill_tree "$step"
     done
 }
 
 stop() {
     local name
+    [ "$(readlink -f "$LINK")" = "$FOLDER/slurm.conf" ] || fail "no cluster runs in $FOLDER"
     scancel --user root 2>/dev/null || true
     fail_node
     for name in slurmctld munge; do
         [ ! -f "$FOLDER/$name.pid" ] || kill "$(cat "$FOLDER/$name.pid")" 2>/dev/null || true
     done
-    rm -f "$FOLDER/slurm.conf"
+    rm -f "$LINK" "$FOLDER/slurm.conf"
 }
 
 ACTION=${1:-}
 if [ "$ACTION" != install ]; then
     [ $# -eq 2 ] || fail "usage: $0 install | start FOLDER | fail FOLDER | repair FOLDER | stop FOLDER"
     mkdir -p "$2"
-    FOLDER=$(cd "$2" && pwd)
-    export SLURM_CONF=$FOLDER/slurm.conf
+    FOLDER=$(cd "$2" && pwd -P)
 fi
 case $ACTION in
 install) install ;;

@@ -1,0 +1,30 @@
+"""What a process in a job of SLURM has to forget before MPI is loaded.
+
+`srun` without `--mpi` starts a process as the only task of a step and hands it no way to find other
+ranks. Open MPI sees the step, looks for the way, and aborts; without the step's number it starts as
+a single rank.
+"""
+
+from __future__ import annotations
+
+from collections.abc import MutableMapping
+
+_STEP = ("SLURM_STEP_ID", "SLURM_STEPID")
+_LAUNCHERS = ("PMIX_", "PMI_", "OMPI_COMM_WORLD_")
+
+
+def leave_lone_step(environment: MutableMapping[str, str]) -> None:
+    """Forget the step of a process that is its only task and was not started as an MPI rank.
+
+    Examples
+    --------
+    >>> environment = {"SLURM_STEP_ID": "0", "SLURM_STEP_NUM_TASKS": "1"}
+    >>> leave_lone_step(environment)
+    >>> environment
+    {'SLURM_STEP_NUM_TASKS': '1'}
+    """
+    if environment.get("SLURM_STEP_NUM_TASKS") != "1":
+        return
+    if not any(name.startswith(_LAUNCHERS) for name in environment):
+        for name in _STEP:
+            environment.pop(name, None)
