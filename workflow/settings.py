@@ -19,6 +19,8 @@ from workflow import training
 
 PLACES = ("results_dir", "mesh_folder", "baseline")
 """Keys that say where something lies, on which no result depends."""
+DEFAULT_FORESTS = "default"
+"""Name of the forests that come with the package."""
 SCHEMA = Path(__file__).parent / "schemas" / "config.schema.yaml"
 BUILTIN = "builtin:"
 
@@ -60,7 +62,7 @@ def check_links(config: Mapping[str, Any]) -> None:
     Raises
     ------
     UserError
-        If a model's mesh or material does not exist, a list of models names none,
+        If a model's mesh or material or the forests do not exist, a list of models names none,
         `objectives.objectives` names no objective, or training data make no sense.
     """
     for name in config["models"]:
@@ -75,6 +77,12 @@ def check_links(config: Mapping[str, Any]) -> None:
     for part in ("convergence", "scaling"):
         figures = config["figures"]
         _require_models(f"figures.{part}", figures[part], figures["models"])
+    forests = forests_file(config)
+    if forests is not None and not Path(forests).is_file():
+        raise UserError(
+            f"forests.model: there is no file {forests}; name one that python -m forests train "
+            f"wrote, {DEFAULT_FORESTS} for those of the package, or null to train some"
+        )
     for plan in (training.own(config), training.default(config)):
         plan.check()
     training.check_study(config)
@@ -101,6 +109,23 @@ def model_files(config: Mapping[str, Any], model: str) -> list[str]:
     mesh, material = mesh_of(config, model), material_of(config, model)
     files = [] if mesh.startswith(BUILTIN) else [mesh]
     return files if material in MATERIALS else [*files, material]
+
+
+def forests_file(config: Mapping[str, Any]) -> str | None:
+    """Forests to coarsen by that are there already; None if the run trains its own.
+
+    Raises
+    ------
+    UserError
+        If no forests come with the package, but are wanted.
+    """
+    named: str | None = config["forests"]["model"]
+    return str(forest_model.default_path()) if named == DEFAULT_FORESTS else named
+
+
+def own_shards(config: Mapping[str, Any]) -> list[str]:
+    """Names of the run's training data; none if it trains no forests."""
+    return [] if config["forests"]["model"] else training.own(config).shards
 
 
 def modes_of(config: Mapping[str, Any], model: str) -> int:

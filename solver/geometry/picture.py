@@ -24,8 +24,12 @@ FACE_DIRECTIONS = np.array(
 #: Colour of a body that shows no values.
 PLAIN = (0.90, 0.80, 0.64)
 
-#: Share of the object's diagonal that the largest displacement is drawn with.
+#: Elevation and azimuth of the eye [degrees].
+VIEW = (22.0, -58.0)
+
+#: Shares of the object's diagonal: the largest displacement that is drawn, and an arrow.
 DRAWN_AMPLITUDE = 0.08
+ARROW_LENGTH = 0.22
 
 
 def surface_quads(mesh: HexMesh) -> np.ndarray:
@@ -40,7 +44,7 @@ def draw(
     values: np.ndarray | None = None,
     scale: float | str = "auto",
     up: str = "auto",
-    view: tuple[float, float] = (22.0, -58.0),
+    view: tuple[float, float] = VIEW,
     cmap: str = "viridis",
     limits: tuple[float, float] | None = None,
 ) -> Poly3DCollection:
@@ -106,6 +110,72 @@ def draw(
     ax.add_collection3d(polygons)
     _frame(ax, points[np.unique(quads)], view)
     return polygons
+
+
+def draw_surface(
+    ax: Axes3D,
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    mesh: HexMesh,
+    up: str = "auto",
+    view: tuple[float, float] = VIEW,
+) -> None:
+    """Draw triangles as `draw` draws their voxels: in the same place, size and light.
+
+    Parameters
+    ----------
+    vertices, faces : (v, 3) [m] and (f, 3), wound either way.
+    mesh : the voxels.
+    """
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    turn = _rotation(guess_up(mesh) if up == "auto" else up)
+    corners = (np.asarray(vertices) @ turn.T)[faces]
+    normal = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    towards = normal @ _direction(*np.radians(view))
+    normal *= np.where(towards < 0.0, -1.0, 1.0)[:, None]
+    colours = np.clip(np.array(PLAIN) * _brightness(normal, view)[:, None], 0, 1)
+    polygons = Poly3DCollection(corners, facecolors=colours, edgecolors=colours)
+    polygons.set_linewidth(0.2)
+    ax.add_collection3d(polygons)
+    _frame(ax, mesh.nodes[np.unique(surface_quads(mesh))] @ turn.T, view)
+
+
+def mark(
+    ax: Axes3D,
+    mesh: HexMesh,
+    point: np.ndarray,
+    colour: str,
+    inward: np.ndarray | None = None,
+    up: str = "auto",
+) -> None:
+    """Mark a point (3,) [m] of a drawn mesh: by an arrow that pushes `inward`, else by a ring."""
+    turn = _rotation(guess_up(mesh) if up == "auto" else up)
+    tip = turn @ point
+    style = {"zorder": 10, "clip_on": False}
+    if inward is None:
+        ax.plot(*tip[:, None], "o", color=colour, fillstyle="none", ms=13, mew=2.4, **style)
+        return
+    length = ARROW_LENGTH * np.linalg.norm(np.ptp(mesh.nodes, axis=0))
+    ax.quiver(
+        *(tip - length * (turn @ inward)),
+        *(length * (turn @ inward)),
+        color=colour,
+        linewidth=2.6,
+        arrow_length_ratio=0.4,
+        **style,
+    )
+
+
+def view_of(mesh: HexMesh, outward: np.ndarray, up: str = "auto") -> tuple[float, float]:
+    """Elevation and azimuth [degrees] from where the sides that look `outward` (d, 3) are seen."""
+    turned = outward @ _rotation(guess_up(mesh) if up == "auto" else up).T
+    azimuths = VIEW[1] + np.arange(0.0, 360.0, 15.0)
+    seen = [
+        (turned @ _direction(np.radians(VIEW[0]), np.radians(azimuth))).min()
+        for azimuth in azimuths
+    ]
+    return VIEW[0], float(azimuths[int(np.argmax(seen))])
 
 
 def guess_up(mesh: HexMesh) -> str:
@@ -190,7 +260,10 @@ def _light(
         at_nodes = np.zeros_like(points)
         np.add.at(at_nodes, quads, smooth[:, None, :])
         smooth = _unit(_unit(at_nodes)[quads].mean(axis=1))
-    normal = _unit(normal + 1.2 * smooth)
+    return _brightness(_unit(normal + 1.2 * smooth), view)
+
+
+def _brightness(normal: np.ndarray, view: tuple[float, float]) -> np.ndarray:
     azimuth = np.radians(view[1])
     key = _direction(np.radians(48.0), azimuth - np.radians(40.0))
     fill = _direction(np.radians(15.0), azimuth + np.radians(50.0))

@@ -62,7 +62,8 @@ def _evidence_row(model: str, variant: str, spectrum: ModesFile) -> dict[str, An
 def provenance(results: Results) -> Table:
     """Command, code and machine behind every result file."""
     origins = {f"dataset/{name}.h5": shard["provenance"] for name, shard in results.shards.items()}
-    origins["forests/forests.h5"] = results.forests["provenance"]
+    forests = results.config["forests"]["model"] or "forests/forests.h5"
+    origins[forests] = results.forests["provenance"]
     origins["forests/table.json"] = results.blocks_record
     for model, spectra in results.spectra.items():
         for variant, spectrum in spectra.items():

@@ -41,20 +41,25 @@ SCORE_KINDS = {
 
 def training(results: Results) -> Table:
     """Counts and held-out scores."""
-    shards, forests = list(results.shards.values()), results.forests
-    rows = [
-        _row("distributions", "Distributions of the moduli", "text", _distributions(results)),
-        _row("fits", "Blocks drawn and fitted", "count", _fits(shards)),
-        _row("converged", "… whose fit converged", "share", _mean(shards, "converged")),
-        _row("partly_void", "… that are partly void", "share", _mean(shards, "partly_void")),
-        _row("at_floor", "… moduli that ended at the floor", "share", _mean(shards, "at_floor")),
-    ]
+    forests = results.forests
+    rows = _data_rows(results) if results.shards else []
     return scores_table(
         "training",
         f"Training data (objective {forests['objective']}) and forests. Held-out blocks were not "
         "used in training.",
         rows + scores_rows(forests),
     )
+
+
+def _data_rows(results: Results) -> list[dict[str, Any]]:
+    shards = list(results.shards.values())
+    return [
+        _row("distributions", "Distributions of the moduli", "text", _distributions(results)),
+        _row("fits", "Blocks drawn and fitted", "count", _fits(shards)),
+        _row("converged", "… whose fit converged", "share", _mean(shards, "converged")),
+        _row("partly_void", "… that are partly void", "share", _mean(shards, "partly_void")),
+        _row("at_floor", "… moduli that ended at the floor", "share", _mean(shards, "at_floor")),
+    ]
 
 
 def scores_rows(forests: dict[str, Any]) -> list[dict[str, Any]]:

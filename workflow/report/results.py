@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from solver.modes_file import ModesFile, read_modes
-from workflow import training
+from workflow import settings
 from workflow.variants import CANDIDATES, VARIANTS
 
 
@@ -97,7 +97,7 @@ class Results:
     @cached_property
     def shards(self) -> dict[str, dict[str, Any]]:
         """Summaries of the training data by shard."""
-        names = training.own(self.config).shards
+        names = settings.own_shards(self.config)
         return {name: self._json("dataset", f"{name}.json") for name in names}
 
     @cached_property

@@ -1,4 +1,6 @@
 # The two regression forests, and how well they do on blocks they have not seen.
+OWN_FORESTS = f"{RESULTS}/forests/forests.h5"
+FORESTS = settings.forests_file(config) or OWN_FORESTS
 
 
 def workers(plan):
@@ -10,7 +12,7 @@ rule train_forests:
     input:
         expand(f"{RESULTS}/dataset/{{name}}.h5", name=OWN.shards),
     output:
-        f"{RESULTS}/forests/forests.h5",
+        OWN_FORESTS,
     log:
         f"{LOGS}/forests/train.log",
     benchmark:
@@ -33,7 +35,7 @@ rule train_forests:
 
 rule describe_forests:
     input:
-        f"{RESULTS}/forests/forests.h5",
+        FORESTS,
     output:
         f"{RESULTS}/forests/forests.json",
     log:
@@ -52,7 +54,7 @@ rule describe_forests:
 # Takes all cores although it uses one: its costs per block are timed.
 rule rate_forests:
     input:
-        f"{RESULTS}/forests/forests.h5",
+        FORESTS,
     output:
         f"{RESULTS}/forests/table.json",
     log:

@@ -14,14 +14,14 @@ def model_arguments(wildcards, resolution=None):
         f" --resolution {resolution or model['resolution']}"
         f" --material {settings.material_of(config, wildcards.model)} --unit {model['unit']}"
         f" --density {model['density']} --poisson {config['poisson']} --seed {model['seed']}"
-        f" --pieces {model['pieces']}"
+        f" --fill {model['fill']} --pieces {model['pieces']}"
     )
 
 
 def variant_files(wildcards):
     """The forests, for the variants that coarsen with them."""
     needs_forests = variants.VARIANTS[wildcards.variant].coarsen == "ddfem"
-    return [f"{RESULTS}/forests/forests.h5"] if needs_forests else []
+    return [FORESTS] if needs_forests else []
 
 
 def forest_argument(wildcards, input):

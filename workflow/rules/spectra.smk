@@ -80,7 +80,7 @@ rule compare_with_truth:
 rule time_methods:
     input:
         model=model_files,
-        forests=f"{RESULTS}/forests/forests.h5",
+        forests=FORESTS,
     output:
         f"{RESULTS}/models/{{model}}/methods.json",
     log:

@@ -38,7 +38,7 @@ rule save_config:
 rule tabulate_results:
     input:
         config=f"{RESULTS}/config.yaml",
-        shards=expand(f"{RESULTS}/dataset/{{name}}.json", name=OWN.shards),
+        shards=expand(f"{RESULTS}/dataset/{{name}}.json", name=settings.own_shards(config)),
         forests=f"{RESULTS}/forests/forests.json",
         blocks=f"{RESULTS}/forests/table.json",
         modes=expand(
