@@ -9,6 +9,7 @@ import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -170,13 +171,19 @@ def _seal_of(stream: io.BufferedRandom | io.BufferedReader) -> bytes:
 
 
 def _is_sealed(path: Path) -> bool:
-    """Whether the file begins with a seal.
+    """Whether the file begins with a seal; it is read once in a process, unless it changes.
 
     Raises
     ------
     UserError
         If the seal is broken.
     """
+    status = path.stat()
+    return _is_version_sealed(path, status.st_ino, status.st_size, status.st_mtime_ns)
+
+
+@cache
+def _is_version_sealed(path: Path, inode: int, size: int, changed: int) -> bool:
     with open(path, "rb") as stream:
         found = stream.read(SEAL_BYTES)
         if not found.startswith(_SEAL):

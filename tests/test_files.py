@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
+from carillon import files
 from carillon.errors import UserError
 from carillon.files import atomic_path, create_h5, open_h5, remove_leftovers, require_writable
 
@@ -200,6 +201,20 @@ def test_a_flipped_bit_breaks_the_seal(sealed, place):
     with pytest.raises(UserError) as caught, open_h5(sealed, "shard", 3, sealed=True):
         pass
     assert "is damaged" in one_sentence(caught)
+
+
+def test_a_seal_is_read_once_unless_the_file_changes(sealed, monkeypatch):
+    read = []
+    seal_of = files._seal_of
+    monkeypatch.setattr(files, "_seal_of", lambda stream: read.append(1) or seal_of(stream))
+    for _ in range(3):
+        with open_h5(sealed, "shard", 3, sealed=True):
+            pass
+    assert len(read) == 1
+    sealed.write_bytes(sealed.read_bytes()[:-1] + b"\1")
+    os.utime(sealed, ns=(0, 0))  # clocks of file systems may tick slower than this test runs
+    with pytest.raises(UserError, match="is damaged"), open_h5(sealed, "shard", 3, sealed=True):
+        pass
 
 
 def test_a_file_without_a_seal_is_refused_where_one_is_demanded(shard):
