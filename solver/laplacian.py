@@ -7,12 +7,15 @@ reduce the material (Y = Phi z, section 6 of the paper) and cut the mesh (sectio
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import eigsh
 
-from solver.geometry import HexMesh
+if TYPE_CHECKING:
+    from solver.geometry import HexMesh
 
 Array = NDArray[np.float64]
 

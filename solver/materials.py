@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from solver.geometry import HexMesh
 from solver.laplacian import laplacian_modes
+
+if TYPE_CHECKING:  # Geometry needs trimesh, whose import takes long; names of materials do without.
+    from solver.geometry import HexMesh
 
 Array = NDArray[np.float64]
 

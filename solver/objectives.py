@@ -31,15 +31,12 @@ from solver.geometry import Blocks, blocks_from_mesh
 from solver.model import RIGID_MODES, ElasticModel
 from solver.modes_file import frequencies
 from solver.problem import Problem, ProblemOptions, build_problem
-from solver.trained import Trained, trained_or_reason
+from solver.trained import FOREST, Trained, trained_or_reason
 
 Array = NDArray[np.float64]
 
 BASELINES = ("galerkin", "average")
 """Coarsenings without a fit, which every objective is to beat."""
-
-FOREST = "ddfem"
-"""Coarsening by the forests."""
 
 CHECKS = ("inertia", "verification")
 """Phases that check modes instead of computing them."""

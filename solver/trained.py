@@ -10,6 +10,9 @@ from carillon.errors import UserError
 from forests import Model, load_model
 from forests import model as forest_model
 
+FOREST = "ddfem"
+"""What coarsening by forests is called among the objectives."""
+
 DEFAULT = "default"
 """Name of the forests that come with the package."""
 

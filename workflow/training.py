@@ -8,7 +8,6 @@ from typing import Any
 
 from carillon.errors import UserError
 from dataset_gen.sampling import moduli
-from forests.training.studies import VARIANTS
 
 
 @dataclass(frozen=True)
@@ -130,7 +129,14 @@ def check_study(config: Mapping[str, Any]) -> None:
             f"forests_study.curve_rows: {max(wanted['curve_rows']):,} rows, but "
             f"default_forest.dataset.samples gives {8 * data['samples']:,}"
         )
-    for name in wanted["variants"] or ():
+    if wanted["variants"]:
+        _check_variants(wanted["variants"])
+
+
+def _check_variants(names: list[str]) -> None:
+    from forests.training.studies import VARIANTS  # Needs scikit-learn, whose import takes long.
+
+    for name in names:
         if name not in VARIANTS:
             raise UserError(
                 f"forests_study.variants: {name!r} is unknown, choose from {', '.join(VARIANTS)}"

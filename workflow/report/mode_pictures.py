@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from solver.analysis import RIGID_MODES
 from solver.geometry import HexMesh
 from solver.geometry.picture import DRAWN_AMPLITUDE, draw, guess_up, surface_quads
+from solver.model import RIGID_MODES
 from solver.modes_file import ModesFile, read_modes
 from workflow.report.results import Results
 from workflow.report.style import SETTINGS, pixels, save_pixels

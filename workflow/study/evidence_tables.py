@@ -8,7 +8,7 @@ from typing import Any
 
 import solver.materials
 from dataset_gen.objectives import OBJECTIVES
-from solver.objectives import FOREST
+from solver.trained import FOREST
 from workflow.report import evidence_tables
 from workflow.report.table import Column, Table
 from workflow.study.cases import Case, Study
