@@ -27,7 +27,9 @@ from solver.verification import count_rigid
 Array = NDArray[np.float64]
 
 LAST_MODES = 16
-"""Modes before the last one among which the widest gap is looked for, to count below it."""
+"""Modes before the last one among which a gap is looked for, to count below it."""
+GAP = 1e-4
+"""Relative width of a gap in which inaccurate eigenvalues cannot be mistaken for others."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,7 @@ def audit(file: ModesFile) -> Audit:
 
 
 def gap_below_last(values: Array) -> tuple[float, int]:
-    """Middle of the widest relative gap between some of the last of ascending values.
+    """Middle of the last gap between ascending values that is wide, or else of the widest one.
 
     Returns
     -------
@@ -108,14 +110,15 @@ def gap_below_last(values: Array) -> tuple[float, int]:
 
     Examples
     --------
-    >>> gap_below_last(np.array([0.0] * 6 + [1.0, 2.0, 5.0, 6.0]))
+    >>> gap_below_last(np.array([0.0] * 6 + [1.0, 2.0, 5.0, 5.00001]))
     (3.5, 8)
     """
     if len(values) <= RIGID_MODES + 1:
         return float(values[-1] * (1.0 + 1e-6)), len(values)
     first = max(RIGID_MODES, len(values) - 1 - LAST_MODES)
     gaps = np.diff(values[first:]) / values[first + 1 :]
-    below = first + int(np.argmax(gaps)) + 1
+    wide = np.flatnonzero(gaps > GAP)
+    below = first + 1 + int(wide[-1] if len(wide) else np.argmax(gaps))
     return float(0.5 * (values[below - 1] + values[below])), below
 
 

@@ -68,14 +68,34 @@ def choose_contacts(
     along = np.einsum("nik,ni->nk", motion, outward)
     first = int(np.argmax((along**2 / eigenvalues).sum(axis=1)))
     if strike is not None:
-        first = _nearest(points, strike, truth.mesh.edge, "strike")
+        first = surface_node(truth.mesh, np.asarray(strike), "strike")
     away = np.linalg.norm(points - points[first], axis=1)
     swing = ((motion**2).sum(axis=1) * (along[first] ** 2 / eigenvalues)).sum(axis=1)
     second = int(np.argmax(np.where(away >= FAR * away.max(), swing, -1.0)))
     if observed is not None:
-        second = _nearest(points, observed, truth.mesh.edge, "observed")
+        second = surface_node(truth.mesh, np.asarray(observed), "observed")
     third = int(np.argmax(np.minimum(away, np.linalg.norm(points - points[second], axis=1))))
     return [Contact(points[index], -outward[index]) for index in (first, second, third)]
+
+
+def surface_node(mesh: HexMesh, wanted: Array, what: str) -> int:
+    """Number, among the nodes on the surface, of that nearest to the point `wanted` (3,) [m].
+
+    Raises
+    ------
+    UserError
+        If the point, which the message calls `what`, is away from the surface.
+    """
+    points = mesh.nodes[np.unique(surface_quads(mesh))]
+    distance, index = cKDTree(points).query(wanted)
+    if distance > REACH * mesh.edge:
+        shown = [", ".join(f"{x:.4g}" for x in point) for point in (wanted, points[index])]
+        raise UserError(
+            f"{what}: the point ({shown[0]}) m is {distance:.3g} m from the surface of the voxels, "
+            f"expected at most {REACH:g} cells of {mesh.edge:.3g} m; the nearest one is "
+            f"({shown[1]}) m"
+        )
+    return int(index)
 
 
 def surface_normals(mesh: HexMesh) -> tuple[NDArray[np.int64], Array]:
@@ -127,17 +147,6 @@ def _ruling_modes(truth: ModesFile, nodes: NDArray[np.int64]) -> tuple[Array, Ar
     chosen = slice(RIGID_MODES, RIGID_MODES + RULING_MODES)
     modes = truth.modes[:, chosen]
     return modes.reshape(truth.mesh.n_nodes, 3, -1)[nodes], truth.eigenvalues[chosen]
-
-
-def _nearest(points: Array, wanted: Sequence[float], edge: float, what: str) -> int:
-    distance, index = cKDTree(points).query(np.asarray(wanted, dtype=float))
-    if distance > REACH * edge:
-        shown = [", ".join(f"{x:.4g}" for x in point) for point in (wanted, points[index])]
-        raise UserError(
-            f"{what}: the point ({shown[0]}) m is {distance:.3g} m from the surface of the voxels, "
-            f"expected at most {REACH:g} cells of {edge:.3g} m; the nearest one is ({shown[1]}) m"
-        )
-    return int(index)
 
 
 def _at_nodes(mesh: HexMesh, quads: NDArray[np.int32], faces: Array) -> Array:

@@ -109,8 +109,8 @@ def displacements(
     return np.asarray((modal * contacts.push[strike]) @ contacts.motion[observed].T)
 
 
-def contact_sound(contacts: Contacts, damping: Damping, contact_seconds: float) -> Array:
-    """Sound (s,) [m/s] of one strike after another at each point (Fig. 13).
+def contact_sounds(contacts: Contacts, damping: Damping, contact_seconds: float) -> Array:
+    """Sounds (p, s) [m/s] of a strike at each point (Fig. 13).
 
     After an impulse f at a point it is the sum of a_k exp(-xi_k w_k t) sin(w_d t) over the audible
     modes, with a_k = (u_k^T f) (u_k^T n): the amplitude of mode k by the paper's section 5, times
@@ -125,7 +125,15 @@ def contact_sound(contacts: Contacts, damping: Damping, contact_seconds: float) 
     amplitudes = contacts.push[:, modes] ** 2 * damped
     single = impulse_responses(values, damping, seconds) @ amplitudes.T
     strikes = fftconvolve(single, _half_sine(contact_seconds)[:, None], axes=0)[: len(seconds)]
-    return np.asarray(strikes.T.ravel())
+    return np.asarray(strikes.T)
+
+
+def in_turn(sounds: Array, loudest: Array) -> Array:
+    """Sounds (p, s) one after another, each divided by its `loudest` value (p,); none if that is 0.
+
+    A strike where the solid is stiff would not be heard beside one where it is soft.
+    """
+    return np.asarray((sounds / np.where(loudest > 0.0, loudest, np.inf)[:, None]).ravel())
 
 
 def is_audible(eigenvalues: Array) -> NDArray[np.bool_]:

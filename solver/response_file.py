@@ -21,8 +21,9 @@ from solver.response import (
     Contacts,
     Damping,
     at_contacts,
-    contact_sound,
+    contact_sounds,
     displacements,
+    in_turn,
     is_audible,
     relative_difference,
     spectral_distance,
@@ -67,7 +68,8 @@ class Response:
     Attributes
     ----------
     displacement : (t, 3) [m] of the observed point after an impulse of 1 N s at the struck one.
-    sound : (s,) [m/s] at `SAMPLE_RATE_HERTZ`, see `solver.response.contact_sound`.
+    sound : (s,) at `SAMPLE_RATE_HERTZ`, strikes at all points in turn, each relative to the
+        loudest that the truth's is, see `solver.response.contact_sounds`.
     audible : number of modes that sound.
     difference : relative 2-norm of the displacement's difference from the truth's.
     distance_decibels : rms difference of the spectrograms; NaN where the truth is not heard.
@@ -120,11 +122,21 @@ def respond(
     seen |= {name: at_contacts(read_modes(path), points) for name, path in candidates.items()}
     period = 2.0 * np.pi / np.sqrt(seen[TRUTH].eigenvalues[0])
     seconds = np.linspace(0.0, options.periods * period, INSTANTS)
-    known = _motions(seen[TRUTH], options, seconds)
+    motions = {name: displacements(part, options.damping, seconds) for name, part in seen.items()}
+    sounds = _played(seen, options)
     return ResponseFile(
         seconds,
         dict(zip(POINTS, points, strict=True)),
-        {name: _response(part, options, seconds, known) for name, part in seen.items()},
+        {
+            name: Response(
+                motions[name],
+                sounds[name],
+                int(is_audible(part.eigenvalues).sum()),
+                relative_difference(motions[name], motions[TRUTH]),
+                _distance(sounds[name], sounds[TRUTH]),
+            )
+            for name, part in seen.items()
+        },
         {
             "mass_damping": options.damping.mass_per_second,
             "stiffness_damping": options.damping.stiffness_seconds,
@@ -184,25 +196,18 @@ def read_response(path: str | Path) -> ResponseFile:
         )
 
 
-def _motions(seen: Contacts, options: StrikeOptions, seconds: Array) -> tuple[Array, Array]:
-    return (
-        displacements(seen, options.damping, seconds),
-        contact_sound(seen, options.damping, options.contact_seconds),
-    )
+def _played(seen: dict[str, Contacts], options: StrikeOptions) -> dict[str, Array]:
+    """Strikes at all points in turn, by name of the spectrum."""
+    sounds = {
+        name: contact_sounds(part, options.damping, options.contact_seconds)
+        for name, part in seen.items()
+    }
+    loudest = np.abs(sounds[TRUTH]).max(axis=1)
+    return {name: in_turn(sound, loudest) for name, sound in sounds.items()}
 
 
-def _response(
-    seen: Contacts, options: StrikeOptions, seconds: Array, known: tuple[Array, Array]
-) -> Response:
-    displacement, sound = _motions(seen, options, seconds)
-    heard = known[1].any()
-    return Response(
-        displacement,
-        sound,
-        int(is_audible(seen.eigenvalues).sum()),
-        relative_difference(displacement, known[0]),
-        spectral_distance(sound, known[1]) if heard else float("nan"),
-    )
+def _distance(sound: Array, truth: Array) -> float:
+    return spectral_distance(sound, truth) if truth.any() else float("nan")
 
 
 def _put(file: Any, name: str, data: Array, units: str) -> None:

@@ -150,21 +150,20 @@ def mark(
     up: str = "auto",
 ) -> None:
     """Mark a point (3,) [m] of a drawn mesh: by an arrow that pushes `inward`, else by a ring."""
+    from matplotlib.lines import Line2D
+    from mpl_toolkits.mplot3d import proj3d
+
     turn = _rotation(guess_up(mesh) if up == "auto" else up)
-    tip = turn @ point
-    style = {"zorder": 10, "clip_on": False}
+    tip = proj3d.proj_transform(*(turn @ point), ax.get_proj())[:2]
     if inward is None:
-        ax.plot(*tip[:, None], "o", color=colour, fillstyle="none", ms=13, mew=2.4, **style)
+        line = Line2D([tip[0]], [tip[1]], color=colour, marker="o", fillstyle="none", zorder=10)
+        line.set(markersize=13, markeredgewidth=2.4, clip_on=False)
+        ax.add_line(line)
         return
     length = ARROW_LENGTH * np.linalg.norm(np.ptp(mesh.nodes, axis=0))
-    ax.quiver(
-        *(tip - length * (turn @ inward)),
-        *(length * (turn @ inward)),
-        color=colour,
-        linewidth=2.6,
-        arrow_length_ratio=0.4,
-        **style,
-    )
+    end = proj3d.proj_transform(*(turn @ (point - length * inward)), ax.get_proj())[:2]
+    style = {"color": colour, "arrowstyle": "-|>", "linewidth": 3.0, "mutation_scale": 18}
+    ax.annotate("", tip, end, annotation_clip=False, arrowprops=style, zorder=10)
 
 
 def view_of(mesh: HexMesh, outward: np.ndarray, up: str = "auto") -> tuple[float, float]:

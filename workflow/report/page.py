@@ -96,7 +96,7 @@ def _model(results: Results, tables: dict[str, Table], model: str) -> dict[str, 
     pictures = [
         {
             "variant": variant,
-            "source": _data_uri(results.figure(f"{model}-mode-{variant}.png")),
+            "source": picture_uri(results.figure(f"{model}-mode-{variant}.png")),
             **description[variant],
         }
         for variant in SHOWN
@@ -123,5 +123,6 @@ def _listed(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return first + [row for row in rows[FIRST_MODES:] if row["mode"] in HIGHER_MODES]
 
 
-def _data_uri(path: Path) -> str:
+def picture_uri(path: Path) -> str:
+    """A PNG file as a data URI."""
     return f"data:image/png;base64,{base64.b64encode(path.read_bytes()).decode()}"

@@ -66,3 +66,15 @@ def times_arguments(part):
 def model_modes(wildcards):
     """Number of modes of a model, rigid ones included."""
     return settings.modes_of(config, wildcards.model)
+
+
+def strike_arguments(wildcards):
+    """How a model is struck in its validation; points in metres."""
+    model, how = config["models"][wildcards.model], config["validation"]
+    points = [
+        f"--{name} " + " ".join(f"{model['unit'] * part:.12f}" for part in model[name])
+        for name in ("strike", "observed")
+        if model[name]
+    ]
+    names = ("mass_damping", "stiffness_damping", "contact", "periods")
+    return " ".join([*points, *(f"--{name.replace('_', '-')} {how[name]}" for name in names)])

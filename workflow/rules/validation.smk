@@ -1,0 +1,82 @@
+# A page for every model that judges its spectra: `snakemake validation`, part of the default run too.
+VALIDATION = f"{RESULTS}/validation"
+
+
+rule validation:
+    input:
+        expand(f"{VALIDATION}/{{model}}.html", model=MODELS),
+
+
+rule audit_spectra:
+    input:
+        expand(f"{RESULTS}/models/{{{{model}}}}/{{variant}}.h5", variant=variants.SHOWN),
+    output:
+        f"{RESULTS}/models/{{model}}/audit.json",
+    log:
+        f"{LOGS}/models/{{model}}/audit.log",
+    threads: 1
+    resources:
+        mem_mb=growing(4000),
+        runtime=growing(30),
+    params:
+        source=source("solver.audit"),
+    shell:
+        "OMP_NUM_THREADS={threads} python -m solver audit {input} --out {output} > {log} 2>&1"
+
+
+rule strike_solid:
+    input:
+        expand(f"{RESULTS}/models/{{{{model}}}}/{{variant}}.h5", variant=variants.SHOWN),
+    output:
+        f"{RESULTS}/models/{{model}}/response.h5",
+    log:
+        f"{LOGS}/models/{{model}}/response.log",
+    threads: 1
+    resources:
+        mem_mb=growing(2000),
+        runtime=growing(30),
+    params:
+        source=source("solver.response_file"),
+        strike=strike_arguments,
+    shell:
+        "OMP_NUM_THREADS={threads} python -m solver respond {input} {params.strike} --out {output}"
+        " > {log} 2>&1"
+
+
+rule validate_model:
+    input:
+        model=model_files,
+        config=f"{RESULTS}/config.yaml",
+        modes=expand(f"{RESULTS}/models/{{{{model}}}}/{{variant}}.h5", variant=variants.SHOWN),
+        comparisons=expand(
+            f"{RESULTS}/models/{{{{model}}}}/{{variant}}.comparison.json",
+            variant=[variant for variant in variants.SHOWN if variant != variants.TRUTH],
+        ),
+        audit=f"{RESULTS}/models/{{model}}/audit.json",
+        response=f"{RESULTS}/models/{{model}}/response.h5",
+        pictures=expand(
+            f"{RESULTS}/figures/{{{{model}}}}-mode-{{variant}}.png", variant=variants.SHOWN
+        ),
+        description=f"{RESULTS}/figures/{{model}}-mode.json",
+        templates=[
+            Path(workflow.basedir, "workflow", name)
+            for name in (
+                "validate/page.html.j2",
+                "report/base.html.j2",
+                "report/macros.html.j2",
+                "report/page.css",
+            )
+        ],
+    output:
+        page=f"{VALIDATION}/{{model}}.html",
+        criteria=f"{VALIDATION}/tables/{{model}}-criteria.json",
+    log:
+        f"{LOGS}/validation/{{model}}.log",
+    localrule: True
+    resources:
+        mem_mb=2000,
+        runtime="15m",
+    params:
+        source=source("workflow.scripts.validate_model"),
+    script:
+        "../scripts/validate_model.py"

@@ -1,0 +1,238 @@
+"""`python -m workflow validate`: the rules of the validation, on one solid that is named."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from carillon.arguments import non_negative_number, poisson_ratio, positive_number, whole_number
+from carillon.errors import UserError
+from carillon.files import atomic_path
+from carillon.progress import say
+from solver.contact import surface_node
+from solver.geometry import FILLS, PIECES, surface_name
+from solver.materials import NAMES as MATERIALS
+from solver.model import DEFAULT_DENSITY
+from solver.problem import ProblemOptions, build_problem
+from solver.trained import load_trained
+from workflow import settings
+from workflow.report.table import read_table
+from workflow.settings import BUILTIN, DEFAULT_FORESTS
+from workflow.validate.verdict import headline
+
+CONFIGURATION = "validate.yaml"
+"""File in the folder of the results that the run is started with."""
+FAILED = 1
+"""Exit status if a criterion is missed."""
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command line."""
+    parser.description = (
+        "Compute the modes of one solid four ways, prove and compare them, and build a page that "
+        "says how far they can be trusted. The same command goes on where it was stopped. Exit "
+        f"status 0 if all criteria are met, {FAILED} if one is missed."
+    )
+    parser.add_argument("mesh", metavar="MESH", help="surface mesh file, or builtin:NAME")
+    parser.add_argument(
+        "--resolution", type=whole_number(4), required=True, help="voxels along the longest side"
+    )
+    parser.add_argument(
+        "--material",
+        default="uniform",
+        help=f"{', '.join(MATERIALS)}, or a file with one Young's modulus [Pa] per voxel "
+        "(default %(default)s)",
+    )
+    parser.add_argument("--out", required=True, metavar="FOLDER", help="folder of all results")
+    parser.add_argument("--name", help="name of the solid's page (default: that of the mesh)")
+    parser.add_argument(
+        "--unit", type=positive_number, default=1.0, help="metres per mesh unit (default 1)"
+    )
+    parser.add_argument("--fill", choices=sorted(FILLS), default="winding", help="voxel filling")
+    parser.add_argument(
+        "--pieces", choices=PIECES, default="error", help="if the voxels fall apart"
+    )
+    parser.add_argument(
+        "--density", type=positive_number, default=DEFAULT_DENSITY, help="kg/m^3 (default 1000)"
+    )
+    parser.add_argument(
+        "--poisson", type=poisson_ratio, default=0.25, help="Poisson's ratio (default 0.25)"
+    )
+    parser.add_argument(
+        "--modes", type=whole_number(12), default=256, help="rigid included (default 256)"
+    )
+    parser.add_argument("--seed", type=whole_number(0), default=0, help="of random materials")
+    parser.add_argument("--forest", help="forests to coarsen by (default: those of the package)")
+    for name, what in (("strike", "that is struck"), ("observed", "that is watched")):
+        parser.add_argument(
+            f"--{name}",
+            type=float,
+            nargs=3,
+            metavar=("X", "Y", "Z"),
+            help=f"point of the surface {what}, in mesh units (default: chosen)",
+        )
+    for name, unit in (("mass-damping", "1/s"), ("stiffness-damping", "s")):
+        parser.add_argument(
+            f"--{name}",
+            type=non_negative_number,
+            help=f"Rayleigh damping [{unit}] (default: of a plastic)",
+        )
+    parser.add_argument(
+        "--tolerances",
+        nargs="+",
+        type=_tolerance,
+        default=[],
+        metavar="NAME=VALUE",
+        help=f"limits of the criteria: {', '.join(_tolerance_names())}",
+    )
+    parser.add_argument(
+        "--cores", type=whole_number(1), default=_cores(), help="cores to use (default: all)"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Validate one solid; returns the exit status.
+
+    Raises
+    ------
+    UserError
+        If the solid cannot be made, or the run fails.
+    """
+    _check_solid(arguments)
+    config = configuration(arguments)
+    settings.check(config)
+    name = next(iter(config["models"]))
+    folder = Path(arguments.out).resolve()
+    _write(config, folder)
+    _run_rules(folder, arguments.cores)
+    page = folder / "validation" / f"{name}.html"
+    criteria = read_table(folder / "validation" / "tables" / f"{name}-criteria.json").rows
+    missed = [row for row in criteria if row["verdict"] != "met"]
+    print(headline(len(criteria), len(missed)))
+    for row in missed:
+        print(f"  {row['label']}: {row['shown']}, required {row['required']}")
+    print(page)
+    return FAILED if missed else 0
+
+
+def configuration(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Configuration of a run with this one solid; what it leaves out takes the defaults."""
+    model = {
+        "mesh": arguments.mesh if arguments.mesh.startswith(BUILTIN) else _path(arguments.mesh),
+        "material": arguments.material
+        if arguments.material in MATERIALS
+        else _path(arguments.material),
+        **{
+            key: getattr(arguments, key)
+            for key in (
+                "resolution",
+                "unit",
+                "fill",
+                "pieces",
+                "density",
+                "modes",
+                "seed",
+                "strike",
+                "observed",
+            )
+        },
+    }
+    validation: dict[str, Any] = {"tolerances": dict(arguments.tolerances)}
+    for key in ("mass_damping", "stiffness_damping"):
+        if getattr(arguments, key) is not None:
+            validation[key] = getattr(arguments, key)
+    title = arguments.name or surface_name(arguments.mesh)
+    return {
+        "title": f"Validation of {title}",
+        "results_dir": _path(arguments.out),
+        "mesh_folder": "",
+        "poisson": arguments.poisson,
+        "models": {_model_name(title): {"title": title, **model}},
+        "forests": {"model": _path(arguments.forest) if arguments.forest else DEFAULT_FORESTS},
+        "validation": validation,
+    }
+
+
+def _check_solid(arguments: argparse.Namespace) -> None:
+    """Make the solid once, so that all that is wrong with it is told before anything runs."""
+    names = ("mesh", "resolution", "material", "unit", "fill", "pieces", "poisson", "density")
+    given = {name: getattr(arguments, name) for name in names}
+    load_trained(arguments.forest, arguments.poisson)
+    solid = build_problem(ProblemOptions(**given, seed=arguments.seed))
+    for name in ("strike", "observed"):
+        point = getattr(arguments, name)
+        if point is not None:
+            surface_node(solid.fine, arguments.unit * np.array(point), name)
+    say(f"{solid.fine.n_cells:,} voxels, {solid.fine.n_dofs:,} unknowns")
+
+
+def _write(config: dict[str, Any], folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(
+            f"{folder}: cannot be made ({error.strerror}); name another folder"
+        ) from None
+    with atomic_path(folder / CONFIGURATION) as temporary:
+        temporary.write_text(yaml.safe_dump(config, sort_keys=False))
+
+
+def _run_rules(folder: Path, cores: int) -> None:
+    """Snakemake's target `validation`, with its own files in the folder of the results."""
+    command = [
+        *(sys.executable, "-m", "snakemake", "validation"),
+        *("--snakefile", str(ROOT / "Snakefile"), "--directory", str(folder)),
+        *("--configfile", str(folder / CONFIGURATION), "--cores", str(cores)),
+        *("--profile", str(ROOT / "workflow" / "profiles" / "default")),
+    ]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    log = folder / "validate.log"
+    say(f"running on {cores} cores, see {log}")
+    with open(log, "w") as stream:
+        done = subprocess.run(command, env=environment, stdout=stream, stderr=stream)
+    if done.returncode:
+        raise UserError(f"the run failed, {_cause(log)}; all that it said is in {log}")
+
+
+def _cause(log: Path) -> str:
+    """The last line that a program of the run addressed to its user, if there is one."""
+    said = re.findall(r"^\s*((?:solver|forests)[ \w]*: .+)$", log.read_text(), re.MULTILINE)
+    return str(said[-1]) if said else "no program said why"
+
+
+def _path(text: str) -> str:
+    return str(Path(text).resolve())
+
+
+def _model_name(title: str) -> str:
+    """A title as the name of a model: lower-case letters, digits and hyphens."""
+    return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-") or "solid"
+
+
+def _tolerance(text: str) -> tuple[str, float]:
+    """Argument type: NAME=VALUE."""
+    name, _, value = text.partition("=")
+    if name not in _tolerance_names():
+        raise argparse.ArgumentTypeError(
+            f"{text!r} names no tolerance, expected NAME=VALUE with one of "
+            f"{', '.join(_tolerance_names())}"
+        )
+    return name, positive_number(value)
+
+
+def _tolerance_names() -> list[str]:
+    section = settings.schema()["properties"]["validation"]["properties"]["tolerances"]
+    return list(section["properties"])
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0))
