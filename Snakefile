@@ -39,6 +39,7 @@ include: "workflow/rules/study.smk"
 include: "workflow/rules/objectives.smk"
 include: "workflow/rules/default_forest.smk"
 include: "workflow/rules/forests_study.smk"
+include: "workflow/rules/compare.smk"
 
 
 rule all:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from workflow.report.numbers import show
 from workflow.report.page import unbroken
-from workflow.report.table import read_table
+from workflow.report.table import kind_in, read_table
 
 
 class Page(HTMLParser):
@@ -76,7 +76,8 @@ def assert_same_numbers(page: Page, tables: Path, name: str, hidden: tuple[str, 
     for row, cells, line in zip(table.rows, shown, rows):
         raw = dict(zip([column.key for column in table.columns], line))
         for column, (text, value) in zip(columns, cells, strict=True):
-            assert text == unbroken(row.get(column.key), column.kind)
-            assert show(row.get(column.key), column.kind).replace("|", "/") in markdown
+            kind = kind_in(row, column)
+            assert text == unbroken(row.get(column.key), kind)
+            assert show(row.get(column.key), kind).replace("|", "/") in markdown
             if column.kind not in ("text", "range"):
                 assert raw[column.key] == ("" if value == "None" else value)

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from workflow.report.numbers import show
 from workflow.report.results import Results
 from workflow.report.table import KIND, Column, Table
 
@@ -90,8 +89,7 @@ def scores_table(name: str, caption: str, rows: list[dict[str, Any]]) -> Table:
         [
             Column("key", "Key", shown=False),
             Column("quantity", "Quantity"),
-            Column("shown", "Value"),
-            Column("value", "Raw value", shown=False),
+            Column("value", "Value"),
             Column(f"value{KIND}", "Its kind", shown=False),
         ],
         rows,
@@ -102,7 +100,6 @@ def _row(key: str, label: str, kind: str, value: Any) -> dict[str, Any]:
     return {
         "key": key,
         "quantity": label,
-        "shown": show(value, kind).replace(" ", "\N{NO-BREAK SPACE}"),
         "value": value,
         f"value{KIND}": kind,
     }

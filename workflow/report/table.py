@@ -83,7 +83,7 @@ class Table:
 
     def cells(self, row: dict[str, Any]) -> list[str]:
         """A row as people read it."""
-        return [show(row.get(column.key), column.kind) for column in self.shown]
+        return [show(row.get(column.key), kind_in(row, column)) for column in self.shown]
 
     def as_csv(self) -> str:
         """Raw values, SI units in the head, below lines about the table."""
@@ -113,6 +113,12 @@ class Table:
         )
         below = f"\n{self.conditions.as_markdown()}" if self.conditions else ""
         return f"{self.caption}\n\n{table}{below}"
+
+
+def kind_in(row: dict[str, Any], column: Column) -> str:
+    """Kind of a column's value in a row."""
+    kind: str = row.get(f"{column.key}{KIND}") or column.kind
+    return kind
 
 
 def write_table(table: Table, folder: str | Path) -> None:
@@ -147,10 +153,7 @@ def read_csv_table(path: str | Path) -> Table:
         Path(path).stem,
         "",
         columns,
-        [
-            {column.key: _value_of(text, column) for column, text in zip(columns, row)}
-            for row in rows
-        ],
+        [_row_of(columns, row) for row in rows],
         about["keys"].split(", "),
         read_conditions(about),
     )
@@ -161,10 +164,15 @@ def _column_of(head: str, kind: str) -> Column:
     return Column(key, key, kind, unit.removesuffix("]"))
 
 
-def _value_of(text: str, column: Column) -> Any:
+def _row_of(columns: list[Column], texts: list[str]) -> dict[str, Any]:
+    row: dict[str, Any] = dict(zip((column.key for column in columns), texts, strict=True))
+    return {column.key: _value_of(row[column.key], kind_in(row, column)) for column in columns}
+
+
+def _value_of(text: str, kind: str) -> Any:
     if not text:
         return None
-    if column.kind in ("text", "range"):
+    if kind in ("text", "range"):
         return text
     return int(text) if text.isdigit() else float(text)
 

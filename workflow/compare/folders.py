@@ -1,0 +1,107 @@
+"""The tables and the configuration that a folder of results holds."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from carillon.errors import UserError
+from workflow.report.table import Table, read_csv_table, read_table
+
+PARTS = ("tables", "paper/tables", "forests_study/tables")
+"""Folders of tables below a folder of results."""
+READERS = {".json": read_table, ".csv": read_csv_table}
+"""How a table is read, by the ending of its file; the first file that exists counts."""
+
+
+@dataclass(frozen=True)
+class Folder:
+    """What is compared of a folder of results.
+
+    Attributes
+    ----------
+    path : of the folder.
+    tables : by their path below the folder, without ending.
+    config : the resolved configuration; empty if the folder has none.
+    """
+
+    path: Path
+    tables: dict[str, Table]
+    config: dict[str, Any] = field(default_factory=dict)
+
+
+def read_folder(path: str | Path) -> Folder:
+    """Read all tables of a folder of results.
+
+    Raises
+    ------
+    UserError
+        If there is no such folder, if it holds no tables, or if one cannot be read.
+    """
+    path = require_tables(path)
+    config = path / "config.yaml"
+    return Folder(
+        path,
+        {str(stem.relative_to(path)): _read(stem) for stem in _stems(path)},
+        yaml.safe_load(config.read_text()) if config.is_file() else {},
+    )
+
+
+def require_tables(path: str | Path) -> Path:
+    """Check that a folder holds tables.
+
+    Raises
+    ------
+    UserError
+        If it does not, or does not exist.
+    """
+    path = Path(path)
+    if not path.is_dir():
+        raise UserError(f"{path}: there is no such folder, expected one with the results of a run")
+    if not _stems(path):
+        raise UserError(
+            f"{path}: holds no tables, expected {PARTS[0]}/*.json or {PARTS[0]}/*.csv as a run or "
+            "the target reference leaves them"
+        )
+    return path
+
+
+def require_baseline(config: Mapping[str, Any]) -> list[str]:
+    """Check before anything runs that a configuration names a baseline, for the rule's input.
+
+    Returns
+    -------
+    No files: they may be those of the rule `reference`, which must not be made anew for this.
+
+    Raises
+    ------
+    UserError
+        If the configuration names none.
+    """
+    if not config["baseline"]:
+        raise UserError("baseline: names no folder, run with --config baseline=FOLDER")
+    return []
+
+
+def _stems(path: Path) -> list[Path]:
+    """Files of tables without their endings, each once."""
+    files = (file for part in PARTS for file in sorted((path / part).glob("*")))
+    return list(dict.fromkeys(file.with_suffix("") for file in files if file.suffix in READERS))
+
+
+def _read(stem: Path) -> Table:
+    for ending, read in READERS.items():
+        file = stem.with_suffix(ending)
+        if file.is_file():
+            try:
+                return read(file)
+            except (ValueError, KeyError, TypeError, json.JSONDecodeError):
+                raise UserError(
+                    f"{file}: is no table of this version, or damaged; run the workflow again"
+                ) from None
+    raise FileNotFoundError(stem)

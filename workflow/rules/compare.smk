@@ -1,0 +1,48 @@
+# A run beside another one: `snakemake compare --config baseline=FOLDER`, and the small tables that
+# are kept for others to compare theirs with: `snakemake reference`.
+from workflow.compare.folders import require_baseline, require_tables
+
+if config["baseline"]:
+    try:
+        require_tables(config["baseline"])
+    except UserError as error:
+        raise WorkflowError(f"baseline: {error}") from None
+
+
+rule compare:
+    input:
+        lambda wildcards: require_baseline(config),
+        config=f"{RESULTS}/config.yaml",
+        tables=expand(f"{RESULTS}/tables/{{table}}.json", table=TABLES),
+    log:
+        f"{LOGS}/compare.log",
+    localrule: True
+    resources:
+        mem_mb=500,
+        runtime="5m",
+    params:
+        source=source("workflow.compare.command", "workflow.__main__"),
+        baseline=config["baseline"],
+        results=RESULTS,
+    shell:
+        "python -m workflow compare {params.baseline:q} {params.results:q}"
+        " --out {params.results:q}/comparison 2>&1 | tee {log}"
+
+
+rule reference:
+    input:
+        config=f"{RESULTS}/config.yaml",
+        report=f"{RESULTS}/report.html",
+        tables=expand(f"{RESULTS}/tables/{{table}}.json", table=TABLES),
+    output:
+        f"{RESULTS}/reference/README.md",
+    log:
+        f"{LOGS}/reference.log",
+    localrule: True
+    resources:
+        mem_mb=500,
+        runtime="5m",
+    params:
+        source=source("workflow.scripts.write_reference"),
+    script:
+        "../scripts/write_reference.py"
