@@ -47,3 +47,4 @@ rule all:
     input:
         f"{RESULTS}/report.html",
         expand(f"{RESULTS}/figures/{{model}}-overview.png", model=MODELS),
+        expand(f"{RESULTS}/validation/{{model}}.html", model=MODELS),

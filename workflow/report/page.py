@@ -19,6 +19,7 @@ from workflow.report.scaling_tables import assumptions
 from workflow.report.style import themed
 from workflow.report.table import Table, read_table
 from workflow.report.tables import BUILDERS
+from workflow.validate.verdict import headline
 from workflow.variants import SHOWN, TRUTH, VARIANTS
 
 HERE = Path(__file__).parent
@@ -107,11 +108,18 @@ def _model(results: Results, tables: dict[str, Table], model: str) -> dict[str, 
         "settings": results.config["models"][model],
         "summary": _rows(tables["summary"], model)[0],
         "pictures": pictures,
+        "judgement": _judgement(results, model),
         "spectrum": inline(results.figure(f"{model}-spectrum.svg")),
         "frequencies": _listed(_rows(tables["frequencies"], model)),
         "errors": {row["variant"]: row for row in _rows(tables["errors"], model)},
         "evidence": {row["variant"]: row for row in _rows(tables["evidence"], model)},
     }
+
+
+def _judgement(results: Results, model: str) -> str:
+    """How the model's validation ended, in a sentence."""
+    rows = read_table(results.folder / "validation" / "tables" / f"{model}-criteria.json").rows
+    return headline(len(rows), sum(row["verdict"] != "met" for row in rows))
 
 
 def _rows(table: Table, model: str) -> list[dict[str, Any]]:

@@ -126,6 +126,7 @@ rule build_report:
             variant=variants.SHOWN,
         ),
         descriptions=expand(f"{RESULTS}/figures/{{model}}-mode.json", model=MODELS),
+        validation=expand(f"{RESULTS}/validation/tables/{{model}}-criteria.json", model=MODELS),
         spectra=expand(f"{RESULTS}/figures/{{model}}-spectrum.svg", model=MODELS),
         convergence=expand(
             f"{RESULTS}/figures/{{model}}-convergence.svg",
