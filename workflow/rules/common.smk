@@ -3,7 +3,7 @@ import os
 import sys
 from pathlib import Path
 
-from workflow import training, variants
+from workflow import locks, training, variants
 from workflow.sources import fingerprint as source
 
 RESULTS = config["results_dir"].rstrip("/")
@@ -50,6 +50,10 @@ def prepend(variable, folder):
     rest = os.environ.get(variable)
     os.environ[variable] = f"{folder}{os.pathsep}{rest}" if rest else str(folder)
 
+
+# Jobs of a cluster parse this file too.
+if workflow.is_main_process:
+    locks.take()
 
 # Jobs run the interpreter that Snakemake runs in, and the packages of this checkout.
 prepend("PATH", Path(sys.executable).parent)
