@@ -1,0 +1,148 @@
+"""Benchmark tables: their conditions in every form, and CSV files that programs can read."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import pytest
+
+from carillon.measurement import measured, memory_bytes
+from workflow import settings
+from workflow.report.conditions import LABELS, ONE_COLD_RUN, Conditions, conditions
+from workflow.report.numbers import MISSING
+from workflow.report.scaling_tables import repeats, scaling
+from workflow.report.table import Column, Table, read_csv_table, read_table, write_table
+
+CONFIG = {
+    "title": "A run",
+    "results_dir": "results",
+    "mesh_folder": "meshes",
+    "solver": {"modes": 30},
+}
+
+
+def record(**changes) -> dict:
+    """Provenance of a measurement."""
+    return measured({"modes": 30}, ranks=2, threads=1) | changes
+
+
+def table(told: Conditions | None) -> Table:
+    return Table(
+        "demo",
+        "What it shows.",
+        [
+            Column("model", "Solid"),
+            Column("mode", "Mode", "count"),
+            Column("seconds", "Time", "seconds", "s"),
+            Column("value", "Value"),
+            Column("value_kind", "Kind", shown=False),
+        ],
+        [
+            {
+                "model": "bell #1, big",
+                "mode": 7,
+                "seconds": 0.5,
+                "value": 0.25,
+                "value_kind": "share",
+            },
+            {"model": "bar", "mode": 8, "seconds": None, "value": "none", "value_kind": "text"},
+        ],
+        ["model", "mode"],
+        told,
+    )
+
+
+TOLD = conditions({"bell": record(), "bar": record()}, CONFIG, ONE_COLD_RUN)
+
+
+def test_a_measurement_tells_machine_ranks_threads_and_date():
+    found = record()
+    assert found["memory_bytes"] > 1e8 and found["threads"] == 1 and found["ranks"] == "2"
+    assert found["date"].endswith("+00:00")
+    assert measured({}, ranks=[1, 2, 4])["ranks"] == "1, 2, 4"
+
+
+def test_memory_is_what_the_control_group_allows(tmp_path):
+    limit = tmp_path / "memory.max"
+    limit.write_text("1000000\n")
+    assert memory_bytes(limit) == 1_000_000
+    limit.write_text("max\n")
+    assert memory_bytes(limit) == memory_bytes(tmp_path / "absent") > 1e8
+
+
+def test_conditions_that_all_rows_share_are_told_once():
+    assert TOLD is not None and not TOLD.differing
+    assert MISSING not in TOLD.told.values()
+    assert set(TOLD.told) == set(LABELS) - {"differing"}
+    assert TOLD.configuration == settings.config_hash(CONFIG)
+
+
+def test_conditions_that_differ_between_rows_are_said_to():
+    records = {
+        "bell": record(date="2026-01-30T10:00:00+00:00"),
+        "bar": record(processor="Another", date="2026-02-01T10:00:00+00:00"),
+    }
+    told = conditions(records, CONFIG, ONE_COLD_RUN)
+    assert told.differing == "processor"
+    assert "(bell); Another (bar)" in told.processor
+    assert "not the same for all rows: processor" in told.headline
+    assert told.date == "2026-01-30 to 2026-02-01"
+
+
+def test_no_results_no_conditions():
+    assert conditions({}, CONFIG, ONE_COLD_RUN) is None
+
+
+def test_the_hash_of_a_configuration_does_not_depend_on_folders():
+    elsewhere = CONFIG | {"results_dir": "x", "mesh_folder": "y", "baseline": "z"}
+    assert settings.config_hash(elsewhere) == settings.config_hash(CONFIG)
+    assert settings.config_hash(CONFIG | {"solver": {"modes": 31}}) != settings.config_hash(CONFIG)
+    assert "baseline" not in settings.resolved(elsewhere)
+
+
+@pytest.mark.parametrize("told", [TOLD, None])
+def test_a_table_survives_its_files(tmp_path, told):
+    write_table(table(told), tmp_path)
+    assert read_table(tmp_path / "demo.json") == table(told)
+    found = read_csv_table(tmp_path / "demo.csv")
+    assert (found.rows, found.keys, found.conditions) == (table(told).rows, ["model", "mode"], told)
+    assert [column.kind for column in found.columns] == [c.kind for c in table(told).columns]
+
+
+def test_conditions_stand_in_every_form(tmp_path):
+    write_table(table(TOLD), tmp_path)
+    markdown = (tmp_path / "demo.md").read_text()
+    assert json.loads((tmp_path / "demo.json").read_text())["conditions"]["commit"] == TOLD.commit
+    lines = (tmp_path / "demo.csv").read_text().splitlines()
+    for key, text in TOLD.told.items():
+        assert f"# {key}: {text}" in lines
+        assert f"{LABELS[key]}: {text}" in markdown
+
+
+def test_programs_skip_what_the_csv_file_says_about_itself(tmp_path):
+    write_table(table(TOLD), tmp_path)
+    with (tmp_path / "demo.csv").open() as stream:
+        rows = list(csv.DictReader(line for line in stream if not line.startswith("#")))
+    assert [row["seconds [s]"] for row in rows] == ["0.5", ""]
+    assert rows[0]["model"] == "bell #1, big"
+
+
+def test_pandas_reads_the_csv_file(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    write_table(table(TOLD), tmp_path)
+    found = pandas.read_csv(tmp_path / "demo.csv", comment="#")
+    assert list(found["mode"]) == [7, 8]
+
+
+def test_scaling_keeps_the_slowest_run_beside_the_fastest():
+    run = {"ranks": 2, "n_dofs": 900, "subdomains": 4, "seconds": 1.0, "slowest_seconds": 1.5}
+    run |= {"repeats": 3, "oversubscribed": False, "cores": 2, "peak_memory_bytes": [5.0, 7.0]}
+    modelled = {"ranks": 4, "n_dofs": 900, "subdomains": 4, "total": 0.6}
+    part = {"runs": [run], "model": {"rows": [modelled]}}
+    found = {"bell": {"strong": part, "weak": None}}
+    measured_row, modelled_row = scaling(found, {"bell": "A bell"}).rows
+    assert (measured_row["measured"], measured_row["measured_most"]) == (1.0, 1.5)
+    assert measured_row["peak_memory"] == 7.0 and measured_row["note"] == "measured"
+    assert modelled_row["measured"] is None and modelled_row["modelled"] == 0.6
+    assert repeats(found).runs.startswith("3")
