@@ -8,6 +8,7 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
+import yaml
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
@@ -62,6 +63,7 @@ def build(evidence: Evidence) -> tuple[str, dict[str, Table]]:
         errors=_inline(plots.errors_figure(found["errors"], evidence.tolerances), "errors"),
         shapes=_inline(plots.shapes_figure(evidence), "shapes"),
         files=_digests(evidence),
+        configuration=_configuration(evidence),
         page_record=provenance.record({"config": evidence.results.config}),
     )
     return page, found
@@ -164,6 +166,17 @@ def _digests(evidence: Evidence) -> list[tuple[str, str]]:
             digest = hashlib.file_digest(stream, "sha256").hexdigest()[:_DIGITS]
         found.append((Path(name).name, digest))
     return found
+
+
+def _configuration(evidence: Evidence) -> str:
+    """The part of the configuration that tells on this solid."""
+    config = evidence.results.config
+    parts = {key: config[key] for key in ("poisson", "solver", "validation")}
+    forests = {"model": config["forests"]["model"]}
+    return yaml.safe_dump(
+        {"models": {evidence.model: evidence.settings}, "forests": forests, **parts},
+        sort_keys=False,
+    )
 
 
 def _inline(figure: Figure, name: str) -> Markup:

@@ -91,18 +91,19 @@ def motion_figure(response: ResponseFile) -> Figure:
     direction = np.linalg.svd(truth, full_matrices=False)[2][0]
     milliseconds = 1e3 * response.seconds
     peak = float(np.linalg.norm(truth, axis=1).max())
+    factor, unit = _length_unit(peak)
     with plt.rc_context(SETTINGS):
         figure, (above, below) = plt.subplots(
             2, 1, figsize=(7.6, 4.9), sharex=True, height_ratios=(1.5, 1)
         )
         for variant in SHOWN:
             found = response.responses[variant].displacement
-            above.plot(milliseconds, 1e6 * found @ direction, **_line(variant))
+            above.plot(milliseconds, factor * found @ direction, **_line(variant))
             if variant != TRUTH:
                 # At the first instant nothing has moved yet.
                 difference = np.linalg.norm(found - truth, axis=1)[1:] / peak
                 below.semilogy(milliseconds[1:], visible(difference), **_line(variant))
-        above.set(ylabel="displacement [µm]", title="Motion of the observed point")
+        above.set(ylabel=f"displacement [{unit}]", title="Motion of the observed point")
         below.set(
             xlabel="time after the strike [ms]",
             ylabel="|difference| [1]",
@@ -149,6 +150,12 @@ def highest_hertz(response: ResponseFile) -> float:
         heard = (decibels(magnitudes, float(magnitudes.max())) > FLOOR_DECIBELS).any(axis=1)
         highest = max(highest, float(hertz[heard].max()))
     return min(1.1 * highest + 200.0, float(hertz[-1]))
+
+
+def _length_unit(peak: float) -> tuple[float, str]:
+    """Unit that makes a length [m] a number above 1, if there is one, and its share of a metre."""
+    units = ((1.0, "m"), (1e3, "mm"), (1e6, "µm"), (1e9, "nm"))
+    return next((pair for pair in units if peak * pair[0] >= 1.0), units[-1])
 
 
 def _line(variant: str, line: bool = True) -> dict[str, Any]:
