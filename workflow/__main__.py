@@ -1,4 +1,4 @@
-"""Command line: `python -m workflow estimate | compare | validate`."""
+"""Command line: `python -m workflow estimate | compare | digest | validate`."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ PROGRAM = "workflow"
 COMMANDS = {
     "estimate": "core-hours, memory and storage of a configuration, before anything runs",
     "compare": "two folders of results side by side, and what moved beyond noise",
+    "digest": "what result files say, as one number: equal for runs that found the same bits",
     "validate": "one solid against ground truth, ending at a page that says how far to trust it",
 }
 """Commands; each is a package of its name with a module `command`."""
