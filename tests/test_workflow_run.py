@@ -8,23 +8,31 @@ from pathlib import Path
 
 import pytest
 import yaml
+from markupsafe import escape
 
 from tests.pages import Page, assert_same_numbers, assert_self_contained
-from tests.workflow_runs import PROFILE, TINY, snakemake
+from tests.workflow_runs import PROFILE, TINY, planned, snakemake
+from workflow.report.conditions import LABELS
+from workflow.report.numbers import MISSING
 from workflow.report.table import read_table
 from workflow.report.tables import BUILDERS
+from workflow.settings import config_hash
 from workflow.variants import CANDIDATES, SHOWN, VARIANTS
 
 pytestmark = pytest.mark.slow
 
 MODELS = list(yaml.safe_load(TINY.read_text())["models"])
+NOT_SHOWN = ("phases", "frequencies", "scaling")
+"""Tables that are not on the page, or not all of them; the smallest run measures no scaling."""
+TOLD_APART = ("provenance", "training", "scaling")
+"""Tables without conditions: of many results with their own origins, or of none."""
 SECOND_RUN_SECONDS = 30
 """A run with nothing to do is planned within seconds; the rest is for a busy machine."""
 
 
-def run_tiny(folder: Path) -> subprocess.CompletedProcess[str]:
+def run_tiny(folder: Path, *more: str) -> subprocess.CompletedProcess[str]:
     options = ["--profile", PROFILE, "--configfile", TINY, "--config", "results_dir=results"]
-    return snakemake(folder, *options, timeout=900)
+    return snakemake(folder, *options, *more, timeout=900)
 
 
 @pytest.fixture(scope="module")
@@ -46,17 +54,19 @@ def page(results):
     return Page(results / "report.html")
 
 
-def test_a_second_run_does_nothing(finished):
+def test_a_second_run_does_nothing_but_compare_with_the_baseline(finished):
     begin = time.monotonic()
-    done = run_tiny(finished)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "Nothing to be done" in done.stdout + done.stderr
+    done = run_tiny(finished, "baseline=results", "--", "all", "compare")
+    assert planned(done) == {"compare": 1, "total": 1}
+    assert "none moved beyond noise" in done.stdout + done.stderr
+    assert (finished / "results" / "comparison" / "comparison.html").is_file()
     assert time.monotonic() - begin < SECOND_RUN_SECONDS
 
 
 def test_resolved_configuration_lies_beside_the_results(results):
     config = yaml.safe_load((results / "config.yaml").read_text())
     assert list(config["models"]) == MODELS
+    assert "baseline" not in config
     # A value that the file leaves to the schema.
     assert config["solver"]["tolerance"] == 1e-7
 
@@ -79,9 +89,7 @@ def test_page_shows_every_model_with_its_pictures(page, results):
     assert page.source.count("data:image/png;base64,") == len(MODELS) * len(SHOWN)
 
 
-@pytest.mark.parametrize(
-    "name", [name for name in BUILDERS if name not in ("phases", "frequencies")]
-)
+@pytest.mark.parametrize("name", [name for name in BUILDERS if name not in NOT_SHOWN])
 def test_page_and_files_hold_the_same_numbers(page, results, name):
     assert_same_numbers(page, results / "tables", name)
 
@@ -120,6 +128,22 @@ def test_every_result_tells_its_origin(results):
     assert "forests/forests.h5" in files
     for row in rows:
         assert row["command"] and row["commit"] and row["config_hash"] and row["versions"]
+
+
+@pytest.mark.parametrize("name", [name for name in BUILDERS if name not in TOLD_APART])
+def test_every_benchmark_table_tells_its_conditions(page, results, name):
+    table = read_table(results / "tables" / f"{name}.json")
+    told = table.conditions.told
+    assert set(told) == set(LABELS) - {"differing"}
+    assert MISSING not in told.values()
+    assert told["configuration"] == config_hash(
+        yaml.safe_load((results / "config.yaml").read_text())
+    )
+    if name not in NOT_SHOWN:
+        assert escape(table.conditions.headline) in page.source
+    timed = [column.key for column in table.columns if column.kind == "seconds"]
+    if name in ("spreads", "blocks"):
+        assert any(f"{key}_least" in timed and f"{key}_most" in timed for key in timed)
 
 
 def test_timed_rules_leave_benchmarks(results):
