@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import h5py
 import numpy as np
 import pytest
 import scipy.linalg as la
 
 from carillon.errors import UserError
+from solver.__main__ import main
 from solver.audit import audit
 from solver.contact import Contact, choose_contacts, interpolation, surface_normals
 from solver.geometry import blocks_from_mesh, prolongation
@@ -270,11 +274,14 @@ def test_an_audit_finds_a_missing_mode_and_a_wrong_one(tmp_path, files):
     assert audit(read_modes(files["truth"])).residual_max > 1e-3
 
 
-def test_commands_read_and_write_files(run_cli, tmp_path, files):
-    out = tmp_path / "audit.json"
-    done = run_cli("solver", "audit", files["truth"], files["coarse"], "--out", out, check=True)
-    assert "truth: 30 modes of 90 unknowns, 6 rigid" in done.stdout and out.is_file()
-    out = tmp_path / "response.h5"
-    point = ["--strike", "-0.001", 0, 0]
-    run_cli("solver", "respond", files["truth"], files["coarse"], *point, "--out", out, check=True)
+def test_commands_read_and_write_files(tmp_path, files, capsys):
+    given = [str(files[name]) for name in ("truth", "coarse")]
+    out = str(tmp_path / "audit.json")
+    assert main(["audit", *given, "--out", out]) == 0
+    assert "truth: 30 modes of 90 unknowns, 6 rigid" in capsys.readouterr().out
+    assert set(json.loads(Path(out).read_text())["spectra"]) == {"truth", "coarse"}
+    out = str(tmp_path / "response.h5")
+    assert main(["respond", *given, "--strike", "-0.001", "0", "0", "--out", out]) == 0
     np.testing.assert_allclose(read_response(out).contacts["strike"].position, 0.0, atol=1e-12)
+    assert main(["respond", *given, "--strike", "1", "0", "0", "--out", out]) == 2
+    assert "from the surface of the voxels" in capsys.readouterr().err

@@ -1,0 +1,171 @@
+"""`python -m workflow validate`: a mesh and a material of one's own, and what the page says."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from dataclasses import asdict
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import trimesh
+import yaml
+
+from carillon import cli
+from solver.audit import audit_files
+from solver.comparison import compare_files
+from solver.response_file import StrikeOptions, read_response, respond, write_response
+from tests.pages import Page, assert_self_contained
+from workflow.__main__ import main
+from workflow.report.results import Results
+from workflow.report.table import read_table
+from workflow.validate.criteria import Criterion
+from workflow.validate.evidence import COMPARED, Evidence
+from workflow.validate.page import build
+from workflow.variants import SHOWN
+
+SIDES = (80.0, 40.0, 20.0)
+RESOLUTION = 8
+CELLS = 64
+LOOSE = ("frequency_rms=0.5", "frequency_worst=0.9")
+"""So coarse a mesh does not come closer after coarsening."""
+
+
+def call(*words: object) -> int:
+    return cli.run("workflow", lambda: main(["validate", *map(str, words)]))
+
+
+@pytest.fixture(scope="module")
+def solid(tmp_path_factory) -> Path:
+    """Folder with a box in millimetres and moduli of its voxels."""
+    folder = tmp_path_factory.mktemp("solid")
+    trimesh.creation.box(SIDES).export(folder / "block.obj")
+    young = 1e9 * 10.0 ** np.random.default_rng(5).uniform(-0.5, 0.5, CELLS)
+    np.savetxt(folder / "young.txt", young)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def run(solid) -> Path:
+    """Folder of a finished validation."""
+    words = ("--unit", 1e-3, "--density", 2000, "--modes", 24, "--strike", 40, 20, 10)
+    out = solid / "out"
+    status = call(
+        *(solid / "block.obj", "--resolution", RESOLUTION, "--material", solid / "young.txt"),
+        *(*words, "--tolerances", *LOOSE, "--out", out),
+    )
+    log = out / "validate.log"
+    assert status == 0, log.read_text()[-6000:] if log.exists() else "nothing ran"
+    return out
+
+
+@pytest.fixture(scope="module")
+def page(run) -> Page:
+    return Page(run / "validation" / "block.html")
+
+
+def words_of(page: Page) -> str:
+    text = re.sub(r"<(style|svg)\b.*?</\1>|<wbr>", "", page.source, flags=re.DOTALL)
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", text))
+
+
+@pytest.mark.slow
+def test_a_good_spectrum_passes_in_words(run, page):
+    text = words_of(page)
+    assert "Passed: all 17 criteria are met." in text
+    assert "an independent count finds none missing" in text
+    rows = read_table(run / "validation" / "tables" / "block-criteria.json").rows
+    assert len(rows) == 17 and {row["verdict"] for row in rows} == {"met"}
+    shown = [[cell for cell, _ in row] for row in page.tables["criteria"] if row]
+    assert [row[1] for row in shown] == [row["shown"] for row in rows]
+    for row, (criterion, *_) in zip(rows, shown):
+        assert criterion == row["label"] + row["why"] + row["source"]
+
+
+@pytest.mark.slow
+def test_page_needs_nothing_from_elsewhere_and_can_be_heard(page):
+    assert_self_contained(page)
+    assert page.source.count("data:audio/wav;base64,") == len(SHOWN)
+    assert page.source.count("data:image/png;base64,") >= 4 + len(SHOWN)
+    assert len(page.source) < 4e6
+
+
+@pytest.mark.slow
+def test_no_forest_was_trained_and_the_point_that_was_named_is_struck(run):
+    assert not (run / "dataset").exists() and not (run / "forests").exists()
+    strike = read_response(run / "models" / "block" / "response.h5").contacts["strike"]
+    np.testing.assert_allclose(strike.position, [0.04, 0.02, 0.01], atol=1e-9)
+    config = yaml.safe_load((run / "config.yaml").read_text())
+    assert config["models"]["block"]["density"] == 2000
+    assert config["validation"]["tolerances"]["frequency_rms"] == 0.5
+
+
+@pytest.mark.slow
+def test_every_number_tells_its_origin(run, page):
+    rows = read_table(run / "validation" / "tables" / "block-provenance.json").rows
+    files = {row["file"] for row in rows}
+    assert {f"models/block/{variant}.h5" for variant in SHOWN} < files
+    assert {"models/block/audit.json", "models/block/response.h5"} < files
+    for row in rows:
+        assert row["command"] and row["commit"] and row["config_hash"] and row["versions"]
+    for name in ("block.obj", "young.txt", "truth.h5"):
+        assert re.search(rf"\b{name} SHA-256 begins with [0-9a-f]{{16}}\b", words_of(page))
+
+
+@pytest.mark.slow
+def test_a_mode_that_is_missing_fails_in_words(run, tmp_path):
+    """HCMS + EC is robbed of mode 10, and everything after it is done again."""
+    shutil.copytree(run, tmp_path / "spoiled", ignore=shutil.ignore_patterns(".snakemake"))
+    folder = tmp_path / "spoiled" / "models" / "block"
+    with h5py.File(folder / "hcms_ec.h5", "r+") as file:
+        for name in ("eigenvalues", "frequencies", "residuals"):
+            file[name][9:-1] = file[name][10:]
+        file["modes"][:, 9:-1] = file["modes"][:, 10:]
+    paths = {variant: folder / f"{variant}.h5" for variant in SHOWN}
+    compared = compare_files(paths["hcms_ec"], paths["truth"]).as_dict()
+    (folder / "hcms_ec.comparison.json").write_text(json.dumps(compared))
+    audits = {name: asdict(found) for name, found in audit_files(paths.values()).items()}
+    (folder / "audit.json").write_text(json.dumps({"spectra": audits, "provenance": {}}))
+    candidates = {variant: paths[variant] for variant in COMPARED}
+    write_response(folder / "response.h5", respond(paths["truth"], candidates, StrikeOptions()), {})
+    html, tables = build(Evidence(Results(tmp_path / "spoiled"), "block"))
+    (tmp_path / "page.html").write_text(html)
+    text = words_of(Page(tmp_path / "page.html"))
+    missed = {row["key"] for row in tables["criteria"].rows if row["verdict"] == "missed"}
+    assert {"eigenvalue_error", "subspace_angle", "response", "counted"} <= missed
+    assert "Failed:" in text and "not the same" in text
+    assert "Do not rely on HCMS + EC for this solid and material" in text
+
+
+def test_what_was_not_found_or_is_no_number_does_not_pass():
+    for found in (None, float("nan")):
+        assert not Criterion("truth", "key", "label", found, 1.0, "small", "why", "file").passed
+    six = Criterion("truth", "rigid", "label", 7, 6, "count", "why", "file", exact=True)
+    assert not six.passed and six.row["required"] == "6" and six.row["verdict"] == "missed"
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["gone.obj"], "gone.obj: no such file"),
+        (["builtin:gong"], "gong"),
+        (["builtin:bar", "--material", "cheese"], "material 'cheese' is neither a file nor"),
+        (["block.obj", "--material", "short.txt"], "short.txt: 3 values for 64 voxels"),
+        (["builtin:bar", "--strike", "9", "9", "9"], "strike: the point (9, 9, 9) m is"),
+        (["builtin:bar", "--poisson", "0.3"], "the default forests are for Poisson's ratio 0.25"),
+        (["builtin:bar", "--tolerances", "luck=1"], "'luck=1' names no tolerance"),
+        (["builtin:bar", "--tolerances", "residual=0"], "expected a number above 0"),
+        (["builtin:bar", "--modes", "6"], "6 is too small, expected at least 12"),
+    ],
+)
+def test_bad_input_is_answered_in_one_sentence(words, says, solid, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(solid)
+    (solid / "short.txt").write_text("1e9 1e9 1e9")
+    status = call(*words, "--resolution", RESOLUTION, "--out", tmp_path / "out")
+    error = capsys.readouterr().err.strip()
+    assert status == cli.EXIT_BAD_INPUT
+    assert says in error and len(error.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
