@@ -72,6 +72,9 @@ def test_ratios_name_their_base():
     assert (found["ratio_least"], found["ratio_most"]) == (0.5 / 5.0, 5.0 / 0.5)
     # What is needed beforehand takes 2/3 s, run by run.
     assert found["with_precompute_most"] == pytest.approx(5.0 / (0.5 + 4.0 / 1.5 - 2.0))
+    once = row(hcms_ec=2.0) | {"runs": {"slepc": 1, "hcms_ec": 5}}
+    (found,) = ratios({"bar": once}, {"bar": "A bar"}).rows
+    assert found["ratio"] == 2.0 and "ratio_least" not in found
 
 
 def test_tables_of_nothing_have_no_rows():

@@ -21,6 +21,8 @@ COLOURS = dict(
 )
 INK = "#23211d"
 TITLES = {"strong": "Strong: one solid", "weak": "Weak: unknowns grow with ranks"}
+NARROWEST = 7.6
+"""Inches that the legend needs."""
 SMALLEST = 1e-4
 """Seconds at which the axis ends."""
 
@@ -48,7 +50,8 @@ def scaling_figure(result: dict[str, Any], settings: Mapping[str, Any] | None = 
     shown = [name for name in TITLES if result[name] is not None]
     chosen: Any = {"figure.constrained_layout.use": True, **(settings or {})}
     with plt.rc_context(chosen):
-        figure, axes = plt.subplots(1, len(shown), figsize=(4.2 * len(shown), 4.2), squeeze=False)
+        size = (max(NARROWEST, 4.2 * len(shown)), 4.2)
+        figure, axes = plt.subplots(1, len(shown), figsize=size, squeeze=False)
         for axis, name in zip(axes[0], shown, strict=True):
             _draw(axis, result[name])
             axis.set_title(TITLES[name])

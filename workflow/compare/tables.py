@@ -90,21 +90,21 @@ def listed(name: str, cells: Iterable[Cell], with_table: bool = True) -> Table:
             Column("table", "Table", shown=with_table),
             Column("row", "Row"),
             Column("column", "Quantity"),
+            Column("verdict", "Verdict"),
             Column("before", "Baseline"),
             Column("now", "This run"),
             Column("ratio", "Ratio", "times"),
-            Column("verdict", "Verdict"),
         ],
         [
             {
                 "table": cell.table,
                 "row": cell.row,
                 "column": cell.label,
+                "verdict": cell.verdict,
+                "verdict_mark": mark(cell),
                 "before": cell.shown(cell.before),
                 "now": cell.shown(cell.now),
                 "ratio": cell.ratio,
-                "verdict": cell.verdict,
-                "verdict_mark": mark(cell),
             }
             for cell in cells
         ],

@@ -200,9 +200,11 @@ def _ratio(
 ) -> Row:
     """A speed-up with its extremes: the fastest base over the slowest method, and vice versa.
 
-    What the method needs beforehand, if that counts, is the same in both.
+    What the method needs beforehand, if that counts, is the same in both. A single run has none.
     """
     ratio = ratios[method][base]
+    if min(row["runs"][method], row["runs"][base]) < 2:
+        return {key: ratio}
     seconds, spread = row["seconds"], row["spread"]
     before = seconds[base] / ratio - seconds[method]
     return {
