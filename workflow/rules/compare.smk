@@ -23,7 +23,7 @@ rule compare:
     params:
         source=source("workflow.compare.command", "workflow.__main__"),
         baseline=config["baseline"],
-        results=RESULTS,
+        results=lambda wildcards, input: str(Path(input.config).parent),
     shell:
         "python -m workflow compare {params.baseline:q} {params.results:q}"
         " --out {params.results:q}/comparison 2>&1 | tee {log}"
