@@ -62,6 +62,7 @@ def build(evidence: Evidence) -> tuple[str, dict[str, Table]]:
         strike_seconds=STRIKE_SECONDS,
         errors=_inline(plots.errors_figure(found["errors"], evidence.tolerances), "errors"),
         shapes=_inline(plots.shapes_figure(evidence), "shapes"),
+        counted=_counted_by_run(evidence),
         files=_digests(evidence),
         configuration=_configuration(evidence),
         page_record=provenance.record({"config": evidence.results.config}),
@@ -154,6 +155,12 @@ def _sounds(evidence: Evidence) -> list[dict[str, Any]]:
         }
         for variant in SHOWN
     ]
+
+
+def _counted_by_run(evidence: Evidence) -> dict[str, Any] | None:
+    """What the run of the ground truth counted itself; None if it could not."""
+    told = evidence.spectra[TRUTH].attributes
+    return told if "inertia_count" in told else None
 
 
 def _digests(evidence: Evidence) -> list[tuple[str, str]]:
