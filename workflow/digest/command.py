@@ -1,4 +1,4 @@
-"""`python -m workflow digest PATH...`: SHA-256 of what result files say, wherever they come from."""
+"""`python -m workflow digest PATH...`: SHA-256 of what result files say, wherever they are from."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ import numpy as np
 
 from carillon.errors import UserError
 
-CIRCUMSTANCES = frozenset({"provenance", "timings", "peak_memory_bytes", "ranks", "threads"})
-"""Groups and attributes that tell where and how fast, not what."""
+CIRCUMSTANCES = frozenset(
+    {"provenance", "timings", "hcms", "peak_memory_bytes", "ranks", "threads", "forest_sha256"}
+)
+"""Groups and attributes that tell where, how fast and from which file, not what."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -12,7 +12,8 @@ BENCHMARKS = f"{RESULTS}/benchmarks"
 MODELS = list(config["models"])
 
 # Timed rules take all cores, so that no other job disturbs their wall times.
-SOLVER_CORES = config["solver"]["cores"] or workflow.cores or 1
+# On a cluster nothing says how many there are but the configuration.
+SOLVER_CORES = config["solver"]["cores"] or workflow.resource_settings.cores or 1
 RANKS = config["solver"]["ranks"]
 # What starts ranks, in a job of SLURM its own.
 ANY_LAUNCHER = "srun --mpi=pmix" if "SLURM_JOB_ID" in os.environ else "mpiexec"

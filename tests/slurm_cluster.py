@@ -1,0 +1,121 @@
+"""A throw-away SLURM cluster on this machine (test support)."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from tests.workflow_runs import CHECKOUT
+
+SCRIPT = CHECKOUT / "slurm" / "test-cluster.sh"
+PROFILE = CHECKOUT / "slurm"
+SITE_CONFIGURATION = Path("/etc/slurm/slurm.conf")
+QUICK = (
+    *("--slurm-no-account", "--slurm-init-seconds-before-status-checks", "1"),
+    *("--max-status-checks-per-second", "1", "--latency-wait", "20"),
+)
+"""Options for jobs of seconds: the profile is for jobs of hours."""
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """A running cluster of one node.
+
+    Attributes
+    ----------
+    folder : what its daemons write.
+    """
+
+    folder: Path
+
+    def fail(self) -> None:
+        """Let the node die, with all of its jobs."""
+        control("fail", self.folder)
+
+    def repair(self) -> None:
+        """Bring the node back, and start what it lost at once; SLURM would wait two minutes."""
+        control("repair", self.folder)
+        waiting = ["squeue", "--noheader", "--states=PENDING", "--format=%A"]
+        for job in subprocess.run(waiting, capture_output=True, text=True).stdout.split():
+            subprocess.run(["scontrol", "update", f"JobId={job}", "StartTime=now"], check=True)
+
+    def restart_controller(self, pause: float) -> None:
+        """Leave the cluster without slurmctld for some seconds."""
+        process = Path("/proc", (self.folder / "slurmctld.pid").read_text().strip())
+        os.kill(int(process.name), signal.SIGTERM)
+        while process.exists():
+            time.sleep(0.1)
+        time.sleep(pause)
+        subprocess.run(["slurmctld"], check=True)
+
+    def log(self) -> str:
+        """What slurmd has to say."""
+        return (self.folder / "log" / "slurmd.log").read_text()
+
+    def ends(self) -> list[str]:
+        """How jobs ended, one state each, in order."""
+        record = self.folder / "log" / "jobs.txt"
+        return re.findall(r"JobState=(\S+)", record.read_text()) if record.exists() else []
+
+
+def control(*arguments: object) -> None:
+    """Run the cluster's script."""
+    done = subprocess.run(
+        ["bash", str(SCRIPT), *map(str, arguments)], capture_output=True, text=True, timeout=300
+    )
+    if done.returncode:
+        raise RuntimeError(f"{SCRIPT.name} {arguments[0]}: {done.stderr}")
+
+
+def started(folder: Path) -> Cluster:
+    """Install SLURM where it is missing and start a cluster; skip where that is impossible."""
+    if os.geteuid() != 0:
+        pytest.skip("a SLURM cluster can only be started by root")
+    if SITE_CONFIGURATION.exists():
+        pytest.skip(f"this machine has a SLURM of its own: {SITE_CONFIGURATION}")
+    if not shutil.which("slurmctld") and not shutil.which("apt-get"):
+        pytest.skip("no SLURM here, and no apt-get to install it by")
+    control("install")
+    control("start", folder)
+    return Cluster(folder)
+
+
+def snakemake(folder: Path, *options: object) -> subprocess.Popen[str]:
+    """Start Snakemake with the SLURM profile; its output goes to FOLDER/snakemake.log."""
+    command = [sys.executable, "-m", "snakemake", "-s", CHECKOUT / "Snakefile"]
+    with (folder / "snakemake.log").open("w") as log:
+        return subprocess.Popen(
+            [str(part) for part in (*command, "--profile", PROFILE, *QUICK, *options)],
+            cwd=folder,
+            env={**os.environ, "PYTHONPATH": str(CHECKOUT)},
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+
+
+def wait_for(
+    met: Callable[[], object], run: subprocess.Popen[str], seconds: float, what: str
+) -> None:
+    """Wait until something is so.
+
+    Raises
+    ------
+    AssertionError
+        If it is not within so many seconds, or before the run has ended.
+    """
+    until = time.monotonic() + seconds
+    while not met():
+        assert run.poll() is None, f"{what}: the run has ended before"
+        assert time.monotonic() < until, f"{what}: not within {seconds:g} s"
+        time.sleep(0.2)

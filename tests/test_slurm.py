@@ -1,0 +1,170 @@
+"""On a real SLURM: the same bits as anywhere else, and nothing that a cluster does loses work."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import pytest
+
+from tests import slurm_cluster, workflow_runs
+from tests.slurm_cluster import Cluster, wait_for
+from tests.workflow_runs import CHECKOUT
+from workflow.digest.command import digest
+
+pytestmark = [pytest.mark.slurm, pytest.mark.mpi, pytest.mark.slow]
+
+SAMPLES, SHARDS = 3000, 2
+SMALL = f"""\
+models: {{bar: {{mesh: 'builtin:bar', resolution: 12, material: two-region}}}}
+dataset: {{samples: {SAMPLES}, distributions: [uniform], shards: {SHARDS}}}
+forests: {{trees: 1, depth: 6, ranks: 2}}
+solver: {{modes: 16, ranks: 2, cores: 2, launcher: LAUNCHER}}
+"""
+MODES = "results/models/bar/ddfem_hcms_ec.h5"
+FORESTS = "results/forests/forests.h5"
+DATASET = [f"results/dataset/uniform-{shard}.h5" for shard in range(SHARDS)]
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    """A cluster of this machine alone."""
+    found = slurm_cluster.started(tmp_path_factory.mktemp("slurm"))
+    yield found
+    slurm_cluster.control("stop", found.folder)
+
+
+def finish(run: subprocess.Popen[str], folder: Path, seconds: float = 300) -> str:
+    """Output of a run that has to end well."""
+    try:
+        status = run.wait(seconds)
+    finally:
+        run.kill()
+    output = (folder / "snakemake.log").read_text()
+    assert status == 0, output[-6000:]
+    return output
+
+
+@pytest.fixture(scope="module")
+def local(tmp_path_factory):
+    """Folder of a run without SLURM."""
+    folder = tmp_path_factory.mktemp("local")
+    (folder / "config.yaml").write_text(SMALL.replace("LAUNCHER", "mpiexec --oversubscribe"))
+    done = workflow_runs.snakemake(
+        folder, MODES, "--cores", 2, "--configfile", "config.yaml", timeout=300
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def remote(cluster, tmp_path_factory):
+    """Folder of a run by jobs of SLURM: an array of shards, then two MPI jobs."""
+    folder = tmp_path_factory.mktemp("remote")
+    (folder / "config.yaml").write_text(SMALL.replace("LAUNCHER", "null"))
+    finish(slurm_cluster.snakemake(folder, MODES, "--configfile", "config.yaml"), folder)
+    return folder
+
+
+def test_jobs_of_slurm_find_the_same_bits_as_a_local_run(local, remote):
+    for file in (*DATASET, FORESTS, MODES):
+        assert digest(remote / file) == digest(local / file), file
+    for file in DATASET:
+        assert (remote / file).read_bytes() == (local / file).read_bytes()
+
+
+def test_jobs_were_an_array_and_mpi_jobs(remote):
+    output = (remote / "snakemake.log").read_text()
+    assert "Submitted array job" in output
+    assert "srun --mpi=pmix -n 2 python -m mpi4py -m solver modes" in output
+    with h5py.File(remote / MODES) as modes:
+        assert modes.attrs["ranks"] == 2
+
+
+def test_array_by_hand_yields_identical_shards(cluster, remote, tmp_path):
+    arguments = f"--samples {SAMPLES} --shards {SHARDS} --seed 0 --distribution uniform"
+    done = subprocess.run(
+        ["sbatch", "--wait", f"--array=0-{SHARDS - 1}", "--ntasks=2", "--mem-per-cpu=500M"]
+        + [str(CHECKOUT / "slurm" / "shards.sbatch"), "uniform-%a.h5", *arguments.split()],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHON": sys.executable, "PYTHONPATH": str(CHECKOUT)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    logs = "".join(path.read_text() for path in tmp_path.glob("slurm-*.out"))
+    assert done.returncode == 0, done.stderr + logs
+    for file in DATASET:
+        assert (tmp_path / Path(file).name).read_bytes() == (remote / file).read_bytes()
+
+
+LONG = """\
+models: {{bar: {{mesh: 'builtin:bar', resolution: 12}}}}
+dataset: {{samples: {samples}, distributions: [uniform], shards: 1, objective: chen2015}}
+"""
+LONG_SAMPLES = 600_000
+
+
+def worker(shard: Path) -> int | None:
+    """Process that makes a shard; None if there is none."""
+    found = subprocess.run(
+        ["pgrep", "-f", f"^python -m dataset_gen generate .*{shard.name}"],
+        capture_output=True,
+        text=True,
+    ).stdout.split()
+    return int(found[0]) if found else None
+
+
+def test_a_job_outlives_all_that_befalls_it(cluster: Cluster, tmp_path):
+    """Out of memory, a dead node, a controller that is away, a stuck process, a time limit."""
+    (tmp_path / "config.yaml").write_text(LONG.format(samples=LONG_SAMPLES))
+    shard = tmp_path / DATASET[0]
+    journal = shard.with_name(f".{shard.name}.journal")
+
+    def runs() -> bool:
+        return worker(shard) is not None and journal.exists() and journal.stat().st_size > before
+
+    run = slurm_cluster.snakemake(
+        tmp_path,
+        *(DATASET[0], "--configfile", "config.yaml", "--set-resources"),
+        # Too little for a Python with its packages at the first try.
+        *(
+            "generate_shard:mem_mb=60 if attempt == 1 else 1000",
+            "generate_shard:runtime=max(1, attempt - 1)",
+        ),
+    )
+    try:
+        wait_for(lambda: "exceeded memory limit" in cluster.log(), run, 90, "out of memory")
+        before = 1000
+        wait_for(runs, run, 90, "the second try")
+        os.kill(worker(shard), signal.SIGSTOP)
+        done = journal.stat().st_size
+        cluster.fail()
+        assert worker(shard) is None
+        wait_for(lambda: "NODE_FAIL" in cluster.ends(), run, 60, "the node's death")
+        cluster.repair()
+        before = done
+        wait_for(runs, run, 120, "the requeued job")
+        cluster.restart_controller(pause=3)
+        # A process that hangs, as on a file system that does not answer, until its time is up.
+        os.kill(worker(shard), signal.SIGSTOP)
+        wait_for(lambda: "TIMEOUT" in cluster.ends(), run, 150, "the time limit")
+    except AssertionError as error:
+        run.terminate()
+        raise AssertionError((tmp_path / "snakemake.log").read_text()[-6000:]) from error
+    output = finish(run, tmp_path)
+    assert len(re.findall(r"submitted with SLURM jobid", output)) == 3
+    undisturbed = tmp_path / "undisturbed.h5"
+    subprocess.run(
+        [sys.executable, "-m", "dataset_gen", "generate", "--samples", str(LONG_SAMPLES)]
+        + ["--objective", "chen2015", "--workers", "2", "--out", str(undisturbed)],
+        cwd=CHECKOUT,
+        check=True,
+        capture_output=True,
+    )
+    assert shard.read_bytes() == undisturbed.read_bytes()
