@@ -34,6 +34,11 @@ def cores_of(ranks):
     return max(1, SOLVER_CORES // ranks)
 
 
+def workers(plan):
+    """Argument for the processes that fit leaves on one rank; several ranks are one process each."""
+    return " --workers {threads}" if plan.forests["ranks"] == 1 else ""
+
+
 def growing(first):
     """Resource that doubles with every try: a job that ran out of it gets more."""
     return lambda wildcards, attempt: first * 2 ** (attempt - 1)

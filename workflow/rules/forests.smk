@@ -3,11 +3,6 @@ OWN_FORESTS = f"{RESULTS}/forests/forests.h5"
 FORESTS = settings.forests_file(config) or OWN_FORESTS
 
 
-def workers(plan):
-    """Argument for the processes that fit leaves on one rank; several ranks are one process each."""
-    return " --workers {threads}" if plan.forests["ranks"] == 1 else ""
-
-
 rule train_forests:
     input:
         expand(f"{RESULTS}/dataset/{{name}}.h5", name=OWN.shards),
