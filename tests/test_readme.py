@@ -57,8 +57,10 @@ def test_commands_run_in_the_order_of_the_page(tmp_path):
         words = shlex.split(line, comments=True)
         if words[0] == ".venv/bin/snakemake":
             # The rules themselves run in the tests of the workflow.
+            # The last --config counts, so that what the line says goes into it too.
+            said = words[words.index("--config") + 1 :] if "--config" in words else []
             command = [sys.executable, "-m", "snakemake", *words[1:], "--dry-run"]
-            run([*command, "--config", f"mesh_folder={stand_ins(tmp_path)}"], CHECKOUT)
+            run([*command, "--config", f"mesh_folder={stand_ins(tmp_path)}", *said], CHECKOUT)
             continue
         words = [sys.executable if word == ".venv/bin/python" else word for word in words]
         run(words, tmp_path)
