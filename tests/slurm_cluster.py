@@ -23,6 +23,7 @@ SITE_CONFIGURATION = Path("/etc/slurm/slurm.conf")
 QUICK = (
     *("--slurm-no-account", "--slurm-init-seconds-before-status-checks", "1"),
     *("--max-status-checks-per-second", "1", "--latency-wait", "20"),
+    "--slurm-keep-successful-logs",
 )
 """Options for jobs of seconds: the profile is for jobs of hours."""
 

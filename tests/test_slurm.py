@@ -77,9 +77,9 @@ def test_jobs_of_slurm_find_the_same_bits_as_a_local_run(local, remote):
 
 
 def test_jobs_were_an_array_and_mpi_jobs(remote):
-    output = (remote / "snakemake.log").read_text()
-    assert "Submitted array job" in output
-    assert "srun --mpi=pmix -n 2 python -m mpi4py -m solver modes" in output
+    assert "Submitted array job" in (remote / "snakemake.log").read_text()
+    (log,) = (remote / ".snakemake" / "slurm_logs" / "rule_find_modes").rglob("*.log")
+    assert "srun --mpi=pmix -n 2 python -m mpi4py -m solver modes" in log.read_text()
     with h5py.File(remote / MODES) as modes:
         assert modes.attrs["ranks"] == 2
 

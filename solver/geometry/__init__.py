@@ -1,15 +1,20 @@
 """From a surface to voxels, hexahedra and 2x2x2 blocks."""
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from solver.geometry.blocks import Blocks, blocks_from_mesh, prolongation
-from solver.geometry.builtin import BUILTINS, builtin_surface
 from solver.geometry.hexmesh import (
     CORNER_OFFSETS,
     HexMesh,
     hexmesh_from_grid,
     hexmesh_from_voxels,
 )
-from solver.geometry.surface import load_surface, surface_name
 from solver.geometry.voxels import FILLS, PIECES, VoxelModel, voxelize
+
+if TYPE_CHECKING:
+    from solver.geometry.builtin import BUILTINS, builtin_surface
+    from solver.geometry.surface import load_surface, surface_name
 
 __all__ = [
     "BUILTINS",
@@ -28,3 +33,17 @@ __all__ = [
     "surface_name",
     "voxelize",
 ]
+
+_OF_SURFACES = {
+    "BUILTINS": "builtin",
+    "builtin_surface": "builtin",
+    "load_surface": "surface",
+    "surface_name": "surface",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """What needs trimesh, loaded when first asked for: its import takes long."""
+    if name in _OF_SURFACES:
+        return getattr(import_module(f"solver.geometry.{_OF_SURFACES[name]}"), name)
+    raise AttributeError(f"module 'solver.geometry' has no attribute {name!r}")

@@ -12,12 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import igl
 import numpy as np
-import trimesh
 
 from solver.geometry.topology import pieces, thin_to
+
+if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
+    import trimesh
 
 #: Sample points per voxel edge for the filled fraction of a voxel. Odd, so that "half full" puts a
 #: wall at the middle of a voxel; an even number would move every wall outwards.
@@ -134,6 +136,8 @@ def touched_voxels(surface: trimesh.Trimesh, grid: Grid) -> np.ndarray:
 
 def _cut(surface: trimesh.Trimesh, max_edge: float) -> trimesh.Trimesh:
     """The same surface in triangles with edges of at most `max_edge` [m]."""
+    import trimesh
+
     vertices, faces = trimesh.remesh.subdivide_to_size(
         surface.vertices, surface.faces, max_edge=max_edge, max_iter=30
     )
@@ -142,6 +146,8 @@ def _cut(surface: trimesh.Trimesh, max_edge: float) -> trimesh.Trimesh:
 
 def _inside(surface: trimesh.Trimesh, grid: Grid, points: np.ndarray) -> np.ndarray:
     """Whether `points` (p, 3), in voxels from the grid's corner, are inside the surface."""
+    import igl
+
     # In voxel units, so that the result does not depend on the unit of length.
     vertices = np.ascontiguousarray((surface.vertices - grid.origin) / grid.edge)
     faces = np.ascontiguousarray(surface.faces, dtype=np.int64)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import operator
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 
 from carillon.errors import UserError
 from solver.geometry.fill import FILLS, bounding_grid
 from solver.geometry.topology import pieces as label_pieces
+
+if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
+    import trimesh
 
 PIECES = ("error", "largest")
 
