@@ -24,6 +24,9 @@ except UserError as error:
     raise WorkflowError(str(error)) from None
 
 
+report: "workflow/report/captions/workflow.rst"
+
+
 include: "workflow/rules/common.smk"
 include: "workflow/rules/dataset.smk"
 include: "workflow/rules/forests.smk"

@@ -83,11 +83,7 @@ rule tabulate_figures:
         convergence=shape_results("convergence", "convergence"),
         scaling=shape_results("scaling", "scaling"),
     output:
-        expand(
-            f"{FIGURES}/tables/{{table}}.{{kind}}",
-            table=list(FIGURE_TABLES),
-            kind=["csv", "md", "json"],
-        ),
+        marks.tables(f"{FIGURES}/tables", FIGURE_TABLES, "figures"),
     log:
         f"{LOGS}/{FIGURES_FOLDER}/tables.log",
     localrule: True
@@ -104,7 +100,13 @@ use rule plot_convergence as plot_convergence_in_full with:
     input:
         history=f"{FIGURES}/models/{{shape}}/convergence.json",
     output:
-        svg=f"{FIGURES}/figures/{{shape}}-convergence.svg",
+        svg=report(
+            f"{FIGURES}/figures/{{shape}}-convergence.svg",
+            caption="../report/captions/convergence.rst",
+            category="Figures",
+            subcategory="figures",
+            labels={"figure": "Convergence of the error correction, {shape}"},
+        ),
         png=f"{FIGURES}/figures/{{shape}}-convergence.png",
     log:
         f"{LOGS}/{FIGURES_FOLDER}/{{shape}}/plot-convergence.log",
@@ -114,7 +116,13 @@ use rule plot_methods as plot_methods_in_full with:
     input:
         methods=f"{FIGURES}/tables/methods.json",
     output:
-        svg=f"{FIGURES}/figures/times.svg",
+        svg=report(
+            f"{FIGURES}/figures/times.svg",
+            caption="../report/captions/methods.rst",
+            category="Figures",
+            subcategory="figures",
+            labels={"figure": "Wall times in alternating runs"},
+        ),
         png=f"{FIGURES}/figures/times.png",
     log:
         f"{LOGS}/{FIGURES_FOLDER}/plot-times.log",
@@ -124,7 +132,13 @@ rule plot_scaling:
     input:
         scaling=f"{FIGURES}/models/{{shape}}/scaling.json",
     output:
-        svg=f"{FIGURES}/figures/{{shape}}-scaling.svg",
+        svg=report(
+            f"{FIGURES}/figures/{{shape}}-scaling.svg",
+            caption="../report/captions/scaling.rst",
+            category="Figures",
+            subcategory="figures",
+            labels={"figure": "Scaling over ranks, {shape}"},
+        ),
         png=f"{FIGURES}/figures/{{shape}}-scaling.png",
     log:
         f"{LOGS}/{FIGURES_FOLDER}/{{shape}}/plot-scaling.log",
@@ -157,7 +171,12 @@ rule build_figures_report:
             )
         ],
     output:
-        f"{FIGURES}/report.html",
+        report(
+            f"{FIGURES}/report.html",
+            caption="../report/captions/figures.rst",
+            category="Report",
+            labels={"page": "Times, convergence and scaling in full"},
+        ),
     log:
         f"{LOGS}/{FIGURES_FOLDER}/report.log",
     localrule: True

@@ -118,11 +118,7 @@ rule tabulate_forests_study:
             part=["model", "blocks", "benchmark", "variants", "curve"],
         ),
     output:
-        expand(
-            f"{FORESTS_STUDY}/tables/{{table}}.{{kind}}",
-            table=list(study_tables.BUILDERS),
-            kind=["csv", "md", "json"],
-        ),
+        marks.tables(f"{FORESTS_STUDY}/tables", study_tables.BUILDERS, "forests_study"),
     log:
         f"{LOGS}/forests_study/tables.log",
     localrule: True
@@ -142,7 +138,13 @@ rule plot_forests_study:
             f"{FORESTS_STUDY}/{{part}}.json", part=["blocks", "benchmark", "variants", "curve"]
         ),
     output:
-        svg=f"{FORESTS_STUDY}/figures/{{figure}}.svg",
+        svg=report(
+            f"{FORESTS_STUDY}/figures/{{figure}}.svg",
+            caption="../report/captions/forest_scores.rst",
+            category="Figures",
+            subcategory="forests_study",
+            labels={"figure": "{figure}"},
+        ),
         png=f"{FORESTS_STUDY}/figures/{{figure}}.png",
     log:
         f"{LOGS}/forests_study/{{figure}}.log",
@@ -171,7 +173,12 @@ rule build_forests_report:
             )
         ],
     output:
-        f"{FORESTS_STUDY}/report.html",
+        report(
+            f"{FORESTS_STUDY}/report.html",
+            caption="../report/captions/forests.rst",
+            category="Report",
+            labels={"page": "The default forests"},
+        ),
     log:
         f"{LOGS}/forests_study/report.log",
     localrule: True

@@ -36,9 +36,7 @@ rule tabulate_objectives:
         config=f"{RESULTS}/config.yaml",
         cases=case_files,
     output:
-        expand(
-            f"{STUDY}/tables/{{table}}.{{kind}}", table=list(BUILDERS), kind=["csv", "md", "json"]
-        ),
+        marks.tables(f"{STUDY}/tables", BUILDERS, "objectives"),
     log:
         f"{LOGS}/objectives/tables.log",
     localrule: True
@@ -57,7 +55,13 @@ rule plot_objectives:
         config=f"{RESULTS}/config.yaml",
         errors=f"{STUDY}/tables/errors.json",
     output:
-        svg=f"{STUDY}/figures/{{solid}}.svg",
+        svg=report(
+            f"{STUDY}/figures/{{solid}}.svg",
+            caption="../report/captions/objective_errors.rst",
+            category="Figures",
+            subcategory="objectives",
+            labels={"figure": "Errors by objective, {solid}"},
+        ),
         png=f"{STUDY}/figures/{{solid}}.png",
     log:
         f"{LOGS}/objectives/{{solid}}.log",
@@ -86,7 +90,12 @@ rule build_objectives_report:
             )
         ],
     output:
-        f"{STUDY}/report.html",
+        report(
+            f"{STUDY}/report.html",
+            caption="../report/captions/objectives.rst",
+            category="Report",
+            labels={"page": "Objectives of the coarsening"},
+        ),
     log:
         f"{LOGS}/objectives/report.log",
     localrule: True

@@ -6,9 +6,16 @@ rule draw_modes:
         config=f"{RESULTS}/config.yaml",
         modes=expand(f"{RESULTS}/models/{{{{model}}}}/{{variant}}.h5", variant=variants.SHOWN),
     output:
-        pictures=expand(
-            f"{RESULTS}/figures/{{{{model}}}}-mode-{{variant}}.png", variant=variants.SHOWN
-        ),
+        pictures=[
+            report(
+                f"{RESULTS}/figures/{{model}}-mode-{variant}.png",
+                caption="../report/captions/mode.rst",
+                category="Figures",
+                subcategory="{model}",
+                labels={"figure": f"First elastic mode, {variants.VARIANTS[variant].label}"},
+            )
+            for variant in variants.SHOWN
+        ],
         description=f"{RESULTS}/figures/{{model}}-mode.json",
     log:
         f"{LOGS}/figures/{{model}}-mode.log",
@@ -27,7 +34,13 @@ rule plot_spectrum:
         config=f"{RESULTS}/config.yaml",
         frequencies=f"{RESULTS}/tables/frequencies.json",
     output:
-        svg=f"{RESULTS}/figures/{{model}}-spectrum.svg",
+        svg=report(
+            f"{RESULTS}/figures/{{model}}-spectrum.svg",
+            caption="../report/captions/spectrum.rst",
+            category="Figures",
+            subcategory="{model}",
+            labels={"figure": "Spectrum"},
+        ),
         png=f"{RESULTS}/figures/{{model}}-spectrum.png",
     log:
         f"{LOGS}/figures/{{model}}-spectrum.log",
@@ -45,7 +58,13 @@ rule plot_convergence:
     input:
         history=f"{RESULTS}/models/{{model}}/convergence.json",
     output:
-        svg=f"{RESULTS}/figures/{{model}}-convergence.svg",
+        svg=report(
+            f"{RESULTS}/figures/{{model}}-convergence.svg",
+            caption="../report/captions/convergence.rst",
+            category="Figures",
+            subcategory="{model}",
+            labels={"figure": "Convergence of the error correction"},
+        ),
         png=f"{RESULTS}/figures/{{model}}-convergence.png",
     log:
         f"{LOGS}/figures/{{model}}-convergence.log",
@@ -63,7 +82,13 @@ rule plot_times:
     input:
         times=f"{RESULTS}/tables/times.json",
     output:
-        svg=f"{RESULTS}/figures/times.svg",
+        svg=report(
+            f"{RESULTS}/figures/times.svg",
+            caption="../report/captions/times.rst",
+            category="Figures",
+            subcategory="all models",
+            labels={"figure": "Wall times of one cold run"},
+        ),
         png=f"{RESULTS}/figures/times.png",
     log:
         f"{LOGS}/figures/times.log",
@@ -81,7 +106,13 @@ rule plot_methods:
     input:
         methods=f"{RESULTS}/tables/methods.json",
     output:
-        svg=f"{RESULTS}/figures/methods.svg",
+        svg=report(
+            f"{RESULTS}/figures/methods.svg",
+            caption="../report/captions/methods.rst",
+            category="Figures",
+            subcategory="all models",
+            labels={"figure": "Wall times in alternating runs"},
+        ),
         png=f"{RESULTS}/figures/methods.png",
     log:
         f"{LOGS}/figures/methods.log",
@@ -103,7 +134,13 @@ rule draw_overview:
         frequencies=f"{RESULTS}/tables/frequencies.json",
         config=f"{RESULTS}/config.yaml",
     output:
-        f"{RESULTS}/figures/{{model}}-overview.png",
+        report(
+            f"{RESULTS}/figures/{{model}}-overview.png",
+            caption="../report/captions/overview.rst",
+            category="Figures",
+            subcategory="{model}",
+            labels={"figure": "Mode and spectrum"},
+        ),
     log:
         f"{LOGS}/figures/{{model}}-overview.log",
     localrule: True
@@ -142,7 +179,12 @@ rule build_report:
             for name in ("page.html.j2", "base.html.j2", "macros.html.j2", "page.css")
         ],
     output:
-        f"{RESULTS}/report.html",
+        report(
+            f"{RESULTS}/report.html",
+            caption="../report/captions/report.rst",
+            category="Report",
+            labels={"page": "This run"},
+        ),
     log:
         f"{LOGS}/report.log",
     localrule: True

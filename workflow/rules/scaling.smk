@@ -23,7 +23,13 @@ use rule plot_scaling as plot_scaling_of_run with:
     input:
         scaling=f"{RESULTS}/models/{{model}}/scaling.json",
     output:
-        svg=f"{RESULTS}/figures/{{model}}-scaling.svg",
+        svg=report(
+            f"{RESULTS}/figures/{{model}}-scaling.svg",
+            caption="../report/captions/scaling.rst",
+            category="Figures",
+            subcategory="{model}",
+            labels={"figure": "Scaling over ranks"},
+        ),
         png=f"{RESULTS}/figures/{{model}}-scaling.png",
     log:
         f"{LOGS}/figures/{{model}}-scaling.log",

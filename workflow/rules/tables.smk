@@ -1,4 +1,5 @@
 # All results as tables: CSV for programs, Markdown for people, JSON for the report.
+from workflow.report import marks
 
 TABLES = [
     "summary",
@@ -60,11 +61,7 @@ rule tabulate_results:
             f"{RESULTS}/models/{{model}}/scaling.json", model=config["scaling"]["models"]
         ),
     output:
-        expand(
-            f"{RESULTS}/tables/{{table}}.{{kind}}",
-            table=TABLES,
-            kind=["csv", "md", "json"],
-        ),
+        marks.tables(f"{RESULTS}/tables", TABLES, "all"),
     log:
         f"{LOGS}/tables.log",
     localrule: True

@@ -68,7 +68,12 @@ rule validate_model:
             )
         ],
     output:
-        page=f"{VALIDATION}/{{model}}.html",
+        page=report(
+            f"{VALIDATION}/{{model}}.html",
+            caption="../report/captions/validation.rst",
+            category="Validation",
+            labels={"model": "{model}"},
+        ),
         criteria=f"{VALIDATION}/tables/{{model}}-criteria.json",
     log:
         f"{LOGS}/validation/{{model}}.log",
