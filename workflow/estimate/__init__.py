@@ -1,0 +1,1 @@
+"""What a run of the workflow takes, from measured rates, before anything runs."""

@@ -1,0 +1,116 @@
+"""The configuration as a page, from its schema: `python -m workflow.schema_page`."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from workflow import settings
+
+_HEAD = """# Configuration
+
+<!-- Made by python -m workflow.schema_page > docs/configuration.md; do not edit. -->
+
+{description}. Name the file with `snakemake --configfile FILE`. Presets are in `workflow/config/`:
+`tiny` for tests, `laptop` for a start, `cluster` and `paper`; `python -m workflow estimate --preset
+NAME` says what each takes. Mistakes are answered in one sentence before anything runs.
+
+A plain number has the unit 1. `NAME` stands for names of your own, `[]` for an entry of a list."""
+_TABLE = "| key | type | default | unit | meaning |\n| --- | --- | --- | --- | --- |"
+_BOUNDS = {
+    "minimum": "at least {}",
+    "exclusiveMinimum": "above {}",
+    "maximum": "at most {}",
+    "exclusiveMaximum": "below {}",
+    "minItems": "at least {} long",
+    "maxItems": "at most {} long",
+}
+_UNIT = re.compile(r"^(.*) \[([^]]+)\]$")
+"""A description that ends with its unit."""
+
+Schema = Mapping[str, Any]
+
+
+def page() -> str:
+    """The whole page as Markdown."""
+    schema = settings.schema()
+    parts = [_HEAD.format(description=schema["description"].rstrip("."))]
+    plain = {key: part for key, part in schema["properties"].items() if not _is_section(part)}
+    parts.append(f"## The run\n\n{_table(_rows(plain, '', schema['required']))}")
+    for key, part in schema["properties"].items():
+        if _is_section(part):
+            required = _nested(part).get("required", ())
+            rows = _rows(_children(part), f"{_named(key, part)}.", required)
+            parts.append(f"## {key}\n\n{part['description']}.\n\n{_table(rows)}")
+    return "\n\n".join(parts) + "\n"
+
+
+def _is_section(part: Schema) -> bool:
+    return bool(_children(part))
+
+
+def _nested(part: Schema) -> Schema:
+    """The part itself, or what each of its named entries or items is."""
+    if "properties" in part:
+        return part
+    for name in ("additionalProperties", "items"):
+        if isinstance(part.get(name), dict) and "properties" in part[name]:
+            nested: Schema = part[name]
+            return nested
+    return {}
+
+
+def _children(part: Schema) -> dict[str, Any]:
+    return dict(_nested(part).get("properties", {}))
+
+
+def _named(key: str, part: Schema) -> str:
+    """Name of a part whose children follow: with a place for the name or number of an entry."""
+    if "properties" in part:
+        return key
+    return f"{key}[]" if part.get("type") == "array" else f"{key}.NAME"
+
+
+def _rows(parts: Mapping[str, Any], prefix: str, required: Any) -> Iterator[tuple[str, ...]]:
+    for key, part in parts.items():
+        default = "required" if key in required else _default(part)
+        found = _UNIT.match(part["description"])
+        meaning, unit = found.groups() if found else (part["description"], "")
+        yield f"`{prefix}{key}`", _type(part), default, unit, _cell(meaning)
+        nested = _nested(part)
+        below = f"{prefix}{_named(key, part)}."
+        yield from _rows(_children(part), below, nested.get("required", ()))
+
+
+def _table(rows: Iterator[tuple[str, ...]]) -> str:
+    return "\n".join([_TABLE, *(f"| {' | '.join(row)} |" for row in rows)])
+
+
+def _type(part: Schema) -> str:
+    """Type, choices and bounds in words."""
+    if "enum" in part:
+        return "one of " + ", ".join(f"`{choice}`" for choice in part["enum"])
+    kind = part["type"]
+    words = " or ".join(kind) if isinstance(kind, list) else kind
+    items = part.get("items")
+    if isinstance(items, dict) and ("enum" in items or "properties" not in items):
+        words = f"{words} of ({_type(items)})"
+    bounds = [text.format(part[name]) for name, text in _BOUNDS.items() if name in part]
+    return ", ".join([words, *bounds])
+
+
+def _default(part: Schema) -> str:
+    """Default of a key; that of a section is its keys' own."""
+    if "default" not in part or (_children(part) and part["default"] == {}):
+        return ""
+    return f"`{_cell(json.dumps(part['default'], ensure_ascii=False))}`"
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
+
+
+if __name__ == "__main__":
+    print(page(), end="")
