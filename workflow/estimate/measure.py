@@ -148,6 +148,14 @@ class Bench:
             "fitting_mb": many.memory_mb,
         }
 
+    def compile(self) -> None:
+        """Run the other programs once on next to nothing: the first run of all compiles them."""
+        self._run(
+            "forests train few.h5 --trees 1 --max-leaves 50 --structure-rows 50000 --out x.h5"
+        )
+        self._run("forests table --blocks 10 --materials 2")
+        self._solve("hcms_ec", SMALL, 12)
+
     # Trees
 
     def trees(self) -> None:
@@ -342,6 +350,7 @@ def measure() -> dict[str, Any]:
         steps: dict[str, Callable[[], Any]] = {
             "fits of every objective": lambda: found.update(fits=bench.fits()),
             "shards": lambda: bench.data(found["fits"]),
+            "compiling": bench.compile,
             "trees": bench.trees,
             "leaves": bench.leaves,
             "errors on single blocks": bench.table,
