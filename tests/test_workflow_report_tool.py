@@ -3,12 +3,34 @@
 from __future__ import annotations
 
 import re
+from types import SimpleNamespace
 
+import jinja2
 import pytest
+from docutils.core import publish_parts
 
 from carillon.errors import UserError
 from tests.workflow_runs import CHECKOUT, planned, snakemake
 from workflow import rule_graph
+from workflow.figures.tables import BUILDERS as FIGURE_TABLES
+from workflow.forests_study.plots import FIGURES
+from workflow.forests_study.tables import BUILDERS as FOREST_TABLES
+from workflow.report import marks
+from workflow.report.tables import BUILDERS as RUN_TABLES
+from workflow.study.tables import BUILDERS as STUDY_TABLES
+
+CAPTIONS = sorted((CHECKOUT / "workflow" / "report" / "captions").glob("*.rst"))
+RULES = [CHECKOUT / "Snakefile", *(CHECKOUT / "workflow" / "rules").glob("*.smk")]
+
+
+def rendered(caption: str, figure: str) -> str:
+    """A caption as Snakemake's report shows it; fails on what reStructuredText does not allow."""
+    wildcards = SimpleNamespace(model="bar", shape="bar", solid="bar", figure=figure)
+    job = SimpleNamespace(wildcards=wildcards, config={"title": "A run"})
+    environment = jinja2.Environment(undefined=jinja2.StrictUndefined)
+    text = environment.from_string(caption).render(snakemake=job)
+    parts = publish_parts(text, writer="html", settings_overrides={"halt_level": 2})
+    return str(parts["html_body"])
 
 
 def test_picture_of_the_rules_shows_the_default_run(tmp_path):
@@ -27,3 +49,28 @@ def test_without_graphviz_a_sentence_says_what_is_missing(monkeypatch, tmp_path)
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(UserError, match="install Graphviz"):
         rule_graph.draw([("first", "second")])
+
+
+@pytest.mark.parametrize("path", CAPTIONS, ids=lambda path: path.stem)
+def test_captions_are_sentences(path):
+    figures = FIGURES if "wildcards.figure" in path.read_text() else [""]
+    for figure in figures:
+        assert rendered(path.read_text(), figure).rstrip().removesuffix("</div>").count(".</p>")
+
+
+def test_every_caption_is_used_and_exists():
+    sources = "".join(path.read_text() for path in [*RULES, CHECKOUT / marks.__file__])
+    assert set(re.findall(r"captions/(\w+)\.rst", sources)) == {path.stem for path in CAPTIONS}
+
+
+def test_every_table_is_listed_with_what_it_shows():
+    assert set(marks.SHOWS) == {*RUN_TABLES, *FIGURE_TABLES, *STUDY_TABLES, *FOREST_TABLES}
+
+
+def test_only_the_csv_files_of_tables_are_marked():
+    files = marks.tables("folder", ["times", "errors"], "all")
+    assert files == [
+        f"folder/{name}.{kind}" for name in ("times", "errors") for kind in ("csv", "md", "json")
+    ]
+    marked = [file for file in files if "report" in getattr(file, "flags", {})]
+    assert marked == ["folder/times.csv", "folder/errors.csv"]

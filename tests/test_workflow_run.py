@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
+import re
 import subprocess
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -61,6 +64,26 @@ def test_a_second_run_does_nothing_but_compare_with_the_baseline(finished):
     assert "none moved beyond noise" in done.stdout + done.stderr
     assert (finished / "results" / "comparison" / "comparison.html").is_file()
     assert time.monotonic() - begin < SECOND_RUN_SECONDS
+
+
+def test_snakemakes_own_report_holds_the_results_and_needs_nothing_from_elsewhere(finished):
+    done = run_tiny(finished, "--report", "report.html")
+    assert done.returncode == 0, done.stdout + done.stderr
+    source = (finished / "report.html").read_text(encoding="utf-8")
+    assert not re.search(r"""<\w[^<>]*\s(src|href)\s*=\s*["']?https?:""", source)
+    categories = value_of("categories", source)
+    assert set(categories) == {"Report", "Validation", "Figures", "Tables"}
+    assert set(categories["Figures"]) == {*MODELS, "all models"}
+    results = value_of("results", source)
+    assert {f"results/tables/{name}.csv" for name in BUILDERS} <= set(results)
+    assert all(result["caption"] and result["labels"] for result in results.values())
+
+
+def value_of(name: str, source: str) -> dict[str, Any]:
+    """What the script of that name sets its variable to."""
+    assignment = re.search(rf'<script id="{name}">\s*var {name} = ', source)
+    value: dict[str, Any] = json.JSONDecoder().raw_decode(source, assignment.end())[0]
+    return value
 
 
 def test_resolved_configuration_lies_beside_the_results(results):
