@@ -190,8 +190,8 @@ def _is_version_sealed(path: Path, inode: int, size: int, changed: int) -> bool:
             return False
         if found != _seal_of(stream):
             raise UserError(
-                f"{path}: is damaged (its bytes do not match their checksum); generate the file "
-                "again"
+                f"{path}: is damaged (its bytes do not match their checksum); remove it and "
+                "generate the file again"
             )
     return True
 
@@ -221,7 +221,9 @@ def open_h5(path: str | Path, kind: str, schema: int, sealed: bool = False) -> I
     with file:
         _require_kind(path, file, kind, schema)
         if sealed and not found_seal:
-            raise UserError(f"{path}: is damaged (its checksum is gone); generate the file again")
+            raise UserError(
+                f"{path}: is damaged (its checksum is gone); remove it and generate the file again"
+            )
         try:
             yield file
         except OSError as error:

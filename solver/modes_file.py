@@ -85,7 +85,7 @@ def write_modes(
     """
     mesh = model.mesh
     uniform = bool((model.young == model.young[:, :1]).all())
-    with create_h5(path, KIND, SCHEMA) as file:
+    with create_h5(path, KIND, SCHEMA, sealed=True) as file:
         _put(file, "eigenvalues", eigenvalues, "rad^2/s^2", "eigenvalues of K u = lambda M u")
         _put(file, "frequencies", frequencies(eigenvalues), "Hz", "natural frequencies")
         _put_modes(file, modes, (mesh.n_dofs, len(eigenvalues)))

@@ -149,7 +149,7 @@ def respond(
 
 def write_response(path: str | Path, response: ResponseFile, parameters: dict[str, Any]) -> None:
     """Write the file atomically; `parameters` are those of the command, for the provenance."""
-    with create_h5(path, KIND, SCHEMA) as file:
+    with create_h5(path, KIND, SCHEMA, sealed=True) as file:
         file.attrs.update(response.attributes)
         _put(file, "seconds", response.seconds, "s")
         for name, contact in response.contacts.items():

@@ -11,6 +11,7 @@ import pytest
 
 from solver.geometry import hexmesh_from_voxels, load_surface, voxelize
 from solver.modes_file import read_modes
+from tests.edited_files import edited
 
 BAR = ("builtin:bar", "--resolution", "16")
 
@@ -152,21 +153,21 @@ def test_damaged_and_foreign_files(modes_file, tmp_path, run_cli):
     cut.write_bytes(modes_file.read_bytes()[:2000])
     older = tmp_path / "older.h5"
     shutil.copy(modes_file, older)
-    with h5py.File(older, "r+") as file:
+    with edited(older) as file:
         file.attrs["schema_version"] = 0
     flipped = tmp_path / "flipped.h5"
     shutil.copy(modes_file, flipped)
-    with h5py.File(flipped, "r+") as file:
+    with h5py.File(flipped) as file:
         offset = file["modes"].id.get_chunk_info(0).byte_offset
     with open(flipped, "rb+") as raw:
         raw.seek(offset)
         raw.write(b"\xff" * 64)
     gutted = tmp_path / "gutted.h5"
     shutil.copy(modes_file, gutted)
-    with h5py.File(gutted, "r+") as file:
+    with edited(gutted) as file:
         del file["modes"]
     for path, sentence in (
-        (cut, "not readable as HDF5"),
+        (cut, "damaged"),
         (older, "schema 0"),
         (flipped, "damaged"),
         (gutted, "incomplete"),

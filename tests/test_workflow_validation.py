@@ -8,7 +8,6 @@ import shutil
 from dataclasses import asdict
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 import trimesh
@@ -18,6 +17,7 @@ from carillon import cli
 from solver.audit import audit_files
 from solver.comparison import compare_files
 from solver.response_file import StrikeOptions, read_response, respond, write_response
+from tests.edited_files import edited
 from tests.pages import Page, assert_self_contained
 from workflow.__main__ import main
 from workflow.report.results import Results
@@ -120,7 +120,7 @@ def test_a_mode_that_is_missing_fails_in_words(run, tmp_path):
     """HCMS + EC is robbed of mode 10, and everything after it is done again."""
     shutil.copytree(run, tmp_path / "spoiled", ignore=shutil.ignore_patterns(".snakemake"))
     folder = tmp_path / "spoiled" / "models" / "block"
-    with h5py.File(folder / "hcms_ec.h5", "r+") as file:
+    with edited(folder / "hcms_ec.h5") as file:
         for name in ("eigenvalues", "frequencies", "residuals"):
             file[name][9:-1] = file[name][10:]
         file["modes"][:, 9:-1] = file["modes"][:, 10:]
