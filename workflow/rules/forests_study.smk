@@ -143,7 +143,7 @@ rule plot_forests_study:
             caption="../report/captions/forest_scores.rst",
             category="Figures",
             subcategory="forests_study",
-            labels={"figure": "{figure}"},
+            labels=lambda wildcards: {"figure": marks.SHOWS[wildcards.figure]},
         ),
         png=f"{FORESTS_STUDY}/figures/{{figure}}.png",
     log:
