@@ -44,8 +44,10 @@ class Cluster:
         control("fail", self.folder)
 
     def repair(self) -> None:
-        """Bring the node back, and start what it lost at once; SLURM would wait two minutes."""
+        """Bring the node back, and start what it lost soon; SLURM would wait two minutes."""
         control("repair", self.folder)
+        # Until the node has been told that the jobs are dead, it would kill them again.
+        time.sleep(5)
         waiting = ["squeue", "--noheader", "--states=PENDING", "--format=%A"]
         for job in subprocess.run(waiting, capture_output=True, text=True).stdout.split():
             subprocess.run(["scontrol", "update", f"JobId={job}", "StartTime=now"], check=True)

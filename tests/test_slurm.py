@@ -143,7 +143,7 @@ def test_a_job_outlives_all_that_befalls_it(cluster: Cluster, tmp_path):
         os.kill(worker(shard), signal.SIGSTOP)
         done = journal.stat().st_size
         cluster.fail()
-        assert worker(shard) is None
+        wait_for(lambda: worker(shard) is None, run, 10, "the end of its processes")
         wait_for(lambda: "NODE_FAIL" in cluster.ends(), run, 60, "the node's death")
         cluster.repair()
         before = done
