@@ -34,7 +34,7 @@ from workflow.estimate.sizes import Solid, size_of
 
 ROOT = Path(__file__).resolve().parents[2]
 
-SAMPLES, FEW_SAMPLES = 1 << 19, 1 << 13
+SAMPLES, FEW_SAMPLES = 1 << 20, 1 << 13
 """Samples of the shards that are timed."""
 
 ROWS, FEW_ROWS = 2_000_000, 250_000
@@ -199,12 +199,14 @@ class Bench:
         }
 
     def _fit(self, options: str) -> tuple[float, float, int]:
-        """Seconds and memory [MB] of fitting leaves, and how many these are."""
-        done = self._run(f"forests train data.h5 {options} --out model.h5")
-        model = json.loads(self._run("forests inspect model.h5 --json").output)
-        undisturbed = min(1.0, done.seconds / done.wall)
-        seconds = undisturbed * model["provenance"]["leaves_seconds"]
-        return seconds, done.memory_mb, model["leaves"]
+        """Seconds and memory [MB] of fitting leaves, the faster of two times; and their number."""
+        seconds = []
+        for _ in range(2):
+            done = self._run(f"forests train data.h5 {options} --out model.h5")
+            model = json.loads(self._run("forests inspect model.h5 --json").output)
+            undisturbed = min(1.0, done.seconds / done.wall)
+            seconds.append(undisturbed * model["provenance"]["leaves_seconds"])
+        return min(seconds), done.memory_mb, model["leaves"]
 
     def table(self) -> None:
         """Table of errors on single blocks."""
