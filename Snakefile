@@ -4,7 +4,7 @@ from pathlib import Path
 from snakemake.utils import min_version, validate
 
 from carillon.errors import UserError
-from workflow import settings
+from workflow import room, settings
 
 min_version("9.0")
 
@@ -43,6 +43,10 @@ include: "workflow/rules/objectives.smk"
 include: "workflow/rules/default_forest.smk"
 include: "workflow/rules/forests_study.smk"
 include: "workflow/rules/compare.smk"
+
+
+onerror:
+    room.tell_if_full(RESULTS)
 
 
 rule all:
