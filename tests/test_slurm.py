@@ -153,7 +153,7 @@ def test_a_job_outlives_all_that_befalls_it(cluster: Cluster, tmp_path):
         os.kill(worker(shard), signal.SIGSTOP)
         wait_for(lambda: "TIMEOUT" in cluster.ends(), run, 150, "the time limit")
     except AssertionError as error:
-        run.terminate()
+        run.kill()
         raise AssertionError((tmp_path / "snakemake.log").read_text()[-6000:]) from error
     output = finish(run, tmp_path)
     assert len(re.findall(r"submitted with SLURM jobid", output)) == 3
