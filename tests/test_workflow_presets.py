@@ -1,0 +1,81 @@
+"""Presets: they fit the schema, are planned without any mesh, and hold the counts they promise."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.test_workflow_config import every_key
+from tests.workflow_runs import CHECKOUT, planned, snakemake
+from workflow import schema_page, settings
+from workflow.estimate.command import CONFIGURATIONS, load
+from workflow.estimate.rates import load_rates
+
+PRESETS = ("tiny", "laptop", "cluster", "paper")
+
+
+def preset(name: str) -> dict:
+    return load(CONFIGURATIONS / f"{name}.yaml")
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_presets_need_no_file(name):
+    settings.check_links(preset(name))
+    assert all(model["mesh"].startswith("builtin:") for model in preset(name)["models"].values())
+
+
+@pytest.mark.parametrize("name", ["cluster", "paper"])
+def test_presets_are_planned_on_a_fresh_clone(name, tmp_path):
+    config = preset(name)
+    file = CONFIGURATIONS / f"{name}.yaml"
+    options = ("--dry-run", "--cores", 16, "--configfile", file)
+    jobs = planned(snakemake(tmp_path, "all", "figures", *options))
+    shards = config["dataset"]["shards"] * len(config["dataset"]["distributions"])
+    assert jobs["generate_shard"] == shards
+    assert jobs["find_modes"] == 7 * len(config["models"])
+    # Solids whose mesh is absent are left out.
+    shapes = config["figures"]["models"].values()
+    builtin = sum(shape["mesh"].startswith("builtin:") for shape in shapes)
+    assert jobs["time_methods_in_full"] == builtin < len(shapes)
+
+
+def test_presets_grow():
+    samples = [preset(name)["dataset"]["samples"] for name in PRESETS]
+    assert samples == sorted(samples)
+    assert 8 * preset("cluster")["dataset"]["samples"] > 100_000_000
+    assert preset("cluster")["solver"]["ranks"] > 1
+
+
+def test_the_papers_counts():
+    config = preset("paper")
+    dataset, forests = config["dataset"], config["forests"]
+    assert 8 * dataset["samples"] == 10_000_000_000
+    assert forests["structure_rows"] == 1_000_000_000
+    assert (forests["trees"], forests["depth"], forests["max_leaves"]) == (3, 20, 2**20)
+    assert (dataset["distributions"], dataset["ranges"]) == (["uniform"], {"uniform": [0, 10]})
+    assert config["poisson"] == 0.25 and config["solver"]["modes"] == 256
+    assert {model["density"] for model in config["models"].values()} == {1.0}
+
+
+def test_a_shard_of_the_papers_data_is_about_an_hour():
+    dataset = preset("paper")["dataset"]
+    each = dataset["samples"] / dataset["shards"]
+    assert 0.5 < each / load_rates().fits_per_second[dataset["objective"]] / 3600.0 < 2.0
+
+
+def test_the_page_of_the_configuration_is_up_to_date():
+    written = (CHECKOUT / "docs" / "configuration.md").read_text()
+    assert written == schema_page.page(), "python -m workflow.schema_page > docs/configuration.md"
+
+
+def test_the_page_has_every_key():
+    text = schema_page.page()
+    for path, _ in every_key(settings.schema()):
+        name = path.replace("*", "NAME")
+        assert f"`{name}`" in text or f"## {name}" in text or name.endswith(".NAME"), name
+
+
+def test_the_page_tells_type_default_unit_and_meaning():
+    row = next(line for line in schema_page.page().splitlines() if "`dataset.shards`" in line)
+    assert row.split(" | ")[1:4] == ["integer, at least 1", "`2`", "1"]
+    density = next(line for line in schema_page.page().splitlines() if ".density`" in line)
+    assert "kg/m^3" in density and density.endswith("Mass density of the solid |")
