@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import hashlib
 import io
 import os
@@ -63,13 +64,12 @@ def require_writable(path: str | Path) -> Path:
 def atomic_path(path: str | Path) -> Iterator[Path]:
     """Yield a temporary name beside `path`; on success fsync it and rename it to `path`.
 
-    When the body raises, the temporary file is removed and `path` stays as it was.
+    When the body raises, the temporary file is removed and `path` stays as it was. What killed
+    writers of `path` have left is removed too.
     """
     path = require_writable(path)
-    start, end = _temporary_name(path)
-    handle, name = tempfile.mkstemp(prefix=start, suffix=end, dir=path.parent)
-    os.close(handle)
-    temporary = Path(name)
+    _remove_leftovers(path)
+    handle, temporary = _new_temporary(path)
     try:
         yield temporary
         umask = os.umask(0)
@@ -83,6 +83,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         raise UserError(f"{path}: could not be written ({cause(error)})") from error
     finally:
         temporary.unlink(missing_ok=True)
+        os.close(handle)
 
 
 def sync_folder(folder: Path) -> None:
@@ -95,12 +96,29 @@ def sync_folder(folder: Path) -> None:
             os.close(handle)
 
 
-def remove_leftovers(path: Path) -> None:
-    """Remove what killed writers of `path` left; only for who knows that no other one writes it."""
+def _new_temporary(path: Path) -> tuple[int, Path]:
+    """A new file beside `path` and its handle, which holds a lock as long as its writer lives.
+
+    The lock is shared, as HDF5 readers may find the file under its final name before it ends.
+    """
+    start, end = _temporary_name(path)
+    while True:
+        handle, name = tempfile.mkstemp(prefix=start, suffix=end, dir=path.parent)
+        with suppress(OSError):  # a file system without locks, where leftovers stay
+            fcntl.flock(handle, fcntl.LOCK_SH)
+        if os.path.exists(name):
+            return handle, Path(name)
+        os.close(handle)  # another writer took it for a leftover, before it was locked
+
+
+def _remove_leftovers(path: Path) -> None:
+    """Remove temporary files of `path` that nobody holds a lock on."""
     start, end = _temporary_name(path)
     for other in path.parent.iterdir():
         if other.name.startswith(start) and other.name.endswith(end):
-            other.unlink(missing_ok=True)
+            with suppress(OSError), open(other, "rb+") as stream:
+                fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                other.unlink()
 
 
 def _temporary_name(path: Path) -> tuple[str, str]:

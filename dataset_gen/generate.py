@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from carillon.errors import UserError
-from carillon.files import remove_leftovers, require_writable
+from carillon.files import require_writable
 from carillon.progress import say, track
 from dataset_gen.element import DEFAULT_POISSON
 from dataset_gen.journal import Journal, discard_journal
@@ -107,7 +107,6 @@ def generate_file(
             finished = _is_there(path, plan)
             return None
         before = journal.rows
-        remove_leftovers(path)
         origin = origin | _environment(journal)
         write_rows(path, plan.settings, map(rows_of, _results(journal, engine)), origin)
         finished = True

@@ -14,7 +14,7 @@ import pytest
 
 from carillon import files
 from carillon.errors import UserError
-from carillon.files import atomic_path, create_h5, open_h5, remove_leftovers, require_writable
+from carillon.files import atomic_path, create_h5, open_h5, require_writable
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 
@@ -263,5 +263,34 @@ def test_leftovers_of_killed_writers_are_removed_and_nothing_else(shard):
     others = [folder / ".other.h5.abc.partial.h5", folder / ".shard.h5.journal", shard]
     for path in (left, *others[:2]):
         path.touch()
-    remove_leftovers(shard)
+    with atomic_path(shard) as temporary:
+        assert sorted(folder.iterdir()) == sorted([temporary, *others])
     assert sorted(folder.iterdir()) == sorted(others)
+
+
+def test_a_writer_under_way_is_no_leftover(tmp_path):
+    path = tmp_path / "modes.h5"
+    with create_h5(path, "modes", 1) as first:
+        with create_h5(path, "modes", 1) as second:
+            second["eigenvalues"] = np.ones(3)
+        with open_h5(path, "modes", 1):
+            first["eigenvalues"] = np.zeros(3)
+    with open_h5(path, "modes", 1) as file:
+        assert np.array_equal(file["eigenvalues"], np.zeros(3))
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_new_file_that_is_taken_for_a_leftover_is_made_anew(tmp_path, monkeypatch):
+    lock = files.fcntl.flock
+    taken = []
+
+    def late(file, operation):
+        if not taken:
+            taken.append(next(tmp_path.iterdir()))
+            taken[0].unlink()
+        lock(file, operation)
+
+    monkeypatch.setattr(files.fcntl, "flock", late)
+    with atomic_path(tmp_path / "text") as temporary:
+        temporary.write_text("whole")
+    assert (tmp_path / "text").read_text() == "whole"

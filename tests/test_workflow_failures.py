@@ -35,8 +35,8 @@ HCMS = "results/models/bar/hcms.h5"
 KIB = 1024
 
 
-def run(folder: Path, *targets: str, cores: int = 2) -> subprocess.CompletedProcess[str]:
-    return snakemake(folder, *options(*targets, cores=cores))
+def run(folder: Path, *targets: str) -> subprocess.CompletedProcess[str]:
+    return snakemake(folder, *options(*targets, cores=2))
 
 
 def options(*targets: str, cores: int) -> list[object]:
@@ -121,7 +121,7 @@ def test_a_run_on_a_full_disk_goes_on_when_there_is_room(folder, small_disk, ass
         path.unlink()
     small_disk(80 * KIB)
     targets = (*SHARDS, TRUTH)
-    done = run(folder, *targets, cores=1)
+    done = run(folder, *targets)
     assert done.returncode != 0
     for file in (SHARDS[1], TRUTH):
         sentence = f"{file}: could not be written (No space left on device; make room and run"
@@ -206,7 +206,7 @@ SLOW_DISK = r"""
 
 static void wait_at(const char *path)
 {
-    if (strstr(path, "results/")) usleep(50000);
+    if (strstr(path, "results/")) usleep(30000);
 }
 
 #define OPEN(name)                                                                        \
@@ -230,11 +230,11 @@ int rename(const char *from, const char *to)
 
 int fsync(int file)
 {
-    usleep(500000);
+    usleep(300000);
     return ((int (*)(int))dlsym(RTLD_NEXT, "fsync"))(file);
 }
 """
-"""Delays what goes to disk by half a second, and every name below results by a twentieth."""
+"""Delays what goes to disk by 0.3 s, and every name below results by 0.03 s."""
 
 
 @pytest.fixture(scope="module")
@@ -263,13 +263,13 @@ def start(folder: Path, environment: dict[str, str], *arguments: object) -> subp
     )
 
 
-def written(folder: Path, run: subprocess.Popen[str]) -> Path:
-    """The half-written result that some job of a run is about to name."""
+def written(folder: Path, run: subprocess.Popen[str], left: int = 0) -> list[Path]:
+    """Half-written results: one that a job of a run is about to name, and those left before."""
     until = time.monotonic() + 60
-    while not (found := unfinished(folder)):
+    while len(found := unfinished(folder)) == left:
         assert run.poll() is None and time.monotonic() < until
         time.sleep(0.02)
-    return found[0]
+    return found
 
 
 def job_of(run: subprocess.Popen[str], name: str) -> list[psutil.Process]:
@@ -286,13 +286,10 @@ def test_killed_while_a_result_is_written(folder, slow_disk, assert_as_undisturb
     command = ["snakemake", "-s", CHECKOUT / "Snakefile", *options(FORESTS, TRUTH, cores=1)]
     run = start(folder, slow_disk, *command)
     try:
-        first = written(folder, run)
-        name = next(name for name in results if name in first.name)
-        for process in job_of(run, name):
+        (first,) = written(folder, run)
+        for process in job_of(run, next(name for name in results if name in first.name)):
             process.kill()
-        first.unlink()
-        second = written(folder, run)
-        assert name not in second.name
+        assert len(written(folder, run, left=1)) == 2
     finally:
         os.killpg(run.pid, signal.SIGKILL)
         output, _ = run.communicate()
@@ -303,6 +300,7 @@ def test_killed_while_a_result_is_written(folder, slow_disk, assert_as_undisturb
     assert again.returncode == 0, output[-6000:]
     assert "removed the lock of a run that was killed" in output
     assert_as_undisturbed(folder, *SHARDS, FORESTS, TRUTH)
+    assert unfinished(folder) == []
 
 
 def test_two_processes_make_a_shard_once_on_a_slow_disk(undisturbed, slow_disk, tmp_path):
