@@ -11,10 +11,13 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import h5py
 import psutil
 import pytest
 
+from carillon.errors import UserError
 from dataset_gen.journal import journal_of
+from solver.modes_file import read_modes
 from tests.workflow_runs import CHECKOUT, PROFILE, snakemake
 from workflow.digest.command import digest
 
@@ -29,7 +32,6 @@ solver: {modes: 12, cores: 1}
 SHARDS = ["results/dataset/uniform-0.h5", "results/dataset/uniform-1.h5"]
 FORESTS = "results/forests/forests.h5"
 SHARD_LOG = "results/logs/dataset/uniform-1.log"
-TRUTH_LOG = "results/logs/models/bar/truth.log"
 TRUTH = "results/models/bar/truth.h5"
 HCMS = "results/models/bar/hcms.h5"
 KIB = 1024
@@ -126,6 +128,8 @@ def test_a_run_on_a_full_disk_goes_on_when_there_is_room(folder, small_disk, ass
     for file in (SHARDS[1], TRUTH):
         sentence = f"{file}: could not be written (No space left on device; make room and run"
         assert sentence in output_of(done)
+    # The run says it too: with no room at all the log of a job stays empty.
+    assert "results: cannot be written (No space left on device; make room" in output_of(done)
     assert not shard.exists() and not truth.exists()
     assert unfinished(folder) == [journal_of(shard)]
     small_disk(KIB * KIB)
@@ -133,17 +137,6 @@ def test_a_run_on_a_full_disk_goes_on_when_there_is_room(folder, small_disk, ass
     assert "going on after 300 of 300" in (folder / SHARD_LOG).read_text()
     assert_as_undisturbed(folder, *targets)
     assert unfinished(folder) == []
-
-
-def test_a_disk_without_any_room_is_told_by_the_run(folder, small_disk):
-    """Where the log of a job finds no room either."""
-    for file in (TRUTH, TRUTH_LOG):
-        (folder / file).unlink()
-    small_disk(0)
-    done = run(folder, TRUTH)
-    assert done.returncode != 0
-    assert "results: cannot be written (No space left on device; make" in output_of(done)
-    assert not (folder / TRUTH).exists() and unfinished(folder) == []
 
 
 # Damaged -----------------------------------------------------------------------------------------
@@ -172,7 +165,7 @@ def test_damaged_files_are_named_and_nothing_comes_of_them(folder, assert_as_und
         damage(folder / file, change)
     needing = [
         "results/dataset/uniform-1.json",
-        "results/models/bar/ddfem_slepc.h5",
+        "results/forests/forests.json",
         "results/models/bar/hcms.comparison.json",
     ]
     done = run(folder, *needing)
@@ -188,10 +181,23 @@ def test_damaged_files_are_named_and_nothing_comes_of_them(folder, assert_as_und
         "generate_shard": 1,
         "describe_shard": 1,
         "train_forests": 1,
-        "find_modes": 2,
+        "describe_forests": 1,
+        "find_modes": 1,
         "compare_with_truth": 1,
     }
     assert_as_undisturbed(folder, *SHARDS, FORESTS, TRUTH, HCMS)
+
+
+def test_zeros_where_a_copy_failed_are_no_modes(undisturbed, tmp_path):
+    """HDF5's own checksum of a chunk of zeros is zero."""
+    path = Path(shutil.copy(undisturbed / TRUTH, tmp_path))
+    with h5py.File(path) as file:
+        chunk = file["eigenvalues"].id.get_chunk_info(0)
+    with path.open("rb+") as stream:
+        stream.seek(chunk.byte_offset)
+        stream.write(bytes(chunk.size))
+    with pytest.raises(UserError, match=r"truth\.h5: is damaged .* remove it and generate"):
+        read_modes(path)
 
 
 # Killed, slow ------------------------------------------------------------------------------------
