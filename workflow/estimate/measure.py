@@ -261,7 +261,7 @@ class Bench:
         cores = len(os.sched_getaffinity(0))
         if cores == 1:
             return 1.0
-        walls = [self._solve("hcms_ec", LARGE, FEW_MODES, threads=cores).wall for _ in range(2)]
+        walls = [self._solve("hcms_ec", LARGE, FEW_MODES, threads=cores).wall for _ in range(3)]
         share = (_more(self.start.seconds, min(walls)) / alone - 1.0 / cores) / (1.0 - 1.0 / cores)
         return min(1.0, max(0.0, share))
 
