@@ -13,8 +13,9 @@ PYTHON_OF_VENV = $(VENV)/bin/python
 CORES ?= all
 TARGETS ?= all
 PYTEST_OPTIONS ?=
-# Test files run beside each other, each in one process; many tests start three ranks themselves.
-PYTEST_PROCESSES ?= 2
+# Test files run beside each other, each in one process, the long ones first. Those of SLURM wait most
+# of the time, which is what the third process is for.
+PYTEST_PROCESSES ?= 3
 PACKAGES = $(patsubst %/__init__.py,%,$(wildcard */__init__.py))
 RULES = $(wildcard Snakefile workflow/rules/*.smk)
 
@@ -41,7 +42,8 @@ run: env  ## the default workflow; ends at results/report.html
 	@echo "report: $(abspath results/report.html)"
 
 test: env  ## the whole test suite
-	@$(PYTHON_OF_VENV) -m pytest -q -n $(PYTEST_PROCESSES) --dist loadfile $(PYTEST_OPTIONS)
+	@$(PYTHON_OF_VENV) -m pytest -q -n $(PYTEST_PROCESSES) --dist loadfile \
+		--no-loadscope-reorder $(PYTEST_OPTIONS)
 
 check: env  ## lint, formatting, types, Snakemake rules
 	@ruff check --quiet

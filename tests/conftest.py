@@ -17,6 +17,19 @@ MESH_FILES = ("stanford-bunny.obj", "teapot.obj")
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files that take longest first, so that no process is left with them at the end."""
+
+    def first(item: pytest.Item) -> int:
+        marks = {mark.name for mark in item.iter_markers()}
+        return 0 if "slurm" in marks else 1 if "slow" in marks else 2
+
+    rank: dict[Path, int] = {}
+    for item in items:
+        rank[item.path] = min(first(item), rank.get(item.path, 2))
+    items.sort(key=lambda item: rank[item.path])
+
+
 def _environment(threads: int, extra: Mapping[str, str] | None) -> dict[str, str]:
     environment = dict(os.environ)
     environment.update(
