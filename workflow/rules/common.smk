@@ -39,6 +39,11 @@ def workers(plan):
     return " --workers {threads}" if plan.forests["ranks"] == 1 else ""
 
 
+def tree_memory(plan):
+    """Megabytes for growing trees: 118 bytes a row were measured (`workflow estimate`), half more asked."""
+    return 2000 + plan.forests["structure_rows"] // 6000
+
+
 def growing(first):
     """Resource that doubles with every try: a job that ran out of it gets more."""
     return lambda wildcards, attempt: first * 2 ** (attempt - 1)

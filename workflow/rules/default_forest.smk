@@ -45,7 +45,7 @@ rule grow_tree:
         f"{BENCHMARKS}/default_forest/trees/{{tree}}.tsv"
     threads: 1
     resources:
-        mem_mb=growing(1000 + DEFAULT.forests["structure_rows"] // 2000),
+        mem_mb=growing(tree_memory(DEFAULT)),
         runtime=growing(240),
     params:
         source=source("forests.training.command"),
