@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import math
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -124,7 +125,14 @@ def test_forests_that_exist_are_not_trained(config):
 def test_what_is_far_beyond_the_measurements_is_said(configs):
     told = values(configs["paper"])["cautions"]
     assert any("1,000,000,000 rows are far beyond" in caution for caution in told)
-    assert not values(configs["tiny"])["cautions"]
+    assert not any(stage.cautions for stage in found(configs["tiny"]).values())
+
+
+def test_rates_of_a_busy_machine_say_so():
+    made = {**load_rates().made, "cores": 2}
+    rates = replace(load_rates(), made={**made, "load": 5.0})
+    assert "load 5 on 2 cores" in rates.disturbed
+    assert not replace(rates, made={**made, "load": 1.2}).disturbed
 
 
 def test_jobs_are_those_of_the_rules(configs, tmp_path):

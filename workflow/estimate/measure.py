@@ -121,6 +121,7 @@ class Bench:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.numbers: dict[str, float] = {}
+        self.load = 0.0
 
     def _run(self, arguments: str, threads: int = 1) -> Run:
         return run_module(self.folder, arguments, threads)
@@ -239,6 +240,7 @@ class Bench:
 
     def shares(self, laws: dict[str, Cost]) -> None:
         """What more cores shorten, and what the composed programs cost."""
+        self.load = os.getloadavg()[0]
         solid = f"{SOLID} --resolution {SMALL} --modes {FEW_MODES}"
         size = size_of(Solid(SOLID, SMALL))
         composition = Composition(laws)
@@ -365,7 +367,7 @@ def measure() -> dict[str, Any]:
             step()
     return {
         "schema": VERSION,
-        "made": _made(),
+        "made": _made(bench.load),
         "numbers": bench.numbers,
         "fits_per_second": found["fits"],
         "laws": {name: _plain(cost) for name, cost in found["laws"].items()},
@@ -385,8 +387,8 @@ def _plain(cost: Cost) -> dict[str, Any]:
     return {"seconds": vars(cost.seconds), "memory_mb": vars(cost.memory_mb)}
 
 
-def _made() -> dict[str, Any]:
-    """Where and when, without the name of the machine."""
+def _made(load: float) -> dict[str, Any]:
+    """Where, when and beside how much other work, without the name of the machine."""
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     return {
         "commit": provenance.commit(),
@@ -394,6 +396,7 @@ def _made() -> dict[str, Any]:
         "processor": provenance.processor(),
         "cores": len(os.sched_getaffinity(0)),
         "memory_gb": round(memory / 1e9, 1),
+        "load": round(load, 1),
         "blas": blas_name(),
         "versions": provenance.versions(),
     }

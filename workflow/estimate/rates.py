@@ -77,6 +77,17 @@ class Rates:
             f"{made['blas']}, commit {made['commit']}, {made['date']}"
         )
 
+    @property
+    def disturbed(self) -> str:
+        """One sentence if other work took cores while the speed-up was measured; else empty."""
+        load, cores = self.made["load"], self.made["cores"]
+        if load + 0.5 <= cores:
+            return ""
+        return (
+            f"rates were measured on a busy machine, load {load:g} on {cores} cores: runs get less "
+            "out of many cores here than they will"
+        )
+
 
 def rates_of(values: Mapping[str, Any], where: str) -> Rates:
     """Rates from the plain values of their file.

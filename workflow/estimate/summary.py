@@ -34,8 +34,16 @@ def plain(
         "solids": {name: vars(size) for name, size in sizes.items()},
         "stages": rows,
         "totals": totals,
-        "cautions": [caution for stage in stages for caution in stage.cautions],
-        "rates": {"made": rates.made, "how": rates.how, "up_to": rates.up_to},
+        "cautions": [
+            *(caution for stage in stages for caution in stage.cautions),
+            *([rates.disturbed] if rates.disturbed else []),
+        ],
+        "rates": {
+            "origin": rates.origin,
+            "made": rates.made,
+            "how": rates.how,
+            "up_to": rates.up_to,
+        },
     }
 
 
@@ -66,7 +74,7 @@ def _row(stage: Stage, machine: Machine) -> dict[str, Any]:
 
 def as_text(found: Mapping[str, Any], name: str) -> str:
     """The result of `plain` as lines."""
-    machine, totals, made = found["machine"], found["totals"], found["rates"]["made"]
+    machine, totals = found["machine"], found["totals"]
     cores = machine["nodes"] * machine["cores_per_node"]
     lines = [
         f"{name} on {machine['nodes']} x {machine['cores_per_node']} = {cores:,} cores, "
@@ -79,8 +87,7 @@ def as_text(found: Mapping[str, Any], name: str) -> str:
         "memory is that of the largest job; files stay, beside them there are up to "
         f"{_size(totals['scratch_gb'])} of journals for a while",
         "",
-        f"rates of {made['processor']}, {made['cores']} cores, {made['blas']}, commit "
-        f"{made['commit']}, {made['date']}",
+        f"rates of {found['rates']['origin']}",
     ]
     for solid, size in found["solids"].items():
         lines.append(
