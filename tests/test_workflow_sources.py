@@ -39,7 +39,7 @@ def project(tmp_path, monkeypatch):
 
 
 def fingerprint(*modules):
-    for cached in (sources._file_of, sources._named_in, sources._content, sources._tree):
+    for cached in (sources._file_of, sources._named_in, sources._content, sources._read):
         cached.cache_clear()
     return sources.fingerprint(*modules)
 

@@ -72,16 +72,7 @@ def _file_of(module: str) -> Path | None:
 @cache
 def _named_in(path: Path) -> tuple[frozenset[str], frozenset[Path]]:
     """Names that may be modules, and files of the same folder, that a source file mentions."""
-    names: set[str] = set()
-    data: set[Path] = set()
-    for node in ast.walk(_tree(path)):
-        if isinstance(node, ast.Import):
-            names.update(alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            names.add(node.module)
-            names.update(f"{node.module}.{alias.name}" for alias in node.names)
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-            data.update(_data_beside(path, node.value))
+    names, data, _ = _read(path)
     packages = {parent for name in names for parent in _parents(name)}
     return frozenset(names | packages), frozenset(data)
 
@@ -104,12 +95,17 @@ def _parents(name: str) -> Iterator[str]:
 @cache
 def _content(path: Path) -> bytes:
     """What counts of a file: the syntax tree of a module, all bytes of another file."""
-    return ast.dump(_tree(path)).encode() if path.suffix == ".py" else path.read_bytes()
+    return _read(path)[2] if path.suffix == ".py" else path.read_bytes()
 
 
 @cache
-def _tree(path: Path) -> ast.Module:
-    """Syntax tree of a source file without docstrings and help texts."""
+def _read(path: Path) -> tuple[set[str], set[Path], bytes]:
+    """Imported names, data files beside it, and syntax tree of a source file.
+
+    The tree is without docstrings and help texts.
+    """
+    names: set[str] = set()
+    data: set[Path] = set()
     tree = ast.parse(path.read_text(encoding="utf-8"))
     for node in ast.walk(tree):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)):
@@ -117,7 +113,14 @@ def _tree(path: Path) -> ast.Module:
             node.body = [part for part in node.body if not _is_text(part)]
         elif isinstance(node, ast.Call):
             node.keywords = [part for part in node.keywords if part.arg not in _TEXTS]
-    return tree
+        elif isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names.add(node.module)
+            names.update(f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            data.update(_data_beside(path, node.value))
+    return names, data, ast.dump(tree).encode()
 
 
 def _is_text(statement: ast.stmt) -> bool:

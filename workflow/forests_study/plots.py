@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
-
-import matplotlib.pyplot as plt
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from typing import TYPE_CHECKING, Any
 
 from workflow.forests_study.results import ForestsStudy, Row
 from workflow.report.blocks_tables import compared, kind_of, method_of
 from workflow.report.style import COLOURS, MUTED, SETTINGS
+
+if TYPE_CHECKING:  # Rules ask for the names of the figures; drawing is loaded when there is any.
+    from matplotlib.figure import Figure
 
 MARKS: tuple[tuple[str, str], ...] = (
     ("o", COLOURS["hcms"]),
@@ -45,6 +44,8 @@ def blocks_figure(study: ForestsStudy) -> Figure:
     rows = compared(study.blocks)
     kinds = list(dict.fromkeys(map(kind_of, rows)))
     marks = _marks(list(dict.fromkeys(map(method_of, rows))))
+    import matplotlib.pyplot as plt
+
     with plt.rc_context(SETTINGS):
         figure, axes = plt.subplots(
             -(-len(kinds) // 2), 2, figsize=(7.6, 1.2 + 1.45 * len(kinds)), sharex=True, sharey=True
@@ -88,6 +89,8 @@ def _panel(axis: Any, rows: Sequence[Row], marks: dict[str, tuple[str, str]]) ->
 def curve_figure(study: ForestsStudy) -> Figure:
     """Errors on fresh blocks over the rows trained on."""
     rows = study.curve
+    import matplotlib.pyplot as plt
+
     with plt.rc_context(SETTINGS):
         figure, axes = plt.subplots(figsize=(7.6, 4.2))
         for distribution, colour in zip(rows[0]["scores"], DISTRIBUTIONS):
@@ -113,6 +116,8 @@ def variants_figure(study: ForestsStudy) -> Figure:
     rows = study.variants
     names = [row["variant"] for row in rows]
     distributions = list(rows[0]["scores"])
+    import matplotlib.pyplot as plt
+
     with plt.rc_context(SETTINGS):
         figure, axes = plt.subplots(figsize=(7.6, 1.3 + 0.32 * len(names)))
         for number, (distribution, colour) in enumerate(zip(distributions, DISTRIBUTIONS)):
@@ -142,6 +147,8 @@ def sizes_figure(study: ForestsStudy) -> Figure:
     """Time of a block over the size of forests."""
     found = study.benchmark["sizes"]
     ours = study.benchmark["megabytes"]
+    import matplotlib.pyplot as plt
+
     with plt.rc_context(SETTINGS):
         figure, axes = plt.subplots(figsize=(7.6, 3.4))
         for (key, label), colour in zip(SIZED.items(), DISTRIBUTIONS):
@@ -160,6 +167,8 @@ def sizes_figure(study: ForestsStudy) -> Figure:
 
 def _plain(axis: Any) -> None:
     """Ticks of a logarithmic axis as plain numbers."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
     axis.set_major_locator(LogLocator(10, subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
