@@ -129,10 +129,10 @@ def test_what_is_far_beyond_the_measurements_is_said(configs):
 
 
 def test_rates_of_a_busy_machine_say_so():
-    made = {**load_rates().made, "cores": 2}
-    rates = replace(load_rates(), made={**made, "load": 5.0})
-    assert "load 5 on 2 cores" in rates.disturbed
-    assert not replace(rates, made={**made, "load": 1.2}).disturbed
+    known = replace(load_rates(), measured_share=0.3)
+    unknown = replace(known, measured_share=None)
+    assert known.serial_share == 0.3 and not known.unmeasured
+    assert 0.0 < unknown.serial_share < 1.0 and "too busy" in unknown.unmeasured
 
 
 def test_jobs_are_those_of_the_rules(configs, tmp_path):
@@ -246,6 +246,17 @@ def test_what_is_measured_are_rates(monkeypatch, capsys):
     assert set(rates.fits_per_second) == set(DATASET_OBJECTIVES)
     assert "measuring 1 of" in capsys.readouterr().err
     assert all(cost.seconds(1000, 10) > 0.0 for cost in rates.laws.values())
+
+
+def test_measured_rates_are_kept_and_used(tmp_path, monkeypatch, capsys):
+    packaged = json.loads(PACKAGED.read_text())
+    monkeypatch.setattr(measure, "measure", lambda: packaged)
+    kept = tmp_path / "rates.json"
+    assert main(["estimate", "--preset", "tiny", "--measure", "--rates", str(kept)]) == 0
+    assert json.loads(kept.read_text()) == packaged
+    first = capsys.readouterr().out
+    assert main(["estimate", "--preset", "tiny", "--rates", str(kept)]) == 0
+    assert capsys.readouterr().out == first
 
 
 def test_a_program_is_charged_what_it_took(tmp_path):

@@ -122,6 +122,7 @@ class Bench:
         self.folder = folder
         self.numbers: dict[str, float] = {}
         self.load = 0.0
+        self.serial_share: float | None = None
 
     def _run(self, arguments: str, threads: int = 1) -> Run:
         return run_module(self.folder, arguments, threads)
@@ -254,16 +255,21 @@ class Bench:
         for name, (arguments, composed) in runs.items():
             done = self._run(f"solver {arguments}")
             self.numbers[name] = _more(self.start.seconds, done.seconds) / composed
-        self.numbers["serial_share"] = self._serial_share(
-            composition.seconds("hcms_ec", size_of(Solid(SOLID, LARGE)).fine, FEW_MODES)
-        )
+        large = size_of(Solid(SOLID, LARGE)).fine
+        alone = composition.seconds("hcms_ec", large, FEW_MODES)
+        self.serial_share = self._serial_share(alone)
 
-    def _serial_share(self, alone: float) -> float:
-        """Share of a run of so many seconds on one core that more cores do not shorten."""
+    def _serial_share(self, alone: float) -> float | None:
+        """Share of a run of so many seconds on one core that more cores do not shorten.
+
+        None on a machine that is busy with something else, where that cannot be measured.
+        """
         cores = len(os.sched_getaffinity(0))
         if cores == 1:
             return 1.0
-        walls = [self._solve("hcms_ec", LARGE, FEW_MODES, threads=cores).wall for _ in range(3)]
+        if self.load > cores - 0.5:
+            return None
+        walls = [self._solve("hcms_ec", LARGE, FEW_MODES, threads=cores).wall for _ in range(2)]
         share = (_more(self.start.seconds, min(walls)) / alone - 1.0 / cores) / (1.0 - 1.0 / cores)
         return min(1.0, max(0.0, share))
 
@@ -369,6 +375,7 @@ def measure() -> dict[str, Any]:
         "schema": VERSION,
         "made": _made(bench.load),
         "numbers": bench.numbers,
+        "serial_share": bench.serial_share,
         "fits_per_second": found["fits"],
         "laws": {name: _plain(cost) for name, cost in found["laws"].items()},
         "up_to": {

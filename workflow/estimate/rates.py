@@ -21,6 +21,9 @@ PACKAGED = Path(__file__).parent / "rates.json"
 
 VERSION = 1
 
+ASSUMED_SHARE = 0.5
+"""What is taken for `Rates.serial_share` where it was not measured."""
+
 
 @dataclass(frozen=True)
 class Law:
@@ -56,6 +59,7 @@ class Rates:
     ----------
     made : where and when.
     numbers, fits_per_second : costs by name.
+    measured_share : share of a solver run that more cores do not shorten, if that was measured.
     laws : costs of solver runs by name.
     up_to : largest sizes that were measured.
     how : how, in a sentence for each kind.
@@ -63,6 +67,7 @@ class Rates:
 
     made: Mapping[str, Any]
     numbers: Mapping[str, float]
+    measured_share: float | None
     fits_per_second: Mapping[str, float]
     laws: Mapping[str, Cost]
     up_to: Mapping[str, int]
@@ -78,15 +83,20 @@ class Rates:
         )
 
     @property
-    def disturbed(self) -> str:
-        """One sentence if other work took cores while the speed-up was measured; else empty."""
-        load, cores = self.made["load"], self.made["cores"]
-        if load + 0.5 <= cores:
+    def unmeasured(self) -> str:
+        """One sentence if it is not known how far more cores help; else empty."""
+        if self.measured_share is not None:
             return ""
         return (
-            f"rates were measured on a busy machine, load {load:g} on {cores} cores: runs get less "
-            "out of many cores here than they will"
+            f"the machine was too busy, load {self.made['load']:g} on {self.made['cores']} cores, "
+            f"to measure how far more cores shorten a solver run; {ASSUMED_SHARE:.0%} of it is "
+            "taken to stay as it is"
         )
+
+    @property
+    def serial_share(self) -> float:
+        """Share of a solver run on one core that more cores do not shorten."""
+        return ASSUMED_SHARE if self.measured_share is None else self.measured_share
 
 
 def rates_of(values: Mapping[str, Any], where: str) -> Rates:
@@ -112,6 +122,7 @@ def rates_of(values: Mapping[str, Any], where: str) -> Rates:
     return Rates(
         values["made"],
         values["numbers"],
+        values["serial_share"],
         values["fits_per_second"],
         laws,
         values["up_to"],

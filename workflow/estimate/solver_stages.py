@@ -62,7 +62,7 @@ class SolverStages:
         """A solver run by its seconds on one core and its memory, both beyond starting."""
         numbers = self.run.numbers
         ranks = self.run.config["solver"]["ranks"] if ranks is None else ranks
-        cores, serial = self.run.cores(ranks), numbers["serial_share"]
+        cores, serial = self.run.cores(ranks), self.run.rates.serial_share
         wall = numbers["start_seconds"] + seconds * (serial + (1.0 - serial) / cores)
         return Jobs(1, wall, cores, ranks * numbers["start_mb"] + memory_mb, ranks)
 
@@ -225,7 +225,7 @@ class SolverStages:
         return {
             "seconds": f"{runs}; {law} takes {seconds.factor:.2g} s x "
             f"unknowns^{seconds.unknowns:.2f} x modes^{seconds.modes:.2f} on one core, of which "
-            f"{self.run.numbers['serial_share']:.0%} stays on many; {how}",
+            f"{self.run.rates.serial_share:.0%} stays on many; {how}",
             "memory": f"{self.run.numbers['start_mb']:.0f} MB a rank and, for {law}, "
             f"{memory.factor:.2g} MB x unknowns^{memory.unknowns:.2f} x "
             f"modes^{memory.modes:.2f}; {how}",

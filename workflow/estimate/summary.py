@@ -36,7 +36,7 @@ def plain(
         "totals": totals,
         "cautions": [
             *(caution for stage in stages for caution in stage.cautions),
-            *([rates.disturbed] if rates.disturbed else []),
+            *([rates.unmeasured] if rates.unmeasured else []),
         ],
         "rates": {
             "origin": rates.origin,
