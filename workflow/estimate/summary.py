@@ -137,7 +137,7 @@ def _size(gigabytes: float) -> str:
     for unit, name in ((1e3, "TB"), (1.0, "GB"), (1e-3, "MB")):
         if gigabytes >= unit:
             return f"{_number(gigabytes / unit)} {name}"
-    return "-"
+    return "<1 MB" if gigabytes else "-"
 
 
 def _number(value: float) -> str:
