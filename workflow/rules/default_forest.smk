@@ -70,7 +70,7 @@ rule train_default_forest:
         mpi=launcher(DEFAULT.forests["ranks"]),
         tasks=DEFAULT.forests["ranks"],
         cpus_per_task=cores_of(DEFAULT.forests["ranks"]),
-        mem_mb=growing(8000),
+        mem_mb=growing(training_memory(DEFAULT)),
         runtime=growing(240),
     params:
         source=source("forests.training.command"),

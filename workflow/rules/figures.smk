@@ -39,7 +39,7 @@ rule follow_convergence_in_full:
         f"{BENCHMARKS}/{FIGURES_FOLDER}/{{shape}}/convergence.tsv"
     threads: SOLVER_CORES
     resources:
-        mem_mb=growing(8000),
+        mem_mb=growing(16000),
         runtime=growing(120),
     params:
         source=source("solver.convergence", "solver.__main__"),
@@ -63,7 +63,7 @@ rule measure_scaling:
         f"{BENCHMARKS}/{FIGURES_FOLDER}/{{shape}}/scaling.tsv"
     threads: SOLVER_CORES
     resources:
-        mem_mb=growing(8000),
+        mem_mb=growing(16000),
         runtime=growing(120),
     params:
         source=source("solver.scaling", "solver.__main__"),

@@ -17,7 +17,7 @@ rule train_forests:
         mpi=launcher(OWN.forests["ranks"]),
         tasks=OWN.forests["ranks"],
         cpus_per_task=cores_of(OWN.forests["ranks"]),
-        mem_mb=growing(tree_memory(OWN)),
+        mem_mb=growing(training_memory(OWN)),
         runtime=growing(240),
     params:
         source=source("forests.training.command"),

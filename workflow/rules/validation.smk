@@ -16,7 +16,7 @@ rule audit_spectra:
         f"{LOGS}/models/{{model}}/audit.log",
     threads: 1
     resources:
-        mem_mb=growing(4000),
+        mem_mb=growing(6000),
         runtime=growing(30),
     params:
         source=source("solver.audit"),
@@ -33,7 +33,7 @@ rule strike_solid:
         f"{LOGS}/models/{{model}}/response.log",
     threads: 1
     resources:
-        mem_mb=growing(2000),
+        mem_mb=growing(4000),
         runtime=growing(30),
     params:
         source=source("solver.response_file"),
