@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import platform
 import shlex
 import subprocess
@@ -17,7 +16,7 @@ from typing import Any
 import h5py
 
 from carillon import __version__
-from carillon.runtime import blas_name
+from carillon.runtime import allowed_cores, blas_name
 
 _PACKAGES = (
     "numpy",
@@ -88,7 +87,7 @@ def record(parameters: dict[str, Any]) -> dict[str, Any]:
         "command": _command(),
         "versions": json.dumps(versions()),
         "processor": processor(),
-        "cores": len(os.sched_getaffinity(0)),
+        "cores": allowed_cores(),
         "blas": blas_name(),
     }
 

@@ -113,9 +113,14 @@ def reuse_freed_memory() -> None:
         mallopt(_M_TRIM_THRESHOLD, _NEVER)
 
 
+def allowed_cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
 def allowed_threads() -> int:
     """Threads that this process may use: its cores, or fewer if `OMP_NUM_THREADS` says so."""
-    cores = len(os.sched_getaffinity(0))
+    cores = allowed_cores()
     requested = os.environ.get("OMP_NUM_THREADS", "")
     return min(cores, int(requested)) if requested.isdigit() and int(requested) > 0 else cores
 
@@ -125,7 +130,7 @@ def limit_threads(ranks: int) -> int:
 
     Returns the number of BLAS threads now allowed in this process.
     """
-    cores = len(os.sched_getaffinity(0))
+    cores = allowed_cores()
     threads = max(1, cores // max(1, ranks))
     requested = os.environ.get("OMP_NUM_THREADS", "")
     if requested.isdigit() and int(requested) > 0:

@@ -10,8 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import ShortTimeFFT, fftconvolve
-from scipy.signal.windows import hann
 
 from solver.contact import Contact, interpolation
 from solver.model import RIGID_MODES
@@ -118,6 +116,8 @@ def contact_sounds(contacts: Contacts, damping: Damping, contact_seconds: float)
     the sign of a mode nor on how the modes of a cluster are mixed.  The force is half a sine of
     `contact_seconds` with an impulse of 1 N s.  Nothing is said about radiation into the air.
     """
+    from scipy.signal import fftconvolve  # Loaded where sound is made, not by every command.
+
     seconds = np.arange(round(STRIKE_SECONDS * SAMPLE_RATE_HERTZ)) / SAMPLE_RATE_HERTZ
     modes = is_audible(contacts.eigenvalues)
     values = contacts.eigenvalues[modes]
@@ -144,6 +144,9 @@ def is_audible(eigenvalues: Array) -> NDArray[np.bool_]:
 
 def spectrogram(sound: Array) -> tuple[Array, Array, Array]:
     """Times (t,) [s], frequencies (f,) [Hz] and magnitudes (f, t) of a sound."""
+    from scipy.signal import ShortTimeFFT
+    from scipy.signal.windows import hann
+
     window = hann(round(_WINDOW_SECONDS * SAMPLE_RATE_HERTZ), sym=False)
     hop = round(_HOP_SECONDS * SAMPLE_RATE_HERTZ)
     transform = ShortTimeFFT(window, hop, SAMPLE_RATE_HERTZ, mfft=2048, scale_to="magnitude")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ import yaml
 from carillon.arguments import whole_number
 from carillon.errors import UserError
 from carillon.files import cause, require_writable
+from carillon.runtime import allowed_cores
 from dataset_gen.objectives import DATASET_OBJECTIVES
 from workflow import settings, training
 from workflow.estimate import summary
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--cores-per-node",
         type=whole_number(1),
-        default=len(os.sched_getaffinity(0)),
+        default=allowed_cores(),
         metavar="CORES",
         help="(default: those of this machine)",
     )

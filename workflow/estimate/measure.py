@@ -23,8 +23,9 @@ import numpy as np
 
 from carillon import provenance
 from carillon.errors import UserError
+from carillon.measurement import memory_bytes
 from carillon.progress import say
-from carillon.runtime import blas_name
+from carillon.runtime import allowed_cores, blas_name
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, SAMPLED
 from forests.comparison.combinations import combinations
 from forests.training.moments import ENTRIES
@@ -264,7 +265,7 @@ class Bench:
 
         None on a machine that is busy with something else, where that cannot be measured.
         """
-        cores = len(os.sched_getaffinity(0))
+        cores = allowed_cores()
         if cores == 1:
             return 1.0
         if self.load > cores - 0.5:
@@ -384,7 +385,7 @@ def measure() -> dict[str, Any]:
             "leaves": LEAVES,
             "unknowns": size_of(Solid(SOLID, LARGE)).fine,
             "modes": MODES,
-            "cores": len(os.sched_getaffinity(0)),
+            "cores": allowed_cores(),
         },
         "how": _how(),
     }
@@ -396,13 +397,12 @@ def _plain(cost: Cost) -> dict[str, Any]:
 
 def _made(load: float) -> dict[str, Any]:
     """Where, when and beside how much other work, without the name of the machine."""
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     return {
         "commit": provenance.commit(),
         "date": datetime.now(UTC).date().isoformat(),
         "processor": provenance.processor(),
-        "cores": len(os.sched_getaffinity(0)),
-        "memory_gb": round(memory / 1e9, 1),
+        "cores": allowed_cores(),
+        "memory_gb": round(memory_bytes() / 1e9, 1),
         "load": round(load, 1),
         "blas": blas_name(),
         "versions": provenance.versions(),

@@ -50,6 +50,13 @@ def training_memory(plan):
     return plan.forests["ranks"] * (tree_memory(plan) + int(leaves))
 
 
+def templates(package):
+    """Templates of a page: those of its package, and what all pages share."""
+    shared = [f"report/{name}" for name in ("base.html.j2", "macros.html.j2", "page.css")]
+    names = [f"{package}/page.html.j2", *shared]
+    return [Path(workflow.basedir, "workflow", name) for name in names]
+
+
 def growing(first):
     """Resource that doubles with every try: a job that ran out of it gets more."""
     return lambda wildcards, attempt: first * 2 ** (attempt - 1)

@@ -161,15 +161,7 @@ rule build_figures_report:
             f"{FIGURES}/figures/{{shape}}-convergence.svg", shape=present(config, "convergence")
         ),
         scaling=expand(f"{FIGURES}/figures/{{shape}}-scaling.svg", shape=present(config, "scaling")),
-        templates=[
-            Path(workflow.basedir, "workflow", name)
-            for name in (
-                "figures/page.html.j2",
-                "report/base.html.j2",
-                "report/macros.html.j2",
-                "report/page.css",
-            )
-        ],
+        templates=templates("figures"),
     output:
         report(
             f"{FIGURES}/report.html",

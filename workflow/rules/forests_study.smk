@@ -163,15 +163,7 @@ rule build_forests_report:
         config=f"{RESULTS}/config.yaml",
         tables=expand(f"{FORESTS_STUDY}/tables/{{table}}.json", table=list(study_tables.BUILDERS)),
         figures=expand(f"{FORESTS_STUDY}/figures/{{figure}}.svg", figure=list(study_plots.FIGURES)),
-        templates=[
-            Path(workflow.basedir, "workflow", name)
-            for name in (
-                "forests_study/page.html.j2",
-                "report/base.html.j2",
-                "report/macros.html.j2",
-                "report/page.css",
-            )
-        ],
+        templates=templates("forests_study"),
     output:
         report(
             f"{FORESTS_STUDY}/report.html",

@@ -80,15 +80,7 @@ rule build_objectives_report:
         config=f"{RESULTS}/config.yaml",
         tables=expand(f"{STUDY}/tables/{{table}}.json", table=list(BUILDERS)),
         figures=expand(f"{STUDY}/figures/{{solid}}.svg", solid=cases.solids_of(config)),
-        templates=[
-            Path(workflow.basedir, "workflow", name)
-            for name in (
-                "study/page.html.j2",
-                "report/base.html.j2",
-                "report/macros.html.j2",
-                "report/page.css",
-            )
-        ],
+        templates=templates("study"),
     output:
         report(
             f"{STUDY}/report.html",

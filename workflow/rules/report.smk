@@ -174,10 +174,7 @@ rule build_report:
         scaling=expand(
             f"{RESULTS}/figures/{{model}}-scaling.svg", model=config["scaling"]["models"]
         ),
-        templates=[
-            Path(workflow.basedir, "workflow/report", name)
-            for name in ("page.html.j2", "base.html.j2", "macros.html.j2", "page.css")
-        ],
+        templates=templates("report"),
     output:
         report(
             f"{RESULTS}/report.html",

@@ -58,15 +58,7 @@ rule validate_model:
             f"{RESULTS}/figures/{{{{model}}}}-mode-{{variant}}.png", variant=variants.SHOWN
         ),
         description=f"{RESULTS}/figures/{{model}}-mode.json",
-        templates=[
-            Path(workflow.basedir, "workflow", name)
-            for name in (
-                "validate/page.html.j2",
-                "report/base.html.j2",
-                "report/macros.html.j2",
-                "report/page.css",
-            )
-        ],
+        templates=templates("validate"),
     output:
         page=report(
             f"{VALIDATION}/{{model}}.html",

@@ -17,6 +17,7 @@ from carillon.arguments import non_negative_number, poisson_ratio, positive_numb
 from carillon.errors import UserError
 from carillon.files import atomic_path
 from carillon.progress import say
+from carillon.runtime import allowed_cores
 from solver.contact import surface_node
 from solver.geometry import FILLS, PIECES, surface_name
 from solver.materials import NAMES as MATERIALS
@@ -95,7 +96,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"limits of the criteria: {', '.join(_tolerance_names())}",
     )
     parser.add_argument(
-        "--cores", type=whole_number(1), default=_cores(), help="cores to use (default: all)"
+        "--cores", type=whole_number(1), default=allowed_cores(), help="cores to use (default: all)"
     )
 
 
@@ -232,7 +233,3 @@ def _tolerance(text: str) -> tuple[str, float]:
 def _tolerance_names() -> list[str]:
     section = settings.schema()["properties"]["validation"]["properties"]["tolerances"]
     return list(section["properties"])
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0))
