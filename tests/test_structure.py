@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 CHECKOUT = Path(__file__).resolve().parent.parent
-CHAIN = ("carillon", "dataset_gen", "forests", "solver", "workflow")
+CHAIN = ("carillon", "dataset_gen", "forests", "solver", "sound", "workflow")
 
 
 def imported_rooms(source: Path) -> set[str]:

@@ -1,0 +1,1 @@
+"""Sound design: targets from clips, material optimisation, synthesis and export."""
