@@ -83,35 +83,27 @@ def write_modes(
     UserError
         If the file cannot be written.
     """
-    mesh = model.mesh
-    uniform = bool((model.young == model.young[:, :1]).all())
     with create_h5(path, KIND, SCHEMA, sealed=True) as file:
-        _put(file, "eigenvalues", eigenvalues, "rad^2/s^2", "eigenvalues of K u = lambda M u")
-        _put(file, "frequencies", frequencies(eigenvalues), "Hz", "natural frequencies")
-        _put_modes(file, modes, (mesh.n_dofs, len(eigenvalues)))
-        _put(file, "residuals", residuals, "1", "|K x - lambda M x| / (lambda |M x|)")
-        _put(file, "nodes", mesh.nodes, "m", "positions of the nodes")
-        _put(file, "node_grid", mesh.node_grid, "1", "integer coordinates of the nodes")
-        _put(file, "cells", mesh.cells, "1", "node numbers of the cells, corners in bit order")
-        _put(file, "grid", mesh.grid, "1", "integer coordinates of the cells")
-        young = model.young[:, 0] if uniform else model.young
-        _put(file, "young", young, "Pa", "Young's modulus per cell or per quadrature point")
-        _put(file, "fill", model.fill, "1", "bit pattern of the cell's octants that hold mass")
-        file.attrs["poisson"] = model.poisson
-        file.attrs["density"] = model.density
-        file.attrs["lumped"] = model.lumped
-        file.attrs["lumped_share"] = model.lumped_share
-        file.attrs["cell_edge"] = mesh.edge
-        file.attrs["origin"] = mesh.origin
+        put_eigenvalues(file, eigenvalues)
+        put_modes(file, modes, (model.n_dofs, len(eigenvalues)))
+        put(file, "residuals", residuals, "1", "|K x - lambda M x| / (lambda |M x|)")
+        put_model(file, model)
         for key, value in attributes.items():
             file.attrs[key] = json.dumps(value) if isinstance(value, dict) else value
         origin = measured(parameters, attributes.get("ranks", 1))
         file.create_group("provenance").attrs.update(origin)
 
 
-def _put_modes(file: h5py.File, blocks: Iterable[Array], shape: tuple[int, int]) -> None:
+def put_eigenvalues(group: h5py.Group, eigenvalues: Array) -> None:
+    """Write the eigenvalues (k,) and the frequencies that they belong to."""
+    put(group, "eigenvalues", eigenvalues, "rad^2/s^2", "eigenvalues of K u = lambda M u")
+    put(group, "frequencies", frequencies(eigenvalues), "Hz", "natural frequencies")
+
+
+def put_modes(group: h5py.Group, blocks: Iterable[Array], shape: tuple[int, int]) -> None:
+    """Write mass-normalised modes of the given shape (n_dofs, k), handed over in blocks."""
     chunks = (min(_ROWS_PER_CHUNK, shape[0]), min(_COLUMNS_PER_CHUNK, shape[1]))
-    dataset = file.create_dataset("modes", shape, float, chunks=chunks, fletcher32=True)
+    dataset = group.create_dataset("modes", shape, float, chunks=chunks, fletcher32=True)
     dataset.attrs["units"] = "kg^-1/2"
     dataset.attrs["long_name"] = "mass-normalised modes; row 3 n + i is node n along axis i"
     first = 0
@@ -120,6 +112,48 @@ def _put_modes(file: h5py.File, blocks: Iterable[Array], shape: tuple[int, int])
         first += block.shape[1]
     if first != shape[1]:
         raise ValueError(f"{first} modes for {shape[1]} eigenvalues")
+
+
+def put_model(group: h5py.Group, model: ElasticModel) -> None:
+    """Write a solid, from which K and M can be assembled again."""
+    mesh = model.mesh
+    uniform = bool((model.young == model.young[:, :1]).all())
+    young = model.young[:, 0] if uniform else model.young
+    put(group, "nodes", mesh.nodes, "m", "positions of the nodes")
+    put(group, "node_grid", mesh.node_grid, "1", "integer coordinates of the nodes")
+    put(group, "cells", mesh.cells, "1", "node numbers of the cells, corners in bit order")
+    put(group, "grid", mesh.grid, "1", "integer coordinates of the cells")
+    put(group, "young", young, "Pa", "Young's modulus per cell or per quadrature point")
+    put(group, "fill", model.fill, "1", "bit pattern of the cell's octants that hold mass")
+    group.attrs["poisson"] = model.poisson
+    group.attrs["density"] = model.density
+    group.attrs["lumped"] = model.lumped
+    group.attrs["lumped_share"] = model.lumped_share
+    group.attrs["cell_edge"] = mesh.edge
+    group.attrs["origin"] = mesh.origin
+
+
+def get_model(group: h5py.Group) -> ElasticModel:
+    """Read a solid written by `put_model`."""
+    mesh = HexMesh(
+        cells=group["cells"][()],
+        grid=group["grid"][()],
+        node_grid=group["node_grid"][()],
+        origin=group.attrs["origin"],
+        edge=float(group.attrs["cell_edge"]),
+    )
+    young = group["young"][()]
+    if young.ndim == 1:
+        young = np.repeat(young[:, None], 8, axis=1)
+    return ElasticModel(
+        mesh,
+        young,
+        group["fill"][()],
+        float(group.attrs["poisson"]),
+        float(group.attrs["density"]),
+        bool(group.attrs["lumped"]),
+        float(group.attrs.get("lumped_share", 0.0)),
+    )
 
 
 def read_modes(path: str | Path, with_modes: bool = True) -> ModesFile:
@@ -132,25 +166,7 @@ def read_modes(path: str | Path, with_modes: bool = True) -> ModesFile:
     """
     with open_h5(path, KIND, SCHEMA) as file:
         attributes = {key: _plain(value) for key, value in file.attrs.items()}
-        mesh = HexMesh(
-            cells=file["cells"][()],
-            grid=file["grid"][()],
-            node_grid=file["node_grid"][()],
-            origin=file.attrs["origin"],
-            edge=float(file.attrs["cell_edge"]),
-        )
-        young = file["young"][()]
-        if young.ndim == 1:
-            young = np.repeat(young[:, None], 8, axis=1)
-        model = ElasticModel(
-            mesh,
-            young,
-            file["fill"][()],
-            float(file.attrs["poisson"]),
-            float(file.attrs["density"]),
-            bool(file.attrs["lumped"]),
-            float(file.attrs.get("lumped_share", 0.0)),
-        )
+        model = get_model(file)
         result = ModesFile(
             file["eigenvalues"][()],
             file["frequencies"][()],
@@ -161,8 +177,8 @@ def read_modes(path: str | Path, with_modes: bool = True) -> ModesFile:
             provenance.read(file),
         )
         shape = file["modes"].shape
-    expected = (mesh.n_dofs, len(result.eigenvalues))
-    if shape != expected or len(young) != mesh.n_cells:
+    expected = (model.n_dofs, len(result.eigenvalues))
+    if shape != expected or len(model.young) != model.mesh.n_cells:
         raise UserError(
             f"{path}: holds modes of shape {shape}, expected {expected}; generate the file again"
         )
@@ -174,8 +190,9 @@ def frequencies(eigenvalues: Array) -> Array:
     return np.asarray(np.sqrt(np.maximum(eigenvalues, 0.0)) / (2.0 * np.pi))
 
 
-def _put(file: h5py.File, name: str, data: NDArray[Any], units: str, long_name: str) -> None:
-    dataset = file.create_dataset(name, data=data, fletcher32=True, chunks=True)
+def put(group: h5py.Group, name: str, data: NDArray[Any], units: str, long_name: str) -> None:
+    """Write one dataset with a checksum, its unit and what it is."""
+    dataset = group.create_dataset(name, data=data, fletcher32=True, chunks=True)
     dataset.attrs["units"] = units
     dataset.attrs["long_name"] = long_name
 
