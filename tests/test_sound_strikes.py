@@ -1,0 +1,119 @@
+"""Struck points: on the surface, into the solid, one target each."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from carillon.errors import UserError
+from solver.geometry import BUILTINS, builtin_surface
+from sound.strikes import Place, inward_normals, locate, locate_all
+from sound.surface import struck_surface
+
+PAN = "builtin:frying-pan"
+
+
+def ball(radius: float = 0.1) -> trimesh.Trimesh:
+    return trimesh.creation.icosphere(subdivisions=3, radius=radius)
+
+
+def soup(surface: trimesh.Trimesh) -> trimesh.Trimesh:
+    """The surface with vertices of their own for every triangle."""
+    faces = np.arange(3 * len(surface.faces)).reshape(-1, 3)
+    return trimesh.Trimesh(surface.vertices[surface.faces].reshape(-1, 3), faces, process=False)
+
+
+def upside_down(surface: trimesh.Trimesh) -> trimesh.Trimesh:
+    return trimesh.Trimesh(surface.vertices, surface.faces[:, ::-1], process=False)
+
+
+def half_turned(surface: trimesh.Trimesh) -> trimesh.Trimesh:
+    faces = surface.faces.copy()
+    faces[::2] = faces[::2, ::-1]
+    return trimesh.Trimesh(surface.vertices, faces, process=False)
+
+
+@pytest.mark.parametrize("change", [lambda s: s, soup, upside_down, half_turned])
+def test_strikes_go_into_a_ball_however_its_triangles_are_stored(change):
+    strike = locate(change(ball()), "top", at=(0.0, 0.001, 0.1))
+    assert np.allclose(strike.position, (0.0, 0.0, 0.1), atol=1e-2)
+    assert strike.inward @ (-strike.position / 0.1) > 0.999
+    assert np.linalg.norm(strike.inward) == pytest.approx(1.0)
+
+
+def test_a_vertex_is_struck_by_its_number():
+    strike = locate(ball(), "there", vertex=17)
+    assert strike.vertex == 17
+    assert np.array_equal(strike.position, ball().vertices[17])
+
+
+def test_inward_is_into_every_built_in_object():
+    import igl
+
+    for name in BUILTINS:
+        surface = struck_surface(f"builtin:{name}")
+        positions = np.asarray(surface.vertices)[:: max(1, len(surface.vertices) // 200)]
+        inward = inward_normals(surface, positions)
+        vertices, faces = np.array(surface.vertices), np.array(surface.faces, dtype=np.int64)
+        step = 1e-3 * surface.extents.max() * inward
+        ahead, behind = (
+            igl.fast_winding_number(vertices, faces, positions + s) for s in (step, -step)
+        )
+        assert (ahead > behind - 0.25).all(), name
+        assert (ahead > 0.5).mean() > 0.95, name
+
+
+def test_a_struck_surface_is_fine_everywhere_and_keeps_its_vertices():
+    plain, fine = builtin_surface("frying-pan"), struck_surface(PAN)
+    assert np.array_equal(fine.vertices[: len(plain.vertices)], plain.vertices)
+    assert fine.edges_unique_length.max() <= fine.extents.max() / 16
+    assert fine.is_watertight and fine.is_winding_consistent
+    assert fine.volume == pytest.approx(plain.volume)
+    middle = locate(fine, "plate", at=(0.05, 0.0, 0.022))  # the plain mesh has no vertex near
+    assert np.linalg.norm(middle.position - (0.05, 0.0, 0.022)) < 0.02
+    assert np.allclose(middle.inward, (0.0, 0.0, -1.0))
+    with pytest.raises(UserError, match=r"'plate'.* m from the surface's vertices, expected"):
+        locate(plain, "plate", at=(0.05, 0.0, 0.022))
+
+
+def test_the_unit_of_the_mesh_scales_the_surface():
+    assert np.allclose(struck_surface(PAN, 2.0).extents, 2.0 * struck_surface(PAN).extents)
+
+
+@pytest.mark.parametrize(
+    ("place", "says"),
+    [
+        (
+            {"at": (0.0, 0.0, 0.15)},
+            r"'top'.*\(0, 0, 0.15\) m is 0.05 m .*nearest vertex is \d+",
+        ),
+        ({"at": (0.0, float("nan"), 0.1)}, "'top'.*not finite"),
+        ({"vertex": 642}, r"'top'.*no vertex 642.* 642 of them, numbered from 0 to 641"),
+        ({"vertex": -1}, "'top'.*no vertex -1"),
+        ({}, "'top'.*either a position or a vertex"),
+        ({"at": (0.0, 0.0, 0.1), "vertex": 3}, "'top'.*either a position or a vertex"),
+    ],
+)
+def test_a_place_that_cannot_be_struck_is_answered_in_one_sentence(place, says):
+    with pytest.raises(UserError, match=says) as caught:
+        locate(ball(), "top", **place)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_vertex_without_triangles_cannot_be_struck():
+    surface = ball()
+    loose = trimesh.Trimesh([*surface.vertices, (0, 0, 0.1)], surface.faces, process=False)
+    with pytest.raises(UserError, match="vertex 642 belongs to no triangle"):
+        locate(loose, "top", vertex=642)
+    assert locate(loose, "top", at=(0, 0, 0.1)).vertex != 642
+
+
+def test_two_targets_at_one_place_are_refused_even_if_its_vertices_differ():
+    surface = soup(ball())
+    corner = surface.vertices[0]
+    twins = np.flatnonzero((surface.vertices == corner).all(axis=1))
+    with pytest.raises(UserError, match="'left' and 'right' are both at vertex 0"):
+        locate_all(surface, [Place("left", vertex=0), Place("right", vertex=int(twins[1]))])
+    apart = locate_all(surface, [Place("left", vertex=0), Place("right", vertex=1)])
+    assert [strike.name for strike in apart] == ["left", "right"]
