@@ -1,0 +1,189 @@
+"""Project files: defaults, paths, and one sentence about each mistake."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from jsonschema import Draft202012Validator
+
+from carillon.errors import UserError
+from solver.geometry import FILLS, PIECES
+from solver.problem import ProblemOptions
+from sound import project
+from sound.project import Project, load_project
+
+LEAST = {"mesh": "builtin:bell", "targets": [{"name": "rim", "vertex": 3, "clip": "rim.wav"}]}
+SCHEMA = yaml.safe_load(project.SCHEMA.read_text())
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for name in ("rim.wav", "top.wav"):
+        (tmp_path / name).touch()
+    return tmp_path
+
+
+def write(folder: Path, described: object) -> Path:
+    path = folder / "bell.yaml"
+    path.write_text(described if isinstance(described, str) else yaml.safe_dump(described))
+    return path
+
+
+def load(folder: Path, **keys: object) -> Project:
+    return load_project(write(folder, LEAST | keys))
+
+
+def test_the_schema_is_one_and_describes_every_key():
+    Draft202012Validator.check_schema(SCHEMA)
+    for part in (SCHEMA, SCHEMA["properties"]["targets"]["items"]):
+        assert all(each["description"] for each in part["properties"].values())
+        assert part["additionalProperties"] is False
+
+
+def test_what_a_project_leaves_out_takes_the_defaults_of_the_schema(folder):
+    found = load(folder).as_dict()
+    for key, part in SCHEMA["properties"].items():
+        for inner, each in part.get("properties", {}).items():
+            assert found[key][inner] == each["default"]
+        if "default" in part and "properties" not in part:
+            assert found[key] == part["default"]
+
+
+def test_defaults_of_the_solid_are_those_of_the_solver():
+    defaults = {field.name: field.default for field in dataclasses.fields(ProblemOptions)}
+    for key in ("unit", "fill", "pieces", "poisson", "density", "forest"):
+        assert SCHEMA["properties"][key]["default"] == defaults[key]
+    assert SCHEMA["properties"]["fill"]["enum"] == list(FILLS)
+    assert SCHEMA["properties"]["pieces"]["enum"] == list(PIECES)
+
+
+def test_everything_that_is_written_is_read(folder):
+    targets = [
+        {"name": "rim", "at": [0.088, 0, 0], "clip": "rim.wav", "modes": 20},
+        {"name": "top", "vertex": 7, "clip": "top.wav"},
+    ]
+    found = load(
+        folder,
+        resolution=16,
+        coarsen="none",
+        modes=12,
+        targets=targets,
+        material={"law": "exponential"},
+        optimiser={"method": "cma", "seconds": None, "evaluations": 40},
+    )
+    assert found.solid == ProblemOptions("builtin:bell", 16)
+    assert found.modes == 12
+    assert [target.name for target in found.targets] == ["rim", "top"]
+    assert found.targets[0].at == (0.088, 0, 0) and found.targets[0].modes == 20
+    assert found.targets[1].vertex == 7 and found.targets[1].modes is None
+    assert found.material.law == "exponential" and found.material.young == 1e9
+    assert found.optimiser.method == "cma" and found.optimiser.seconds is None
+
+
+def test_paths_are_relative_to_the_project(folder, monkeypatch):
+    monkeypatch.chdir("/")
+    found = load(folder, mesh="models/jug.obj", forest="forests.h5")
+    assert found.solid.mesh == str(folder / "models/jug.obj")
+    assert found.solid.forest == str(folder / "forests.h5")
+    assert found.targets[0].clip == str(folder / "rim.wav")
+
+
+def test_a_project_as_a_dictionary_is_the_same_project_anywhere(folder, tmp_path):
+    found = load(folder, mesh="jug.obj", targets=[LEAST["targets"][0] | {"modes": 4}])
+    other = tmp_path / "elsewhere"
+    other.mkdir()
+    assert load_project(write(other, found.as_dict())) == found
+
+
+@pytest.mark.parametrize("number", ["1e9", "1.0e9", "1.0e+9", "1000000000"])
+def test_numbers_may_be_written_as_people_do(folder, number):
+    text = yaml.safe_dump(LEAST) + f"material: {{young: {number}}}\nmodes: 12.0\n"
+    found = load_project(write(folder, text))
+    assert found.material.young == 1e9
+    assert found.modes == 12 and isinstance(found.modes, int)
+
+
+def test_points_are_struck_in_the_unit_of_the_mesh(folder):
+    places = [
+        {"name": "rim", "at": [0.088, 0.0, 0.0], "clip": "rim.wav"},
+        {"name": "top", "vertex": 7, "clip": "top.wav"},
+    ]
+    found = load(folder, unit=2.0, targets=places)
+    rim, top = found.strikes(found.surface())
+    assert rim.name == "rim" and top.vertex == 7
+    assert np.linalg.norm(rim.position - (0.176, 0.0, 0.0)) < 0.02
+
+
+RIM = LEAST["targets"][0]
+
+
+@pytest.mark.parametrize(
+    ("keys", "says"),
+    [
+        ({"mseh": "x"}, "there is no key 'mseh', only mesh, .*did you mean mesh?"),
+        ({"optimizer": {}}, "no key 'optimizer'.*did you mean optimiser?"),
+        (
+            {"targets": [{"name": "a", "vertex": 1, "clp": "rim.wav"}]},
+            r"targets\[0\]: .*'clp'.*clip?",
+        ),
+        ({"weights": {"bark": 1.0}}, "weights: there is no key 'bark', only frequency, amplitude,"),
+        ({"targets": [{"name": "a", "vertex": 1}]}, r"targets\[0\]: the key clip is missing"),
+        ({"targets": []}, "targets: found .*expected at least 1 of them"),
+        ({"targets": [{**RIM, "clip": "gong.wav"}]}, r"targets\[0\].clip: there is no file .*gong"),
+        (
+            {"targets": [{**RIM, "at": [0, 0, 0]}]},
+            r"targets\[0\]: expected at or vertex, found both",
+        ),
+        ({"targets": [{"name": "a", "clip": "rim.wav"}]}, "expected at or vertex, found neither"),
+        ({"targets": [{"name": "a", "at": [0, 0], "clip": "rim.wav"}]}, r"\.at: .*at least 3 of"),
+        (
+            {"targets": [{"name": "a", "at": [0, 0, "x"], "clip": "rim.wav"}]},
+            r"\.at\[2\]: found 'x'",
+        ),
+        ({"targets": [{**RIM, "modes": 0}]}, r"targets\[0\].modes: found 0, expected at least 1"),
+        ({"targets": [RIM, RIM]}, r"targets\[0\] and targets\[1\] are both named 'rim'"),
+        ({"targets": "rim"}, "targets: found 'rim', expected a list"),
+        ({"modes": 0}, "modes: found 0, expected at least 1: elastic modes"),
+        ({"modes": "many"}, "modes: found 'many', expected a whole number: elastic modes"),
+        ({"mesh": None}, "mesh: found None, expected a text"),
+        (
+            {"coarsen": "fit"},
+            "coarsen: found 'fit', expected one of none, average, galerkin, ddfem",
+        ),
+        ({"poisson": 0.5}, "poisson: found 0.5, expected below 0.5"),
+        ({"density": float("nan")}, "density: found nan, expected a finite number"),
+        ({"optimiser": {"seconds": 0}}, "optimiser.seconds: found 0, expected above 0"),
+        ({"optimiser": None}, "optimiser: found None, expected keys and values"),
+    ],
+)
+def test_a_mistake_is_answered_in_one_sentence(folder, keys, says):
+    with pytest.raises(UserError, match=says) as caught:
+        load(folder, **keys)
+    assert "\n" not in str(caught.value)
+    assert str(caught.value).startswith(str(folder / "bell.yaml"))
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("mesh: builtin:bell", "the key targets is missing, expected struck points"),
+        ("", "expected keys and values"),
+        ("- a\n- b", "expected keys and values"),
+        ("mesh: builtin:bell\ntargets: [", "is not readable as YAML .line 2"),
+    ],
+)
+def test_a_file_that_is_no_project_is_answered_in_one_sentence(folder, text, says):
+    with pytest.raises(UserError, match=says) as caught:
+        load_project(write(folder, text))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_missing_project_is_answered_in_one_sentence(folder):
+    with pytest.raises(UserError, match="no such file, expected a project"):
+        load_project(folder / "none.yaml")
+    with pytest.raises(UserError, match="is not readable as YAML"):
+        load_project(folder)
