@@ -124,8 +124,15 @@ def contact_sounds(contacts: Contacts, damping: Damping, contact_seconds: float)
     damped = np.sqrt(np.maximum(values - damping.decay_per_second(values) ** 2, 0.0))
     amplitudes = contacts.push[:, modes] ** 2 * damped
     single = impulse_responses(values, damping, seconds) @ amplitudes.T
-    strikes = fftconvolve(single, _half_sine(contact_seconds)[:, None], axes=0)[: len(seconds)]
+    strikes = fftconvolve(single, half_sine(contact_seconds)[:, None], axes=0)[: len(seconds)]
     return np.asarray(strikes.T)
+
+
+def half_sine(seconds: float, rate: int = SAMPLE_RATE_HERTZ) -> Array:
+    """Samples of a force of half a sine with unit sum; a single one if it is too short."""
+    count = max(1, round(seconds * rate))
+    force = np.sin(np.pi * (np.arange(count) + 0.5) / count)
+    return np.asarray(force / force.sum())
 
 
 def in_turn(sounds: Array, loudest: Array) -> Array:
@@ -171,10 +178,3 @@ def spectral_distance(sound: Array, truth: Array) -> float:
 def relative_difference(found: Array, truth: Array) -> float:
     """|found - truth| / |truth| in the 2-norm over all entries."""
     return float(np.linalg.norm(found - truth) / np.linalg.norm(truth))
-
-
-def _half_sine(seconds: float) -> Array:
-    """Samples of a force of half a sine with unit sum."""
-    count = max(1, round(seconds * SAMPLE_RATE_HERTZ))
-    force = np.sin(np.pi * (np.arange(count) + 0.5) / count)
-    return np.asarray(force / force.sum())
