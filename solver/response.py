@@ -149,14 +149,16 @@ def is_audible(eigenvalues: Array) -> NDArray[np.bool_]:
     return np.asarray((hertz >= AUDIBLE_HERTZ[0]) & (hertz <= AUDIBLE_HERTZ[1]))
 
 
-def spectrogram(sound: Array) -> tuple[Array, Array, Array]:
-    """Times (t,) [s], frequencies (f,) [Hz] and magnitudes (f, t) of a sound."""
+def spectrogram(sound: Array, rate: int = SAMPLE_RATE_HERTZ) -> tuple[Array, Array, Array]:
+    """Times (t,) [s], frequencies (f,) [Hz] and magnitudes (f, t) of a sound at `rate` [Hz]."""
     from scipy.signal import ShortTimeFFT
     from scipy.signal.windows import hann
 
-    window = hann(round(_WINDOW_SECONDS * SAMPLE_RATE_HERTZ), sym=False)
-    hop = round(_HOP_SECONDS * SAMPLE_RATE_HERTZ)
-    transform = ShortTimeFFT(window, hop, SAMPLE_RATE_HERTZ, mfft=2048, scale_to="magnitude")
+    window = hann(round(_WINDOW_SECONDS * rate), sym=False)
+    bins = max(2048, 2 ** int(np.ceil(np.log2(len(window)))))
+    transform = ShortTimeFFT(
+        window, round(_HOP_SECONDS * rate), rate, mfft=bins, scale_to="magnitude"
+    )
     return transform.t(len(sound)), transform.f, np.abs(transform.stft(sound))
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import NDArray
 
 from carillon.files import atomic_path
@@ -111,6 +112,15 @@ def themed(source: str) -> str:
     for colour, variable in THEMED.items():
         source = re.sub(colour, f"var({variable})", source, flags=re.IGNORECASE)
     return re.sub(r"font-family: [^;\"]*", "font-family: var(--sans)", source)
+
+
+def inlined(figure: Figure, name: str) -> Markup:
+    """The figure as part of a page, in the page's own colours and font; it is closed."""
+    import matplotlib.pyplot as plt
+
+    source = themed(svg(figure, name))
+    plt.close(figure)
+    return Markup(source)
 
 
 def pixels(figure: Any) -> NDArray[np.uint8]:

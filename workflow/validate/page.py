@@ -6,25 +6,23 @@ import hashlib
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 import yaml
-from markupsafe import Markup
-from matplotlib.figure import Figure
 
 from carillon import provenance
 from solver.geometry import load_surface
 from solver.response import STRIKE_SECONDS
 from workflow import settings
+from workflow.report.audio import wav_uri
 from workflow.report.mode_pictures import CLUSTER_WIDTH
 from workflow.report.page import page_template, picture_uri
-from workflow.report.style import svg, themed
+from workflow.report.pictures import png_uri
+from workflow.report.style import inlined
 from workflow.report.table import Table
 from workflow.validate import plots, tables
-from workflow.validate.audio import wav_uri
 from workflow.validate.criteria import judge
 from workflow.validate.evidence import Evidence
-from workflow.validate.pictures import png_uri, solid_pictures, struck_picture
+from workflow.validate.pictures import solid_pictures, struck_picture
 from workflow.validate.verdict import verdict
 from workflow.variants import SHOWN, TRUTH, VARIANTS
 
@@ -60,8 +58,8 @@ def build(evidence: Evidence) -> tuple[str, dict[str, Table]]:
         strike=_strike(evidence),
         sounds=_sounds(evidence),
         strike_seconds=STRIKE_SECONDS,
-        errors=_inline(plots.errors_figure(found["errors"], evidence.tolerances), "errors"),
-        shapes=_inline(plots.shapes_figure(evidence), "shapes"),
+        errors=inlined(plots.errors_figure(found["errors"], evidence.tolerances), "errors"),
+        shapes=inlined(plots.shapes_figure(evidence), "shapes"),
         counted=_counted_by_run(evidence),
         files=_digests(evidence),
         configuration=_configuration(evidence),
@@ -103,7 +101,7 @@ def _solid(evidence: Evidence) -> dict[str, Any]:
             }
             for title, picture in zip(titles, pictures, strict=True)
         ],
-        "histogram": _inline(plots.moduli_figure(young), "moduli"),
+        "histogram": inlined(plots.moduli_figure(young), "moduli"),
     }
 
 
@@ -133,7 +131,7 @@ def _strike(evidence: Evidence) -> dict[str, Any]:
         },
         "chosen": {name: evidence.settings[name] is not None for name in ("strike", "observed")},
         "milliseconds": 1e3 * float(response.seconds[-1]),
-        "motion": _inline(plots.motion_figure(response), "motion"),
+        "motion": inlined(plots.motion_figure(response), "motion"),
         **response.attributes,
     }
 
@@ -148,7 +146,7 @@ def _sounds(evidence: Evidence) -> list[dict[str, Any]]:
     return [
         {
             "variant": variant,
-            "plot": _inline(plots.spectrogram_figure(response, variant), f"sound-{variant}"),
+            "plot": inlined(plots.sound_figure(response, variant), f"sound-{variant}"),
             "source": wav_uri(response.responses[variant].sound, rate, loudest),
             "audible": response.responses[variant].audible,
             "distance": response.responses[variant].distance_decibels,
@@ -184,10 +182,3 @@ def _configuration(evidence: Evidence) -> str:
         {"models": {evidence.model: evidence.settings}, "forests": forests, **parts},
         sort_keys=False,
     )
-
-
-def _inline(figure: Figure, name: str) -> Markup:
-    """A figure as part of the page."""
-    source = themed(svg(figure, name))
-    plt.close(figure)
-    return Markup(source)

@@ -10,14 +10,15 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from solver.response import FLOOR_DECIBELS, decibels, spectrogram
+from solver.response import SAMPLE_RATE_HERTZ, spectrogram
 from solver.response_file import ResponseFile
 from workflow.report.convergence_plot import visible
+from workflow.report.pictures import COLOUR_MAP
 from workflow.report.plots import LINES
-from workflow.report.style import COLOURS, MUTED, SETTINGS
+from workflow.report.spectrogram_plot import highest_hertz, spectrogram_figure
+from workflow.report.style import COLOURS, SETTINGS
 from workflow.report.table import Table
 from workflow.validate.evidence import COARSENED, COMPARED, SOLVED, Evidence
-from workflow.validate.pictures import COLOUR_MAP
 from workflow.variants import SHOWN, TRUTH, VARIANTS
 
 Array = NDArray[np.float64]
@@ -119,37 +120,12 @@ def motion_figure(response: ResponseFile) -> Figure:
     return figure
 
 
-def spectrogram_figure(response: ResponseFile, variant: str) -> Figure:
+def sound_figure(response: ResponseFile, variant: str) -> Figure:
     """Spectrogram of a sound, in levels below the loudest of the truth's."""
-    loudest = float(spectrogram(response.responses[TRUTH].sound)[2].max())
-    times, hertz, magnitudes = spectrogram(response.responses[variant].sound)
-    shown = hertz <= highest_hertz(response)
-    levels = decibels(magnitudes[shown], loudest)
-    with plt.rc_context({**SETTINGS, "axes.grid": False}):
-        figure, axes = plt.subplots(figsize=(4.7, 2.9))
-        extent = (1e3 * times[0], 1e3 * times[-1], 0.0, 1e-3 * hertz[shown][-1])
-        image = axes.imshow(
-            levels,
-            aspect="auto",
-            origin="lower",
-            extent=extent,
-            vmin=FLOOR_DECIBELS,
-            vmax=0.0,
-            cmap="magma",
-        )
-        figure.colorbar(image, ax=axes, label="level [dB]", pad=0.02).outline.set_edgecolor(MUTED)
-        axes.set(xlabel="time [ms]", ylabel="frequency [kHz]", xlim=(0.0, extent[1]))
-    return figure
-
-
-def highest_hertz(response: ResponseFile) -> float:
-    """Frequency up to which the loudest sounds reach, with some room above."""
-    highest = 0.0
-    for part in response.responses.values():
-        _, hertz, magnitudes = spectrogram(part.sound)
-        heard = (decibels(magnitudes, float(magnitudes.max())) > FLOOR_DECIBELS).any(axis=1)
-        highest = max(highest, float(hertz[heard].max()))
-    return min(1.1 * highest + 200.0, float(hertz[-1]))
+    responses = response.responses
+    loudest = float(spectrogram(responses[TRUTH].sound)[2].max())
+    highest = highest_hertz((part.sound, SAMPLE_RATE_HERTZ) for part in responses.values())
+    return spectrogram_figure(responses[variant].sound, loudest, highest)
 
 
 def _length_unit(peak: float) -> tuple[float, str]:
