@@ -1,33 +1,36 @@
-"""What struck points shall sound like: modal parameters shared by several clips."""
+"""Targets of a design: the modes of several clips, brought to one list of frequencies."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.errors import UserError
+from sound.clips.extraction import ModalSound
+
 Array = NDArray[np.float64]
+
+SAME_HERTZ, SAME_SHARE = 1.0, 0.002
+"""Modes of different clips closer than 1 Hz or 0.2 %, whichever is more, are one: about what
+listeners can tell apart in pure tones (Moore, An Introduction to the Psychology of Hearing, ch. 6).
+"""
 
 
 @dataclass(frozen=True)
 class Targets:
-    """Frequencies and dampings common to all clips, and each clip's amplitudes (§5).
+    """What a design should sound like when struck at T points.
 
     Attributes
     ----------
-    names
-        Of the T clips.
-    frequencies
-        (N,) [Hz], ascending.
-    dampings
-        (N,) [1/s].
-    amplitudes
-        (T, N) in samples, >= 0; 0 where the clip of that position has no such mode.
-    residuals
-        T arrays of samples: each clip less its modes, from the strike on.
-    rates
-        T sampling rates [Hz].
+    names : T names of the points.
+    frequencies : (N,) [Hz], ascending, shared by all points.
+    dampings : (N,) [1/s].
+    amplitudes : (T, N) at the strike, 0 where the clip of that point has no such mode.
+    residuals : T arrays of samples, what is left of each clip without its modes.
+    rates : T sampling rates of the residuals [Hz].
     """
 
     names: tuple[str, ...]
@@ -36,3 +39,84 @@ class Targets:
     amplitudes: Array
     residuals: tuple[Array, ...]
     rates: tuple[int, ...]
+
+
+def share_frequencies(names: Sequence[str], sounds: Sequence[ModalSound], modes: int) -> Targets:
+    """The `modes` modes that carry most of all clips' sound, with amplitudes per clip.
+
+    Modes of different clips that cannot be told apart become one, whose frequency and damping are
+    means weighted by amplitude. They are chosen one by one: the clip of whose energy the least is
+    covered yet names its strongest mode. Loud and quiet clips count alike, as each one's energy is
+    its own measure.
+
+    Raises
+    ------
+    UserError
+        If fewer modes were extracted from all clips together.
+    """
+    owners = np.repeat(np.arange(len(sounds)), [len(sound.frequencies) for sound in sounds])
+    frequencies = np.concatenate([sound.frequencies for sound in sounds])
+    dampings = np.concatenate([sound.dampings for sound in sounds])
+    amplitudes = np.concatenate([sound.amplitudes for sound in sounds])
+    shares = np.concatenate([sound.energies / sound.energies.sum() for sound in sounds])
+
+    groups = _groups(frequencies, owners)
+    if modes > groups.max() + 1:
+        raise UserError(
+            f"{modes} modes asked for, more than the {groups.max() + 1} different ones that were "
+            f"extracted from the {len(sounds)} clips; ask for fewer"
+        )
+    table = np.zeros((len(sounds), groups.max() + 1))
+    covered = table.copy()
+    table[owners, groups] = amplitudes
+    covered[owners, groups] = shares
+    loudness = np.array([np.sqrt(sound.energies.sum()) for sound in sounds])
+    weights = amplitudes / loudness[owners]
+    weight = np.bincount(groups, weights)
+    shared = np.bincount(groups, weights * frequencies) / weight
+    chosen = _chosen(covered, modes)
+    chosen = chosen[np.argsort(shared[chosen])]
+    return Targets(
+        names=tuple(names),
+        frequencies=shared[chosen],
+        dampings=(np.bincount(groups, weights * dampings) / weight)[chosen],
+        amplitudes=table[:, chosen],
+        residuals=tuple(sound.residual for sound in sounds),
+        rates=tuple(sound.rate for sound in sounds),
+    )
+
+
+def _groups(frequencies: Array, owners: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Group number (k,) of each mode, the closest pairs joined first.
+
+    A group spans no more than what counts as the same, and has one mode of a clip at most.
+    """
+    groups = np.arange(len(frequencies))
+    order = np.argsort(frequencies, kind="stable")
+    near = [
+        (i, j) for a, i in enumerate(order) for j in order[a + 1 :] if _same(frequencies[[i, j]])
+    ]
+    for i, j in sorted(near, key=lambda pair: abs(frequencies[pair[0]] - frequencies[pair[1]])):
+        members = np.flatnonzero((groups == groups[i]) | (groups == groups[j]))
+        apart = len(set(owners[members])) == len(members)
+        if groups[i] != groups[j] and apart and _same(frequencies[members]):
+            groups[members] = groups[i]
+    return np.unique(groups, return_inverse=True)[1]
+
+
+def _same(frequencies: Array) -> bool:
+    low, high = frequencies.min(), frequencies.max()
+    return bool(high - low <= max(SAME_HERTZ, SAME_SHARE * low))
+
+
+def _chosen(shares: Array, modes: int) -> NDArray[np.intp]:
+    """Numbers (modes,) of the columns of `shares` (T, k) that cover all rows evenly."""
+    left = shares.copy()
+    chosen: list[int] = []
+    while len(chosen) < modes:
+        open_rows = np.flatnonzero(left.any(axis=1))
+        covered = shares[open_rows][:, chosen].sum(axis=1)
+        least = open_rows[np.argmin(covered)]
+        chosen.append(int(np.argmax(left[least])))
+        left[:, chosen[-1]] = 0.0
+    return np.array(chosen)

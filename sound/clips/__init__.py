@@ -1,0 +1,1 @@
+"""Sound clips: reading and writing WAV, their modes, and synthesised examples."""

@@ -1,0 +1,165 @@
+"""Damped sinusoids: their samples, and least-squares fits of them to a signal.
+
+A signal is Re sum_k c_k exp(lambda_k n) at sample n = 0, 1, ..., with complex `coefficients` c and
+`exponents` lambda = (-d + 2 pi i f) / rate.  As sums of products of two such terms have closed
+forms, the normal equations of a fit cost nothing beside its right-hand side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import scipy.linalg as la
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_BLOCK = 2048
+_CLOSEST = 1e-3
+_FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-9, 1e6
+_CONVERGED = 1e-9
+
+
+def exponents_of(frequencies: Array, dampings: Array, rate: int) -> Complex:
+    """Exponents (k,) per sample of frequencies [Hz] and dampings [1/s]."""
+    return np.asarray((-dampings + 2j * np.pi * frequencies) / rate)
+
+
+def damped_sinusoids(
+    frequencies: Array, dampings: Array, amplitudes: Array, phases: Array, rate: int, count: int
+) -> Array:
+    """Samples (count,) of sum_k a_k exp(-d_k t) sin(2 pi f_k t + theta_k), t = n / rate.
+
+    Parameters
+    ----------
+    frequencies, dampings, amplitudes, phases : (k,) [Hz], [1/s], any unit, [rad].
+
+    Examples
+    --------
+    >>> one = np.ones(1)
+    >>> damped_sinusoids(one, 0.0 * one, one, 0.0 * one, rate=4, count=5).round(6) + 0.0
+    array([ 0.,  1.,  0., -1.,  0.])
+    """
+    coefficients = -1j * np.asarray(amplitudes) * np.exp(1j * np.asarray(phases))
+    return superposed(exponents_of(frequencies, dampings, rate), coefficients, count)
+
+
+def superposed(exponents: Complex, coefficients: Complex, count: int) -> Array:
+    """Samples (count,) of Re sum_k c_k exp(lambda_k n)."""
+    parts = [(powers @ coefficients).real for powers, _ in _blocks(exponents, count)]
+    return np.concatenate(parts) if parts else np.zeros(0)
+
+
+def correlations(exponents: Complex, signal: Array) -> Complex:
+    """Sums (2, k) over the samples of signal[n] exp(lambda_k n) and of the same times n."""
+    total = np.zeros((2, len(exponents)), complex)
+    for powers, n in _blocks(exponents, len(signal)):
+        part = signal[n[0] : n[-1] + 1]
+        total += np.stack([part, n * part]) @ powers
+    return total
+
+
+def _blocks(exponents: Complex, count: int) -> Iterator[tuple[Complex, NDArray[np.intp]]]:
+    """exp(lambda_k n) for a block of sample numbers n at a time, and those numbers."""
+    first = np.exp(np.outer(np.arange(min(_BLOCK, count)), exponents))
+    for start in range(0, count, _BLOCK):
+        n = np.arange(start, min(start + _BLOCK, count))
+        yield first[: len(n)] * np.exp(start * exponents), n
+
+
+def normal_matrix(exponents: Complex, directions: Complex, count: int, order: int = 2) -> Array:
+    """Normal matrix (2 order k, 2 order k) of Re(A w) for complex unknowns w (order k,).
+
+    Columns of A are exp(lambda_k n) and, with order 2, directions_k n exp(lambda_k n): what a
+    small change of c_k and of lambda_k adds if `directions` are the coefficients.  Rows of the
+    result are the real parts of w, then the imaginary parts.
+    """
+    conjugate = _gram(exponents.conj(), exponents, directions.conj(), directions, count, order)
+    plain = _gram(exponents, exponents, directions, directions, count, order)
+    both, difference = 0.5 * (conjugate + plain), 0.5 * (conjugate - plain)
+    return np.block([[both.real, -both.imag], [-both.imag.T, difference.real]])
+
+
+def _gram(
+    left: Complex, right: Complex, c_left: Complex, c_right: Complex, count: int, order: int
+) -> Complex:
+    sums = _power_sums(left[:, None] + right[None, :], count)
+    if order == 1:
+        return sums[0]
+    return np.block(
+        [
+            [sums[0], sums[1] * c_right],
+            [c_left[:, None] * sums[1], c_left[:, None] * sums[2] * c_right],
+        ]
+    )
+
+
+def _power_sums(exponents: Complex, count: int) -> tuple[Complex, Complex, Complex]:
+    """Sums of n^m exp(mu n) over n = 0 .. count - 1 for m = 0, 1, 2.
+
+    These are derivatives of a geometric series.  Exponents too close to 0 for its quotients are
+    moved a little away from there.
+    """
+    near = np.abs(exponents) * count < _CLOSEST
+    mu = np.where(near, -_CLOSEST / count, exponents)
+    last = np.exp(mu * count)
+    below, slope = np.expm1(mu), np.exp(mu)
+    zeroth = np.expm1(mu * count) / below
+    first = (count * last - zeroth * slope) / below
+    second = (count**2 * last - (2.0 * first + zeroth) * slope) / below
+    return zeroth, first, second
+
+
+def solved(matrix: Array, right: Complex, damping: float = 1e-13) -> Complex:
+    """Complex unknowns w of real normal equations, Levenberg-Marquardt damped.
+
+    Parameters
+    ----------
+    matrix : see `normal_matrix`.
+    right : A^T r for a signal r.
+    damping : share of the diagonal that is added to it.
+    """
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), np.finfo(float).tiny))
+    scaled = matrix * scale * scale[:, None]
+    scaled[np.diag_indices_from(scaled)] += damping
+    values = scale * la.lstsq(scaled, scale * np.concatenate([right.real, -right.imag]))[0]
+    half = len(right)
+    return np.asarray(values[:half] + 1j * values[half:])
+
+
+def fitted_coefficients(exponents: Complex, signal: Array) -> Complex:
+    """Coefficients (k,) that fit `signal` best, its exponents given."""
+    count = len(signal)
+    matrix = normal_matrix(exponents, np.ones(len(exponents), complex), count, order=1)
+    coefficients = solved(matrix, correlations(exponents, signal)[0])
+    rest = signal - superposed(exponents, coefficients, count)
+    return coefficients + solved(matrix, correlations(exponents, rest)[0])
+
+
+def refined(
+    exponents: Complex, coefficients: Complex, signal: Array, steps: int
+) -> tuple[Complex, Complex, Array]:
+    """Exponents and coefficients after Levenberg-Marquardt steps of least squares, and the rest.
+
+    Exponents may move by no more than a step that keeps the cost falling; the cost never rises.
+    """
+    count, damping = len(signal), _FIRST_DAMPING
+    rest = signal - superposed(exponents, coefficients, count)
+    for _ in range(steps):
+        matrix = normal_matrix(exponents, coefficients, count)
+        sums = correlations(exponents, rest)
+        step = solved(matrix, np.concatenate([sums[0], sums[1] * coefficients]), damping)
+        change, move = np.split(step, 2)
+        tried = exponents + move, coefficients + change
+        new_rest = signal - superposed(*tried, count)
+        gain = 1.0 - (new_rest @ new_rest) / (rest @ rest)
+        if not gain > 0.0:
+            damping = min(100.0 * max(damping, 1e-6), _MOST_DAMPING)
+            continue
+        exponents, coefficients = tried
+        rest, damping = new_rest, max(0.1 * damping, _LEAST_DAMPING)
+        if gain < _CONVERGED:
+            break
+    return exponents, coefficients, rest

@@ -1,0 +1,65 @@
+"""Exponents of damped sinusoids in a short complex signal, by ESPRIT; their number, by ESTER."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg as la
+from numpy.typing import NDArray
+
+Complex = NDArray[np.complex128]
+
+MOST = 40
+"""Most exponents that are looked for in one signal."""
+_ESTER_SHARE = 0.1
+
+
+def esprit(signal: Complex, most: int = MOST) -> Complex:
+    """Exponents (p,) per sample of the damped sinusoids in `signal` (n,).
+
+    The leading left singular vectors of the signal's Hankel matrix span what exp(lambda_k n) span,
+    so that shifting them by a sample multiplies them by a matrix with eigenvalues exp(lambda_k)
+    (Roy and Kailath 1989), which is found by total least squares.
+    """
+    vectors = _subspace(signal, most)
+    order = ester(vectors)
+    poles = la.eigvals(_rotation(vectors[:, :order]))
+    return np.log(poles[np.abs(poles) > 0.0])
+
+
+def ester(vectors: Complex) -> int:
+    """Number of sinusoids: the largest order whose subspace hardly changes under a shift.
+
+    The criterion of Badeau, David and Richard (2006): J(p) is the inverse square of the spectral
+    norm of what least squares leaves of the shift of the first p vectors.  It is largest at the
+    number of sinusoids, or of the strong ones among them; the last order within a tenth of the
+    maximum counts.
+    """
+    errors = np.array([_shift_error(vectors[:, :p]) for p in range(1, vectors.shape[1] + 1)])
+    criterion = errors**-2.0
+    return int(np.flatnonzero(criterion >= _ESTER_SHARE * criterion.max())[-1]) + 1
+
+
+def _subspace(signal: Complex, most: int) -> Complex:
+    rows = len(signal) // 3
+    hankel = np.lib.stride_tricks.sliding_window_view(signal, len(signal) - rows + 1)
+    most = min(most, rows - 2)
+    covariance = hankel @ hankel.conj().T
+    vectors = la.eigh(covariance, subset_by_index=(rows - most, rows - 1))[1]
+    return np.asarray(vectors[:, ::-1])
+
+
+def _shift_error(vectors: Complex) -> float:
+    """Spectral norm of what least squares leaves; the square root of rounding at least."""
+    above, below = vectors[:-1], vectors[1:]
+    normal = above.conj().T
+    error = below - above @ la.lstsq(normal @ above, normal @ below)[0]
+    square = la.eigvalsh(error.conj().T @ error)[-1]
+    return float(np.sqrt(max(square, np.finfo(float).eps)))
+
+
+def _rotation(vectors: Complex) -> Complex:
+    """Matrix F that makes vectors[:-1] F = vectors[1:], by total least squares."""
+    order = vectors.shape[1]
+    right = la.svd(np.hstack([vectors[:-1], vectors[1:]]), full_matrices=False)[2].conj().T
+    upper, lower = right[:order, order:], right[order:, order:]
+    return np.asarray(-upper @ la.pinv(lower))
