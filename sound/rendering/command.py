@@ -1,0 +1,246 @@
+"""`python -m sound render`: the sound of a strike, as WAV."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from carillon.arguments import non_negative_number, positive_number, whole_number
+from carillon.errors import UserError
+
+if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from sound.design_file import Design
+    from sound.rendering.listening import Listening
+    from sound.rendering.solid import SoundingSolid
+
+    Array = NDArray[np.float64]
+
+PEAK = 0.5
+"""Largest sample of a sound whose loudness no clip tells."""
+
+
+@dataclass
+class _Scene:
+    """What is struck, where and how: the solid, its loudness, a point and an impulse there."""
+
+    solid: SoundingSolid
+    listening: Listening | None
+    position: Array
+    impulse: Array
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument("file", metavar="FILE", help="design.h5, or modes.h5 of the solver")
+    point = parser.add_mutually_exclusive_group(required=True)
+    point.add_argument("--target", metavar="NAME", help="strike where a target was assigned")
+    point.add_argument("--vertex", type=whole_number(0), help="strike a vertex of the surface")
+    point.add_argument(
+        "--at",
+        type=float,
+        nargs=3,
+        metavar=("X", "Y", "Z"),
+        help="strike the surface near a point [m]",
+    )
+    impulse = parser.add_mutually_exclusive_group()
+    impulse.add_argument(
+        "--impulse", type=float, nargs=3, metavar=("FX", "FY", "FZ"), help="impulse [N s]"
+    )
+    impulse.add_argument(
+        "--strength",
+        type=positive_number,
+        default=1.0,
+        help="impulse along the inward normal [N s] (default 1, which sounds as loud as the clip)",
+    )
+    parser.add_argument("--seconds", type=positive_number, help="length (default: until it decays)")
+    parser.add_argument(
+        "--rate", type=whole_number(1000), default=44_100, help="samples per second (default 44100)"
+    )
+    parser.add_argument(
+        "--contact-seconds",
+        type=non_negative_number,
+        default=0.0,
+        help="duration of the force, half a sine (default 0: an impulse)",
+    )
+    parser.add_argument(
+        "--no-residual", action="store_true", help="modes only, without the rest of the clips"
+    )
+    parser.add_argument(
+        "--like",
+        metavar="DESIGN",
+        help="for modes.h5 of a designed object: dampings, points, loudness, residuals of a design",
+    )
+    parser.add_argument(
+        "--damping",
+        type=non_negative_number,
+        nargs=2,
+        metavar=("ALPHA", "BETA"),
+        help="for modes.h5: Rayleigh damping, coefficients of mass [1/s] and stiffness [s] "
+        "(default 30 1e-6)",
+    )
+    parser.add_argument("--out", required=True, help="file to write (WAV)")
+    parser.add_argument("--json", action="store_true", help="print what sounds as JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Render, write, and say what sounds."""
+    import numpy as np
+
+    from carillon.files import require_writable
+    from sound.rendering.render import Hit, render, ringing_seconds
+
+    require_writable(arguments.out)
+    scene = _scene(arguments)
+    hit = Hit(0.0, scene.position, scene.impulse)
+    sound = render(
+        scene.solid,
+        [hit],
+        arguments.seconds or ringing_seconds(scene.solid),
+        arguments.rate,
+        arguments.contact_seconds,
+        scene.listening,
+        not arguments.no_residual,
+    )
+    gain = 1.0 if scene.listening is None else scene.listening.gain(scene.position)
+    peak = float(np.abs(sound).max(initial=0.0))
+    if scene.listening is None and peak > 0.0:
+        gain = PEAK / peak
+        sound, peak = gain * sound, PEAK
+    _write(arguments.out, sound, arguments.rate)
+    found = _summary(arguments, scene, gain, peak)
+    print(json.dumps(found) if arguments.json else _sentence(found))
+    if peak > 1.0:
+        print(f"sound: {peak:.2f} of full scale; lower --strength for players", file=sys.stderr)
+    return 0
+
+
+def _scene(arguments: argparse.Namespace) -> _Scene:
+    import numpy as np
+
+    position, inward, solid, listening = _point_of_solid(arguments)
+    if arguments.impulse is None:
+        return _Scene(solid, listening, position, arguments.strength * inward)
+    impulse = np.array(arguments.impulse)
+    if not (np.isfinite(impulse).all() and impulse.any()):
+        raise UserError("--impulse: expected three finite numbers [N s], not all of them 0")
+    return _Scene(solid, listening, position, impulse)
+
+
+def _point_of_solid(
+    arguments: argparse.Namespace,
+) -> tuple[Array, Array, SoundingSolid, Listening | None]:
+    """Struck point, inward normal there, the solid, and how its clips are heard if it has some."""
+    from solver.modes_file import read_modes
+    from solver.response import Damping
+    from sound.design_file import read_design
+    from sound.rendering.listening import Listening
+    from sound.rendering.solid import SoundingSolid
+
+    has_modes = _kind(arguments.file) == "modes"
+    if not has_modes and (arguments.damping or arguments.like):
+        raise UserError("--damping and --like go with modes.h5; a design has dampings of its own")
+    if arguments.damping and arguments.like:
+        raise UserError("--damping and --like exclude each other; a design tells all dampings")
+    if has_modes and not arguments.like:
+        file = read_modes(arguments.file)
+        damping = Damping(*arguments.damping) if arguments.damping else Damping()
+        return *_voxel_point(arguments, file.mesh), SoundingSolid.of_modes(file, damping), None
+    design = read_design(arguments.like or arguments.file)
+    if has_modes:
+        solid = SoundingSolid.of_truth(read_modes(arguments.file), design)
+    else:
+        solid = SoundingSolid.of_design(design)
+    return *_surface_point(arguments, design), solid, Listening.of_design(design, solid)
+
+
+def _kind(path: str) -> str:
+    """Kind of a Carillon file; nothing if it is none, which whoever reads it will say."""
+    import h5py
+
+    try:
+        with h5py.File(path) as file:
+            return str(file.attrs.get("kind", ""))
+    except OSError:
+        return ""
+
+
+def _surface_point(arguments: argparse.Namespace, design: Design) -> tuple[Array, Array]:
+    """Struck point of a design's surface and inward normal there."""
+    if arguments.target is not None:
+        strikes = {strike.name: strike for strike in design.strikes}
+        if arguments.target not in strikes:
+            raise UserError(
+                f"--target {arguments.target}: the design has no such target, expected one of "
+                f"{', '.join(strikes)}"
+            )
+        strike = strikes[arguments.target]
+        return strike.position, strike.inward
+    import trimesh
+
+    from sound.strikes import locate
+
+    surface = trimesh.Trimesh(design.surface_vertices, design.surface_faces, process=False)
+    what = "--at" if arguments.vertex is None else "--vertex"
+    strike = locate(surface, what, arguments.at, arguments.vertex)
+    return strike.position, strike.inward
+
+
+def _voxel_point(arguments: argparse.Namespace, mesh: Any) -> tuple[Array, Array]:
+    """Struck point of the voxels' surface and inward normal there."""
+    import numpy as np
+
+    from solver.contact import surface_node, surface_normals
+
+    if arguments.at is None:
+        raise UserError(
+            "a modes file knows neither targets nor the vertices of a surface; strike it --at a "
+            "point, or name its design by --like"
+        )
+    nodes, outward = surface_normals(mesh)
+    index = surface_node(mesh, np.array(arguments.at), "--at")
+    return mesh.nodes[nodes[index]], -outward[index]
+
+
+def _write(path: str, sound: Array, rate: int) -> None:
+    import soundfile
+
+    from carillon.files import atomic_path
+
+    with atomic_path(path) as temporary:
+        soundfile.write(temporary, sound, rate, format="WAV", subtype="FLOAT")
+
+
+def _summary(
+    arguments: argparse.Namespace, scene: _Scene, gain: float, peak: float
+) -> dict[str, Any]:
+    solid = scene.solid
+    amplitudes = gain * solid.amplitudes(scene.position[None], scene.impulse[None])[0]
+    heard = solid.frequencies < arguments.rate / 2.0
+    return {
+        "out": str(Path(arguments.out)),
+        "rate_hz": arguments.rate,
+        "position_m": scene.position.tolist(),
+        "impulse_newton_seconds": scene.impulse.tolist(),
+        "gain": gain,
+        "peak": peak,
+        "frequencies_hz": solid.frequencies[heard].tolist(),
+        "dampings_per_second": solid.dampings[heard].tolist(),
+        "amplitudes": amplitudes[heard].tolist(),
+        "modes_left_out": int((~heard).sum()),
+    }
+
+
+def _sentence(found: dict[str, Any]) -> str:
+    hertz = found["frequencies_hz"]
+    span = f", {min(hertz):.4g} to {max(hertz):.4g} Hz" if hertz else ""
+    text = f"{found['out']}: {len(hertz)} modes{span}, peak {found['peak']:.3g} of full scale"
+    if found["modes_left_out"]:
+        text += f"; {found['modes_left_out']} above half the sampling rate are left out"
+    return text

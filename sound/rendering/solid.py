@@ -1,0 +1,109 @@
+"""A solid as something that sounds: its elastic modes, how they decay, how strikes excite them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.errors import UserError
+from solver.comparison import clusters
+from solver.contact import interpolation
+from solver.geometry import HexMesh
+from solver.model import RIGID_MODES
+from solver.modes_file import ModesFile
+from solver.response import Damping
+from sound.design_file import Design
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SoundingSolid:
+    """Elastic modes of a solid.
+
+    Attributes
+    ----------
+    frequencies, dampings
+        (k,) of the sound [Hz] and [1/s], as in Eq. 3 of the appendix.
+    mesh
+        Mesh that the modes are given on.
+    modes
+        (n_dofs, k) mass-normalised [kg^-1/2].
+    """
+
+    frequencies: Array
+    dampings: Array
+    mesh: HexMesh
+    modes: Array
+
+    @classmethod
+    def of_design(cls, design: Design) -> SoundingSolid:
+        """The coarse solid of a design, its modes damped as the clips' (§5)."""
+        return cls(
+            design.frequencies, design.targets.dampings, design.model.mesh, design.elastic_modes
+        )
+
+    @classmethod
+    def of_modes(cls, file: ModesFile, damping: Damping) -> SoundingSolid:
+        """A solid of any modes file with Rayleigh damping; modes too damped to oscillate are out.
+
+        Raises
+        ------
+        UserError
+            If none is left.
+        """
+        assert file.modes is not None
+        values = file.eigenvalues[RIGID_MODES:]
+        decay = damping.decay_per_second(values)
+        square = values - decay**2
+        kept = np.flatnonzero(square > 0.0)
+        if not len(kept):
+            raise UserError(
+                f"of {len(file.eigenvalues)} modes none is elastic and damped little enough to "
+                "sound; compute more or lower the damping"
+            )
+        hertz = np.sqrt(square[kept]) / (2.0 * np.pi)
+        return cls(hertz, decay[kept], file.mesh, file.modes[:, RIGID_MODES + kept])
+
+    @classmethod
+    def of_truth(cls, file: ModesFile, design: Design) -> SoundingSolid:
+        """The same object by other modes, for instance of the fine mesh, damped as the design's.
+
+        Raises
+        ------
+        UserError
+            If the file holds fewer elastic modes than the design.
+        """
+        assert file.modes is not None
+        count = len(design.frequencies)
+        if len(file.frequencies) < RIGID_MODES + count:
+            raise UserError(
+                f"found {len(file.frequencies)} modes, expected {RIGID_MODES} rigid and {count} "
+                f"elastic ones as in the design; compute {RIGID_MODES + count}"
+            )
+        kept = slice(RIGID_MODES, RIGID_MODES + count)
+        dampings = design.targets.dampings
+        return cls(file.frequencies[kept], dampings, file.mesh, file.modes[:, kept])
+
+    def motion(self, positions: Array) -> Array:
+        """Displacement (p, 3, k) [kg^-1/2] of points (p, 3) [m] of the surface in each mode."""
+        values = interpolation(self.mesh, positions)
+        modes = self.modes.reshape(self.mesh.n_nodes, -1)
+        return np.asarray(values @ modes).reshape(len(positions), 3, -1)
+
+    def amplitudes(self, positions: Array, impulses: Array) -> Array:
+        """Amplitudes a_k (p, k) [kg^-1/2 N s] after impulses (p, 3) [N s] at points (p, 3) [m].
+
+        a_k = |u_k^T f|: every mode sets out in the direction that it is pushed to, so its sign does
+        not matter.  Within a cluster of equal frequencies it is (u_k^T f)^2 over the root of the
+        sum of these squares: together the cluster then is as loud as |U^T f|, however its modes are
+        mixed.
+        """
+        pushed = np.einsum("pik,pi->pk", self.motion(positions), impulses)
+        groups = clusters(self.frequencies**2)
+        square = pushed**2
+        joint = np.sqrt(np.add.reduceat(square, [group.start for group in groups], axis=1))
+        joint = np.repeat(joint, [group.stop - group.start for group in groups], axis=1)
+        return np.asarray(np.divide(square, joint, out=np.zeros_like(square), where=joint > 0.0))

@@ -1,0 +1,272 @@
+"""What the sound of a strike is made of."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import soundfile
+from scipy.signal import find_peaks
+
+from carillon.errors import UserError
+from solver import solve
+from solver.contact import interpolation
+from solver.model import RIGID_MODES
+from solver.modes_file import read_modes, write_modes
+from solver.response import Damping
+from sound.__main__ import main
+from sound.design_file import write_design
+from sound.rendering.bank import Bank, ring
+from sound.rendering.listening import Listening, resampled
+from sound.rendering.render import Hit, render
+from sound.rendering.solid import SoundingSolid
+from tests.small_design import N_MODES, small_design
+from tests.solids import uniform_box
+
+RATE = 44_100
+
+
+def partial(frequency: float, damping: float, t: np.ndarray) -> np.ndarray:
+    """Eq. 3 of the appendix as it is written."""
+    return np.where(t >= 0.0, np.exp(-damping * t) * np.sin(2 * np.pi * frequency * t), 0.0)
+
+
+def measured_partial(sound: np.ndarray, near: float, rate: int) -> tuple[float, float]:
+    """Frequency and damping of the partial near a frequency, by peaks of windowed spectra.
+
+    The damping is the fall of the peak from the first half to the second.
+    """
+    half = len(sound) // 2
+    window = np.hanning(half)
+    spectra = [np.abs(np.fft.rfft(window * part, 64 * half)) for part in np.split(sound, 2)]
+    hertz = np.fft.rfftfreq(64 * half, 1.0 / rate)
+    inside = np.abs(hertz - near) < 0.02 * near
+    peaks = [np.log(spectrum[inside].max()) for spectrum in spectra]
+    whole = np.log(spectra[0])
+    index = int(np.argmax(np.where(inside, spectra[0], 0.0)))
+    a, b, c = whole[index - 1 : index + 2]
+    found = hertz[index] + 0.5 * (a - c) / (a - 2 * b + c) * (hertz[1] - hertz[0])
+    return found, (peaks[0] - peaks[1]) * rate / half
+
+
+def design_solid() -> tuple[SoundingSolid, Listening]:
+    design = small_design()
+    solid = SoundingSolid.of_design(design)
+    return solid, Listening.of_design(design, solid)
+
+
+def test_bank_is_the_sum_of_damped_sinusoids_at_any_time() -> None:
+    random = np.random.default_rng(1)
+    f, d = random.uniform(50.0, 15_000.0, 20), random.uniform(1.0, 900.0, 20)
+    strikes = [(seconds, random.uniform(0.0, 1.0, 20)) for seconds in (0.31, 0.0, 0.1234567, 0.5)]
+    sound = ring(Bank(f, d, RATE), strikes, 20_000)
+    t = np.arange(20_000) / RATE
+    expected = sum(
+        a[k] * partial(f[k], d[k], t - start) for start, a in strikes for k in range(len(f))
+    )
+    np.testing.assert_allclose(sound, expected, atol=1e-9)
+
+
+def test_bank_goes_on_where_it_stopped() -> None:
+    f, d = np.array([440.0, 1000.0]), np.array([3.0, 50.0])
+    whole, parts = (Bank(f, d, RATE) for _ in range(2))
+    for bank in (whole, parts):
+        bank.strike(np.array([1.0, 0.5]))
+    pieces = np.concatenate([parts.advance(count) for count in (1, 511, 700, 3000)])
+    np.testing.assert_allclose(pieces, whole.advance(4212), atol=1e-12)
+
+
+def test_modes_beyond_half_the_rate_are_silent_and_low_ones_stay() -> None:
+    f, d = np.array([100.0, 4000.0, 4001.0]), np.full(3, 5.0)
+    one, two = (ring(Bank(f, d, 8000), [(0.0, np.array(a))], 800) for a in ([1, 1, 1], [1, 0, 0]))
+    np.testing.assert_array_equal(one, two)
+
+
+def test_amplitude_is_the_push_on_each_mode() -> None:
+    design = small_design()
+    solid, _ = design_solid()
+    strike = design.strikes[1]
+    motion = interpolation(design.model.mesh, strike.position) @ design.elastic_modes.reshape(
+        design.model.mesh.n_nodes, -1
+    )
+    pushed = motion.reshape(3, N_MODES).T @ (2.5 * strike.inward)
+    found = solid.amplitudes(strike.position[None], 2.5 * strike.inward[None])[0]
+    np.testing.assert_allclose(found, np.abs(pushed), rtol=1e-12)
+
+
+def test_signs_of_modes_do_not_matter() -> None:
+    solid, listening = design_solid()
+    signs = np.where(np.arange(N_MODES) % 2, -1.0, 1.0)
+    hits = [Hit(0.0, small_design().strikes[0].position, np.array([0.3, -1.0, 0.2]))]
+    flipped = replace(solid, modes=solid.modes * signs)
+    one, two = (render(part, hits, 0.1, listening=listening) for part in (solid, flipped))
+    np.testing.assert_allclose(one, two, atol=1e-12)
+
+
+def test_mixing_a_cluster_does_not_matter() -> None:
+    solid, _ = design_solid()
+    f, d = solid.frequencies.copy(), solid.dampings.copy()
+    f[3], d[3] = f[2], d[2]
+    turn = np.eye(N_MODES)
+    turn[2:4, 2:4] = [[0.6, -0.8], [0.8, 0.6]]
+    hits = [Hit(0.0, small_design().strikes[0].position, np.array([1.0, 0.5, 0.2]))]
+    pure = replace(solid, frequencies=f, dampings=d)
+    mixed = replace(pure, modes=pure.modes @ turn)
+    one, two = (render(part, hits, 0.1) for part in (pure, mixed))
+    np.testing.assert_allclose(one, two, atol=1e-12 * np.abs(one).max())
+
+
+def test_target_points_sound_as_loud_as_their_clips() -> None:
+    design = small_design()
+    solid, listening = design_solid()
+    for strike, wanted in zip(design.strikes, design.targets.amplitudes):
+        found = solid.amplitudes(strike.position[None], strike.inward[None])[0]
+        assert listening.gain(strike.position) * found.max() == pytest.approx(wanted.max())
+
+
+def test_weights_are_one_at_a_struck_point_and_blend_between() -> None:
+    _, listening = design_solid()
+    first, second = listening.positions
+    assert listening.weights(first).tolist() == [1.0, 0.0]
+    np.testing.assert_allclose(listening.weights((first + second) / 2.0), [0.5, 0.5])
+    near = listening.weights(first + 1e-3 * (second - first))
+    assert near.sum() == pytest.approx(1.0) and near[0] > 0.999
+
+
+def test_residual_follows_the_impulse_and_the_rate() -> None:
+    design = small_design()
+    solid, listening = design_solid()
+    strike = design.strikes[1]
+    hits = [Hit(0.1, strike.position, 3.0 * strike.inward)]
+    sounds = [
+        render(solid, hits, 0.5, 22_050, listening=listening, residual=part)
+        for part in (True, False)
+    ]
+    added = sounds[0] - sounds[1]
+    residual = design.targets.residuals[1]
+    np.testing.assert_allclose(added[2205 : 2205 + len(residual)], 3.0 * residual, atol=1e-12)
+    assert not added[:2205].any()
+
+
+def test_resampling_keeps_a_tone() -> None:
+    t = np.arange(4000) / 8000
+    tone = np.sin(2 * np.pi * 440.0 * t)
+    found = resampled(tone, 8000, 44_100)
+    u = np.arange(len(found)) / 44_100
+    middle = (u > 0.05) & (u < 0.45)
+    np.testing.assert_allclose(found[middle], np.sin(2 * np.pi * 440.0 * u[middle]), atol=5e-3)
+
+
+def test_a_melody_is_the_sum_of_its_strikes() -> None:
+    design = small_design()
+    solid, listening = design_solid()
+    hits = [
+        Hit(0.2 * index, strike.position, (1.0 + index) * strike.inward)
+        for index, strike in enumerate(design.strikes)
+    ]
+    single = sum(render(solid, [hit], 0.6, listening=listening) for hit in hits)
+    np.testing.assert_allclose(render(solid, hits, 0.6, listening=listening), single, atol=1e-12)
+
+
+def test_a_longer_contact_excites_high_modes_less() -> None:
+    solid, _ = design_solid()
+    hits = [Hit(0.0, small_design().strikes[0].position, np.array([1.0, 1.0, 1.0]))]
+    impulse, push = (render(solid, hits, 0.4, contact_seconds=c) for c in (0.0, 4e-3))
+    spectra = [np.abs(np.fft.rfft(sound)) for sound in (impulse, push)]
+    hertz = np.fft.rfftfreq(len(impulse), 1.0 / RATE)
+    kept = []
+    for frequency in solid.frequencies[[0, -1]]:
+        near = np.abs(hertz - frequency) < 5.0
+        kept.append(spectra[1][near].sum() / spectra[0][near].sum())
+    assert kept[0] > 2.0 * kept[1]
+
+
+def run(arguments: list[object]) -> int:
+    return main([str(argument) for argument in arguments])
+
+
+def test_partials_of_a_rendered_file_are_the_modes(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    design = small_design()
+    write_design(tmp_path / "design.h5", design)
+    out = tmp_path / "hit.wav"
+    words = ["render", tmp_path / "design.h5", "--target", "corner", "--no-residual", "--json"]
+    assert run([*words, "--seconds", 0.4, "--out", out]) == 0
+    told = json.loads(capsys.readouterr().out)
+    np.testing.assert_allclose(told["frequencies_hz"], design.frequencies)
+    sound, rate = soundfile.read(out)
+    assert rate == RATE and len(sound) == round(0.4 * RATE)
+    loud = np.array(told["amplitudes"]) > 0.05 * max(told["amplitudes"])
+    gaps = np.diff(design.frequencies, prepend=0.0, append=np.inf)
+    resolved = loud & (np.minimum(gaps[:-1], gaps[1:]) > 20.0)
+    assert resolved.sum() >= 4
+    for k in np.flatnonzero(resolved):
+        frequency, damping = design.frequencies[k], design.targets.dampings[k]
+        found, decay = measured_partial(sound, frequency, rate)
+        assert found == pytest.approx(frequency, rel=5e-4)
+        assert decay == pytest.approx(damping, rel=0.02)
+    spectrum = np.abs(np.fft.rfft(np.hanning(len(sound)) * sound))
+    assert len(find_peaks(spectrum, height=0.02 * spectrum.max(), distance=20)[0]) <= N_MODES
+
+
+def test_the_solver_s_modes_can_be_heard(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    model = uniform_box(6, 4, 2, 0.04)
+    found = solve(model, modes=RIGID_MODES + N_MODES, method="slepc")
+    path, out = tmp_path / "modes.h5", tmp_path / "hit.wav"
+    write_modes(path, model, found.eigenvalues, [found.modes], found.residuals, {}, {})
+    words = ["render", path, "--at", 0, 0, 0, "--damping", 5, 2e-7, "--json", "--out", out]
+    assert run(words) == 0
+    told = json.loads(capsys.readouterr().out)
+    decay = Damping(5.0, 2e-7).decay_per_second(found.eigenvalues[RIGID_MODES:])
+    np.testing.assert_allclose(told["dampings_per_second"], decay)
+    np.testing.assert_allclose(told["frequencies_hz"], found.frequencies[RIGID_MODES:], rtol=1e-4)
+    assert np.abs(soundfile.read(out)[0]).max() == pytest.approx(0.5)
+    write_design(tmp_path / "design.h5", small_design())
+    like = ["--like", tmp_path / "design.h5", "--target", "side", "--json"]
+    assert run(["render", path, *like, "--out", out]) == 0
+    told = json.loads(capsys.readouterr().out)
+    np.testing.assert_allclose(told["dampings_per_second"], small_design().targets.dampings)
+    assert max(told["amplitudes"]) == pytest.approx(small_design().targets.amplitudes[1].max())
+
+
+def test_modes_too_damped_to_oscillate_are_left_out(tmp_path: Path) -> None:
+    model = uniform_box(4, 3, 2, 0.05)
+    found = solve(model, modes=RIGID_MODES + 4, method="slepc")
+    path = tmp_path / "modes.h5"
+    write_modes(path, model, found.eigenvalues, [found.modes], found.residuals, {}, {})
+    critical = 2.0 * np.sqrt(found.eigenvalues[RIGID_MODES + 1])
+    assert len(SoundingSolid.of_modes(read_modes(path), Damping(0.9 * critical)).frequencies) <= 4
+    with pytest.raises(UserError, match="none is elastic"):
+        SoundingSolid.of_modes(read_modes(path), Damping(1e3 * critical))
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["--target", "lid"], "no such target, expected one of corner, side"),
+        (["--vertex", 999_999], "there is no vertex 999999"),
+        (["--at", 9, 9, 9], "m from the surface"),
+        (["--target", "side", "--impulse", 0, 0, 0], "not all of them 0"),
+        (["--target", "side", "--damping", 1, 0], "go with modes.h5"),
+        (["--target", "side", "--like", "x.h5"], "go with modes.h5"),
+    ],
+)
+def test_mistakes_are_answered_in_one_sentence(
+    tmp_path: Path, words: list[object], complaint: str
+) -> None:
+    write_design(tmp_path / "design.h5", small_design())
+    with pytest.raises(UserError, match=complaint):
+        run(["render", tmp_path / "design.h5", *words, "--out", tmp_path / "hit.wav"])
+    assert not (tmp_path / "hit.wav").exists()
+
+
+def test_other_files_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "clip.h5").write_text("no HDF5")
+    for name in ("clip.h5", "absent.h5"):
+        words = ["render", tmp_path / name, "--target", "a", "--out", tmp_path / "hit.wav"]
+        with pytest.raises(UserError, match="design file"):
+            run(words)
