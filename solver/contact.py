@@ -128,18 +128,26 @@ def interpolation(mesh: HexMesh, points: Array) -> sp.csr_matrix:
     array([[0.5, 0.5, 0. , 0. , 0. , 0. ],
            [0. , 0. , 0. , 0. , 0. , 1. ]])
     """
+    cells, weights = embedding(mesh, points)
+    rows = np.repeat(np.arange(len(cells)), 8)
+    shape = (len(cells), mesh.n_nodes)
+    matrix = sp.csr_matrix((weights.ravel(), (rows, mesh.cells[cells].ravel())), shape=shape)
+    matrix.eliminate_zeros()
+    return matrix
+
+
+def embedding(mesh: HexMesh, points: Array) -> tuple[NDArray[np.int64], Array]:
+    """Cells (p,) that `points` (p, 3) [m] lie in, and trilinear weights (p, 8) of their corners.
+
+    A point outside all cells belongs to a nearest cell, with the weights of its nearest point.
+    """
     points = np.atleast_2d(points)
     centres = mesh.grid + 0.5
     position = (points - mesh.origin) / mesh.edge
     # In the largest norm a cell is the ball around its centre.
-    cell = cKDTree(centres).query(position, p=np.inf)[1]
-    local = np.clip(position - mesh.grid[cell], 0.0, 1.0)[:, None, :]
-    weights = np.where(CORNER_OFFSETS, local, 1.0 - local).prod(axis=2)
-    rows = np.repeat(np.arange(len(points)), 8)
-    shape = (len(points), mesh.n_nodes)
-    matrix = sp.csr_matrix((weights.ravel(), (rows, mesh.cells[cell].ravel())), shape=shape)
-    matrix.eliminate_zeros()
-    return matrix
+    cells = cKDTree(centres).query(position, p=np.inf)[1]
+    local = np.clip(position - mesh.grid[cells], 0.0, 1.0)[:, None, :]
+    return cells, np.where(CORNER_OFFSETS, local, 1.0 - local).prod(axis=2)
 
 
 def _ruling_modes(truth: ModesFile, nodes: NDArray[np.int64]) -> tuple[Array, Array]:

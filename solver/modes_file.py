@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -67,6 +67,7 @@ def write_modes(
     residuals: Array,
     attributes: dict[str, Any],
     parameters: dict[str, Any],
+    more: Callable[[h5py.File], None] | None = None,
 ) -> None:
     """Write a modes file atomically.
 
@@ -77,6 +78,8 @@ def write_modes(
         `System.pour` gives them; each is on its way to disk before the next one is asked for.
     attributes, parameters
         Evidence and timings; the parameters of the command, for the provenance.
+    more
+        Writes what else the file shall hold, under names that are not taken.
 
     Raises
     ------
@@ -92,6 +95,8 @@ def write_modes(
             file.attrs[key] = json.dumps(value) if isinstance(value, dict) else value
         origin = measured(parameters, attributes.get("ranks", 1))
         file.create_group("provenance").attrs.update(origin)
+        if more is not None:
+            more(file)
 
 
 def put_eigenvalues(group: h5py.Group, eigenvalues: Array) -> None:
