@@ -122,23 +122,28 @@ def write_design(path: str | Path, design: Design) -> None:
     if fault:
         raise ValueError(fault)
     with create_h5(path, KIND, SCHEMA, sealed=True) as file:
-        _put_strikes(file.create_group("strikes"), design.strikes)
-        _put_targets(file.create_group("targets"), design.targets)
+        put_object(file, design)
         put(file, "coordinates", design.coordinates, "1", "z of the reduced material, Y = Phi z")
-        put(file, "young", design.young, "Pa", "Young's modulus of the fine cells")
         put_eigenvalues(file, design.eigenvalues)
         put_modes(file, [design.modes], (design.model.n_dofs, len(design.eigenvalues)))
         put_model(file.create_group("coarse"), design.model)
-        put(file, "surface/vertices", design.surface_vertices, "m", "vertices of the surface")
-        put(file, "surface/faces", design.surface_faces, "1", "vertex numbers of the triangles")
-        put(file, "fine/grid", design.fine_grid, "1", "integer coordinates of the fine cells")
-        put(file, "fine/origin", design.fine_origin, "m", "position of grid coordinates (0, 0, 0)")
-        put(file, "fine/edge", np.array([design.fine_edge]), "m", "edge of a fine cell")
         for name, (units, meaning) in HISTORY.items():
             put(file, f"history/{name}", design.history[name], units, meaning)
         _put_text(file, "settings", json.dumps(design.settings), "the project as resolved, JSON")
         _put_text(file, "evidence", json.dumps(design.evidence), "how the result was got, JSON")
         file.create_group("provenance").attrs.update(measured(design.settings))
+
+
+def put_object(file: h5py.File, design: Design) -> None:
+    """Write what does not depend on the analysis: struck points, targets, surface, fine cells."""
+    _put_strikes(file.create_group("strikes"), design.strikes)
+    _put_targets(file.create_group("targets"), design.targets)
+    put(file, "surface/vertices", design.surface_vertices, "m", "vertices of the surface")
+    put(file, "surface/faces", design.surface_faces, "1", "vertex numbers of the triangles")
+    put(file, "fine/grid", design.fine_grid, "1", "integer coordinates of the fine cells")
+    put(file, "fine/young", design.young, "Pa", "Young's modulus of the fine cells")
+    put(file, "fine/origin", design.fine_origin, "m", "position of grid coordinates (0, 0, 0)")
+    put(file, "fine/edge", np.array([design.fine_edge]), "m", "edge of a fine cell")
 
 
 def read_design(path: str | Path) -> Design:
@@ -155,7 +160,7 @@ def read_design(path: str | Path) -> Design:
             _get_strikes(file["strikes"]),
             _get_targets(file["targets"]),
             file["coordinates"][()],
-            file["young"][()],
+            file["fine/young"][()],
             get_model(file["coarse"]),
             file["eigenvalues"][()],
             file["modes"][()],

@@ -1,0 +1,1 @@
+"""Designs for other tools: embedded mesh with eigenpairs, glTF, Faust."""

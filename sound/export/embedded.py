@@ -1,0 +1,69 @@
+"""HDF5: the embedded finite element mesh of the surface with its eigenpairs, the paper's output."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+
+from solver.comparison import recomputed_residuals
+from solver.contact import embedding
+from solver.modes_file import ModesFile, frequencies, put, write_modes
+from solver.sparse import assembled
+from sound.design_file import Design, put_object
+from sound.rendering.listening import Listening
+from sound.rendering.solid import SoundingSolid
+
+NORMALISATION = "modes^T M modes = 1 with the mass matrix M in kg, so modes are in kg^-1/2"
+SOUND = (
+    "s(t) = gain sum_k a_k exp(-d_k t) sin(2 pi f_k t) over the elastic modes k, which follow six "
+    "rigid ones; a_k = |u_k . f| in kg^-1/2 N s, u_k = displacement of the struck point in mode k, "
+    "f = impulse in N s; within a cluster of equal frequencies a_k = (u_k . f)^2 / |U . f|"
+)
+EMBEDDING = "vertex value = sum over corners c of weights[v, c] * values[cells[cell[v], c]]"
+
+
+def write_embedded(path: str | Path, design: Design, parameters: dict[str, Any]) -> None:
+    """Write a modes file of the solver that holds surface, embedding, dampings and targets, too.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be written.
+    """
+    hertz = frequencies(design.eigenvalues)
+    none = design.eigenvalues[:0]
+    file = ModesFile(design.eigenvalues, hertz, design.modes, none, design.model, {}, {})
+    residuals = recomputed_residuals(file, *assembled(design.model))
+    attributes = {
+        "method": "sound design",
+        "normalisation": NORMALISATION,
+        "sound": SOUND,
+        "embedding": EMBEDDING,
+        "mesh": str(design.settings.get("mesh", "")),
+    }
+
+    def more(target: h5py.File) -> None:
+        _put_more(target, design)
+
+    write_modes(
+        path,
+        design.model,
+        design.eigenvalues,
+        [design.modes],
+        residuals,
+        attributes,
+        parameters,
+        more,
+    )
+
+
+def _put_more(file: h5py.File, design: Design) -> None:
+    cells, weights = embedding(design.model.mesh, design.surface_vertices)
+    listening = Listening.of_design(design, SoundingSolid.of_design(design))
+    put_object(file, design)
+    put(file, "surface/cell", cells, "1", "row of `cells` that the vertex lies in or next to")
+    put(file, "surface/weights", weights, "1", "trilinear weights of that cell's eight corners")
+    put(file, "dampings", design.targets.dampings, "1/s", "d of the elastic modes, exp(-d t)")
+    put(file, "strikes/gains", listening.gains, "kg^1/2/(N s)", "samples of full scale per a_k")

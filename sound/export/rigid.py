@@ -1,0 +1,47 @@
+"""Mass, centre and inertia of a solid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.model import ElasticModel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MassProperties:
+    """A solid as a rigid body.
+
+    Attributes
+    ----------
+    mass
+        [kg].
+    centre
+        (3,) centre of mass [m].
+    moments
+        (3,) principal moments of inertia about it [kg m^2], ascending.
+    axes
+        (3, 3) rotation whose columns are the principal axes.
+    """
+
+    mass: float
+    centre: Array
+    moments: Array
+    axes: Array
+
+
+def mass_properties(model: ElasticModel) -> MassProperties:
+    """Integrals of the density over the solid; exact, as positions are trilinear in every cell."""
+    corners = model.mesh.nodes[model.mesh.cells]
+    nodal = model.nodal_mass()
+    mass = float(nodal.sum())
+    centre = np.einsum("cab,cbi->i", nodal, corners) / mass
+    arms = corners - centre
+    second = np.einsum("cai,cab,cbj->ij", arms, nodal, arms)
+    moments, axes = np.linalg.eigh(np.trace(second) * np.eye(3) - second)
+    axes[:, 0] *= np.sign(np.linalg.det(axes))
+    return MassProperties(mass, centre, moments, axes)

@@ -1,0 +1,250 @@
+"""What other tools read from an exported design."""
+
+from __future__ import annotations
+
+import base64
+import json
+import shutil
+import struct
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import trimesh
+
+from carillon.errors import UserError
+from solver.audit import audit
+from solver.coarsening import build_model
+from solver.comparison import compare_files
+from solver.contact import interpolation
+from solver.model import fine_model
+from solver.modes_file import read_modes
+from sound.__main__ import main
+from sound.design_file import write_design
+from sound.export.gltf import EXTENSION, UNSIGNED_INT
+from sound.export.rigid import mass_properties
+from sound.rendering.bank import Bank, ring
+from sound.rendering.listening import Listening
+from sound.rendering.solid import SoundingSolid
+from tests.small_design import N_MODES, SIDES, small_design
+from tests.solids import box_mesh
+
+RATE = 44_100
+PLAYER = """
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+#include <string>
+#define FAUSTFLOAT double
+struct Meta { void declare(const char*, const char*) {} };
+struct UI {
+    std::map<std::string, double*> zones;
+    void openVerticalBox(const char*) {}
+    void openHorizontalBox(const char*) {}
+    void closeBox() {}
+    void declare(double*, const char*, const char*) {}
+    void addButton(const char* name, double* zone) { zones[name] = zone; }
+    void addNumEntry(const char* name, double* zone, double, double, double, double)
+    { zones[name] = zone; }
+    void addHorizontalSlider(const char* name, double* zone, double, double, double, double)
+    { zones[name] = zone; }
+};
+struct dsp {};
+<<includeIntrinsic>>
+<<includeclass>>
+int main(int, char** words) {
+    mydsp model;
+    UI ui;
+    model.init(44100);
+    model.buildUserInterface(&ui);
+    *ui.zones["position"] = atof(words[1]);
+    *ui.zones["impulse"] = atof(words[2]);
+    *ui.zones["contact"] = atof(words[3]);
+    *ui.zones["gate"] = 1.0;
+    static double sound[22050];
+    double* outputs[] = {sound};
+    model.compute(22050, nullptr, outputs);
+    fwrite(sound, sizeof(double), 22050, stdout);
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The design and all its exports."""
+    path = tmp_path_factory.mktemp("export")
+    write_design(path / "design.h5", small_design())
+    for name in ("pan.h5", "pan.gltf", "pan.glb"):
+        assert main(["export", str(path / "design.h5"), "--out", str(path / name)]) == 0
+    points = ["--points", "3", "--out", str(path / "pan.dsp")]
+    assert main(["export", str(path / "design.h5"), *points]) == 0
+    return path
+
+
+def target_amplitudes() -> np.ndarray:
+    """Amplitudes (T, N) in full scale after 1 N s at the targets' points."""
+    design = small_design()
+    solid = SoundingSolid.of_design(design)
+    inward = np.array([strike.inward for strike in design.strikes])
+    listening = Listening.of_design(design, solid)
+    return listening.gains[:, None] * solid.amplitudes(listening.positions, inward)
+
+
+def test_the_solver_reads_and_audits_the_embedded_mesh(folder: Path) -> None:
+    file = read_modes(folder / "pan.h5")
+    np.testing.assert_array_equal(file.modes, small_design().modes)
+    found = audit(file)
+    assert found.rigid_modes == 6 and found.counted == found.expected
+    assert found.residual_max < 1e-9 and found.orthogonality < 1e-9
+    compared = compare_files(folder / "pan.h5", folder / "pan.h5")
+    assert compared.modes_compared == N_MODES and compared.subspace_angle_max < 1e-7
+
+
+def test_the_embedding_carries_modes_to_the_surface(folder: Path) -> None:
+    design = small_design()
+    modes = design.modes.reshape(design.model.mesh.n_nodes, 3, -1)
+    with h5py.File(folder / "pan.h5") as file:
+        cells = file["cells"][()][file["surface/cell"][()]]
+        found = np.einsum("vc,vcik->vik", file["surface/weights"][()], modes[cells])
+        np.testing.assert_array_equal(file["surface/vertices"], design.surface_vertices)
+        np.testing.assert_array_equal(file["dampings"], design.targets.dampings)
+        assert "kg" in file.attrs["normalisation"]
+    values = interpolation(design.model.mesh, design.surface_vertices)
+    expected = (values @ modes.reshape(len(modes), -1)).reshape(found.shape)
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def read_gltf(path: Path) -> tuple[dict[str, Any], bytes]:
+    """JSON and buffer of either kind of file, by the specification."""
+    raw = path.read_bytes()
+    if path.suffix == ".gltf":
+        document = json.loads(raw)
+        return document, base64.b64decode(document["buffers"][0]["uri"].split(",", 1)[1])
+    magic, version, total, length, kind = struct.unpack("<4sIII4s", raw[:20])
+    assert (magic, version, total, kind) == (b"glTF", 2, len(raw), b"JSON")
+    data_length, kind = struct.unpack("<I4s", raw[20 + length : 28 + length])
+    assert kind == b"BIN\0" and 28 + length + data_length == total
+    return json.loads(raw[20 : 20 + length]), raw[28 + length :]
+
+
+def accessor(document: dict[str, Any], data: bytes, number: int) -> np.ndarray:
+    wanted = document["accessors"][number]
+    view = document["bufferViews"][wanted["bufferView"]]
+    kind = "<u4" if wanted["componentType"] == UNSIGNED_INT else "<f4"
+    width = {"SCALAR": 1, "VEC3": 3}[wanted["type"]]
+    count = wanted["count"] * width
+    assert view["byteOffset"] % 4 == 0 and view["byteLength"] == 4 * count
+    return np.frombuffer(data, kind, count, view["byteOffset"]).reshape(-1, width)
+
+
+@pytest.mark.parametrize("name", ["pan.gltf", "pan.glb"])
+def test_gltf_is_the_surface(folder: Path, name: str) -> None:
+    loaded = trimesh.load(folder / name).to_geometry()
+    assert loaded.is_watertight
+    assert loaded.volume == pytest.approx(np.prod(SIDES), rel=1e-6)
+    np.testing.assert_allclose(loaded.bounds, [[0, 0, 0], SIDES], atol=1e-7)
+
+
+@pytest.mark.parametrize("name", ["pan.gltf", "pan.glb"])
+def test_a_player_of_the_draft_makes_the_designed_sound(folder: Path, name: str) -> None:
+    document, data = read_gltf(folder / name)
+    assert document["extensionsUsed"] == [EXTENSION]
+    model = document["extensions"][EXTENSION]["modalModels"][0]
+    f, d = (accessor(document, data, model[key])[:, 0] for key in ("frequencies", "decayRates"))
+    positions = accessor(document, data, model["positions"])
+    shapes = accessor(document, data, model["shapes"]).reshape(len(f), len(positions), 3)
+    assert accessor(document, data, model["indices"]).max() < len(positions)
+    order = np.array(model["extras"]["modeNumbers"]) - 1
+    np.testing.assert_allclose(f, small_design().frequencies[order], rtol=1e-6)
+    np.testing.assert_allclose(d, small_design().targets.dampings[order], rtol=1e-6)
+    gain = document["nodes"][0]["extensions"][EXTENSION]["gain"]
+    listening = [node["extras"]["gain"] for node in document["nodes"][1:]]
+    for row, strike in enumerate(small_design().strikes):
+        nearest = np.argmin(np.linalg.norm(positions - strike.position, axis=1))
+        played = gain * 2 * np.pi * f * (shapes[:, nearest] @ strike.inward)
+        own = np.abs(played) * listening[row] / np.mean(listening)
+        np.testing.assert_allclose(own, target_amplitudes()[row, order], rtol=1e-4)
+
+
+def test_the_loudest_modes_come_first(folder: Path) -> None:
+    document, _ = read_gltf(folder / "pan.glb")
+    order = np.array(document["extensions"][EXTENSION]["modalModels"][0]["extras"]["modeNumbers"])
+    energy = (target_amplitudes() ** 2).sum(axis=0) / small_design().targets.dampings
+    assert (np.diff(energy[order - 1]) <= 0.0).all()
+
+
+def test_mass_properties_of_a_box() -> None:
+    a, b, c = SIDES
+    found = mass_properties(fine_model(box_mesh(6, 4, 2, 0.04), np.full(48, 1e9), density=500.0))
+    mass = 500.0 * a * b * c
+    assert found.mass == pytest.approx(mass)
+    np.testing.assert_allclose(found.centre, np.array(SIDES) / 2)
+    moments = mass / 12.0 * np.array([b**2 + c**2, a**2 + c**2, a**2 + b**2])
+    np.testing.assert_allclose(found.moments, np.sort(moments))
+    assert np.linalg.det(found.axes) == pytest.approx(1.0)
+
+
+def test_partly_filled_coarse_cells_weigh_what_their_fine_ones_do() -> None:
+    mesh = box_mesh(5, 3, 3, 0.02)
+    young = np.full(mesh.n_cells, 1e9)
+    coarse, fine = (mass_properties(build_model(mesh, young, m)) for m in ("average", "none"))
+    assert coarse.mass == pytest.approx(fine.mass)
+    np.testing.assert_allclose(coarse.centre, fine.centre)
+    np.testing.assert_allclose(coarse.moments, fine.moments)
+
+
+@pytest.fixture(scope="module")
+def player(folder: Path) -> Path:
+    """The Faust model as a program that writes the sound of a strike."""
+    for tool in ("faust", "g++"):
+        if shutil.which(tool) is None:
+            pytest.skip(f"{tool} is not installed")
+    (folder / "player.cpp").write_text(PLAYER)
+    faust = ["faust", "-double", "-a", "player.cpp", "pan.dsp", "-o", "pan.cpp"]
+    for words in (faust, ["g++", "-O1", "pan.cpp", "-o", "pan"]):
+        subprocess.run(words, cwd=folder, check=True, capture_output=True)
+    return folder / "pan"
+
+
+def played(player: Path, *words: float) -> np.ndarray:
+    done = subprocess.run([player, *map(str, words)], check=True, capture_output=True)
+    return np.frombuffer(done.stdout)
+
+
+@pytest.mark.parametrize("position", [0, 1])
+def test_faust_plays_what_we_render(player: Path, position: int) -> None:
+    design = small_design()
+    bank = Bank(design.frequencies, design.targets.dampings, RATE)
+    expected = ring(bank, [(0.0, 2.0 * target_amplitudes()[position])], 22_050)
+    found = played(player, position, 2.0, 0.0)
+    np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
+
+
+def test_a_force_that_takes_time_has_the_same_impulse_in_faust(player: Path) -> None:
+    from solver.response import half_sine
+
+    impulse, push = (played(player, 4, 1.0, contact) for contact in (0.0, 2.0))
+    expected = np.convolve(impulse, half_sine(2e-3, RATE))[: len(impulse)]
+    np.testing.assert_allclose(push, expected, atol=1e-6 * np.abs(impulse).max())
+
+
+def test_faust_s_program_names_points_and_units(folder: Path) -> None:
+    text = (folder / "pan.dsp").read_text()
+    assert "nPositions = 5;" in text and f"nModes = {N_MODES};" in text
+    assert "'corner':0;'side':1;'vertex " in text
+    assert "N s" in text and "kg^-1/2" in text
+
+
+def test_an_ending_that_tells_no_format_is_refused(folder: Path) -> None:
+    with pytest.raises(UserError, match="tells no format"):
+        main(["export", str(folder / "design.h5"), "--out", str(folder / "pan.obj")])
+    words = ["--out", str(folder / "pan.txt"), "--format", "dsp"]
+    assert main(["export", str(folder / "design.h5"), *words]) == 0
+
+
+def test_only_designs_are_exported(folder: Path) -> None:
+    with pytest.raises(UserError, match="expected a Carillon design file"):
+        main(["export", str(folder / "pan.h5"), "--out", str(folder / "other.glb")])
