@@ -95,7 +95,7 @@ def check_links(config: Mapping[str, Any]) -> None:
 
 def mesh_of(config: Mapping[str, Any], model: str) -> str:
     """Mesh argument of the solver: `builtin:NAME` or the path of a file."""
-    return _located(config, config["models"][model]["mesh"])
+    return located(config, config["models"][model]["mesh"])
 
 
 def material_of(config: Mapping[str, Any], model: str) -> str:
@@ -136,12 +136,12 @@ def modes_of(config: Mapping[str, Any], model: str) -> int:
 
 def studied_mesh(config: Mapping[str, Any], solid: str) -> str:
     """Mesh argument of the solver for a solid of the objectives' study."""
-    return _located(config, config["objectives"]["models"][solid]["mesh"])
+    return located(config, config["objectives"]["models"][solid]["mesh"])
 
 
 def figured_mesh(config: Mapping[str, Any], solid: str) -> str:
     """Mesh argument of the solver for a solid of the figures."""
-    return _located(config, config["figures"]["models"][solid]["mesh"])
+    return located(config, config["figures"]["models"][solid]["mesh"])
 
 
 def studied_objectives(config: Mapping[str, Any]) -> list[str]:
@@ -180,7 +180,8 @@ def _require_models(where: str, names: Iterable[str], models: Iterable[str]) -> 
             raise UserError(f"{where}: {name!r} is not among the models {', '.join(known)}")
 
 
-def _located(config: Mapping[str, Any], mesh: str) -> str:
+def located(config: Mapping[str, Any], mesh: str) -> str:
+    """Mesh argument of the solver: `builtin:NAME`, or the path of a file below mesh_folder."""
     return mesh if mesh.startswith(BUILTIN) else _in_mesh_folder(config, mesh)
 
 

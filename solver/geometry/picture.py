@@ -168,13 +168,17 @@ def mark(
 
 def view_of(mesh: HexMesh, outward: np.ndarray, up: str = "auto") -> tuple[float, float]:
     """Elevation and azimuth [degrees] from where the sides that look `outward` (d, 3) are seen."""
-    turned = outward @ _rotation(guess_up(mesh) if up == "auto" else up).T
     azimuths = VIEW[1] + np.arange(0.0, 360.0, 15.0)
-    seen = [
-        (turned @ _direction(np.radians(VIEW[0]), np.radians(azimuth))).min()
-        for azimuth in azimuths
-    ]
+    seen = [looks_at(mesh, outward, (VIEW[0], azimuth), up).min() for azimuth in azimuths]
     return VIEW[0], float(azimuths[int(np.argmax(seen))])
+
+
+def looks_at(
+    mesh: HexMesh, outward: np.ndarray, view: tuple[float, float], up: str = "auto"
+) -> np.ndarray:
+    """Cosines (d,) between directions `outward` (d, 3) and the one that the eye is in."""
+    turned = outward @ _rotation(guess_up(mesh) if up == "auto" else up).T
+    return np.asarray(turned @ _direction(*np.radians(view)))
 
 
 def guess_up(mesh: HexMesh) -> str:

@@ -1,0 +1,230 @@
+"""Examples of sound design: what they are, how they are planned, and their pages."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from solver import solve
+from solver.model import RIGID_MODES, fine_model
+from solver.modes_file import write_modes
+from sound.clips.wav import write_wav
+from sound.design_file import HISTORY_TYPE, Design, write_design
+from sound.project import load_project
+from sound.rendering.listening import Listening
+from sound.rendering.render import Hit, render
+from sound.rendering.solid import SoundingSolid
+from tests.pages import Page, assert_same_numbers, assert_self_contained
+from tests.small_design import N_MODES, SIDES, small_design
+from workflow import settings
+from workflow.estimate.command import CONFIGURATIONS, load
+from workflow.report.table import write_table
+from workflow.sounds import index, page
+from workflow.sounds.examples import (
+    DESIGN,
+    ELSEWHERE,
+    FOLDER,
+    PROJECT,
+    START,
+    TRUTH,
+    Example,
+    Target,
+    examples,
+    names,
+    project,
+)
+from workflow.sounds.pictures import fine_mesh
+from workflow.sounds.plots import _ticks
+from workflow.sounds.results import Found
+
+RATE = 22_050
+EXAMPLE = Example(
+    name="box",
+    title="A box",
+    figure="no figure",
+    about="Two targets on a box.",
+    mesh="builtin:box",
+    resolution=6,
+    density=1000.0,
+    modes=N_MODES,
+    seconds=1.0,
+    targets=(Target("corner", SIDES, "metal", 1), Target("side", (0.0, 0.0, 0.0), "wood", 2)),
+    elsewhere=("top", (0.12, 0.08, 0.08)),
+    compared=True,
+)
+CONFIG = load(CONFIGURATIONS / "laptop.yaml")
+
+
+def history(*rows: tuple[float, float]) -> np.ndarray:
+    """Costs over seconds, ten evaluations a second."""
+    return np.array([(s, 10 * s + 1, c, 0.5 * c, 0.05 * c, 0.0) for s, c in rows], HISTORY_TYPE)
+
+
+def designed(**parts: object) -> Design:
+    resolved = {
+        "mesh": "builtin:box",
+        "unit": 1.0,
+        "weights": {"frequency": 1.0, "amplitude": 10.0},
+    }
+    return replace(small_design(), settings=resolved, **parts)
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory) -> Found:
+    """Results of an example, made without optimisation."""
+    root = tmp_path_factory.mktemp("results") / FOLDER
+    example = Found(root, CONFIG, EXAMPLE)
+    for folder in ("edit-1", "before", "clips", "after", "fine", "tables"):
+        (example.folder / folder).mkdir(parents=True)
+    first = designed(history=history((0.1, 9.0), (1.0, 4.0)))
+    final = designed(history=history((0.1, 9.0), (1.0, 4.0), (1.2, 6.0), (3.0, 0.5)))
+    write_design(example.folder / "edit-1" / DESIGN, first)
+    write_design(example.folder / DESIGN, final)
+    write_design(example.folder / START, designed(history=history((0.1, 9.0))))
+    (example.folder / PROJECT).write_text("mesh: builtin:box\n")
+    write_truth(example.folder / TRUTH, final)
+    write_sounds(example.folder, final)
+    rows = [
+        {
+            "method": method,
+            "cost_start": 9.0,
+            "cost_end": end,
+            "fall": 1 - end / 9.0,
+            "evaluations": 30,
+            "evaluations_per_minute": 600.0,
+            "seconds": 3.0,
+            "cold_seconds": 0.2,
+            "warm_seconds": 0.05,
+            "curve": [[0.1, 9.0], [3.0, end]],
+        }
+        for method, end in (("hybrid", 0.5), ("cma", 4.0), ("bfgs", 2.0))
+    ]
+    (example.folder / "optimisers.json").write_text(json.dumps({"rows": rows, "provenance": {}}))
+    return example
+
+
+def write_truth(path: Path, design: Design) -> None:
+    model = fine_model(fine_mesh(design), design.young)
+    modes = solve(model, modes=RIGID_MODES + N_MODES, method="slepc")
+    assert modes.modes is not None
+    write_modes(path, model, modes.eigenvalues, [modes.modes], modes.residuals, {}, {})
+
+
+def write_sounds(folder: Path, design: Design) -> None:
+    solid = SoundingSolid.of_design(design)
+    listening = Listening.of_design(design, solid)
+    for strike in design.strikes:
+        sound = render(solid, [Hit(0.0, strike.position, strike.inward)], 0.3, RATE, 0.0, listening)
+        for state in page.STATES:
+            write_wav(folder / state / f"{strike.name}.wav", sound, RATE)
+    write_wav(folder / "after" / f"{ELSEWHERE}.wav", sound, RATE)
+
+
+@pytest.fixture(scope="module")
+def built(found: Found) -> Page:
+    html, tables = page.build(found)
+    for table in tables.values():
+        write_table(table, found.folder / "tables")
+    (found.folder / "page.html").write_text(html, encoding="utf-8")
+    return Page(found.folder / "page.html")
+
+
+def test_the_page_needs_nothing_from_elsewhere_and_can_be_heard(found, built):
+    assert_self_contained(built)
+    assert built.source.count("data:audio/wav;base64,") == 2 * len(page.STATES) + 1
+    assert built.source.count("data:image/png;base64,") >= 2
+    assert len(built.source) < 4e6
+
+
+def test_files_that_the_page_leads_to_are_there(found, built):
+    assert {DESIGN, START, TRUTH, PROJECT, "optimisers.json", "clips/corner.wav"} <= set(built.led)
+    assert f"edit-1/{DESIGN}" in built.led
+    assert all((found.folder / name).is_file() for name in built.led if not name.startswith("#"))
+
+
+@pytest.mark.parametrize(
+    "name", ["designs", "frequencies", "truth", "amplitudes", "optimisers", "provenance"]
+)
+def test_tables_of_the_page_are_those_of_the_files(found, built, name):
+    assert_same_numbers(built, found.folder / "tables", name)
+
+
+def test_every_edit_counts_its_own_time(found, built):
+    rows = page.tables.designs(found).rows
+    assert [row["cost_before"] for row in rows] == [9.0, 6.0]
+    assert [row["cost"] for row in rows] == [4.0, 0.5]
+    assert rows[1]["seconds"] == pytest.approx(2.0) and rows[1]["evaluations"] == 20
+    assert rows[1]["per_minute"] == pytest.approx(600.0)
+
+
+def test_the_fine_model_is_set_beside_the_coarse_one(found):
+    rows = page.tables.truth(found).rows
+    assert len(rows) == N_MODES
+    for row in rows:
+        assert row["error"] == pytest.approx(row["found"] / row["truth"] - 1.0)
+    assert max(abs(row["error"]) for row in rows) > 0.0
+
+
+def test_the_index_leads_to_the_page(found, built, tmp_path):
+    (tmp_path / "tables").mkdir()
+    html, table = index.build([found])
+    write_table(table, tmp_path / "tables")
+    (tmp_path / "index.html").write_text(html, encoding="utf-8")
+    read = Page(tmp_path / "index.html")
+    assert_self_contained(read)
+    assert_same_numbers(read, tmp_path / "tables", "sounds")
+    assert "box/page.html" in read.led
+    assert read.source.count("data:audio/wav;base64,") == 2
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.01, 10.0), (0.9, 1.1), (0.3, 7.0), (1.0, 1.002)])
+def test_a_colour_bar_has_round_ticks_within_its_range(low, high):
+    ticks = _ticks(low, high)
+    assert 3 <= len(ticks) <= 12
+    assert all(0.98 * low <= tick <= 1.02 * high for tick in ticks)
+
+
+def test_the_schema_names_the_examples():
+    section = settings.schema()["properties"]["sound"]["properties"]
+    assert section["examples"]["items"]["enum"] == names()
+
+
+def test_projects_of_all_examples_are_valid_and_their_points_on_the_surface(tmp_path):
+    config = {**CONFIG, "results_dir": str(tmp_path)}
+    for example in examples(config).values():
+        clips = tmp_path / FOLDER / example.name / "clips"
+        clips.mkdir(parents=True)
+        for target in example.targets:
+            (clips / f"{target.name}.wav").touch()
+        for part in example.parts:
+            file = tmp_path / FOLDER / part / PROJECT
+            file.parent.mkdir(exist_ok=True)
+            file.write_text(yaml.safe_dump(project(example, part, config)))
+            read = load_project(file)
+            strikes = read.strikes(read.surface())
+            assert [strike.name for strike in strikes] == [
+                target.name for target in example.targets_of(part)
+            ]
+            assert read.optimiser.seconds == example.seconds
+
+
+def test_the_pitcher_is_edited_twice():
+    pitcher = examples(CONFIG)["pitcher"]
+    assert pitcher.parts == ["pitcher/edit-1", "pitcher/edit-2", "pitcher"]
+    counts = [len(pitcher.targets_of(part)) for part in pitcher.parts]
+    assert counts == [1, 2, 3]
+
+
+def test_the_chord_is_on_the_bunny_where_its_mesh_is_and_on_a_bell_otherwise(tmp_path):
+    config = {**CONFIG, "mesh_folder": str(tmp_path)}
+    assert examples(config)["chord"].mesh == "builtin:bell"
+    (tmp_path / config["sound"]["bunny"]).touch()
+    chord = examples(config)["chord"]
+    assert chord.mesh_files == [str(tmp_path / "stanford-bunny.obj")]
+    relative = project(chord, "chord", {**config, "results_dir": str(tmp_path / "results")})["mesh"]
+    assert relative == "../../../stanford-bunny.obj"

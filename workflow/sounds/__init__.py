@@ -1,0 +1,1 @@
+"""Examples of sound design, each with a page: `snakemake sounds`."""

@@ -1,0 +1,162 @@
+"""The examples: which solid, which clips at which places, and in which order they are edited."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from workflow.settings import BUILTIN, located
+
+EXAMPLES = Path(__file__).with_name("examples.yaml")
+FOLDER = "sound"
+"""Folder of the examples beside the run's configuration."""
+PROJECT, DESIGN, START, TRUTH = "project.yaml", "design.h5", "start.h5", "truth.h5"
+"""What is wanted, what was found, what the search began with, modes of the fine model."""
+ELSEWHERE = "elsewhere"
+"""Name of the sound at a point without a target."""
+BUNNY = "bunny"
+
+
+@dataclass(frozen=True)
+class Target:
+    """A place, the arguments of `sound clip` for its clip, and the edit that it joins in."""
+
+    name: str
+    at: tuple[float, float, float]
+    clip: str
+    edit: int
+
+
+@dataclass(frozen=True)
+class Example:
+    """One example on the solid whose mesh is there.
+
+    Attributes
+    ----------
+    name, title, figure, about
+        Short name, heading, what it follows in the paper, and a sentence.
+    mesh, resolution, density, modes, seconds
+        See `sound/project.schema.yaml`.
+    targets
+        In the order of their edits.
+    elsewhere
+        Name and position of a point without a target that is struck, too.
+    compared
+        Whether the optimisers are compared on it.
+    """
+
+    name: str
+    title: str
+    figure: str
+    about: str
+    mesh: str
+    resolution: int
+    density: float
+    modes: int
+    seconds: float
+    targets: tuple[Target, ...]
+    elsewhere: tuple[str, tuple[float, float, float]]
+    compared: bool
+
+    @property
+    def edits(self) -> int:
+        """Number of designs, each going on from the one before."""
+        return max(target.edit for target in self.targets)
+
+    @property
+    def mesh_files(self) -> list[str]:
+        """Its mesh file; none for a built-in object."""
+        return [] if self.mesh.startswith(BUILTIN) else [self.mesh]
+
+    def part(self, edit: int) -> str:
+        """Folder of an edit below that of the examples; the last one has none of its own."""
+        return self.name if edit == self.edits else f"{self.name}/edit-{edit}"
+
+    @property
+    def parts(self) -> list[str]:
+        """Folders of all edits."""
+        return [self.part(edit) for edit in range(1, self.edits + 1)]
+
+    def edit_of(self, part: str) -> int:
+        """Number of the edit whose folder is `part`."""
+        return self.parts.index(part) + 1
+
+    def targets_of(self, part: str) -> list[Target]:
+        """Targets of an edit: its own and those before."""
+        edit = self.edit_of(part)
+        return [target for target in self.targets if target.edit <= edit]
+
+
+def names() -> list[str]:
+    """Names of all examples."""
+    return list(_described())
+
+
+def examples(config: Mapping[str, Any]) -> dict[str, Example]:
+    """The examples that a configuration asks for, by name."""
+    return {name: _example(name, config) for name in config["sound"]["examples"]}
+
+
+def project(example: Example, part: str, config: Mapping[str, Any]) -> dict[str, Any]:
+    """Content of the project file of an edit; its paths are relative to the folder `part`."""
+    folder = Path(config["results_dir"], FOLDER, part)
+    clips = Path(config["results_dir"], FOLDER, example.name, "clips")
+    return {
+        "mesh": example.mesh if not example.mesh_files else os.path.relpath(example.mesh, folder),
+        "resolution": example.resolution,
+        "density": example.density,
+        "modes": example.modes,
+        "targets": [
+            {
+                "name": target.name,
+                "at": list(target.at),
+                "clip": os.path.relpath(clips / f"{target.name}.wav", folder),
+            }
+            for target in example.targets_of(part)
+        ],
+        "optimiser": {"seconds": example.seconds, "seed": config["sound"]["seed"]},
+    }
+
+
+def _example(name: str, config: Mapping[str, Any]) -> Example:
+    described, wanted = _described()[name], config["sound"]
+    meshes = [_mesh(solid["mesh"], config) for solid in described["solids"]]
+    there = (mesh.startswith(BUILTIN) or Path(mesh).is_file() for mesh in meshes)
+    chosen = list(there).index(True)
+    solid = described["solids"][chosen]
+    targets = [
+        Target(
+            each["name"], tuple(solid["places"][each["name"]]), each["clip"], each.get("edit", 1)
+        )
+        for each in described["targets"]
+    ]
+    return Example(
+        name,
+        described["title"],
+        described["figure"],
+        described["about"],
+        meshes[chosen],
+        wanted["resolution"] or solid["resolution"],
+        described["density"],
+        wanted["modes"] or described["modes"],
+        wanted["seconds"] or described["seconds"],
+        tuple(targets),
+        (solid["elsewhere"]["name"], tuple(solid["elsewhere"]["at"])),
+        described.get("compared", False),
+    )
+
+
+def _mesh(mesh: str, config: Mapping[str, Any]) -> str:
+    return located(config, config["sound"]["bunny"] if mesh == BUNNY else mesh)
+
+
+@cache
+def _described() -> dict[str, Any]:
+    loaded: dict[str, Any] = yaml.safe_load(EXAMPLES.read_text(encoding="utf-8"))
+    return loaded

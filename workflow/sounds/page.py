@@ -1,0 +1,158 @@
+"""The page of an example: what was wanted, what was found, to see and to hear."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+import yaml
+from numpy.typing import NDArray
+
+from carillon import provenance
+from solver.response import spectrogram
+from sound.strikes import locate
+from workflow.report.audio import wav_uri
+from workflow.report.page import page_template
+from workflow.report.pictures import Pixels, png_uri
+from workflow.report.spectrogram_plot import highest_hertz, spectrogram_figure
+from workflow.report.style import inlined
+from workflow.report.table import Table
+from workflow.sounds import plots, tables
+from workflow.sounds.examples import DESIGN, ELSEWHERE, PROJECT, START, TRUTH
+from workflow.sounds.pictures import ELSEWHERE_CLASS, Mark, marks_of, material_pictures
+from workflow.sounds.results import Found
+
+Array = NDArray[np.float64]
+Sound = tuple[Array, int]
+
+SHOWN_SECONDS, PLAYED_SECONDS = 1.0, 2.0
+"""Longest time of a spectrogram and of a player."""
+STATES = {
+    "before": "Before",
+    "clips": "Target",
+    "after": "After",
+    "fine": "After, on the fine model",
+}
+"""Folders of sounds, and their names for people."""
+
+
+def build(found: Found) -> tuple[str, dict[str, Table]]:
+    """The page as HTML, and its tables by name."""
+    made = tables.build(found)
+    example, design = found.example, found.design
+    marks = marks_of(design)
+    elsewhere = _elsewhere(found)
+    page = page_template("sounds/page.html.j2").render(
+        title=example.title,
+        example=example,
+        design=design,
+        settings=design.settings,
+        tables=made,
+        edits=made["designs"].rows,
+        worst=_worst(made),
+        points=_points(found, marks),
+        elsewhere=elsewhere,
+        rest=_panel(found, "after", ELSEWHERE, [found.sound("after", ELSEWHERE)]),
+        cost=inlined(plots.cost_figure(found), "cost"),
+        frequencies=inlined(
+            plots.frequency_figure(made["frequencies"], made["truth"]), "frequencies"
+        ),
+        optimisers=found.optimisers
+        and inlined(plots.optimisers_figure(found.optimisers), "optimisers"),
+        pictures=[_picture(each) for each in material_pictures(design, [*marks, elsewhere])],
+        colour_bar=inlined(plots.colour_bar(design.young), "colours"),
+        moduli=(design.young.min(), np.median(design.young), design.young.max()),
+        files=_files(found),
+        project=yaml.safe_dump(design.settings, sort_keys=False),
+        page_record=provenance.record({"config": found.config}),
+    )
+    return page, made
+
+
+def _worst(made: dict[str, Table]) -> dict[str, float]:
+    """Largest differences [bark] from the targets before and after."""
+    rows = made["frequencies"].rows
+    return {state: max(abs(row[f"{state}_bark"]) for row in rows) for state in ("start", "found")}
+
+
+def _points(found: Found, marks: list[Mark]) -> list[dict[str, Any]]:
+    """Sounds and balance of every struck point."""
+    names = found.design.targets.names
+    balance = tables.amplitudes(found)
+    return [
+        {
+            "name": name,
+            "style": mark.style,
+            "position": (mark.position / found.design.settings["unit"]).tolist(),
+            "panels": _panels(found, name),
+            "balance": inlined(plots.balance_figure(balance, name), f"balance-{number}"),
+        }
+        for number, (name, mark) in enumerate(zip(names, marks))
+    ]
+
+
+def _panels(found: Found, name: str) -> list[dict[str, Any]]:
+    """Sound before, wanted and after at a point, on the same scales."""
+    sounds = [found.sound(state, name) for state in STATES]
+    return [_panel(found, state, name, sounds) for state in STATES]
+
+
+def _panel(found: Found, state: str, name: str, together: list[Sound]) -> dict[str, Any]:
+    """Spectrogram and player of a sound, scaled as those that are shown `together`."""
+    sound, rate = found.sound(state, name)
+    target = found.sound("clips", name) if state in STATES and name != ELSEWHERE else (sound, rate)
+    loudest = float(spectrogram(*target)[2].max())
+    seconds = min(SHOWN_SECONDS, max(len(each) / own for each, own in together))
+    shown = _first(sound, rate, seconds)
+    figure = spectrogram_figure(shown, loudest, highest_hertz(together), rate)
+    peak = max(float(np.abs(each).max()) for each, _ in together)
+    return {
+        "state": STATES[state],
+        "plot": inlined(figure, f"sound-{state}-{name.replace(' ', '-')}"),
+        "source": wav_uri(sound[: round(PLAYED_SECONDS * rate)], rate, peak),
+    }
+
+
+def _first(sound: Array, rate: int, seconds: float) -> Array:
+    """The first seconds of a sound, followed by silence if it is shorter."""
+    count = round(seconds * rate)
+    return np.pad(sound[:count], (0, max(0, count - len(sound))))
+
+
+def _elsewhere(found: Found) -> Mark:
+    """The point without a target."""
+    surface = trimesh.Trimesh(
+        found.design.surface_vertices, found.design.surface_faces, process=False
+    )
+    strike = locate(surface, *found.example.elsewhere)
+    return Mark(ELSEWHERE_CLASS, strike.position, strike.inward)
+
+
+def _picture(picture: Pixels) -> dict[str, Any]:
+    return {"source": png_uri(picture), "height": picture.shape[0], "width": picture.shape[1]}
+
+
+def _files(found: Found) -> list[dict[str, Any]]:
+    """Files beside the page that are of use elsewhere."""
+    told = {
+        PROJECT: "the project, for python -m sound design",
+        DESIGN: "the design: material, modes, targets, history",
+        START: "the same with the uniform material that the search began with",
+        TRUTH: "modes of the fine model with the material found",
+        "young.npy": "Young’s modulus [Pa] of every voxel, for solver modes --material",
+        "optimisers.json": "the optimisers beside each other",
+    }
+    for state, what in STATES.items():
+        for name in found.design.targets.names:
+            told[f"{state}/{name}.wav"] = f"{name}, {what[0].lower()}{what[1:]}"
+    told[f"after/{ELSEWHERE}.wav"] = f"{found.example.elsewhere[0]}, without a target"
+    for part in found.example.parts[:-1]:
+        below = Path(part).name
+        told[f"{below}/{DESIGN}"] = f"the design after {below.replace('-', ' ')}"
+    return [
+        {"name": name, "what": what, "bytes": (found.folder / name).stat().st_size}
+        for name, what in told.items()
+        if (found.folder / name).is_file()
+    ]
