@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
+from solver.clusters import clusters
 from solver.geometry import prolongation
 from solver.model import RIGID_MODES
 from solver.modes_file import ModesFile, read_modes
@@ -19,8 +20,6 @@ from solver.verification import residual_scale
 
 Array = NDArray[np.float64]
 
-CLUSTER_GAP = 1e-3
-"""Truth eigenvalues closer than this, relatively, are one cluster."""
 AUDIBLE_FIRST, AUDIBLE_LAST = 7, 60
 """Mode numbers, from 1, of the frequency errors that are reported for coarsened models."""
 
@@ -164,13 +163,6 @@ def recomputed_residuals(file: ModesFile, K: sp.csr_matrix, M: sp.csr_matrix) ->
     residual = K @ file.modes - mass_modes * file.eigenvalues
     scale = residual_scale(file.eigenvalues) * np.linalg.norm(mass_modes, axis=0)
     return np.asarray(np.linalg.norm(residual, axis=0) / scale)
-
-
-def clusters(values: Array, gap: float = CLUSTER_GAP) -> list[slice]:
-    """Runs of ascending `values` whose neighbours are relatively closer than `gap`."""
-    breaks = np.flatnonzero(np.diff(values) > gap * values[1:]) + 1
-    bounds = [0, *breaks.tolist(), len(values)]
-    return [slice(start, stop) for start, stop in zip(bounds[:-1], bounds[1:], strict=True)]
 
 
 def subspace_angles(modes: Array, truth: Array, M: sp.csr_matrix, groups: list[slice]) -> Array:

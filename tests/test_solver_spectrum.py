@@ -12,7 +12,8 @@ from carillon.errors import ConvergenceError, UserError
 from dataset_gen.block import degrees_of_freedom
 from dataset_gen.element import rigid_motions
 from solver.analysis import RIGID_MODES, SolverOptions, modal_analysis
-from solver.comparison import clusters, subspace_angles
+from solver.clusters import clusters
+from solver.comparison import subspace_angles
 from solver.correction import correct
 from solver.distribution import distribute
 from solver.hcms.condense import restrict_stiffness

@@ -245,6 +245,11 @@ def test_an_ending_that_tells_no_format_is_refused(folder: Path) -> None:
     assert main(["export", str(folder / "design.h5"), *words]) == 0
 
 
+def test_a_design_is_not_overwritten(folder: Path) -> None:
+    with pytest.raises(UserError, match="is the design itself"):
+        main(["export", str(folder / "design.h5"), "--out", str(folder / "design.h5")])
+
+
 def test_only_designs_are_exported(folder: Path) -> None:
     with pytest.raises(UserError, match="expected a Carillon design file"):
         main(["export", str(folder / "pan.h5"), "--out", str(folder / "other.glb")])

@@ -43,6 +43,8 @@ def run(arguments: argparse.Namespace) -> int:
             f".{', .'.join(FORMATS)}; or name it by --format"
         )
     require_writable(arguments.out)
+    if Path(arguments.out).resolve() == Path(arguments.design).resolve():
+        raise UserError(f"--out {arguments.out}: is the design itself; name another file")
     design = read_design(arguments.design)
     if wanted == "h5":
         write_embedded(arguments.out, design, {"design": arguments.design})

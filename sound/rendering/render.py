@@ -54,8 +54,6 @@ def render(
     residual
         Whether residuals are added.
     """
-    from scipy.signal import fftconvolve
-
     count = round(seconds * rate)
     positions = np.array([hit.position for hit in hits])
     amplitudes = solid.amplitudes(positions, np.array([hit.impulse for hit in hits]))
@@ -64,6 +62,8 @@ def render(
     bank = Bank(solid.frequencies, solid.dampings, rate)
     sound = ring(bank, zip([hit.seconds for hit in hits], amplitudes), count)
     if contact_seconds > 0.0:
+        from scipy.signal import fftconvolve  # Loaded where it is needed: it takes long.
+
         sound = fftconvolve(sound, half_sine(contact_seconds, rate))[:count]
     if listening is not None and residual:
         for hit in hits:

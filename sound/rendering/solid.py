@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from solver.comparison import clusters
+from solver.clusters import clusters
 from solver.contact import interpolation
 from solver.geometry import HexMesh
 from solver.model import RIGID_MODES

@@ -1,0 +1,24 @@
+"""Eigenvalues so close that their modes may be mixed: only the space that they span is certain."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+CLUSTER_GAP = 1e-3
+"""Eigenvalues closer than this, relatively, are one cluster."""
+
+
+def clusters(values: Array, gap: float = CLUSTER_GAP) -> list[slice]:
+    """Runs of ascending `values` whose neighbours are relatively closer than `gap`.
+
+    Examples
+    --------
+    >>> clusters(np.array([1.0, 2.0, 2.0001, 3.0]))
+    [slice(0, 1, None), slice(1, 3, None), slice(3, 4, None)]
+    """
+    breaks = np.flatnonzero(np.diff(values) > gap * values[1:]) + 1
+    bounds = [0, *breaks.tolist(), len(values)]
+    return [slice(start, stop) for start, stop in zip(bounds[:-1], bounds[1:], strict=True)]
