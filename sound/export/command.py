@@ -32,9 +32,6 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the file and say what it holds."""
     from carillon.files import require_writable
     from sound.design_file import read_design
-    from sound.export.embedded import write_embedded
-    from sound.export.faust import write_faust
-    from sound.export.gltf import write_gltf
 
     wanted = arguments.format or Path(arguments.out).suffix.lstrip(".").lower()
     if wanted not in FORMATS:
@@ -47,10 +44,16 @@ def run(arguments: argparse.Namespace) -> int:
         raise UserError(f"--out {arguments.out}: is the design itself; name another file")
     design = read_design(arguments.design)
     if wanted == "h5":
+        from sound.export.embedded import write_embedded  # Loaded if needed: some take long.
+
         write_embedded(arguments.out, design, {"design": arguments.design})
     elif wanted == "dsp":
+        from sound.export.faust import write_faust
+
         write_faust(arguments.out, design, arguments.points)
     else:
+        from sound.export.gltf import write_gltf
+
         write_gltf(arguments.out, design, binary=wanted == "glb")
     print(
         f"{arguments.out}: {len(design.frequencies)} modes, {design.frequencies[0]:.4g} to "

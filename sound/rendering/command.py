@@ -22,9 +22,6 @@ if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
 
     Array = NDArray[np.float64]
 
-PEAK = 0.5
-"""Largest sample of a sound whose loudness no clip tells."""
-
 
 @dataclass
 class _Scene:
@@ -94,6 +91,7 @@ def run(arguments: argparse.Namespace) -> int:
     import numpy as np
 
     from carillon.files import require_writable
+    from sound.clips.wav import PEAK, write_wav
     from sound.rendering.render import Hit, render, ringing_seconds
 
     require_writable(arguments.out)
@@ -113,7 +111,7 @@ def run(arguments: argparse.Namespace) -> int:
     if scene.listening is None and peak > 0.0:
         gain = PEAK / peak
         sound, peak = gain * sound, PEAK
-    _write(arguments.out, sound, arguments.rate)
+    write_wav(arguments.out, sound, arguments.rate)
     found = _summary(arguments, scene, gain, peak)
     print(json.dumps(found) if arguments.json else _sentence(found))
     if peak > 1.0:
@@ -206,15 +204,6 @@ def _voxel_point(arguments: argparse.Namespace, mesh: Any) -> tuple[Array, Array
     nodes, outward = surface_normals(mesh)
     index = surface_node(mesh, np.array(arguments.at), "--at")
     return mesh.nodes[nodes[index]], -outward[index]
-
-
-def _write(path: str, sound: Array, rate: int) -> None:
-    import soundfile
-
-    from carillon.files import atomic_path
-
-    with atomic_path(path) as temporary:
-        soundfile.write(temporary, sound, rate, format="WAV", subtype="FLOAT")
 
 
 def _summary(
