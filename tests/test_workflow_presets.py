@@ -65,6 +65,10 @@ def test_a_shard_of_the_papers_data_is_about_an_hour():
 def test_the_page_of_the_configuration_is_up_to_date():
     written = (CHECKOUT / "docs" / "configuration.md").read_text()
     assert written == schema_page.page(), "python -m workflow.schema_page > docs/configuration.md"
+    written = (CHECKOUT / "docs" / "project.md").read_text()
+    assert written == schema_page.project_page(), (
+        "python -m workflow.schema_page project > docs/project.md"
+    )
 
 
 def test_the_page_has_every_key():

@@ -1,15 +1,21 @@
-"""The configuration as a page, from its schema: `python -m workflow.schema_page`."""
+"""The configuration as a page, from its schema: `python -m workflow.schema_page`.
+
+With the argument `project`, the page of the projects of `sound design`.
+"""
 
 from __future__ import annotations
 
 import json
 import re
+import sys
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import yaml
+
 from workflow import settings
 
-_HEAD = """# Configuration
+_CONFIGURATION = """# Configuration
 
 <!-- Made by python -m workflow.schema_page > docs/configuration.md; do not edit. -->
 
@@ -18,6 +24,21 @@ _HEAD = """# Configuration
 NAME` says what each takes. Mistakes are answered in one sentence before anything runs.
 
 A plain number has the unit 1. `NAME` stands for names of your own, `[]` for an entry of a list."""
+_PROJECT = """# Project of a sound design
+
+<!-- Made by python -m workflow.schema_page project > docs/project.md; do not edit. -->
+
+{description}. `python -m sound design PROJECT.yaml --out design.h5` reads it; mistakes are answered
+in one sentence. The least that a project says:
+
+```yaml
+mesh: builtin:frying-pan
+targets:
+  - {{name: plate, at: [0.036, 0.054, 0.022], clip: plate.wav}}
+```
+
+A plain number has the unit 1. `[]` stands for an entry of a list."""
+_PROJECT_SCHEMA = settings.SCHEMA.parents[2] / "sound" / "project.schema.yaml"
 _TABLE = "| key | type | default | unit | meaning |\n| --- | --- | --- | --- | --- |"
 _BOUNDS = {
     "minimum": "at least {}",
@@ -34,11 +55,20 @@ Schema = Mapping[str, Any]
 
 
 def page() -> str:
-    """The whole page as Markdown."""
-    schema = settings.schema()
-    parts = [_HEAD.format(description=schema["description"].rstrip("."))]
+    """The page of the configuration as Markdown."""
+    return _page(_CONFIGURATION, settings.schema(), "The run")
+
+
+def project_page() -> str:
+    """The page of a project of `sound design` as Markdown."""
+    schema = yaml.safe_load(_PROJECT_SCHEMA.read_text(encoding="utf-8"))
+    return _page(_PROJECT, schema, "The solid")
+
+
+def _page(head: str, schema: Schema, plain_title: str) -> str:
+    parts = [head.format(description=schema["description"].rstrip("."))]
     plain = {key: part for key, part in schema["properties"].items() if not _is_section(part)}
-    parts.append(f"## The run\n\n{_table(_rows(plain, '', schema['required']))}")
+    parts.append(f"## {plain_title}\n\n{_table(_rows(plain, '', schema['required']))}")
     for key, part in schema["properties"].items():
         if _is_section(part):
             required = _nested(part).get("required", ())
@@ -113,4 +143,4 @@ def _cell(text: str) -> str:
 
 
 if __name__ == "__main__":
-    print(page(), end="")
+    print(project_page() if sys.argv[1:] == ["project"] else page(), end="")

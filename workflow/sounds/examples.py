@@ -21,6 +21,7 @@ PROJECT, DESIGN, START, TRUTH = "project.yaml", "design.h5", "start.h5", "truth.
 ELSEWHERE = "elsewhere"
 """Name of the sound at a point without a target."""
 BUNNY = "bunny"
+RIGID_MODES = 6
 
 
 @dataclass(frozen=True)
@@ -122,6 +123,15 @@ def project(example: Example, part: str, config: Mapping[str, Any]) -> dict[str,
         ],
         "optimiser": {"seconds": example.seconds, "seed": config["sound"]["seed"]},
     }
+
+
+def solid_arguments(example: Example) -> str:
+    """Arguments of `solver modes` for the fine model of an example, but for its material."""
+    modes = RIGID_MODES + example.modes
+    return (
+        f"{example.mesh} --resolution {example.resolution} --density {example.density}"
+        f" --modes {modes}"
+    )
 
 
 def _example(name: str, config: Mapping[str, Any]) -> Example:

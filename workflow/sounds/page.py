@@ -29,6 +29,8 @@ Sound = tuple[Array, int]
 
 SHOWN_SECONDS, PLAYED_SECONDS = 1.0, 2.0
 """Longest time of a spectrogram and of a player."""
+ROOM_ABOVE = 1.5
+"""Highest frequency of a spectrogram over that of the highest target."""
 STATES = {
     "before": "Before",
     "clips": "Target",
@@ -106,7 +108,8 @@ def _panel(found: Found, state: str, name: str, together: list[Sound]) -> dict[s
     loudest = float(spectrogram(*target)[2].max())
     seconds = min(SHOWN_SECONDS, max(len(each) / own for each, own in together))
     shown = _first(sound, rate, seconds)
-    figure = spectrogram_figure(shown, loudest, highest_hertz(together), rate)
+    highest = min(highest_hertz(together), ROOM_ABOVE * found.design.targets.frequencies[-1])
+    figure = spectrogram_figure(shown, loudest, float(highest), rate)
     peak = max(float(np.abs(each).max()) for each, _ in together)
     return {
         "state": STATES[state],

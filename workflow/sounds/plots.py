@@ -41,13 +41,9 @@ def cost_figure(found: Found) -> Figure:
         for number, (rows, begin) in enumerate(zip(histories, begins)):
             for key, (label, colour, weight) in lines.items():
                 style: Any = {"color": colour, "linewidth": 2.2 if key == "cost" else 1.2}
-                axes.step(
-                    begin + rows["seconds"],
-                    _positive(weight * rows[key]),
-                    where="post",
-                    label=None if number else label,
-                    **style,
-                )
+                values = _positive(weight * rows[key])
+                name = None if number else label
+                axes.plot(begin + rows["seconds"], values, label=name, **style)
         for begin in begins[1:-1]:
             axes.axvline(begin, color=MUTED, linewidth=0.9, linestyle=(0, (1, 2)))
         axes.set(yscale="log", xlabel="wall time [s]", ylabel="cost [1]", title="Cost")
@@ -66,9 +62,7 @@ def optimisers_figure(compared: dict[str, Any]) -> Figure:
             colour = colours.get(row["method"], COLOURS["hcms_ec"])
             width = 2.2 if row["method"] == "hybrid" else 1.3
             label = METHODS[row["method"]]
-            axes.step(
-                seconds, _positive(cost), where="post", color=colour, linewidth=width, label=label
-            )
+            axes.plot(seconds, _positive(cost), color=colour, linewidth=width, label=label)
         axes.set(yscale="log", xlabel="wall time [s]", ylabel="cost [1]", title="Cost")
         axes.set_xlim(left=0.0)
         axes.legend(loc="upper right")

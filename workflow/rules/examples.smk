@@ -1,0 +1,100 @@
+# Examples of sound design: their files, and arguments of the programs.
+import shlex
+
+from workflow.sounds import examples as sound_examples
+from workflow.sounds.examples import DESIGN, ELSEWHERE, PROJECT, START, TRUTH
+
+SOUND_FOLDER = sound_examples.FOLDER
+SOUND = f"{RESULTS}/{SOUND_FOLDER}"
+EXAMPLES = sound_examples.examples(config)
+
+
+wildcard_constraints:
+    example="|".join(EXAMPLES),
+    part="|".join(part for example in EXAMPLES.values() for part in example.parts),
+    point=r"[a-z][a-z0-9-]*",
+
+
+def example_of(wildcards):
+    """The example that a part belongs to."""
+    return EXAMPLES[wildcards.part.split("/")[0]]
+
+
+def targets_of(wildcards):
+    """Targets of an example by name."""
+    return {target.name: target for target in EXAMPLES[wildcards.example].targets}
+
+
+def part_clips(wildcards):
+    """Clips of the targets of a part."""
+    example = example_of(wildcards)
+    targets = example.targets_of(wildcards.part)
+    return [f"{SOUND}/{example.name}/clips/{target.name}.wav" for target in targets]
+
+
+def part_mesh(wildcards):
+    """Mesh file of a part; none for a built-in object."""
+    return example_of(wildcards).mesh_files
+
+
+def project_of(wildcards):
+    """Content of the project file of a part."""
+    return sound_examples.project(example_of(wildcards), wildcards.part, config)
+
+
+def start_argument(wildcards, input):
+    """The design to go on from, if there is one."""
+    return f"--start {input.before}" if input.before else ""
+
+
+def design_before(wildcards):
+    """The design of the edit before; none for the first."""
+    example = example_of(wildcards)
+    edit = example.edit_of(wildcards.part)
+    return [] if edit == 1 else [f"{SOUND}/{example.part(edit - 1)}/{DESIGN}"]
+
+
+def clip_arguments(wildcards):
+    """What the clip of a point is made as."""
+    return targets_of(wildcards)[wildcards.point].clip
+
+
+def place_arguments(wildcards):
+    """Where an example is struck for a sound."""
+    if wildcards.point == ELSEWHERE:
+        return "--at " + " ".join(map(str, EXAMPLES[wildcards.example].elsewhere[1]))
+    return f"--target {shlex.quote(wildcards.point)}"
+
+
+def all_sounds(wildcards):
+    """All sounds of an example's page."""
+    names = list(targets_of(wildcards))
+    files = [f"{state}/{name}.wav" for state in ("before", "clips", "fine") for name in names]
+    files += [f"after/{name}.wav" for name in [*names, ELSEWHERE]]
+    return [f"{SOUND}/{wildcards.example}/{file}" for file in files]
+
+
+def example_clips(wildcards):
+    """Clips of all targets of an example."""
+    return [f"{SOUND}/{wildcards.example}/clips/{name}.wav" for name in targets_of(wildcards)]
+
+
+def mesh_files(wildcards):
+    """Mesh file of an example; none for a built-in object."""
+    return EXAMPLES[wildcards.example].mesh_files
+
+
+def example_designs(wildcards):
+    """Designs of all edits of an example."""
+    return [f"{SOUND}/{part}/{DESIGN}" for part in EXAMPLES[wildcards.example].parts]
+
+
+def fine_solid(wildcards):
+    """The fine model of an example, but for its material."""
+    return sound_examples.solid_arguments(EXAMPLES[wildcards.example])
+
+
+def comparison(wildcards):
+    """The comparison of the optimisers, where there is one."""
+    compared = EXAMPLES[wildcards.example].compared
+    return [f"{SOUND}/{wildcards.example}/optimisers.json"] if compared else []

@@ -1,0 +1,258 @@
+# Examples of sound design, from clips to a material to sounds: `snakemake sounds`, no part of the
+# default run.
+
+
+rule sounds:
+    input:
+        f"{SOUND}/index.html",
+
+
+rule synthesise_clip:
+    output:
+        f"{SOUND}/{{example}}/clips/{{point}}.wav",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/{{example}}/clip-{{point}}.log",
+    threads: 1
+    resources:
+        mem_mb=growing(1000),
+        runtime=growing(10),
+    params:
+        source=source("sound.clips.clip_command"),
+        how=clip_arguments,
+    shell:
+        "OMP_NUM_THREADS={threads} python -m sound clip {params.how} --out {output} > {log} 2>&1"
+
+
+rule write_project:
+    output:
+        f"{SOUND}/{{part}}/{PROJECT}",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/{{part}}/project.log",
+    localrule: True
+    resources:
+        mem_mb=500,
+        runtime="5m",
+    params:
+        source=source("workflow.scripts.write_project"),
+        project=project_of,
+    script:
+        "../scripts/write_project.py"
+
+
+# The search takes all cores, since what it finds depends on how much it evaluates in its time.
+rule design_sound:
+    input:
+        project=f"{SOUND}/{{part}}/{PROJECT}",
+        mesh=part_mesh,
+        clips=part_clips,
+        before=design_before,
+        forests=settings.default_forest_files(),
+    output:
+        f"{SOUND}/{{part}}/{DESIGN}",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/{{part}}/design.log",
+    benchmark:
+        f"{BENCHMARKS}/{SOUND_FOLDER}/{{part}}/design.tsv"
+    threads: SOLVER_CORES
+    resources:
+        mem_mb=growing(8000),
+        runtime=growing(60),
+    params:
+        source=source("sound.design.command"),
+        start=start_argument,
+    shell:
+        "OMP_NUM_THREADS={threads} python -m sound design {input.project} {params.start}"
+        " --out {output} > {log} 2>&1"
+
+
+# One evaluation: that of the uniform material.
+rule begin_design:
+    input:
+        project=f"{SOUND}/{{example}}/{PROJECT}",
+        mesh=mesh_files,
+        clips=example_clips,
+        forests=settings.default_forest_files(),
+    output:
+        f"{SOUND}/{{example}}/{START}",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/{{example}}/start.log",
+    threads: SOLVER_CORES
+    resources:
+        mem_mb=growing(8000),
+        runtime=growing(30),
+    params:
+        source=source("sound.design.command"),
+    shell:
+        "OMP_NUM_THREADS={threads} python -m sound design {input.project} --evaluations 1"
+        " --out {output} > {log} 2>&1"
+
+
+rule compare_optimisers:
+    input:
+        project=f"{SOUND}/{{example}}/{PROJECT}",
+        mesh=mesh_files,
+        clips=example_clips,
+        forests=settings.default_forest_files(),
+    output:
+        f"{SOUND}/{{example}}/optimisers.json",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/{{example}}/optimisers.log",
+    benchmark:
+        f"{BENCHMARKS}/{SOUND_FOLDER}/{{example}}/optimisers.tsv"
+    threads: SOLVER_CORES
+    resources:
+        mem_mb=growing(8000),
+        runtime=growing(60),
+    params:
+        source=source("sound.design.benchmark_command"),
+        seconds=config["sound"]["compare_seconds"],
+    shell:
+        "OMP_NUM_THREADS={threads} python -m sound benchmark {input.project}"
+        " --seconds {params.seconds} --json > {output}.partial 2> {log}"
+        " && mv {output}.partial {output}"
+
+
+rule save_moduli:
+    input:
+        design=f"{SOUND}/{{example}}/{DESIGN}",
+    output:
+        f"{SOUND}/{{example}}/young.npy",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/{{example}}/young.log",
+    localrule: True
+    resources:
+        mem_mb=500,
+        runtime="5m",
+    params:
+        source=source("workflow.scripts.save_moduli"),
+    script:
+        "../scripts/save_moduli.py"
+
+
+rule check_design:
+    input:
+        mesh=mesh_files,
+        young=f"{SOUND}/{{example}}/young.npy",
+    output:
+        f"{SOUND}/{{example}}/{TRUTH}",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/{{example}}/truth.log",
+    threads: SOLVER_CORES
+    resources:
+        mem_mb=growing(8000),
+        runtime=growing(60),
+    params:
+        source=source("solver.problem", "solver.modes_file", "solver.__main__"),
+        solid=fine_solid,
+    shell:
+        "OMP_NUM_THREADS={threads} python -m solver modes {params.solid} --material {input.young}"
+        " --coarsen none --method slepc --out {output} > {log} 2>&1"
+
+
+rule render_before:
+    input:
+        f"{SOUND}/{{example}}/{START}",
+    output:
+        f"{SOUND}/{{example}}/before/{{point}}.wav",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/{{example}}/before-{{point}}.log",
+    threads: 1
+    resources:
+        mem_mb=growing(1000),
+        runtime=growing(10),
+    params:
+        source=source("sound.rendering.command"),
+        place=place_arguments,
+    shell:
+        "OMP_NUM_THREADS={threads} python -m sound render {input} {params.place} --out {output}"
+        " > {log} 2>&1"
+
+
+use rule render_before as render_after with:
+    input:
+        f"{SOUND}/{{example}}/{DESIGN}",
+    output:
+        f"{SOUND}/{{example}}/after/{{point}}.wav",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/{{example}}/after-{{point}}.log",
+
+
+rule render_fine:
+    input:
+        truth=f"{SOUND}/{{example}}/{TRUTH}",
+        design=f"{SOUND}/{{example}}/{DESIGN}",
+    output:
+        f"{SOUND}/{{example}}/fine/{{point}}.wav",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/{{example}}/fine-{{point}}.log",
+    threads: 1
+    resources:
+        mem_mb=growing(2000),
+        runtime=growing(10),
+    params:
+        source=source("sound.rendering.command"),
+        place=place_arguments,
+    shell:
+        "OMP_NUM_THREADS={threads} python -m sound render {input.truth} --like {input.design}"
+        " {params.place} --out {output} > {log} 2>&1"
+
+
+rule build_sound_page:
+    input:
+        config=f"{RESULTS}/config.yaml",
+        designs=example_designs,
+        start=f"{SOUND}/{{example}}/{START}",
+        truth=f"{SOUND}/{{example}}/{TRUTH}",
+        sounds=all_sounds,
+        optimisers=comparison,
+        templates=templates("sounds"),
+    output:
+        page=report(
+            f"{SOUND}/{{example}}/page.html",
+            caption="../report/captions/sound.rst",
+            category="Sounds",
+            labels={"example": "{example}"},
+        ),
+        designs=f"{SOUND}/{{example}}/tables/designs.json",
+        frequencies=f"{SOUND}/{{example}}/tables/frequencies.json",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/{{example}}/page.log",
+    localrule: True
+    resources:
+        mem_mb=2000,
+        runtime="15m",
+    params:
+        source=source("workflow.scripts.build_sound_page"),
+    script:
+        "../scripts/build_sound_page.py"
+
+
+rule build_sounds_index:
+    input:
+        config=f"{RESULTS}/config.yaml",
+        pages=expand(f"{SOUND}/{{example}}/page.html", example=EXAMPLES),
+        tables=expand(
+            f"{SOUND}/{{example}}/tables/{{table}}.json",
+            example=EXAMPLES,
+            table=["designs", "frequencies"],
+        ),
+        templates=[Path(workflow.basedir, "workflow/sounds/index.html.j2"), *templates("sounds")],
+    output:
+        page=report(
+            f"{SOUND}/index.html",
+            caption="../report/captions/sounds.rst",
+            category="Sounds",
+            labels={"example": "all"},
+        ),
+        table=f"{SOUND}/tables/sounds.json",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/index.log",
+    localrule: True
+    resources:
+        mem_mb=1000,
+        runtime="10m",
+    params:
+        source=source("workflow.scripts.build_sounds_index"),
+        examples=list(EXAMPLES),
+    script:
+        "../scripts/build_sounds_index.py"
