@@ -252,6 +252,7 @@ def test_modes_too_damped_to_oscillate_are_left_out(tmp_path: Path) -> None:
         (["--vertex", 999_999], "there is no vertex 999999"),
         (["--at", 9, 9, 9], "m from the surface"),
         (["--target", "side", "--impulse", 0, 0, 0], "not all of them 0"),
+        (["--target", "side", "--seconds", 1e9], "expected at most 600"),
         (["--target", "side", "--damping", 1, 0], "go with modes.h5"),
         (["--target", "side", "--like", "x.h5"], "go with modes.h5"),
     ],

@@ -21,6 +21,7 @@ if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     from sound.rendering.solid import SoundingSolid
 
     Array = NDArray[np.float64]
+LONGEST_SECONDS = 600.0
 
 
 @dataclass
@@ -95,6 +96,8 @@ def run(arguments: argparse.Namespace) -> int:
     from sound.rendering.render import Hit, render, ringing_seconds
 
     require_writable(arguments.out)
+    if arguments.seconds is not None and arguments.seconds > LONGEST_SECONDS:
+        raise UserError(f"--seconds {arguments.seconds:g}: expected at most {LONGEST_SECONDS:g}")
     scene = _scene(arguments)
     hit = Hit(0.0, scene.position, scene.impulse)
     sound = render(
@@ -201,6 +204,8 @@ def _voxel_point(arguments: argparse.Namespace, mesh: Any) -> tuple[Array, Array
             "a modes file knows neither targets nor the vertices of a surface; strike it --at a "
             "point, or name its design by --like"
         )
+    if not np.isfinite(arguments.at).all():
+        raise UserError("--at: expected three finite numbers [m]")
     nodes, outward = surface_normals(mesh)
     index = surface_node(mesh, np.array(arguments.at), "--at")
     return mesh.nodes[nodes[index]], -outward[index]
