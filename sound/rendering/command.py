@@ -21,7 +21,9 @@ if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     from sound.rendering.solid import SoundingSolid
 
     Array = NDArray[np.float64]
+
 LONGEST_SECONDS = 600.0
+"""Length of a sound that memory surely holds."""
 
 
 @dataclass
