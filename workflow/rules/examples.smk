@@ -1,5 +1,6 @@
 # Examples of sound design: their files, and arguments of the programs.
 import shlex
+from dataclasses import asdict
 
 from workflow.sounds import examples as sound_examples
 from workflow.sounds.examples import DESIGN, ELSEWHERE, PROJECT, START, TRUTH
@@ -7,6 +8,10 @@ from workflow.sounds.examples import DESIGN, ELSEWHERE, PROJECT, START, TRUTH
 SOUND_FOLDER = sound_examples.FOLDER
 SOUND = f"{RESULTS}/{SOUND_FOLDER}"
 EXAMPLES = sound_examples.examples(config)
+
+NO_EXAMPLE = "-"
+RECORDED = "|".join(name for name in EXAMPLES if EXAMPLES[name].recorded) or NO_EXAMPLE
+SYNTHESISED = "|".join(name for name in EXAMPLES if not EXAMPLES[name].recorded) or NO_EXAMPLE
 
 
 wildcard_constraints:
@@ -57,6 +62,23 @@ def design_before(wildcards):
 def clip_arguments(wildcards):
     """What the clip of a point is made as."""
     return targets_of(wildcards)[wildcards.point].clip
+
+
+def recording_of(wildcards):
+    """What a recorded solid is made from."""
+    example = EXAMPLES[wildcards.example]
+    return {
+        "mesh": example.mesh,
+        "resolution": example.resolution,
+        "recorded": asdict(example.recorded),
+    }
+
+
+def strike_of_recording(wildcards):
+    """Where and how a recorded solid is struck for a clip."""
+    at = targets_of(wildcards)[wildcards.point].at
+    damping = EXAMPLES[wildcards.example].recorded.damping
+    return " ".join(["--at", *map(str, at), "--damping", *map(str, damping)])
 
 
 def place_arguments(wildcards):

@@ -12,6 +12,8 @@ rule synthesise_clip:
         f"{SOUND}/{{example}}/clips/{{point}}.wav",
     log:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/clip-{{point}}.log",
+    wildcard_constraints:
+        example=SYNTHESISED,
     threads: 1
     resources:
         mem_mb=growing(1000),
@@ -21,6 +23,75 @@ rule synthesise_clip:
         how=clip_arguments,
     shell:
         "OMP_NUM_THREADS={threads} python -m sound clip {params.how} --out {output} > {log} 2>&1"
+
+
+rule check_design:
+    input:
+        mesh=mesh_files,
+        young=f"{SOUND}/{{example}}/young.npy",
+    output:
+        f"{SOUND}/{{example}}/{TRUTH}",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/{{example}}/truth.log",
+    threads: SOLVER_CORES
+    resources:
+        mem_mb=growing(8000),
+        runtime=growing(60),
+    params:
+        source=source("solver.problem", "solver.modes_file", "solver.__main__"),
+        solid=fine_solid,
+    shell:
+        "OMP_NUM_THREADS={threads} python -m solver modes {params.solid} --material {input.young}"
+        " --coarsen none --method slepc --out {output} > {log} 2>&1"
+
+
+rule save_recorded_moduli:
+    output:
+        f"{SOUND}/{{example}}/recorded.npy",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/{{example}}/recorded-young.log",
+    wildcard_constraints:
+        example=RECORDED,
+    localrule: True
+    resources:
+        mem_mb=1000,
+        runtime="5m",
+    params:
+        source=source("workflow.scripts.save_recorded_moduli"),
+        example=recording_of,
+    script:
+        "../scripts/save_recorded_moduli.py"
+
+
+use rule check_design as find_recorded_modes with:
+    input:
+        mesh=mesh_files,
+        young=f"{SOUND}/{{example}}/recorded.npy",
+    output:
+        f"{SOUND}/{{example}}/recorded.h5",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/{{example}}/recorded.log",
+
+
+rule record_clip:
+    input:
+        f"{SOUND}/{{example}}/recorded.h5",
+    output:
+        f"{SOUND}/{{example}}/clips/{{point}}.wav",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/{{example}}/clip-{{point}}.log",
+    wildcard_constraints:
+        example=RECORDED,
+    threads: 1
+    resources:
+        mem_mb=growing(1000),
+        runtime=growing(10),
+    params:
+        source=source("sound.rendering.command"),
+        how=strike_of_recording,
+    shell:
+        "OMP_NUM_THREADS={threads} python -m sound render {input} {params.how} --out {output}"
+        " > {log} 2>&1"
 
 
 rule write_project:
@@ -127,26 +198,6 @@ rule save_moduli:
         source=source("workflow.scripts.save_moduli"),
     script:
         "../scripts/save_moduli.py"
-
-
-rule check_design:
-    input:
-        mesh=mesh_files,
-        young=f"{SOUND}/{{example}}/young.npy",
-    output:
-        f"{SOUND}/{{example}}/{TRUTH}",
-    log:
-        f"{LOGS}/{SOUND_FOLDER}/{{example}}/truth.log",
-    threads: SOLVER_CORES
-    resources:
-        mem_mb=growing(8000),
-        runtime=growing(60),
-    params:
-        source=source("solver.problem", "solver.modes_file", "solver.__main__"),
-        solid=fine_solid,
-    shell:
-        "OMP_NUM_THREADS={threads} python -m solver modes {params.solid} --material {input.young}"
-        " --coarsen none --method slepc --out {output} > {log} 2>&1"
 
 
 rule render_before:

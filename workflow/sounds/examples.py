@@ -9,9 +9,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
+from numpy.typing import NDArray
 
 from workflow.settings import BUILTIN, located
+
+Array = NDArray[np.float64]
 
 EXAMPLES = Path(__file__).with_name("examples.yaml")
 FOLDER = "sound"
@@ -26,12 +30,40 @@ RIGID_MODES = 6
 
 @dataclass(frozen=True)
 class Target:
-    """A place, the arguments of `sound clip` for its clip, and the edit that it joins in."""
+    """A place, the arguments of `sound clip` for its clip, and the edit that it joins in.
+
+    The clips of a recorded solid have no arguments.
+    """
 
     name: str
     at: tuple[float, float, float]
     clip: str
     edit: int
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A solid whose strikes are the clips.
+
+    Attributes
+    ----------
+    axis, jump
+        Coordinate x, y or z, and its value [m], at which the modulus jumps.
+    young
+        Moduli [Pa] below and above it.
+    damping
+        Rayleigh's coefficients of mass [1/s] and stiffness [s].
+    """
+
+    axis: str
+    jump: float
+    young: tuple[float, float]
+    damping: tuple[float, float]
+
+    def moduli(self, centres: Array) -> Array:
+        """Moduli (m,) [Pa] of cells with `centres` (m, 3) [m]."""
+        above = centres[:, "xyz".index(self.axis)] >= self.jump
+        return np.where(above, self.young[1], self.young[0])
 
 
 @dataclass(frozen=True)
@@ -50,6 +82,8 @@ class Example:
         Name and position of a point without a target that is struck, too.
     compared
         Whether the optimisers are compared on it.
+    recorded
+        What its clips are strikes of; None if they are synthesised.
     """
 
     name: str
@@ -64,6 +98,7 @@ class Example:
     targets: tuple[Target, ...]
     elsewhere: tuple[str, tuple[float, float, float]]
     compared: bool
+    recorded: Recording | None = None
 
     @property
     def edits(self) -> int:
@@ -142,7 +177,10 @@ def _example(name: str, config: Mapping[str, Any]) -> Example:
     solid = described["solids"][chosen]
     targets = [
         Target(
-            each["name"], tuple(solid["places"][each["name"]]), each["clip"], each.get("edit", 1)
+            each["name"],
+            tuple(solid["places"][each["name"]]),
+            each.get("clip", ""),
+            each.get("edit", 1),
         )
         for each in described["targets"]
     ]
@@ -159,6 +197,7 @@ def _example(name: str, config: Mapping[str, Any]) -> Example:
         tuple(targets),
         (solid["elsewhere"]["name"], tuple(solid["elsewhere"]["at"])),
         described.get("compared", False),
+        Recording(**described["recorded"]) if "recorded" in described else None,
     )
 
 
