@@ -29,6 +29,8 @@ Sound = tuple[Array, int]
 
 SHOWN_SECONDS, PLAYED_SECONDS = 1.0, 2.0
 """Longest time of a spectrogram and of a player."""
+DIGITS = 6
+"""Of coordinates after the point."""
 ROOM_ABOVE = 1.5
 """Highest frequency of a spectrogram over that of the highest target."""
 STATES = {
@@ -87,7 +89,7 @@ def _points(found: Found, marks: list[Mark]) -> list[dict[str, Any]]:
         {
             "name": name,
             "style": mark.style,
-            "position": (mark.position / found.design.settings["unit"]).tolist(),
+            "position": np.round(mark.position / found.design.settings["unit"], DIGITS).tolist(),
             "panels": _panels(found, name),
             "balance": inlined(plots.balance_figure(balance, name), f"balance-{number}"),
         }
