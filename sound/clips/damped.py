@@ -18,7 +18,7 @@ Complex = NDArray[np.complex128]
 
 _BLOCK = 2048
 _CLOSEST = 1e-3
-_FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-9, 1e6
+_FIRST_DAMPING, _LEAST_DAMPING = 1e-3, 1e-6
 _CONVERGED = 1e-9
 
 
@@ -48,7 +48,8 @@ def damped_sinusoids(
 
 def superposed(exponents: Complex, coefficients: Complex, count: int) -> Array:
     """Samples (count,) of Re sum_k c_k exp(lambda_k n)."""
-    parts = [(powers @ coefficients).real for powers, _ in _blocks(exponents, count)]
+    with np.errstate(over="ignore", invalid="ignore"):
+        parts = [(powers @ coefficients).real for powers, _ in _blocks(exponents, count)]
     return np.concatenate(parts) if parts else np.zeros(0)
 
 
@@ -121,12 +122,17 @@ def solved(matrix: Array, right: Complex, damping: float = 1e-13) -> Complex:
     right : A^T r for a signal r.
     damping : share of the diagonal that is added to it.
     """
+    values = inverse(matrix, damping) @ np.concatenate([right.real, -right.imag])
+    half = len(right)
+    return np.asarray(values[:half] + 1j * values[half:])
+
+
+def inverse(matrix: Array, damping: float = 1e-13) -> Array:
+    """Inverse of a normal matrix plus a share `damping` of its diagonal."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), np.finfo(float).tiny))
     scaled = matrix * scale * scale[:, None]
     scaled[np.diag_indices_from(scaled)] += damping
-    values = scale * la.lstsq(scaled, scale * np.concatenate([right.real, -right.imag]))[0]
-    half = len(right)
-    return np.asarray(values[:half] + 1j * values[half:])
+    return np.asarray(la.pinvh(scaled) * scale * scale[:, None])
 
 
 def fitted_coefficients(exponents: Complex, signal: Array) -> Complex:
@@ -140,11 +146,8 @@ def fitted_coefficients(exponents: Complex, signal: Array) -> Complex:
 
 def refined(
     exponents: Complex, coefficients: Complex, signal: Array, steps: int
-) -> tuple[Complex, Complex, Array]:
-    """Exponents and coefficients after Levenberg-Marquardt steps of least squares, and the rest.
-
-    Exponents may move by no more than a step that keeps the cost falling; the cost never rises.
-    """
+) -> tuple[Complex, Complex]:
+    """Exponents and coefficients (k,) after Levenberg-Marquardt steps of least squares."""
     count, damping = len(signal), _FIRST_DAMPING
     rest = signal - superposed(exponents, coefficients, count)
     for _ in range(steps):
@@ -152,14 +155,13 @@ def refined(
         sums = correlations(exponents, rest)
         step = solved(matrix, np.concatenate([sums[0], sums[1] * coefficients]), damping)
         change, move = np.split(step, 2)
-        tried = exponents + move, coefficients + change
-        new_rest = signal - superposed(*tried, count)
+        new_rest = signal - superposed(exponents + move, coefficients + change, count)
         gain = 1.0 - (new_rest @ new_rest) / (rest @ rest)
-        if not gain > 0.0:
-            damping = min(100.0 * max(damping, 1e-6), _MOST_DAMPING)
+        if not gain > 0.0:  # too long a step, which may even have overflown
+            damping = 100.0 * max(damping, _LEAST_DAMPING)
             continue
-        exponents, coefficients = tried
-        rest, damping = new_rest, max(0.1 * damping, _LEAST_DAMPING)
+        exponents, coefficients, rest = exponents + move, coefficients + change, new_rest
         if gain < _CONVERGED:
             break
-    return exponents, coefficients, rest
+        damping *= 0.1
+    return exponents, coefficients

@@ -4,7 +4,8 @@ Ren, Yeh and Lin (2013), whom the paper follows, fit peaks of spectrograms.  Her
 into bands, ESPRIT (Roy and Kailath 1989) finds the damped sinusoids of every band, ESTER (Badeau,
 David and Richard 2006) their number, and a least-squares fit to the whole clip refines them.  This
 is done for narrow bands, which tell slow and close modes apart, and then, on what those leave, for
-wide ones, in which modes that die away at once stand out.
+wide ones, in which modes that die away at once stand out.  What does not stand out of the noise
+is dropped, which is why ESTER may be generous.
 """
 
 from __future__ import annotations
@@ -13,7 +14,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.linalg as la
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
@@ -23,6 +23,7 @@ from sound.clips.bands import Band, bands
 from sound.clips.damped import (
     damped_sinusoids,
     fitted_coefficients,
+    inverse,
     normal_matrix,
     refined,
     superposed,
@@ -49,10 +50,15 @@ PROMINENCE = 100.0
 WIDTH_FACTORS = (1.0, 4.0, 16.0)
 """Widths of bands, one search after the other."""
 BAND_SAMPLES = 512
-_PEAK = 12.0
-"""Largest over median power in a band's spectrum below which it holds noise alone."""
-_NEIGHBOURHOOD = 20.0
-_LEAST_LEVEL = 1e-24
+"""Length of a band's signal, from the strike on; narrow bands last longer."""
+BAND_DECAY = 5.0
+"""Nepers of decay within a band's length from which on a mode is sought again in wider bands."""
+_PEAK = 20.0
+"""Largest over median power in a band's spectrum below which it is taken for noise."""
+_NEIGHBOURHOOD = 100.0
+"""Angular frequency on either side of a mode, in dampings, from which its noise is taken."""
+_LEAST_LEVEL = 1e-15
+"""Variance of noise that is always assumed, relative to the peak: that of 24-bit samples."""
 _SETTLING_STEPS, _FINAL_STEPS = 4, 20
 
 
@@ -162,14 +168,16 @@ class _Fit:
 
 def _found(clip: Array, rate: int, visible: bool) -> _Fit:
     """All damped sinusoids that stand out of a clip."""
-    exponents, coefficients, rest = np.zeros(0, complex), np.zeros(0, complex), clip
-    first = BAND_SAMPLES / (2.0 * min(1.0, len(clip) / rate))
+    exponents, coefficients = np.zeros(0, complex), np.zeros(0, complex)
+    first = 0.5 * BAND_SAMPLES / min(1.0, len(clip) / rate)
     widths = [first * factor for factor in WIDTH_FACTORS]
     for width in [width for width in widths if width < 0.5 * rate] or [0.5 * rate]:
+        slow = -exponents.real * rate < BAND_DECAY * 2.0 * width / BAND_SAMPLES
+        rest = clip - superposed(exponents[slow], coefficients[slow], len(clip))
         new = _candidates(rest, rate, width, f"bands of {width:.0f} Hz", visible)
-        exponents = np.concatenate([exponents, new])
-        exponents, coefficients, rest = _settled(exponents, clip, _SETTLING_STEPS)
-    exponents, coefficients, rest = _settled(exponents, clip, _FINAL_STEPS)
+        exponents, coefficients = _settled(np.concatenate([exponents, new]), clip, _SETTLING_STEPS)
+    exponents, coefficients = _settled(exponents, clip, _FINAL_STEPS)
+    rest = clip - superposed(exponents, coefficients, len(clip))
     return _significance(exponents, coefficients, rest)
 
 
@@ -195,18 +203,18 @@ def _band_exponents(band: Band, rate: int) -> Complex:
     return exponents[audible & ~quick & ~grows]
 
 
-def _settled(exponents: Complex, clip: Array, steps: int) -> tuple[Complex, Complex, Array]:
-    """Exponents refined on the whole clip, without those that do not stand out; the rest."""
-    exponents, coefficients, rest = _pruned(exponents, clip)
-    exponents, coefficients, rest = refined(exponents, coefficients, clip, steps)
+def _settled(exponents: Complex, clip: Array, steps: int) -> tuple[Complex, Complex]:
+    """Exponents refined on the whole clip, without those that do not stand out; coefficients."""
+    exponents, coefficients = _pruned(exponents, clip)
+    exponents, coefficients = refined(exponents, coefficients, clip, steps)
     return _pruned(exponents, clip)
 
 
-def _pruned(exponents: Complex, clip: Array) -> tuple[Complex, Complex, Array]:
-    """Exponents in order of frequency, less those that do not stand out; coefficients; the rest.
+def _pruned(exponents: Complex, clip: Array) -> tuple[Complex, Complex]:
+    """Exponents in order of frequency, less those that do not stand out; coefficients.
 
-    Of neighbours that do not, the one that the fit needs least goes first: two estimates of one
-    mode need each other not at all.
+    Of neighbours that do not, the one that the fit needs least goes first: of two estimates of one
+    mode neither is needed while the other is there.
     """
     exponents = exponents[np.argsort(exponents.imag)]
     while True:
@@ -217,7 +225,7 @@ def _pruned(exponents: Complex, clip: Array) -> tuple[Complex, Complex, Array]:
         least = (prominence <= beside[:-2]) & (prominence <= beside[2:])
         weak = least & (prominence < PROMINENCE)
         if not weak.any():
-            return exponents, coefficients, rest
+            return exponents, coefficients
         exponents = exponents[~weak]
 
 
@@ -225,8 +233,8 @@ def _significance(exponents: Complex, coefficients: Complex, rest: Array) -> _Fi
     """How much of a clip each damped sinusoid alone explains, over the noise in the rest."""
     count = len(exponents)
     matrix = normal_matrix(exponents, np.ones(count, complex), len(rest), order=1)
-    inverse = la.pinvh(matrix).reshape(2, count, 2, count)
-    own = np.moveaxis(np.diagonal(inverse, axis1=1, axis2=3), -1, 0)
+    blocks = inverse(matrix).reshape(2, count, 2, count)
+    own = np.moveaxis(np.diagonal(blocks, axis1=1, axis2=3), -1, 0)
     parts = np.stack([coefficients.real, coefficients.imag], axis=1)
     gain = np.einsum("ki,kij,kj->k", parts, np.linalg.inv(own), parts)
     level = _level(exponents, rest)
@@ -337,6 +345,6 @@ def _deviations(fit: _Fit, samples: int) -> Complex:
     """Standard deviations of exponents, real and imaginary, that the noise under each allows."""
     count = len(fit.exponents)
     matrix = normal_matrix(fit.exponents, fit.coefficients, samples)
-    variances = np.diag(la.pinvh(matrix)).reshape(2, 2, count)[:, 1]
+    variances = np.diag(inverse(matrix)).reshape(2, 2, count)[:, 1]
     deviations = np.sqrt(np.maximum(variances, 0.0) * fit.level)
     return np.asarray(deviations[0] + 1j * deviations[1])
