@@ -268,6 +268,10 @@ class ModalSolver:
             found.inverse,
         )
 
+    def inverse(self, modes: Modes, shift: float) -> Inverse:
+        """(K - shift M)^-1 of the material that `modes` belong to, by the correction's solver."""
+        return self._inner.inverse(modes.system, shift)
+
     @property
     def _exact(self) -> bool:
         """Whether eigenpairs are wanted, not just approximations of them."""

@@ -1,0 +1,144 @@
+"""`python -m sound design`: a material for a project."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from carillon.arguments import positive_number, whole_number
+from carillon.errors import UserError
+from carillon.files import require_writable
+from carillon.progress import LINE_SECONDS, say
+
+if TYPE_CHECKING:
+    from sound.design.search import Search
+    from sound.design_file import Design
+
+SHOWN_EVERY = 1.0
+"""Seconds between two progress lines on a terminal."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command line."""
+    parser.add_argument("project", help="project file (YAML)")
+    parser.add_argument("--out", required=True, help="HDF5 file to write; goes on if it exists")
+    parser.add_argument("--start", help="design of the same mesh to go on from, its targets aside")
+    parser.add_argument("--restart", action="store_true", help="begin anew, even if --out exists")
+    parser.add_argument("--seconds", type=positive_number, help="wall time, not the project's")
+    parser.add_argument("--evaluations", type=whole_number(1), help="at most, not the project's")
+    parser.add_argument("--method", choices=("hybrid", "cma", "bfgs"), help="not the project's")
+    parser.add_argument("--workers", type=whole_number(1), help="processes, not the project's")
+    parser.add_argument("--json", action="store_true", help="print the outcome as JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Search, writing the design every half minute and at the end."""
+    # Loaded here, since they take a second that --help does not need.
+    from sound.design.designing import design, prepare
+    from sound.design_file import read_design, write_design
+    from sound.project import load_project
+
+    _require_one_rank()
+    out = require_writable(arguments.out)
+    project = load_project(arguments.project)
+    given = {
+        key: getattr(arguments, key)
+        for key in ("seconds", "evaluations", "method", "workers")
+        if getattr(arguments, key) is not None
+    }
+    if "evaluations" in given and "seconds" not in given:
+        given["seconds"] = None
+    project = replace(project, optimiser=replace(project.optimiser, **given))
+    former = None
+    if arguments.start is not None:
+        former = read_design(arguments.start)
+    elif out.exists() and not arguments.restart:
+        former = read_design(out)
+        say(f"{out}: going on after {former.history['evaluations'][-1]:,.0f} evaluations")
+    prepared = prepare(project)
+    found = design(
+        prepared, former, keep=lambda each: write_design(out, each), watch=_Progress().show
+    )
+    write_design(out, found)
+    summary = summarise(found)
+    print(json.dumps(summary) if arguments.json else _sentences(out, found, summary))
+    return 0
+
+
+class _Progress:
+    """A line with cost and time: in place on a terminal, one a minute in a log."""
+
+    def __init__(self) -> None:
+        self._terminal = sys.stderr.isatty()
+        self._due = time.monotonic() + (0.0 if self._terminal else LINE_SECONDS)
+
+    def show(self, search: Search) -> None:
+        """Say how far the search is, if that is due."""
+        now = time.monotonic()
+        if now < self._due:
+            return
+        self._due = now + (SHOWN_EVERY if self._terminal else LINE_SECONDS)
+        moment, first = search.history[-1], search.history[0]
+        cost = moment.cost
+        text = (
+            f"{search.own_seconds:6.1f} s  {search.own_evaluations:5,} evaluations  "
+            f"cost {cost.total:9.4g} ({1.0 - cost.total / first.cost.total:.1%} less)  "
+            f"E_f {cost.frequency:8.3g}  E_a {cost.amplitude:8.3g}"
+        )
+        say(text, end="\r" if self._terminal else "\n")
+
+
+def summarise(found: Design) -> dict[str, Any]:
+    """The outcome as plain values."""
+    evidence = found.evidence
+    off = np.abs(found.frequencies / found.targets.frequencies - 1.0)
+    return {
+        "cost_start": evidence["cost_start"],
+        "cost": evidence["cost"],
+        "frequency_cost": evidence["frequency_cost"],
+        "amplitude_cost": evidence["amplitude_cost"],
+        "fall": 1.0 - evidence["cost"] / evidence["cost_start"],
+        "seconds": evidence["seconds"],
+        "evaluations": evidence["evaluations"],
+        "evaluations_per_minute": evidence["evaluations_per_minute"],
+        "workers": evidence["workers"],
+        "method": evidence["method"],
+        "modes": len(found.frequencies),
+        "targets": [strike.name for strike in found.strikes],
+        "frequency_error_median": float(np.median(off)),
+        "frequency_error_max": float(off.max()),
+        "young_min_pa": float(found.young.min()),
+        "young_max_pa": float(found.young.max()),
+        "residual_max": evidence["residual_max"],
+    }
+
+
+def _sentences(out: Path, found: Design, summary: dict[str, Any]) -> str:
+    return "\n".join(
+        [
+            f"cost {summary['cost_start']:.4g} -> {summary['cost']:.4g} ({summary['fall']:.1%} "
+            f"less) in {summary['seconds']:.1f} s and {summary['evaluations']:,} evaluations "
+            f"({summary['evaluations_per_minute']:,.0f} a minute, {summary['workers']} workers)",
+            f"frequencies of {summary['modes']} modes: median error "
+            f"{summary['frequency_error_median']:.2%}, worst {summary['frequency_error_max']:.2%}; "
+            f"residuals of the modes up to {summary['residual_max']:.1e}",
+            f"Young's modulus {found.young.min() / 1e9:.3g} to {found.young.max() / 1e9:.3g} GPa",
+            f"design: {out}",
+        ]
+    )
+
+
+def _require_one_rank() -> None:
+    from mpi4py import MPI
+
+    if MPI.COMM_WORLD.size > 1:
+        raise UserError(
+            f"started on {MPI.COMM_WORLD.size} MPI ranks; run it once, its workers share the cores"
+        )

@@ -1,0 +1,225 @@
+"""Descent to a local optimum by damped Gauss-Newton steps.
+
+The cost is a sum of squares whose Jacobian J is known, so J^T J stands for the Hessian that other
+quasi-Newton methods have to learn from gradients one by one; damped as Levenberg and Marquardt do.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.errors import ConvergenceError
+from sound.design.material import ReducedMaterial
+from sound.design.objective import Cost, Objective
+from sound.design.simulation import Evaluation, Simulation
+
+Array = NDArray[np.float64]
+
+LARGEST_DAMPING = 1e4
+"""Damping, as a share of the mean curvature, beyond which steps are too short to help."""
+HARDER, SOFTER = 8.0, 0.25
+"""Factors of the damping after a step that failed, and after one that did as foretold."""
+FORETOLD = 0.5
+"""Share of the fall of the quadratic model from which it is trusted more."""
+TINY = 1e-300
+
+
+@dataclass(frozen=True)
+class Manner:
+    """How a descent goes.
+
+    Attributes
+    ----------
+    parts
+        Terms that steps reduce in turn: whether E_f, whether E_a.
+    damping
+        To begin with, as a share of the mean curvature.
+    longest
+        Largest root mean square change of Phi z in a step.
+    """
+
+    parts: tuple[tuple[bool, bool], ...]
+    damping: float
+    longest: float
+
+
+@dataclass(frozen=True)
+class Squares:
+    """A cost as 1/2 |r|^2, and the derivatives of r.
+
+    Attributes
+    ----------
+    residual
+        (r,) weighted.
+    jacobian
+        (r, m).
+    """
+
+    residual: Array
+    jacobian: Array
+
+    @property
+    def gradient(self) -> Array:
+        """J^T r."""
+        return np.asarray(self.jacobian.T @ self.residual)
+
+    @property
+    def curvature(self) -> Array:
+        """J^T J, the Hessian but for the second derivatives of r."""
+        return np.asarray(self.jacobian.T @ self.jacobian)
+
+
+class Way(NamedTuple):
+    """A cost on the way: when (monotonic clock [s]), after how many evaluations, and what."""
+
+    clock: float
+    evaluations: int
+    cost: Cost
+
+
+@dataclass
+class Descent:
+    """How far a descent came.
+
+    Attributes
+    ----------
+    found
+        The last material, with derivatives; none where it stayed in another process.
+    way
+        Costs from its start on, the last one that of `found`.
+    evaluations
+        Materials looked at.
+    damping
+        Of each part, to go on with.
+    stalled
+        Whether no step was to be found any more.
+    """
+
+    found: Evaluation | None
+    way: list[Way]
+    evaluations: int
+    damping: tuple[float, ...]
+    stalled: bool = False
+
+    @property
+    def cost(self) -> Cost:
+        """Cost of the last material."""
+        return self.way[-1].cost
+
+
+def cost_of(objective: Objective, material: ReducedMaterial, found: Evaluation) -> Cost:
+    """Eq. (4) of a material."""
+    return objective.cost(found.eigenvalues, found.pushed, material.regulariser(found.z))
+
+
+def squares_of(
+    objective: Objective,
+    material: ReducedMaterial,
+    found: Evaluation,
+    frequency: bool = True,
+    amplitude: bool = True,
+) -> Squares:
+    """Weighted residuals of a material with derivatives, those of the regulariser included."""
+    weights, sensitivity = objective.weights, found.sensitivity
+    assert sensitivity is not None
+    root = np.sqrt(weights.regulariser * material.laplacian)
+    residuals, rows = [root * found.z], [np.diag(root)]
+    if frequency:
+        factor = np.sqrt(weights.frequency)
+        residuals.append(factor * objective.frequency_residual(found.eigenvalues))
+        rows.append(factor * objective.frequency_jacobian(found.eigenvalues, sensitivity))
+    if amplitude:
+        factor = np.sqrt(weights.amplitude)
+        difference = objective.amplitude_residual(found.eigenvalues, found.pushed)
+        slopes = objective.amplitude_jacobian(found.eigenvalues, found.pushed, sensitivity)
+        residuals.append(factor * difference.ravel())
+        rows.append(factor * slopes.reshape(-1, len(found.z)))
+    return Squares(np.concatenate(residuals), np.concatenate(rows))
+
+
+def descend(
+    simulation: Simulation,
+    objective: Objective,
+    z: Array,
+    start: Array | None,
+    manner: Manner,
+    steps: int,
+    damping: tuple[float, ...] | None = None,
+    deadline: float = np.inf,
+) -> Descent:
+    """Up to `steps` steps from z, each of which lowers the whole of Eq. (4).
+
+    Parameters
+    ----------
+    start
+        Modes to begin from, see `Simulation.evaluate`.
+    damping
+        Where a former descent in the same manner ended.
+    deadline
+        Monotonic clock [s] from which no step is begun.
+
+    Raises
+    ------
+    ConvergenceError
+        If z itself has no modes.
+    """
+    found = simulation.evaluate(z, start, derivatives=True)
+    way = [Way(time.monotonic(), 1, cost_of(objective, simulation.material, found))]
+    here = Descent(found, way, 1, damping or (manner.damping,) * len(manner.parts))
+    idle = 0
+    for step in range(steps):
+        if time.monotonic() >= deadline:
+            break
+        taken = _step(simulation, objective, here, manner, step % len(manner.parts))
+        idle = 0 if taken else idle + 1
+        here.stalled = idle == len(manner.parts)
+        if here.stalled:
+            break
+    return here
+
+
+def _step(
+    simulation: Simulation, objective: Objective, here: Descent, manner: Manner, part: int
+) -> bool:
+    """Take one step, if there is one that lowers the cost."""
+    assert here.found is not None
+    squares = squares_of(objective, simulation.material, here.found, *manner.parts[part])
+    curvature, gradient = squares.curvature, squares.gradient
+    damping = here.damping[part]
+    while damping <= LARGEST_DAMPING:
+        move = _damped(curvature, gradient, damping, manner.longest)
+        here.evaluations += 1
+        try:
+            tried = simulation.evaluate(here.found.z + move, here.found.modes)
+            cost = cost_of(objective, simulation.material, tried)
+        except ConvergenceError:
+            cost = None
+        if cost is None or cost.total >= here.cost.total:
+            damping *= HARDER
+            continue
+        foretold = -(gradient @ move + 0.5 * move @ curvature @ move)
+        if here.cost.total - cost.total > FORETOLD * foretold:
+            damping *= SOFTER
+        here.damping = _replaced(here.damping, part, damping)
+        here.found = simulation.differentiate(tried)
+        here.way.append(Way(time.monotonic(), here.evaluations, cost))
+        return True
+    here.damping = _replaced(here.damping, part, manner.damping)
+    return False
+
+
+def _replaced(values: tuple[float, ...], index: int, value: float) -> tuple[float, ...]:
+    return (*values[:index], value, *values[index + 1 :])
+
+
+def _damped(curvature: Array, gradient: Array, damping: float, longest: float) -> Array:
+    """Step of the damped normal equations, not longer than `longest`."""
+    size = len(curvature)
+    damped = curvature + damping * np.trace(curvature) / size * np.eye(size)
+    step = -np.linalg.solve(damped, gradient)
+    return np.asarray(step * min(1.0, longest / max(float(np.linalg.norm(step)), TINY)))

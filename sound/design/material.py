@@ -1,0 +1,110 @@
+"""Young's modulus from few coordinates: Y = Phi z over the modes of the volumetric Laplacian."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.errors import UserError
+from solver.geometry import HexMesh
+from solver.laplacian import laplacian_modes
+
+Array = NDArray[np.float64]
+
+LAWS = ("linear", "exponential")
+KNEE = 0.1
+"""Share of the reference modulus below which the linear law bends, so that none becomes negative.
+
+Regression forests tell moduli in a block apart over four decades or so; a knee far lower would
+only make cells that carry nothing.
+"""
+REACH = np.log(100.0)
+"""Logarithm of the largest modulus of the exponential law as a multiple of the reference."""
+
+
+@dataclass(frozen=True)
+class ReducedMaterial:
+    """Moduli of the cells as a function of reduced coordinates z (section 6, [XLCB15]).
+
+    `linear` is Y / Y0 = g(x) with x = Phi z, where g(x) = x as far as x is above the knee k, and
+    k exp(x / k - 1) below it: the paper's Y = Phi z, continued with its slope to where it would not
+    be positive.  `exponential` is Y / Y0 = exp(r tanh(x / r)), about
+    exp(Phi z) within a factor of `REACH` both ways, for moduli that differ by decades.
+
+    Neither frequencies relative to the first one nor balances of amplitudes depend on a factor
+    common to all moduli, so the constant part is not among the coordinates: z = 0 is the uniform
+    material Y0.
+
+    Attributes
+    ----------
+    basis
+        (M, m) modes of the Laplacian without the constant, their rms value 1.
+    laplacian
+        (m,) eigenvalues of the Laplacian, the diagonal of Q in Eq. (4).
+    young
+        Modulus Y0 [Pa].
+    law
+        One of `LAWS`.
+    """
+
+    basis: Array
+    laplacian: Array
+    young: float
+    law: str
+
+    @classmethod
+    def of_mesh(cls, mesh: HexMesh, dimensions: int, young: float, law: str) -> ReducedMaterial:
+        """Reduction of the moduli of a mesh to `dimensions` coordinates.
+
+        Raises
+        ------
+        UserError
+            If the mesh has too few cells, or the law is unknown.
+        """
+        if law not in LAWS:
+            raise UserError(f"material law {law!r} is unknown, expected one of {', '.join(LAWS)}")
+        if not 1 <= dimensions < mesh.n_cells:
+            raise UserError(
+                f"{dimensions} material coordinates for {mesh.n_cells:,} voxels; expected at least "
+                "1 and fewer than voxels"
+            )
+        values, modes = laplacian_modes(mesh, dimensions + 1)
+        basis = np.sqrt(mesh.n_cells) * modes[:, 1:]
+        return cls(np.ascontiguousarray(basis), np.maximum(values[1:], 0.0), young, law)
+
+    @property
+    def dimensions(self) -> int:
+        """Number of coordinates."""
+        return self.basis.shape[1]
+
+    def moduli(self, z: Array) -> Array:
+        """Moduli (M,) [Pa] of the cells."""
+        field = self.basis @ z
+        if self.law == "exponential":
+            return np.asarray(self.young * np.exp(REACH * np.tanh(field / REACH)))
+        x = 1.0 + field
+        bent = KNEE * np.exp(np.minimum(x, KNEE) / KNEE - 1.0)
+        return np.asarray(self.young * np.where(x > KNEE, x, bent))
+
+    def coordinates(self, moduli: Array) -> Array:
+        """Coordinates (m,) whose moduli come nearest to a multiple of given ones (M,) [Pa]."""
+        if self.law == "exponential":
+            level = np.log(moduli) - np.log(moduli).mean()
+            reach = 0.999 * REACH
+            field = REACH * np.arctanh(np.clip(level, -reach, reach) / REACH)
+        else:
+            field = moduli / moduli.mean() - 1.0
+        return np.asarray(np.linalg.lstsq(self.basis, field, rcond=None)[0])
+
+    def slopes(self, moduli: Array) -> Array:
+        """Derivatives (M,) [Pa] of the moduli with respect to Phi z, at given `moduli`."""
+        if self.law == "exponential":
+            level = np.log(moduli / self.young) / REACH
+            return np.asarray(moduli * (1.0 - level**2))
+        return np.asarray(self.young * np.minimum(1.0, moduli / (KNEE * self.young)))
+
+    def regulariser(self, z: Array) -> float:
+        """R = 1/2 z^T Q z of Eq. (4)."""
+        return float(0.5 * z @ (self.laplacian * z))

@@ -1,0 +1,204 @@
+"""How far a solid sounds from its targets: Eq. (1) to (4), as sums of squares.
+
+Two decisions make the amplitudes of Eq. (2) functions that have derivatives.  A mode has no sign,
+so magnitudes are compared.  And modes of one frequency have no shapes of their own, only their span
+has: what a strike excites within the width that the ear resolves is averaged,
+
+    b_k = sum_i w((f_i - f_k) / f_k) a_i^2 / sum_i w((f_i - f_k) / f_k),   w a Gaussian,
+
+which for a mode on its own is a_k^2.  The targets' amplitudes are averaged likewise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sound.design.bark import bark, bark_slope
+
+if TYPE_CHECKING:
+    from sound.project import Weights
+    from sound.targets import Targets
+
+Array = NDArray[np.float64]
+
+RESOLVED = 3e-3
+"""Standard deviation of the average over neighbouring modes, as a share of their frequency: about
+the difference of two tones that the ear just tells apart."""
+CLUSTER = 1e-6
+"""Relative difference of eigenvalues below which they are taken for equal."""
+EQUAL = 1e-9
+"""The same, below which a divided difference is a derivative."""
+TINY = 1e-30
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Derivatives of eigenpairs with respect to m coordinates, projected where they are needed.
+
+    Attributes
+    ----------
+    stiffness
+        (m, N, N) u_i^T (dK/dz) u_j of the elastic modes [rad^2/s^2].
+    outside
+        (m, T, N) part of the derivative of each pushed mode that lies outside the computed modes.
+    """
+
+    stiffness: Array
+    outside: Array
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Value of Eq. (4) and its parts, each without its weight."""
+
+    total: float
+    frequency: float
+    amplitude: float
+    regulariser: float
+
+
+class Objective:
+    """Eq. (1) to (4) for N elastic modes and T struck points.
+
+    Parameters
+    ----------
+    targets
+        What the points shall sound like.
+    weights
+        w_f, w_a and w_r.
+    """
+
+    def __init__(self, targets: Targets, weights: Weights) -> None:
+        self.targets = targets
+        self.weights = weights
+        self._bark = bark(targets.frequencies)
+        wanted = _average(targets.frequencies, targets.amplitudes**2)
+        self._wanted = np.sqrt(wanted / np.maximum(wanted.max(axis=1, keepdims=True), TINY))
+
+    def frequency_residual(self, eigenvalues: Array) -> Array:
+        """Bark differences (N - 1,) of the second mode to the last (Eq. 1)."""
+        return np.asarray(bark(self._scaled(eigenvalues)) - self._bark)[1:]
+
+    def amplitude_residual(self, eigenvalues: Array, pushed: Array) -> Array:
+        """Differences (T, N - 1) of the balances, of the second mode to the last (Eq. 2)."""
+        return np.asarray(self._balance(eigenvalues, pushed) - self._wanted)[:, 1:]
+
+    def cost(self, eigenvalues: Array, pushed: Array, regulariser: float) -> Cost:
+        """Eq. (4).
+
+        Parameters
+        ----------
+        eigenvalues
+            (N,) of the elastic modes [rad^2/s^2], ascending.
+        pushed
+            (T, N) u_k^T f of a unit impulse f along the inward normals [kg^-1/2 N s].
+        regulariser
+            R.
+        """
+        frequency = 0.5 * float(np.sum(self.frequency_residual(eigenvalues) ** 2))
+        amplitude = 0.5 * float(np.sum(self.amplitude_residual(eigenvalues, pushed) ** 2))
+        w = self.weights
+        total = w.frequency * frequency + w.amplitude * amplitude + w.regulariser * regulariser
+        return Cost(total, frequency, amplitude, regulariser)
+
+    def frequency_jacobian(self, eigenvalues: Array, sensitivity: Sensitivity) -> Array:
+        """Derivatives (N - 1, m) of `frequency_residual`."""
+        scaled = self._scaled(eigenvalues)
+        relative = 0.5 * _slopes(eigenvalues, sensitivity) / eigenvalues
+        rows = (bark_slope(scaled) * scaled) * (relative - relative[:, :1])
+        return np.asarray(rows.T[1:])
+
+    def amplitude_jacobian(
+        self, eigenvalues: Array, pushed: Array, sensitivity: Sensitivity
+    ) -> Array:
+        """Derivatives (T, N - 1, m) of `amplitude_residual`."""
+        energies, slopes = _average_slopes(eigenvalues, pushed, sensitivity)
+        largest = energies.argmax(axis=1)
+        points = np.arange(len(energies))
+        peak = energies[points, largest][:, None]
+        balance = np.sqrt(energies / peak)
+        relative = slopes / np.maximum(energies, TINY * peak)[:, :, None]
+        relative_peak = slopes[points, largest] / peak
+        rows = 0.5 * balance[:, :, None] * (relative - relative_peak[:, None, :])
+        return np.asarray(rows[:, 1:])
+
+    def _scaled(self, eigenvalues: Array) -> Array:
+        """s_f f_i with s_f = F_1 / f_1."""
+        return np.asarray(self.targets.frequencies[0] * np.sqrt(eigenvalues / eigenvalues[0]))
+
+    def _balance(self, eigenvalues: Array, pushed: Array) -> Array:
+        energies = _average(np.sqrt(eigenvalues), pushed**2)
+        return np.asarray(np.sqrt(energies / energies.max(axis=1, keepdims=True)))
+
+
+def _kernel(frequencies: Array) -> Array:
+    """Weights (N k, N i) of mode i in the average around mode k, not normalised."""
+    distance = frequencies[None, :] / frequencies[:, None] - 1.0
+    return np.asarray(np.exp(-0.5 * (distance / RESOLVED) ** 2))
+
+
+def _average(frequencies: Array, energies: Array) -> Array:
+    """b_k (T, N) of squared amplitudes (T, N)."""
+    kernel = _kernel(frequencies)
+    return np.asarray(energies @ (kernel / kernel.sum(axis=1, keepdims=True)).T)
+
+
+def _slopes(eigenvalues: Array, sensitivity: Sensitivity) -> Array:
+    """Derivatives (m, N) of the eigenvalues; those of equal ones share their mean.
+
+    Equal eigenvalues part in any direction, and have no derivatives one by one.  The mean is what
+    central differences of the sorted ones find.
+    """
+    slopes = np.einsum("mii->mi", sensitivity.stiffness).copy()
+    for group in _clusters(eigenvalues):
+        slopes[:, group] = slopes[:, group].mean(axis=1, keepdims=True)
+    return np.asarray(slopes)
+
+
+def _clusters(eigenvalues: Array) -> list[slice]:
+    """Ranges of eigenvalues taken for equal."""
+    apart = np.flatnonzero(np.diff(eigenvalues) > CLUSTER * eigenvalues[1:]) + 1
+    bounds = [0, *apart.tolist(), len(eigenvalues)]
+    return [slice(a, b) for a, b in zip(bounds[:-1], bounds[1:]) if b - a > 1]
+
+
+def _average_slopes(
+    eigenvalues: Array, pushed: Array, sensitivity: Sensitivity
+) -> tuple[Array, Array]:
+    """b_k (T, N) and its derivatives (T, N, m).
+
+    With h_k(lambda) the kernel as a function of the eigenvalue, the sum over i of h_k(lambda_i)
+    a_i^2 is f^T U h_k(Lambda) U^T f.  Its derivative is that of a function of a matrix: divided
+    differences of h_k stand where the eigenvectors' derivatives would have differences of
+    eigenvalues in their denominators, and stay finite where these vanish.
+    """
+    frequencies = np.sqrt(eigenvalues)
+    kernel = _kernel(frequencies)
+    total = kernel.sum(axis=1)
+    energies = pushed**2 @ kernel.T / total
+    ratio = frequencies[None, :] / frequencies[:, None]
+    # Derivative of the kernel (k, i) with respect to eigenvalue i; that to k is opposite in scale.
+    by_own = -kernel * (ratio - 1.0) * ratio / (2.0 * RESOLVED**2 * eigenvalues[None, :])
+    by_centre = -by_own * eigenvalues[None, :] / eigenvalues[:, None]
+    gaps = eigenvalues[:, None] - eigenvalues[None, :]
+    near = np.abs(gaps) <= EQUAL * eigenvalues[:, None]
+    divided = (kernel[:, :, None] - kernel[:, None, :]) / np.where(near, 1.0, gaps)
+    mean_slope = 0.5 * (by_own[:, :, None] + by_own[:, None, :])
+    divided = np.where(near, mean_slope, divided)
+    values = _slopes(eigenvalues, sensitivity)
+    m, count = values.shape
+    flat = sensitivity.stiffness.reshape(m, -1)
+    slopes = np.empty((len(pushed), count, m))
+    for point, a in enumerate(pushed):
+        weights = (divided * (a[:, None] * a[None, :])).reshape(count, -1)
+        slopes[point] = weights @ flat.T
+        slopes[point] += (2.0 * kernel * a) @ sensitivity.outside[:, point].T
+        # The centre of the average moves, and so does the sum that divides it.
+        moved = (by_centre @ a**2)[:, None] * values.T
+        lost = energies[point][:, None] * (by_own @ values.T + by_centre.sum(1)[:, None] * values.T)
+        slopes[point] = (slopes[point] + moved - lost) / total[:, None]
+    return energies, slopes

@@ -1,0 +1,129 @@
+"""Optimisers of the material: the hybrid of appendix 3, and its two parts by themselves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sound.design.descent import Manner
+from sound.design.pool import Task, Trial
+from sound.design.search import Search
+
+Array = NDArray[np.float64]
+
+ALTERNATING = ((True, False), (False, True), (True, True))
+"""E_f, then E_a (section 6), then both: by themselves they undo some of what the other gained."""
+TOGETHER = ((True, True),)
+MANNERS = (
+    Manner(ALTERNATING, damping=1e-2, longest=0.5),
+    Manner(TOGETHER, damping=1e-2, longest=0.5),
+    Manner(ALTERNATING, damping=10.0, longest=0.1),
+    Manner(TOGETHER, damping=1.0, longest=0.3),
+)
+"""How the descents go that run side by side: none is the best for all solids."""
+STEPS = 6
+"""Steps that a descent takes before all are compared."""
+WORTHWHILE = 0.01
+"""Share of its cost that a descent has to take off in these, to be worth going on with."""
+SPREAD = 0.03
+"""Standard deviation of the first offspring along each coordinate."""
+_LARGE = 1e12
+
+
+def hybrid(search: Search, z: Array, seed: int, population: int | None) -> None:
+    """Appendix 3: quasi-Newton descents to local optima, and offspring to leave them.
+
+    Descents run side by side.  One that stalls gives its place to one of the best offspring that
+    the evolution strategy bears around the best material known; what descends from them is told to
+    the strategy, whose covariance learns where better optima lie.
+    """
+    lanes = [Task(z, manner=manner, steps=STEPS) for manner in MANNERS]
+    strategy: Any = None
+    while True:
+        lanes = [_until(lane, search.deadline) for lane in lanes]
+        trials = search.run(lanes)
+        stalled = [k for k, trial in enumerate(trials) if _is_stalled(trial)]
+        lanes = [_continued(lane, trial) for lane, trial in zip(lanes, trials)]
+        if not stalled:
+            continue
+        best = search.best
+        assert best is not None
+        if strategy is None:
+            strategy = _strategy(best.z, seed, population)
+        strategy.inject([best.z, *(trials[k].z for k in stalled)], force=True)
+        points = [np.asarray(point) for point in strategy.ask()]
+        offspring = search.run([Task(point, best.start) for point in points])
+        strategy.tell(points, [_rank(trial) for trial in offspring])
+        new = [trial for trial in sorted(offspring, key=_rank) if not _is_known(trial, trials)]
+        for lane, trial in zip(stalled, new):
+            lanes[lane] = Task(trial.z, best.start, manner=MANNERS[lane], steps=STEPS)
+
+
+def evolution(search: Search, z: Array, seed: int, population: int | None) -> None:
+    """CMA-ES by itself."""
+    (first,) = search.run([Task(z, gradient=True)])
+    strategy = _strategy(z, seed, population)
+    while True:
+        points = [np.asarray(point) for point in strategy.ask()]
+        trials = search.run([Task(point, first.start) for point in points])
+        strategy.tell(points, [_rank(trial) for trial in trials])
+        if min(_rank(trial) for trial in trials) < first.cost.total:
+            best = search.best
+            assert best is not None
+            (first,) = search.run([Task(best.z, first.start, gradient=True)])
+
+
+def quasi_newton(search: Search, z: Array, seed: int, population: int | None) -> None:
+    """L-BFGS by itself (scipy), again from where it stopped for as long as there is time."""
+    from scipy.optimize import minimize
+
+    start: Array | None = None
+
+    def value(point: Array) -> tuple[float, Array]:
+        nonlocal start
+        (trial,) = search.run([Task(point, start, gradient=True)])
+        if trial.gradient is None:
+            return _LARGE, np.zeros(len(point))
+        start = trial.start
+        return trial.cost.total, trial.gradient
+
+    while True:
+        z = minimize(value, z, jac=True, method="L-BFGS-B").x
+
+
+OPTIMISERS = {"hybrid": hybrid, "cma": evolution, "bfgs": quasi_newton}
+
+
+def _until(lane: Task, deadline: float) -> Task:
+    return Task(lane.z, lane.start, False, lane.manner, lane.steps, lane.damping, deadline)
+
+
+def _continued(lane: Task, trial: Trial) -> Task:
+    """The task to go on with after a descent."""
+    damping = None if trial.descent is None else trial.descent.damping
+    return Task(trial.z, trial.start, manner=lane.manner, steps=STEPS, damping=damping)
+
+
+def _is_stalled(trial: Trial) -> bool:
+    if trial.descent is None or trial.descent.stalled:
+        return True
+    return trial.cost.total > (1.0 - WORTHWHILE) * trial.descent.way[0].cost.total
+
+
+def _is_known(trial: Trial, others: list[Trial]) -> bool:
+    return any(np.allclose(trial.z, other.z, rtol=0.0, atol=1e-9) for other in others)
+
+
+def _rank(trial: Trial) -> float:
+    return min(trial.cost.total, _LARGE)
+
+
+def _strategy(z: Array, seed: int, population: int | None) -> Any:
+    import cma
+
+    options = {"seed": seed + 1, "verbose": -9, "verb_log": 0}
+    if population is not None:
+        options["popsize"] = population
+    return cma.CMAEvolutionStrategy(z, SPREAD, options)

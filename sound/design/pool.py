@@ -1,0 +1,195 @@
+"""Materials evaluated side by side, each by one thread of one process.
+
+What is found depends on the coordinates and on the modes that the evaluation starts from, and on
+nothing that another task has done.  So results do not depend on how many processes share the work.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, replace
+from multiprocessing import get_context
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.errors import ConvergenceError, UserError
+from carillon.runtime import limit_threads
+from solver.geometry import HexMesh
+from solver.problem import ProblemOptions
+from sound.design.descent import Descent, Manner, cost_of, descend, squares_of
+from sound.design.material import ReducedMaterial
+from sound.design.objective import Cost, Objective
+from sound.design.simulation import TOLERANCE, Simulation
+from sound.strikes import Strike
+
+Array = NDArray[np.float64]
+
+FAILED = Cost(np.inf, np.inf, np.inf, np.inf)
+"""Cost of a material whose modes could not be found."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """The solid, its struck points and what they shall sound like; travels to other processes."""
+
+    mesh: HexMesh
+    options: ProblemOptions
+    material: ReducedMaterial
+    strikes: Sequence[Strike]
+    objective: Objective
+
+    def simulation(self, tolerance: float = TOLERANCE) -> Simulation:
+        """Its simulation, on as many threads as this process is allowed."""
+        modes = len(self.objective.targets.frequencies)
+        return Simulation(self.mesh, self.options, self.material, self.strikes, modes, tolerance)
+
+
+@dataclass(frozen=True)
+class Task:
+    """A material to evaluate, or to descend from.
+
+    Attributes
+    ----------
+    z
+        (m,) coordinates.
+    start
+        Rows of modes to begin from.
+    gradient
+        Whether the gradient of the cost is wanted.
+    manner, steps, damping, deadline
+        Of a descent, see `descend`; an evaluation alone if there is no manner.
+    """
+
+    z: Array
+    start: Array | None = None
+    gradient: bool = False
+    manner: Manner | None = None
+    steps: int = 0
+    damping: tuple[float, ...] | None = None
+    deadline: float = np.inf
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What became of a task.
+
+    Attributes
+    ----------
+    z, cost
+        The material and its cost, `FAILED` if there are no modes to be had.
+    evaluations
+        Materials looked at.
+    gradient
+        (m,) of the cost, if it was wanted.
+    descent
+        How a descent went; its modes stay behind.
+    start
+        Modes for others to begin from, of a descent or with the gradient.
+    """
+
+    z: Array
+    cost: Cost
+    evaluations: int
+    gradient: Array | None = None
+    descent: Descent | None = None
+    start: Array | None = None
+
+
+class Pool:
+    """Processes that evaluate materials; this one alone if `workers` is 1."""
+
+    def __init__(self, setting: Setting, workers: int) -> None:
+        self.workers = workers
+        self._executor: ProcessPoolExecutor | None = None
+        if workers == 1:
+            _prepare(setting)
+            return
+        # Not forked, as MPI and threads do not survive that.
+        self._executor = ProcessPoolExecutor(
+            workers, get_context("spawn"), _prepare_apart, (setting,)
+        )
+
+    def run(self, tasks: Sequence[Task]) -> list[Trial]:
+        """What becomes of the tasks, in their order.
+
+        Raises
+        ------
+        UserError
+            If a process died.
+        """
+        if self._executor is None:
+            return [_run(task) for task in tasks]
+        try:
+            return list(self._executor.map(_run, tasks))
+        except BrokenProcessPool:
+            raise UserError(
+                "a process that evaluates materials died, perhaps for lack of memory; run the same "
+                "command again, with fewer workers"
+            ) from None
+
+    def close(self) -> None:
+        """End the processes, whatever they are doing: they own nothing."""
+        if self._executor is not None:
+            for process in list((self._executor._processes or {}).values()):
+                process.terminate()
+            self._executor.shutdown(cancel_futures=True)
+
+
+_simulation: Simulation
+_objective: Objective
+
+
+def _prepare_apart(setting: Setting) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _prepare(setting)
+
+
+def _prepare(setting: Setting) -> None:
+    global _simulation, _objective
+    os.environ["OMP_NUM_THREADS"] = "1"
+    limit_threads(1)
+    _simulation, _objective = setting.simulation(), setting.objective
+
+
+def _run(task: Task) -> Trial:
+    """Do a task; from nothing if its start leads nowhere."""
+    for start in (task.start, None) if task.start is not None else (None,):
+        try:
+            return _done(replace(task, start=start))
+        except ConvergenceError:
+            continue
+    return Trial(task.z, FAILED, 1)
+
+
+def _done(task: Task) -> Trial:
+    if task.manner is not None:
+        descent = descend(
+            _simulation,
+            _objective,
+            task.z,
+            task.start,
+            task.manner,
+            task.steps,
+            task.damping,
+            task.deadline,
+        )
+        last = descent.found
+        assert last is not None
+        return Trial(
+            last.z,
+            descent.cost,
+            descent.evaluations,
+            descent=replace(descent, found=None),
+            start=last.modes.start(),
+        )
+    found = _simulation.evaluate(task.z, task.start, task.gradient)
+    cost = cost_of(_objective, _simulation.material, found)
+    if not task.gradient:
+        return Trial(task.z, cost, 1)
+    gradient = squares_of(_objective, _simulation.material, found).gradient
+    return Trial(task.z, cost, 1, gradient, start=found.modes.start())

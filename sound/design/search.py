@@ -1,0 +1,129 @@
+"""What every optimiser works with: trials of materials, a budget, and a record of the way."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sound.design.objective import Cost
+from sound.design.pool import Pool, Task, Trial
+
+Array = NDArray[np.float64]
+
+
+class BudgetSpentError(Exception):
+    """Time or evaluations are used up, or somebody asked to stop."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """The best cost known after some time [s] and evaluations."""
+
+    seconds: float
+    evaluations: int
+    cost: Cost
+
+
+class Search:
+    """Runs tasks until the budget is spent.
+
+    Parameters
+    ----------
+    make_pool
+        Makes the processes that run them; their start counts as time of the search.
+    seconds, evaluations
+        Budget; None sets no limit.
+    watch
+        Called after every round of tasks; ends the search by returning True.
+    before
+        Seconds and evaluations of former searches that this one goes on from.
+
+    Attributes
+    ----------
+    best
+        The best trial so far.
+    history
+        Its cost over time.
+    """
+
+    def __init__(
+        self,
+        make_pool: Callable[[], Pool],
+        seconds: float | None,
+        evaluations: int | None,
+        watch: Callable[[Search], bool] | None = None,
+        before: tuple[float, int] = (0.0, 0),
+    ) -> None:
+        self.best: Trial | None = None
+        self.history: list[Moment] = []
+        self._most = evaluations
+        self._watch = watch
+        self._before = before
+        self._done = 0
+        self._begin = time.monotonic()
+        self.deadline = np.inf if seconds is None else self._begin + seconds
+        self._pool = make_pool()
+
+    def __enter__(self) -> Search:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._pool.close()
+
+    @property
+    def own_seconds(self) -> float:
+        """Seconds since this search began."""
+        return time.monotonic() - self._begin
+
+    @property
+    def own_evaluations(self) -> int:
+        """Evaluations of this search."""
+        return self._done
+
+    def run(self, tasks: Sequence[Task]) -> list[Trial]:
+        """What becomes of the tasks.
+
+        Raises
+        ------
+        BudgetSpentError
+            If the budget is spent, before or after: what was found is in `best` then.
+        """
+        self._require_budget(len(tasks))
+        trials = self._pool.run(tasks)
+        self._record(trials)
+        stopped = self._watch is not None and self._watch(self)
+        if stopped or time.monotonic() >= self.deadline:
+            raise BudgetSpentError
+        return trials
+
+    def _require_budget(self, tasks: int) -> None:
+        if self._most is not None and self._done + tasks > self._most:
+            raise BudgetSpentError
+
+    def _record(self, trials: Sequence[Trial]) -> None:
+        """Add what was found, in the order of the clock, to the history."""
+        now = time.monotonic()
+        costs = []
+        for trial in trials:
+            way = [] if trial.descent is None else trial.descent.way
+            counted = 0
+            for point in way:
+                costs.append((point.clock, point.evaluations - counted, point.cost))
+                counted = point.evaluations
+            if trial.evaluations > counted:
+                costs.append((now, trial.evaluations - counted, trial.cost))
+            if self.best is None or trial.cost.total < self.best.cost.total:
+                self.best = trial
+        for clock, evaluations, cost in sorted(costs, key=lambda each: each[0]):
+            self._done += evaluations
+            if not self.history or cost.total < self.history[-1].cost.total:
+                self._note(clock, cost)
+        self._note(now, self.history[-1].cost)
+
+    def _note(self, clock: float, cost: Cost) -> None:
+        seconds = self._before[0] + clock - self._begin
+        self.history.append(Moment(seconds, self._before[1] + self._done, cost))

@@ -1,0 +1,218 @@
+"""From material coordinates to the modes that are heard, and their derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from carillon.errors import UserError
+from dataset_gen.block import degrees_of_freedom
+from dataset_gen.objectives import lumped_share
+from forests import coarsen
+from forests.baselines import average, galerkin
+from forests.evaluate import coarsen_with_derivatives
+from solver.analysis import ModalSolver, Modes, SolverOptions
+from solver.coarsening import CoarseMaterial, block_moduli, coarse_model
+from solver.contact import interpolation
+from solver.geometry import HexMesh, blocks_from_mesh
+from solver.model import RIGID_MODES, Constants, ElasticModel, fine_model
+from solver.problem import ProblemOptions
+from solver.trained import Trained, load_trained
+from sound.design.material import ReducedMaterial
+from sound.design.objective import Sensitivity
+from sound.design.sensitivity import (
+    outside_response,
+    projected_stiffness,
+    shift_between,
+    strain_factors,
+)
+from sound.strikes import Strike
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 1e-3
+"""Relative error of eigenvalues at which an analysis stops; a thousandth is a hundredth of a
+bark."""
+KRYLOV_BLOCKS = 6
+"""Blocks of the Krylov space for what lies outside the computed modes, see `outside_response`."""
+LINEAR = {"average": average, "galerkin": galerkin}
+"""Coarsenings that are linear in the fine moduli."""
+
+
+@dataclass
+class Evaluation:
+    """The modes of one material.
+
+    Attributes
+    ----------
+    z
+        (m,) material coordinates.
+    eigenvalues
+        (N,) of the elastic modes [rad^2/s^2], ascending.
+    pushed
+        (T, N) u_k^T f of a unit impulse f along the inward normal at each point [kg^-1/2 N s].
+    modes
+        All of the analysis, to start the next one from.
+    sensitivity
+        Derivatives, if they were asked for.
+    """
+
+    z: Array
+    eigenvalues: Array
+    pushed: Array
+    modes: Modes
+    sensitivity: Sensitivity | None = None
+
+
+class Coarsening:
+    """Moduli at the quadrature points of the analysed mesh from those of the fine cells.
+
+    Parameters
+    ----------
+    mesh
+        Fine mesh.
+    options
+        The solid; `coarsen` is `none`, `average`, `galerkin` or `ddfem`.
+    """
+
+    def __init__(self, mesh: HexMesh, options: ProblemOptions) -> None:
+        self.method = options.coarsen
+        self.trained: Trained | None = None
+        constants: Constants = {"poisson": options.poisson, "density": options.density}
+        if self.method == "none":
+            self.model = fine_model(mesh, np.ones(mesh.n_cells), **constants)
+            return
+        self.blocks = blocks_from_mesh(mesh)
+        share = 0.0
+        if self.method == "ddfem":
+            self.trained = load_trained(options.forest, options.poisson)
+            share = lumped_share(self.trained.model.objective)
+        elif self.method not in LINEAR:
+            raise UserError(
+                f"coarsening {self.method!r} has no derivative here, expected none, ddfem, "
+                f"{' or '.join(LINEAR)}"
+            )
+        else:
+            self._rows = LINEAR[self.method](np.eye(8)).T
+        ones = np.ones((self.blocks.coarse.n_cells, 8))
+        self.model = coarse_model(self.blocks, CoarseMaterial(ones, share), **constants)
+
+    def moduli(self, young: Array) -> Array:
+        """Moduli (c, 8) [Pa] at the quadrature points from those (M,) [Pa] of the fine cells."""
+        if self.method == "none":
+            return np.repeat(young[:, None], 8, axis=1)
+        e = block_moduli(self.blocks, young)
+        if self.trained is not None:
+            return coarsen(self.trained.model, e)
+        return np.asarray(e @ self._rows.T)
+
+    def slopes(self, young: Array, directions: Array) -> Array:
+        """Derivatives (8 c, m) of `moduli` along `directions` (M, m) of the fine moduli."""
+        if self.method == "none":
+            return np.repeat(directions, 8, axis=0)
+        fine = self.blocks.fine_of_block
+        inside = np.where(self.blocks.mask[:, :, None], directions[fine], 0.0)
+        if self.trained is not None:
+            _, rows = coarsen_with_derivatives(self.trained.model, block_moduli(self.blocks, young))
+        else:
+            rows = self._rows[None]
+        return np.asarray((rows @ inside).reshape(-1, directions.shape[1]))
+
+
+class Simulation:
+    """Modes of a solid for any coordinates of its material.
+
+    Parameters
+    ----------
+    mesh
+        Fine mesh.
+    options
+        The solid, of which constants, coarsening and forests are used.
+    material
+        Its moduli as a function of the coordinates.
+    strikes
+        Struck points.
+    modes
+        Number N of elastic modes.
+    tolerance
+        Relative error of the eigenvalues.
+    """
+
+    def __init__(
+        self,
+        mesh: HexMesh,
+        options: ProblemOptions,
+        material: ReducedMaterial,
+        strikes: Sequence[Strike],
+        modes: int,
+        tolerance: float = TOLERANCE,
+    ) -> None:
+        self.material = material
+        self.coarsening = Coarsening(mesh, options)
+        self.modes = modes
+        wanted = SolverOptions(modes=RIGID_MODES + modes, tolerance=tolerance)
+        self.solver = ModalSolver(self.model, wanted, MPI.COMM_SELF)
+        # Rows of the analysis are in the order of its partition.
+        self._order = degrees_of_freedom(self.solver.share.nodes)
+        self._pushes = pushes(self.model.mesh, strikes)[self._order]
+        self._strains = np.sqrt(self.model.mesh.edge) * strain_factors(self.model.poisson)
+
+    @property
+    def model(self) -> ElasticModel:
+        """The solid that is analysed, with moduli of 1 Pa."""
+        return self.coarsening.model
+
+    def evaluate(
+        self, z: Array, start: Modes | Array | None = None, derivatives: bool = False
+    ) -> Evaluation:
+        """Modes at the coordinates z.
+
+        Parameters
+        ----------
+        start
+            Modes at coordinates not far from there, from which the analysis then begins.
+        derivatives
+            Whether their derivatives are wanted.
+        """
+        young = self.material.moduli(z)
+        modes = self.solver.solve(self.coarsening.moduli(young), start)
+        elastic = modes.vectors[:, RIGID_MODES:]
+        found = Evaluation(z, modes.values[RIGID_MODES:], self._pushes.T @ elastic, modes)
+        return self.differentiate(found) if derivatives else found
+
+    def differentiate(self, found: Evaluation) -> Evaluation:
+        """The same evaluation with derivatives."""
+        young = self.material.moduli(found.z)
+        elastic = np.ascontiguousarray(found.modes.vectors[:, RIGID_MODES:])
+        return replace(found, sensitivity=self._sensitivity(young, found, elastic))
+
+    def _sensitivity(self, young: Array, found: Evaluation, elastic: Array) -> Sensitivity:
+        directions = self.material.slopes(young)[:, None] * self.material.basis
+        slopes = self.coarsening.slopes(young, directions)
+        inverse = self.solver.inverse(found.modes, shift_between(found.eigenvalues))
+        outside = outside_response(
+            found.modes, inverse, elastic, found.eigenvalues, self._pushes, KRYLOV_BLOCKS
+        )
+        inverse.destroy()
+        vectors, others = np.empty_like(elastic), np.empty_like(outside)
+        vectors[self._order], others[self._order] = elastic, outside
+        corners = self.model.mesh.cells
+        inside, beyond = projected_stiffness(corners, self._strains, vectors, others, slopes)
+        return Sensitivity(inside, beyond)
+
+    def mesh_rows(self, vectors: Array) -> Array:
+        """Vectors (n_dofs, k) in mesh node order from those in the order of an analysis."""
+        rows = np.empty_like(vectors)
+        rows[self._order] = vectors
+        return rows
+
+
+def pushes(mesh: HexMesh, strikes: Sequence[Strike]) -> Array:
+    """Forces (n_dofs, T) of unit impulses [N s] along the inward normals of struck points."""
+    weights = interpolation(mesh, np.array([strike.position for strike in strikes])).toarray()
+    inward = np.array([strike.inward for strike in strikes])
+    return np.asarray((weights[:, :, None] * inward[:, None, :]).reshape(len(strikes), -1).T)
