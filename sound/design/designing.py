@@ -256,8 +256,7 @@ def _interruptible() -> Iterator[Callable[[], bool]]:
     def ask(number: int, frame: FrameType | None) -> None:
         nonlocal asked
         asked = True
-        for each, handler in former.items():
-            signal.signal(each, handler)
+        _restore(former)
 
     former: dict[int, Any] = {}
     for each in (signal.SIGINT, signal.SIGTERM):
@@ -268,5 +267,9 @@ def _interruptible() -> Iterator[Callable[[], bool]]:
     try:
         yield lambda: asked
     finally:
-        for each, handler in former.items():
-            signal.signal(each, handler)
+        _restore(former)
+
+
+def _restore(handlers: dict[int, Any]) -> None:
+    for number, handler in handlers.items():
+        signal.signal(number, handler)

@@ -150,8 +150,8 @@ def _average(frequencies: Array, energies: Array) -> Array:
 def _slopes(eigenvalues: Array, sensitivity: Sensitivity) -> Array:
     """Derivatives (m, N) of the eigenvalues; those of equal ones share their mean.
 
-    Equal eigenvalues part in any direction, and have no derivatives one by one.  The mean is what
-    central differences of the sorted ones find.
+    Equal eigenvalues part in any direction and have no derivatives one by one.  The mean is that of
+    a change that keeps them together; of a pair, it is what central differences find.
     """
     slopes = np.einsum("mii->mi", sensitivity.stiffness).copy()
     for group in _clusters(eigenvalues):

@@ -6,11 +6,11 @@ nothing that another task has done.  So results do not depend on how many proces
 
 from __future__ import annotations
 
-import os
 import signal
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
 
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError, UserError
-from carillon.runtime import limit_threads
+from carillon.threads import one_thread
 from solver.geometry import HexMesh
 from solver.problem import ProblemOptions
 from sound.design.descent import Descent, Manner, cost_of, descend, squares_of
@@ -104,9 +104,10 @@ class Pool:
     """Processes that evaluate materials; this one alone if `workers` is 1."""
 
     def __init__(self, setting: Setting, workers: int) -> None:
-        self.workers = workers
         self._executor: ProcessPoolExecutor | None = None
+        self._alone = ExitStack()
         if workers == 1:
+            self._alone.enter_context(one_thread())
             _prepare(setting)
             return
         # Not forked, as MPI and threads do not survive that.
@@ -134,6 +135,7 @@ class Pool:
 
     def close(self) -> None:
         """End the processes, whatever they are doing: they own nothing."""
+        self._alone.close()
         if self._executor is not None:
             for process in list((self._executor._processes or {}).values()):
                 process.terminate()
@@ -146,13 +148,12 @@ _objective: Objective
 
 def _prepare_apart(setting: Setting) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    one_thread().__enter__()
     _prepare(setting)
 
 
 def _prepare(setting: Setting) -> None:
     global _simulation, _objective
-    os.environ["OMP_NUM_THREADS"] = "1"
-    limit_threads(1)
     _simulation, _objective = setting.simulation(), setting.objective
 
 

@@ -1,0 +1,132 @@
+"""How long an evaluation takes, and how the optimisers compare on one project."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from statistics import median
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.threads import one_thread
+from sound.design.designing import Prepared, design
+from sound.design.optimisers import OPTIMISERS
+from sound.design.simulation import Evaluation
+from sound.design_file import Design
+
+Array = NDArray[np.float64]
+
+CHANGE = 0.05
+"""Root mean square change of Phi z between the materials of a warm start."""
+
+
+@dataclass(frozen=True)
+class EvaluationTimes:
+    """Median wall times of an evaluation on one thread.
+
+    Attributes
+    ----------
+    cold_seconds
+        From nothing.
+    warm_seconds
+        From the modes of a material that differs by `CHANGE`.
+    gradient_seconds
+        The same, with derivatives of all frequencies and amplitudes.
+    analysis_seconds
+        Of the warm one, the modal analysis; the rest is coarsening.
+    runs
+        Measured after one that warms up.
+    n_dofs, modes, coordinates
+        Size of what was evaluated.
+    """
+
+    cold_seconds: float
+    warm_seconds: float
+    gradient_seconds: float
+    analysis_seconds: float
+    runs: int
+    n_dofs: int
+    modes: int
+    coordinates: int
+
+
+def time_evaluations(prepared: Prepared, runs: int = 7, seed: int = 0) -> EvaluationTimes:
+    """Median times of evaluations near the uniform material."""
+    with one_thread():
+        simulation = prepared.setting.simulation()
+        size = simulation.material.dimensions
+        random = np.random.default_rng(seed)
+        moves = random.standard_normal((runs + 1, size))
+        moves *= CHANGE / np.linalg.norm(moves, axis=1, keepdims=True)
+        here = simulation.evaluate(np.zeros(size))
+        cold, _ = _timed(lambda k: simulation.evaluate(moves[k]), runs)
+        warm, evaluations = _timed(lambda k: simulation.evaluate(moves[k], here.modes), runs)
+        gradient, _ = _timed(lambda k: simulation.evaluate(moves[k], here.modes, True), runs)
+    analysis = [sum(each.modes.seconds.values()) for each in evaluations]
+    return EvaluationTimes(
+        median(cold),
+        median(warm),
+        median(gradient),
+        median(analysis),
+        runs,
+        simulation.model.n_dofs,
+        simulation.modes,
+        size,
+    )
+
+
+def compare_optimisers(
+    prepared: Prepared, report: Callable[[str], None] | None = None
+) -> list[dict[str, Any]]:
+    """One row for each optimiser, all with the project's budget, seed and workers."""
+    rows = []
+    for method in OPTIMISERS:
+        if report is not None:
+            report(method)
+        project = prepared.project
+        chosen = replace(project, optimiser=replace(project.optimiser, method=method))
+        rows.append(_row(method, design(replace(prepared, project=chosen))))
+    return rows
+
+
+def benchmark(
+    prepared: Prepared, runs: int, report: Callable[[str], None] | None = None
+) -> dict[str, Any]:
+    """Times of evaluations, and the optimisers' rows."""
+    if report is not None:
+        report("evaluations")
+    times = time_evaluations(prepared, runs, prepared.project.optimiser.seed)
+    return {"evaluation": asdict(times), "rows": compare_optimisers(prepared, report)}
+
+
+def _row(method: str, found: Design) -> dict[str, Any]:
+    evidence, history = found.evidence, found.history
+    start, end = float(history["cost"][0]), float(history["cost"][-1])
+    low = np.flatnonzero(history["cost"] <= 0.1 * start)
+    return {
+        "method": method,
+        "cost_start": start,
+        "cost_end": end,
+        "fall_percent": 100.0 * (1.0 - end / start),
+        "seconds_to_90_percent": float(history["seconds"][low[0]]) if len(low) else None,
+        "evaluations": evidence["evaluations"],
+        "evaluations_per_minute": evidence["evaluations_per_minute"],
+        "seconds": evidence["seconds"],
+        "workers": evidence["workers"],
+        "curve": [
+            [float(s), float(c)] for s, c in zip(history["seconds"], history["cost"], strict=True)
+        ],
+    }
+
+
+def _timed(work: Callable[[int], Evaluation], runs: int) -> tuple[list[float], list[Evaluation]]:
+    """Wall times of `runs` runs after one that warms up, and what they returned."""
+    seconds, results = [], []
+    for run in range(runs + 1):
+        begin = time.perf_counter()
+        results.append(work(run))
+        seconds.append(time.perf_counter() - begin)
+    return seconds[1:], results[1:]

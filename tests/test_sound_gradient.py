@@ -1,0 +1,167 @@
+"""Derivatives of the objective against finite differences, on models with clustered modes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver.geometry import hexmesh_from_grid
+from solver.problem import ProblemOptions
+from sound.design.bark import bark, bark_slope
+from sound.design.material import LAWS, ReducedMaterial
+from sound.design.objective import Objective
+from sound.design.simulation import Simulation
+from sound.project import Weights
+from sound.strikes import Strike
+from sound.targets import Targets
+
+EDGE = 0.01
+MODES, SIZE = 8, 6
+
+
+def block_mesh(shape):
+    grid = np.argwhere(np.ones(shape)).astype(np.int32)
+    return hexmesh_from_grid(grid[np.lexsort(grid.T)], np.zeros(3), EDGE)
+
+
+def strikes(shape):
+    extent = EDGE * np.array(shape)
+    return [
+        Strike("a", 0, np.array([0.2, 0.3, 1.0]) * extent, np.array([0.0, 0.0, -1.0])),
+        Strike("b", 1, np.array([1.0, 0.6, 0.4]) * extent, np.array([-1.0, 0.0, 0.0])),
+    ]
+
+
+def simulation(shape, coarsen, law):
+    mesh = block_mesh(shape)
+    material = ReducedMaterial.of_mesh(mesh, SIZE, 1e9, law)
+    options = ProblemOptions("block", 8, coarsen=coarsen)
+    return Simulation(mesh, options, material, strikes(shape), MODES, tolerance=1e-13)
+
+
+def random_objective(seed=0):
+    random = np.random.default_rng(seed)
+    frequencies = np.sort(200.0 * (1.0 + random.uniform(0.0, 3.0, MODES)))
+    residuals, rates = (np.zeros(1),) * 2, (44100,) * 2
+    amplitudes = random.uniform(0.0, 1.0, (2, MODES))
+    targets = Targets(("a", "b"), frequencies, np.ones(MODES), amplitudes, residuals, rates)
+    return Objective(targets, Weights(1.0, 10.0, 1e-5))
+
+
+def gradients(simulation, objective, z):
+    """Gradients (m,) of E_f and E_a by formula, and what was evaluated."""
+    found = simulation.evaluate(z, derivatives=True)
+    values, pushed, sensitivity = found.eigenvalues, found.pushed, found.sensitivity
+    frequency = objective.frequency_jacobian(values, sensitivity)
+    amplitude = objective.amplitude_jacobian(values, pushed, sensitivity)
+    return (
+        frequency.T @ objective.frequency_residual(values),
+        np.einsum("tnm,tn->m", amplitude, objective.amplitude_residual(values, pushed)),
+        found,
+    )
+
+
+def differences(simulation, objective, z, step):
+    """The same by central differences."""
+    rows = []
+    for direction in np.eye(len(z)):
+        ends = [simulation.evaluate(z + sign * step * direction) for sign in (1.0, -1.0)]
+        costs = [objective.cost(end.eigenvalues, end.pushed, 0.0) for end in ends]
+        rows.append(
+            [
+                (getattr(costs[0], part) - getattr(costs[1], part)) / (2.0 * step)
+                for part in ("frequency", "amplitude")
+            ]
+        )
+    return np.array(rows).T
+
+
+def relative(found, expected):
+    return np.linalg.norm(found - expected) / np.linalg.norm(expected)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_gradient_through_the_forests(law):
+    shape = (8, 6, 4)
+    solid, objective = simulation(shape, "ddfem", law), random_objective()
+    z = 0.2 * np.random.default_rng(0).standard_normal(SIZE)
+    frequency, amplitude, _ = gradients(solid, objective, z)
+    # So small a step stays on one piece of the forests.
+    by_frequency, by_amplitude = differences(solid, objective, z, 1e-5)
+    assert relative(frequency, by_frequency) < 1e-4
+    assert relative(amplitude, by_amplitude) < 1e-4
+
+
+@pytest.mark.parametrize("coarsen", ["none", "galerkin"])
+def test_gradient_with_clustered_modes(coarsen):
+    """A cube whose pairs and triples of modes are parted by a thousandth and less."""
+    shape = (6, 6, 6)
+    solid, objective = simulation(shape, coarsen, "linear"), random_objective()
+    z = 0.01 * np.random.default_rng(0).standard_normal(SIZE)
+    frequency, amplitude, found = gradients(solid, objective, z)
+    gaps = np.diff(found.eigenvalues) / found.eigenvalues[1:]
+    assert np.sum(gaps < 5e-3) >= 3 and gaps.min() < 1e-4
+    by_frequency, by_amplitude = differences(solid, objective, z, 1e-6)
+    assert relative(frequency, by_frequency) < 1e-4
+    assert relative(amplitude, by_amplitude) < 1e-4
+
+
+def test_gradient_at_repeated_modes():
+    """A square prism has exact pairs, whose amplitudes one by one have no derivatives."""
+    shape = (8, 8, 4)
+    solid, objective = simulation(shape, "none", "linear"), random_objective()
+    frequency, amplitude, found = gradients(solid, objective, np.zeros(SIZE))
+    gaps = np.diff(found.eigenvalues) / found.eigenvalues[1:]
+    assert gaps.min() < 1e-9
+    # Modes of a pair change places on the way from one end to the other, which adds an error of
+    # first order in the step: it is extrapolated away.
+    whole, half = (differences(solid, objective, np.zeros(SIZE), h) for h in (4e-5, 2e-5))
+    by_frequency, by_amplitude = 2.0 * half - whole
+    assert relative(frequency, by_frequency) < 1e-4
+    assert relative(amplitude, by_amplitude) < 1e-4
+
+
+def test_modes_beyond_those_computed_matter():
+    """Leaving them out, as the appendix does, is not accurate enough for a gradient."""
+    shape = (8, 6, 4)
+    solid, objective = simulation(shape, "none", "linear"), random_objective()
+    z = 0.2 * np.random.default_rng(0).standard_normal(SIZE)
+    _, amplitude, found = gradients(solid, objective, z)
+    values, pushed = found.eigenvalues, found.pushed
+    found.sensitivity.outside[:] = 0.0
+    rows = objective.amplitude_jacobian(values, pushed, found.sensitivity)
+    without = np.einsum("tnm,tn->m", rows, objective.amplitude_residual(values, pushed))
+    assert relative(without, amplitude) > 1e-2
+
+
+def test_bark():
+    f = np.array([50.0, 440.0, 3000.0, 15000.0])
+    step = 1e-3
+    slope = (bark(f + step) - bark(f - step)) / (2.0 * step)
+    np.testing.assert_allclose(bark_slope(f), slope, rtol=1e-6)
+    # Table of Zwicker: upper limits of the critical bands 1, 5, 10, 15, 20 and 24.
+    limits = np.array([100.0, 510.0, 1270.0, 2700.0, 6400.0, 15500.0])
+    np.testing.assert_allclose(bark(limits), [1, 5, 10, 15, 20, 24], atol=0.25)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_moduli_stay_positive(law):
+    material = ReducedMaterial.of_mesh(block_mesh((6, 4, 3)), SIZE, 2e9, law)
+    np.testing.assert_allclose(material.moduli(np.zeros(SIZE)), 2e9)
+    z = 20.0 * np.random.default_rng(0).standard_normal(SIZE)
+    assert (material.moduli(z) > 0.0).all()
+    step = 1e-6
+    z *= 0.02
+    slope = material.slopes(material.moduli(z))[:, None] * material.basis
+    for k, direction in enumerate(np.eye(SIZE)):
+        ends = material.moduli(z + step * direction), material.moduli(z - step * direction)
+        np.testing.assert_allclose(
+            (ends[0] - ends[1]) / (2 * step), slope[:, k], rtol=1e-4, atol=1e3
+        )
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_coordinates_of_moduli(law):
+    material = ReducedMaterial.of_mesh(block_mesh((6, 4, 3)), SIZE, 2e9, law)
+    z = 0.05 * np.random.default_rng(1).standard_normal(SIZE)
+    np.testing.assert_allclose(material.coordinates(3.0 * material.moduli(z)), z, atol=1e-3)
