@@ -1,0 +1,57 @@
+"""`python -m sound clip`: a synthesised clip to design after."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from carillon.arguments import positive_number, whole_number
+
+NAMES = ("metal", "wood", "piano")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument("instrument", choices=NAMES, help="what is struck")
+    pitch = parser.add_mutually_exclusive_group()
+    pitch.add_argument("--note", help="lowest partial as a note, such as C4 or F#3")
+    pitch.add_argument("--pitch", type=positive_number, help="lowest partial [Hz]")
+    parser.add_argument("--seconds", type=positive_number, default=2.0, help="length (default 2)")
+    parser.add_argument(
+        "--rate", type=whole_number(1000), default=44_100, help="samples per second (default 44100)"
+    )
+    parser.add_argument(
+        "--seed", type=whole_number(0), default=0, help="of imperfections and noise (default 0)"
+    )
+    parser.add_argument("--json", action="store_true", help="print the partials as JSON")
+    parser.add_argument("--out", metavar="FILE.wav", required=True, help="sound file to write")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command."""
+    from carillon.files import require_writable
+    from sound.clips.instruments import note_hertz, synthesised
+    from sound.clips.wav import PEAK, write_wav
+
+    require_writable(arguments.out)
+    pitch = note_hertz(arguments.note) if arguments.note else arguments.pitch
+    options = (arguments.seconds, arguments.rate, arguments.seed)
+    sound = synthesised(arguments.instrument, pitch, *options)
+    samples = sound.modal_part() + sound.residual
+    write_wav(arguments.out, samples, sound.rate, peak=True)
+    if arguments.json:
+        scale = PEAK / abs(samples).max()
+        content = {
+            **sound.evidence,
+            "frequencies_hz": sound.frequencies.tolist(),
+            "dampings_per_second": sound.dampings.tolist(),
+            "amplitudes": (scale * sound.amplitudes).tolist(),
+        }
+        print(json.dumps(content, indent=2))
+        return 0
+    low, high = sound.frequencies[[0, -1]]
+    print(
+        f"{arguments.out}: {arguments.seconds:g} s of struck {arguments.instrument}, "
+        f"{len(sound.frequencies)} partials from {low:.2f} to {high:.2f} Hz"
+    )
+    return 0
