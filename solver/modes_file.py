@@ -144,7 +144,8 @@ def get_model(group: h5py.Group) -> ElasticModel:
         cells=group["cells"][()],
         grid=group["grid"][()],
         node_grid=group["node_grid"][()],
-        origin=group.attrs["origin"],
+        # Attributes come with an explicit byte order, which MPI does not know.
+        origin=group.attrs["origin"].astype(float),
         edge=float(group.attrs["cell_edge"]),
     )
     young = group["young"][()]

@@ -144,11 +144,12 @@ class Pool:
 
 _simulation: Simulation
 _objective: Objective
+_for_good = ExitStack()
 
 
 def _prepare_apart(setting: Setting) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    one_thread().__enter__()
+    _for_good.enter_context(one_thread())
     _prepare(setting)
 
 

@@ -1,0 +1,70 @@
+"""A design problem that takes a second: a bar of few cells whose targets are its own sounds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sound.clips.wav import write_wav
+from sound.design.designing import prepare
+from sound.project import project_of
+from sound.targets import Targets
+
+RATE = 22_050
+PROJECT = {
+    "mesh": "builtin:bar",
+    "resolution": 16,
+    "coarsen": "none",
+    "modes": 6,
+    "targets": [
+        {"name": "end", "at": [-0.12, 0.0, 0.03], "clip": "end.wav"},
+        {"name": "side", "at": [0.04, 0.0225, 0.02], "clip": "side.wav"},
+    ],
+    "material": {"dimensions": 10},
+    "optimiser": {"seconds": None, "evaluations": 120, "workers": 1},
+}
+
+
+def write_clips(folder, frequencies, amplitudes=None):
+    """Clips of damped sinusoids, one for each target."""
+    seconds = np.arange(0.25 * RATE) / RATE
+    random = np.random.default_rng(0)
+    for target in PROJECT["targets"]:
+        loudness = random.uniform(0.3, 1.0, len(frequencies)) if amplitudes is None else amplitudes
+        modes = np.exp(-20.0 * seconds) * np.sin(2 * np.pi * np.outer(frequencies, seconds))
+        write_wav(folder / target["clip"], loudness @ modes, RATE, peak=True)
+
+
+def project(folder, **changes):
+    """The project, whose clips are there but say nothing; keys of `optimiser` may be changed."""
+    for target in PROJECT["targets"]:
+        (folder / target["clip"]).touch()
+    made = project_of(PROJECT, folder)
+    return replace(made, optimiser=replace(made.optimiser, **changes))
+
+
+def targets(made, seed=0, names=("end", "side")):
+    """What the bar sounds like with a material of other coordinates."""
+    count = made.modes
+    empty = Targets(
+        ("end", "side"),
+        np.linspace(400.0, 4000.0, count),
+        np.full(count, 20.0),
+        np.ones((2, count)),
+        (np.zeros(1),) * 2,
+        (RATE,) * 2,
+    )
+    simulation = prepare(made, empty).setting.simulation()
+    random = np.random.default_rng(seed)
+    found = simulation.evaluate(0.3 * random.standard_normal(simulation.material.dimensions))
+    frequencies = np.sqrt(found.eigenvalues) / (2.0 * np.pi)
+    chosen = [("end", "side").index(name) for name in names]
+    return replace(
+        empty,
+        names=tuple(names),
+        frequencies=0.5 * frequencies,
+        amplitudes=np.abs(found.pushed)[chosen],
+        residuals=empty.residuals[: len(names)],
+        rates=empty.rates[: len(names)],
+    )

@@ -1,0 +1,214 @@
+"""The search for a material: what it reaches, and what it does not depend on."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+
+from carillon.errors import UserError
+from sound.design.designing import design, prepare, targets_of
+from sound.design.objective import Objective
+from sound.design.optimisers import OPTIMISERS
+from sound.design.pool import Pool, Task
+from sound.design_file import read_design, write_design
+from sound.project import Weights, project_of
+from tests import small_project
+
+
+@pytest.fixture(scope="module")
+def prepared(tmp_path_factory):
+    made = small_project.project(tmp_path_factory.mktemp("project"))
+    return prepare(made, small_project.targets(made))
+
+
+@pytest.fixture(scope="module")
+def found(prepared):
+    return design(prepared)
+
+
+def with_options(prepared, **changes):
+    project = prepared.project
+    return replace(
+        prepared, project=replace(project, optimiser=replace(project.optimiser, **changes))
+    )
+
+
+def with_targets(prepared, targets):
+    names = set(targets.names)
+    strikes = [strike for strike in prepared.setting.strikes if strike.name in names]
+    objective = Objective(targets, prepared.project.weights)
+    return replace(
+        prepared, setting=replace(prepared.setting, strikes=strikes, objective=objective)
+    )
+
+
+def test_hybrid_finds_a_material_that_sounds_alike(found):
+    assert found.evidence["cost"] < 0.02 * found.evidence["cost_start"]
+    targets = found.targets
+    np.testing.assert_allclose(found.frequencies[0], targets.frequencies[0], rtol=1e-6)
+    np.testing.assert_allclose(found.frequencies, targets.frequencies, rtol=0.03)
+    assert (np.diff(found.history["cost"]) <= 0.0).all()
+    assert (np.diff(found.history["evaluations"]) >= 0).all()
+    assert found.evidence["residual_max"] < 1e-3
+    assert found.young.min() > 0.0
+
+
+def test_written_modes_are_those_of_the_written_model(found, tmp_path):
+    """An independent solver finds the same frequencies from what the file says."""
+    from solver import solve
+
+    write_design(tmp_path / "design.h5", found)
+    read = read_design(tmp_path / "design.h5")
+    truth = solve(read.model, modes=6 + len(read.frequencies), method="slepc")
+    np.testing.assert_allclose(truth.frequencies[6:], read.frequencies, rtol=1e-6)
+
+
+@pytest.mark.parametrize("method", sorted(set(OPTIMISERS) - {"hybrid"}))
+def test_parts_of_the_hybrid_improve_by_themselves(prepared, method):
+    found = design(with_options(prepared, method=method, evaluations=60))
+    assert found.evidence["cost"] < 0.7 * found.evidence["cost_start"]
+
+
+def test_result_does_not_depend_on_the_number_of_workers(prepared):
+    one, two = (design(with_options(prepared, evaluations=60, workers=n)) for n in (1, 2))
+    np.testing.assert_array_equal(one.coordinates, two.coordinates)
+    np.testing.assert_array_equal(one.modes, two.modes)
+    assert one.evidence["cost"] == two.evidence["cost"]
+
+
+def test_a_design_goes_on_from_where_it_was(prepared, found):
+    again = design(with_options(prepared, evaluations=30), former=found)
+    # A search compares costs to the tolerance of its analyses, a thousandth.
+    assert again.evidence["cost"] <= found.evidence["cost"] * (1 + 1e-3)
+    assert again.history["evaluations"][-1] > found.history["evaluations"][-1]
+    assert (np.diff(again.history["seconds"]) >= 0.0).all()
+
+
+def test_a_target_can_be_added(prepared):
+    made = prepared.project
+    one = with_targets(prepared, small_project.targets(made, names=("end",)))
+    first = design(with_options(one, evaluations=60))
+    both = design(with_options(prepared, evaluations=60), former=first)
+    assert len(first.strikes) == 1 and len(both.strikes) == 2
+    alone = design(with_options(prepared, evaluations=1, method="cma"))
+    # The material of the first search is a better start than the uniform one.
+    assert both.evidence["cost_start"] < alone.evidence["cost_start"]
+    assert both.evidence["cost"] < both.evidence["cost_start"]
+
+
+def test_design_of_other_voxels_is_refused(prepared, found):
+    other = replace(found, fine_grid=found.fine_grid[:-1])
+    with pytest.raises(UserError, match="begin a new design"):
+        design(prepared, former=other)
+
+
+def test_designs_are_kept_on_the_way(prepared):
+    kept = []
+    design(with_options(prepared, evaluations=60), keep=kept.append, keep_every=0.0)
+    costs = [each.evidence["cost"] for each in kept]
+    assert len(kept) > 1 and costs[-1] < costs[0]
+
+
+def test_cost_vanishes_at_the_targets_and_knows_no_scale_nor_sign(prepared):
+    simulation = prepared.setting.simulation()
+    objective = prepared.setting.objective
+    z = 0.1 * np.random.default_rng(3).standard_normal(simulation.material.dimensions)
+    found = simulation.evaluate(z)
+    targets = replace(
+        objective.targets,
+        frequencies=np.sqrt(found.eigenvalues) / 7.0,
+        amplitudes=5.0 * np.abs(found.pushed),
+    )
+    same = Objective(targets, Weights(1.0, 10.0, 0.0))
+    assert same.cost(found.eigenvalues, found.pushed, 0.0).total < 1e-20
+    cost = objective.cost(found.eigenvalues, found.pushed, 0.0)
+    signs = np.where(np.arange(len(found.eigenvalues)) % 2, 1.0, -1.0)
+    other = objective.cost(3.0 * found.eigenvalues, 2.0 * signs * found.pushed, 0.0)
+    assert other.total == pytest.approx(cost.total, rel=1e-12)
+
+
+def test_mixed_modes_of_a_cluster_cost_the_same(prepared):
+    objective = prepared.setting.objective
+    random = np.random.default_rng(0)
+    values = np.array([1.0, 2.0, 2.0, 3.0, 5.0, 6.0]) * 1e6
+    pushed = random.standard_normal((2, 6))
+    c, s = np.cos(0.7), np.sin(0.7)
+    mixed = pushed.copy()
+    mixed[:, 1:3] = pushed[:, 1:3] @ np.array([[c, s], [-s, c]])
+    costs = [objective.cost(values, each, 0.0).total for each in (pushed, mixed)]
+    assert costs[0] == pytest.approx(costs[1], rel=1e-12)
+
+
+def test_a_worker_that_dies_is_told(prepared):
+    pool = Pool(prepared.setting, 2)
+    z = np.zeros(prepared.setting.material.dimensions)
+    try:
+        pool.run([Task(z)] * 2)
+        process = next(iter(pool._executor._processes.values()))
+        threading.Timer(0.2, process.kill).start()
+        with pytest.raises(UserError, match="died"):
+            while True:
+                pool.run([Task(z)] * 4)
+    finally:
+        pool.close()
+
+
+def run_design(folder, *words, **options):
+    command = [sys.executable, "-m", "sound", "design", "project.yaml", "--out", "design.h5"]
+    return subprocess.Popen(
+        [*command, *words],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.getcwd()},
+        **options,
+    )
+
+
+@pytest.fixture
+def folder(tmp_path):
+    small_project.write_clips(tmp_path, np.array([500.0, 1200.0, 1900.0, 2600.0, 3300.0, 4100.0]))
+    (tmp_path / "project.yaml").write_text(yaml.safe_dump(small_project.PROJECT))
+    return tmp_path
+
+
+def test_command_from_clips_to_file_and_on(folder):
+    first = run_design(folder, "--json")
+    out, errors = first.communicate()
+    assert first.returncode == 0, errors
+    summary = json.loads(out)
+    assert summary["cost"] < 0.7 * summary["cost_start"] and summary["workers"] == 1
+    before = read_design(folder / "design.h5").history["evaluations"][-1]
+    second = run_design(folder, "--evaluations", "8")
+    out, errors = second.communicate()
+    assert second.returncode == 0, errors
+    assert f"going on after {before:.0f} evaluations" in errors and "less) in" in out
+    assert read_design(folder / "design.h5").history["evaluations"][-1] > before
+
+
+def test_somebody_who_interrupts_gets_the_best_so_far(prepared):
+    rounds = []
+
+    def interrupt(search):
+        rounds.append(search.own_evaluations)
+        if len(rounds) == 2:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    found = design(with_options(prepared, evaluations=10**6), watch=interrupt)
+    assert len(rounds) == 2
+    assert found.evidence["cost"] < found.evidence["cost_start"]
+
+
+def test_more_modes_than_the_clips_have(folder):
+    with pytest.raises(UserError, match="40 modes"):
+        targets_of(project_of({**small_project.PROJECT, "modes": 40}, folder))
