@@ -42,6 +42,8 @@ include: "workflow/rules/study.smk"
 include: "workflow/rules/objectives.smk"
 include: "workflow/rules/default_forest.smk"
 include: "workflow/rules/forests_study.smk"
+include: "workflow/rules/examples.smk"
+include: "workflow/rules/sound.smk"
 include: "workflow/rules/compare.smk"
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from carillon.arguments import positive_number, whole_number
+from carillon.measurement import measured
 from carillon.progress import say
 
 
@@ -35,7 +36,10 @@ def run(arguments: argparse.Namespace) -> int:
     }
     project = replace(project, optimiser=replace(project.optimiser, **given))
     found = benchmark(prepare(project), arguments.runs, lambda what: say(f"measuring: {what}"))
-    print(json.dumps(found) if arguments.json else _table(found))
+    if arguments.json:
+        print(json.dumps({**found, "provenance": measured(project.as_dict())}))
+        return 0
+    print(_table(found))
     return 0
 
 
