@@ -14,14 +14,15 @@ from carillon.provenance import record
 from solver import solve
 from solver.model import RIGID_MODES, fine_model
 from solver.modes_file import write_modes
-from sound.clips.wav import write_wav
-from sound.design_file import HISTORY_TYPE, Design, write_design
+from sound.clips.wav import read_wav, write_wav
+from sound.design_file import HISTORY_TYPE, Design, read_design, write_design
 from sound.project import load_project
 from sound.rendering.listening import Listening
 from sound.rendering.render import Hit, render
 from sound.rendering.solid import SoundingSolid
 from tests.pages import Page, assert_same_numbers, assert_self_contained
 from tests.small_design import N_MODES, SIDES, small_design
+from tests.workflow_runs import TINY, planned, snakemake
 from workflow import settings
 from workflow.estimate.command import CONFIGURATIONS, load
 from workflow.report.table import write_table
@@ -241,3 +242,27 @@ def test_the_chord_is_on_the_bunny_where_its_mesh_is_and_on_a_bell_otherwise(tmp
     assert chord.mesh_files == [str(tmp_path / "stanford-bunny.obj")]
     relative = project(chord, "chord", {**config, "results_dir": str(tmp_path / "results")})["mesh"]
     assert relative == "../../../stanford-bunny.obj"
+
+
+def test_all_examples_are_planned_without_any_mesh_file(tmp_path):
+    jobs = planned(snakemake(tmp_path, "sounds", "--dry-run", "--cores", 2))
+    chosen = examples(CONFIG).values()
+    assert jobs["design_sound"] == sum(example.edits for example in chosen) == 6
+    assert jobs["begin_design"] == jobs["check_design"] == jobs["build_sound_page"] == 4
+    assert jobs["record_clip"] == 2 and jobs["synthesise_clip"] == 9
+    assert jobs["compare_optimisers"] == jobs["build_sounds_index"] == 1
+
+
+@pytest.mark.slow
+def test_a_tiny_design_is_made_from_synthesised_clips_and_sounds(tmp_path):
+    folder = Path("results-tiny", FOLDER, "frying-pan")
+    target = folder / "after" / "plate.wav"
+    done = snakemake(tmp_path, target, "--configfile", TINY, "--cores", 2)
+    log = tmp_path / "results-tiny" / "logs" / FOLDER / "frying-pan" / "design.log"
+    assert done.returncode == 0, done.stderr + (log.read_text() if log.exists() else "")
+    design = read_design(tmp_path / folder / DESIGN)
+    assert design.targets.names == ("plate", "handle")
+    assert design.frequencies[0] == pytest.approx(design.targets.frequencies[0])
+    assert (np.diff(design.history["cost"]) <= 0.0).all()
+    sound, rate = read_wav(tmp_path / target)
+    assert rate == 44_100 and len(sound) > 0.1 * rate
