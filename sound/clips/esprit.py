@@ -31,12 +31,14 @@ def ester(vectors: Complex) -> int:
 
     The criterion of Badeau, David and Richard (2006): J(p) is the inverse square of the spectral
     norm of what least squares leaves of the shift of the first p vectors.  It is largest at the
-    number of sinusoids, or of the strong ones among them; the last order
-    within a fiftieth of the maximum counts, as too many do less harm than too few.
+    number of sinusoids, or of the strong ones among them; the last order within a fiftieth of the
+    maximum counts, as too many do less harm than too few.
     """
-    errors = np.array([_shift_error(vectors[:, :p]) for p in range(1, vectors.shape[1] + 1)])
-    criterion = errors**-2.0
-    return int(np.flatnonzero(criterion >= _ESTER_SHARE * criterion.max())[-1]) + 1
+    across = vectors[:-1].conj().T @ vectors[1:]
+    orders = np.arange(1, vectors.shape[1] + 1)
+    squares = [_shift_error(vectors[:, :p], across[:p, :p]) for p in orders]
+    criterion = 1.0 / np.maximum(squares, np.finfo(float).eps)
+    return int(orders[criterion >= _ESTER_SHARE * criterion.max()][-1])
 
 
 def _subspace(signal: Complex, most: int) -> Complex:
@@ -48,13 +50,17 @@ def _subspace(signal: Complex, most: int) -> Complex:
     return np.asarray(vectors[:, ::-1])
 
 
-def _shift_error(vectors: Complex) -> float:
-    """Spectral norm of what least squares leaves; the square root of rounding at least."""
-    above, below = vectors[:-1], vectors[1:]
-    normal = above.conj().T
-    error = below - above @ la.lstsq(normal @ above, normal @ below)[0]
-    square = la.eigvalsh(error.conj().T @ error)[-1]
-    return float(np.sqrt(max(square, np.finfo(float).eps)))
+def _shift_error(vectors: Complex, across: Complex) -> float:
+    """Square of the spectral norm of what least squares leaves of the shift.
+
+    As the vectors are orthonormal, their products without the first or the last row differ from
+    the identity by one of rank 1.
+    """
+    first, last = vectors[0], vectors[-1]
+    rank_one = last @ across / np.sqrt(max(1.0 - np.vdot(last, last).real, np.finfo(float).eps))
+    explained = across.conj().T @ across + np.outer(rank_one.conj(), rank_one)
+    left = np.eye(len(across)) - np.outer(first.conj(), first) - explained
+    return float(la.eigvalsh(left, check_finite=False)[-1])
 
 
 def _rotation(vectors: Complex) -> Complex:

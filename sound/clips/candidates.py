@@ -1,0 +1,65 @@
+"""Where in a clip there may be modes: damped sinusoids that ESPRIT finds in its bands."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.progress import track
+from sound.clips.bands import Band, bands
+from sound.clips.esprit import esprit
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+BAND_SAMPLES = 512
+"""Length of a band's signal, from the strike on; narrow bands last longer."""
+BAND_DECAY = 5.0
+"""Nepers of decay within a band's length from which on a mode is sought again in wider bands."""
+LOWEST_HERTZ, HIGHEST_SHARE = 20.0, 0.97
+"""Lowest frequency of a mode, and the highest in half sampling rates."""
+LEAST_QUALITY = 2.0
+"""pi f / d of a mode; what dies away faster is a knock rather than a mode."""
+LEAST_DECAY = 0.1
+"""Nepers (0.87 dB) by which a mode must decay within the clip; what does not is a steady tone."""
+_LATER = 16
+"""Samples of a band by which a second search begins later."""
+_PEAK = 20.0
+"""Largest over median power in a band's spectrum below which it is taken for noise."""
+
+
+def candidates(rest: Array, rate: int, width: float, label: str, visible: bool) -> Complex:
+    """Exponents (k,) per sample of the clip from its bands of `width` [Hz], or of what is left."""
+    count = int(0.5 * rate / width) + 1
+    parts = bands(rest, rate, width, BAND_SAMPLES)
+    found = [_band_exponents(band, rate) for band in track(parts, label, count, visible=visible)]
+    return np.concatenate(found)
+
+
+def _band_exponents(band: Band, rate: int) -> Complex:
+    power = np.abs(np.fft.fft(band.signal)) ** 2
+    if len(power) < 4 * _LATER or power.max() < _PEAK * np.median(power):
+        return np.zeros(0, complex)
+    exponents = _stable(band.signal) * band.rate / rate
+    inside = np.abs(exponents.imag) * rate <= np.pi * band.width
+    exponents = exponents[inside] + 2j * np.pi * band.centre / rate
+    low, high = 2.0 * np.pi * LOWEST_HERTZ / rate, HIGHEST_SHARE * np.pi
+    sounds = (exponents.imag > low) & (exponents.imag < high) & rings(exponents)
+    grows = exponents.real * len(band.signal) * rate / band.rate > LEAST_DECAY
+    return exponents[sounds & ~grows]
+
+
+def rings(exponents: Complex) -> NDArray[np.bool_]:
+    """Which sinusoids vibrate long enough, compared to their period, to be modes."""
+    return exponents.imag > -2.0 * LEAST_QUALITY * exponents.real
+
+
+def _stable(signal: Complex) -> Complex:
+    """Exponents per sample that ESPRIT finds from the strike on and also from a little later on.
+
+    What it makes of the noise of a blow changes altogether, while a mode moves by less than it
+    decays, or than what decays slowly can be told from in so short a signal.
+    """
+    exponents, later = esprit(signal), esprit(signal[_LATER:])
+    moved = np.abs(exponents[:, None] - later).min(axis=1)
+    return exponents[moved < np.maximum(-exponents.real, BAND_DECAY / len(signal))]

@@ -1,0 +1,111 @@
+"""Which damped sinusoids stand out of a clip's noise, and how sure their parameters are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sound.clips.damped import fitted_coefficients, inverse, normal_matrix, refined, superposed
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+PROMINENCE = 100.0
+"""Energy of a mode over that of the noise under it; at 100 its damping is uncertain by 20 %."""
+_NEIGHBOURHOOD = 100.0
+"""Angular frequency on either side of a mode, in dampings, from which its noise is taken."""
+_LEAST_LEVEL = 1e-15
+"""Variance of noise that is always assumed, relative to the peak: that of 24-bit samples."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Damped sinusoids (k,) fitted to a clip of peak 1, see `sound.clips.damped`.
+
+    Attributes
+    ----------
+    exponents, coefficients : (k,) in order of frequency.
+    prominence : (k,) energy that the fit would lose without each, over the level.
+    level : (k,) variance of white noise as strong as the noise under each.
+    """
+
+    exponents: Complex
+    coefficients: Complex
+    prominence: Array
+    level: Array
+
+    def chosen(self, which: NDArray[Any]) -> Fit:
+        """Some of them, by mask or numbers."""
+        fields = (self.exponents, self.coefficients, self.prominence, self.level)
+        return Fit(*(values[which] for values in fields))
+
+    def deviations(self, samples: int) -> Complex:
+        """Standard deviations (k,) of exponents that the noise allows, for both their parts."""
+        matrix = normal_matrix(self.exponents, self.coefficients, samples)
+        variances = np.diag(inverse(matrix)).reshape(2, 2, -1)[:, 1]
+        real, imaginary = np.sqrt(np.maximum(variances, 0.0) * self.level)
+        return np.asarray(real + 1j * imaginary)
+
+
+def settled(exponents: Complex, clip: Array, steps: int) -> Fit:
+    """Fit to the whole clip, refined, of those that stand out of its noise."""
+    fit = _pruned(exponents, clip)
+    return _pruned(refined(fit.exponents, fit.coefficients, clip, steps)[0], clip)
+
+
+def _pruned(exponents: Complex, clip: Array) -> Fit:
+    """Fit of the exponents less those that do not stand out.
+
+    Of neighbours that do not, the one that the fit needs least goes first: of two estimates of one
+    mode neither is needed while the other is there.
+    """
+    exponents = exponents[np.argsort(exponents.imag)]
+    while True:
+        coefficients = fitted_coefficients(exponents, clip)
+        rest = clip - superposed(exponents, coefficients, len(clip))
+        level = _level(exponents, rest)
+        prominence = _gain(exponents, coefficients, len(clip)) / level
+        beside = np.pad(prominence, 1, constant_values=np.inf)
+        least = (prominence <= beside[:-2]) & (prominence <= beside[2:])
+        weak = least & (prominence < PROMINENCE)
+        if not weak.any():
+            return Fit(exponents, coefficients, prominence, level)
+        exponents = exponents[~weak]
+
+
+def _gain(exponents: Complex, coefficients: Complex, samples: int) -> Array:
+    """Energy (k,) that each damped sinusoid explains and the others cannot."""
+    count = len(exponents)
+    matrix = normal_matrix(exponents, np.ones(count, complex), samples, order=1)
+    blocks = inverse(matrix).reshape(2, count, 2, count)
+    own = np.moveaxis(np.diagonal(blocks, axis1=1, axis2=3), -1, 0)
+    parts = np.stack([coefficients.real, coefficients.imag], axis=1)
+    return np.asarray(np.einsum("ki,kij,kj->k", parts, np.linalg.inv(own), parts))
+
+
+def _level(exponents: Complex, rest: Array) -> Array:
+    """Variance (k,) of white noise as strong as the rest where and when each sinusoid sounds.
+
+    It is the median, over frequencies around the sinusoid's, of the rest's correlation with
+    sinusoids that die away as fast to the nearest power of 2.
+    """
+    from scipy.fft import next_fast_len, rfft
+
+    size = next_fast_len(len(rest), real=True)
+    n = np.arange(len(rest))
+    slowest = 1.0 / len(rest)
+    octaves = np.round(np.log2(np.maximum(-exponents.real, slowest) / slowest))
+    level = np.empty(len(exponents))
+    for octave in np.unique(octaves):
+        rate = slowest * 2.0**octave
+        window = np.exp(-rate * n)
+        power = np.abs(rfft(rest * window, size)) ** 2 / (window @ window)
+        reach = round(_NEIGHBOURHOOD * rate / (2.0 * np.pi) * size)
+        for k in np.flatnonzero(octaves == octave):
+            bin_number = round(exponents[k].imag / (2.0 * np.pi) * size)
+            around = power[max(0, bin_number - reach) : bin_number + reach + 1]
+            level[k] = np.median(around) / np.log(2.0)
+    return np.maximum(level, _LEAST_LEVEL)
