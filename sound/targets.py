@@ -41,8 +41,10 @@ class Targets:
     rates: tuple[int, ...]
 
 
-def share_frequencies(names: Sequence[str], sounds: Sequence[ModalSound], modes: int) -> Targets:
-    """The `modes` modes that carry most of all clips' sound, with amplitudes per clip.
+def share_frequencies(
+    names: Sequence[str], sounds: Sequence[ModalSound], modes: int | None = None
+) -> Targets:
+    """The `modes` modes that carry most of all clips' sound, with amplitudes per clip; all if None.
 
     Modes of different clips that cannot be told apart become one, whose frequency and damping are
     means weighted by amplitude. They are chosen one by one: the clip of whose energy the least is
@@ -61,12 +63,13 @@ def share_frequencies(names: Sequence[str], sounds: Sequence[ModalSound], modes:
     shares = np.concatenate([sound.energies / sound.energies.sum() for sound in sounds])
 
     groups = _groups(frequencies, owners)
-    if modes > groups.max() + 1:
+    count = int(groups.max()) + 1
+    if modes is not None and modes > count:
         raise UserError(
-            f"{modes} modes asked for, more than the {groups.max() + 1} different ones that were "
-            f"extracted from the {len(sounds)} clips; ask for fewer"
+            f"{modes} modes asked for, more than the {count} that were extracted from the clips "
+            f"({', '.join(names)}); ask for fewer"
         )
-    table = np.zeros((len(sounds), groups.max() + 1))
+    table = np.zeros((len(sounds), count))
     covered = table.copy()
     table[owners, groups] = amplitudes
     covered[owners, groups] = shares
@@ -74,7 +77,7 @@ def share_frequencies(names: Sequence[str], sounds: Sequence[ModalSound], modes:
     weights = amplitudes / loudness[owners]
     weight = np.bincount(groups, weights)
     shared = np.bincount(groups, weights * frequencies) / weight
-    chosen = _chosen(covered, modes)
+    chosen = _chosen(covered, count if modes is None else modes)
     chosen = chosen[np.argsort(shared[chosen])]
     return Targets(
         names=tuple(names),
