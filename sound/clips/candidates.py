@@ -22,6 +22,8 @@ LEAST_QUALITY = 2.0
 """pi f / d of a mode; what dies away faster is a knock rather than a mode."""
 LEAST_DECAY = 0.1
 """Nepers (0.87 dB) by which a mode must decay within the clip; what does not is a steady tone."""
+_MOST_GROWTH = 5.0
+"""Nepers by which a sinusoid may grow within a band, for a clip that does not decay to be told."""
 _LATER = 16
 """Samples of a band by which a second search begins later."""
 _PEAK = 20.0
@@ -45,7 +47,7 @@ def _band_exponents(band: Band, rate: int) -> Complex:
     exponents = exponents[inside] + 2j * np.pi * band.centre / rate
     low, high = 2.0 * np.pi * LOWEST_HERTZ / rate, HIGHEST_SHARE * np.pi
     sounds = (exponents.imag > low) & (exponents.imag < high) & rings(exponents)
-    grows = exponents.real * len(band.signal) * rate / band.rate > LEAST_DECAY
+    grows = exponents.real * len(band.signal) * rate / band.rate > _MOST_GROWTH
     return exponents[sounds & ~grows]
 
 

@@ -1,0 +1,251 @@
+"""Modes of clips: what a synthesised clip was made of comes back, and bad clips are refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import soundfile
+
+from carillon.errors import UserError
+from sound.clips.damped import (
+    correlations,
+    damped_sinusoids,
+    exponents_of,
+    fitted_coefficients,
+    normal_matrix,
+    refined,
+)
+from sound.clips.esprit import esprit
+from sound.clips.extraction import ModalSound, extract
+from sound.clips.instruments import synthesised
+from sound.clips.onset import strike_sample
+from sound.clips.wav import read_wav
+
+RATE = 8000
+FREQUENCY_TOLERANCE, DAMPING_TOLERANCE = 1e-3, 0.05
+
+
+def modes(count: int, highest: float, seed: int, lowest: float = 50.0) -> ModalSound:
+    """Modes from `lowest` to `highest` [Hz], the higher the quicker, within 12 dB of each other."""
+    random = np.random.default_rng(seed)
+    steps = np.arange(count) + random.uniform(-0.3, 0.3, count)
+    frequencies = lowest * (highest / lowest) ** (np.clip(steps, 0.0, count - 1) / (count - 1))
+    return ModalSound(
+        frequencies=frequencies,
+        dampings=(2.0 + 0.002 * frequencies) * random.uniform(0.7, 1.4, count),
+        amplitudes=10.0 ** (-random.uniform(0.0, 12.0, count) / 20.0),
+        phases=random.uniform(-np.pi, np.pi, count),
+        residual=np.zeros(0),
+        rate=0,
+        evidence={},
+    )
+
+
+def sampled(true: ModalSound, rate: int, seconds: float, decibels: float = 20.0) -> np.ndarray:
+    """The modes in white noise `decibels` below them."""
+    values = (true.frequencies, true.dampings, true.amplitudes, true.phases)
+    clean = damped_sinusoids(*values, rate, round(seconds * rate))
+    noise = np.random.default_rng(7).standard_normal(len(clean))
+    return clean + noise * np.sqrt(np.mean(clean**2)) * 10.0 ** (-decibels / 20.0)
+
+
+def single(frequency: float, damping: float, seconds: float, rate: int = RATE) -> np.ndarray:
+    one = np.ones(1)
+    return damped_sinusoids(
+        frequency * one, damping * one, one, 0.0 * one, rate, round(seconds * rate)
+    )
+
+
+def assert_same(found: ModalSound, true: ModalSound) -> None:
+    assert len(found.frequencies) == len(true.frequencies)
+    np.testing.assert_allclose(found.frequencies, true.frequencies, rtol=FREQUENCY_TOLERANCE)
+    np.testing.assert_allclose(found.dampings, true.dampings, rtol=DAMPING_TOLERANCE)
+    np.testing.assert_allclose(found.amplitudes, true.amplitudes, rtol=0.1)
+
+
+@pytest.mark.parametrize(
+    ("rate", "count", "seconds", "highest"),
+    [
+        (8000, 5, 1.0, 3000.0),
+        (8000, 20, 2.0, 3500.0),
+        (22_050, 10, 1.0, 9000.0),
+        (44_100, 30, 2.0, 15_000.0),
+        (96_000, 8, 1.0, 15_000.0),
+    ],
+)
+def test_parameters_come_back_at_20_decibels(rate, count, seconds, highest):
+    true = modes(count, highest, seed=count)
+    found = extract(sampled(true, rate, seconds), rate)
+    assert_same(found, true)
+    assert found.evidence["order"] == count
+    assert found.evidence["explained"] == pytest.approx(1.0 / 1.01, abs=2e-3)
+
+
+def test_parameters_come_back_from_a_stereo_file_with_silence_before_the_strike(tmp_path):
+    true = modes(6, 3000.0, seed=1)
+    strike = 1234
+    clip = np.concatenate([np.zeros(strike), 0.1 * sampled(true, RATE, 1.0, 40.0)])
+    random = np.random.default_rng(2)
+    clip += 1e-4 * random.standard_normal(len(clip))
+    path = tmp_path / "clip.wav"
+    soundfile.write(path, np.stack([1.2 * clip, 0.8 * clip], axis=1), RATE, subtype="PCM_24")
+    found = extract(*read_wav(path))
+    assert found.evidence["strike_seconds"] == pytest.approx(strike / RATE, abs=1e-3)
+    np.testing.assert_allclose(found.frequencies, true.frequencies, rtol=FREQUENCY_TOLERANCE)
+    np.testing.assert_allclose(found.dampings, true.dampings, rtol=DAMPING_TOLERANCE)
+    np.testing.assert_allclose(found.amplitudes, 0.1 * true.amplitudes, rtol=0.1)
+
+
+def test_errors_are_those_that_the_noise_allows():
+    true = modes(12, 3500.0, seed=3)
+    scores = []
+    for decibels in (15.0, 30.0, 45.0):
+        found = extract(sampled(true, RATE, 1.0, decibels), RATE)
+        deviations = np.array(found.evidence["damping_deviations_per_second"])
+        scores.append((found.dampings - true.dampings) / deviations)
+    # Of 36 standard normal numbers the largest is about 2.4, their root mean square 1 +- 0.12.
+    assert np.abs(scores).max() < 5.0
+    assert 0.6 < np.sqrt(np.mean(np.square(scores))) < 1.6
+
+
+@pytest.mark.parametrize("damping", [2.0, 30.0])
+def test_two_modes_a_bandwidth_apart_are_told_apart(damping):
+    frequencies = np.array([1000.0, 1000.0 + damping / np.pi])
+    true = ModalSound(
+        frequencies,
+        np.array([damping, 1.2 * damping]),
+        np.array([1.0, 0.7]),
+        np.array([0.3, 2.0]),
+        np.zeros(0),
+        0,
+        {},
+    )
+    found = extract(sampled(true, RATE, 1.5), RATE)
+    assert len(found.frequencies) == 2
+    np.testing.assert_allclose(found.frequencies, true.frequencies, rtol=FREQUENCY_TOLERANCE)
+    np.testing.assert_allclose(found.dampings, true.dampings, rtol=DAMPING_TOLERANCE)
+
+
+def test_peaks_of_a_zero_padded_spectrum_agree():
+    from scipy.signal import find_peaks
+    from scipy.signal.windows import hann
+
+    clip = sampled(modes(10, 3500.0, seed=5, lowest=150.0), RATE, 1.0, 40.0)
+    found = extract(clip, RATE)
+    size = 1 << 18
+    spectrum = np.abs(np.fft.rfft(clip * hann(len(clip)), size))
+    width = 30 * size // RATE
+    peaks = find_peaks(spectrum, height=0.002 * spectrum.max(), distance=width)[0] * RATE / size
+    highest = peaks[np.abs(peaks[:, None] - found.frequencies).argmin(axis=0)]
+    np.testing.assert_allclose(highest, found.frequencies, atol=0.5)
+    strong = found.energies > 0.02 * found.energies.max()
+    np.testing.assert_allclose(highest[strong], found.frequencies[strong], atol=0.2)
+
+
+def test_modes_and_residual_add_up_to_the_clip():
+    clip = sampled(modes(6, 3000.0, seed=6), RATE, 0.5)
+    found = extract(clip, RATE)
+    start = len(clip) - len(found.residual)
+    np.testing.assert_allclose(found.modal_part() + found.residual, clip[start:], atol=1e-10)
+
+
+def test_strongest_modes_are_kept_and_the_residual_is_without_the_others_too():
+    clip = sampled(modes(6, 3000.0, seed=6), RATE, 0.5)
+    everything, three = extract(clip, RATE), extract(clip, RATE, modes=3)
+    strongest = np.sort(np.argsort(everything.energies)[-3:])
+    np.testing.assert_array_equal(three.frequencies, everything.frequencies[strongest])
+    np.testing.assert_array_equal(three.residual, everything.residual)
+    assert three.evidence["explained"] < three.evidence["explained_by_all"]
+
+
+def test_loudness_does_not_matter():
+    clip = sampled(modes(4, 3000.0, seed=8), RATE, 0.5)
+    loud, quiet = extract(clip, RATE), extract(1e-3 * clip, RATE)
+    np.testing.assert_allclose(quiet.frequencies, loud.frequencies, rtol=1e-9)
+    np.testing.assert_allclose(quiet.amplitudes, 1e-3 * loud.amplitudes, rtol=1e-6)
+
+
+def test_the_noise_of_a_blow_is_no_mode():
+    true = synthesised("metal", 700.0, 1.0, 16_000, seed=1)
+    knock = 20.0 * true.residual  # 8 dB below the sum of all partials
+    found = extract(true.modal_part() + knock, 16_000)
+    apart = np.abs(found.frequencies[:, None] / true.frequencies - 1.0).min(axis=1)
+    assert (apart < FREQUENCY_TOLERANCE).all()
+    left = np.sum((found.residual - knock[-len(found.residual) :]) ** 2)
+    assert left < 0.2 * np.sum(knock**2)
+
+
+def test_hum_is_no_mode():
+    true = modes(3, 3000.0, seed=9, lowest=300.0)
+    clip = sampled(true, RATE, 1.0, 40.0) + 0.05 * single(50.0, 0.0, 1.0)
+    assert_same(extract(clip, RATE), true)
+
+
+def noise(count: int = 4000) -> np.ndarray:
+    return np.random.default_rng(0).standard_normal(count)
+
+
+@pytest.mark.parametrize(
+    ("clip", "message"),
+    [
+        (np.zeros(4000), "is silent"),
+        (np.full(4000, np.nan), "has 4000 samples that are not finite"),
+        (noise(), "no modes that stand out"),
+        (np.eye(1, 4000)[0], "no modes that stand out"),
+        (single(440.0, 0.0, 1.0) + 1e-3 * noise(RATE), "does not decay"),
+        (single(440.0, -3.0, 1.0), "does not decay"),
+        (single(30.0, 5.0, 0.06), "less than 3 periods of its lowest mode"),
+        (single(400.0, 5.0, 0.02), "ends .* samples after its strike"),
+    ],
+)
+def test_clips_that_are_no_strike_are_answered_in_one_sentence(clip, message):
+    with pytest.raises(UserError, match=message) as error:
+        extract(clip, RATE)
+    assert "\n" not in str(error.value)
+
+
+def test_more_modes_than_there_are_cannot_be_asked_for():
+    clip = sampled(modes(3, 3000.0, seed=9), RATE, 0.5)
+    with pytest.raises(UserError, match="5 modes asked for, more than the 3 that were extracted"):
+        extract(clip, RATE, modes=5)
+
+
+@pytest.mark.parametrize("before", [0, 1, 700])
+def test_strike_is_found(before):
+    clip = np.concatenate([np.zeros(before), single(300.0, 8.0, 0.5)])
+    clip += 1e-3 * noise(len(clip))
+    assert abs(strike_sample(clip) - before) <= 2
+
+
+def test_esprit_finds_exponents_and_their_number():
+    exponents = np.array([-0.01 + 0.3j, -0.02 + 0.32j, -0.002 - 1.0j])
+    signal = np.exp(np.outer(np.arange(200), exponents)).sum(axis=1)
+    signal += 1e-6 * (noise(400).reshape(2, 200) * [[1.0], [1.0j]]).sum(axis=0)
+    found = esprit(signal)
+    assert len(found) == 3
+    np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(exponents), atol=1e-6)
+
+
+def test_normal_matrix_is_that_of_the_columns():
+    exponents = exponents_of(np.array([300.0, 310.0, 50.0]), np.array([5.0, 40.0, 0.1]), RATE)
+    directions = np.array([1.0 + 2.0j, 0.5j, -1.0])
+    n = np.arange(3000)[:, None]
+    powers = np.exp(n * exponents)
+    columns = np.concatenate([powers, directions * n * powers], axis=1)
+    real = np.concatenate([columns.real, -columns.imag], axis=1)
+    dense = real.T @ real
+    scale = np.sqrt(np.diag(dense))
+    error = (normal_matrix(exponents, directions, len(n)) - dense) / np.outer(scale, scale)
+    assert np.abs(error).max() < 1e-9
+    signal = noise(3000)
+    sums = np.stack([signal @ powers, (n[:, 0] * signal) @ powers])
+    np.testing.assert_allclose(correlations(exponents, signal), sums, rtol=1e-9)
+
+
+def test_least_squares_refines_exponents():
+    true = modes(4, 3000.0, seed=10)
+    clip = sampled(true, RATE, 0.5, 200.0)
+    start = exponents_of(1.0005 * true.frequencies, 1.2 * true.dampings, RATE)
+    found = refined(start, fitted_coefficients(start, clip), clip, 30)[0]
+    exact = exponents_of(true.frequencies, true.dampings, RATE)
+    np.testing.assert_allclose(found, exact, rtol=1e-8)

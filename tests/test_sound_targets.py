@@ -1,0 +1,137 @@
+"""Clips share frequencies; each has its say in which modes are kept."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from carillon.errors import UserError
+from sound.__main__ import main
+from sound.clips.extraction import ModalSound
+from sound.clips.wav import read_wav, write_wav
+from sound.targets import share_frequencies
+
+RATE = 8000
+
+
+def sound(frequencies: list[float], amplitudes: list[float], damping: float = 5.0) -> ModalSound:
+    count = len(frequencies)
+    return ModalSound(
+        np.array(frequencies),
+        np.full(count, damping),
+        np.array(amplitudes),
+        np.zeros(count),
+        np.arange(3.0),
+        RATE,
+        {},
+    )
+
+
+def test_modes_that_cannot_be_told_apart_are_shared():
+    low, high = sound([200.0, 1000.0], [1.0, 1.0], 4.0), sound([500.0, 1001.5], [1.0, 1.0], 8.0)
+    found = share_frequencies(["low", "high"], [low, high], 3)
+    np.testing.assert_allclose(found.frequencies[:2], [200.0, 500.0])
+    np.testing.assert_allclose(found.dampings[:2], [4.0, 8.0])
+    share = (found.frequencies[2] - 1000.0) / 1.5
+    assert 0.3 < share < 0.7
+    assert found.dampings[2] == pytest.approx(4.0 + 4.0 * share)
+    np.testing.assert_array_equal(found.amplitudes, [[1.0, 0.0, 1.0], [0.0, 1.0, 1.0]])
+    assert found.names == ("low", "high")
+    assert found.rates == (RATE, RATE)
+    assert len(found.residuals) == 2
+
+
+def test_shared_frequency_leans_to_the_clip_that_has_more_of_it():
+    strong, weak = sound([200.0, 1000.0], [0.1, 1.0]), sound([300.0, 1001.0], [1.0, 0.01])
+    found = share_frequencies("ab", [strong, weak])
+    assert 1000.0 < found.frequencies[-1] < 1000.1
+
+
+def test_modes_of_one_clip_stay_apart_and_the_closest_ones_meet():
+    beating, other = sound([1000.0, 1001.0], [1.0, 1.0]), sound([1001.2], [1.0])
+    found = share_frequencies("ab", [beating, other])
+    assert len(found.frequencies) == 2
+    np.testing.assert_array_equal(found.amplitudes, [[1.0, 1.0], [0.0, 1.0]])
+
+
+def test_chains_of_close_modes_do_not_become_one():
+    sounds = [sound([1000.0 + 1.5 * number], [1.0]) for number in range(4)]
+    found = share_frequencies("abcd", sounds)
+    assert len(found.frequencies) == 2
+    np.testing.assert_array_equal(found.amplitudes.sum(axis=1), 1.0)
+
+
+@pytest.mark.parametrize("quieter", [1.0, 1e-4])
+def test_quiet_clips_are_heard(quieter):
+    loud = sound([100.0 * n for n in range(1, 11)], [1.0 / n for n in range(1, 11)])
+    quiet = sound([150.0, 250.0, 350.0], [quieter, quieter, 0.1 * quieter])
+    found = share_frequencies(["loud", "quiet"], [loud, quiet], 4)
+    np.testing.assert_allclose(found.frequencies, [100.0, 150.0, 200.0, 250.0])
+
+
+def test_one_clip_keeps_its_strongest():
+    found = share_frequencies(["one"], [sound([1.0e3, 2.0e3, 3.0e3], [0.1, 1.0, 0.5])], 2)
+    np.testing.assert_allclose(found.frequencies, [2.0e3, 3.0e3])
+    np.testing.assert_array_equal(found.amplitudes, [[1.0, 0.5]])
+
+
+def test_clips_in_another_order_give_the_same():
+    first, second = sound([200.0, 700.0, 1000.0], [1, 2, 3]), sound([300.0, 1001.0], [2, 1])
+    one = share_frequencies("ab", [first, second], 3)
+    other = share_frequencies("ba", [second, first], 3)
+    np.testing.assert_allclose(one.frequencies, other.frequencies, rtol=1e-15)
+    np.testing.assert_array_equal(one.amplitudes, other.amplitudes[::-1])
+
+
+def test_more_modes_than_all_clips_have_cannot_be_asked_for():
+    sounds = [sound([200.0, 1000.0], [1.0, 1.0]), sound([1000.5], [1.0])]
+    with pytest.raises(UserError, match="3 modes asked for, more than the 2"):
+        share_frequencies(["a", "b"], sounds, 3)
+
+
+@pytest.fixture(scope="module")
+def clips(tmp_path_factory):
+    """Two clips with a mode in common."""
+    folder = tmp_path_factory.mktemp("clips")
+    for name, frequencies in {"a": [300.0, 800.0], "b": [300.0, 1900.0]}.items():
+        part = sound(frequencies, [0.2, 0.1])
+        write_wav(folder / f"{name}.wav", part.modal_part(RATE // 2), RATE)
+    return folder
+
+
+def test_extract_command_prints_a_table_and_writes_json(clips, tmp_path, capsys):
+    paths = [str(clips / "a.wav"), str(clips / "b.wav")]
+    out = tmp_path / "targets.json"
+    assert main(["extract", *paths, "--out", str(out)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith(f"{paths[0]}: strike at 0.0")
+    assert lines[2].split() == ["Hz", "1/s", "a", "b"]
+    assert [float(line.split()[0]) for line in lines[3:]] == [300.0, 800.0, 1900.0]
+    content = json.loads(out.read_text())
+    assert content["names"] == ["a", "b"]
+    np.testing.assert_allclose(content["dampings_per_second"], 5.0, rtol=1e-3)
+    np.testing.assert_allclose(content["amplitudes"], [[0.2, 0.1, 0], [0.2, 0, 0.1]], rtol=1e-3)
+
+
+def test_extract_command_writes_what_is_left(clips, tmp_path, capsys):
+    left = tmp_path / "left.wav"
+    samples, rate = read_wav(clips / "a.wav")
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(len(samples))
+    write_wav(tmp_path / "noisy.wav", samples + noise, rate)
+    arguments = ["extract", str(tmp_path / "noisy.wav"), "--modes", "2", "--json"]
+    assert main([*arguments, "--residual", str(left)]) == 0
+    assert json.loads(capsys.readouterr().out)["clips"][0]["order"] == 2
+    rest = read_wav(left)[0]
+    np.testing.assert_allclose(rest, noise[-len(rest) :], atol=2e-4)
+
+
+def test_extract_command_names_the_bad_clip(clips, tmp_path):
+    path = tmp_path / "noise.wav"
+    write_wav(path, np.random.default_rng(0).uniform(-0.5, 0.5, 4000), RATE)
+    with pytest.raises(UserError, match="no modes that stand out") as error:
+        main(["extract", str(clips / "a.wav"), str(path)])
+    assert str(error.value).startswith(f"{path}: the clip has")
+    with pytest.raises(UserError, match="of one clip, 2 were given"):
+        main(["extract", *[str(clips / "a.wav")] * 2, "--residual", str(tmp_path / "r.wav")])
