@@ -54,6 +54,7 @@ EXAMPLE = Example(
     resolution=6,
     density=1000.0,
     modes=N_MODES,
+    dimensions=5,
     seconds=1.0,
     targets=(Target("corner", SIDES, "metal", 1), Target("side", (0.0, 0.0, 0.0), "wood", 2)),
     elsewhere=("top", (0.12, 0.08, 0.08)),
@@ -250,7 +251,7 @@ def test_all_examples_are_planned_without_any_mesh_file(tmp_path):
     assert jobs["design_sound"] == sum(example.edits for example in chosen) == 6
     assert jobs["begin_design"] == jobs["check_design"] == jobs["build_sound_page"] == 4
     assert jobs["record_clip"] == 2 and jobs["synthesise_clip"] == 9
-    assert jobs["compare_optimisers"] == jobs["build_sounds_index"] == 1
+    assert jobs["build_sounds_index"] == 1 and jobs["compare_optimisers"] == 2
 
 
 @pytest.mark.slow

@@ -74,7 +74,7 @@ class Example:
     ----------
     name, title, figure, about
         Short name, heading, what it follows in the paper, and a sentence.
-    mesh, resolution, density, modes, seconds
+    mesh, resolution, density, modes, dimensions, seconds
         See `sound/project.schema.yaml`.
     targets
         In the order of their edits.
@@ -94,6 +94,7 @@ class Example:
     resolution: int
     density: float
     modes: int
+    dimensions: int
     seconds: float
     targets: tuple[Target, ...]
     elsewhere: tuple[str, tuple[float, float, float]]
@@ -156,6 +157,7 @@ def project(example: Example, part: str, config: Mapping[str, Any]) -> dict[str,
             }
             for target in example.targets_of(part)
         ],
+        "material": {"dimensions": example.dimensions},
         "optimiser": {"seconds": example.seconds, "seed": config["sound"]["seed"]},
     }
 
@@ -193,6 +195,7 @@ def _example(name: str, config: Mapping[str, Any]) -> Example:
         wanted["resolution"] or solid["resolution"],
         described["density"],
         wanted["modes"] or described["modes"],
+        described["dimensions"],
         wanted["seconds"] or described["seconds"],
         tuple(targets),
         (solid["elsewhere"]["name"], tuple(solid["elsewhere"]["at"])),

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from workflow.report.pictures import COLOUR_MAP
@@ -46,7 +47,7 @@ def cost_figure(found: Found) -> Figure:
                 axes.plot(begin + rows["seconds"], values, label=name, **style)
         for begin in begins[1:-1]:
             axes.axvline(begin, color=MUTED, linewidth=0.9, linestyle=(0, (1, 2)))
-        axes.set(yscale="log", xlabel="wall time [s]", ylabel="cost [1]", title="Cost")
+        _cost_axes(axes)
         axes.set_xlim(0.0, begins[-1])
         axes.legend(loc="upper right")
     return figure
@@ -63,7 +64,7 @@ def optimisers_figure(compared: dict[str, Any]) -> Figure:
             width = 2.2 if row["method"] == "hybrid" else 1.3
             label = METHODS[row["method"]]
             axes.plot(seconds, _positive(cost), color=colour, linewidth=width, label=label)
-        axes.set(yscale="log", xlabel="wall time [s]", ylabel="cost [1]", title="Cost")
+        _cost_axes(axes)
         axes.set_xlim(left=0.0)
         axes.legend(loc="upper right")
     return figure
@@ -125,6 +126,14 @@ def limits(young: Array) -> tuple[float, float]:
     """Moduli [Pa] at both ends of the colours."""
     low, high = float(young.min()), float(young.max())
     return (low, high) if high > 1.001 * low else (0.5 * low, 2.0 * high)
+
+
+def _cost_axes(axes: Any) -> None:
+    """Axes of costs over wall time, with plain numbers."""
+    axes.set(yscale="log", xlabel="wall time [s]", ylabel="cost [1]", title="Cost")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter(NullFormatter())
 
 
 def _ticks(low: float, high: float) -> list[float]:
