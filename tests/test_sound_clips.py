@@ -154,3 +154,9 @@ def test_clip_command_writes_the_partials_it_prints(tmp_path, capsys):
     np.testing.assert_allclose(found.dampings, told["dampings_per_second"], rtol=0.05)
     np.testing.assert_allclose(found.amplitudes, told["amplitudes"], rtol=0.05)
     assert told["frequencies_hz"][0] == pytest.approx(note_hertz("G4"))
+
+
+@pytest.mark.parametrize("seconds", ["1e-5", "1e9"])
+def test_clips_have_a_sensible_length(tmp_path, seconds):
+    with pytest.raises(UserError, match="--seconds .* expected 0.0058 to 60"):
+        main(["clip", "wood", "--seconds", seconds, "--out", str(tmp_path / "wood.wav")])

@@ -38,9 +38,11 @@ def bands(clip: Array, rate: int, width: float, samples: int) -> Iterator[Band]:
     clip, so that a damped sinusoid stays one from the strike on, in that only its coefficient
     changes.  The end of the band, where the filter would look beyond the clip, is left out.
     """
+    from scipy.fft import next_fast_len  # Slow to load.
+
     factor = max(1, int(rate / (2.0 * width)))
     taps = _low_pass(rate, width)
-    length = -(-(len(clip) + len(taps)) // factor)
+    length = next_fast_len(-(-(len(clip) + len(taps)) // factor))
     spectrum = np.fft.fft(clip, factor * length)
     offsets = np.arange(length) - length // 2
     response = np.fft.fft(taps, factor * length).conj()[offsets] / factor

@@ -6,8 +6,11 @@ import argparse
 import json
 
 from carillon.arguments import positive_number, whole_number
+from carillon.errors import UserError
 
 NAMES = ("metal", "wood", "piano")
+LONGEST_SECONDS = 60.0
+"""Length of a clip that is long enough for every strike to die away."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,10 +33,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     from carillon.files import require_writable
+    from sound.clips.extraction import SHORTEST_SAMPLES
     from sound.clips.instruments import note_hertz, synthesised
     from sound.clips.wav import PEAK, write_wav
 
     require_writable(arguments.out)
+    shortest = SHORTEST_SAMPLES / arguments.rate
+    if not shortest <= arguments.seconds <= LONGEST_SECONDS:
+        raise UserError(
+            f"--seconds {arguments.seconds:g}: expected {shortest:.3g} to {LONGEST_SECONDS:g}"
+        )
     pitch = note_hertz(arguments.note) if arguments.note else arguments.pitch
     options = (arguments.seconds, arguments.rate, arguments.seed)
     sound = synthesised(arguments.instrument, pitch, *options)
