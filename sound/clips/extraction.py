@@ -39,6 +39,11 @@ FEWEST_PERIODS = 3.0
 WIDTH_FACTORS = (1.0, 4.0, 16.0)
 """Widths of bands, one search after the other."""
 _SETTLING_STEPS, _FINAL_STEPS = 4, 20
+SAME = 0.25
+"""Distance of two exponents, over the decay of one, below which they are one mode."""
+UNDER_PEAK, DROWNED = 2.0, 0.01
+"""Distance, over the decay of the louder one, and share of its amplitude, below which a sinusoid
+mends the fit of another and is no mode of its own."""
 
 
 @dataclass(frozen=True)
@@ -132,11 +137,33 @@ def _found(clip: Array, rate: int, visible: bool) -> Fit:
     first = 0.5 * BAND_SAMPLES / min(1.0, len(clip) / rate)
     widths = [first * factor for factor in WIDTH_FACTORS]
     for width in [width for width in widths if width < 0.5 * rate] or [0.5 * rate]:
-        slow = fit.chosen(-fit.exponents.real * rate < BAND_DECAY * 2.0 * width / BAND_SAMPLES)
+        is_slow = -fit.exponents.real * rate < BAND_DECAY * 2.0 * width / BAND_SAMPLES
+        slow, quick = fit.chosen(is_slow), fit.exponents[~is_slow]
         rest = clip - superposed(slow.exponents, slow.coefficients, len(clip))
         new = candidates(rest, rate, width, f"bands of {width:.0f} Hz", visible)
-        fit = settled(np.concatenate([fit.exponents, new]), clip, _SETTLING_STEPS)
-    return settled(fit.exponents, clip, _FINAL_STEPS)
+        # Two sinusoids for one mode would fit a clean clip even better.
+        new = new[~_is_beside(new, slow.exponents)]
+        quick = quick[~_is_beside(quick, new)]
+        fit = settled(np.concatenate([slow.exponents, quick, new]), clip, _SETTLING_STEPS)
+    fit = settled(fit.exponents, clip, _FINAL_STEPS)
+    return settled(fit.exponents[~_is_drowned(fit)], clip, 0)
+
+
+def _is_beside(exponents: Complex, others: Complex) -> NDArray[np.bool_]:
+    """Which exponents nobody can tell from one of the others."""
+    if not len(others):
+        return np.zeros(len(exponents), bool)
+    distance = np.abs(exponents[:, None] - others).min(axis=1)
+    return np.asarray(distance < SAME * np.abs(exponents.real))
+
+
+def _is_drowned(fit: Fit) -> NDArray[np.bool_]:
+    """Which sinusoids lie under the peak of another mode, far below it in amplitude."""
+    distance = np.abs(fit.exponents[:, None] - fit.exponents)
+    under = distance < UNDER_PEAK * np.abs(fit.exponents.real)
+    amplitudes = np.abs(fit.coefficients)
+    louder = amplitudes[None, :] * DROWNED > amplitudes[:, None]
+    return np.asarray((under & louder).any(axis=1))
 
 
 def _is_mode(fit: Fit, samples: int) -> NDArray[np.bool_]:

@@ -61,7 +61,7 @@ def targets_of(project: Project) -> Targets:
     for target in project.targets:
         samples, rate = read_wav(target.clip)
         try:
-            sounds.append(extract(samples, rate, target.modes))
+            sounds.append(extract(samples, rate, target.modes, visible=True))
         except UserError as error:
             raise UserError(f"{target.clip}: {error}") from None
     return share_frequencies([target.name for target in project.targets], sounds, project.modes)
