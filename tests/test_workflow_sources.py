@@ -14,7 +14,7 @@ import pytest
 from tests.workflow_runs import CHECKOUT, planned
 from workflow import sources
 
-PACKAGES = ("carillon", "dataset_gen", "forests", "solver", "workflow")
+PACKAGES = ("carillon", "dataset_gen", "forests", "solver", "sound", "workflow")
 CONFIG = """\
 results_dir: results
 models: {{bar: {{mesh: 'builtin:bar', resolution: 8}}}}
