@@ -8,9 +8,11 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from dataclasses import replace
 
 import numpy as np
+import psutil
 import pytest
 import yaml
 
@@ -212,3 +214,20 @@ def test_somebody_who_interrupts_gets_the_best_so_far(prepared):
 def test_more_modes_than_the_clips_have(folder):
     with pytest.raises(UserError, match="40 modes"):
         targets_of(project_of({**small_project.PROJECT, "modes": 40}, folder))
+
+
+def test_workers_end_with_a_killed_parent(folder):
+    process = run_design(folder, "--workers", "2", "--evaluations", "1000000")
+    workers = []
+    while len(workers) < 2:
+        time.sleep(0.1)
+        children = psutil.Process(process.pid).children()
+        workers = [child for child in children if is_at_work(child)]
+    process.kill()
+    process.wait()
+    assert not psutil.wait_procs(workers, timeout=20)[1]
+
+
+def is_at_work(process):
+    """Whether it is a worker that has begun, and so waits for its parent's death as well."""
+    return "spawn_main" in " ".join(process.cmdline()) and process.num_threads() > 1

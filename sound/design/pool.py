@@ -6,13 +6,16 @@ nothing that another task has done.  So results do not depend on how many proces
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
+from multiprocessing.connection import wait
+from threading import Thread
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,8 +152,17 @@ _for_good = ExitStack()
 
 def _prepare_apart(setting: Setting) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Thread(target=_end_with_parent, daemon=True).start()
     _for_good.enter_context(one_thread())
     _prepare(setting)
+
+
+def _end_with_parent() -> None:
+    """End this process when the one that started it is gone, however that came to be."""
+    parent = parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)
 
 
 def _prepare(setting: Setting) -> None:
