@@ -22,7 +22,7 @@ from sound.clips.wav import read_wav
 from sound.design.material import ReducedMaterial
 from sound.design.objective import Objective
 from sound.design.optimisers import OPTIMISERS
-from sound.design.pool import Pool, Setting
+from sound.design.pool import Pool, Setting, Task
 from sound.design.search import BudgetSpentError, Moment, Search
 from sound.design_file import HISTORY_TYPE, Design
 from sound.project import Project
@@ -170,6 +170,7 @@ def design(
         )
         with search:
             try:
+                search.run([Task(z)])
                 OPTIMISERS[budget.method](search, z, budget.seed, budget.population)
             except BudgetSpentError:
                 pass

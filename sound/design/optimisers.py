@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -42,8 +43,7 @@ def hybrid(search: Search, z: Array, seed: int, population: int | None) -> None:
     lanes = [Task(z, manner=manner, steps=STEPS) for manner in MANNERS]
     strategy: Any = None
     while True:
-        lanes = [_until(lane, search.deadline) for lane in lanes]
-        trials = search.run(lanes)
+        trials = search.run([replace(lane, deadline=search.deadline) for lane in lanes])
         stalled = [k for k, trial in enumerate(trials) if _is_stalled(trial)]
         lanes = [_continued(lane, trial) for lane, trial in zip(lanes, trials)]
         if not stalled:
@@ -96,14 +96,10 @@ def quasi_newton(search: Search, z: Array, seed: int, population: int | None) ->
 OPTIMISERS = {"hybrid": hybrid, "cma": evolution, "bfgs": quasi_newton}
 
 
-def _until(lane: Task, deadline: float) -> Task:
-    return Task(lane.z, lane.start, False, lane.manner, lane.steps, lane.damping, deadline)
-
-
 def _continued(lane: Task, trial: Trial) -> Task:
     """The task to go on with after a descent."""
     damping = None if trial.descent is None else trial.descent.damping
-    return Task(trial.z, trial.start, manner=lane.manner, steps=STEPS, damping=damping)
+    return replace(lane, z=trial.z, start=trial.start, damping=damping)
 
 
 def _is_stalled(trial: Trial) -> bool:

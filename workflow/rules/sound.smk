@@ -136,7 +136,7 @@ rule design_sound:
         " --out {output} > {log} 2>&1"
 
 
-# A single evaluation is that of the uniform material; a hybrid search begins with more.
+# A single evaluation is that of the uniform material.
 rule begin_design:
     input:
         project=f"{SOUND}/{{example}}/{PROJECT}",
@@ -154,7 +154,7 @@ rule begin_design:
     params:
         source=source("sound.design.command"),
     shell:
-        "OMP_NUM_THREADS={threads} python -m sound design {input.project} --method cma --evaluations 1"
+        "OMP_NUM_THREADS={threads} python -m sound design {input.project} --evaluations 1"
         " --out {output} > {log} 2>&1"
 
 
