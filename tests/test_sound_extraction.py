@@ -249,3 +249,21 @@ def test_least_squares_refines_exponents():
     found = refined(start, fitted_coefficients(start, clip), clip, 30)[0]
     exact = exponents_of(true.frequencies, true.dampings, RATE)
     np.testing.assert_allclose(found, exact, rtol=1e-8)
+
+
+def test_a_clean_steady_tone_is_refused_at_once():
+    """Without noise, what its end leaves in all bands would be searched for minutes."""
+    tone = 0.5 * np.sin(2.0 * np.pi * 440.0 * np.arange(44_100) / 44_100)
+    with pytest.raises(UserError, match="440.* does not fade"):
+        extract(tone, 44_100)
+
+
+def test_modes_of_a_clean_clip_are_found_once():
+    frequencies = np.array([145.08, 533.05, 569.33, 1326.89, 2152.06])
+    seconds = np.arange(44_100) / 44_100
+    waves = np.exp(-np.outer([6.0, 6.6, 6.6, 9.5, 15.1], seconds))
+    waves *= np.sin(2.0 * np.pi * np.outer(frequencies, seconds))
+    clip = np.array([0.4, 0.1, 2e-3, 0.02, 0.1]) @ waves
+    found = extract(clip.astype(np.float32), 44_100)
+    assert len(found.frequencies) == len(frequencies)
+    np.testing.assert_allclose(found.frequencies, frequencies, rtol=1e-6)

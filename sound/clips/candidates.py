@@ -26,29 +26,51 @@ _MOST_GROWTH = 5.0
 """Nepers by which a sinusoid may grow within a band, for a clip that does not decay to be told."""
 _LATER = 16
 """Samples of a band by which a second search begins later."""
+MOST = 200
+"""Candidates of one pass over the bands."""
 _PEAK = 20.0
 """Largest over median power in a band's spectrum below which it is taken for noise."""
 
 
 def candidates(rest: Array, rate: int, width: float, label: str, visible: bool) -> Complex:
-    """Exponents (k,) per sample of the clip from its bands of `width` [Hz], or of what is left."""
+    """Exponents (k,) per sample of the clip from its bands of `width` [Hz], or of what is left.
+
+    Of more than `MOST` those with most energy: a clip that ends in mid-tone, and has no noise that
+    would hide what its end leaves in all bands, would take minutes otherwise.
+    """
     count = int(0.5 * rate / width) + 1
     parts = bands(rest, rate, width, BAND_SAMPLES)
     found = [_band_exponents(band, rate) for band in track(parts, label, count, visible=visible)]
-    return np.concatenate(found)
+    exponents = np.concatenate([each for each, _ in found])
+    energies = np.concatenate([energies for _, energies in found])
+    return exponents[np.sort(np.argsort(-energies, kind="stable")[:MOST])]
 
 
-def _band_exponents(band: Band, rate: int) -> Complex:
+def _band_exponents(band: Band, rate: int) -> tuple[Complex, Array]:
+    """Exponents (k,) per sample of the clip, and the energy (k,) that each has in the band."""
+    nothing = np.zeros(0, complex), np.zeros(0)
     power = np.abs(np.fft.fft(band.signal)) ** 2
     if len(power) < 4 * _LATER or power.max() < _PEAK * np.median(power):
-        return np.zeros(0, complex)
-    exponents = _stable(band.signal) * band.rate / rate
+        return nothing
+    own = _stable(band.signal)
+    energies = _energies(own, band.signal)
+    exponents = own * band.rate / rate
     inside = np.abs(exponents.imag) * rate <= np.pi * band.width
     exponents = exponents[inside] + 2j * np.pi * band.centre / rate
     low, high = 2.0 * np.pi * LOWEST_HERTZ / rate, HIGHEST_SHARE * np.pi
     sounds = (exponents.imag > low) & (exponents.imag < high) & rings(exponents)
     grows = exponents.real * len(band.signal) * rate / band.rate > _MOST_GROWTH
-    return exponents[sounds & ~grows]
+    kept = sounds & ~grows
+    return exponents[kept], energies[inside][kept]
+
+
+def _energies(exponents: Complex, signal: Complex) -> Array:
+    """Energy (k,) of each sinusoid within the signal, fitted to it together."""
+    if not len(exponents):
+        return np.zeros(0)
+    waves = np.exp(np.outer(np.arange(len(signal)), exponents))
+    coefficients = np.linalg.lstsq(waves, signal, rcond=None)[0]
+    return np.asarray((np.abs(waves * coefficients) ** 2).sum(axis=0))
 
 
 def rings(exponents: Complex) -> NDArray[np.bool_]:

@@ -110,6 +110,7 @@ def extract(
             f"the clip ends {len(clip)} samples after its strike, expected {SHORTEST_SAMPLES} at "
             "least; give a longer recording"
         )
+    _require_no_steady_tone(clip, rate)
     scale = float(np.abs(clip).max())
     searched = clip[: round(LONGEST_SECONDS * rate)] / scale
     with single_threaded_blas():  # many small matrices
@@ -129,6 +130,28 @@ def _require_sound(clip: Array) -> None:
         )
     if not clip.any():
         raise UserError("the clip is silent, expected the sound of a strike")
+
+
+def _require_no_steady_tone(clip: Array, rate: int) -> None:
+    """Refuse a tone that is as loud at the end as at the beginning, before it is searched.
+
+    Where it breaks off, it would fill all bands with candidates.
+    """
+    quarter = len(clip) // 4
+    first, last = clip[:quarter], clip[-quarter:]
+    if last @ last < np.exp(-1.5 * LEAST_DECAY) * (first @ first):
+        return
+    power = np.abs(np.fft.rfft(clip * np.hanning(len(clip)))) ** 2
+    peak = int(np.argmax(power))
+    if power[max(0, peak - 2) : peak + 3].sum() > 0.5 * power.sum():
+        raise UserError(_steady(peak * rate / len(clip), len(clip) / rate))
+
+
+def _steady(hertz: float, seconds: float) -> str:
+    return (
+        f"the clip does not decay (its tone at {hertz:.5g} Hz does not fade in {seconds:.3g} s), "
+        "expected the sound of a strike"
+    )
 
 
 def _found(clip: Array, rate: int, visible: bool) -> Fit:
@@ -198,10 +221,7 @@ def _require_modes(fit: Fit, samples: int, rate: int) -> None:
     if energies[steady].sum() > energies[modes].sum():
         loudest = np.argmax(np.where(steady, energies, 0.0))
         hertz = float(fit.exponents[loudest].imag * rate / (2.0 * np.pi))
-        raise UserError(
-            f"the clip does not decay (its tone at {hertz:.5g} Hz does not fade in "
-            f"{seconds:.3g} s), expected the sound of a strike"
-        )
+        raise UserError(_steady(hertz, seconds))
     if not modes.any():
         raise UserError(
             "the clip has no modes that stand out of its noise, expected the sound of a strike"
