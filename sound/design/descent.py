@@ -1,4 +1,4 @@
-"""Descent to a local optimum by damped Gauss-Newton steps.
+"""Descent to a local optimum by damped Gauss-Newton steps, or by L-BFGS.
 
 The cost is a sum of squares whose Jacobian J is known, so J^T J stands for the Hessian that other
 quasi-Newton methods have to learn from gradients one by one; damped as Levenberg and Marquardt do.
@@ -26,7 +26,7 @@ HARDER, SOFTER = 8.0, 0.25
 """Factors of the damping after a step that failed, and after one that did as foretold."""
 FORETOLD = 0.5
 """Share of the fall of the quadratic model from which it is trusted more."""
-TINY = 1e-300
+TINY, LARGE = 1e-300, 1e12
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,19 @@ class Manner:
     parts: tuple[tuple[bool, bool], ...]
     damping: float
     longest: float
+
+
+@dataclass(frozen=True)
+class LimitedMemory:
+    """A descent by L-BFGS, which knows the gradient alone and so moves less at first.
+
+    Attributes
+    ----------
+    evaluations
+        Gradients that stand for one step of the other manner.
+    """
+
+    evaluations: int
 
 
 @dataclass(frozen=True)
@@ -181,6 +194,51 @@ def descend(
         if here.stalled:
             break
     return here
+
+
+def descend_by_gradients(
+    simulation: Simulation,
+    objective: Objective,
+    z: Array,
+    start: Array | None,
+    evaluations: int,
+    deadline: float = np.inf,
+) -> Descent:
+    """Descent by L-BFGS (scipy), with about as many gradients as `evaluations` says.
+
+    Parameters and errors are those of `descend`.
+    """
+    from scipy.optimize import minimize
+
+    found = simulation.evaluate(z, start, derivatives=True)
+    way = [Way(time.monotonic(), 1, cost_of(objective, simulation.material, found))]
+    here = Descent(found, way, 1, ())
+
+    def value(point: Array) -> tuple[float, Array]:
+        if time.monotonic() >= deadline:
+            raise _LateError
+        here.evaluations += 1
+        try:
+            assert here.found is not None
+            tried = simulation.evaluate(point, here.found.modes, derivatives=True)
+        except ConvergenceError:
+            return LARGE, np.zeros(len(point))
+        cost = cost_of(objective, simulation.material, tried)
+        if cost.total < here.cost.total:
+            here.found = tried
+            here.way.append(Way(time.monotonic(), here.evaluations, cost))
+        return cost.total, squares_of(objective, simulation.material, tried).gradient
+
+    try:
+        minimize(value, z, jac=True, method="L-BFGS-B", options={"maxfun": evaluations})
+    except _LateError:
+        pass
+    here.stalled = len(here.way) == 1
+    return here
+
+
+class _LateError(Exception):
+    """The deadline has passed."""
 
 
 def _step(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sound.design.descent import Manner
+from sound.design.descent import LimitedMemory, Manner
 from sound.design.pool import Task, Trial
 from sound.design.search import Search
 
@@ -21,7 +21,7 @@ MANNERS = (
     Manner(ALTERNATING, damping=1e-2, longest=0.5),
     Manner(TOGETHER, damping=1e-2, longest=0.5),
     Manner(ALTERNATING, damping=10.0, longest=0.1),
-    Manner(TOGETHER, damping=1.0, longest=0.3),
+    LimitedMemory(evaluations=2),
 )
 """How the descents go that run side by side: none is the best for all solids."""
 STEPS = 6

@@ -24,7 +24,15 @@ from carillon.errors import ConvergenceError, UserError
 from carillon.threads import one_thread
 from solver.geometry import HexMesh
 from solver.problem import ProblemOptions
-from sound.design.descent import Descent, Manner, cost_of, descend, squares_of
+from sound.design.descent import (
+    Descent,
+    LimitedMemory,
+    Manner,
+    cost_of,
+    descend,
+    descend_by_gradients,
+    squares_of,
+)
 from sound.design.material import ReducedMaterial
 from sound.design.objective import Cost, Objective
 from sound.design.simulation import TOLERANCE, Simulation
@@ -71,7 +79,7 @@ class Task:
     z: Array
     start: Array | None = None
     gradient: bool = False
-    manner: Manner | None = None
+    manner: Manner | LimitedMemory | None = None
     steps: int = 0
     damping: tuple[float, ...] | None = None
     deadline: float = np.inf
@@ -180,18 +188,16 @@ def _run(task: Task) -> Trial:
     return Trial(task.z, FAILED, 1)
 
 
+def _descent(task: Task, manner: Manner | LimitedMemory) -> Descent:
+    parts = (_simulation, _objective, task.z, task.start)
+    if isinstance(manner, LimitedMemory):
+        return descend_by_gradients(*parts, task.steps * manner.evaluations, task.deadline)
+    return descend(*parts, manner, task.steps, task.damping, task.deadline)
+
+
 def _done(task: Task) -> Trial:
     if task.manner is not None:
-        descent = descend(
-            _simulation,
-            _objective,
-            task.z,
-            task.start,
-            task.manner,
-            task.steps,
-            task.damping,
-            task.deadline,
-        )
+        descent = _descent(task, task.manner)
         last = descent.found
         assert last is not None
         return Trial(
