@@ -132,7 +132,9 @@ kill_tree() {
 fail_node() {
     local step
     kill -KILL "$(cat "$FOLDER/slurmd.pid")" 2>/dev/null || true
-    # Every job has a slurmstepd, which outlives slurmd, but not a node.
+    # Every job has a slurmstepd, which outlives slurmd, but not a node.  It is stopped first: while it
+    # saw its processes die it could still tell the controller of them.
+    pkill -STOP -x slurmstepd || true
     for step in $(pgrep -x slurmstepd || true); do
         kill_tree "$step"
     done
