@@ -34,8 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     from carillon.files import atomic_path, require_writable
-    from sound.clips.extraction import extract
-    from sound.clips.wav import read_wav, write_wav
+    from sound.clips.files import extract_file
+    from sound.clips.wav import write_wav
     from sound.targets import share_frequencies
 
     if arguments.residual and len(arguments.clips) > 1:
@@ -44,14 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
     for path in filter(None, [arguments.out, arguments.residual]):
         require_writable(path)
-    sounds = []
-    for clip in arguments.clips:
-        try:
-            samples, rate = read_wav(clip)
-            sounds.append(extract(samples, rate, visible=sys.stderr.isatty()))
-        except UserError as error:
-            text = str(error)
-            raise UserError(text if text.startswith(clip) else f"{clip}: {text}") from None
+    sounds = [extract_file(clip, visible=sys.stderr.isatty()) for clip in arguments.clips]
     targets = share_frequencies(_names(arguments.clips), sounds, arguments.modes)
     if arguments.residual:
         write_wav(arguments.residual, sounds[0].residual, sounds[0].rate)

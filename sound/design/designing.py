@@ -17,8 +17,9 @@ from carillon.errors import UserError
 from carillon.runtime import allowed_cores
 from solver.geometry import hexmesh_from_voxels, voxelize
 from solver.geometry.surface import surface_name
-from sound.clips.extraction import extract
-from sound.clips.wav import read_wav
+from solver.modes_file import frequencies
+from sound.clips.files import extract_file
+from sound.design.descent import cost_of
 from sound.design.material import ReducedMaterial
 from sound.design.objective import Objective
 from sound.design.optimisers import OPTIMISERS
@@ -57,13 +58,7 @@ def targets_of(project: Project) -> Targets:
     UserError
         If a clip is unusable, or all together have fewer modes than the project asks for.
     """
-    sounds = []
-    for target in project.targets:
-        samples, rate = read_wav(target.clip)
-        try:
-            sounds.append(extract(samples, rate, target.modes, visible=True))
-        except UserError as error:
-            raise UserError(f"{target.clip}: {error}") from None
+    sounds = [extract_file(target.clip, target.modes, True) for target in project.targets]
     return share_frequencies([target.name for target in project.targets], sounds, project.modes)
 
 
@@ -188,12 +183,9 @@ def _finished(prepared: Prepared, search: Search, former_rows: NDArray[np.void])
     simulation = setting.simulation(FINAL_TOLERANCE)
     found = simulation.evaluate(best.z, best.start)
     targets = setting.objective.targets
-    first = float(np.sqrt(found.eigenvalues[0]) / (2.0 * np.pi))
-    factor = (targets.frequencies[0] / first) ** 2
+    factor = float((targets.frequencies[0] / frequencies(found.eigenvalues)[0]) ** 2)
     moduli = setting.material.moduli(best.z)
-    cost = setting.objective.cost(
-        found.eigenvalues, found.pushed, setting.material.regulariser(best.z)
-    )
+    cost = cost_of(setting.objective, setting.material, found)
     rows = np.concatenate([former_rows, history_rows(search.history)])
     seconds, evaluations = search.own_seconds, search.own_evaluations
     evidence: dict[str, Any] = {
