@@ -16,6 +16,7 @@ PYTEST_OPTIONS ?=
 # Test files run beside each other, each in one process, the long ones first. Those of SLURM wait most
 # of the time, which is what the third process is for.
 PYTEST_PROCESSES ?= 3
+TORTURE_PROCESSES ?= 2
 PACKAGES = $(patsubst %/__init__.py,%,$(wildcard */__init__.py))
 RULES = $(wildcard Snakefile workflow/rules/*.smk)
 
@@ -28,10 +29,10 @@ export OMPI_ALLOW_RUN_AS_ROOT := 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 endif
 
-.PHONY: help env run test check clean
+.PHONY: help env run test torture check clean
 
 help:  ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-6s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-7s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 	@echo "  PETSC=source make env   build PETSc and SLEPc against the MPI on PATH instead of using apt's"
 
 env:  ## only the environment: .venv with PETSc and SLEPc
@@ -42,8 +43,14 @@ run: env  ## the default workflow; ends at results/report.html
 	@echo "report: $(abspath results/report.html)"
 
 test: env  ## the whole test suite
+	@bash workflow/envs/packages.sh install tests >/dev/null || echo "tests without them are skipped"
+	@$(PYTHON_OF_VENV) -m tests.warm_up 2>/dev/null || echo "kernels are compiled by the tests"
 	@$(PYTHON_OF_VENV) -m pytest -q -n $(PYTEST_PROCESSES) --dist loadfile \
 		--no-loadscope-reorder $(PYTEST_OPTIONS)
+
+torture: env  ## all hostile inputs, many more random ones, fifty kills; takes an hour or two
+	@CARILLON_TORTURE=1 $(PYTHON_OF_VENV) -m pytest -q -n $(TORTURE_PROCESSES) --dist loadfile \
+		$(wildcard tests/test_hostile_*.py tests/test_properties*.py tests/test_kills.py) $(PYTEST_OPTIONS)
 
 check: env  ## lint, formatting, types, Snakemake rules
 	@ruff check --quiet

@@ -15,27 +15,22 @@ set -euo pipefail
 
 # Where all of SLURM's programs look, also in jobs, whose environment may be another one.
 LINK=/etc/slurm/slurm.conf
+PACKAGES=$(dirname "${BASH_SOURCE[0]}")/../workflow/envs/packages.sh
 
 fail() {
     echo "test-cluster: $*" >&2
     exit 2
 }
 
+# SLURM's plug-in for MPI ranks loads the library by this name, which no dependency brings.
+has_pmix() { python3 -c 'import ctypes; ctypes.CDLL("libpmix.so")' 2>/dev/null; }
+
+complete() { command -v slurmctld slurmd sbatch munged ps pgrep >/dev/null && has_pmix; }
+
 install() {
-    local run=() packages=(slurmctld slurmd slurm-client munge)
-    if command -v slurmctld slurmd sbatch munged >/dev/null; then
-        return
-    fi
-    command -v apt-get >/dev/null ||
-        fail "no SLURM and no apt-get here; install slurmctld, slurmd, the client and munge by hand"
-    if [ "$(id -u)" -ne 0 ]; then
-        sudo -n true 2>/dev/null || fail "installing needs root: sudo apt-get install ${packages[*]}"
-        run=(sudo)
-    fi
-    ${run[@]+"${run[@]}"} apt-get update -qq
-    # The packages would start services for a configuration that does not exist.
-    ${run[@]+"${run[@]}"} env DEBIAN_FRONTEND=noninteractive RUNLEVEL=1 \
-        apt-get install -y -qq --no-install-recommends "${packages[@]}" >/dev/null
+    complete || bash "$PACKAGES" install slurm >/dev/null ||
+        fail "install slurmctld, slurmd, the client, munge, PMIx and procps by hand"
+    complete || fail "SLURM is installed, but its programs or libpmix.so cannot be loaded"
 }
 
 free_port() { python3 -c 'import socket; s = socket.socket(); s.bind(("", 0)); print(s.getsockname()[1])'; }
@@ -100,25 +95,36 @@ start_munge() {
 start() {
     local _
     [ "$(id -u)" -eq 0 ] || fail "the daemons have to be started by root"
-    command -v slurmctld slurmd sbatch munged >/dev/null || fail "no SLURM here; run $0 install"
+    complete || fail "no SLURM here, or not all that it needs; run $0 install"
     [ ! -e "$FOLDER/slurm.conf" ] || fail "$FOLDER holds a cluster already; stop it, or name another folder"
+    forget_dead_cluster
     [ ! -e "$LINK" ] || fail "this machine has a SLURM already: $(readlink -f "$LINK")"
     configure
     mkdir -p "$(dirname "$LINK")"
     ln -sf "$FOLDER/slurm.conf" "$LINK"
-    start_munge
-    slurmctld
-    slurmd
-    for _ in $(seq 100); do
-        if sinfo --noheader --format %T 2>/dev/null | grep -q idle; then
-            return
-        fi
-        sleep 0.2
-    done
+    if start_munge && slurmctld && slurmd; then
+        for _ in $(seq 300); do
+            if sinfo --noheader --format %T 2>/dev/null | grep -q idle; then
+                return
+            fi
+            sleep 0.2
+        done
+    fi
     tail -n 5 "$FOLDER"/log/*.log >&2
     stop
-    fail "the node did not become idle within 20 seconds; the last lines of the logs are above"
+    fail "the node did not become idle within a minute; the last lines of the logs are above"
 }
+
+# What is left where a cluster of this script was killed instead of stopped.
+forget_dead_cluster() {
+    local other
+    other=$(readlink -f "$LINK" 2>/dev/null) || return 0
+    if grep -qs '^ClusterName=throwaway$' "$other" && ! alive "$(dirname "$other")/slurmctld.pid"; then
+        rm -f "$LINK"
+    fi
+}
+
+alive() { [ -f "$1" ] && kill -0 "$(cat "$1")" 2>/dev/null; }
 
 # The process with the number in a file, and all that it has started.
 kill_tree() {
@@ -134,9 +140,17 @@ fail_node() {
     kill -KILL "$(cat "$FOLDER/slurmd.pid")" 2>/dev/null || true
     # Every job has a slurmstepd, which outlives slurmd, but not a node.  It is stopped first: while it
     # saw its processes die it could still tell the controller of them.
-    pkill -STOP -x slurmstepd || true
-    for step in $(pgrep -x slurmstepd || true); do
+    # Another root on the machine, with processes of its own, may hold a cluster too.
+    local here=(--ns "$BASHPID" --nslist pid)
+    pkill "${here[@]}" -STOP -x slurmstepd || true
+    for step in $(pgrep "${here[@]}" -x slurmstepd || true); do
         kill_tree "$step"
+    done
+    # Without cgroups SLURM loses sight of processes whose parents have died.
+    for step in $(pgrep "${here[@]}" '.' || true); do
+        if tr '\0' '\n' 2>/dev/null <"/proc/$step/environ" | grep -qx 'SLURM_CLUSTER_NAME=throwaway'; then
+            kill -KILL "$step" 2>/dev/null || true
+        fi
     done
 }
 

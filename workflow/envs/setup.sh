@@ -20,11 +20,6 @@ STAMP=$VENV/carillon-environment     # written last: it exists only beside a fin
 UNFINISHED=$VENV/carillon-unfinished # exists while packages are being written
 LOG=$ROOT/build/environment.log
 DEBIAN_PYTHON=/usr/bin/python3
-DEBIAN_PACKAGES=(
-    make python3-venv python3-numpy
-    python3-petsc4py python3-slepc4py python3-mpi4py openmpi-bin
-    libopenblas0-pthread # apt's default is the reference BLAS, several times slower
-)
 OLDEST_PYTHON=11 # 3.11
 
 # The user's own Python settings must not leak into the environment that is built here.
@@ -102,45 +97,13 @@ require_python() {
     fi
 }
 
-missing_packages() {
-    local package installed
-    installed=$(dpkg-query -W -f '${Package} ${Status}\n' "${DEBIAN_PACKAGES[@]}" 2>/dev/null || true)
-    for package in "${DEBIAN_PACKAGES[@]}"; do
-        case $installed in
-        *"$package install ok installed"*) ;;
-        *) printf '%s\n' "$package" ;;
-        esac
-    done
-}
-
 install_packages() {
-    local missing install
-    if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
-        fail "this machine has no apt-get (not Debian or Ubuntu); load a compiler and an MPI, then run" \
-            "PETSC=source make env"
+    if command -v apt-get >/dev/null && [ -n "$(bash "$ENVS/packages.sh" missing environment)" ]; then
+        say "Installing system packages"
     fi
-    mapfile -t missing < <(missing_packages)
-    if [ ${#missing[@]} -eq 0 ]; then
-        return
-    fi
-    if [ "$(id -u)" -eq 0 ]; then
-        install=()
-    elif command -v sudo >/dev/null && sudo -n true 2>/dev/null; then
-        install=(sudo -n)
-    else
-        fail "system packages are missing and you are not root; run" \
-            "sudo apt-get install --no-install-recommends ${missing[*]}" \
-            "and try again, or build without them: PETSC=source make env"
-    fi
-    say "Installing system packages: ${missing[*]}"
-    install+=(env DEBIAN_FRONTEND=noninteractive apt-get -q -y -o DPkg::Lock::Timeout=300)
-    # A fresh machine has no package lists, an old one has lists that name files long gone.
-    if ! "${install[@]}" install --no-install-recommends "${missing[@]}" >>"$LOG" 2>&1; then
-        logged "${install[@]}" update || fail "apt-get update failed, see $LOG"
-        logged "${install[@]}" install --no-install-recommends "${missing[@]}" ||
-            fail "apt-get could not install ${missing[*]} (see $LOG); install them by hand, or run" \
-                "PETSC=source make env"
-    fi
+    logged bash "$ENVS/packages.sh" install environment ||
+        fail "system packages are missing (above; the log is $LOG); install them, or load a compiler" \
+            "and an MPI and build without them: PETSC=source make env"
 }
 
 # Major version of the numpy that the distribution's petsc4py was compiled against.
@@ -371,7 +334,7 @@ main() {
     choose_kind
     NUMPY_ABI=2
     if [ "$KIND" = debian ]; then
-        if [ ! -f "$STAMP" ] || [ -n "$(missing_packages)" ]; then
+        if [ ! -f "$STAMP" ] || [ -n "$(bash "$ENVS/packages.sh" missing environment)" ]; then
             : >"$LOG"
             install_packages
         fi

@@ -1,0 +1,36 @@
+"""How long tests wait: a bound against hangs, never a demand on speed (test support)."""
+
+from __future__ import annotations
+
+import subprocess
+import time
+from collections.abc import Callable
+
+HANG_SECONDS = 1200.0
+"""What takes longer hangs, on however busy a machine."""
+
+
+def wait_for(
+    met: Callable[[], object], what: str, run: subprocess.Popen[str] | None = None
+) -> None:
+    """Wait until something is so.
+
+    Parameters
+    ----------
+    met
+        Whether it is so.
+    what
+        Is waited for.
+    run
+        A process without which it cannot happen.
+
+    Raises
+    ------
+    AssertionError
+        If the process ends before, or nothing happens at all.
+    """
+    until = time.monotonic() + HANG_SECONDS
+    while not met():
+        assert run is None or run.poll() is None or met(), f"{what}: the run has ended before"
+        assert time.monotonic() < until, f"{what}: not within {HANG_SECONDS:g} s"
+        time.sleep(0.05)
