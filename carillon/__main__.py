@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import sys
 from typing import Any
 
 from carillon import cli, provenance, runtime
+from carillon.arguments import Parser
 from carillon.errors import UserError
 
 
@@ -69,7 +69,7 @@ def _print_table(found: dict[str, Any]) -> None:
 
 def main() -> int:
     """Print the description of the environment, as a table or as JSON."""
-    parser = argparse.ArgumentParser(prog="python -m carillon", description=__doc__)
+    parser = Parser(prog="carillon", description=__doc__)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     arguments = parser.parse_args()
     found = describe()

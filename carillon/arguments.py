@@ -3,10 +3,22 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Callable
 from typing import NoReturn
 
 from carillon.errors import UserError
+from carillon.runtime import allowed_cores
+
+LARGEST = 2**63 - 1
+"""Of whole numbers: what files and compiled code can hold."""
+
+MOST_WORKERS = 64
+"""Processes or threads that one command may start on a machine of few cores."""
+WORKERS_OF_CORE = 4
+"""The same for each core of a machine with more."""
+
+_WHOLE = re.compile(r"[-+]?[0-9]{1,30}", re.ASCII)
 
 
 class Parser(argparse.ArgumentParser):
@@ -17,16 +29,36 @@ class Parser(argparse.ArgumentParser):
         raise UserError(f"{message} (see {self.prog} --help)")
 
 
-def whole_number(least: int) -> Callable[[str], int]:
-    """Argument type: an integer that is at least `least`."""
+def whole_number(least: int, most: int = LARGEST) -> Callable[[str], int]:
+    """Argument type: an integer in `least`..`most`, in digits."""
 
     def convert(text: str) -> int:
-        try:
-            value = int(text)
-        except ValueError:
-            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+        if not _WHOLE.fullmatch(text):
+            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
+        value = int(text)
         if value < least:
             raise argparse.ArgumentTypeError(f"{value} is too small, expected at least {least}")
+        if value > most:
+            raise argparse.ArgumentTypeError(f"{value} is too large, expected at most {most}")
+        return value
+
+    return convert
+
+
+def number_of_workers(text: str) -> int:
+    """Argument type: processes or threads, no more than this machine could bear."""
+    return whole_number(1, max(MOST_WORKERS, WORKERS_OF_CORE * allowed_cores()))(text)
+
+
+def number_between(low: float, high: float, unit: str = "") -> Callable[[str], float]:
+    """Argument type: a number in `low`..`high`, both of them included."""
+
+    def convert(text: str) -> float:
+        value = _number(text)
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(
+                f"{text} is out of range, expected {low:g} to {high:g} {unit}".rstrip()
+            )
         return value
 
     return convert

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import fcntl
 import hashlib
 import io
@@ -16,74 +15,63 @@ from typing import Any
 
 import h5py
 
-from carillon.errors import UserError
+from carillon.errors import ConvergenceError, UserError
+from carillon.places import cause as cause
+from carillon.places import first_line, require_file, target_of
+from carillon.places import require_writable as require_writable
+
+LONGEST_ENDING = 10
+"""Characters of a format's ending, which temporary names keep."""
 
 SEAL_BYTES = 512
 """Length of the seal, which stands before the HDF5 file proper (its user block)."""
 
+_FAULTS = {
+    OSError: "damaged",
+    KeyError: "incomplete",
+    Exception: "not what it should be",
+}
+_NONSENSE = (
+    OSError,
+    LookupError,
+    ValueError,
+    TypeError,
+    AttributeError,
+    ArithmeticError,
+    RuntimeError,
+)
+"""What HDF5, numpy and JSON raise where a file holds something else than is read from it."""
 _SEAL = b"Carillon: the bytes behind the first 512 have the SHA-256 "
-_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-
-
-def cause(error: OSError) -> str:
-    """What the operating system said, in one line, and what to do if there is no room left."""
-    text = error.strerror if error.errno and error.strerror else _first_line(error)
-    if error.errno in _NO_ROOM:
-        text = os.strerror(error.errno)
-        return f"{text}; make room and run the same command again"
-    return text
-
-
-def require_writable(path: str | Path) -> Path:
-    """Check, before hours of work, that a result can be written to `path`.
-
-    Raises
-    ------
-    UserError
-        If the folder is missing or not writable, or `path` names a folder.
-    """
-    path = Path(path)
-    folder = path.parent if str(path.parent) else Path(".")
-    if path.is_dir():
-        raise UserError(f"{path}: is a folder, expected the name of a file to write")
-    if not folder.is_dir():
-        raise UserError(
-            f"{path}: cannot be written, the folder {folder} does not exist; create it first"
-        )
-    try:
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise UserError(
-            f"{path}: cannot be written ({error.strerror}); name a folder you may write to"
-        ) from None
-    return path
 
 
 @contextmanager
 def atomic_path(path: str | Path) -> Iterator[Path]:
     """Yield a temporary name beside `path`; on success fsync it and rename it to `path`.
 
-    When the body raises, the temporary file is removed and `path` stays as it was. What killed
-    writers of `path` have left is removed too.
+    Only regular files are replaced, see `require_writable`.  When the body raises, the temporary
+    file is removed and `path` stays as it was.  What killed writers of `path` have left is removed
+    too.  Of several writers at a time the last one stays; readers see one whole file or another.
     """
     path = require_writable(path)
-    _remove_leftovers(path)
-    handle, temporary = _new_temporary(path)
     try:
-        yield temporary
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(temporary, 0o666 & ~umask)
-        with open(temporary, "rb+") as stream:
-            os.fsync(stream.fileno())
-        os.replace(temporary, path)
-        sync_folder(path.parent)
+        target = target_of(path)
+        _remove_leftovers(target)
+        handle, temporary = _new_temporary(target)
+        try:
+            yield temporary
+            umask = os.umask(0)
+            os.umask(umask)
+            os.chmod(temporary, 0o666 & ~umask)
+            with open(temporary, "rb+") as stream:
+                os.fsync(stream.fileno())
+            target_of(path)  # refuses what may have come there in the meantime
+            os.replace(temporary, target)
+            sync_folder(target.parent)
+        finally:
+            temporary.unlink(missing_ok=True)
+            os.close(handle)
     except OSError as error:
         raise UserError(f"{path}: could not be written ({cause(error)})") from error
-    finally:
-        temporary.unlink(missing_ok=True)
-        os.close(handle)
 
 
 def sync_folder(folder: Path) -> None:
@@ -122,13 +110,15 @@ def _remove_leftovers(path: Path) -> None:
 
 
 def _temporary_name(path: Path) -> tuple[str, str]:
-    return f".{path.name}.", f".partial{path.suffix}"
+    ending = path.suffix if len(path.suffix) <= LONGEST_ENDING else ""
+    return f".{path.name}.", f".partial{ending}"
 
 
 class _Disk(io.FileIO):
     """A file for HDF5 that never fails: the first error is kept for later, what follows is dropped.
 
-    HDF5 itself crashes at exit once it could not write what it holds, for instance on a full disk.
+    HDF5 itself crashes once it could not write what it holds, for instance on a full disk, or when
+    it then reads beyond the end of its file: what is dropped becomes a hole, which takes no room.
     """
 
     failure: OSError | None = None
@@ -136,13 +126,21 @@ class _Disk(io.FileIO):
     def write(self, data: Any) -> int:
         """Write all of `data`, or remember why that failed."""
         view = memoryview(data).cast("B")
-        done = 0
+        begin, done = self.tell(), 0
         while done < len(view) and self.failure is None:
             try:
                 done += super().write(view[done:]) or 0
             except OSError as error:
                 self.failure = error
+        if done < len(view):
+            self._leave_hole(begin + len(view))
         return len(view)
+
+    def _leave_hole(self, end: int) -> None:
+        with suppress(OSError):
+            if end > os.fstat(self.fileno()).st_size:
+                super().truncate(end)
+        self.seek(end)
 
     def truncate(self, size: int | None = None) -> int:
         """Set the length, or remember why that failed."""
@@ -168,10 +166,16 @@ def create_h5(
     """
     with atomic_path(path) as temporary:
         with _Disk(temporary, "w+b") as disk:
-            with h5py.File(disk, "w", userblock_size=SEAL_BYTES if sealed else 0) as file:
-                file.attrs["kind"] = kind
-                file.attrs["schema_version"] = schema
-                yield file
+            try:
+                with h5py.File(disk, "w", userblock_size=SEAL_BYTES if sealed else 0) as file:
+                    file.attrs["kind"] = kind
+                    file.attrs["schema_version"] = schema
+                    yield file
+            except UserError:  # from whoever makes the contents, and knows more
+                raise
+            except BaseException:
+                disk.check()  # it says more than what HDF5 then stumbles over
+                raise
             disk.check()
         if sealed:
             with open(temporary, "rb+") as stream:
@@ -218,22 +222,22 @@ def _is_version_sealed(path: Path, inode: int, size: int, changed: int) -> bool:
 def open_h5(path: str | Path, kind: str, schema: int, sealed: bool = False) -> Iterator[h5py.File]:
     """Open the HDF5 file `path` for reading and check that it is what it should be.
 
-    A seal is verified if there is one, before HDF5 sees the file; `sealed` demands one.
+    A seal is verified if there is one, before HDF5 sees the file; `sealed` demands one.  What goes
+    wrong within the body is taken for a fault of the file: do nothing but reading in there.
 
     Raises
     ------
     UserError
-        If the file is missing, damaged, of another kind, or of another schema version.
+        If the file is missing, damaged, of another kind, or of another schema version, or its
+        content cannot be read as the body tries to.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise UserError(f"{path}: no such file, expected a Carillon {kind} file (HDF5)")
+    path = require_file(path, f"a Carillon {kind} file (HDF5)")
     try:
         found_seal = _is_sealed(path)
         file = h5py.File(path, "r")
     except OSError as error:
         raise UserError(
-            f"{path}: is not readable as HDF5 ({_first_line(error)}); the file is damaged or of "
+            f"{path}: is not readable as HDF5 ({first_line(error)}); the file is damaged or of "
             f"another format, expected a Carillon {kind} file"
         ) from None
     with file:
@@ -244,14 +248,13 @@ def open_h5(path: str | Path, kind: str, schema: int, sealed: bool = False) -> I
             )
         try:
             yield file
-        except OSError as error:
+        except ConvergenceError:
+            raise
+        except _NONSENSE as error:
+            fault = next(text for kind, text in _FAULTS.items() if isinstance(error, kind))
             raise UserError(
-                f"{path}: is damaged ({_first_line(error)}); generate the file again"
-            ) from None
-        except KeyError as error:
-            raise UserError(
-                f"{path}: is incomplete ({_first_line(error)}); generate the file again"
-            ) from None
+                f"{path}: is {fault} ({first_line(error)}); generate the file again"
+            ) from error
 
 
 def _require_kind(path: Path, file: h5py.File, kind: str, schema: int) -> None:
@@ -260,7 +263,7 @@ def _require_kind(path: Path, file: h5py.File, kind: str, schema: int) -> None:
         found = int(file.attrs.get("schema_version", -1))
     except Exception as error:  # HDF5 has many ways to say that bytes make no sense
         raise UserError(
-            f"{path}: is damaged ({_first_line(error)}); generate the file again"
+            f"{path}: is damaged ({first_line(error)}); generate the file again"
         ) from None
     if found_kind != kind:
         raise UserError(f"{path}: holds {found_kind!r}, expected a Carillon {kind} file")
@@ -269,8 +272,3 @@ def _require_kind(path: Path, file: h5py.File, kind: str, schema: int) -> None:
             f"{path}: written with {kind} schema {found}, this version reads schema {schema}; "
             f"generate the file again"
         )
-
-
-def _first_line(error: BaseException) -> str:
-    lines = str(error).strip("'\"").splitlines()
-    return lines[0] if lines else type(error).__name__

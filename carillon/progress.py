@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sized
+from contextlib import suppress
 from datetime import timedelta
 from typing import TypeVar
 
@@ -89,7 +90,8 @@ def _short(rate: float) -> str:
 def say(text: str, visible: bool = True, end: str = "\n") -> None:
     """Print one line to standard error; standard output stays free for results.
 
-    With `end="\\r"` the next line takes its place.
+    With `end="\\r"` the next line takes its place.  Work goes on if standard error is gone or full.
     """
     if visible:
-        print(text, file=sys.stderr, flush=True, end=end)
+        with suppress(OSError, ValueError):
+            print(text, file=sys.stderr, flush=True, end=end)
