@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-import traceback
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -14,36 +13,46 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
+from petsc4py import PETSc
 
-from carillon.arguments import Parser, non_negative_number, positive_number, whole_number
-from carillon.cli import EXIT_BAD_INPUT, EXIT_NOT_CONVERGED
-from carillon.errors import ConvergenceError, UserError
+from carillon import cli
+from carillon.arguments import Parser, number_between, number_of_workers, whole_number
+from carillon.errors import UserError
 from carillon.files import atomic_path, require_writable
+from carillon.pictures import require_plottable
+from carillon.progress import say
 from carillon.runtime import limit_threads, warn_about_reference_blas
 from dataset_gen.element import DEFAULT_POISSON
 from dataset_gen.objectives import OBJECTIVES, require_objective
-from solver import coarsening, inner, materials
+from solver import coarsening, inner, materials, petsc_options
 from solver.analysis import METHODS, ModalSolver, Modes, SolverOptions
 from solver.correction import ACCELERATIONS, EIGENVALUE_TOLERANCE, INTERACTIVE_TOLERANCE
 from solver.decomposition import keep_on_root, on_root
-from solver.eigensolver import insert_options
 from solver.geometry import FILLS, PIECES
 from solver.hcms.condense import INTERFACES
+from solver.limits import EXTENTS, FARTHEST, MOST_RANKS
 from solver.problem import Problem, ProblemOptions, build_problem
 from solver.truth import RESIDUAL_TOLERANCE
 
 _PROBLEM_FIELDS = tuple(ProblemOptions.__dataclass_fields__)
+_INPUTS = ("mesh", "material", "forest", "truth", "start")
+_MODES = whole_number(1, 2**31 - 1)
+_TOLERANCE = number_between(1e-15, 1.0)
+_MOST_STEPS, _MOST_SOLIDS = 10_000, 100_000
+_FARTHEST = EXTENTS[1] * FARTHEST
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; every rank returns the same status, or the whole job is aborted."""
     comm = MPI.COMM_WORLD
-    try:
-        options = _parser().parse_args(arguments)
-    except UserError as error:
-        if comm.rank == 0:
-            print(f"solver: {error}", file=sys.stderr, flush=True)
-        return EXIT_BAD_INPUT
+    found: list[argparse.Namespace] = []
+    status = cli.run("solver", lambda: found.append(_parser().parse_args(arguments)), comm)
+    for options in found:
+        status = cli.run(f"solver {options.command}", partial(_run, options, comm), comm)
+    return status
+
+
+def _run(options: argparse.Namespace, comm: MPI.Comm) -> None:
     node = comm.Split_type(MPI.COMM_TYPE_SHARED)
     limit_threads(node.size)
     node.Free()
@@ -51,26 +60,27 @@ def main(arguments: list[str] | None = None) -> int:
         warn_about_reference_blas()
     try:
         options.run(options, comm)
-    except (UserError, ConvergenceError) as error:
-        status = EXIT_BAD_INPUT if isinstance(error, UserError) else EXIT_NOT_CONVERGED
-        if comm.rank == 0 or not error.collective:
-            print(f"solver {options.command}: {error}", file=sys.stderr, flush=True)
-        if comm.size > 1 and not error.collective:
-            comm.Abort(status)
-        return status
-    except Exception:
-        if comm.size == 1:
-            raise
-        traceback.print_exc()
-        comm.Abort(1)
-    return 0
+    except PETSc.Error as error:
+        raise petsc_options.meaning(error, getattr(options, "petsc", None)) from error
+
+
+def _require_outputs(options: argparse.Namespace) -> None:
+    """Check that the results can be written, and not in the place of what they are made from."""
+    given = vars(options)
+    inputs = [given[name] for name in _INPUTS if given.get(name) is not None]
+    files = [*inputs, *given.get("files", []), *given.get("candidates", [])]
+    if given.get("plot") is not None:
+        require_plottable(given["plot"])
+    for name in ("out", "plot"):
+        if given.get(name) is not None:
+            require_writable(given[name], files)
 
 
 def _modes(options: argparse.Namespace, comm: MPI.Comm) -> None:
     from solver.modes_file import write_modes
     from solver.start import start_from_file
 
-    on_root(comm, lambda: require_writable(options.out))
+    on_root(comm, lambda: _require_outputs(options))
     parameters = _problem_options(options)
     solver = SolverOptions(
         method=options.method,
@@ -88,7 +98,7 @@ def _modes(options: argparse.Namespace, comm: MPI.Comm) -> None:
     )
     problem = keep_on_root(comm, lambda: build_problem(parameters))
     model = None if problem is None else problem.model
-    insert_options(options.petsc)
+    petsc_options.insert_options(options.petsc, options.method)
     prepared = ModalSolver(model, solver, comm, verbose=sys.stderr.isatty())
     start = None
     if options.start is not None:
@@ -111,7 +121,14 @@ def _modes(options: argparse.Namespace, comm: MPI.Comm) -> None:
 
     result.system.pour(result.vectors, write)
     if comm.rank == 0:
+        _warn_about_options()
         _print_summary(attributes, result.values, options)
+
+
+def _warn_about_options() -> None:
+    unused = petsc_options.unused_options()
+    if unused:
+        say(f"warning: PETSc had no use for {', '.join(unused)}; see whether the names are right")
 
 
 def _modes_attributes(
@@ -147,8 +164,10 @@ def _print_summary(attributes: dict[str, Any], values: Any, options: argparse.Na
     total = sum(attributes["timings"].values())
     elastic = hertz[6:]
     span = f"{elastic[0]:.2f} to {elastic[-1]:.2f} Hz" if len(elastic) else "none elastic"
+    added = attributes.get("modes_added", 0)
+    late = f", {added} found after the first search" if added else ""
     print(
-        f"{options.out}: {len(values)} modes of {attributes['n_dofs']:,} unknowns, {span}; "
+        f"{options.out}: {len(values)} modes of {attributes['n_dofs']:,} unknowns, {span}{late}; "
         f"{attributes['rigid_modes']} rigid, largest residual {attributes['residual_max']:.1e}, "
         f"orthogonal to {attributes['orthogonality']:.1e}, {total:.1f} s on {attributes['ranks']} "
         f"rank{'s' if attributes['ranks'] > 1 else ''}"
@@ -186,8 +205,7 @@ def _audit(options: argparse.Namespace, comm: MPI.Comm) -> None:
     from solver.audit import audit_files
 
     _require_one_rank(options, comm)
-    if options.out is not None:
-        require_writable(options.out)
+    _require_outputs(options)
     audits = {name: found.as_dict() for name, found in audit_files(options.files).items()}
     content = {"spectra": audits, "provenance": record(_command_parameters(options))}
     if options.out is not None:
@@ -206,10 +224,10 @@ def _audit(options: argparse.Namespace, comm: MPI.Comm) -> None:
 
 def _respond(options: argparse.Namespace, comm: MPI.Comm) -> None:
     from solver.response import Damping
-    from solver.response_file import StrikeOptions, respond, write_response
+    from solver.response_file import TRUTH, StrikeOptions, respond, write_response
 
     _require_one_rank(options, comm)
-    require_writable(options.out)
+    _require_outputs(options)
     strike = StrikeOptions(
         options.strike,
         options.observed,
@@ -218,6 +236,11 @@ def _respond(options: argparse.Namespace, comm: MPI.Comm) -> None:
         options.periods,
     )
     candidates = {Path(path).stem: path for path in options.candidates}
+    if len(candidates) < len(options.candidates) or TRUTH in candidates:
+        raise UserError(
+            f"files called {', '.join(sorted(Path(path).stem for path in options.candidates))}: "
+            f"expected names that differ from each other and from {TRUTH!r}; rename one"
+        )
     found = respond(options.truth, candidates, strike)
     write_response(options.out, found, _command_parameters(options))
     for name, response in found.responses.items():
@@ -236,7 +259,7 @@ def _convergence(options: argparse.Namespace, comm: MPI.Comm) -> None:
     from carillon.measurement import measured
     from solver.convergence import correction_history
 
-    on_root(comm, lambda: require_writable(options.out))
+    on_root(comm, lambda: _require_outputs(options))
     problem = keep_on_root(comm, lambda: build_problem(_problem_options(options)))
     model = None if problem is None else problem.model
     history = correction_history(
@@ -250,8 +273,7 @@ def _benchmark(options: argparse.Namespace, comm: MPI.Comm) -> None:
     from carillon.measurement import measured
     from solver.benchmark import BenchmarkOptions, benchmark_row, row_lines
 
-    if options.out is not None:
-        on_root(comm, lambda: require_writable(options.out))
+    on_root(comm, lambda: _require_outputs(options))
     benchmark = BenchmarkOptions(
         options.modes,
         options.runs,
@@ -272,9 +294,7 @@ def _scaling(options: argparse.Namespace, comm: MPI.Comm) -> None:
     from carillon.measurement import measured
     from solver.scaling import ScalingOptions, measure, scaling_study, study_lines
 
-    for path in (options.out, options.plot):
-        if path is not None:
-            on_root(comm, partial(require_writable, path))
+    on_root(comm, lambda: _require_outputs(options))
     if options.here or comm.size > 1:
         problem = keep_on_root(comm, lambda: build_problem(_problem_options(options)))
         model = None if problem is None else problem.model
@@ -325,8 +345,7 @@ def _objectives(options: argparse.Namespace, comm: MPI.Comm) -> None:
     from carillon.provenance import record
     from solver.objectives import rate_objectives
 
-    if options.out is not None:
-        on_root(comm, lambda: require_writable(options.out))
+    on_root(comm, lambda: _require_outputs(options))
     found = rate_objectives(_problem_options(options), options.modes, options.objectives, comm)
     found["provenance"] = record(_command_parameters(options))
     if options.out is not None:
@@ -347,7 +366,7 @@ def _calibrate(options: argparse.Namespace, comm: MPI.Comm) -> None:
 
     if comm.size > 1:
         raise UserError("calibrate runs on one rank; share its work with --workers instead")
-    require_writable(options.out)
+    _require_outputs(options)
     paths = make_cases(
         Path(options.cases), options.seed, options.solids, objects=not options.random_only
     )
@@ -412,6 +431,12 @@ def _command_parameters(options: argparse.Namespace) -> dict[str, Any]:
     return {key: value for key, value in vars(options).items() if key not in hidden}
 
 
+def _tolerance(text: str) -> float:
+    """Argument type: a relative tolerance that double precision can reach, or 0 for none."""
+    value = number_between(0.0, 1.0)(text)
+    return value if value == 0.0 else _TOLERANCE(text)
+
+
 def _objective_names(text: str) -> list[str]:
     """Argument type: names of objectives, separated by commas."""
     names = list(dict.fromkeys(text.split(",")))
@@ -425,7 +450,7 @@ def _objective_names(text: str) -> list[str]:
 
 def _rank_counts(text: str) -> list[int]:
     """Argument type: numbers of ranks, separated by commas, each once and ascending."""
-    return sorted({whole_number(1)(part) for part in text.split(",")})
+    return sorted({whole_number(1, MOST_RANKS)(part) for part in text.split(",")})
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -439,19 +464,19 @@ def _parser() -> argparse.ArgumentParser:
     _add_problem(modes)
     modes.add_argument("--method", choices=METHODS, default="hcms", help="default: %(default)s")
     modes.add_argument(
-        "--modes", type=int, default=256, help="number, rigid included (default 256)"
+        "--modes", type=_MODES, default=256, help="number, rigid included (default 256)"
     )
     modes.add_argument("--out", required=True, help="modes file to write (HDF5)")
     modes.add_argument(
         "--tol",
-        type=non_negative_number,
+        type=_tolerance,
         help="hcms: relative eigenvalue error to correct to "
         f"(default {EIGENVALUE_TOLERANCE:g}; 0 makes exactly --corrections steps); "
         f"slepc, arpack: residual tolerance (default {RESIDUAL_TOLERANCE:g})",
     )
     modes.add_argument(
         "--corrections",
-        type=whole_number(0),
+        type=whole_number(0, _MOST_STEPS),
         default=SolverOptions.corrections,
         help="largest number of correction steps; 0 is plain HCMS (default %(default)s)",
     )
@@ -478,18 +503,17 @@ def _parser() -> argparse.ArgumentParser:
     modes.add_argument(
         "--prove",
         action=argparse.BooleanOptionalAction,
-        help="count the eigenvalues by inertia (default: for slepc and arpack)",
+        help="count the eigenvalues by inertia, and find those that are missing (default: for "
+        "slepc and arpack)",
     )
-    modes.add_argument(
-        "--keep", type=whole_number(1), help="modes kept at the root of the merge tree"
-    )
+    modes.add_argument("--keep", type=_MODES, help="modes kept at the root of the merge tree")
     modes.add_argument(
         "--cutoff",
-        type=positive_number,
+        type=number_between(1e-9, 1e15, "Hz"),
         metavar="HZ",
         help="frequency up to which HCMS keeps modes below the root (default: a number of them)",
     )
-    modes.add_argument("--subdomains", type=whole_number(1), help="number of subdomains")
+    modes.add_argument("--subdomains", type=_MODES, help="number of subdomains")
     modes.add_argument(
         "--interface",
         choices=INTERFACES,
@@ -519,9 +543,11 @@ def _parser() -> argparse.ArgumentParser:
         "convergence", help="eigenvalues after each correction from several starts (Fig. 10)"
     )
     _add_problem(convergence)
-    convergence.add_argument("--modes", type=int, default=256, help="rigid included (default 256)")
     convergence.add_argument(
-        "--steps", type=whole_number(0), default=3, help="corrections (default 3)"
+        "--modes", type=_MODES, default=256, help="rigid included (default 256)"
+    )
+    convergence.add_argument(
+        "--steps", type=whole_number(0, _MOST_STEPS), default=3, help="corrections (default 3)"
     )
     convergence.add_argument(
         "--truth", help="modes file with the exact eigenvalues (default: SLEPc finds them)"
@@ -532,12 +558,17 @@ def _parser() -> argparse.ArgumentParser:
     benchmark = commands.add_parser("benchmark", help="time all methods on one solid (Fig. 11)")
     _add_solid(benchmark)
     benchmark.add_argument("--forest", help="forests to coarsen by (HDF5; default: packaged)")
-    benchmark.add_argument("--modes", type=int, default=256, help="rigid included (default 256)")
+    benchmark.add_argument("--modes", type=_MODES, default=256, help="rigid included (default 256)")
     benchmark.add_argument(
-        "--runs", type=whole_number(1), default=5, help="rounds of all methods (default 5)"
+        "--runs",
+        type=whole_number(1, _MOST_STEPS),
+        default=5,
+        help="rounds of all methods (default 5)",
     )
     benchmark.add_argument(
-        "--slow-runs", type=whole_number(1), help="rounds that ARPACK runs in (default: all)"
+        "--slow-runs",
+        type=whole_number(1, _MOST_STEPS),
+        help="rounds that ARPACK runs in (default: all)",
     )
     benchmark.add_argument("--skip-arpack", action="store_true", help="leave the slowest one out")
     benchmark.add_argument(
@@ -556,7 +587,7 @@ def _parser() -> argparse.ArgumentParser:
         "scaling", help="wall time over the number of ranks, measured and modelled"
     )
     _add_problem(scaling)
-    scaling.add_argument("--modes", type=int, default=256, help="rigid included (default 256)")
+    scaling.add_argument("--modes", type=_MODES, default=256, help="rigid included (default 256)")
     scaling.add_argument(
         "--ranks",
         type=_rank_counts,
@@ -568,7 +599,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     scaling.add_argument(
         "--tol",
-        type=positive_number,
+        type=_TOLERANCE,
         default=INTERACTIVE_TOLERANCE,
         help="relative eigenvalue error to correct to (default %(default)g)",
     )
@@ -579,10 +610,14 @@ def _parser() -> argparse.ArgumentParser:
         help="inner solver, the same on any number of ranks (default %(default)s)",
     )
     scaling.add_argument(
-        "--latency", type=positive_number, help="of the modelled network [s] (default: measured)"
+        "--latency",
+        type=number_between(1e-12, 1e3, "s"),
+        help="of the modelled network [s] (default: measured)",
     )
     scaling.add_argument(
-        "--bandwidth", type=positive_number, help="of the modelled network [B/s] (the same)"
+        "--bandwidth",
+        type=number_between(1.0, 1e18, "B/s"),
+        help="of the modelled network [B/s] (the same)",
     )
     scaling.add_argument("--here", action="store_true", help=argparse.SUPPRESS)
     scaling.add_argument("--out", help="also write the result to this JSON file")
@@ -595,7 +630,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     _add_solid(objectives)
     objectives.add_argument("--forest", help="forests to compare with (HDF5; default: packaged)")
-    objectives.add_argument("--modes", type=int, default=256, help="rigid included (default 256)")
+    objectives.add_argument(
+        "--modes", type=_MODES, default=256, help="rigid included (default 256)"
+    )
     objectives.add_argument(
         "--objectives",
         type=_objective_names,
@@ -610,16 +647,22 @@ def _parser() -> argparse.ArgumentParser:
         "calibrate", help="constants of the objective `calibrated` from spectra of random solids"
     )
     calibrate.add_argument(
-        "--solids", type=whole_number(1), default=150, help="random solids (default 150)"
+        "--solids",
+        type=whole_number(1, _MOST_SOLIDS),
+        default=150,
+        help="random solids (default 150)",
     )
     calibrate.add_argument(
         "--random-only", action="store_true", help="leave the built-in objects out"
     )
     calibrate.add_argument("--seed", type=whole_number(0), default=0, help="of the solids")
     calibrate.add_argument(
-        "--steps", type=whole_number(1), default=10, help="Gauss-Newton steps at most (default 10)"
+        "--steps",
+        type=whole_number(1, _MOST_STEPS),
+        default=10,
+        help="Gauss-Newton steps at most (default 10)",
     )
-    calibrate.add_argument("--workers", type=whole_number(1), default=1, help="processes")
+    calibrate.add_argument("--workers", type=number_of_workers, default=1, help="processes")
     calibrate.add_argument(
         "--cases", required=True, help="folder that keeps the solids' exact spectra"
     )
@@ -640,7 +683,7 @@ def _add_respond(parser: argparse.ArgumentParser) -> None:
     for name, what in (("strike", "that is struck"), ("observed", "whose motion is watched")):
         parser.add_argument(
             f"--{name}",
-            type=float,
+            type=number_between(-_FARTHEST, _FARTHEST, "m"),
             nargs=3,
             metavar=("X", "Y", "Z"),
             help=f"point of the surface {what} [m] (default: chosen by the truth)",
@@ -648,25 +691,25 @@ def _add_respond(parser: argparse.ArgumentParser) -> None:
     damping = Damping()
     parser.add_argument(
         "--mass-damping",
-        type=non_negative_number,
+        type=number_between(0.0, 1e12, "1/s"),
         default=damping.mass_per_second,
         help="coefficient of the mass in Rayleigh damping [1/s] (default %(default)g)",
     )
     parser.add_argument(
         "--stiffness-damping",
-        type=non_negative_number,
+        type=number_between(0.0, 1e6, "s"),
         default=damping.stiffness_seconds,
         help="coefficient of the stiffness [s] (default %(default)g)",
     )
     parser.add_argument(
         "--contact",
-        type=positive_number,
+        type=number_between(1e-9, 10.0, "s"),
         default=StrikeOptions.contact_seconds,
         help="duration of the force in the sound [s] (default %(default)g)",
     )
     parser.add_argument(
         "--periods",
-        type=positive_number,
+        type=number_between(1e-6, 1e6),
         default=StrikeOptions.periods,
         help="time watched, in periods of the first elastic mode (default %(default)g)",
     )
@@ -692,7 +735,7 @@ def _add_solid(parser: argparse.ArgumentParser) -> None:
     defaults = ProblemOptions
     parser.add_argument("mesh", metavar="MESH", help="surface mesh file, or builtin:NAME")
     parser.add_argument(
-        "--resolution", type=int, required=True, help="voxels along the longest side"
+        "--resolution", type=whole_number(2), required=True, help="voxels along the longest side"
     )
     parser.add_argument(
         "--material",
@@ -720,7 +763,7 @@ def _add_solid(parser: argparse.ArgumentParser) -> None:
         "--seed",
         type=whole_number(0),
         default=defaults.seed,
-        help="of random materials and the partition",
+        help="of random materials, the partition, and the vectors that slepc and arpack start from",
     )
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from carillon.errors import UserError
 from carillon.progress import say
-from carillon.runtime import limit_threads, reuse_freed_memory
+from carillon.runtime import available_memory, limit_threads, reuse_freed_memory
 from solver.correction import EIGENVALUE_TOLERANCE, FEWEST_GUARDS, correct, default_guard
 from solver.decomposition import on_root
 from solver.distribution import Share, deal_moduli, distribute
@@ -21,6 +21,7 @@ from solver.hcms.condense import DEFAULT_INTERFACE
 from solver.hcms.synthesis import Synthesis, make_subdomains, synthesize
 from solver.inner import InnerSolver, Inverse
 from solver.model import RIGID_MODES, ElasticModel
+from solver.rayleigh_ritz import rigid_pairs
 from solver.system import Layout, System, assemble
 from solver.timing import Phases, peak_memory
 from solver.truth import (
@@ -28,7 +29,8 @@ from solver.truth import (
     SPARE_MODES,
     Truth,
     can_count,
-    prove_complete,
+    complete,
+    count_beyond,
     solve_truth,
 )
 from solver.verification import (
@@ -49,6 +51,8 @@ KEPT_SHARE, TOGETHER_SHARE = 1.6, 1.17
 Lanczos iteration corrects them together."""
 FEW_PARTS = 16
 """Subdomains up to which these shares hold; the best ones grow about like the cube root of more."""
+FEWEST_BLOCKS, FEWEST_SQUARES = 2, 2
+"""Blocks of all vectors, and matrices of their products, that any method keeps at a time."""
 ORTHOGONAL_TO_RIGID = 1e-10
 """Largest overlap of HCMS modes with the rigid motions that needs no correction."""
 
@@ -78,10 +82,11 @@ class SolverOptions:
     interface
         Interface treatment, see `solver.hcms.condense`.
     seed
-        Seed of the partition.
+        Seed of the partition, and of the vectors that ground truth starts from.
     prove
-        Whether an inertia count proves that no eigenvalue was missed; by default for ground truth
-        alone.
+        Whether an inertia count proves that no eigenvalue was missed, and those that were are
+        searched for; by default for ground truth alone, for which further searches have to do where
+        nothing can be counted.
     inner
         Inner solver of the correction, see `solver.inner.InnerSolver`.
     acceleration
@@ -175,7 +180,8 @@ class ModalSolver:
     Raises
     ------
     UserError
-        If more modes are wanted than there are unknowns, or more ranks than subdomains.
+        If more modes are wanted than there are unknowns or than memory can hold, or there are more
+        ranks than subdomains.
 
     Examples
     --------
@@ -194,6 +200,7 @@ class ModalSolver:
         verbose: bool = False,
     ) -> None:
         on_root(comm, lambda: check_mode_count(options.modes, cast(ElasticModel, model).n_dofs))
+        _require_memory(model, options, comm)
         self.options = options
         self.comm = comm
         self._verbose = verbose
@@ -297,31 +304,47 @@ class ModalSolver:
 
     def _general_solver(self, system: System, phases: Phases, evidence: dict[str, Any]) -> _Found:
         options = self.options
-        proving = options.prove is not False and can_count()
+        proving = options.prove is not False
         with phases("eigensolver"):
             truth = solve_truth(
                 system,
                 options.modes,
                 options.method,
                 options.tolerance or RESIDUAL_TOLERANCE,
-                SPARE_MODES if proving else 0,
+                SPARE_MODES if proving and can_count() else 0,
+                options.seed,
             )
-        evidence["eigensolver_iterations"] = truth.iterations
         if proving:
-            self._prove(system, truth, phases, evidence)
-        count = options.modes
-        return _Found(truth.values[:count], np.ascontiguousarray(truth.vectors[:, :count]))
+            truth = self._prove(system, truth, phases, evidence)
+        evidence |= {
+            "eigensolver_iterations": truth.iterations,
+            "further_searches": truth.searches,
+            "modes_added": truth.added,
+        }
+        return _Found(*truth.lowest())
 
     def _prove(
         self, system: System, truth: Truth, phases: Phases, evidence: dict[str, Any]
-    ) -> None:
-        with phases("inertia"):
-            inertia = prove_complete(system, truth)
-        evidence |= {
-            "inertia_at": inertia.value,
-            "inertia_count": inertia.counted,
-            "inertia_expected": inertia.computed,
-        }
+    ) -> Truth:
+        """`truth` with the modes that it lacked."""
+        options = self.options
+        inertia = None
+        if can_count():
+            with phases("inertia"):
+                inertia = count_beyond(system, truth)
+        if inertia is None or inertia.counted != inertia.computed:
+            tolerance = None if options.method == "hcms" else options.tolerance
+            with phases("completion"):
+                truth, inertia = complete(
+                    system, truth, inertia, tolerance or RESIDUAL_TOLERANCE, options.seed
+                )
+        if inertia is not None:
+            evidence |= {
+                "inertia_at": inertia.value,
+                "inertia_count": inertia.counted,
+                "inertia_expected": inertia.computed,
+            }
+        return truth
 
     def _hcms(
         self,
@@ -368,21 +391,23 @@ class ModalSolver:
                 report=_reporter(self._verbose and self.comm.rank == 0),
                 similar=similar,
             )
-            stiff = system.inner(system.rigid, system.times_stiffness(system.rigid))
+            rigid_values, rigid = rigid_pairs(system)
         evidence |= {
             "inner": self._inner.method,
             "corrections": result.steps,
             "right_hand_sides": result.solves,
             "eigenvalue_error_estimate": float(result.errors[:wanted].max()),
         }
-        found = np.concatenate([np.maximum(np.diag(stiff), 0.0), result.values])
-        vectors = np.concatenate([system.rigid, result.vectors], axis=1)
+        found = Truth(
+            np.concatenate([rigid_values, result.values]),
+            np.concatenate([rigid, result.vectors], axis=1),
+            options.modes,
+            result.steps,
+        )
         if options.prove and can_count():
-            truth = Truth(found, vectors, options.modes, result.steps)
-            self._prove(system, truth, phases, evidence)
-        count = options.modes
-        vectors = np.ascontiguousarray(vectors[:, :count])
-        return _Found(found[:count], vectors, result.guard, result.inverse)
+            found = self._prove(system, found, phases, evidence)
+            evidence |= {"further_searches": found.searches, "modes_added": found.added}
+        return _Found(*found.lowest(), result.guard, result.inverse)
 
     def _uncorrected(self, synthesis: Synthesis) -> _Found:
         count = self.options.modes
@@ -422,6 +447,26 @@ def check_mode_count(modes: int, n_dofs: int) -> None:
             f"{modes:,} modes asked for, but the model has {n_dofs:,} unknowns; ask for fewer or "
             "raise --resolution"
         )
+
+
+def _require_memory(model: ElasticModel | None, options: SolverOptions, comm: MPI.Comm) -> None:
+    """Raise UserError if the vectors of this rank's machine alone are more than its free memory."""
+    node = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    share = node.size / comm.size
+    node.Free()
+
+    def check() -> None:
+        n_dofs = cast(ElasticModel, model).n_dofs
+        vectors = min(max(options.modes, options.keep or 0), n_dofs)
+        needed = 8 * vectors * (FEWEST_BLOCKS * n_dofs * share + FEWEST_SQUARES * vectors)
+        free = available_memory()
+        if free is not None and needed > free:
+            raise UserError(
+                f"{vectors:,} modes of {n_dofs:,} unknowns take {needed / 1e9:,.1f} GB at least, "
+                f"{free / 1e9:,.1f} GB are free; ask for fewer modes or a lower --resolution"
+            )
+
+    on_root(comm, check)
 
 
 def default_keep(modes: int, parts: int, together: bool = False) -> int:

@@ -16,6 +16,7 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from carillon.errors import UserError
 from solver.comparison import recomputed_residuals
 from solver.eigensolver import distributed_matrix
 from solver.model import RIGID_MODES
@@ -70,22 +71,41 @@ class Audit:
 
 
 def audit_files(paths: Iterable[str | Path]) -> dict[str, Audit]:
-    """Audits of modes files by the stems of their names.
+    """Audits of modes files by the stems of their names, or by the names where stems are equal.
 
     Raises
     ------
     UserError
-        If a file is unusable.
+        If a file is unusable, or its audit leaves the range of numbers.
     """
-    return {Path(path).stem: audit(read_modes(path)) for path in paths}
+    found = list(dict.fromkeys(map(str, paths)))
+    stems = [Path(path).stem for path in found]
+    labels = stems if len(set(stems)) == len(stems) else found
+    return {label: _audited(path) for label, path in zip(labels, found, strict=True)}
+
+
+def _audited(path: str) -> Audit:
+    try:
+        return audit(read_modes(path))
+    except ArithmeticError as error:
+        raise UserError(f"{path}: {error}; compute the modes again") from None
 
 
 def audit(file: ModesFile) -> Audit:
-    """Audit the contents of a modes file."""
+    """Audit the contents of a modes file.
+
+    Raises
+    ------
+    ArithmeticError
+        If what is found is no number, so that nothing can be said about the modes.
+    """
     assert file.modes is not None
     K, M = assembled(file.model)
-    residuals = recomputed_residuals(file, K, M)
-    gram = file.modes.T @ (M @ file.modes)
+    with np.errstate(all="ignore"):  # judged below
+        residuals = recomputed_residuals(file, K, M)
+        gram = file.modes.T @ (M @ file.modes)
+    if not (np.isfinite(residuals).all() and np.isfinite(gram).all()):
+        raise ArithmeticError("residuals or products of the modes are not finite numbers")
     value, expected = gap_below_last(file.eigenvalues)
     return Audit(
         len(file.eigenvalues),

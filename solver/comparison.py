@@ -10,11 +10,10 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from carillon.errors import UserError
 from solver.clusters import clusters
 from solver.geometry import prolongation
 from solver.model import RIGID_MODES
-from solver.modes_file import ModesFile, read_modes
+from solver.modes_file import ModesFile, read_elastic, require_same_solid
 from solver.sparse import assembled
 from solver.verification import residual_scale
 
@@ -128,15 +127,11 @@ def compare_files(candidate: str | Path, truth: str | Path) -> Comparison:
     Raises
     ------
     UserError
-        If a file is unusable or there is no elastic mode to compare.
+        If a file is unusable or holds no elastic mode to compare, or they are of other solids.
     """
-    a, b = read_modes(candidate), read_modes(truth)
+    a, b = read_elastic(candidate), read_elastic(truth)
+    require_same_solid([truth, candidate], [b, a])
     count = min(len(a.eigenvalues), len(b.eigenvalues))
-    if count <= RIGID_MODES:
-        raise UserError(
-            f"{candidate} and {truth} share {count} modes, of which {RIGID_MODES} are rigid; "
-            "compute more"
-        )
     elastic = slice(RIGID_MODES, count)
     values, exact = a.eigenvalues[elastic], b.eigenvalues[elastic]
     shift = a.frequencies[elastic] / b.frequencies[elastic] - 1.0

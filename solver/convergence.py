@@ -99,7 +99,7 @@ def _exact(
     """The lowest eigenvalues (modes,) from the file `truth` or by SLEPc."""
     if truth is not None:
         return on_root(comm, lambda: _read_exact(cast(ElasticModel, model), modes, truth))
-    result = modal_analysis(model, SolverOptions(method="slepc", modes=modes, prove=False), comm)
+    result = modal_analysis(model, SolverOptions(method="slepc", modes=modes), comm)
     result.system.destroy()
     return result.values
 

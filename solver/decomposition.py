@@ -128,9 +128,11 @@ def keep_on_root(comm: MPI.Comm, compute: Callable[[], T]) -> T | None:
 
 
 def _attempt(comm: MPI.Comm, compute: Callable[[], T]) -> tuple[T | None, Exception | None]:
+    """Result of `compute` on rank 0, or the exception, marked as one that all ranks will raise."""
     if comm.rank == 0:
         try:
             return compute(), None
         except Exception as error:
+            error.collective = True  # type: ignore[attr-defined]
             return None, error
     return None, None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,35 +11,17 @@ from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from carillon.errors import UserError
+from solver.petsc_options import OPTIONS_PREFIX, require_known_options
+
+if TYPE_CHECKING:
+    from solver.system import System
 
 Array = NDArray[np.float64]
 
 TYPES = {"slepc": SLEPc.EPS.Type.KRYLOVSCHUR, "arpack": SLEPc.EPS.Type.ARPACK}
 MAX_ITERATIONS = 500
-OPTIONS_PREFIX = "carillon_"
-"""What the names of PETSc's options for this program begin with."""
-
-
-def insert_options(text: str | None) -> None:
-    """Put options like `-carillon_eps_ncv 400` into PETSc's options database.
-
-    Raises
-    ------
-    UserError
-        If an option lacks the prefix, and would be ignored.
-    """
-    if text is None:
-        return
-    words = text.split()
-    strangers = [
-        word
-        for word in words
-        if word[:1] == "-" and word[1:2].isalpha() and not word.startswith(f"-{OPTIONS_PREFIX}")
-    ]
-    if strangers or not words or words[0][0] != "-":
-        found = strangers[0] if strangers else text
-        raise UserError(f"PETSc option {found!r}: expected names like -{OPTIONS_PREFIX}eps_ncv")
-    PETSc.Options().insertString(text)
+ARPACK_MARGIN = 2
+"""Unknowns beyond the pairs wanted that ARPACK needs."""
 
 
 def factor_package(ranks: int) -> str:
@@ -74,29 +56,56 @@ def distributed_matrix(rows: sp.csr_matrix, comm: Any) -> Any:
 
 
 def smallest_eigenpairs(
-    K: Any, M: Any, count: int, shift: float, tolerance: float, method: str = "slepc"
+    system: System,
+    known: Array,
+    count: int,
+    shift: float,
+    start: Array,
+    tolerance: float,
+    method: str = "slepc",
+    configurable: bool = True,
 ) -> tuple[Array, Array, int]:
-    """Eigenpairs of K x = lambda M x with lambda closest to -`shift`, below the whole spectrum.
+    """Eigenpairs of K x = lambda M x that are M-orthogonal to known ones, lowest eigenvalues first.
+
+    The Krylov space of one vector holds one vector of every eigenspace, and more by rounding alone:
+    copies of a multiple eigenvalue may be missed.
+
+    Krylov-Schur deflates the known vectors.  ARPACK cannot, since SLEPc lets it keep its basis
+    where the deflated vectors are: it finds as many pairs more, of which those in the span of the
+    known ones are dropped.
 
     Parameters
     ----------
-    K, M
-        PETSc matrices; K positive semidefinite, M positive definite.
+    system
+        K positive semidefinite, M positive definite.
+    known
+        (local, k) M-orthonormal eigenvectors.
     count
         Number of pairs wanted.
     shift
         Positive; K + shift M is factorised.
+    start
+        (local,) vector that the Krylov space is made from.
     tolerance
         Relative residual.
     method
         `slepc` (Krylov-Schur) or `arpack`.
+    configurable
+        Whether PETSc's options database may overrule this set-up.
 
     Returns
     -------
-    values (found,) ascending, M-orthonormal vectors (local, found), outer iterations; `found` may
-    be smaller than `count`, which is for the caller to judge.
+    values (found,) ascending, vectors (local, found), outer iterations; `found` may be smaller than
+    `count`, which is for the caller to judge.  The vectors are M-orthonormal but for copies of a
+    multiple eigenvalue, which are so to the tolerance.
+
+    Raises
+    ------
+    UserError
+        If this SLEPc lacks the method.
     """
-    solver = SLEPc.EPS().create(K.getComm())
+    solver = SLEPc.EPS().create(system.comm)
+    vectors = [_petsc_vector(start, system.comm)]
     try:
         try:
             solver.setType(TYPES[method])
@@ -104,10 +113,17 @@ def smallest_eigenpairs(
             raise UserError(
                 f"this SLEPc was built without {method}; use slepc or rebuild SLEPc with it"
             ) from None
-        solver.setOperators(K, M)
+        solver.setOperators(system.K, system.M)
         solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
-        solver.setDimensions(count)
         solver.setTolerances(tolerance, MAX_ITERATIONS)
+        solver.setInitialSpace(vectors[0])
+        asked = count
+        if method == "arpack":
+            asked = min(count + known.shape[1], system.n_dofs - ARPACK_MARGIN)
+        else:
+            vectors += [_petsc_vector(column, system.comm) for column in known.T]
+            solver.setDeflationSpace(vectors[1:])
+        solver.setDimensions(asked)
         solver.setTarget(-shift)
         solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
         transform = solver.getST()
@@ -117,24 +133,48 @@ def smallest_eigenpairs(
         linear.setType(PETSc.KSP.Type.PREONLY)
         preconditioner = linear.getPC()
         preconditioner.setType(PETSc.PC.Type.CHOLESKY)
-        preconditioner.setFactorSolverType(factor_package(K.getComm().size))
-        # Everything above may be overruled by PETSc's options database.
-        solver.setOptionsPrefix(OPTIONS_PREFIX)
-        solver.setFromOptions()
+        preconditioner.setFactorSolverType(factor_package(system.comm.size))
+        if configurable:
+            solver.setOptionsPrefix(OPTIONS_PREFIX)
+            solver.setFromOptions()
+            solver.setUp()
+            require_known_options()
         solver.solve()
-        values, vectors = _collect(K, solver, min(solver.getConverged(), count))
-        return values, vectors, int(solver.getIterationNumber())
+        values, found = _collect(system, solver, min(solver.getConverged(), asked))
+        values, found = _outside(system, known, values, found)
+        return values[:count], found[:, :count], int(solver.getIterationNumber())
     finally:
-        solver.destroy()
+        for used in (solver, *vectors):
+            used.destroy()
 
 
-def _collect(K: Any, solver: SLEPc.EPS, count: int) -> tuple[Array, Array]:
-    vector = K.createVecRight()
-    values = np.empty(count)
-    vectors = np.empty((vector.getLocalSize(), count), order="F")
-    for index in range(count):
-        values[index] = solver.getEigenpair(index, vector).real
-        vectors[:, index] = vector.getArray(readonly=True)
+def _petsc_vector(entries: Array, comm: Any) -> Any:
+    return PETSc.Vec().createWithArray(np.array(entries), comm=comm)
+
+
+def _collect(system: System, solver: SLEPc.EPS, count: int) -> tuple[Array, Array]:
+    """The first `count` eigenpairs, values ascending, vectors row-major."""
+    values = np.array([solver.getEigenvalue(index).real for index in range(count)])
+    # Two processors may round apart, but have to agree on the order of a multiple eigenvalue.
+    values = system.comm.bcast(values)
+    order = np.argsort(values, kind="stable")
+    vector = system.K.createVecRight()
+    vectors = np.empty((vector.getLocalSize(), count))
+    for column, index in enumerate(order):
+        solver.getEigenpair(int(index), vector)
+        vectors[:, column] = vector.getArray(readonly=True)
     vector.destroy()
-    order = np.argsort(values)
-    return values[order], np.asfortranarray(vectors[:, order])
+    return values[order], vectors
+
+
+def _outside(system: System, known: Array, values: Array, vectors: Array) -> tuple[Array, Array]:
+    """The pairs that are not in the span of the known ones, made M-orthogonal to it.
+
+    SLEPc ends with a product with the inverse, which brings back a little of inaccurate known ones.
+    """
+    share = system.inner(system.times_mass(known), vectors)
+    outside = np.einsum("ij,ij->j", share, share) < 0.5
+    if not outside.all():
+        values, vectors, share = values[outside], vectors[:, outside], share[:, outside]
+    vectors -= known @ share
+    return values, vectors

@@ -106,7 +106,8 @@ def lanczos(
     mixed = wanted if tolerance > ROUGH else min(len(values), int(MIXED * wanted))
     columns = min(_columns(wanted), wanted)
     longest = min(LONGEST * (wanted + columns), system.n_dofs)
-    begin = _mixed(values[:mixed], start[:, :mixed], inverse.shift, columns)
+    modes = start[:, :mixed]
+    begin = _mixed(values[:mixed], modes, _signs(system, modes), inverse.shift, columns)
     basis = _Basis(system, inverse, begin, longest + begin.shape[1])
     looks = _Looks(tolerance, int((1.0 if tolerance > ROUGH else FIRST_LOOK) * mixed), columns)
     while basis.remainder.shape[1] and basis.size < longest:
@@ -298,7 +299,18 @@ class _Basis:
         return values, found
 
 
-def _mixed(values: Array, modes: Array, shift: float, columns: int) -> Array:
+def _signs(system: System, modes: Array) -> Array:
+    """Signs (k,) that make each mode point along one fixed pattern over the rows.
+
+    LAPACK finds a mode with either sign, as rounding has it, which differs with the number of
+    threads.  Another mixture would agree to the tolerance; the same one agrees to rounding.
+    """
+    pattern = np.cos(np.arange(3.0 * system.start, 3.0 * system.stop))
+    along = system.inner(pattern[:, None], modes)[0]
+    return np.where(along < 0.0, -1.0, 1.0)
+
+
+def _mixed(values: Array, modes: Array, signs: Array, shift: float, columns: int) -> Array:
     """The modes in few columns (local, b), those next to each other in different ones.
 
     Those far from the shift, which need most steps, enter with most weight.
@@ -307,7 +319,7 @@ def _mixed(values: Array, modes: Array, shift: float, columns: int) -> Array:
     weight = np.abs(values - shift) ** END_WEIGHT
     number = np.arange(count)
     mixture = np.zeros((count, columns))
-    mixture[number, number % columns] = weight / weight.max()
+    mixture[number, number % columns] = signs * weight / weight.max()
     return np.asarray(modes @ mixture)
 
 

@@ -16,6 +16,7 @@ from solver.geometry import HexMesh
 from solver.materials import young_modulus
 from solver.model import ElasticModel, fine_model
 from solver.modes_file import frequencies
+from solver.moduli_file import require_moduli
 from solver.start import deal_rows
 
 Array = NDArray[np.float64]
@@ -131,8 +132,12 @@ def _with_material(
         raise UserError(
             f"moduli of shape {young.shape}, expected ({mesh.n_cells},) or ({mesh.n_cells}, 8)"
         )
+    if young.dtype.kind not in "fiu":
+        raise UserError(f"moduli [Pa]: found an array of {young.dtype}, expected real numbers")
+    young = young.astype(float)
     if not (np.isfinite(young).all() and (young > 0.0).all()):
         raise UserError("moduli [Pa]: found negative or no numbers, expected positive ones")
+    require_moduli(young.ravel(), "moduli")
     points = np.broadcast_to(young if young.ndim == 2 else young[:, None], (mesh.n_cells, 8))
     solid = fine_model(mesh, points[:, 0]) if isinstance(model, HexMesh) else model
     return solid.with_young(points)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import os
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
+from carillon.places import require_file
 from solver.laplacian import laplacian_modes
+from solver.moduli_file import read_moduli
 
 if TYPE_CHECKING:  # Geometry needs trimesh, whose import takes long; names of materials do without.
     from solver.geometry import HexMesh
@@ -70,62 +72,14 @@ def noise(mesh: HexMesh, seed: int = 0) -> Array:
     return np.random.default_rng(seed).uniform(*NOISE_YOUNG, mesh.n_cells)
 
 
-def from_file(path: str | Path, mesh: HexMesh, label: str) -> Array:
-    """Moduli [Pa] from a numpy `.npy` or text file, one per filled voxel in cell order.
+def young_modulus(name: str, mesh: HexMesh, seed: int = 0, label: str = "mesh") -> Array:
+    """Moduli (m,) [Pa] of a material: one of `NAMES`, or a file with one value per cell.
 
     Raises
     ------
     UserError
-        If the file is missing or unreadable, its length is wrong, or it holds values that are
-        negative, not finite, or all zero.
+        If there is no such file, or for what `solver.moduli_file.read_moduli` refuses.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise UserError(
-            f"material '{path}' is neither a file nor one of the names {', '.join(NAMES)}"
-        )
-    try:
-        values = np.load(path, allow_pickle=False) if path.suffix == ".npy" else np.loadtxt(path)
-        values = np.asarray(values, dtype=float)
-    except (OSError, ValueError, TypeError, EOFError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise UserError(
-            f"{path}: is not readable as an array of numbers ({reason}); expected a .npy or text "
-            "file with one Young's modulus [Pa] per voxel"
-        ) from None
-    return check(values.ravel(), mesh, str(path), label)
-
-
-def check(values: Array, mesh: HexMesh, source: str, label: str) -> Array:
-    """Return `values` if they are moduli [Pa] for the cells of `mesh`, else raise UserError."""
-    if len(values) != mesh.n_cells:
-        raise UserError(f"{source}: {len(values):,} values for {mesh.n_cells:,} voxels ({label})")
-    bad = np.flatnonzero(~np.isfinite(values))
-    if len(bad):
-        raise UserError(
-            f"{source}: {len(bad):,} values are not finite (the first at index {bad[0]}); "
-            "expected Young's moduli [Pa]"
-        )
-    bad = np.flatnonzero(values < 0.0)
-    if len(bad):
-        raise UserError(
-            f"{source}: {len(bad):,} values are negative (the first at index {bad[0]}: "
-            f"{values[bad[0]]:g}); expected Young's moduli [Pa]"
-        )
-    if not values.any():
-        raise UserError(f"{source}: all {len(values):,} values are zero; expected moduli [Pa]")
-    bad = np.flatnonzero(values == 0.0)
-    if len(bad):
-        raise UserError(
-            f"{source}: {len(bad):,} voxels have modulus zero (the first at index {bad[0]}); give "
-            "them a small positive modulus or take them out of the mesh, since mass without "
-            "stiffness has no place in a spectrum"
-        )
-    return values
-
-
-def young_modulus(name: str, mesh: HexMesh, seed: int = 0, label: str = "mesh") -> Array:
-    """Moduli (m,) [Pa] of a material: one of `NAMES`, or a file with one value per cell."""
     match name:
         case "uniform":
             return uniform(mesh)
@@ -138,4 +92,10 @@ def young_modulus(name: str, mesh: HexMesh, seed: int = 0, label: str = "mesh") 
         case "noise":
             return noise(mesh, seed)
         case _:
-            return from_file(name, mesh, label)
+            if not os.path.exists(name):
+                raise UserError(
+                    f"material {name!r} is neither a file nor one of the names {', '.join(NAMES)}"
+                )
+            return read_moduli(
+                require_file(name, "a material, a file of moduli"), mesh.n_cells, label
+            )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,16 +13,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon import provenance
+from carillon.datasets import INTEGER, find, finite, number, read, refused
 from carillon.errors import UserError
 from carillon.files import create_h5, open_h5
 from carillon.measurement import measured
-from solver.geometry import HexMesh
-from solver.model import ElasticModel
+from solver.geometry import CORNER_OFFSETS, HexMesh
+from solver.limits import DENSITIES, EDGES, POISSON
+from solver.model import RIGID_MODES, ElasticModel
 
 Array = NDArray[np.float64]
 
 KIND = "modes"
 SCHEMA = 1
+CHECKS = ("inertia", "completion", "verification")
+"""Phases that check modes, and find those that the check misses; no method is charged for them."""
+ROUNDING = 1e-6
+"""Of the largest eigenvalue: what those of rigid motions may be below zero."""
+SAME_SOLID = 1.000001
+"""Cell edges by which boxes around voxels of one solid may differ."""
 _COLUMNS_PER_CHUNK = 16
 _ROWS_PER_CHUNK = 1 << 20
 
@@ -139,27 +147,60 @@ def put_model(group: h5py.Group, model: ElasticModel) -> None:
 
 
 def get_model(group: h5py.Group) -> ElasticModel:
-    """Read a solid written by `put_model`."""
+    """Read a solid written by `put_model`.
+
+    Raises
+    ------
+    UserError
+        If it is incomplete or its parts do not fit each other.
+    """
+    grid = read(group, "grid", (None, 3), INTEGER).astype(np.int32)
+    node_grid = read(group, "node_grid", (None, 3), INTEGER).astype(np.int32)
+    cells = read(group, "cells", (len(grid), 8), INTEGER)
+    if not _are_corners(cells, grid, node_grid):
+        raise refused(group, "cells, nodes and their places on the grid do not fit each other")
     mesh = HexMesh(
-        cells=group["cells"][()],
-        grid=group["grid"][()],
-        node_grid=group["node_grid"][()],
-        # Attributes come with an explicit byte order, which MPI does not know.
-        origin=group.attrs["origin"].astype(float),
-        edge=float(group.attrs["cell_edge"]),
+        cells=cells.astype(np.int32),
+        grid=grid,
+        node_grid=node_grid,
+        origin=_origin(group),
+        edge=number(group, "cell_edge", *EDGES),
     )
-    young = group["young"][()]
-    if young.ndim == 1:
+    whole = getattr(group.get("young"), "ndim", 0) == 2
+    young = read(group, "young", (len(grid), 8) if whole else (len(grid),))
+    if (young < 0.0).any():
+        raise refused(group, "dataset 'young' holds negative moduli")
+    if not whole:
         young = np.repeat(young[:, None], 8, axis=1)
     return ElasticModel(
         mesh,
-        young,
-        group["fill"][()],
-        float(group.attrs["poisson"]),
-        float(group.attrs["density"]),
-        bool(group.attrs["lumped"]),
-        float(group.attrs.get("lumped_share", 0.0)),
+        young.astype(float, copy=False),
+        read(group, "fill", (len(grid),), INTEGER).astype(np.uint8),
+        number(group, "poisson", *POISSON),
+        number(group, "density", *DENSITIES),
+        bool(number(group, "lumped", 0.0, 1.0)),
+        number(group, "lumped_share", 0.0, 1.0) if "lumped_share" in group.attrs else 0.0,
     )
+
+
+def _are_corners(
+    cells: NDArray[np.integer], grid: NDArray[np.int32], node_grid: NDArray[np.int32]
+) -> bool:
+    """Whether every cell has the nodes at its corners, and every node a cell."""
+    n_nodes = len(node_grid)
+    if not len(cells) or cells.min() < 0 or cells.max() >= n_nodes:
+        return False
+    if not (np.bincount(cells.ravel(), minlength=n_nodes) > 0).all():
+        return False
+    return np.array_equal(node_grid[cells], grid[:, None, :] + CORNER_OFFSETS)
+
+
+def _origin(group: h5py.Group) -> Array:
+    # Attributes come with an explicit byte order, which MPI does not know.
+    origin = np.asarray(group.attrs["origin"]).astype(float)
+    if origin.shape != (3,) or not np.isfinite(origin).all():
+        raise refused(group, f"'origin' is {origin.tolist()}, expected a point")
+    return origin
 
 
 def read_modes(path: str | Path, with_modes: bool = True) -> ModesFile:
@@ -168,27 +209,87 @@ def read_modes(path: str | Path, with_modes: bool = True) -> ModesFile:
     Raises
     ------
     UserError
-        If the file is missing, damaged, of another schema, or inconsistent.
+        If the file is missing, damaged, of another schema, or inconsistent: everything in it is a
+        finite number, eigenvalues ascend, and the parts fit each other.
     """
-    with open_h5(path, KIND, SCHEMA) as file:
+    with open_h5(path, KIND, SCHEMA, sealed=True) as file:
         attributes = {key: _plain(value) for key, value in file.attrs.items()}
-        model = get_model(file)
-        result = ModesFile(
-            file["eigenvalues"][()],
-            file["frequencies"][()],
-            file["modes"][()] if with_modes else None,
-            file["residuals"][()],
+        eigenvalues, model = get_eigenvalues(file), get_model(file)
+        shape = (model.n_dofs, len(eigenvalues))
+        stored = find(file, "modes", shape)
+        return ModesFile(
+            eigenvalues,
+            read(file, "frequencies", eigenvalues.shape),
+            finite(file, "modes", stored[()]) if with_modes else None,
+            read(file, "residuals", eigenvalues.shape),
             model,
             attributes,
             provenance.read(file),
         )
-        shape = file["modes"].shape
-    expected = (model.n_dofs, len(result.eigenvalues))
-    if shape != expected or len(model.young) != model.mesh.n_cells:
+
+
+def read_elastic(path: str | Path) -> ModesFile:
+    """Read a modes file that holds elastic modes, whose frequencies one can divide by.
+
+    Raises
+    ------
+    UserError
+        See `read_modes`; or if there is none, or one at zero frequency.
+    """
+    file = read_modes(path)
+    if len(file.eigenvalues) <= RIGID_MODES:
         raise UserError(
-            f"{path}: holds modes of shape {shape}, expected {expected}; generate the file again"
+            f"{path}: holds {len(file.eigenvalues)} modes, of which {RIGID_MODES} are rigid; "
+            "compute more"
         )
-    return result
+    if file.eigenvalues[RIGID_MODES] <= 0.0:
+        raise UserError(
+            f"{path}: more than {RIGID_MODES} of its modes have frequency zero, as of a solid that "
+            "hangs on a hinge; repair the mesh and compute them again"
+        )
+    return file
+
+
+def require_same_solid(paths: Sequence[str | Path], files: Sequence[ModesFile]) -> None:
+    """Check that files are of one solid: boxes around it that agree to cells of the coarsest mesh.
+
+    Raises
+    ------
+    UserError
+        If one differs from the first.
+    """
+    corners = [
+        np.array([file.mesh.nodes.min(axis=0), file.mesh.nodes.max(axis=0)]) for file in files
+    ]
+    for path, file, box in zip(paths, files, corners, strict=True):
+        cell = max(file.mesh.edge, files[0].mesh.edge)
+        if np.abs(box - corners[0]).max() > SAME_SOLID * cell:
+            sides = [
+                " x ".join(f"{x:.4g}" for x in np.ptp(each, axis=0)) for each in (box, corners[0])
+            ]
+            raise UserError(
+                f"{path}: is of another solid ({sides[0]} m) or place than {paths[0]} "
+                f"({sides[1]} m); name files of one"
+            )
+
+
+def get_eigenvalues(group: h5py.Group) -> Array:
+    """Eigenvalues (k,) [rad^2/s^2], ascending but for the rounding of those of rigid motions.
+
+    Raises
+    ------
+    UserError
+        If they are missing, not finite, out of order, or negative beyond rounding.
+    """
+    values = read(group, "eigenvalues", (None,)).astype(float, copy=False)
+    if not len(values):
+        raise refused(group, "holds no modes")
+    slack = ROUNDING * float(np.abs(values).max())
+    rigid, elastic = values[:RIGID_MODES], values[RIGID_MODES:]
+    ascending = rigid.max() <= elastic.min(initial=np.inf) and (np.diff(elastic) >= -slack).all()
+    if values.min() < -slack or not ascending:
+        raise refused(group, "eigenvalues are negative or do not ascend")
+    return values
 
 
 def frequencies(eigenvalues: Array) -> Array:

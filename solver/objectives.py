@@ -29,7 +29,7 @@ from solver.comparison import AUDIBLE_LAST, frequency_errors
 from solver.decomposition import keep_on_root, on_root
 from solver.geometry import Blocks, blocks_from_mesh
 from solver.model import RIGID_MODES, ElasticModel
-from solver.modes_file import frequencies
+from solver.modes_file import CHECKS, frequencies
 from solver.problem import Problem, ProblemOptions, build_problem
 from solver.trained import FOREST, Trained, trained_or_reason
 
@@ -37,9 +37,6 @@ Array = NDArray[np.float64]
 
 BASELINES = ("galerkin", "average")
 """Coarsenings without a fit, which every objective is to beat."""
-
-CHECKS = ("inertia", "verification")
-"""Phases that check modes instead of computing them."""
 
 
 def rate_objectives(
@@ -135,8 +132,8 @@ def solve_seconds(result: Modes) -> float:
     return sum(seconds for phase, seconds in result.seconds.items() if phase not in CHECKS)
 
 
-def _solve(model: ElasticModel | None, modes: int, comm: MPI.Comm, prove: bool = True) -> Modes:
-    result = modal_analysis(model, SolverOptions(method="slepc", modes=modes, prove=prove), comm)
+def _solve(model: ElasticModel | None, modes: int, comm: MPI.Comm) -> Modes:
+    result = modal_analysis(model, SolverOptions(method="slepc", modes=modes), comm)
     result.system.destroy()
     return result
 
@@ -170,7 +167,7 @@ def _row(name: str, solid: _Solid | None, exact: Array, comm: MPI.Comm) -> dict[
         coarse and (min(len(exact), coarse.model.n_dofs), coarse.seconds, coarse.converged)
     )
     try:
-        result = _solve(model, modes, comm, prove=False)
+        result = _solve(model, modes, comm)
     except ConvergenceError as error:
         raise ConvergenceError(f"{name}: {error}") from None
     found = frequencies(result.values)

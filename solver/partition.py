@@ -41,7 +41,8 @@ def partition_cells(mesh: HexMesh, parts: int, seed: int = 0) -> NDArray[np.int3
     values, vectors = laplacian_modes(mesh, EMBEDDING_MODES + 1)
     # Commute-time weights: distances in the embedding follow distances along the solid.
     embedding = vectors[:, 1:] / np.sqrt(np.maximum(values[1:], 1e-12))
-    labels = KMeans(parts, init="k-means++", n_init=1, random_state=seed).fit_predict(embedding)
+    kmeans = KMeans(parts, init="k-means++", n_init=1, random_state=seed % 2**32)
+    labels = kmeans.fit_predict(embedding)
     return _without_gaps(labels)
 
 

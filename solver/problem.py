@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.errors import UserError
 from dataset_gen.element import DEFAULT_POISSON
 from dataset_gen.objectives import DEFAULT_OBJECTIVE
 from solver.coarsening import build_model
@@ -20,6 +19,7 @@ from solver.geometry import (
     surface_name,
     voxelize,
 )
+from solver.limits import require_constants
 from solver.materials import young_modulus
 from solver.model import DEFAULT_DENSITY, ElasticModel
 from solver.trained import load_trained
@@ -98,7 +98,7 @@ def build_problem(options: ProblemOptions) -> Problem:
     UserError
         For anything wrong with the mesh, the material or the parameters.
     """
-    _check(options)
+    require_constants(options.poisson, options.density)
     begin = time.perf_counter()
     surface = load_surface(options.mesh, options.unit)
     name = surface_name(options.mesh)
@@ -124,10 +124,3 @@ def build_problem(options: ProblemOptions) -> Problem:
     if options.coarsen != "none":
         seconds["coarsening"] = time.perf_counter() - assigned
     return Problem(fine, young, model, seconds, forest.record() if forest else {})
-
-
-def _check(options: ProblemOptions) -> None:
-    if not -1.0 < options.poisson < 0.5:
-        raise UserError(f"Poisson's ratio {options.poisson:g} is outside (-1, 0.5)")
-    if not (np.isfinite(options.density) and options.density > 0.0):
-        raise UserError(f"density {options.density:g} kg/m^3: expected a positive number")

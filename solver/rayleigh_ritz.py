@@ -35,14 +35,14 @@ def rayleigh_ritz(system: System, block: Array, count: int | None = None) -> tup
     """
     block, mass_block = remove_rigid(system, np.ascontiguousarray(block))
     stiff = system.inner(block, system.times_stiffness(block))
-    gram = None if _orthonormal(system, block, mass_block) else system.inner(block, mass_block)
+    gram = None if is_orthonormal(system, block, mass_block) else system.inner(block, mass_block)
     # Solved once: two processors may round apart, and an eigenvector's sign hangs on rounding.
     values, weights = on_root(system.comm, lambda: _reduced_eigenpairs(stiff, gram))
     count = len(values) if count is None else min(count, len(values))
     return values[:count], block @ weights[:, :count]
 
 
-def _orthonormal(system: System, block: Array, mass_block: Array) -> bool:
+def is_orthonormal(system: System, block: Array, mass_block: Array) -> bool:
     """Whether `block` is mass-orthonormal, tried on a few of its combinations.
 
     The modes of a similar material are, as long as the mass is the same, and need no Gram matrix.
@@ -92,6 +92,17 @@ def remove_rigid(system: System, block: Array) -> tuple[Array, Array]:
     if not elastic.all():
         block, mass_block = block[:, elastic], mass_block[:, elastic]
     return np.ascontiguousarray(block), np.ascontiguousarray(mass_block)
+
+
+def rigid_pairs(system: System) -> tuple[Array, Array]:
+    """Rayleigh quotients (6,) and M-orthonormal vectors (local, 6) of the rigid motions.
+
+    The quotients [rad^2/s^2] are zero but for rounding, not negative, and ascending.
+    """
+    stiff = system.inner(system.rigid, system.times_stiffness(system.rigid))
+    values = np.maximum(np.diag(stiff), 0.0)
+    order = np.argsort(values, kind="stable")
+    return values[order], np.ascontiguousarray(system.rigid[:, order])
 
 
 def first_elastic_estimate(system: System) -> float:

@@ -14,8 +14,7 @@ from carillon import provenance
 from carillon.errors import UserError
 from carillon.files import create_h5, open_h5
 from solver.contact import Contact, choose_contacts
-from solver.model import RIGID_MODES
-from solver.modes_file import read_modes
+from solver.modes_file import read_elastic, require_same_solid
 from solver.response import (
     SAMPLE_RATE_HERTZ,
     Contacts,
@@ -109,21 +108,26 @@ def respond(
     Raises
     ------
     UserError
-        If a file is unusable or holds no elastic mode, or a point is away from the surface.
+        If a file is unusable or holds no elastic mode, a point is away from the surface, or the
+        motion leaves the range of numbers.
     """
-    reference = read_modes(truth)
-    if len(reference.eigenvalues) <= RIGID_MODES:
-        raise UserError(
-            f"{truth}: holds {len(reference.eigenvalues)} modes, of which {RIGID_MODES} are rigid; "
-            "compute more"
-        )
+    reference = read_elastic(truth)
     points = choose_contacts(reference, options.strike, options.observed)
     seen = {TRUTH: at_contacts(reference, points)}
-    seen |= {name: at_contacts(read_modes(path), points) for name, path in candidates.items()}
+    for name, path in candidates.items():
+        candidate = read_elastic(path)
+        require_same_solid([truth, path], [reference, candidate])
+        seen[name] = at_contacts(candidate, points)
     period = 2.0 * np.pi / np.sqrt(seen[TRUTH].eigenvalues[0])
     seconds = np.linspace(0.0, options.periods * period, INSTANTS)
     motions = {name: displacements(part, options.damping, seconds) for name, part in seen.items()}
     sounds = _played(seen, options)
+    for name in seen:
+        if not (np.isfinite(motions[name]).all() and np.isfinite(sounds[name]).all()):
+            raise UserError(
+                f"the response of {name!r} is not a finite number; choose a lower damping or a "
+                "longer contact, or compute its modes again"
+            )
     return ResponseFile(
         seconds,
         dict(zip(POINTS, points, strict=True)),
@@ -175,7 +179,7 @@ def read_response(path: str | Path) -> ResponseFile:
     UserError
         If it is missing, damaged or of another kind.
     """
-    with open_h5(path, KIND, SCHEMA) as file:
+    with open_h5(path, KIND, SCHEMA, sealed=True) as file:
         attributes = dict(file.attrs)
         contacts = {
             name: Contact(file[f"points/{name}/position"][()], file[f"points/{name}/inward"][()])

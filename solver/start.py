@@ -9,7 +9,8 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.errors import UserError
+from carillon.datasets import INTEGER, find, finite, read
+from carillon.errors import LocalUserError, UserError
 from carillon.files import open_h5
 from dataset_gen.block import degrees_of_freedom
 from solver.decomposition import on_root
@@ -47,9 +48,12 @@ def start_from_file(
 
     def check() -> int:
         assert model is not None
-        with open_h5(path, KIND, SCHEMA) as file:
-            count = int(file["modes"].shape[1])
-            grid = file["node_grid"][()]
+        with open_h5(path, KIND, SCHEMA, sealed=True) as file:
+            grid = read(file, "node_grid", (None, 3), INTEGER)
+            modes_there = find(file, "modes", (3 * len(grid), None))
+            count = int(modes_there.shape[1])
+            for first in range(0, count, COLUMNS):
+                finite(file, "modes", modes_there[:, first : first + COLUMNS])
         if not np.array_equal(grid, model.mesh.node_grid):
             raise UserError(
                 f"{path}: modes of another mesh ({len(grid):,} nodes), expected the one to solve "
@@ -62,13 +66,18 @@ def start_from_file(
         return count
 
     count = on_root(comm, check)
-    return deal_rows(_read_columns(path), count, share, comm)
+    return deal_rows(_read_columns(path, count), count, share, comm)
 
 
-def _read_columns(path: str | Path) -> Iterator[Array]:
-    with open_h5(path, KIND, SCHEMA) as file:
-        for first in range(0, file["modes"].shape[1], COLUMNS):
-            yield file["modes"][:, first : first + COLUMNS]
+def _read_columns(path: str | Path, count: int) -> Iterator[Array]:
+    """Modes of the file in blocks; what goes wrong now, after the check, this rank alone knows."""
+    try:
+        with open_h5(path, KIND, SCHEMA, sealed=True) as file:
+            modes = find(file, "modes", (None, count))
+            for first in range(0, count, COLUMNS):
+                yield modes[:, first : first + COLUMNS]
+    except UserError as error:
+        raise LocalUserError(str(error)) from None
 
 
 def deal_rows(blocks: Iterable[Array], count: int, share: Share, comm: MPI.Comm) -> Array:

@@ -52,7 +52,7 @@ def count_rigid(values: Array) -> int:
 
 def require_orthonormal(orthogonality: float) -> None:
     """Raise ConvergenceError unless the modes are mass-orthonormal to the tolerance."""
-    if orthogonality > ORTHOGONALITY_TOLERANCE:
+    if not orthogonality <= ORTHOGONALITY_TOLERANCE:  # nor if it is no number
         raise ConvergenceError(
             f"the modes are mass-orthonormal to {orthogonality:.1e} only, "
             f"{ORTHOGONALITY_TOLERANCE:.0e} is required"

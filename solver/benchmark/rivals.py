@@ -16,10 +16,11 @@ from slepc4py import SLEPc
 
 from carillon.errors import ConvergenceError
 from solver.distribution import distribute
-from solver.eigensolver import OPTIONS_PREFIX, factor_package
-from solver.model import ElasticModel
-from solver.rayleigh_ritz import safe_shift
-from solver.system import assemble
+from solver.eigensolver import factor_package
+from solver.model import RIGID_MODES, ElasticModel
+from solver.petsc_options import OPTIONS_PREFIX
+from solver.rayleigh_ritz import rigid_pairs
+from solver.system import System, assemble
 
 Array = NDArray[np.float64]
 
@@ -104,8 +105,9 @@ def smallest_without_factor(
 ) -> Array:
     """Lowest eigenvalues (modes,) [rad^2/s^2] by ARPACK in regular mode: products alone.
 
-    With a diagonal mass the problem is D x' = lambda x', D = M^-1/2 K M^-1/2.  A small shift keeps
-    the rigid motions' zeros away from ARPACK's test, which is relative to the eigenvalue.
+    With a diagonal mass the problem is D x' = lambda x', D = M^-1/2 K M^-1/2.  The rigid motions
+    are given: their zeros would never pass ARPACK's test, which is relative to the eigenvalue.
+    Copies of other multiple eigenvalues may be missed.
 
     Raises
     ------
@@ -113,28 +115,44 @@ def smallest_without_factor(
         If too few pairs converge.
     """
     system = assemble(distribute(model, None, seed, comm), comm)
-    scale = system.M.getDiagonal()
-    scale.sqrtabs()
-    scale.reciprocal()
-    operator = system.K.copy()
-    operator.diagonalScale(scale, scale)
-    shift = safe_shift(system)
-    operator.shift(shift)
-    operator.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    rigid_values, rigid = rigid_pairs(system)
+    operator = _elastic_operator(system, rigid)
     solver = SLEPc.EPS().create(comm)
     solver.setType(SLEPc.EPS.Type.ARPACK)
     solver.setOperators(operator)
     solver.setProblemType(SLEPc.EPS.ProblemType.HEP)
     solver.setWhichEigenpairs(SLEPc.EPS.Which.SMALLEST_REAL)
-    solver.setDimensions(modes)
+    solver.setDimensions(modes - RIGID_MODES)
     solver.setTolerances(tolerance, MOST_RESTARTS)
     solver.solve()
     found = solver.getConverged()
-    values = np.sort([solver.getEigenvalue(index).real for index in range(found)]) - shift
-    for used in (solver, operator, scale, system):
+    elastic = np.sort([solver.getEigenvalue(index).real for index in range(found)])
+    for used in (solver, operator, system):
         used.destroy()
-    if found < modes:
+    if RIGID_MODES + found < modes:
         raise ConvergenceError(
-            f"ARPACK in regular mode converged {found} of {modes} modes in {MOST_RESTARTS} restarts"
+            f"ARPACK in regular mode converged {RIGID_MODES + found} of {modes} modes in "
+            f"{MOST_RESTARTS} restarts"
         )
-    return values[:modes]
+    return np.concatenate([rigid_values, elastic])[:modes]
+
+
+def _elastic_operator(system: System, rigid: Array) -> PETSc.Mat:
+    """M^-1/2 K M^-1/2 plus a matrix of rank six that moves the rigid motions' zeros to the top."""
+    scale = system.M.getDiagonal()
+    scale.sqrtabs()
+    motions = np.asfortranarray(rigid * scale.getArray(readonly=True)[:, None])
+    size = ((len(motions), system.n_dofs), (None, RIGID_MODES))
+    columns = PETSc.Mat().createDense(size, array=motions, comm=system.comm)
+    columns.assemble()
+    scale.reciprocal()
+    scaled = system.K.copy()
+    scaled.diagonalScale(scale, scale)
+    top = PETSc.Vec().createSeq(RIGID_MODES)
+    top.set(scaled.norm(PETSc.NormType.NORM_INFINITY))
+    operator = PETSc.Mat().createLRC(scaled, columns, top, columns)
+    operator.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    # The operator holds on to its parts.
+    for part in (scale, scaled, columns, top):
+        part.destroy()
+    return operator

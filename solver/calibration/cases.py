@@ -161,7 +161,7 @@ class Case:
 
 def write_case(path: Path, case: Case) -> None:
     """Write a case atomically."""
-    with create_h5(path, KIND, SCHEMA) as file:
+    with create_h5(path, KIND, SCHEMA, sealed=True) as file:
         file.attrs["name"] = case.name
         file.attrs["cell_edge"] = case.model.mesh.edge
         file["grid"] = case.model.mesh.grid
@@ -178,7 +178,7 @@ def read_case(path: Path) -> Case:
     UserError
         If the file is missing, damaged or of another schema.
     """
-    with open_h5(path, KIND, SCHEMA) as file:
+    with open_h5(path, KIND, SCHEMA, sealed=True) as file:
         grid, edge = file["grid"][()], float(file.attrs["cell_edge"])
         blocks, exact, name = file["blocks"][()], file["exact"][()], str(file.attrs["name"])
     mesh = hexmesh_from_grid(grid, np.zeros(3), edge)

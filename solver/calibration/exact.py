@@ -47,7 +47,7 @@ def _case(name: str, mesh: HexMesh, young: Array) -> Case | None:
     coarse = coarse_model(blocks, CoarseMaterial(np.ones_like(e), 0.0))
     if coarse.n_dofs > LARGEST or coarse.n_dofs < 3 * MODES:
         return None
-    options = SolverOptions(method="slepc", modes=MODES, prove=False)
+    options = SolverOptions(method="slepc", modes=MODES)
     result = modal_analysis(fine_model(mesh, young), options, MPI.COMM_SELF)
     result.system.destroy()
     return Case(name, coarse, e, np.sqrt(result.values[RIGID_MODES:]))

@@ -69,7 +69,8 @@ def winding_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.n
     Returns
     -------
     filled : (nx, ny, nz) bool, all False if its volume is not within a factor of `TOO_THIN` of the
-        volume inside the surface: only a skeleton would be left of walls that thin.
+        volume inside the surface, or its length of the surface's: only a skeleton would be left of
+        walls that thin, and less of needles.
     origin : (3,) corner of the grid [m].
     """
     # The hierarchy behind fast winding numbers suffers from long triangles.
@@ -83,9 +84,16 @@ def winding_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.n
     cover = (labels > 0) & (held >= 0.5)[labels]
     filled = thin_to(cover, half_full, fraction)
     inside, count = fraction.sum(), np.count_nonzero(filled)
-    if not inside / TOO_THIN <= count <= inside * TOO_THIN:
+    alike = inside / TOO_THIN <= count <= inside * TOO_THIN
+    if not alike or TOO_THIN * _length(filled) < _length(cover):
         filled = np.zeros_like(filled)
     return filled, grid.origin
+
+
+def _length(voxels: np.ndarray) -> int:
+    """Voxels along the longest side of the box around those that are set."""
+    found = np.argwhere(voxels)
+    return int(np.ptp(found, axis=0).max()) + 1 if len(found) else 0
 
 
 def centre_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
@@ -132,6 +140,16 @@ def touched_voxels(surface: trimesh.Trimesh, grid: Grid) -> np.ndarray:
     touched = np.zeros(grid.shape, dtype=bool)
     touched[tuple(np.clip(index, 0, np.array(grid.shape) - 1).T)] = True
     return touched
+
+
+def cut_triangles(surface: trimesh.Trimesh, max_edge: float) -> float:
+    """Number of triangles once every edge is cut to at most `max_edge` [m], see `_cut`.
+
+    Cutting halves all edges of a triangle until the longest one is short enough.
+    """
+    longest = np.asarray(surface.edges_unique_length)[surface.faces_unique_edges].max(axis=1)
+    halvings = np.ceil(np.log2(np.maximum(longest / max_edge, 1.0)))
+    return float((4.0**halvings).sum())
 
 
 def _cut(surface: trimesh.Trimesh, max_edge: float) -> trimesh.Trimesh:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from carillon.errors import UserError
-from solver.geometry.fill import FILLS, bounding_grid
+from solver.geometry.fill import FILLS, bounding_grid, cut_triangles
 from solver.geometry.topology import pieces as label_pieces
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
@@ -19,6 +19,9 @@ PIECES = ("error", "largest")
 
 #: Most voxels of a bounding grid; filling takes about 150 bytes for each of them.
 MAX_GRID = 16_000_000
+
+#: Most triangles that a surface may be cut into; each takes about 100 bytes.
+MAX_TRIANGLES = 100_000_000
 
 #: Factors by which a resolution is raised in search of one that leaves the model in one piece,
 #: and the largest grid [voxels] that such a trial may have.
@@ -129,8 +132,15 @@ def _checked_resolution(surface: trimesh.Trimesh, resolution: int, name: str) ->
     if count > MAX_GRID:
         largest = int(checked * (MAX_GRID / count) ** (1 / 3))
         raise UserError(
-            f"mesh {name!r} at resolution {checked} needs a grid of {count:,.0f} voxels, the limit "
-            f"is {MAX_GRID:,}; use a resolution of about {largest} or less"
+            f"mesh {name!r} at resolution {checked:,} needs a grid of {count:,.0f} voxels, the "
+            f"limit is {MAX_GRID:,}; use a resolution of about {largest} or less"
+        )
+    pieces = cut_triangles(surface, float(extents.max()) / checked / 2)
+    if pieces > MAX_TRIANGLES:
+        raise UserError(
+            f"mesh {name!r} at resolution {checked} would be cut into {pieces:.2g} triangles, the "
+            f"limit is {MAX_TRIANGLES:,}; it has too many large triangles, or use a lower "
+            "resolution"
         )
     return checked
 

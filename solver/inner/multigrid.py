@@ -18,6 +18,7 @@ from petsc4py import PETSc
 
 from carillon.threads import in_parallel, split
 from solver.inner.block_rows import BlockRows
+from solver.petsc_options import MULTIGRID_PREFIX
 
 Array = NDArray[np.floating]
 
@@ -32,7 +33,6 @@ LANCZOS_STEPS = 20
 """Steps of the estimate."""
 EXHAUSTED = 1e-6
 """A next Lanczos vector that is this small, relative to the matrix, is nothing but rounding."""
-_PREFIX = "carillon_amg_"
 
 
 class Multigrid:
@@ -190,16 +190,21 @@ def _aggregate(matrix: Any, near_null: Array, comm: MPI.Comm, threshold: float) 
         "pc_gamg_threshold": threshold,
         "pc_gamg_coarse_eq_limit": COARSEST_UNKNOWNS,
     }
-    options = PETSc.Options(_PREFIX)
+    options = PETSc.Options(MULTIGRID_PREFIX)
     for name, value in settings.items():
         options[name] = value
+    everywhere = PETSc.Options()
+    if comm.size > 1:
+        # By default PETSc adds other ranks' parts of a coarse matrix in the order they arrive in.
+        everywhere["matptap_via"] = "allatonce"
     pc = PETSc.PC().create(comm)
-    pc.setOptionsPrefix(_PREFIX)
+    pc.setOptionsPrefix(MULTIGRID_PREFIX)
     pc.setOperators(matrix)
     pc.setFromOptions()
     for name in settings:
         options.delValue(name)
     pc.setUp()
+    everywhere.delValue("matptap_via")
     motions.destroy()
     for vector in vectors:
         vector.destroy()

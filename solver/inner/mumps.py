@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from carillon.errors import ConvergenceError
-from solver.eigensolver import OPTIONS_PREFIX, factor_package
+from solver.eigensolver import factor_package
+from solver.petsc_options import INNER_PREFIX
 from solver.system import System
 
 Array = NDArray[np.float64]
@@ -35,7 +36,7 @@ class MumpsInverse:
         self._matrix.setOption(option, True)
         package = factor_package(system.comm.size)
         self._pc = PETSc.PC().create(system.comm)
-        self._pc.setOptionsPrefix(f"{OPTIONS_PREFIX}inner_")
+        self._pc.setOptionsPrefix(INNER_PREFIX)
         self._pc.setOperators(self._matrix)
         self._pc.setType(PETSc.PC.Type.CHOLESKY)
         self._pc.setFactorSolverType(package)

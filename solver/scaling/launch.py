@@ -5,15 +5,17 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from carillon.children import run_child
 from carillon.errors import UserError
 from carillon.progress import say, track
+from carillon.runtime import allowed_cores
+from solver.limits import MOST_RANKS, RANKS_OF_CORE
 
 LAUNCHER = "mpiexec"
 _ALLOWED = {
@@ -70,9 +72,27 @@ def measure_each(
     return found, failed
 
 
+def require_ranks(ranks: int, environment: Mapping[str, str] = os.environ) -> None:
+    """Check that so many ranks may share the cores of this machine, or of a SLURM job's nodes.
+
+    Raises
+    ------
+    UserError
+        If not.
+    """
+    nodes = environment.get("SLURM_JOB_NUM_NODES", "1")
+    cores = allowed_cores() * (int(nodes) if nodes.isdecimal() else 1)
+    most = min(MOST_RANKS, RANKS_OF_CORE * cores)
+    if ranks > most:
+        raise UserError(
+            f"{ranks:,} ranks on {cores} cores, expected at most {most:,}; the model tells about "
+            "more without running them"
+        )
+
+
 def _run(command: list[str], environment: dict[str, str]) -> str | None:
     """Run to the end; what it said if it failed."""
-    done = subprocess.run(command, env=environment, capture_output=True, text=True)
+    done = run_child(command, environment)
     if done.returncode == 0:
         return None
     said = [line for line in done.stderr.splitlines() if line.startswith("solver")]

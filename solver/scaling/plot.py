@@ -34,7 +34,7 @@ def save_plot(result: dict[str, Any], path: str | Path) -> None:
     matplotlib.use("Agg")
     figure = scaling_figure(result)
     with atomic_path(path) as temporary:
-        figure.savefig(temporary, format=Path(path).suffix[1:] or "png", dpi=160)
+        figure.savefig(temporary, format=Path(path).suffix[1:].lower(), dpi=160)
 
 
 def scaling_figure(result: dict[str, Any], settings: Mapping[str, Any] | None = None) -> Figure:

@@ -11,7 +11,7 @@ import numpy as np
 from solver.decomposition import decompose
 from solver.model import ElasticModel
 from solver.problem import ProblemOptions, build_problem
-from solver.scaling.launch import measure_each
+from solver.scaling.launch import measure_each, require_ranks
 from solver.scaling.model import (
     ASSUMPTIONS,
     WEAK_ASSUMPTIONS,
@@ -84,6 +84,7 @@ def scaling_study(
     UserError
         For anything wrong with the solid, or if all runs fail.
     """
+    require_ranks(max(scaling.ranks))
     problem = build_problem(options)
 
     def runs(resolutions: dict[int, int]) -> tuple[list[Result], dict[int, str]]:

@@ -1,0 +1,108 @@
+"""Options that people hand to PETSc and SLEPc, and what those say to them."""
+
+from __future__ import annotations
+
+import ctypes
+from contextlib import suppress
+from pathlib import Path
+
+from petsc4py import PETSc
+
+from carillon.errors import LocalUserError, UserError
+
+OPTIONS_PREFIX = "carillon_"
+"""What the names of PETSc's options for this program begin with."""
+INNER_PREFIX, MULTIGRID_PREFIX = f"{OPTIONS_PREFIX}inner_", f"{OPTIONS_PREFIX}amg_"
+"""The same for inner solvers of the correction."""
+OUT_OF_MEMORY, OTHER_LIBRARY = 55, 76
+"""PETSc's codes of errors that one rank may have alone; all ranks dislike options together."""
+_ASKED_LATE = ("view", "monitor", "reason")
+"""Parts of names that PETSc asks for when it has solved."""
+
+_inserted: list[str] = []
+
+
+def insert_options(text: str | None, method: str = "slepc") -> None:
+    """Put options like `-carillon_eps_ncv 400` into PETSc's options database.
+
+    Raises
+    ------
+    UserError
+        If an option lacks the prefix, and would be ignored by the method or mean something for the
+        whole program.
+    """
+    if text is None:
+        return
+    hcms = method == "hcms"
+    prefixes = (INNER_PREFIX, MULTIGRID_PREFIX) if hcms else (OPTIONS_PREFIX,)
+    strangers = [name for name in _names(text) if not name.startswith(prefixes)]
+    if strangers or not text.strip().startswith(f"-{OPTIONS_PREFIX}"):
+        found = f"-{strangers[0]}" if strangers else text
+        example = f"{INNER_PREFIX}mat_mumps_icntl_14" if hcms else f"{OPTIONS_PREFIX}eps_ncv"
+        raise UserError(
+            f"PETSc option {found!r}: expected names with the prefix -{prefixes[0]}, like "
+            f"-{example}, for --method {method}"
+        )
+    PETSc.Options().insertString(text)
+    _inserted[:] = _names(text)
+
+
+def require_known_options() -> None:
+    """Check, once an eigensolver is set up and before it solves, that it knows all options.
+
+    Raises
+    ------
+    UserError
+        If it did not ask for one of those inserted, which is then misspelt.
+    """
+    strange = [name for name in unused_options() if not any(part in name for part in _ASKED_LATE)]
+    if strange:
+        raise UserError(f"PETSc knows no option {', '.join(strange)} here; see how it is spelt")
+
+
+def _names(text: str) -> list[str]:
+    """Names in a text of options, without their dashes; numbers may begin with a dash, too."""
+    words = [word for word in text.split() if word.startswith("-")]
+    names = [word.removeprefix("-").removeprefix("-") for word in words]
+    return [name for name in names if name[:1].isalpha()]
+
+
+def unused_options() -> list[str]:
+    """Those of the options inserted that PETSc has not asked for so far.
+
+    None are found where PETSc's library is not, which alone can tell.
+    """
+    library = _library() if _inserted else None
+    if library is None:
+        return []
+    unused = []
+    for name in _inserted:
+        used = ctypes.c_int(1)
+        library.PetscOptionsUsed(None, name.encode(), ctypes.byref(used))
+        if not used.value:
+            unused.append(f"-{name}")
+    return unused
+
+
+def _library() -> ctypes.CDLL | None:
+    """The library of PETSc that this process has loaded."""
+    with suppress(OSError):
+        for line in Path("/proc/self/maps").read_text().splitlines():
+            path = line.split(maxsplit=5)[-1]
+            if Path(path).name.startswith("libpetsc"):
+                return ctypes.CDLL(path)
+    return None
+
+
+def meaning(error: PETSc.Error, text: str | None) -> Exception:
+    """What to raise for an error of PETSc's: it lacks memory, or dislikes options in `text`.
+
+    Anything else is a fault of this program's and stays as it is.
+    """
+    said = str(error).strip().splitlines()[-1].split("] ", 1)[-1]
+    if error.ierr == OUT_OF_MEMORY:
+        return MemoryError(said)
+    if text is None:
+        return error
+    refusal = LocalUserError if error.ierr == OTHER_LIBRARY else UserError
+    return refusal(f"PETSc refuses --petsc {text!r}: {said}")
