@@ -10,6 +10,7 @@ from carillon import cli
 from carillon.arguments import (
     Parser,
     non_negative_number,
+    number_of_workers,
     poisson_ratio,
     positive_number,
     whole_number,
@@ -27,7 +28,9 @@ from dataset_gen.speed import Speed
 from dataset_gen.tasks import Plan
 
 PROGRAM = "dataset_gen"
-EXIT_INTERRUPTED = 130
+
+MOST_TIMED = 1_000_000
+"""Samples that a benchmark keeps in memory."""
 
 
 def _parser() -> Parser:
@@ -43,10 +46,10 @@ def _parser() -> Parser:
     make.add_argument("--distribution", choices=tuple(DISTRIBUTIONS), default="uniform")
     make.add_argument("--low", type=non_negative_number, help="least modulus in GPa (0 or 0.01)")
     make.add_argument("--high", type=positive_number, help="largest modulus in GPa (10 or 1000)")
-    make.add_argument("--workers", type=whole_number(1), default=1, help="processes")
+    make.add_argument("--workers", type=number_of_workers, default=1, help="processes")
     make.add_argument("--out", required=True, help="HDF5 file to write")
     time = commands.add_parser("benchmark", help="fits per second of every objective")
-    time.add_argument("--samples", type=whole_number(1), default=4000)
+    time.add_argument("--samples", type=whole_number(1, MOST_TIMED), default=4000)
     time.add_argument("--objective", choices=tuple(OBJECTIVES), help="this one only")
     time.add_argument("--poisson", type=poisson_ratio, default=DEFAULT_POISSON)
     time.add_argument("--json", action="store_true")
@@ -74,7 +77,7 @@ def _generate(arguments: argparse.Namespace, engine: Engine) -> int:
         fitted = generate_file(arguments.out, Plan(settings), origin_of(settings, *split), engine)
     except KeyboardInterrupt:
         say(f"{arguments.out}: interrupted; the same command goes on from here")
-        return EXIT_INTERRUPTED
+        return cli.EXIT_INTERRUPTED
     what = f"samples {settings.start}..{settings.stop - 1}, {settings.objective}"
     if fitted is None:
         say(f"{arguments.out}: holds {what} already, nothing to do")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
 from pathlib import Path
@@ -14,11 +15,11 @@ from carillon.errors import UserError
 from carillon.files import require_writable
 from carillon.progress import say, track
 from dataset_gen.element import DEFAULT_POISSON
-from dataset_gen.journal import Journal, discard_journal
+from dataset_gen.journal import Journal, discard_journal, journal_of
 from dataset_gen.objectives import DEFAULT_OBJECTIVE
 from dataset_gen.settings import settings_of
 from dataset_gen.shards import Shard, origin_of, read_settings, shard_of, write_rows
-from dataset_gen.tasks import Plan, rows_of
+from dataset_gen.tasks import ROW, Plan, rows_of
 from dataset_gen.workers import in_this_process, in_workers
 
 Engine = Callable[[Plan, range], Generator[bytes, None, None]]
@@ -93,12 +94,13 @@ def generate_file(
     ------
     UserError
         If `path` is anything else, another process is writing it, the journal beside it belongs to
-        other settings, or the disk is full; what was done by then is kept.
+        other settings, or the disk is full or too small; what was done by then is kept.
     """
     path = require_writable(path)
     if _is_there(path, plan):
         discard_journal(path)
         return None
+    _require_room(path, plan)
     journal = Journal(path, plan, {name: origin.get(name) for name in _ENVIRONMENT})
     finished = False
     try:
@@ -113,6 +115,20 @@ def generate_file(
     finally:
         journal.close(remove=finished or not journal.tasks)
     return plan.settings.count - before
+
+
+def _require_room(path: Path, plan: Plan) -> None:
+    """Refuse a shard that the disk cannot take: journal and shard are there at the same time."""
+    free = shutil.disk_usage(path.parent).free
+    begun = journal_of(path)
+    if begun.exists():
+        free += begun.stat().st_size
+    needed = 2 * plan.settings.count * ROW.itemsize
+    if needed > free:
+        raise UserError(
+            f"{path}: {plan.settings.count:,} samples take {needed / 1e9:,.1f} GB while they are "
+            f"generated, {free / 1e9:,.1f} GB are free; make room, or divide them over more shards"
+        )
 
 
 def _is_there(path: Path, plan: Plan) -> bool:

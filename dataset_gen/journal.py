@@ -8,8 +8,6 @@ frame that is cut off or whose checksum differs ends the journal; what follows i
 
 from __future__ import annotations
 
-import errno
-import fcntl
 import json
 import os
 import struct
@@ -22,6 +20,7 @@ from typing import Any
 
 from carillon.errors import UserError
 from carillon.files import cause, sync_folder
+from carillon.locks import take
 from carillon.progress import say
 from dataset_gen.settings import settings_from
 from dataset_gen.tasks import Plan
@@ -32,7 +31,6 @@ SYNC_SECONDS = 1.0
 _TITLE = b"Carillon journal of a shard, 1\n"
 _FRAME = struct.Struct("<4sQI")
 _PLAN, _ENVIRONMENT, _TASK = b"PLAN", b"ENVI", b"TASK"
-_NO_LOCKS = (errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOLCK, errno.EINVAL)
 
 
 def journal_of(path: Path) -> Path:
@@ -234,37 +232,9 @@ def _read(file: int, length: int, position: int) -> bytes:
     return b"".join(pieces)
 
 
-def _locked(path: Path) -> int:
-    """Open the journal `path`, made if need be, for this process alone."""
-    while True:
-        try:
-            file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
-        except OSError as error:
-            raise UserError(f"{path}: cannot be written ({cause(error)})") from None
-        try:
-            _lock(path, file)
-            if _is_at(path, file):
-                return file
-        except BaseException:
-            os.close(file)
-            raise
-        os.close(file)  # who had it before has finished and removed it
-
-
-def _lock(path: Path, file: int) -> None:
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise UserError(
-            f"{path}: another process is generating this shard; wait for it, or choose another name"
-        ) from None
-    except OSError as error:
-        if error.errno not in _NO_LOCKS:
-            raise UserError(f"{path}: cannot be locked ({cause(error)})") from None
-        say(f"{path}: this file system has no locks; generate no shard twice at a time")
-
-
-def _is_at(path: Path, file: int) -> bool:
-    with suppress(FileNotFoundError):
-        return os.path.samestat(os.stat(path), os.fstat(file))
-    return False
+def _locked(journal: Path) -> int:
+    """Open the journal, made if need be, for this process alone."""
+    return take(
+        journal,
+        f"{journal}: another process is generating this shard; wait for it, or choose another name",
+    )

@@ -10,6 +10,7 @@ from collections.abc import Callable, Generator
 from functools import partial
 from typing import Any
 
+from carillon import cli
 from carillon.cli import EXIT_BAD_INPUT
 from carillon.errors import UserError
 from carillon.progress import say
@@ -65,9 +66,8 @@ def share(comm: Comm, program: str, make: Callable[[Engine], int]) -> int:
         if busy or comm.rank > 0:
             comm.Abort(EXIT_BAD_INPUT)
         status = EXIT_BAD_INPUT
-    except BaseException:
-        traceback.print_exc()
-        comm.Abort(1)
+    except BaseException as error:
+        give_up(comm, program, error)
     for rank in range(1, comm.size):
         comm.send(_End(status), dest=rank)
     return status
@@ -78,6 +78,16 @@ def refuse(comm: Comm, program: str, error: UserError) -> None:
     if comm.rank == 0:
         print(f"{program}: {error}", file=sys.stderr, flush=True)
     comm.Barrier()
+
+
+def give_up(comm: Comm, program: str, error: BaseException) -> None:
+    """Say what has happened to this rank alone, and end all of them."""
+    status, sentence = cli.meaning(error)
+    if sentence is None:
+        traceback.print_exc()
+    else:
+        cli.tell(f"{program}: {sentence}")
+    comm.Abort(status)
 
 
 class _End:

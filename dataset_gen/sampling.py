@@ -55,10 +55,11 @@ class Moduli:
                 f"{' or '.join(DISTRIBUTIONS)}"
             )
         least, most = EXTREMES
-        if not (self.low == 0.0 or self.low >= least) or not self.low < self.high <= most:
+        in_range = (self.low == 0.0 or self.low >= least) and least <= self.high <= most
+        if not (in_range and self.low < self.high):
             raise UserError(
                 f"moduli from {self.low:g} to {self.high:g} GPa: expected low < high, high up to "
-                f"{most:g}, low 0 or {least:g} at least"
+                f"{most:g}, both {least:g} at least, or low 0"
             )
         if self.logarithmic and self.high > LARGEST_CONTRAST * self.low:
             raise UserError(

@@ -180,6 +180,11 @@ def _opened(path: Path) -> Iterator[tuple[h5py.File, Settings]]:
                     f"{path}: {name} has shape {file[name].shape}, expected {expected} from its "
                     "sample range; generate the file again"
                 )
+            if file[name].dtype != ROW[name].base:
+                raise UserError(
+                    f"{path}: {name} holds {file[name].dtype}, expected {ROW[name].base}; generate "
+                    "the file again"
+                )
         yield file, settings
 
 

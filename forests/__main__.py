@@ -7,22 +7,25 @@ import json
 import sys
 
 from carillon import cli
-from carillon.arguments import Parser, positive_number, whole_number
+from carillon.arguments import Parser, number_between, whole_number
 from carillon.errors import UserError
 from carillon.files import atomic_path, require_writable
 from carillon.measurement import measured
+from carillon.pictures import require_plottable
 from dataset_gen.ranks import refuse, world
 from forests import benchmark, summary
 from forests.comparison import table
 from forests.comparison.cases import CASES
-from forests.comparison.database import MATERIALS
+from forests.comparison.database import MATERIALS, MOST_MATERIALS
 from forests.comparison.methods import common_poisson, databases_of, load_models
-from forests.comparison.plot import plot, require_plottable
+from forests.comparison.plot import plot
 from forests.model import default_path
 from forests.training import command, studies
 from forests.training.command import PROGRAM
 from forests.training.dataset import open_dataset
 
+MOST_BLOCKS = 1_000_000
+"""Blocks that a table or a benchmark keeps in memory."""
 HIDDEN = ("out", "json", "plot")
 """Arguments on which a result does not depend."""
 
@@ -42,15 +45,19 @@ def _parser() -> Parser:
         command.add_workers(study)
     compare = commands.add_parser("table", help="error, cost and storage of every coarsening")
     compare.add_argument("--model", action="append", help="forests to compare, may be repeated")
-    compare.add_argument("--blocks", type=whole_number(1), default=10_000, help="of each range")
+    compare.add_argument(
+        "--blocks", type=whole_number(1, MOST_BLOCKS), default=10_000, help="of each range"
+    )
     compare.add_argument("--seed", type=whole_number(0), default=0)
-    compare.add_argument("--materials", type=whole_number(2), default=MATERIALS, help="a database")
+    compare.add_argument(
+        "--materials", type=whole_number(2, MOST_MATERIALS), default=MATERIALS, help="a database"
+    )
     compare.add_argument("--database", metavar="FILE", help="read databases, or build and write")
     compare.add_argument("--plot", metavar="FILE", help="error over cost, as .png, .svg or .pdf")
     cost = commands.add_parser("benchmark", help="time of a block, of loading, over the size")
     cost.add_argument("--model", help="forests to measure (default: the packaged ones)")
-    cost.add_argument("--blocks", type=whole_number(1), default=100_000)
-    cost.add_argument("--largest", type=positive_number, default=600.0, metavar="MB")
+    cost.add_argument("--blocks", type=whole_number(1, MOST_BLOCKS), default=100_000)
+    cost.add_argument("--largest", type=number_between(1e-3, 1e6), default=600.0, metavar="MB")
     for measuring in (alternatives, curve, compare, cost):
         measuring.add_argument("--json", action="store_true")
         measuring.add_argument("--out", metavar="FILE", help="result and provenance, as JSON")
@@ -85,6 +92,11 @@ def _table(arguments: argparse.Namespace) -> list[table.Row]:
     if arguments.plot:
         plot(rows, arguments.plot)
     return rows
+
+
+def _models(arguments: argparse.Namespace) -> list[str]:
+    named = getattr(arguments, "model", None) or []
+    return [named] if isinstance(named, str) else named
 
 
 def _save(result: object, arguments: argparse.Namespace) -> None:
@@ -127,7 +139,7 @@ def _found(arguments: argparse.Namespace) -> tuple[object, str]:
             studied = _studied(arguments)
             return studied, studies.as_text(studied)
         case _:
-            found = summary.describe(arguments.file or default_path())
+            found = summary.describe(default_path() if arguments.file is None else arguments.file)
             return found, summary.as_text(found)
 
 
@@ -143,7 +155,7 @@ def main(argv: list[str] | None = None) -> int:
             return command.run_train(arguments)
     out = getattr(arguments, "out", None)
     if out is not None:
-        require_writable(out)
+        require_writable(out, [*(getattr(arguments, "datasets", [])), *_models(arguments)])
     result, text = _found(arguments)
     if out is not None:
         _save(result, arguments)

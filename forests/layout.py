@@ -21,6 +21,7 @@ FEATURE_BITS = 3
 FEATURE_MASK = 7
 
 MOST_NODES = 1 << (31 - FEATURE_BITS)
+MOST_LEAVES = MOST_NODES // 2
 
 CLUSTER_LEVELS = 4
 """Levels of a subtree that stand together; measured best of 1 to 5."""

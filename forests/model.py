@@ -228,8 +228,9 @@ def load_model(path: str | Path | None = None) -> Model:
 def _array(path: Path, file: h5py.File, name: str, dtype: np.dtype) -> NDArray[Any]:
     if name not in file:
         raise UserError(f"{path}: has no dataset {name!r}; train the forests again")
-    if file[name].dtype != dtype or file[name].size == 0:
+    stored = file[name]
+    if stored.dtype != dtype or not 0 < stored.nbytes <= stored.id.get_storage_size():
         raise UserError(f"{path}: dataset {name!r} is not what it should be; train again")
-    array = aligned(file[name].shape, dtype)
-    file[name].read_direct(array)
+    array = aligned(stored.shape, dtype)
+    stored.read_direct(array)
     return array

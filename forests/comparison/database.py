@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from carillon import provenance
+from carillon.datasets import INTEGER, number, read, refused
 from carillon.errors import UserError
 from carillon.files import create_h5, open_h5
 from carillon.progress import track
@@ -273,12 +274,17 @@ def load_databases(path: str | Path) -> list[Database]:
 
 
 def _read(group: h5py.Group) -> Database:
+    moduli = read(group, "moduli", (None, 8))
+    keys = read(group, "keys", (None,), INTEGER)
+    entries = read(group, "entries", (len(keys),), INTEGER)
+    if not len(keys) or entries.min() < 0 or entries.max() >= len(moduli):
+        raise refused(group, "combinations name metamaterials that are not there")
     return Database(
-        materials=group["materials"][()],
-        keys=group["keys"][()],
-        entries=group["entries"][()],
-        moduli=group["moduli"][()],
-        poisson=float(group.attrs["poisson"]),
-        radius=float(group.attrs["radius"]),
-        seconds=float(group.attrs["seconds"]),
+        materials=read(group, "materials", (None,)),
+        keys=keys,
+        entries=entries,
+        moduli=moduli,
+        poisson=number(group, "poisson"),
+        radius=number(group, "radius"),
+        seconds=number(group, "seconds"),
     )

@@ -6,22 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from carillon.errors import UserError
 from carillon.files import atomic_path
-
-FORMATS = (".png", ".svg", ".pdf")
+from carillon.pictures import require_plottable
 
 MARKERS = "osD^vP*X<>h8"
 
 PANEL_INCHES = (4.2, 3.4)
-
-
-def require_plottable(path: str | Path) -> Path:
-    """Raise UserError unless `path` ends as a picture does."""
-    path = Path(path)
-    if path.suffix.lower() not in FORMATS:
-        raise UserError(f"{path}: a picture's name ends with {', '.join(FORMATS)}")
-    return path
 
 
 def _case(row: dict[str, Any]) -> tuple[str, str]:

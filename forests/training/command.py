@@ -7,12 +7,19 @@ import time
 from dataclasses import replace
 from typing import Any
 
-from carillon.arguments import Parser, positive_number, whole_number
+from carillon.arguments import (
+    LARGEST,
+    Parser,
+    number_between,
+    number_of_workers,
+    whole_number,
+)
 from carillon.cli import EXIT_BAD_INPUT
 from carillon.errors import UserError
 from carillon.files import require_writable
 from carillon.progress import say
 from dataset_gen.ranks import world
+from forests.layout import MOST_LEAVES
 from forests.model import save_model
 from forests.scaling import TRANSFORMS
 from forests.training.dataset import Dataset, open_dataset
@@ -44,16 +51,16 @@ def add_training(parser: Parser) -> None:
     default = Training()
     parser.add_argument("datasets", nargs="+", metavar="DATASET", help="shards of dataset_gen")
     wholes = {
-        "trees": "of each of the two forests",
-        "depth": "of a tree, at most",
-        "max-leaves": "of a tree, at most; 56 bytes each",
-        "min-leaf": "rows of the subset that a leaf needs",
-        "structure-rows": "rows of the subset that splits are chosen from",
+        "trees": (1000, "of each of the two forests"),
+        "depth": (1000, "of a tree, at most"),
+        "max-leaves": (MOST_LEAVES, "of a tree, at most; 56 bytes each"),
+        "min-leaf": (LARGEST, "rows of the subset that a leaf needs"),
+        "structure-rows": (LARGEST, "rows of the subset that splits are chosen from"),
     }
-    for name, meaning in wholes.items():
+    for name, (most, meaning) in wholes.items():
         parser.add_argument(
             f"--{name}",
-            type=whole_number(1),
+            type=whole_number(1, most),
             default=getattr(default, name.replace("-", "_")),
             help=f"{meaning} (default %(default)s)",
         )
@@ -63,7 +70,7 @@ def add_training(parser: Parser) -> None:
     ):
         parser.add_argument(
             f"--{name}",
-            type=positive_number,
+            type=number_between(1e-9, 1e9),
             default=getattr(default, name.replace("-", "_")),
             help=f"{meaning} (default %(default)s)",
         )
@@ -74,7 +81,7 @@ def add_training(parser: Parser) -> None:
 
 def add_workers(parser: Parser, meaning: str = "threads") -> None:
     """Add the number of threads of a training to a command."""
-    parser.add_argument("--workers", type=whole_number(1), default=1, help=meaning)
+    parser.add_argument("--workers", type=number_of_workers, default=1, help=meaning)
 
 
 def training_of(arguments: argparse.Namespace) -> Training:
@@ -87,7 +94,7 @@ def training_of(arguments: argparse.Namespace) -> Training:
 
 def run_grow(arguments: argparse.Namespace) -> int:
     """Grow one tree and write it."""
-    require_writable(arguments.out)
+    require_writable(arguments.out, arguments.datasets)
     training = training_of(arguments)
     job = arguments.tree
     if job not in training.jobs:
@@ -105,7 +112,7 @@ Grown = tuple[dict[int, Tree], float]
 
 
 def _opened(arguments: argparse.Namespace) -> tuple[Training, Dataset, Grown | None]:
-    require_writable(arguments.out)
+    require_writable(arguments.out, [*arguments.datasets, *(arguments.structure or [])])
     training = training_of(arguments)
     dataset = open_dataset(arguments.datasets)
     if arguments.structure is None:
@@ -122,7 +129,7 @@ def run_train(arguments: argparse.Namespace) -> int:
         return EXIT_BAD_INPUT
     try:
         _train(arguments, ranks, *opened)
-    except UserError as error:
+    except BaseException as error:
         if comm is None:
             raise
         ranks.end_all(PROGRAM, error)

@@ -153,7 +153,7 @@ def grow_linear(
     feature, threshold, left, right over the nodes; group g has root g, leaves have `left` -1.
     """
     roots = len(starts) - 1
-    size = roots + 2 * max(0, max_leaves - roots)
+    size = roots + 2 * max(0, min(max_leaves, len(rows)) - roots)
     feature, threshold = np.zeros(size, dtype=np.int32), np.zeros(size)
     left, right = np.full(size, -1, dtype=np.int32), np.full(size, -1, dtype=np.int32)
     start, stop = np.zeros(size, dtype=np.int64), np.zeros(size, dtype=np.int64)

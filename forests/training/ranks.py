@@ -6,8 +6,8 @@ import sys
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from carillon.cli import EXIT_BAD_INPUT
 from carillon.errors import UserError
+from dataset_gen.ranks import give_up
 from dataset_gen.shards import PIECE_ROWS
 from forests.training.leaves import Sums
 
@@ -84,7 +84,6 @@ class Ranks:
             print(f"{program}: {complaints[0]}", file=sys.stderr, flush=True)
         return None
 
-    def end_all(self, program: str, error: UserError) -> None:
-        """Print a mistake that only this rank knows of, and end all of them."""
-        print(f"{program}: {error}", file=sys.stderr, flush=True)
-        self._comm.Abort(EXIT_BAD_INPUT)
+    def end_all(self, program: str, error: BaseException) -> None:
+        """Say what has happened to this rank alone, and end all of them."""
+        give_up(self._comm, program, error)

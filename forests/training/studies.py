@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from carillon.arguments import LARGEST
 from carillon.errors import UserError
+from carillon.files import atomic_path
 from carillon.progress import say
 from dataset_gen.element import Array
 from dataset_gen.generate import generate
@@ -195,7 +197,8 @@ def error_over_rows(rows: Sequence[Row], path: str) -> None:
     axes.set(xlabel="training rows", ylabel="rms error of log E on fresh samples")
     axes.grid(True, which="both", alpha=0.3)
     axes.legend()
-    figure.savefig(path)
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary)
     plt.close(figure)
 
 
@@ -209,8 +212,8 @@ def require_counts(text: str) -> list[int]:
     """
     try:
         counts = sorted({int(float(part)) for part in text.split(",")})
-    except ValueError:
+    except (ValueError, OverflowError):
         counts = []
-    if not counts or counts[0] < 1 or not np.isfinite(counts[-1]):
+    if not counts or counts[0] < 1 or counts[-1] > LARGEST:
         raise UserError(f"rows {text!r}: expected counts like 1e5,1e6,1e7")
     return counts

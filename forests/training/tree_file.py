@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from carillon import provenance
+from carillon.datasets import INTEGER, REAL, read
 from carillon.errors import UserError
 from carillon.files import create_h5, open_h5
 from forests.scaling import FEATURES, PATTERNS
@@ -54,7 +55,8 @@ def load_trees(
             job = int(file.attrs["tree"])
             seconds += float(file.attrs["seconds"])
             theirs = str(file.attrs["parameters"])
-            tree = Tree(**{field.name: np.asarray(file[field.name][()]) for field in fields(Tree)})
+            kinds = {field.name: INTEGER for field in fields(Tree)} | {"threshold": REAL}
+            tree = Tree(**{name: read(file, name, (None,), kind) for name, kind in kinds.items()})
         if theirs != expected:
             raise UserError(f"{path}: {_difference(json.loads(theirs), json.loads(expected))}")
         if job in found:
