@@ -204,10 +204,15 @@ def _fault(design: Design) -> str:
         if not _matches(found, shape):
             wanted = str(shape).replace("None", "any")
             return f"holds {name} of shape {found}, expected {wanted}"
+    numbers = [(name, data) for name, data, _ in expected if isinstance(data, np.ndarray)]
+    for name, data in [*numbers, ("frequencies", targets.frequencies), ("moduli", design.young)]:
+        if data.dtype.kind not in "fiu" or not np.isfinite(data).all():
+            return f"holds {name} that are no finite real numbers"
     count = len(design.surface_vertices)
-    largest = max([int(design.surface_faces.max()), *(s.vertex for s in design.strikes)])
-    if largest >= count:
-        return f"names the surface's vertex {largest}, of which there are {count}"
+    named = [design.surface_faces.min(), design.surface_faces.max()]
+    for vertex in (*named, *(strike.vertex for strike in design.strikes)):
+        if not 0 <= vertex < count:
+            return f"names the surface's vertex {vertex}, of which there are {count}"
     return ""
 
 

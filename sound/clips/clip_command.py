@@ -7,6 +7,7 @@ import json
 
 from carillon.arguments import positive_number, whole_number
 from carillon.errors import UserError
+from sound.bounds import sample_rate
 
 NAMES = ("metal", "wood", "piano")
 LONGEST_SECONDS = 60.0
@@ -21,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     pitch.add_argument("--pitch", type=positive_number, help="lowest partial [Hz]")
     parser.add_argument("--seconds", type=positive_number, default=2.0, help="length (default 2)")
     parser.add_argument(
-        "--rate", type=whole_number(1000), default=44_100, help="samples per second (default 44100)"
+        "--rate", type=sample_rate, default=44_100, help="samples per second (default 44100)"
     )
     parser.add_argument(
         "--seed", type=whole_number(0), default=0, help="of imperfections and noise (default 0)"
@@ -32,18 +33,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
-    from carillon.files import require_writable
     from sound.clips.extraction import SHORTEST_SAMPLES
     from sound.clips.instruments import note_hertz, synthesised
-    from sound.clips.wav import PEAK, write_wav
+    from sound.clips.wav import ENDINGS, PEAK, write_wav
+    from sound.outputs import require_output
 
-    require_writable(arguments.out)
+    require_output(arguments.out, ENDINGS)
     shortest = SHORTEST_SAMPLES / arguments.rate
     if not shortest <= arguments.seconds <= LONGEST_SECONDS:
         raise UserError(
             f"--seconds {arguments.seconds:g}: expected {shortest:.3g} to {LONGEST_SECONDS:g}"
         )
-    pitch = note_hertz(arguments.note) if arguments.note else arguments.pitch
+    pitch = arguments.pitch if arguments.note is None else note_hertz(arguments.note)
     options = (arguments.seconds, arguments.rate, arguments.seed)
     sound = synthesised(arguments.instrument, pitch, *options)
     samples = sound.modal_part() + sound.residual

@@ -33,23 +33,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
-    from carillon.files import atomic_path, require_writable
+    from carillon.files import atomic_path
     from sound.clips.files import extract_file
-    from sound.clips.wav import write_wav
+    from sound.clips.wav import ENDINGS, write_wav
+    from sound.outputs import require_output
     from sound.targets import share_frequencies
 
-    if arguments.residual and len(arguments.clips) > 1:
+    if arguments.residual is not None and len(arguments.clips) > 1:
         raise UserError(
             f"--residual writes what is left of one clip, {len(arguments.clips)} were given"
         )
-    for path in filter(None, [arguments.out, arguments.residual]):
-        require_writable(path)
+    if arguments.out is not None:
+        require_output(arguments.out, (".json",), arguments.clips)
+    if arguments.residual is not None:
+        require_output(arguments.residual, ENDINGS, arguments.clips)
     sounds = [extract_file(clip, visible=sys.stderr.isatty()) for clip in arguments.clips]
     targets = share_frequencies(_names(arguments.clips), sounds, arguments.modes)
-    if arguments.residual:
+    if arguments.residual is not None:
         write_wav(arguments.residual, sounds[0].residual, sounds[0].rate)
     content = _content(arguments.clips, sounds, targets)
-    if arguments.out:
+    if arguments.out is not None:
         with atomic_path(arguments.out) as temporary:
             temporary.write_text(json.dumps(content, indent=2) + "\n")
     print(json.dumps(content, indent=2) if arguments.json else "\n".join(_lines(content)))

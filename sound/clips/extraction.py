@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from carillon.errors import UserError
 from carillon.threads import single_threaded_blas
+from sound.bounds import require_level
 from sound.clips.candidates import BAND_DECAY, BAND_SAMPLES, LEAST_DECAY, candidates, rings
 from sound.clips.damped import damped_sinusoids, superposed
 from sound.clips.onset import strike_sample
@@ -98,8 +99,8 @@ def extract(
     Raises
     ------
     UserError
-        If the clip is silent, has no modes or fewer than asked for, does not decay, or is shorter
-        than three periods of its lowest mode.
+        If the clip is silent or far beyond full scale, has no modes or fewer than asked for, does
+        not decay, or is shorter than three periods of its lowest mode.
     """
     clip = np.asarray(samples, dtype=float)
     _require_sound(clip)
@@ -128,8 +129,10 @@ def _require_sound(clip: Array) -> None:
         raise UserError(
             f"the clip has {bad} samples that are not finite numbers; repair or record it again"
         )
-    if not clip.any():
-        raise UserError("the clip is silent, expected the sound of a strike")
+    try:
+        require_level(float(np.abs(clip).max(initial=0.0)))
+    except UserError as error:
+        raise UserError(f"the clip {error}") from None
 
 
 def _require_no_steady_tone(clip: Array, rate: int) -> None:

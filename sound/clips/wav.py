@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,16 @@ from numpy.typing import NDArray
 
 from carillon.errors import UserError
 from carillon.files import atomic_path
+from carillon.places import cause, require_file
+from sound.bounds import (
+    HIGHEST_RATE,
+    LOWEST_RATE,
+    MOST_CHANNELS,
+    MOST_CLIP_SAMPLES,
+    require_level,
+)
+from sound.clips.riff import missing_bytes
+from sound.outputs import require_output
 
 Array = NDArray[np.float64]
 
@@ -16,6 +27,8 @@ FULL_SCALE = 0.9999
 """Magnitude from which on a sample is at the end of its format's range."""
 CLIPPED_RUN = 4
 """Equal samples in a row at full scale that no unclipped sound has, but at very low frequencies."""
+ENDINGS = (".wav",)
+"""Of sound files that are written."""
 PEAK = 0.89
 """Largest magnitude of a normalised sound: 1 dB below full scale."""
 _SUBTYPES = {"float": "FLOAT", "16 bit": "PCM_16"}
@@ -27,32 +40,16 @@ def read_wav(path: str | Path) -> tuple[Array, int]:
     Raises
     ------
     UserError
-        If the file is missing or not a sound file, or if it is empty, silent or clipped or has
-        samples that are not finite numbers.
+        If the file is missing, cut off or not a sound file, is empty, silent, clipped or longer
+        than `MOST_CLIP_SAMPLES`, or has samples that are not finite numbers; or if its rate, its
+        number of channels or its level is beyond `sound.bounds`.
     """
-    channels, rate = _channels(Path(path))
-    if not len(channels):
-        raise UserError(f"{path}: has no samples, expected the sound of a strike")
-    bad = int((~np.isfinite(channels)).sum())
-    if bad:
-        raise UserError(
-            f"{path}: has {bad} samples that are not finite numbers (NaN or infinite); repair or "
-            "record it again"
-        )
-    if not channels.any():
-        raise UserError(f"{path}: is silent, expected the sound of a strike")
-    clipped = _clipped(channels)
-    if clipped:
-        raise UserError(
-            f"{path}: is clipped ({clipped} samples at full scale, in runs of {CLIPPED_RUN} or "
-            "more); record it again at a lower level"
-        )
-    samples = channels.mean(axis=1)
-    if not samples.any():
-        raise UserError(
-            f"{path}: is silent once its channels are averaged, they cancel; turn one round first"
-        )
-    return samples, rate
+    path = require_file(path, "a sound clip (WAV)")
+    try:
+        channels, rate = _channels(path)
+        return _mean(channels), rate
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
 
 
 def write_wav(
@@ -68,10 +65,12 @@ def write_wav(
     Raises
     ------
     UserError
-        If samples are not finite or beyond what 16 bits hold, or the file cannot be written.
+        If the name does not end in .wav, samples are not finite or beyond what the format holds,
+        or the file cannot be written.
     """
     import soundfile  # Slow to load.
 
+    require_output(path, ENDINGS)
     samples = np.asarray(samples, dtype=float)
     largest = float(np.abs(samples).max(initial=0.0))
     if not np.isfinite(largest):
@@ -83,23 +82,88 @@ def write_wav(
             f"{path}: not written, the sound reaches {largest:.3g} and 16 bits hold up to 1; "
             "normalise it or write floats"
         )
+    if largest > np.finfo(np.float32).max:
+        raise UserError(
+            f"{path}: not written, the sound reaches {largest:.3g}, more than its samples hold"
+        )
+    # By way of memory, since the library does not say why it could not write to a disk.
+    content = io.BytesIO()
+    soundfile.write(content, samples, rate, format="WAV", subtype=_SUBTYPES[sample_format])
     with atomic_path(path) as temporary:
-        soundfile.write(temporary, samples, rate, format="WAV", subtype=_SUBTYPES[sample_format])
+        temporary.write_bytes(content.getbuffer())
 
 
 def _channels(path: Path) -> tuple[Array, int]:
+    """Samples (s, c) and their rate [Hz], within bounds that are looked at before anything is read.
+
+    Raises
+    ------
+    UserError
+        That does not name the file.
+    """
     import soundfile  # Slow to load.
 
-    if not path.is_file():
-        raise UserError(f"{path}: no such file, expected a sound clip (WAV)")
     try:
-        channels, rate = soundfile.read(path, dtype="float64", always_2d=True)
+        missing = missing_bytes(path)
+        with soundfile.SoundFile(path) as file:
+            _require_bounds(file.samplerate, file.channels, file.frames)
+            channels = file.read(dtype="float64", always_2d=True)
+            missing = missing or file.frames - len(channels)
+            rate = int(file.samplerate)
     except (soundfile.LibsndfileError, OSError) as error:
-        reason = str(error).rsplit(": ", 1)[-1].strip().rstrip(".")
+        said = cause(error) if isinstance(error, OSError) else str(error).rsplit(": ", 1)[-1]
         raise UserError(
-            f"{path}: is not readable as a sound file ({reason}), expected a sound clip (WAV)"
+            f"is not readable as a sound file ({str(said).strip().rstrip('.')}), expected a sound "
+            "clip (WAV)"
         ) from None
-    return channels, int(rate)
+    if missing:
+        raise UserError("ends before the samples that it claims to hold; copy or record it again")
+    return channels, rate
+
+
+def _require_bounds(rate: int, channels: int, frames: int) -> None:
+    if not LOWEST_RATE <= rate <= HIGHEST_RATE:
+        raise UserError(
+            f"has {rate:,} samples per second, expected {LOWEST_RATE:,} to {HIGHEST_RATE:,}"
+        )
+    if channels > MOST_CHANNELS:
+        raise UserError(f"has {channels:,} channels, expected at most {MOST_CHANNELS}")
+    if frames * channels > MOST_CLIP_SAMPLES:
+        raise UserError(
+            f"lasts {frames / rate:,.0f} s, which are {frames * channels:,} samples; expected a "
+            f"single strike, {MOST_CLIP_SAMPLES:,} samples at most; cut it out"
+        )
+
+
+def _mean(channels: Array) -> Array:
+    """The mean (s,) of channels (s, c) that are the sound of a strike.
+
+    Raises
+    ------
+    UserError
+        That does not name the file.
+    """
+    if not len(channels):
+        raise UserError("has no samples, expected the sound of a strike")
+    bad = int((~np.isfinite(channels)).sum())
+    if bad:
+        raise UserError(
+            f"has {bad} samples that are not finite numbers (NaN or infinite); repair or record it "
+            "again"
+        )
+    require_level(float(np.abs(channels).max()))
+    clipped = _clipped(channels)
+    if clipped:
+        raise UserError(
+            f"is clipped ({clipped} samples at full scale, in runs of {CLIPPED_RUN} or more); "
+            "record it again at a lower level"
+        )
+    samples = channels.mean(axis=1)
+    if not samples.any():
+        raise UserError(
+            "is silent once its channels are averaged, they cancel; turn one round first"
+        )
+    return np.asarray(samples)
 
 
 def _clipped(channels: Array) -> int:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from carillon.threads import one_thread
 from sound.design.designing import Prepared, design
+from sound.design.objective import fall
 from sound.design.optimisers import OPTIMISERS
 from sound.design.simulation import Evaluation
 from sound.design_file import Design
@@ -110,7 +111,7 @@ def _row(method: str, found: Design) -> dict[str, Any]:
         "method": method,
         "cost_start": start,
         "cost_end": end,
-        "fall_percent": 100.0 * (1.0 - end / start),
+        "fall_percent": 100.0 * fall(start, end),
         "seconds_to_90_percent": float(history["seconds"][low[0]]) if len(low) else None,
         "evaluations": evidence["evaluations"],
         "evaluations_per_minute": evidence["evaluations_per_minute"],

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import replace
 from typing import Any
 
-from carillon.arguments import positive_number, whole_number
+from carillon.arguments import number_of_workers, positive_number, whole_number
 from carillon.measurement import measured
 from carillon.progress import say
 
@@ -17,8 +16,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("project", help="project file (YAML)")
     parser.add_argument("--seconds", type=positive_number, help="of each, not the project's")
     parser.add_argument("--evaluations", type=whole_number(1), help="of each at most")
-    parser.add_argument("--workers", type=whole_number(1), help="processes, not the project's")
-    parser.add_argument("--runs", type=whole_number(1), default=7, help="timed evaluations")
+    parser.add_argument("--workers", type=number_of_workers, help="processes, not the project's")
+    parser.add_argument("--runs", type=whole_number(1, 1000), default=7, help="timed evaluations")
     parser.add_argument("--json", action="store_true", help="print everything as JSON")
 
 
@@ -26,15 +25,10 @@ def run(arguments: argparse.Namespace) -> int:
     """Measure and print."""
     from sound.design.benchmark import benchmark
     from sound.design.designing import prepare
-    from sound.project import load_project
+    from sound.project import load_project, with_optimiser
 
-    project = load_project(arguments.project)
-    given = {
-        key: getattr(arguments, key)
-        for key in ("seconds", "evaluations", "workers")
-        if getattr(arguments, key) is not None
-    }
-    project = replace(project, optimiser=replace(project.optimiser, **given))
+    given = {key: getattr(arguments, key) for key in ("seconds", "evaluations", "workers")}
+    project = with_optimiser(load_project(arguments.project), **given)
     found = benchmark(prepare(project), arguments.runs, lambda what: say(f"measuring: {what}"))
     if arguments.json:
         print(json.dumps({**found, "provenance": measured(project.as_dict())}))

@@ -7,20 +7,29 @@ import json
 import sys
 import time
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from carillon.arguments import positive_number, whole_number
+from carillon.arguments import number_of_workers, positive_number, whole_number
 from carillon.errors import UserError
-from carillon.files import require_writable
+from carillon.locks import locked
 from carillon.progress import LINE_SECONDS, say
+from sound.design.interrupts import ended_by_interrupts
+from sound.design.objective import fall
 
 if TYPE_CHECKING:
     from sound.design.search import Search
     from sound.design_file import Design
 
+ENDINGS = (".h5", ".hdf5")
+"""Of designs."""
+GIVEN = ("seconds", "evaluations", "method", "workers")
+"""Arguments that take the place of what a project says."""
+SLOW = ("trimesh", "sound.design.designing")
+"""Modules that take seconds to load, which `--help` does without."""
 SHOWN_EVERY = 1.0
 """Seconds between two progress lines on a terminal."""
 
@@ -28,41 +37,52 @@ SHOWN_EVERY = 1.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     parser.add_argument("project", help="project file (YAML)")
-    parser.add_argument("--out", required=True, help="HDF5 file to write; goes on if it exists")
+    parser.add_argument("--out", required=True, help="file to write (.h5); goes on if it exists")
     parser.add_argument("--start", help="design of the same mesh to go on from, its targets aside")
     parser.add_argument("--restart", action="store_true", help="begin anew, even if --out exists")
     parser.add_argument("--seconds", type=positive_number, help="wall time, not the project's")
-    parser.add_argument("--evaluations", type=whole_number(1), help="at most, not the project's")
+    parser.add_argument(
+        "--evaluations", type=whole_number(1), help="modal analyses at most, not the project's"
+    )
     parser.add_argument("--method", choices=("hybrid", "cma", "bfgs"), help="not the project's")
-    parser.add_argument("--workers", type=whole_number(1), help="processes, not the project's")
+    parser.add_argument("--workers", type=number_of_workers, help="processes, not the project's")
     parser.add_argument("--json", action="store_true", help="print the outcome as JSON")
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Search, unless another process does so and writes to the same file."""
+    with ended_by_interrupts():
+        for module in SLOW:
+            import_module(module)
+    with locked(arguments.out):
+        return _search(arguments)
+
+
+def _search(arguments: argparse.Namespace) -> int:
     """Search, writing the design every half minute and at the end."""
-    # Loaded here, since they take a second that --help does not need.
-    from sound.design.designing import design, prepare
+    from sound.design.designing import design, prepare, require_same_voxels
     from sound.design_file import read_design, write_design
-    from sound.project import load_project
+    from sound.outputs import require_output
+    from sound.project import load_project, with_optimiser
 
     _require_one_rank()
-    out = require_writable(arguments.out)
     project = load_project(arguments.project)
-    given = {
-        key: getattr(arguments, key)
-        for key in ("seconds", "evaluations", "method", "workers")
-        if getattr(arguments, key) is not None
-    }
-    if "evaluations" in given and "seconds" not in given:
-        given["seconds"] = None
-    project = replace(project, optimiser=replace(project.optimiser, **given))
+    inputs = filter(None, [arguments.project, project.solid.mesh, project.solid.forest])
+    out = require_output(arguments.out, ENDINGS, inputs)
+    if arguments.evaluations is not None and arguments.seconds is None:
+        project = replace(project, optimiser=replace(project.optimiser, seconds=None))
+    given = {key: getattr(arguments, key) for key in GIVEN}
+    project = with_optimiser(project, **given)
     former = None
     if arguments.start is not None:
         former = read_design(arguments.start)
     elif out.exists() and not arguments.restart:
         former = read_design(out)
-        say(f"{out}: going on after {former.history['evaluations'][-1]:,.0f} evaluations")
     prepared = prepare(project)
+    if former is not None:
+        require_same_voxels(prepared, former)
+        so_far = former.history["evaluations"][-1:].sum()
+        say(f"{arguments.start or out}: going on after {so_far:,.0f} evaluations")
     found = design(
         prepared, former, keep=lambda each: write_design(out, each), watch=_Progress().show
     )
@@ -89,7 +109,7 @@ class _Progress:
         cost = moment.cost
         text = (
             f"{search.own_seconds:6.1f} s  {search.own_evaluations:5,} evaluations  "
-            f"cost {cost.total:9.4g} ({1.0 - cost.total / first.cost.total:.1%} less)  "
+            f"cost {cost.total:9.4g} ({fall(first.cost.total, cost.total):.1%} less)  "
             f"E_f {cost.frequency:8.3g}  E_a {cost.amplitude:8.3g}"
         )
         say(text, end="\r" if self._terminal else "\n")
@@ -104,7 +124,7 @@ def summarise(found: Design) -> dict[str, Any]:
         "cost": evidence["cost"],
         "frequency_cost": evidence["frequency_cost"],
         "amplitude_cost": evidence["amplitude_cost"],
-        "fall": 1.0 - evidence["cost"] / evidence["cost_start"],
+        "fall": fall(evidence["cost_start"], evidence["cost"]),
         "seconds": evidence["seconds"],
         "evaluations": evidence["evaluations"],
         "evaluations_per_minute": evidence["evaluations_per_minute"],

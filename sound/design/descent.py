@@ -87,6 +87,26 @@ class Squares:
         return np.asarray(self.jacobian.T @ self.jacobian)
 
 
+@dataclass(frozen=True)
+class Limits:
+    """When a descent ends in any case.
+
+    Attributes
+    ----------
+    deadline
+        Monotonic clock [s] from which no material is looked at.
+    evaluations
+        Materials that are looked at, at most; that of the start always is.
+    """
+
+    deadline: float = np.inf
+    evaluations: float = np.inf
+
+    def reached(self, evaluations: int) -> bool:
+        """Whether one is reached after so many evaluations."""
+        return evaluations >= self.evaluations or time.monotonic() >= self.deadline
+
+
 class Way(NamedTuple):
     """A cost on the way: when (monotonic clock [s]), after how many evaluations, and what."""
 
@@ -163,7 +183,7 @@ def descend(
     manner: Manner,
     steps: int,
     damping: tuple[float, ...] | None = None,
-    deadline: float = np.inf,
+    limits: Limits = Limits(),
 ) -> Descent:
     """Up to `steps` steps from z, each of which lowers the whole of Eq. (4).
 
@@ -173,8 +193,8 @@ def descend(
         Modes to begin from, see `Simulation.evaluate`.
     damping
         Where a former descent in the same manner ended.
-    deadline
-        Monotonic clock [s] from which no step is begun.
+    limits
+        That end it earlier.
 
     Raises
     ------
@@ -186,9 +206,9 @@ def descend(
     here = Descent(found, way, 1, damping or (manner.damping,) * len(manner.parts))
     idle = 0
     for step in range(steps):
-        if time.monotonic() >= deadline:
+        taken = _step(simulation, objective, here, manner, step % len(manner.parts), limits)
+        if limits.reached(here.evaluations):
             break
-        taken = _step(simulation, objective, here, manner, step % len(manner.parts))
         idle = 0 if taken else idle + 1
         here.stalled = idle == len(manner.parts)
         if here.stalled:
@@ -202,7 +222,7 @@ def descend_by_gradients(
     z: Array,
     start: Array | None,
     evaluations: int,
-    deadline: float = np.inf,
+    limits: Limits = Limits(),
 ) -> Descent:
     """Descent by L-BFGS (scipy), with about as many gradients as `evaluations` says.
 
@@ -215,8 +235,8 @@ def descend_by_gradients(
     here = Descent(found, way, 1, ())
 
     def value(point: Array) -> tuple[float, Array]:
-        if time.monotonic() >= deadline:
-            raise _LateError
+        if limits.reached(here.evaluations):
+            raise _LimitError
         here.evaluations += 1
         try:
             assert here.found is not None
@@ -231,25 +251,32 @@ def descend_by_gradients(
 
     try:
         minimize(value, z, jac=True, method="L-BFGS-B", options={"maxfun": evaluations})
-    except _LateError:
-        pass
+    except _LimitError:
+        return here
     here.stalled = len(here.way) == 1
     return here
 
 
-class _LateError(Exception):
-    """The deadline has passed."""
+class _LimitError(Exception):
+    """A limit is reached."""
 
 
 def _step(
-    simulation: Simulation, objective: Objective, here: Descent, manner: Manner, part: int
+    simulation: Simulation,
+    objective: Objective,
+    here: Descent,
+    manner: Manner,
+    part: int,
+    limits: Limits,
 ) -> bool:
     """Take one step, if there is one that lowers the cost."""
     assert here.found is not None
     squares = squares_of(objective, simulation.material, here.found, *manner.parts[part])
     curvature, gradient = squares.curvature, squares.gradient
     damping = here.damping[part]
-    while damping <= LARGEST_DAMPING:
+    while damping <= LARGEST_DAMPING and curvature.any():
+        if limits.reached(here.evaluations):
+            return False
         move = _damped(curvature, gradient, damping, manner.longest)
         here.evaluations += 1
         try:

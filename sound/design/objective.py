@@ -202,3 +202,8 @@ def _average_slopes(
         lost = energies[point][:, None] * (by_own @ values.T + by_centre.sum(1)[:, None] * values.T)
         slopes[point] = (slopes[point] + moved - lost) / total[:, None]
     return energies, slopes
+
+
+def fall(start: float, end: float) -> float:
+    """Share of the cost at the start that was taken off; none where there was nothing."""
+    return 1.0 - end / start if start > 0.0 else 0.0

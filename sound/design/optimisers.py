@@ -43,7 +43,7 @@ def hybrid(search: Search, z: Array, seed: int, population: int | None) -> None:
     lanes = [Task(z, manner=manner, steps=STEPS) for manner in MANNERS]
     strategy: Any = None
     while True:
-        trials = search.run([replace(lane, deadline=search.deadline) for lane in lanes])
+        trials = search.run(lanes)
         stalled = [k for k, trial in enumerate(trials) if _is_stalled(trial)]
         lanes = [_continued(lane, trial) for lane, trial in zip(lanes, trials)]
         if not stalled:

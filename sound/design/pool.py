@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import wait
@@ -27,6 +27,7 @@ from solver.problem import ProblemOptions
 from sound.design.descent import (
     Descent,
     LimitedMemory,
+    Limits,
     Manner,
     cost_of,
     descend,
@@ -72,7 +73,7 @@ class Task:
         Rows of modes to begin from.
     gradient
         Whether the gradient of the cost is wanted.
-    manner, steps, damping, deadline
+    manner, steps, damping, limits
         Of a descent, see `descend`; an evaluation alone if there is no manner.
     """
 
@@ -82,7 +83,7 @@ class Task:
     manner: Manner | LimitedMemory | None = None
     steps: int = 0
     damping: tuple[float, ...] | None = None
-    deadline: float = np.inf
+    limits: Limits = Limits()
 
 
 @dataclass(frozen=True)
@@ -137,7 +138,9 @@ class Pool:
         if self._executor is None:
             return [_run(task) for task in tasks]
         try:
-            return list(self._executor.map(_run, tasks))
+            with _signals_held():
+                trials = self._executor.map(_run, tasks)  # starts the processes
+            return list(trials)
         except BrokenProcessPool:
             raise UserError(
                 "a process that evaluates materials died, perhaps for lack of memory; run the same "
@@ -149,7 +152,7 @@ class Pool:
         self._alone.close()
         if self._executor is not None:
             for process in list((self._executor._processes or {}).values()):
-                process.terminate()
+                process.kill()
             self._executor.shutdown(cancel_futures=True)
 
 
@@ -158,8 +161,21 @@ _objective: Objective
 _for_good = ExitStack()
 
 
+@contextmanager
+def _signals_held() -> Iterator[None]:
+    """Hold back what asks to stop; processes that begin meanwhile will never hear it.
+
+    Ctrl-C and the signals of schedulers go to all processes; it is for the one that started the
+    others to say when they end.
+    """
+    former = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, former)
+
+
 def _prepare_apart(setting: Setting) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_end_with_parent, daemon=True).start()
     _for_good.enter_context(one_thread())
     _prepare(setting)
@@ -191,8 +207,8 @@ def _run(task: Task) -> Trial:
 def _descent(task: Task, manner: Manner | LimitedMemory) -> Descent:
     parts = (_simulation, _objective, task.z, task.start)
     if isinstance(manner, LimitedMemory):
-        return descend_by_gradients(*parts, task.steps * manner.evaluations, task.deadline)
-    return descend(*parts, manner, task.steps, task.damping, task.deadline)
+        return descend_by_gradients(*parts, task.steps * manner.evaluations, task.limits)
+    return descend(*parts, manner, task.steps, task.damping, task.limits)
 
 
 def _done(task: Task) -> Trial:

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sound.design.descent import Limits
 from sound.design.objective import Cost
 from sound.design.pool import Pool, Task, Trial
 
 Array = NDArray[np.float64]
+
+
+FEWEST = 2
+"""Evaluations that a descent needs: that of its start, and one to find something better."""
 
 
 class BudgetSpentError(Exception):
@@ -36,7 +41,8 @@ class Search:
     make_pool
         Makes the processes that run them; their start counts as time of the search.
     seconds, evaluations
-        Budget; None sets no limit.
+        Budget; None sets no limit.  Descents that run side by side get equal shares of the
+        evaluations that are left, so that what they find does not depend on which one comes first.
     watch
         Called after every round of tasks; ends the search by returning True.
     before
@@ -46,6 +52,8 @@ class Search:
     ----------
     best
         The best trial so far.
+    start
+        The first one.
     history
         Its cost over time.
     """
@@ -59,6 +67,7 @@ class Search:
         before: tuple[float, int] = (0.0, 0),
     ) -> None:
         self.best: Trial | None = None
+        self.start: Trial | None = None
         self.history: list[Moment] = []
         self._most = evaluations
         self._watch = watch
@@ -90,19 +99,30 @@ class Search:
         Raises
         ------
         BudgetSpentError
-            If the budget is spent, before or after: what was found is in `best` then.
+            If the budget is spent, before or after: what was found is in `best` then.  Where it is
+            enough for some of the tasks only, these are run.
         """
-        self._require_budget(len(tasks))
-        trials = self._pool.run(tasks)
+        affordable = self._affordable(tasks)
+        if not affordable:
+            raise BudgetSpentError
+        trials = self._pool.run(affordable)
         self._record(trials)
         stopped = self._watch is not None and self._watch(self)
-        if stopped or time.monotonic() >= self.deadline:
+        if stopped or time.monotonic() >= self.deadline or len(trials) < len(tasks):
             raise BudgetSpentError
         return trials
 
-    def _require_budget(self, tasks: int) -> None:
-        if self._most is not None and self._done + tasks > self._most:
-            raise BudgetSpentError
+    def _affordable(self, tasks: Sequence[Task]) -> list[Task]:
+        """The first tasks that enough evaluations are left for, with their limits."""
+        if self._most is None:
+            return [replace(task, limits=Limits(self.deadline)) for task in tasks]
+        left = self._most - self._done
+        needed = 1 if all(task.manner is None for task in tasks) else FEWEST
+        count = min(len(tasks), left // needed)
+        return [
+            replace(task, limits=Limits(self.deadline, left // count + (k < left % count)))
+            for k, task in enumerate(tasks[:count])
+        ]
 
     def _record(self, trials: Sequence[Trial]) -> None:
         """Add what was found, in the order of the clock, to the history."""
@@ -116,6 +136,8 @@ class Search:
                 counted = point.evaluations
             if trial.evaluations > counted:
                 costs.append((now, trial.evaluations - counted, trial.cost))
+            if self.start is None:
+                self.start = trial
             if self.best is None or trial.cost.total < self.best.cost.total:
                 self.best = trial
         for clock, evaluations, cost in sorted(costs, key=lambda each: each[0]):

@@ -9,6 +9,8 @@ from carillon.arguments import whole_number
 from carillon.errors import UserError
 
 FORMATS = ("h5", "gltf", "glb", "dsp")
+MOST_POINTS = 10_000
+"""To strike in a Faust program, each of which is an entry of its menu."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -19,10 +21,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         required=True,
         help="file to write: .h5 (embedded mesh with eigenpairs), .gltf, .glb, or .dsp (Faust)",
     )
-    parser.add_argument("--format", choices=FORMATS, help="in place of the ending of --out")
+    parser.add_argument("--format", choices=FORMATS, help="where --out has another ending")
     parser.add_argument(
         "--points",
-        type=whole_number(0),
+        type=whole_number(0, MOST_POINTS),
         default=0,
         help="for Faust: points to strike all over the surface, besides the targets' (default 0)",
     )
@@ -30,18 +32,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the file and say what it holds."""
-    from carillon.files import require_writable
     from sound.design_file import read_design
+    from sound.outputs import require_output
 
-    wanted = arguments.format or Path(arguments.out).suffix.lstrip(".").lower()
-    if wanted not in FORMATS:
-        raise UserError(
-            f"--out {arguments.out}: the ending tells no format, expected one of "
-            f".{', .'.join(FORMATS)}; or name it by --format"
-        )
-    require_writable(arguments.out)
-    if Path(arguments.out).resolve() == Path(arguments.design).resolve():
-        raise UserError(f"--out {arguments.out}: is the design itself; name another file")
+    wanted = _format(arguments.out, arguments.format)
+    require_output(arguments.out, [Path(arguments.out).suffix.lower()], [arguments.design])
     design = read_design(arguments.design)
     if wanted == "h5":
         from sound.export.embedded import write_embedded  # Loaded if needed: some take long.
@@ -60,3 +55,16 @@ def run(arguments: argparse.Namespace) -> int:
         f"{design.frequencies[-1]:.4g} Hz, {Path(arguments.out).stat().st_size:,} bytes"
     )
     return 0
+
+
+def _format(out: str, named: str | None) -> str:
+    """What is written: as named, or as the ending tells; the two must not contradict each other."""
+    told = Path(out).suffix.lstrip(".").lower()
+    if named is not None and told in FORMATS and told != named:
+        raise UserError(f"--out {out}: ends in .{told}, but --format is {named}; leave one of them")
+    if named is None and told not in FORMATS:
+        raise UserError(
+            f"--out {out}: the ending tells no format, expected one of .{', .'.join(FORMATS)}; or "
+            "name it by --format"
+        )
+    return named or told

@@ -138,10 +138,11 @@ def _struck_points(design: Design, points: int) -> tuple[list[str], Array, Array
 
 
 def _spread(candidates: Array, taken: Array, count: int) -> list[int]:
-    """Numbers of `count` candidates, each the farthest from those `taken` before."""
+    """Numbers of `count` candidates, fewer if there are not so many, each one the farthest from
+    those `taken` before."""
     away = np.min([np.linalg.norm(candidates - point, axis=1) for point in taken], axis=0)
     chosen: list[int] = []
-    for _ in range(min(count, len(candidates))):
+    while len(chosen) < count and away.any():
         chosen.append(int(np.argmax(away)))
         away = np.minimum(away, np.linalg.norm(candidates - candidates[chosen[-1]], axis=1))
     return chosen

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from carillon.arguments import non_negative_number, positive_number, whole_number
+from carillon.arguments import number_between, positive_number, whole_number
 from carillon.errors import UserError
+from sound.bounds import require_length, sample_rate
 
 if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     import numpy as np
@@ -23,7 +24,9 @@ if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     Array = NDArray[np.float64]
 
 LONGEST_SECONDS = 600.0
-"""Length of a sound that memory surely holds."""
+"""Length of a sound that somebody may want to hear."""
+LONGEST_CONTACT = 1.0
+"""Duration of a force [s] that still strikes rather than pushes."""
 
 
 @dataclass
@@ -44,28 +47,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     point.add_argument("--vertex", type=whole_number(0), help="strike a vertex of the surface")
     point.add_argument(
         "--at",
-        type=float,
+        type=number_between(-1e9, 1e9, "m"),
         nargs=3,
         metavar=("X", "Y", "Z"),
         help="strike the surface near a point [m]",
     )
     impulse = parser.add_mutually_exclusive_group()
     impulse.add_argument(
-        "--impulse", type=float, nargs=3, metavar=("FX", "FY", "FZ"), help="impulse [N s]"
+        "--impulse",
+        type=number_between(-1e6, 1e6, "N s"),
+        nargs=3,
+        metavar=("FX", "FY", "FZ"),
+        help="impulse [N s]",
     )
     impulse.add_argument(
         "--strength",
-        type=positive_number,
+        type=number_between(1e-6, 1e6, "N s"),
         default=1.0,
         help="impulse along the inward normal [N s] (default 1, which sounds as loud as the clip)",
     )
     parser.add_argument("--seconds", type=positive_number, help="length (default: until it decays)")
     parser.add_argument(
-        "--rate", type=whole_number(1000), default=44_100, help="samples per second (default 44100)"
+        "--rate", type=sample_rate, default=44_100, help="samples per second (default 44100)"
     )
     parser.add_argument(
         "--contact-seconds",
-        type=non_negative_number,
+        type=number_between(0.0, LONGEST_CONTACT, "s"),
         default=0.0,
         help="duration of the force, half a sine (default 0: an impulse)",
     )
@@ -79,7 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--damping",
-        type=non_negative_number,
+        type=number_between(0.0, 1e9),
         nargs=2,
         metavar=("ALPHA", "BETA"),
         help="for modes.h5: Rayleigh damping, coefficients of mass [1/s] and stiffness [s] "
@@ -93,13 +100,15 @@ def run(arguments: argparse.Namespace) -> int:
     """Render, write, and say what sounds."""
     import numpy as np
 
-    from carillon.files import require_writable
-    from sound.clips.wav import PEAK, write_wav
+    from sound.clips.wav import ENDINGS, PEAK, write_wav
+    from sound.outputs import require_output
     from sound.rendering.render import Hit, render, ringing_seconds
 
-    require_writable(arguments.out)
+    require_output(arguments.out, ENDINGS)
     if arguments.seconds is not None and arguments.seconds > LONGEST_SECONDS:
         raise UserError(f"--seconds {arguments.seconds:g}: expected at most {LONGEST_SECONDS:g}")
+    if arguments.seconds is not None:
+        require_length(arguments.seconds, arguments.rate)
     scene = _scene(arguments)
     hit = Hit(0.0, scene.position, scene.impulse)
     sound = render(
@@ -131,8 +140,8 @@ def _scene(arguments: argparse.Namespace) -> _Scene:
     if arguments.impulse is None:
         return _Scene(solid, listening, position, arguments.strength * inward)
     impulse = np.array(arguments.impulse)
-    if not (np.isfinite(impulse).all() and impulse.any()):
-        raise UserError("--impulse: expected three finite numbers [N s], not all of them 0")
+    if not impulse.any():
+        raise UserError("--impulse: expected three numbers [N s], not all of them 0")
     return _Scene(solid, listening, position, impulse)
 
 
@@ -167,10 +176,13 @@ def _kind(path: str) -> str:
     """Kind of a Carillon file; nothing if it is none, which whoever reads it will say."""
     import h5py
 
+    from carillon.places import require_file
+
+    require_file(path, "a Carillon design or modes file (HDF5)")
     try:
         with h5py.File(path) as file:
             return str(file.attrs.get("kind", ""))
-    except OSError:
+    except Exception:  # HDF5 has many ways to say that bytes make no sense
         return ""
 
 
@@ -206,8 +218,6 @@ def _voxel_point(arguments: argparse.Namespace, mesh: Any) -> tuple[Array, Array
             "a modes file knows neither targets nor the vertices of a surface; strike it --at a "
             "point, or name its design by --like"
         )
-    if not np.isfinite(arguments.at).all():
-        raise UserError("--at: expected three finite numbers [m]")
     nodes, outward = surface_normals(mesh)
     index = surface_node(mesh, np.array(arguments.at), "--at")
     return mesh.nodes[nodes[index]], -outward[index]

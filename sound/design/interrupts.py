@@ -1,0 +1,59 @@
+"""What Ctrl-C and SIGTERM do to a search: once, they end it; twice, the program."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any
+
+STOPPING = "asked to stop: the best so far is written after this round; ask again to end at once\n"
+
+
+@contextmanager
+def ended_by_interrupts() -> Iterator[None]:
+    """Let Ctrl-C end the process there and then, while it has nothing to lose.
+
+    Python would raise an exception, which some libraries swallow while they are imported.
+    """
+    former = _handled((signal.SIGINT,), signal.SIG_DFL)
+    try:
+        yield
+    finally:
+        _restore(former)
+
+
+@contextmanager
+def interruptible() -> Iterator[Callable[[], bool]]:
+    """Whether somebody asked to stop (Ctrl-C or SIGTERM); asked a second time, it is as before.
+
+    In another thread than the main one nobody can ask.
+    """
+    asked = False
+
+    def ask(number: int, frame: FrameType | None) -> None:
+        nonlocal asked
+        asked = True
+        _restore(former)
+        os.write(2, STOPPING.encode())
+
+    former = _handled((signal.SIGINT, signal.SIGTERM), ask)
+    try:
+        yield lambda: asked
+    finally:
+        _restore(former)
+
+
+def _handled(numbers: tuple[signal.Signals, ...], handler: Any) -> dict[signal.Signals, Any]:
+    """Former handlers of signals that are given another one; none but in the main thread."""
+    try:
+        return {number: signal.signal(number, handler) for number in numbers}
+    except ValueError:
+        return {}
+
+
+def _restore(handlers: dict[signal.Signals, Any]) -> None:
+    for number, handler in handlers.items():
+        signal.signal(number, handler)

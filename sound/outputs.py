@@ -1,0 +1,35 @@
+"""Names of files that commands write: their endings say what is in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from carillon.errors import UserError
+from carillon.places import require_writable
+
+
+def require_output(
+    path: str | Path, endings: Iterable[str], inputs: Iterable[str | Path] = ()
+) -> Path:
+    """Check, before the work, that a result can be written to `path` and that its name suits it.
+
+    Parameters
+    ----------
+    endings
+        With their dots, in lower case; capitals are taken for the same.
+    inputs
+        Files that the command reads, which it must not replace.
+
+    Raises
+    ------
+    UserError
+        If the name has another ending or is an input's, or no file can be written there.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in endings:
+        raise UserError(
+            f"{path}: ends in {path.suffix or 'nothing'}, expected a name that ends in "
+            f"{' or '.join(endings)}, since that is what is written"
+        )
+    return require_writable(path, inputs)
