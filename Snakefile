@@ -4,7 +4,7 @@ from pathlib import Path
 from snakemake.utils import min_version, validate
 
 from carillon.errors import UserError
-from workflow import room, settings
+from workflow import orphans, room, settings, submission
 
 min_version("9.0")
 
@@ -17,6 +17,7 @@ if not workflow.overwrite_configfiles:
 
 
 try:
+    config = settings.read(workflow.configfiles, workflow.config_settings.config)
     settings.check(config)
     validate(config, schema="workflow/schemas/config.schema.yaml")
     settings.check_links(config)
@@ -45,6 +46,17 @@ include: "workflow/rules/forests_study.smk"
 include: "workflow/rules/examples.smk"
 include: "workflow/rules/sound.smk"
 include: "workflow/rules/compare.smk"
+
+
+onstart:
+    if not workflow.local_exec:
+        places = [workflow.main_snakefile, Path.cwd(), *workflow.overwrite_configfiles]
+        try:
+            submission.require_plain(places, workflow.config_settings.config)
+        except UserError as error:
+            raise WorkflowError(str(error)) from None
+    if ALONE:
+        orphans.cancel(Path.cwd())
 
 
 onerror:

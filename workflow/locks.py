@@ -21,8 +21,10 @@ FOLDER = Path(".snakemake")
 _held: list[TextIO] = []
 
 
-def take(folder: Path = FOLDER) -> None:
+def take(folder: Path = FOLDER) -> bool:
     """Hold the lock of a run until this process ends; remove what a killed one has left.
+
+    Returns whether no other run is at work, on this machine or another.
 
     Locks of a run on another machine stay, as some network file systems keep the kernel's locks to
     one machine; `snakemake --unlock` removes them.
@@ -34,13 +36,15 @@ def take(folder: Path = FOLDER) -> None:
     folder.mkdir(exist_ok=True)
     file = (folder / "carillon.run").open("a+")
     _held.append(file)
+    alone = False
     try:
         if _is_alone(file):
-            _clean(folder, file)
+            alone = _clean(folder, file)
             _sign(file)
         fcntl.flock(file, fcntl.LOCK_SH)
     except OSError:  # A file system without locks: Snakemake's own have to do.
         pass
+    return alone
 
 
 def _is_alone(file: TextIO) -> bool:
@@ -51,15 +55,18 @@ def _is_alone(file: TextIO) -> bool:
     return True
 
 
-def _clean(folder: Path, file: TextIO) -> None:
-    """Remove the locks of the run that has signed and did not end properly, if it ran here."""
+def _clean(folder: Path, file: TextIO) -> bool:
+    """Remove the locks of the run that has signed and did not end properly, if it ran here.
+
+    Returns whether it did not sign on another machine, where it may be at work still.
+    """
     owner = _signature(file)
     locks = list((folder / "locks").glob("*.lock"))
-    if not locks or owner.get("host") != socket.gethostname():
-        return
-    for lock in locks:
-        lock.unlink(missing_ok=True)
-    say(f"removed the lock of a run that was killed (process {owner['process']})")
+    if locks and owner.get("host") == socket.gethostname():
+        for lock in locks:
+            lock.unlink(missing_ok=True)
+        say(f"removed the lock of a run that was killed (process {owner['process']})")
+    return owner.get("host", socket.gethostname()) == socket.gethostname()
 
 
 def _signature(file: TextIO) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Whether there is room for results; a job on a full disk cannot even say that it is full."""
+"""Folders for results, and whether there is room in them; a job on a full disk cannot say so."""
 
 from __future__ import annotations
 
@@ -6,11 +6,26 @@ import os
 import tempfile
 from pathlib import Path
 
+from carillon.errors import UserError
 from carillon.files import cause
 from carillon.progress import say
 
 ENOUGH = 1 << 20
 """Bytes that a run can do nothing without."""
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder for results, and those that it is in, unless it is there.
+
+    Raises
+    ------
+    UserError
+        If that is not possible.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be made ({cause(error)}); name another folder") from None
 
 
 def tell_if_full(folder: Path) -> None:

@@ -23,6 +23,11 @@ _CONFIGURATION = """# Configuration
 `tiny` for tests, `laptop` for a start, `cluster` and `paper`; `python -m workflow estimate --preset
 NAME` says what each takes. Mistakes are answered in one sentence before anything runs.
 
+Names of files and folders may hold blanks, quotes and whatever else means something to a shell, but
+none of `{{ }} < >`, which the rules take for placeholders. A file from somebody else is given to
+`python -m workflow estimate --configfile FILE` first, which runs nothing that is in it: Snakemake
+reads the file before the rules check it, and runs Python that stands in it (`__use_yte__`).
+
 A plain number has the unit 1. `NAME` stands for names of your own, `[]` for an entry of a list."""
 _PROJECT = """# Project of a sound design
 
@@ -127,8 +132,12 @@ def _type(part: Schema) -> str:
     items = part.get("items")
     if isinstance(items, dict) and ("enum" in items or "properties" not in items):
         words = f"{words} of ({_type(items)})"
-    bounds = [text.format(part[name]) for name, text in _BOUNDS.items() if name in part]
+    bounds = [text.format(_number(part[name])) for name, text in _BOUNDS.items() if name in part]
     return ", ".join([words, *bounds])
+
+
+def _number(value: float) -> str:
+    return f"{value:,}" if isinstance(value, int) else f"{value:g}"
 
 
 def _default(part: Schema) -> str:

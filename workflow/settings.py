@@ -3,32 +3,73 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import yaml
-from jsonschema import Draft202012Validator
-from jsonschema.exceptions import ValidationError, best_match
+from jsonschema.exceptions import ValidationError
 
 from carillon import provenance
+from carillon.documents import read_yaml
 from carillon.errors import UserError
 from dataset_gen.objectives import OBJECTIVES, require_objective
 from forests import model as forest_model
 from solver.materials import NAMES as MATERIALS
 from workflow import training
+from workflow.arguments import path_word
+from workflow.strict_schema import first_mistake, reason
 
 PLACES = ("results_dir", "mesh_folder", "baseline")
 """Keys that say where something lies, on which no result depends."""
 DEFAULT_FORESTS = "default"
 """Name of the forests that come with the package."""
 SCHEMA = Path(__file__).parent / "schemas" / "config.schema.yaml"
+CONFIGURATION = "a configuration"
 BUILTIN = "builtin:"
+BUILTIN_MESHES = ("bar", "bell", "bowl", "box", "frying-pan", "pitcher", "plate", "snare-drum")
+"""As in `solver.geometry.builtin`, which takes too long to load for every job that is planned."""
 
 
+@cache
 def schema() -> dict[str, Any]:
-    """The JSON schema of the configuration."""
+    """The JSON schema of the configuration, which nobody changes."""
     loaded: dict[str, Any] = yaml.safe_load(SCHEMA.read_text())
     return loaded
+
+
+def read(files: Iterable[str | Path], given: Mapping[str, Any]) -> dict[str, Any]:
+    """A configuration from its files and from what the command line gives beside them.
+
+    Snakemake reads the same files, but takes 1e-3 for text, 2020-01-01 for a date, the last of
+    several equal keys, and what is there once for a million times.
+
+    Parameters
+    ----------
+    files
+        Later ones take precedence.
+    given
+        Values that take precedence over all files.
+
+    Raises
+    ------
+    UserError
+        If a file cannot be read, see `carillon.documents.read_yaml`.
+    """
+    config: dict[str, Any] = {}
+    for values in (*(read_yaml(file, CONFIGURATION) for file in files), given):
+        _update(config, values)
+    return config
+
+
+def _update(config: dict[str, Any], values: Mapping[str, Any]) -> None:
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            below = config.get(key)
+            config[key] = dict(below) if isinstance(below, Mapping) else {}
+            _update(config[key], value)
+        else:
+            config[key] = value
 
 
 def check(config: Mapping[str, Any]) -> None:
@@ -39,7 +80,7 @@ def check(config: Mapping[str, Any]) -> None:
     UserError
         With one sentence about the first value that does not fit.
     """
-    mistake = best_match(Draft202012Validator(schema()).iter_errors(config))
+    mistake = first_mistake(schema(), config)
     if mistake is not None:
         raise UserError(_sentence(mistake))
 
@@ -65,7 +106,16 @@ def check_links(config: Mapping[str, Any]) -> None:
         If a model's mesh or material or the forests do not exist, a list of models names none,
         `objectives.objectives` names no objective, or training data make no sense.
     """
+    results = Path(config["results_dir"])
+    if results.exists() and not results.is_dir():
+        raise UserError(f"results_dir: {results} is no folder; name another")
     for name in config["models"]:
+        mesh = mesh_of(config, name)
+        if mesh.startswith(BUILTIN) and mesh.removeprefix(BUILTIN) not in BUILTIN_MESHES:
+            raise UserError(
+                f"models.{name}.mesh: there is no {mesh}, expected a file or {BUILTIN}NAME with "
+                f"{', '.join(BUILTIN_MESHES)}"
+            )
         for path in model_files(config, name):
             if not Path(path).is_file():
                 raise UserError(
@@ -120,7 +170,9 @@ def forests_file(config: Mapping[str, Any]) -> str | None:
         If no forests come with the package, but are wanted.
     """
     named: str | None = config["forests"]["model"]
-    return str(forest_model.default_path()) if named == DEFAULT_FORESTS else named
+    if named == DEFAULT_FORESTS:
+        return str(forest_model.default_path())
+    return None if named is None else path_word(named)
 
 
 def own_shards(config: Mapping[str, Any]) -> list[str]:
@@ -149,6 +201,12 @@ def studied_objectives(config: Mapping[str, Any]) -> list[str]:
     return list(config["objectives"]["objectives"] or OBJECTIVES)
 
 
+def named_forest(config: Mapping[str, Any]) -> str | None:
+    """Forests that are named to be set beside the fits; None for those of the package."""
+    named = config["objectives"]["forest"]
+    return None if named is None else path_word(named)
+
+
 def studied_forest_files(config: Mapping[str, Any]) -> list[str]:
     """Forests that the study sets beside the fits; none if there are no default ones either."""
     found = _named_or_default(config["objectives"]["forest"])
@@ -168,7 +226,7 @@ def studied_model(config: Mapping[str, Any]) -> str | None:
 
 def _named_or_default(named: str | None) -> str | None:
     try:
-        return named or str(forest_model.default_path())
+        return path_word(named) if named else str(forest_model.default_path())
     except UserError:
         return None
 
@@ -186,13 +244,13 @@ def located(config: Mapping[str, Any], mesh: str) -> str:
 
 
 def _in_mesh_folder(config: Mapping[str, Any], path: str) -> str:
-    return str(Path(config["mesh_folder"]) / path)
+    return path_word(Path(config["mesh_folder"]) / path)
 
 
 def _sentence(mistake: ValidationError) -> str:
     where = ".".join(str(part) for part in mistake.absolute_path) or "configuration"
     meant = mistake.schema.get("description") if isinstance(mistake.schema, dict) else None
-    return f"{where}: {mistake.message}" + (f"; expected: {_lower(meant)}" if meant else "")
+    return f"{where}: {reason(mistake)}" + (f"; expected: {_lower(meant)}" if meant else "")
 
 
 def _lower(text: str) -> str:

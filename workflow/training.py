@@ -8,6 +8,7 @@ from typing import Any
 
 from carillon.errors import UserError
 from dataset_gen.sampling import moduli
+from workflow.arguments import options
 
 
 @dataclass(frozen=True)
@@ -47,24 +48,23 @@ class Training:
         share, left = divmod(self.dataset["samples"], len(self.distributions))
         return int(share) + (self.distributions.index(distribution) < left)
 
-    def generate_arguments(self, distribution: str, shard: int | str) -> str:
+    def generate_arguments(self, distribution: str, shard: int | str) -> list[str]:
         """Arguments of `dataset_gen generate` for one shard."""
-        ends = zip(("low", "high"), self.dataset["ranges"].get(distribution, ()))
-        return " ".join(
-            [
-                f"--samples {self.samples_of(distribution)} --shard {shard}",
-                f"--shards {self.dataset['shards']} --seed {self.dataset['seed']}",
-                f"--objective {self.dataset['objective']} --poisson {self.poisson}",
-                f"--distribution {distribution}",
-                *(f"--{end} {value}" for end, value in ends),
-            ]
-        )
+        how = {
+            "samples": self.samples_of(distribution),
+            "shard": shard,
+            **{key: self.dataset[key] for key in ("shards", "seed", "objective")},
+            "poisson": self.poisson,
+            "distribution": distribution,
+            **dict(zip(("low", "high"), self.dataset["ranges"].get(distribution, ()))),
+        }
+        return options(how)
 
     @property
-    def train_arguments(self) -> str:
+    def train_arguments(self) -> list[str]:
         """Arguments of `forests grow` and `forests train` that say how."""
         names = ("trees", "depth", "max_leaves", "min_leaf", "structure_rows", "seed")
-        return " ".join(f"--{name.replace('_', '-')} {self.forests[name]}" for name in names)
+        return options({name: self.forests[name] for name in names})
 
     @property
     def trees(self) -> range:

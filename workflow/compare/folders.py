@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
-import json
+import csv
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from carillon.documents import read_yaml
 from carillon.errors import UserError
-from workflow.report.table import Table, read_csv_table, read_table
+from carillon.files import cause
+from workflow.compare.noise import Value, verdict
+from workflow.report.numbers import show
+from workflow.report.table import Table, kind_in, read_csv_table, read_table
 
 PARTS = ("tables", "paper/tables", "forests_study/tables")
 """Folders of tables below a folder of results."""
 READERS = {".json": read_table, ".csv": read_csv_table}
 """How a table is read, by the ending of its file; the first file that exists counts."""
+_SENSELESS = (
+    *(ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError),
+    *(RecursionError, csv.Error),
+)
+"""What a file that is no table leads to."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +55,7 @@ def read_folder(path: str | Path) -> Folder:
     return Folder(
         path,
         {str(stem.relative_to(path)): _read(stem) for stem in _stems(path)},
-        yaml.safe_load(config.read_text()) if config.is_file() else {},
+        read_yaml(config, "the configuration of a run") if config.is_file() else {},
     )
 
 
@@ -61,9 +68,13 @@ def require_tables(path: str | Path) -> Path:
         If it does not, or does not exist.
     """
     path = Path(path)
-    if not path.is_dir():
+    try:
+        is_folder, stems = path.is_dir(), _stems(path)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read ({cause(error)}), expected results") from None
+    if not is_folder:
         raise UserError(f"{path}: there is no such folder, expected one with the results of a run")
-    if not _stems(path):
+    if not stems:
         raise UserError(
             f"{path}: holds no tables, expected {PARTS[0]}/*.json or {PARTS[0]}/*.csv as a run or "
             "the target reference leaves them"
@@ -91,7 +102,11 @@ def require_baseline(config: Mapping[str, Any]) -> list[str]:
 def _stems(path: Path) -> list[Path]:
     """Files of tables without their endings, each once."""
     files = (file for part in PARTS for file in sorted((path / part).glob("*")))
-    return list(dict.fromkeys(file.with_suffix("") for file in files if file.suffix in READERS))
+    return list(
+        dict.fromkeys(
+            file.with_suffix("") for file in files if file.suffix in READERS and file.is_file()
+        )
+    )
 
 
 def _read(stem: Path) -> Table:
@@ -99,9 +114,28 @@ def _read(stem: Path) -> Table:
         file = stem.with_suffix(ending)
         if file.is_file():
             try:
-                return read(file)
-            except (ValueError, KeyError, TypeError, json.JSONDecodeError):
+                table = read(file)
+                _try(table)
+            except OSError as error:
+                raise UserError(f"{file}: cannot be read ({cause(error)})") from None
+            except _SENSELESS:
                 raise UserError(
                     f"{file}: is no table of this version, or damaged; run the workflow again"
                 ) from None
+            return table
     raise FileNotFoundError(stem)
+
+
+def _try(table: Table) -> None:
+    """Do once with every value what a comparison does; what is no value of its kind raises."""
+    if table.conditions is not None:
+        "".join(table.conditions.told.values())
+    ", ".join([table.name, *table.keys, *(column.label for column in table.columns)])
+    known = {column.key for column in table.columns}
+    if not known or not known.issuperset(table.keys):
+        raise KeyError(table.keys)
+    for row in table.rows:
+        for column in table.columns:
+            kind, value = kind_in(row, column), Value(row.get(column.key))
+            show(value.value, kind)
+            verdict(kind, value, value)

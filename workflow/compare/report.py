@@ -15,6 +15,7 @@ from workflow.compare.noise import RULES
 from workflow.report.conditions import LABELS
 from workflow.report.page import page_template
 from workflow.report.table import Table
+from workflow.room import make_folder
 
 NAME = "comparison"
 MACHINE = ("processor", "cores", "memory", "ranks", "threads", "blas")
@@ -28,7 +29,7 @@ TITLE = "What moved"
 
 def write(comparison: Comparison, folder: Path) -> None:
     """Write `comparison.csv`, `comparison.md` and `comparison.html`."""
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     for ending, text in (
         ("csv", tables.every_number(comparison).as_csv()),
         ("md", as_markdown(comparison)),

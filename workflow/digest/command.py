@@ -11,11 +11,20 @@ import h5py
 import numpy as np
 
 from carillon.errors import UserError
+from carillon.files import cause, open_h5
 
 CIRCUMSTANCES = frozenset(
-    {"provenance", "timings", "hcms", "peak_memory_bytes", "ranks", "threads", "forest_sha256"}
+    {
+        *("provenance", "timings", "hcms", "peak_memory_bytes", "ranks", "threads"),
+        *("forest_sha256", "settings"),
+    }
 )
-"""Groups and attributes that tell where, how fast and from which file, not what."""
+"""Groups, datasets and attributes that tell where, how fast, from which files and after which wish,
+not what was found."""
+TIMES = "history/seconds"
+"""A dataset of wall times among others that are none."""
+TOLD = CIRCUMSTANCES | {"seconds", "evaluations_per_minute", "workers"}
+"""The same among attributes, and among the keys of texts in JSON."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,35 +49,75 @@ def digest(path: Path) -> str:
     Raises
     ------
     UserError
-        If the file cannot be read.
+        If the file cannot be read, is no result, or does not match the checksum it begins with.
     """
     found = hashlib.sha256()
 
     def add(name: str, entry: h5py.Group | h5py.Dataset) -> None:
-        if CIRCUMSTANCES.intersection(name.split("/")):
+        if CIRCUMSTANCES.intersection(name.split("/")) or name == TIMES:
             return
         found.update(name.encode())
-        for key in sorted(set(entry.attrs) - CIRCUMSTANCES):
+        for key in sorted(set(entry.attrs) - TOLD):
             found.update(f"{key}={np.asarray(entry.attrs[key]).tolist()!r}".encode())
         if isinstance(entry, h5py.Dataset):
             found.update(f"{entry.dtype}{entry.shape}".encode())
-            found.update(np.ascontiguousarray(entry[()]).tobytes())
+            found.update(_bytes_of(entry))
 
     try:
-        with h5py.File(path) as file:
+        with open_h5(path, *_kind(path), sealed=True) as file:
             add("/", file)
             file.visititems(add)
-    except OSError as error:
-        raise UserError(f"{path} cannot be read as HDF5: {error}") from None
+    except UserError:
+        raise
+    except Exception as error:  # HDF5 has many ways to say that bytes make no sense
+        raise UserError(
+            f"{path}: is damaged or no HDF5 file ({error}); name a result file"
+        ) from None
     return found.hexdigest()
 
 
+def _kind(path: Path) -> tuple[str, int]:
+    """Kind and schema version that a file claims."""
+    with h5py.File(path, "r") as file:
+        if "kind" not in file.attrs:
+            raise UserError(f"{path}: holds nothing that says its kind, expected a result file")
+        return str(file.attrs["kind"]), int(file.attrs["schema_version"])
+
+
+def _bytes_of(dataset: h5py.Dataset) -> bytes:
+    """What a dataset holds; of a text in JSON what is no circumstance."""
+    if h5py.check_string_dtype(dataset.dtype) is None:
+        return np.ascontiguousarray(dataset[()]).tobytes()
+    texts = np.asarray(dataset.asstr()[()], dtype=object)
+    return repr([_without_circumstances(text) for text in texts.ravel()]).encode()
+
+
+def _without_circumstances(text: str) -> str:
+    try:
+        told = json.loads(text)
+    except ValueError:
+        return text
+    if not isinstance(told, dict):
+        return text
+    return json.dumps({key: told[key] for key in sorted(set(told) - TOLD)})
+
+
 def _files(paths: list[Path]) -> list[Path]:
-    files = []
+    """Files among the paths and below the folders, but for those that killed writers have left."""
+    files: list[Path] = []
     for path in paths:
-        if not path.exists():
-            raise UserError(f"there is no {path}; name result files, or folders that hold some")
-        files += sorted(path.rglob("*.h5")) if path.is_dir() else [path]
+        try:
+            if path.is_dir():
+                below = sorted(path.rglob("*.h5"))
+                files += [file for file in below if not file.name.startswith(".")]
+            elif path.is_file():
+                files.append(path)
+            else:
+                raise UserError(
+                    f"{path}: no such file or folder; name result files, or folders that hold some"
+                )
+        except OSError as error:
+            raise UserError(f"{path}: cannot be read ({cause(error)})") from None
     if not files:
         raise UserError(f"no HDF5 file in {', '.join(map(str, paths))}")
     return files

@@ -7,11 +7,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from carillon.arguments import whole_number
-from carillon.errors import UserError
-from carillon.files import cause, require_writable
+from carillon.files import require_writable
 from carillon.runtime import allowed_cores
 from dataset_gen.objectives import DATASET_OBJECTIVES
 from workflow import settings, training
@@ -25,6 +22,7 @@ from workflow.estimate.training_stages import TrainingStages
 
 CONFIGURATIONS = Path(__file__).parent.parent / "config"
 DEFAULT_PRESET, PAPER = "laptop", "paper"
+MOST_NODES, MOST_CORES = 100_000, 10_000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,10 +41,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--objective", choices=DATASET_OBJECTIVES, help="instead of dataset.objective"
     )
-    parser.add_argument("--nodes", type=whole_number(1), default=1, help="(default 1)")
+    parser.add_argument("--nodes", type=whole_number(1, MOST_NODES), default=1, help="(default 1)")
     parser.add_argument(
         "--cores-per-node",
-        type=whole_number(1),
+        type=whole_number(1, MOST_CORES),
         default=allowed_cores(),
         metavar="CORES",
         help="(default: those of this machine)",
@@ -94,12 +92,7 @@ def load(path: Path, objective: str | None = None) -> dict[str, Any]:
     """
     from snakemake.utils import validate  # Takes long to import, and --help should not.
 
-    try:
-        config = yaml.safe_load(path.read_text())
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read ({cause(error)}), expected YAML") from None
-    except yaml.YAMLError as error:
-        raise UserError(f"{path}: is no YAML ({' '.join(str(error).split())})") from None
+    config = settings.read([path], {})
     settings.check(config)
     validate(config, str(settings.SCHEMA))
     if objective is not None:

@@ -67,7 +67,8 @@ class Machine:
         return sum(self._wall(cores, same) for cores, same in groupby(ordered, lambda j: j.cores))
 
     def _wall(self, cores: int, jobs: Iterable[Jobs]) -> float:
-        free = [0.0] * self.slots(cores)
+        jobs = list(jobs)
+        free = [0.0] * min(self.slots(cores), max(1, sum(each.count for each in jobs)))
         for each in jobs:
             for _ in range(each.count):
                 heapq.heappush(free, heapq.heappop(free) + each.seconds)

@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from jsonschema import Draft202012Validator
-from jsonschema.exceptions import best_match
 
 from carillon.errors import UserError
 from carillon.files import atomic_path, cause
+from workflow.strict_schema import first_mistake, reason
 
 SCHEMA = Path(__file__).parent.parent / "schemas" / "rates.schema.yaml"
 PACKAGED = Path(__file__).parent / "rates.json"
@@ -108,11 +107,11 @@ def rates_of(values: Mapping[str, Any], where: str) -> Rates:
         With one sentence about the first value that does not fit; `where` begins it.
     """
     schema = yaml.safe_load(SCHEMA.read_text())
-    mistake = best_match(Draft202012Validator(schema).iter_errors(values))
+    mistake = first_mistake(schema, values)
     if mistake is not None:
         place = ".".join(map(str, mistake.absolute_path)) or "contents"
         raise UserError(
-            f"{where}: {place}: {mistake.message}; expected rates made by "
+            f"{where}: {place}: {reason(mistake)}; expected rates made by "
             "python -m workflow estimate --measure --rates FILE"
         )
     laws = {
@@ -142,7 +141,7 @@ def load_rates(path: str | Path = PACKAGED) -> Rates:
         values = json.loads(Path(path).read_text())
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({cause(error)}), expected rates") from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise UserError(f"{path}: is no JSON ({error}); measure the rates again") from None
     return rates_of(values, str(path))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -13,6 +13,10 @@ from workflow.settings import BUILTIN
 TYPICAL_FINE, TYPICAL_COARSE = 0.8, 0.15
 """Unknowns of a compact solid such as the Stanford bunny on the fine and the coarse mesh, over the
 cube of the voxels along its longest side."""
+
+
+LARGEST_COUNTED = 128
+"""Resolution from which on voxels are no longer made to be counted, which would take gigabytes."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +54,11 @@ def size_of(solid: Solid) -> Size:
         cube = solid.resolution**3
         fine, coarse = round(TYPICAL_FINE * cube), round(TYPICAL_COARSE * cube)
         return Size(fine, coarse, f"guessed, {solid.mesh} is absent: as compact as the bunny")
+    if solid.resolution > LARGEST_COUNTED:
+        counted = size_of(replace(solid, resolution=LARGEST_COUNTED))
+        times = (solid.resolution / LARGEST_COUNTED) ** 3
+        basis = f"{counted.basis} at resolution {LARGEST_COUNTED}, times {times:,.1f}"
+        return Size(round(times * counted.fine), round(times * counted.coarse), basis)
     surface = load_surface(solid.mesh)
     voxels = voxelize(surface, solid.resolution, solid.fill, solid.pieces, solid.mesh)
     mesh = hexmesh_from_voxels(voxels)

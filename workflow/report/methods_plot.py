@@ -6,7 +6,7 @@ import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
 from workflow.report.methods_tables import METHODS
-from workflow.report.style import COLOURS, FAINT, INK, MUTED, SETTINGS
+from workflow.report.style import COLOURS, FAINT, INK, MUTED, SETTINGS, plain
 from workflow.report.table import LEAST, MOST, Table
 
 METHOD_COLOURS = {
@@ -49,7 +49,8 @@ def methods_figure(methods: Table) -> Figure:
             )
         axes.set_xscale("log")
         axes.set_yticks(
-            range(len(methods.rows)), [row["title"].replace(", ", "\n") for row in methods.rows]
+            range(len(methods.rows)),
+            [plain(row["title"]).replace(", ", "\n") for row in methods.rows],
         )
         axes.tick_params(axis="y", length=0)
         axes.grid(axis="y", visible=False)

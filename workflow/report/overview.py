@@ -13,7 +13,7 @@ from solver.modes_file import read_modes
 from workflow.report.mode_pictures import View, aligned, displacement
 from workflow.report.plots import LINES
 from workflow.report.results import Results
-from workflow.report.style import COLOURS, MUTED, SETTINGS
+from workflow.report.style import COLOURS, MUTED, SETTINGS, plain
 from workflow.report.table import Table
 from workflow.variants import TRUTH, VARIANTS
 
@@ -40,7 +40,7 @@ def overview_figure(results: Results, frequencies: Table, model: str) -> Figure:
             figure.text(left + 0.01, 0.87, text, color=MUTED)
         rows = [row for row in frequencies.rows if row["model"] == model]
         _plot_spectra(figure.add_axes((0.68, 0.13, 0.305, 0.69)), rows)
-        figure.text(0.68, 0.93, results.title(model), weight="bold", size=10.5)
+        figure.text(0.68, 0.93, plain(results.title(model)), weight="bold", size=10.5)
         figure.text(0.68, 0.87, f"{len(rows)} natural frequencies", color=MUTED)
     return figure
 

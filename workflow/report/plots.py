@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from workflow.report.convergence_plot import visible
 from workflow.report.numbers import show
-from workflow.report.style import COLOURS, FAINT, SETTINGS
+from workflow.report.style import COLOURS, FAINT, SETTINGS, plain
 from workflow.report.table import Table
 from workflow.report.times_tables import TIMED
 from workflow.variants import SHOWN, TRUTH, VARIANTS
@@ -61,7 +61,7 @@ def times_figure(times: Table) -> Figure:
         axes.set_xscale("log")
         axes.set_xlim(left=smallest / 2)
         axes.margins(x=0.12)
-        axes.set_yticks(range(len(rows)), [row["title"].replace(", ", "\n") for row in rows])
+        axes.set_yticks(range(len(rows)), [plain(row["title"]).replace(", ", "\n") for row in rows])
         axes.tick_params(axis="y", length=0)
         axes.grid(axis="y", visible=False)
         axes.spines["left"].set_color(FAINT)

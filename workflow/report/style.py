@@ -78,6 +78,11 @@ SETTINGS: Any = {
 PNG_DPI = 200
 
 
+def plain(text: str) -> str:
+    """Text for a figure, in which dollars are no sign of a formula."""
+    return text.replace("$", r"\$")
+
+
 def save(figure: Figure, outputs: Any) -> None:
     """Write a figure to `outputs.svg` and `outputs.png`."""
     name = Path(outputs.svg).stem

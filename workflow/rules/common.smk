@@ -4,9 +4,10 @@ import sys
 from pathlib import Path
 
 from workflow import locks, training, variants
+from workflow.arguments import options, quoted
 from workflow.sources import fingerprint as source
 
-RESULTS = config["results_dir"].rstrip("/")
+RESULTS = str(Path(config["results_dir"]))
 LOGS = f"{RESULTS}/logs"
 BENCHMARKS = f"{RESULTS}/benchmarks"
 MODELS = list(config["models"])
@@ -20,13 +21,16 @@ ANY_LAUNCHER = "srun --mpi=pmix" if "SLURM_JOB_ID" in os.environ else "mpiexec"
 
 
 def launcher(ranks):
-    """Resource mpi: what goes in front of a program on several ranks; nothing before a single one."""
-    return (config["solver"]["launcher"] or ANY_LAUNCHER) if ranks > 1 else ""
+    """Resource mpi: what goes in front of a program on several ranks; nothing before a single one.
+
+    Its words are quoted here, as it is the one thing that goes to a shell as it is.
+    """
+    return quoted(config["solver"]["launcher"] or ANY_LAUNCHER) if ranks > 1 else ""
 
 
 def on_ranks(ranks):
     """What follows: with -m mpi4py one rank's failure ends them all."""
-    return f"-n {ranks} python -m mpi4py" if ranks > 1 else "python"
+    return ["-n", ranks, "python", "-m", "mpi4py"] if ranks > 1 else ["python"]
 
 
 def cores_of(ranks):
@@ -76,8 +80,7 @@ def prepend(variable, folder):
 
 
 # Jobs of a cluster parse this file too.
-if workflow.is_main_process:
-    locks.take()
+ALONE = workflow.is_main_process and locks.take()
 
 # Jobs run the interpreter that Snakemake runs in, and the packages of this checkout.
 prepend("PATH", Path(sys.executable).parent)

@@ -26,7 +26,7 @@ rule compare:
         results=lambda wildcards, input: str(Path(input.config).parent),
     shell:
         "python -m workflow compare {params.baseline:q} {params.results:q}"
-        " --out {params.results:q}/comparison 2>&1 | tee {log}"
+        " --out {params.results:q}/comparison 2>&1 | tee {log:q}"
 
 
 rule reference:

@@ -19,8 +19,8 @@ rule generate_shard:
         source=source("dataset_gen.generate"),
         samples=lambda wildcards: OWN.generate_arguments(wildcards.distribution, wildcards.shard),
     shell:
-        "python -m dataset_gen generate {params.samples} --workers {threads} --out {output}"
-        " > {log} 2>&1"
+        "python -m dataset_gen generate {params.samples:q} --workers {threads} --out {output:q}"
+        " > {log:q} 2>&1"
 
 
 rule describe_shard:
@@ -37,5 +37,5 @@ rule describe_shard:
     params:
         source=source("dataset_gen.summary"),
     shell:
-        "python -m dataset_gen inspect {input} --json > {output}.partial 2> {log}"
-        " && mv {output}.partial {output}"
+        "python -m dataset_gen inspect {input:q} --json > {output:q}.partial 2> {log:q}"
+        " && mv {output:q}.partial {output:q}"

@@ -51,8 +51,8 @@ rule grow_tree:
         source=source("forests.training.command"),
         training=DEFAULT.train_arguments,
     shell:
-        "python -m forests grow {input} {params.training} --tree {wildcards.tree} --out {output}"
-        " > {log} 2>&1"
+        "python -m forests grow {input:q} {params.training:q} --tree {wildcards.tree:q}"
+        " --out {output:q} > {log:q} 2>&1"
 
 
 rule train_default_forest:
@@ -77,8 +77,8 @@ rule train_default_forest:
         on_ranks=on_ranks(DEFAULT.forests["ranks"]),
         training=DEFAULT.train_arguments,
     shell:
-        "{resources.mpi} {params.on_ranks} -m forests train {input.shards} {params.training}"
-        f" --structure {{input.trees}}{workers(DEFAULT)} --out {{output}} > {{log}} 2>&1"
+        "{resources.mpi} {params.on_ranks:q} -m forests train {input.shards:q} {params.training:q}"
+        f" --structure {{input.trees:q}}{workers(DEFAULT)} --out {{output:q}} > {{log:q}} 2>&1"
 
 
 use rule describe_forests as describe_default_forest with:

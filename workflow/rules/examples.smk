@@ -1,5 +1,4 @@
 # Examples of sound design: their files, and arguments of the programs.
-import shlex
 from dataclasses import asdict
 
 from workflow.sounds import examples as sound_examples
@@ -49,7 +48,7 @@ def project_of(wildcards):
 
 def start_argument(wildcards, input):
     """The design to go on from, if there is one."""
-    return f"--start {input.before}" if input.before else ""
+    return options({"start": str(input.before)})
 
 
 def design_before(wildcards):
@@ -61,7 +60,7 @@ def design_before(wildcards):
 
 def clip_arguments(wildcards):
     """What the clip of a point is made as."""
-    return targets_of(wildcards)[wildcards.point].clip
+    return targets_of(wildcards)[wildcards.point].clip.split()
 
 
 def recording_of(wildcards):
@@ -78,14 +77,14 @@ def strike_of_recording(wildcards):
     """Where and how a recorded solid is struck for a clip."""
     at = targets_of(wildcards)[wildcards.point].at
     damping = EXAMPLES[wildcards.example].recorded.damping
-    return " ".join(["--at", *map(str, at), "--damping", *map(str, damping)])
+    return options({"at": at, "damping": damping})
 
 
 def place_arguments(wildcards):
     """Where an example is struck for a sound."""
     if wildcards.point == ELSEWHERE:
-        return "--at " + " ".join(map(str, EXAMPLES[wildcards.example].elsewhere[1]))
-    return f"--target {shlex.quote(wildcards.point)}"
+        return options({"at": EXAMPLES[wildcards.example].elsewhere[1]})
+    return options({"target": wildcards.point})
 
 
 def all_sounds(wildcards):

@@ -47,8 +47,8 @@ rule follow_convergence_in_full:
         modes=config["figures"]["modes"],
         steps=config["figures"]["steps"],
     shell:
-        "OMP_NUM_THREADS={threads} python -m solver convergence {params.shape}"
-        " --modes {params.modes} --steps {params.steps} --out {output} > {log} 2>&1"
+        "OMP_NUM_THREADS={threads} python -m solver convergence {params.shape:q}"
+        " --modes {params.modes:q} --steps {params.steps:q} --out {output:q} > {log:q} 2>&1"
 
 
 # It starts the ranks itself, one thread each.
@@ -70,10 +70,10 @@ rule measure_scaling:
         shape=shape_arguments,
         modes=config["figures"]["modes"],
         ranks=",".join(map(str, config["figures"]["ranks"])),
-        weak="--weak" if config["figures"]["weak"] else "",
+        weak=options({"weak": config["figures"]["weak"]}),
     shell:
-        "python -m solver scaling {params.shape} --modes {params.modes} --ranks {params.ranks}"
-        " {params.weak} --out {output} > {log} 2>&1"
+        "python -m solver scaling {params.shape:q} --modes {params.modes:q}"
+        " --ranks {params.ranks:q} {params.weak:q} --out {output:q} > {log:q} 2>&1"
 
 
 rule tabulate_figures:

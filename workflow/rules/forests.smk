@@ -24,8 +24,8 @@ rule train_forests:
         on_ranks=on_ranks(OWN.forests["ranks"]),
         training=OWN.train_arguments,
     shell:
-        "{resources.mpi} {params.on_ranks} -m forests train {input} {params.training}"
-        f"{workers(OWN)} --out {{output}} > {{log}} 2>&1"
+        "{resources.mpi} {params.on_ranks:q} -m forests train {input:q} {params.training:q}"
+        f"{workers(OWN)} --out {{output:q}} > {{log:q}} 2>&1"
 
 
 rule describe_forests:
@@ -42,8 +42,8 @@ rule describe_forests:
     params:
         source=source("forests.summary"),
     shell:
-        "python -m forests inspect {input} --json > {output}.partial 2> {log}"
-        " && mv {output}.partial {output}"
+        "python -m forests inspect {input:q} --json > {output:q}.partial 2> {log:q}"
+        " && mv {output:q}.partial {output:q}"
 
 
 # Takes all cores although it uses one: its costs per block are timed.
@@ -65,5 +65,5 @@ rule rate_forests:
         blocks=OWN.forests["blocks"],
         materials=OWN.forests["materials"],
     shell:
-        "python -m forests table --model {input} --blocks {params.blocks}"
-        " --materials {params.materials} --out {output} > {log} 2>&1"
+        "python -m forests table --model {input:q} --blocks {params.blocks:q}"
+        " --materials {params.materials:q} --out {output:q} > {log:q} 2>&1"

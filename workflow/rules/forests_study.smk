@@ -1,7 +1,5 @@
 # What the default forests are worth, block by block: `snakemake forests_study`, no part of the
 # default run.
-import shlex
-
 from workflow.forests_study import plots as study_plots
 from workflow.forests_study import tables as study_tables
 
@@ -56,8 +54,8 @@ rule benchmark_forests:
         blocks=config["forests_study"]["timed_blocks"],
         largest=config["forests_study"]["largest"],
     shell:
-        "python -m forests benchmark --model {input} --blocks {params.blocks}"
-        " --largest {params.largest} --out {output} > {log} 2>&1"
+        "python -m forests benchmark --model {input:q} --blocks {params.blocks:q}"
+        " --largest {params.largest:q} --out {output:q} > {log:q} 2>&1"
 
 
 rule compare_trainings:
@@ -80,12 +78,14 @@ rule compare_trainings:
         source=source("forests.training.studies"),
         training=STUDY_TRAINING.train_arguments,
         leaves=config["forests_study"]["variant_leaves"],
-        variants=" ".join(
-            f"--only {shlex.quote(name)}" for name in config["forests_study"]["variants"] or []
-        ),
+        variants=[
+            word
+            for name in config["forests_study"]["variants"] or []
+            for word in options({"only": name})
+        ],
     shell:
-        "python -m forests variants {input} {params.training} --max-leaves {params.leaves}"
-        " {params.variants} --workers {threads} --out {output} > {log} 2>&1"
+        "python -m forests variants {input:q} {params.training:q} --max-leaves {params.leaves:q}"
+        " {params.variants:q} --workers {threads} --out {output:q} > {log:q} 2>&1"
 
 
 rule follow_learning:
@@ -106,8 +106,8 @@ rule follow_learning:
         training=STUDY_TRAINING.train_arguments,
         rows=",".join(map(str, config["forests_study"]["curve_rows"])),
     shell:
-        "python -m forests curve {input} {params.training} --rows {params.rows}"
-        " --workers {threads} --out {output} > {log} 2>&1"
+        "python -m forests curve {input:q} {params.training:q} --rows {params.rows:q}"
+        " --workers {threads} --out {output:q} > {log:q} 2>&1"
 
 
 rule tabulate_forests_study:

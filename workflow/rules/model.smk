@@ -9,13 +9,13 @@ def model_files(wildcards):
 def model_arguments(wildcards, resolution=None):
     """What the solid is: mesh, resolution (the model's own if None), material."""
     model = config["models"][wildcards.model]
-    return (
-        f"{settings.mesh_of(config, wildcards.model)}"
-        f" --resolution {resolution or model['resolution']}"
-        f" --material {settings.material_of(config, wildcards.model)} --unit {model['unit']}"
-        f" --density {model['density']} --poisson {config['poisson']} --seed {model['seed']}"
-        f" --fill {model['fill']} --pieces {model['pieces']}"
-    )
+    how = {
+        "resolution": resolution or model["resolution"],
+        "material": settings.material_of(config, wildcards.model),
+        "poisson": config["poisson"],
+        **{key: model[key] for key in ("unit", "density", "seed", "fill", "pieces")},
+    }
+    return [settings.mesh_of(config, wildcards.model), *options(how)]
 
 
 def variant_files(wildcards):
@@ -26,29 +26,28 @@ def variant_files(wildcards):
 
 def forest_argument(wildcards, input):
     """The forests to coarsen with, if any are named."""
-    return f"--forest {input.forests}" if input.forests else ""
+    return options({"forest": str(input.forests)})
 
 
 def variant_arguments(wildcards, input):
     """How the solid is coarsened and solved."""
     variant = variants.VARIANTS[wildcards.variant]
-    arguments = [f"--coarsen {variant.coarsen} --method {variant.method}"]
-    arguments.append(forest_argument(wildcards, input))
-    if variant.method == "hcms":
-        arguments.append(hcms_arguments(variant.corrected))
-    return " ".join(arguments)
+    return [
+        *options({"coarsen": variant.coarsen, "method": variant.method}),
+        *forest_argument(wildcards, input),
+        *(hcms_arguments(variant.corrected) if variant.method == "hcms" else []),
+    ]
 
 
 def hcms_arguments(corrected):
     """Parameters of component mode synthesis and its correction."""
     solver = config["solver"]
-    arguments = [f"--interface {solver['interface']}"]
-    arguments += [f"--{key} {solver[key]}" for key in ("keep", "subdomains") if solver[key]]
+    how = {key: solver[key] for key in ("interface", "keep", "subdomains")}
     if corrected:
-        arguments.append(f"--tol {solver['tolerance']} --corrections {solver['corrections']}")
+        how |= {"tol": solver["tolerance"], "corrections": solver["corrections"]}
     else:
-        arguments.append("--corrections 0")
-    return " ".join(arguments)
+        how["corrections"] = 0
+    return options(how)
 
 
 def timed_arguments(wildcards):
@@ -58,9 +57,8 @@ def timed_arguments(wildcards):
 
 def times_arguments(part):
     """How methods are timed, from a part of the configuration."""
-    flags = [f"--{key.replace('_', '-')}" for key in ("tune", "arpack_regular") if part.get(key)]
-    numbers = [f"--{key.replace('_', '-')} {part[key]}" for key in ("modes", "runs", "slow_runs")]
-    return " ".join([*numbers, *flags])
+    keys = ("modes", "runs", "slow_runs", "tune", "arpack_regular")
+    return options({key: part.get(key) for key in keys})
 
 
 def model_modes(wildcards):
@@ -71,10 +69,9 @@ def model_modes(wildcards):
 def strike_arguments(wildcards):
     """How a model is struck in its validation; points in metres."""
     model, how = config["models"][wildcards.model], config["validation"]
-    points = [
-        f"--{name} " + " ".join(f"{model['unit'] * part:.12f}" for part in model[name])
+    points = {
+        name: [f"{model['unit'] * part:.12f}" for part in model[name] or []]
         for name in ("strike", "observed")
-        if model[name]
-    ]
+    }
     names = ("mass_damping", "stiffness_damping", "contact", "periods")
-    return " ".join([*points, *(f"--{name.replace('_', '-')} {how[name]}" for name in names)])
+    return options(points | {name: how[name] for name in names})

@@ -27,8 +27,9 @@ rule rate_objectives:
         objectives=",".join(settings.studied_objectives(config)),
         forest=FOREST_ARGUMENT,
     shell:
-        "OMP_NUM_THREADS={threads} python -m solver objectives {params.case} {params.forest}"
-        " --modes {params.modes} --objectives {params.objectives} --out {output} > {log} 2>&1"
+        "OMP_NUM_THREADS={threads} python -m solver objectives {params.case:q} {params.forest:q}"
+        " --modes {params.modes:q} --objectives {params.objectives:q} --out {output:q}"
+        " > {log:q} 2>&1"
 
 
 rule tabulate_objectives:

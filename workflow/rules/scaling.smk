@@ -16,7 +16,7 @@ use rule measure_scaling as measure_scaling_of_run with:
         shape=lambda wildcards: model_arguments(wildcards, config["scaling"]["resolution"]),
         modes=config["scaling"]["modes"],
         ranks=",".join(map(str, config["scaling"]["ranks"])),
-        weak="",
+        weak=[],
 
 
 use rule plot_scaling as plot_scaling_of_run with:

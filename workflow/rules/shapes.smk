@@ -19,10 +19,11 @@ def shape_mesh(wildcards):
 def shape_arguments(wildcards):
     """What the solid is: mesh, resolution, material."""
     model = config["figures"]["models"][wildcards.shape]
-    return (
-        f"{settings.figured_mesh(config, wildcards.shape)} --resolution {model['resolution']}"
-        f" --material {model['material']} --poisson {config['poisson']} --pieces {model['pieces']}"
-    )
+    how = {key: model[key] for key in ("resolution", "material", "pieces")}
+    return [
+        settings.figured_mesh(config, wildcards.shape),
+        *options(how | {"poisson": config["poisson"]}),
+    ]
 
 
 def shape_results(file, part="models"):

@@ -22,7 +22,8 @@ rule synthesise_clip:
         source=source("sound.clips.clip_command"),
         how=clip_arguments,
     shell:
-        "OMP_NUM_THREADS={threads} python -m sound clip {params.how} --out {output} > {log} 2>&1"
+        "OMP_NUM_THREADS={threads} python -m sound clip {params.how:q} --out {output:q}"
+        " > {log:q} 2>&1"
 
 
 rule check_design:
@@ -41,8 +42,9 @@ rule check_design:
         source=source("solver.problem", "solver.modes_file", "solver.__main__"),
         solid=fine_solid,
     shell:
-        "OMP_NUM_THREADS={threads} python -m solver modes {params.solid} --material {input.young}"
-        " --coarsen none --method slepc --out {output} > {log} 2>&1"
+        "OMP_NUM_THREADS={threads} python -m solver modes {params.solid:q}"
+        " --material {input.young:q} --coarsen none --method slepc --out {output:q}"
+        " > {log:q} 2>&1"
 
 
 rule save_recorded_moduli:
@@ -90,8 +92,8 @@ rule record_clip:
         source=source("sound.rendering.command"),
         how=strike_of_recording,
     shell:
-        "OMP_NUM_THREADS={threads} python -m sound render {input} {params.how} --out {output}"
-        " > {log} 2>&1"
+        "OMP_NUM_THREADS={threads} python -m sound render {input:q} {params.how:q}"
+        " --out {output:q} > {log:q} 2>&1"
 
 
 rule write_project:
@@ -132,8 +134,8 @@ rule design_sound:
         source=source("sound.design.command"),
         start=start_argument,
     shell:
-        "OMP_NUM_THREADS={threads} python -m sound design {input.project} {params.start}"
-        " --out {output} > {log} 2>&1"
+        "OMP_NUM_THREADS={threads} python -m sound design {input.project:q} {params.start:q}"
+        " --out {output:q} > {log:q} 2>&1"
 
 
 # A single evaluation is that of the uniform material.
@@ -154,8 +156,8 @@ rule begin_design:
     params:
         source=source("sound.design.command"),
     shell:
-        "OMP_NUM_THREADS={threads} python -m sound design {input.project} --evaluations 1"
-        " --out {output} > {log} 2>&1"
+        "OMP_NUM_THREADS={threads} python -m sound design {input.project:q} --evaluations 1"
+        " --out {output:q} > {log:q} 2>&1"
 
 
 rule compare_optimisers:
@@ -178,9 +180,9 @@ rule compare_optimisers:
         source=source("sound.design.benchmark_command"),
         seconds=config["sound"]["compare_seconds"],
     shell:
-        "OMP_NUM_THREADS={threads} python -m sound benchmark {input.project}"
-        " --seconds {params.seconds} --json > {output}.partial 2> {log}"
-        " && mv {output}.partial {output}"
+        "OMP_NUM_THREADS={threads} python -m sound benchmark {input.project:q}"
+        " --seconds {params.seconds:q} --json > {output:q}.partial 2> {log:q}"
+        " && mv {output:q}.partial {output:q}"
 
 
 rule save_moduli:
@@ -215,8 +217,8 @@ rule render_before:
         source=source("sound.rendering.command"),
         place=place_arguments,
     shell:
-        "OMP_NUM_THREADS={threads} python -m sound render {input} {params.place} --out {output}"
-        " > {log} 2>&1"
+        "OMP_NUM_THREADS={threads} python -m sound render {input:q} {params.place:q}"
+        " --out {output:q} > {log:q} 2>&1"
 
 
 use rule render_before as render_after with:
@@ -244,8 +246,8 @@ rule render_fine:
         source=source("sound.rendering.command"),
         place=place_arguments,
     shell:
-        "OMP_NUM_THREADS={threads} python -m sound render {input.truth} --like {input.design}"
-        " {params.place} --out {output} > {log} 2>&1"
+        "OMP_NUM_THREADS={threads} python -m sound render {input.truth:q} --like {input.design:q}"
+        " {params.place:q} --out {output:q} > {log:q} 2>&1"
 
 
 rule build_sound_page:

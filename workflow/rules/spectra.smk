@@ -26,10 +26,10 @@ rule find_modes:
         variant=variant_arguments,
         modes=model_modes,
     shell:
-        "OMP_NUM_THREADS=$(( {threads} > {params.ranks} ? {threads} / {params.ranks} : 1 ))"
-        " {resources.mpi} {params.on_ranks} -m solver modes"
-        " {params.model} {params.variant}"
-        " --modes {params.modes} --out {output} > {log} 2>&1"
+        "OMP_NUM_THREADS=$(( {threads} > {params.ranks:q} ? {threads} / {params.ranks:q} : 1 ))"
+        " {resources.mpi} {params.on_ranks:q} -m solver modes"
+        " {params.model:q} {params.variant:q}"
+        " --modes {params.modes:q} --out {output:q} > {log:q} 2>&1"
 
 
 rule follow_convergence:
@@ -52,9 +52,9 @@ rule follow_convergence:
         modes=lambda wildcards: min(config["convergence"]["modes"], model_modes(wildcards)),
         steps=config["convergence"]["steps"],
     shell:
-        "OMP_NUM_THREADS={threads} python -m solver convergence {params.model}"
-        " --modes {params.modes} --steps {params.steps} --truth {input.truth} --out {output}"
-        " > {log} 2>&1"
+        "OMP_NUM_THREADS={threads} python -m solver convergence {params.model:q}"
+        " --modes {params.modes:q} --steps {params.steps:q} --truth {input.truth:q}"
+        " --out {output:q} > {log:q} 2>&1"
 
 
 rule compare_with_truth:
@@ -72,8 +72,8 @@ rule compare_with_truth:
     params:
         source=source("solver.comparison"),
     shell:
-        "OMP_NUM_THREADS={threads} python -m solver compare {input.candidate} {input.truth} --json"
-        " > {output}.partial 2> {log} && mv {output}.partial {output}"
+        "OMP_NUM_THREADS={threads} python -m solver compare {input.candidate:q} {input.truth:q}"
+        " --json > {output:q}.partial 2> {log:q} && mv {output:q}.partial {output:q}"
 
 
 # All methods in alternating runs, on a solid that may be coarser than the model itself.
@@ -102,6 +102,6 @@ rule time_methods:
         how=times_arguments(config["times"]),
         forest=forest_argument,
     shell:
-        "OMP_NUM_THREADS=$(( {threads} > {params.ranks} ? {threads} / {params.ranks} : 1 ))"
-        " {resources.mpi} {params.on_ranks} -m solver benchmark"
-        " {params.model} {params.how} {params.forest} --out {output} > {log} 2>&1"
+        "OMP_NUM_THREADS=$(( {threads} > {params.ranks:q} ? {threads} / {params.ranks:q} : 1 ))"
+        " {resources.mpi} {params.on_ranks:q} -m solver benchmark"
+        " {params.model:q} {params.how:q} {params.forest:q} --out {output:q} > {log:q} 2>&1"

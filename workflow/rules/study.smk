@@ -3,8 +3,7 @@ from workflow.study import cases
 from workflow.study.tables import BUILDERS
 
 STUDY = f"{RESULTS}/objectives"
-NAMED_FOREST = config["objectives"]["forest"]
-FOREST_ARGUMENT = f"--forest {NAMED_FOREST}" if NAMED_FOREST else ""
+FOREST_ARGUMENT = options({"forest": settings.named_forest(config)})
 
 
 wildcard_constraints:
@@ -27,8 +26,10 @@ def case_mesh(wildcards):
 def case_arguments(wildcards):
     """What the solid is: mesh, resolution, material."""
     model = config["objectives"]["models"][wildcards.solid]
-    return (
-        f"{settings.studied_mesh(config, wildcards.solid)} --resolution {wildcards.resolution}"
-        f" --material {wildcards.material} --poisson {config['poisson']}"
-        f" --pieces {model['pieces']}"
-    )
+    how = {
+        "resolution": wildcards.resolution,
+        "material": wildcards.material,
+        "poisson": config["poisson"],
+        "pieces": model["pieces"],
+    }
+    return [settings.studied_mesh(config, wildcards.solid), *options(how)]

@@ -21,7 +21,7 @@ rule audit_spectra:
     params:
         source=source("solver.audit"),
     shell:
-        "OMP_NUM_THREADS={threads} python -m solver audit {input} --out {output} > {log} 2>&1"
+        "OMP_NUM_THREADS={threads} python -m solver audit {input:q} --out {output:q} > {log:q} 2>&1"
 
 
 rule strike_solid:
@@ -39,8 +39,8 @@ rule strike_solid:
         source=source("solver.response_file"),
         strike=strike_arguments,
     shell:
-        "OMP_NUM_THREADS={threads} python -m solver respond {input} {params.strike} --out {output}"
-        " > {log} 2>&1"
+        "OMP_NUM_THREADS={threads} python -m solver respond {input:q} {params.strike:q}"
+        " --out {output:q} > {log:q} 2>&1"
 
 
 rule validate_model:

@@ -13,6 +13,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from workflow.arguments import options
 from workflow.settings import BUILTIN, located
 
 Array = NDArray[np.float64]
@@ -162,13 +163,14 @@ def project(example: Example, part: str, config: Mapping[str, Any]) -> dict[str,
     }
 
 
-def solid_arguments(example: Example) -> str:
+def solid_arguments(example: Example) -> list[str]:
     """Arguments of `solver modes` for the fine model of an example, but for its material."""
-    modes = RIGID_MODES + example.modes
-    return (
-        f"{example.mesh} --resolution {example.resolution} --density {example.density}"
-        f" --modes {modes}"
-    )
+    how = {
+        "resolution": example.resolution,
+        "density": example.density,
+        "modes": RIGID_MODES + example.modes,
+    }
+    return [example.mesh, *options(how)]
 
 
 def _example(name: str, config: Mapping[str, Any]) -> Example:

@@ -13,7 +13,13 @@ from typing import Any
 import numpy as np
 import yaml
 
-from carillon.arguments import non_negative_number, poisson_ratio, positive_number, whole_number
+from carillon.arguments import (
+    non_negative_number,
+    number_of_workers,
+    poisson_ratio,
+    positive_number,
+    whole_number,
+)
 from carillon.errors import UserError
 from carillon.files import atomic_path
 from carillon.progress import say
@@ -26,6 +32,7 @@ from solver.problem import ProblemOptions, build_problem
 from solver.trained import load_trained
 from workflow import settings
 from workflow.report.table import read_table
+from workflow.room import make_folder
 from workflow.settings import BUILTIN, DEFAULT_FORESTS
 from workflow.validate.verdict import headline
 
@@ -33,6 +40,8 @@ CONFIGURATION = "validate.yaml"
 """File in the folder of the results that the run is started with."""
 FAILED = 1
 """Exit status if a criterion is missed."""
+LONGEST_NAME = 64
+"""Characters of a model's name; a title may be longer."""
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -96,7 +105,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"limits of the criteria: {', '.join(_tolerance_names())}",
     )
     parser.add_argument(
-        "--cores", type=whole_number(1), default=allowed_cores(), help="cores to use (default: all)"
+        "--cores",
+        type=number_of_workers,
+        default=allowed_cores(),
+        help="cores to use (default: all)",
     )
 
 
@@ -108,12 +120,13 @@ def run(arguments: argparse.Namespace) -> int:
     UserError
         If the solid cannot be made, or the run fails.
     """
-    _check_solid(arguments)
     config = configuration(arguments)
     settings.check(config)
+    size = _checked_size(arguments)
     name = next(iter(config["models"]))
     folder = Path(arguments.out).resolve()
     _write(config, folder)
+    say(size)
     _run_rules(folder, arguments.cores)
     page = folder / "validation" / f"{name}.html"
     criteria = read_table(folder / "validation" / "tables" / f"{name}-criteria.json").rows
@@ -163,8 +176,8 @@ def configuration(arguments: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def _check_solid(arguments: argparse.Namespace) -> None:
-    """Make the solid once, so that all that is wrong with it is told before anything runs."""
+def _checked_size(arguments: argparse.Namespace) -> str:
+    """The size of the solid, made once to tell all that is wrong with it before anything runs."""
     names = ("mesh", "resolution", "material", "unit", "fill", "pieces", "poisson", "density")
     given = {name: getattr(arguments, name) for name in names}
     load_trained(arguments.forest, arguments.poisson)
@@ -173,16 +186,11 @@ def _check_solid(arguments: argparse.Namespace) -> None:
         point = getattr(arguments, name)
         if point is not None:
             surface_node(solid.fine, arguments.unit * np.array(point), name)
-    say(f"{solid.fine.n_cells:,} voxels, {solid.fine.n_dofs:,} unknowns")
+    return f"{solid.fine.n_cells:,} voxels, {solid.fine.n_dofs:,} unknowns"
 
 
 def _write(config: dict[str, Any], folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(
-            f"{folder}: cannot be made ({error.strerror}); name another folder"
-        ) from None
+    make_folder(folder)
     with atomic_path(folder / CONFIGURATION) as temporary:
         temporary.write_text(yaml.safe_dump(config, sort_keys=False))
 
@@ -216,7 +224,8 @@ def _path(text: str) -> str:
 
 def _model_name(title: str) -> str:
     """A title as the name of a model: lower-case letters, digits and hyphens."""
-    return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-") or "solid"
+    name = re.sub(r"[^a-z0-9]+", "-", title.lower())[:LONGEST_NAME]
+    return name.strip("-") or "solid"
 
 
 def _tolerance(text: str) -> tuple[str, float]:

@@ -1,0 +1,47 @@
+"""What gets into the job scripts of a cluster beside the rules, and must mean nothing to a shell.
+
+Snakemake hands the command line of a run on to its jobs in double quotes, in which a shell looks
+for `$`, backticks, quotes and backslashes.  Of a configuration that is but the name of its file.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from carillon.errors import UserError
+
+_SPECIAL = re.compile(r"""["'$`\\\n]""")
+_PLAIN = re.compile(r"[\w@%+=:,./-]*", re.ASCII)
+
+
+def require_plain(paths: Iterable[str | Path], given: Mapping[str, Any]) -> None:
+    """Check before jobs are submitted that their scripts can hold what they are started with.
+
+    Parameters
+    ----------
+    paths
+        Of the rules, the working directory and configuration files.
+    given
+        Values of the configuration that the command line gives.
+
+    Raises
+    ------
+    UserError
+        If a path has a character that means something within double quotes, or a value one that
+        does without quotes.
+    """
+    for path in map(str, paths):
+        if _SPECIAL.search(path):
+            raise UserError(
+                f"{path!r}: jobs of a cluster cannot be given a path with quotes, $, backticks, "
+                "backslashes or line breaks; rename it, or run without --executor"
+            )
+    for key, value in given.items():
+        if not _PLAIN.fullmatch(str(value)):
+            raise UserError(
+                f"--config {key}={value}: jobs of a cluster cannot be given a value with blanks or "
+                "quotes; write it into the configuration file"
+            )
