@@ -11,14 +11,25 @@ from pathlib import Path
 
 import pytest
 
+from tests.hostile import summary
+from tests.patience import HANG_SECONDS
+
 CHECKOUT = Path(__file__).resolve().parent.parent
 MESH_FILES = ("stanford-bunny.obj", "teapot.obj")
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Files that take longest first, so that no process is left with them at the end."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Files that take longest first, so that no process is left with them at the end.
+
+    What only `make torture` tries is left out otherwise.
+    """
+    if not os.environ.get("CARILLON_TORTURE"):
+        spared = [item for item in items if item.get_closest_marker("torture")]
+        items[:] = [item for item in items if not item.get_closest_marker("torture")]
+        if spared:
+            config.hook.pytest_deselected(items=spared)
 
     def first(item: pytest.Item) -> int:
         marks = {mark.name for mark in item.iter_markers()}
@@ -28,6 +39,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         rank[item.path] = min(first(item), rank.get(item.path, 2))
     items.sort(key=lambda item: rank[item.path])
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """What was hostile, what was killed, and what became of it."""
+    reports = [r for key in ("passed", "failed") for r in terminalreporter.stats.get(key, [])]
+    told = summary.lines((dict(r.user_properties), r.passed) for r in reports if r.when == "call")
+    if told:
+        terminalreporter.section("hostile inputs and kills")
+        terminalreporter.write("\n".join([*told, ""]))
 
 
 def _environment(threads: int, extra: Mapping[str, str] | None) -> dict[str, str]:
@@ -83,7 +103,7 @@ def run_cli() -> Run:
     def run(
         module: str,
         *arguments: object,
-        timeout: float = 120,
+        timeout: float = HANG_SECONDS,
         check: bool = False,
         env: Mapping[str, str] | None = None,
         cwd: Path | str | None = None,
@@ -109,7 +129,7 @@ def mpiexec() -> Run:
         ranks: int,
         module: str | Path,
         *arguments: object,
-        timeout: float = 120,
+        timeout: float = HANG_SECONDS,
         check: bool = False,
         env: Mapping[str, str] | None = None,
         cwd: Path | str | None = None,

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -20,15 +21,18 @@ from solver.analysis import SolverOptions, modal_analysis
 from solver.distribution import Share, distribute
 from solver.geometry import hexmesh_from_grid
 from solver.hcms.synthesis import synthesize
+from solver.inner.multigrid import Multigrid
 from solver.messages import receive_arrays, send_arrays
 from solver.model import ElasticModel
 from solver.modes_file import write_modes
 from solver.sparse import assembled
 from solver.system import assemble
+from solver.truth import complete, count_beyond, solve_truth, start_vector
 from tests import solids
 
 COMM = MPI.COMM_WORLD
 PARTS = 8
+REPETITIONS = 3
 
 
 def on_first(model: ElasticModel) -> ElasticModel | None:
@@ -234,6 +238,61 @@ def groups_that_do_not_touch_can_be_merged() -> None:
     assert (result.values[:12] < 1e-9 * exact[-1]).all()
     assert result.values[12] > 1e-9 * exact[-1]
     assert len(degrees_of_freedom(share.nodes)) == len(result.vectors)
+
+
+def missed_copies_are_found() -> None:
+    model = solids.uniform_box(4, 4, 4, 0.01)
+    exact = solids.dense_eigenvalues(model)
+    system = assemble(distribute(on_first(model), PARTS, comm=COMM), COMM)
+    start = system.gather(start_vector(system, 3)[:, None])
+    if COMM.rank == 0:
+        whole = replace(system, nodes=np.arange(model.mesh.n_nodes))
+        assert (start[:, 0] == start_vector(whole, 3)).all()
+    found = solve_truth(system, 30, seed=3)
+    lost = np.flatnonzero(found.values > 0.9 * exact[12])[:2]
+    poorer = replace(
+        found, values=np.delete(found.values, lost), vectors=np.delete(found.vectors, lost, axis=1)
+    )
+    inertia = count_beyond(system, poorer)
+    assert inertia.counted == inertia.computed + 2
+    again, inertia = complete(system, poorer, inertia)
+    assert inertia.counted == inertia.computed
+    assert again.added == 2
+    assert np.abs(again.values[6:30] / exact[6:30] - 1.0).max() < 1e-9
+    gram = system.inner(again.vectors, system.times_mass(again.vectors))
+    assert np.abs(gram - np.eye(len(gram))).max() < 1e-9
+
+
+def multigrid_is_the_same_bits_again() -> None:
+    system = assemble(distribute(on_first(solids.random_box(9, 6, 5)), PARTS, comm=COMM), COMM)
+    matrix = system.K.copy()
+    matrix.shift(1e-3 * matrix.norm())
+    block = np.ones((len(system.rigid), 2))
+    first, *others = (
+        Multigrid(matrix, system.rigid, COMM, dtype=np.float64).apply(block) for _ in range(8)
+    )
+    assert all((other == first).all() for other in others)
+
+
+def repetitions_give_the_same_bits() -> None:
+    model = on_first(solids.random_box(9, 6, 5))
+    for options in (
+        SolverOptions(modes=20, corrections=0),
+        SolverOptions(modes=20, tolerance=1e-4, inner="icc-pcg"),
+    ):
+        first, *others = (modal_analysis(model, options, COMM) for _ in range(REPETITIONS))
+        for other in others:
+            assert (other.values == first.values).all(), options
+            assert (other.vectors == first.vectors).all(), options
+
+
+def repetitions_with_mumps_agree_to_the_tolerance() -> None:
+    model = on_first(solids.random_box(9, 6, 5))
+    corrected = SolverOptions(modes=20, tolerance=1e-7, inner="mumps")
+    for options, bound in ((corrected, 2e-7), (SolverOptions(modes=20, method="slepc"), 1e-9)):
+        first, *others = (modal_analysis(model, options, COMM) for _ in range(REPETITIONS))
+        for other in others:
+            assert np.abs(other.values[6:] / first.values[6:] - 1.0).max() < bound, options
 
 
 if __name__ == "__main__":

@@ -11,10 +11,10 @@ from pathlib import Path
 
 from solver.geometry import builtin_surface
 from tests.conftest import MESH_FILES
+from tests.patience import HANG_SECONDS
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 README = (CHECKOUT / "README.md").read_text()
-TIMEOUT = 300
 
 
 SOUND = "Design a sound"
@@ -41,7 +41,7 @@ def environment() -> dict[str, str]:
 
 def run(command: list[str], folder: Path) -> str:
     done = subprocess.run(
-        command, cwd=folder, env=environment(), capture_output=True, text=True, timeout=TIMEOUT
+        command, cwd=folder, env=environment(), capture_output=True, text=True, timeout=HANG_SECONDS
     )
     assert done.returncode == 0, f"{shlex.join(command)}\n{done.stdout}\n{done.stderr}"
     return done.stdout

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import product
 
 import numpy as np
@@ -31,6 +32,18 @@ def uniform_box(nx: int, ny: int, nz: int, edge: float, young: float = 1e9) -> E
     """Homogeneous box."""
     mesh = box_mesh(nx, ny, nz, edge)
     return fine_model(mesh, np.full(mesh.n_cells, young))
+
+
+def symmetric_solid(inside: Callable[[np.ndarray], np.ndarray], cells: int) -> ElasticModel:
+    """Homogeneous cells of a cube of `cells`^3 for whose centres (c, 3) `inside` holds.
+
+    Centres are counted from the cube's centre in half edges, so that the solid has every symmetry
+    of the cube that `inside` has, to the last bit.
+    """
+    grid = np.array(list(product(range(cells), repeat=3)))
+    grid = grid[inside(2 * grid - cells + 1)]
+    mesh = hexmesh_from_grid(grid - grid.min(axis=0), np.zeros(3), 0.01)
+    return fine_model(mesh, np.full(mesh.n_cells, 1e9))
 
 
 def dense_eigenvalues(model: ElasticModel) -> np.ndarray:

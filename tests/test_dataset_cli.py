@@ -91,6 +91,12 @@ def test_an_interrupt_is_a_line_and_the_same_command_goes_on(tmp_path, capsys, m
     assert "going on after 8,192 of 9,000 samples" in capsys.readouterr().err
 
 
+def test_one_shard_of_very_many_samples_is_made(tmp_path):
+    many = ("--samples", 10**18, "--shards", 10**17, "--shard", 10**16)
+    assert run("generate", *many, "--objective", "inertial", "--out", tmp_path / "a.h5") == 0
+    assert summary.describe(tmp_path / "a.h5")["samples"] == [10**17, 10**17 + 10]
+
+
 @pytest.fixture
 def quick(monkeypatch):
     monkeypatch.setattr("dataset_gen.benchmark.RUNS", 2)
@@ -147,8 +153,14 @@ def test_benchmark_of_one_objective_as_text_and_iterative_without_operations(cap
         + ("--out", "a.h5"),
         ("generate", "--samples", "9", "--seed", str(1 << 64), "--out", "a.h5"),
         ("generate", "--samples", "9", "--out", "missing/a.h5"),
+        ("generate", "--samples", str(10**18), "--out", "a.h5"),
+        ("generate", "--samples", str(2**63), "--shards", str(2**62), "--out", "a.h5"),
+        ("generate", "--samples", "9", "--workers", str(10**6), "--out", "a.h5"),
+        ("generate", "--samples", "9", "--high", "1e300", "--out", "a.h5"),
+        ("generate", "--samples", "9", "--out", "/dev/null"),
         ("inspect", "missing.h5"),
         ("benchmark", "--samples", "0"),
+        ("benchmark", "--samples", str(10**12)),
         ("benchmark", "--objective", "best"),
     ],
 )

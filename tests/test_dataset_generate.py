@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import json
 import os
 import resource
@@ -17,7 +18,6 @@ import pytest
 
 from carillon.errors import UserError
 from dataset_gen import generate as generate_module
-from dataset_gen import journal as journal_module
 from dataset_gen import settings as settings_module
 from dataset_gen.crew import Dealer
 from dataset_gen.generate import engine_of, generate, generate_file
@@ -27,6 +27,7 @@ from dataset_gen.settings import settings_of
 from dataset_gen.shards import origin_of, read_shard
 from dataset_gen.tasks import ROW, Plan
 from dataset_gen.workers import in_this_process
+from tests.patience import HANG_SECONDS, wait_for
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 SAMPLES, TASK = 3000, 128
@@ -206,7 +207,7 @@ def test_killed_at_ten_random_moments_it_ends_with_the_same_bytes(path, start, r
         if path.exists():
             break
     assert rows == sorted(rows) or path.exists(), f"the journal shrank: {rows}"
-    assert start(seconds=0).wait(60) == 0
+    assert start(seconds=0).wait(HANG_SECONDS) == 0
     assert path.read_bytes() == reference
     assert list(path.parent.iterdir()) == [path]
 
@@ -224,24 +225,17 @@ def is_running(pid):
 
 def test_workers_do_not_outlive_a_killed_parent(path, start):
     process = start(workers=2)
-    wait_for(lambda: size_of(journal_of(path)) > 10_000)
+    wait_for(lambda: size_of(journal_of(path)) > 10_000, "the journal", process)
     workers = children(process.pid)
     assert len(workers) >= 2
     process.kill()
     process.wait()
-    wait_for(lambda: not any(is_running(worker) for worker in workers))
+    wait_for(lambda: not any(is_running(worker) for worker in workers), "the end of its workers")
     assert not path.exists()
 
 
 def size_of(path):
     return path.stat().st_size if path.exists() else 0
-
-
-def wait_for(condition):
-    deadline = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < deadline, "waited in vain"
-        time.sleep(0.02)
 
 
 def test_a_worker_that_dies_is_told_in_a_sentence(path, monkeypatch):
@@ -333,7 +327,7 @@ def test_fits_of_other_code_are_not_mixed(begun, monkeypatch):
 
 def test_one_shard_is_generated_once_at_a_time(path, start):
     process = start()
-    wait_for(journal_of(path).exists)
+    wait_for(journal_of(path).exists, "the journal", process)
     with pytest.raises(UserError, match="another process is generating this shard"):
         make(path)
     assert process.poll() is None and journal_of(path).exists()
@@ -343,7 +337,7 @@ def test_a_file_system_without_locks_is_told(path, monkeypatch, capsys):
     def unsupported(*_):
         raise OSError(95, "Operation not supported")
 
-    monkeypatch.setattr(journal_module.fcntl, "flock", unsupported)
+    monkeypatch.setattr(fcntl, "flock", unsupported)
     make(path, plan_of(200))
     assert "has no locks" in capsys.readouterr().err
 
@@ -412,7 +406,7 @@ def test_a_full_disk_is_told_in_a_sentence_and_nothing_finished_is_lost(
     assert len(reference) > JOURNAL_BYTES
     limit = (resource.RLIMIT_FSIZE, (largest_file, largest_file))
     process = start(seconds=0, preexec_fn=lambda: resource.setrlimit(*limit))
-    (line,) = process.communicate(timeout=60)[1].splitlines()
+    (line,) = process.communicate(timeout=HANG_SECONDS)[1].splitlines()
     assert process.returncode == 2
     assert line.startswith("program: ") and "make room and run the same command again" in line
     if 0 < kept < SAMPLES:

@@ -85,7 +85,7 @@ def test_an_error_on_one_rank_ends_all_and_what_was_done_is_kept(
 ):
     # Beyond the window, so that some tasks are in the journal by then.
     failing = str(tuple((rank, task) for task in range(13, 24)))
-    done = mpiexec(3, program(failing), *options(path), timeout=60)
+    done = mpiexec(3, program(failing), *options(path))
     assert done.returncode == 2
     assert sentences(done) == ["dataset_gen: planted"]
     assert journal_of(path).stat().st_size > TASK * 137 and not path.exists()
@@ -108,7 +108,7 @@ def test_a_mistake_of_the_program_on_one_rank_ends_all_with_its_traceback(path, 
     ],
 )
 def test_bad_input_is_one_sentence_on_all_ranks(more, sentence, path, mpiexec):
-    done = mpiexec(3, "dataset_gen", *options(path, *more), timeout=60)
+    done = mpiexec(3, "dataset_gen", *options(path, *more))
     assert done.returncode == 2
     (line,) = sentences(done)
     assert sentence in line

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.patience import HANG_SECONDS
+
 CHECKOUT = Path(__file__).resolve().parent.parent
 MODELS = "models: {bar: {mesh: 'builtin:bar', resolution: 16}}\n"
 
@@ -35,7 +37,7 @@ def test_moduli_and_workers_reach_the_command(tmp_path, dataset, distribution, e
         env={**os.environ, "PYTHONPATH": str(CHECKOUT)},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=HANG_SECONDS,
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert expected in done.stdout + done.stderr

@@ -14,6 +14,9 @@ import pytest
 import yaml
 
 import carillon
+from tests.patience import HANG_SECONDS
+
+pytestmark = pytest.mark.system
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 
@@ -21,7 +24,12 @@ CHECKOUT = Path(__file__).resolve().parent.parent
 def test_petsc_and_slepc_start_in_an_empty_environment():
     program = "from petsc4py import PETSc; from slepc4py import SLEPc; SLEPc.EPS().create()"
     done = subprocess.run(
-        [sys.executable, "-c", program], env={}, cwd="/", capture_output=True, text=True, timeout=60
+        [sys.executable, "-c", program],
+        env={},
+        cwd="/",
+        capture_output=True,
+        text=True,
+        timeout=HANG_SECONDS,
     )
     assert done.returncode == 0, done.stderr
 
@@ -33,7 +41,7 @@ def test_the_packages_import_from_any_folder_without_pythonpath():
         cwd="/",
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=HANG_SECONDS,
     )
     assert Path(done.stdout.strip()).parent == CHECKOUT / "carillon", done.stderr
 
@@ -87,7 +95,7 @@ def test_an_error_on_one_rank_ends_all_of_them(mpiexec, tmp_path):
         "    raise ValueError('rank 1 cannot go on')\n"
         "MPI.COMM_WORLD.barrier()\n"
     )
-    done = mpiexec(2, script, timeout=60)
+    done = mpiexec(2, script)
     assert done.returncode != 0
     assert "rank 1 cannot go on" in done.stderr
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
+import socket
 import stat
 import subprocess
 import sys
@@ -15,6 +17,7 @@ import pytest
 from carillon import files
 from carillon.errors import UserError
 from carillon.files import atomic_path, create_h5, open_h5, require_writable
+from carillon.places import require_file
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 
@@ -294,3 +297,175 @@ def test_a_new_file_that_is_taken_for_a_leftover_is_made_anew(tmp_path, monkeypa
     with atomic_path(tmp_path / "text") as temporary:
         temporary.write_text("whole")
     assert (tmp_path / "text").read_text() == "whole"
+
+
+# What may be written to, and read from ------------------------------------------------------------
+
+
+@pytest.fixture(params=["device", "pipe", "socket"])
+def special(request, tmp_path):
+    """Something in the file system that is no regular file."""
+    path = tmp_path / "special"
+    if request.param == "device":
+        path = Path("/dev/null")
+    elif request.param == "pipe":
+        os.mkfifo(path)
+    else:
+        with socket.socket(socket.AF_UNIX) as server:
+            server.bind(str(path))
+    return path
+
+
+def test_only_regular_files_are_replaced(special):
+    kind = stat.S_IFMT(special.stat().st_mode)
+    for use in (require_writable, lambda path: atomic_path(path).__enter__()):
+        with pytest.raises(UserError) as caught:
+            use(special)
+        assert "expected the name of a file to write" in one_sentence(caught)
+    assert stat.S_IFMT(special.stat().st_mode) == kind
+
+
+def test_nothing_else_is_replaced_through_a_link(special, tmp_path):
+    link = tmp_path / "link"
+    link.symlink_to(special)
+    with pytest.raises(UserError), atomic_path(link):
+        pass
+    assert link.is_symlink() and not stat.S_ISREG(special.stat().st_mode)
+
+
+def test_what_came_there_in_the_meantime_is_not_replaced(tmp_path):
+    path = tmp_path / "modes.h5"
+    with pytest.raises(UserError, match="is a pipe"), atomic_path(path) as temporary:
+        temporary.write_text("hours of work")
+        os.mkfifo(path)
+    assert path.is_fifo() and list(tmp_path.iterdir()) == [path]
+
+
+def test_a_link_stays_and_the_file_that_it_names_is_replaced(tmp_path):
+    there = tmp_path / "there"
+    there.mkdir()
+    link = tmp_path / "link.txt"
+    link.symlink_to("there/text.txt")  # names nothing so far
+    for content in ("first", "second"):
+        with atomic_path(link) as temporary:
+            assert temporary.parent == there
+            temporary.write_text(content)
+        assert link.is_symlink() and (there / "text.txt").read_text() == content
+    assert list(there.iterdir()) == [there / "text.txt"]
+
+
+def test_a_link_into_a_missing_folder_or_to_itself_is_refused(tmp_path):
+    away, loop = tmp_path / "away", tmp_path / "loop"
+    away.symlink_to(tmp_path / "nowhere" / "text")
+    loop.symlink_to(loop)
+    for path in (away, loop):
+        with pytest.raises(UserError, match="cannot be written"):
+            require_writable(path)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "two\nlines",
+        "null\0byte",
+        "bell\x07",
+        "no text \udcff",
+        "paragraph\u2029",
+        "x" * 201,
+        "é" * 101,
+    ],
+)
+def test_names_that_not_everything_can_hold_are_refused(name, tmp_path):
+    with pytest.raises(UserError) as caught:
+        require_writable(tmp_path / name)
+    assert one_sentence(caught).isprintable()
+
+
+@pytest.mark.parametrize(
+    "name", ["x" * 200, "a." + "x" * 198, "blank 'quote' \"$(x)\" {y} ;.txt", "-dash", "é" * 100]
+)
+def test_other_names_are_written_to(name, tmp_path):
+    with atomic_path(tmp_path / name) as temporary:
+        temporary.write_text("whole")
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+def test_only_regular_files_are_read(special, tmp_path):
+    for path in (special, tmp_path, tmp_path / "absent", tmp_path / ("x" * 300), Path("a\0b")):
+        with pytest.raises(UserError) as caught:
+            require_file(path, "a mesh")
+        assert "expected a mesh" in one_sentence(caught)
+    with pytest.raises(UserError), open_h5(special, "modes", 1):
+        pass
+
+
+@pytest.mark.parametrize(
+    "read",
+    [
+        lambda file: file["young"]["part"],
+        lambda file: file["group"][()],
+        lambda file: file["group"].shape,
+        lambda file: file["text"][()].astype(float),
+        lambda file: json.loads(file.attrs["text"]),
+        lambda file: int(file.attrs["text"]),
+        lambda file: file["young"][()].reshape(7, 7),
+        lambda file: file.attrs["absent"],
+    ],
+)
+def test_what_cannot_be_read_as_expected_is_the_fault_of_the_file(tmp_path, read):
+    path = tmp_path / "modes.h5"
+    with create_h5(path, "modes", 1) as file:
+        file["young"] = np.ones(3)
+        file["text"] = np.array([b"a"])
+        file.attrs["text"] = "a"
+        file.create_group("group")
+    with pytest.raises(UserError) as caught, open_h5(path, "modes", 1) as file:
+        read(file)
+    assert "generate the file again" in one_sentence(caught)
+
+
+# Several at a time --------------------------------------------------------------------------------
+
+WRITERS, ROUNDS = 3, 20
+
+WRITER = """
+import sys
+from carillon.files import atomic_path
+path, letter, rounds = sys.argv[1], sys.argv[2].encode(), int(sys.argv[3])
+print("ready", flush=True)
+sys.stdin.readline()
+for _ in range(rounds):
+    with atomic_path(path) as temporary, open(temporary, "wb") as stream:
+        for _ in range(64):
+            stream.write(4096 * letter)
+"""
+
+
+def test_readers_beside_several_writers_see_one_whole_file_or_another(tmp_path):
+    path = tmp_path / "modes.h5"
+    command = [sys.executable, "-c", WRITER, str(path)]
+    writers = [
+        subprocess.Popen(
+            [*command, "abc"[number], str(ROUNDS)],
+            cwd=CHECKOUT,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for number in range(WRITERS)
+    ]
+    for writer in writers:
+        assert writer.stdout.readline() == "ready\n"
+    for writer in writers:
+        writer.stdin.write("go\n")
+        writer.stdin.flush()
+    seen = []
+    while any(writer.poll() is None for writer in writers):
+        if path.exists():
+            seen.append(path.read_bytes())
+    for writer in writers:
+        writer.communicate()
+    assert [writer.returncode for writer in writers] == [0] * WRITERS
+    whole = {64 * 4096 * letter for letter in (b"a", b"b", b"c")}
+    assert set(seen) <= whole and path.read_bytes() in whole
+    assert list(tmp_path.iterdir()) == [path]

@@ -71,7 +71,7 @@ def sentences(done):
     ],
 )
 def test_bad_input_is_one_sentence_on_all_ranks(arguments, message, folder, mpiexec):
-    done = mpiexec(3, "forests", *arguments, cwd=folder, timeout=60)
+    done = mpiexec(3, "forests", *arguments, cwd=folder)
     assert done.returncode == 2
     (line,) = sentences(done)
     assert message in line
@@ -99,7 +99,7 @@ sys.exit(program.cli.run("forests", program.main))
 def test_an_error_on_one_rank_ends_all(rank, folder, tmp_path, mpiexec):
     path = tmp_path / "program.py"
     path.write_text(PROGRAM.format(rank=rank))
-    done = mpiexec(3, path, *command(folder, "new.h5"), timeout=60)
+    done = mpiexec(3, path, *command(folder, "new.h5"))
     assert done.returncode == 2
     assert sentences(done) == ["forests: planted"]
     assert not (folder / "new.h5").exists()
@@ -110,7 +110,7 @@ def test_a_damaged_shard_is_named_and_nothing_is_written(folder, tmp_path, mpiex
     path.write_bytes((folder / "0.h5").read_bytes())
     with h5py.File(path, "r+") as file:
         file["coarse"][5] = 1.0
-    done = mpiexec(2, "forests", "train", path, "--out", tmp_path / "new.h5", timeout=60)
+    done = mpiexec(2, "forests", "train", path, "--out", tmp_path / "new.h5")
     assert done.returncode == 2
     (line,) = sentences(done)
     assert "damaged.h5" in line

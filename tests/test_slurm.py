@@ -13,8 +13,10 @@ import h5py
 import pytest
 
 from tests import slurm_cluster, workflow_runs
-from tests.slurm_cluster import Cluster, wait_for
+from tests.patience import HANG_SECONDS, wait_for
+from tests.slurm_cluster import Cluster
 from tests.workflow_runs import CHECKOUT
+from workflow import orphans
 from workflow.digest.command import digest
 
 pytestmark = [pytest.mark.slurm, pytest.mark.mpi, pytest.mark.slow]
@@ -39,10 +41,10 @@ def cluster(tmp_path_factory):
     slurm_cluster.control("stop", found.folder)
 
 
-def finish(run: subprocess.Popen[str], folder: Path, seconds: float = 300) -> str:
+def finish(run: subprocess.Popen[str], folder: Path) -> str:
     """Output of a run that has to end well."""
     try:
-        status = run.wait(seconds)
+        status = run.wait(HANG_SECONDS)
     finally:
         run.kill()
     output = (folder / "snakemake.log").read_text()
@@ -55,9 +57,7 @@ def local(tmp_path_factory):
     """Folder of a run without SLURM."""
     folder = tmp_path_factory.mktemp("local")
     (folder / "config.yaml").write_text(SMALL.replace("LAUNCHER", "mpiexec --oversubscribe"))
-    done = workflow_runs.snakemake(
-        folder, MODES, "--cores", 2, "--configfile", "config.yaml", timeout=300
-    )
+    done = workflow_runs.snakemake(folder, MODES, "--cores", 2, "--configfile", "config.yaml")
     assert done.returncode == 0, done.stdout + done.stderr
     return folder
 
@@ -71,11 +71,13 @@ def remote(cluster, tmp_path_factory):
     return folder
 
 
+@pytest.mark.system
 def test_jobs_of_slurm_find_the_same_bits_as_a_local_run(local, remote):
     for file in (*DATASET, FORESTS, MODES):
         assert digest(remote / file) == digest(local / file), file
 
 
+@pytest.mark.system
 def test_jobs_were_an_array_and_mpi_jobs(remote):
     assert "Submitted array job" in (remote / "snakemake.log").read_text()
     (log,) = (remote / ".snakemake" / "slurm_logs" / "rule_find_modes").rglob("*.log")
@@ -84,6 +86,7 @@ def test_jobs_were_an_array_and_mpi_jobs(remote):
         assert modes.attrs["ranks"] == 2
 
 
+@pytest.mark.system
 def test_array_by_hand_yields_identical_shards(cluster, remote, tmp_path):
     arguments = f"--samples {SAMPLES} --shards {SHARDS} --seed 0 --distribution uniform"
     done = subprocess.run(
@@ -93,12 +96,47 @@ def test_array_by_hand_yields_identical_shards(cluster, remote, tmp_path):
         env={**os.environ, "PYTHON": sys.executable, "PYTHONPATH": str(CHECKOUT)},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=HANG_SECONDS,
     )
     logs = "".join(path.read_text() for path in tmp_path.glob("slurm-*.out"))
     assert done.returncode == 0, done.stderr + logs
     for file in DATASET:
         assert digest(tmp_path / Path(file).name) == digest(remote / file)
+
+
+def test_jobs_of_a_killed_run_are_cancelled_by_the_next(cluster: Cluster, tmp_path):
+    """Its job hangs; the next run's own goes on from the journal, and nobody else's ends."""
+    (tmp_path / "config.yaml").write_text(LONG.format(samples=SAMPLES))
+    shard = tmp_path / DATASET[0]
+    options = (DATASET[0], "--configfile", "config.yaml")
+    other = subprocess.run(
+        ["sbatch", "--parsable", "--wrap", "sleep 3600", "--mem=10", "--job-name=other"],
+        cwd=tmp_path,
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout.strip()
+    killed = slurm_cluster.snakemake(tmp_path, *options)
+    wait_for(lambda: worker(shard), "the job", killed)
+    os.kill(worker(shard), signal.SIGSTOP)
+    (left,) = orphans.jobs(tmp_path)
+    killed.kill()
+    killed.wait()
+    output = finish(slurm_cluster.snakemake(tmp_path, *options), tmp_path)
+    assert f"cancelled 1 jobs of SLURM that a killed run has left ({left})" in output
+    assert "CANCELLED" in cluster.ends() and orphans.jobs(tmp_path) == []
+    queue = subprocess.run(["squeue", "--noheader", "--format=%A"], capture_output=True, text=True)
+    assert queue.stdout.split() == [other]
+    subprocess.run(["scancel", other], check=True)
+    arguments = f"--samples {SAMPLES} --objective chen2015 --out undisturbed.h5"
+    subprocess.run(
+        [sys.executable, "-m", "dataset_gen", "generate", *arguments.split()],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(CHECKOUT)},
+        check=True,
+        capture_output=True,
+    )
+    assert digest(shard) == digest(tmp_path / "undisturbed.h5")
 
 
 LONG = """\
@@ -137,21 +175,21 @@ def test_a_job_outlives_all_that_befalls_it(cluster: Cluster, tmp_path):
         ),
     )
     try:
-        wait_for(lambda: "exceeded memory limit" in cluster.log(), run, 90, "out of memory")
+        wait_for(lambda: "exceeded memory limit" in cluster.log(), "out of memory", run)
         before = 1000
-        wait_for(runs, run, 90, "the second try")
+        wait_for(runs, "the second try", run)
         os.kill(worker(shard), signal.SIGSTOP)
         done = journal.stat().st_size
         cluster.fail()
-        wait_for(lambda: worker(shard) is None, run, 10, "the end of its processes")
-        wait_for(lambda: "NODE_FAIL" in cluster.ends(), run, 60, "the node's death")
+        wait_for(lambda: worker(shard) is None, "the end of its processes", run)
+        wait_for(lambda: "NODE_FAIL" in cluster.ends(), "the node's death", run)
         cluster.repair()
         before = done
-        wait_for(runs, run, 120, "the requeued job")
+        wait_for(runs, "the requeued job", run)
         cluster.restart_controller(pause=3)
         # A process that hangs, as on a file system that does not answer, until its time is up.
         os.kill(worker(shard), signal.SIGSTOP)
-        wait_for(lambda: "TIMEOUT" in cluster.ends(), run, 150, "the time limit")
+        wait_for(lambda: "TIMEOUT" in cluster.ends(), "the time limit", run)
     except AssertionError as error:
         run.kill()
         raise AssertionError((tmp_path / "snakemake.log").read_text()[-6000:]) from error

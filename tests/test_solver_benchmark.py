@@ -6,15 +6,18 @@ import json
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
+import solver.truth as truth
 from carillon.errors import ConvergenceError
 from solver.benchmark import BenchmarkOptions, benchmark_row, row_lines
 from solver.benchmark.methods import Methods, Run
-from solver.benchmark.rivals import SlepcConfiguration, configurations
+from solver.benchmark.rivals import SlepcConfiguration, configurations, smallest_without_factor
 from solver.benchmark.row import _alternate
 from solver.benchmark.scores import BASES, median, speedups, spread, tone_error
 from solver.benchmark.solid import CHANGE, make_solid
 from solver.problem import ProblemOptions
+from tests import solids
 
 BAR = ProblemOptions("builtin:bar", 20, "smooth")
 MODES = 24
@@ -73,6 +76,7 @@ def test_every_method_finds_what_it_promises(row):
     found = row["frequency_error"]
     assert found["ddfem"]["rms_7_60"] < found["average"]["rms_7_60"]
     assert "lumped mass" in row["problem"]["arpack_regular"]
+    assert set(row["missed"]) <= {"slepc", "arpack", "ddfem"}
 
 
 def test_speedups_name_their_base(row):
@@ -127,6 +131,32 @@ def test_a_method_that_fails_is_told_and_the_others_go_on(monkeypatch):
     assert "ddfem_hcms_ec" not in found["eigenvalue_error"]
     assert found["runs"]["ddfem_hcms_ec_warm"] == 2
     assert "planted" in "\n".join(row_lines(found))
+
+
+def test_modes_that_a_rival_misses_are_found_off_its_clock(monkeypatch):
+    search = truth.smallest_eigenpairs
+
+    def lose_the_first(*arguments, **options):
+        values, vectors, iterations = search(*arguments, **options)
+        lost = slice(int(options["configurable"]), None)
+        return values[lost], vectors[:, lost], iterations
+
+    methods = Methods(make_solid(BAR, MODES), MODES, SlepcConfiguration.default(1))
+    exact = methods.slepc()
+    assert exact.added == 0
+    monkeypatch.setattr(truth, "smallest_eigenpairs", lose_the_first)
+    for run in (methods.slepc(), methods.arpack()):
+        assert run.added == 1
+        assert not {"inertia", "completion", "verification"} & set(run.phases)
+        assert np.abs(run.values[6:] / exact.values[6:] - 1.0).max() < 1e-9
+
+
+def test_arpack_without_a_factorisation_finds_the_spectrum_of_the_lumped_mass():
+    model = solids.random_box(6, 4, 3, lumped=True)
+    exact = solids.dense_eigenvalues(model)[:30]
+    values = smallest_without_factor(model, 30, 1e-6, 0, MPI.COMM_SELF)
+    assert np.abs(values[6:] / exact[6:] - 1.0).max() < 1e-9
+    assert (values[:6] < 1e-9 * exact[6]).all()
 
 
 def test_moduli_of_the_warm_start_differ_smoothly_and_little():

@@ -119,7 +119,7 @@ def test_material_array_of_the_right_length_is_used(tmp_path, run_cli, n_voxels)
     [
         (["nothing.obj", "--resolution", "16"], "nothing.obj"),
         (["builtin:gong", "--resolution", "16"], "gong"),
-        (["builtin:bar", "--resolution", "1"], "resolution 1"),
+        (["builtin:bar", "--resolution", "1"], "--resolution: 1 is too small"),
         ([*BAR, "--material", "steel"], "material 'steel'"),
         ([*BAR, "--modes", "100000"], "100,000 modes asked for"),
         ([*BAR, "--modes", "6"], "6 modes asked for"),
@@ -134,6 +134,10 @@ def test_material_array_of_the_right_length_is_used(tmp_path, run_cli, n_voxels)
         ([*BAR, "--unit", "0"], "unit"),
         ([*BAR, "--subdomains", "100000"], "100000 subdomains"),
         ([*BAR, "--method", "magic"], "magic"),
+        ([*BAR, "--modes", str(10**12)], "--modes"),
+        ([*BAR, "--seed", str(2**64)], "--seed"),
+        ([*BAR, "--cutoff", "1e300"], "--cutoff"),
+        ([*BAR, "--petsc=-carillon_eps_ncv 90"], "prefix -carillon_inner_"),
     ],
 )
 def test_bad_arguments(arguments, sentence, tmp_path, run_cli):

@@ -13,6 +13,7 @@ from solver.inner.iterative import METHODS, IterativeInverse
 from solver.model import fine_model
 from solver.rayleigh_ritz import safe_shift
 from tests import inner_checks, solids
+from tests.patience import HANG_SECONDS
 
 PROGRAM = Path(__file__).with_name("inner_checks.py")
 CHECKS = (
@@ -32,7 +33,7 @@ def test_on_one_rank(name):
 @pytest.mark.mpi
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_on_several_ranks(ranks, mpiexec):
-    mpiexec(ranks, PROGRAM, ",".join(CHECKS), timeout=300, check=True)
+    mpiexec(ranks, PROGRAM, ",".join(CHECKS), timeout=HANG_SECONDS, check=True)
 
 
 def nearly_void(young: np.ndarray, ratio: float) -> np.ndarray:

@@ -9,6 +9,7 @@ import pytest
 
 from solver.comparison import compare_files
 from solver.modes_file import read_modes
+from tests.patience import HANG_SECONDS
 
 pytestmark = pytest.mark.mpi
 
@@ -68,7 +69,7 @@ def test_ground_truth_in_parallel(ranks, truth, tmp_path, mpiexec):
 )
 def test_bad_input_ends_all_ranks_with_one_sentence(arguments, sentence, tmp_path, mpiexec):
     out = tmp_path / "modes.h5"
-    done = mpiexec(3, "solver", "modes", *arguments, "--out", out, timeout=60)
+    done = mpiexec(3, "solver", "modes", *arguments, "--out", out)
     assert done.returncode == 2
     lines = [line for line in done.stderr.splitlines() if line.startswith("solver modes:")]
     assert len(lines) == 1
@@ -91,7 +92,7 @@ def test_failure_of_one_rank_ends_the_others(tmp_path, mpiexec):
         "original, Subdomain.modes = Subdomain.modes, fail\n"
         f"sys.exit(main(['modes', *{MODEL!r}, '--modes', '30', '--out', 'x.h5']))\n"
     )
-    done = mpiexec(3, program, timeout=60, cwd=tmp_path)
+    done = mpiexec(3, program, timeout=HANG_SECONDS, cwd=tmp_path)
     assert done.returncode != 0
     assert "solver modes: planted" in done.stderr
     assert not (tmp_path / "x.h5").exists()

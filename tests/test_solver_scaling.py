@@ -129,7 +129,7 @@ def study(tmp_path_factory, run_cli):
     folder = tmp_path_factory.mktemp("scaling")
     out, plot = folder / "scaling.json", folder / "scaling.png"
     options = ("--modes", 30, "--ranks", "2,1,3", "--weak", "--out", out, "--plot", plot)
-    run_cli("solver", "scaling", *BAR, *options, check=True, timeout=300)
+    run_cli("solver", "scaling", *BAR, *options, check=True)
     return json.loads(out.read_text()), plot
 
 

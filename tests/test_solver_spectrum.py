@@ -22,7 +22,6 @@ from solver.inner import InnerSolver
 from solver.model import fine_model
 from solver.sparse import assembled
 from solver.system import Layout, assemble
-from solver.truth import count_below, prove_complete, solve_truth
 from tests import solids
 
 COMM = MPI.COMM_SELF
@@ -133,42 +132,6 @@ def test_correction_that_misses_its_tolerance_says_so():
         spectrum(
             model, modes=60, corrections=1, tolerance=1e-12, subdomains=6, acceleration="krylov"
         )
-
-
-@pytest.mark.parametrize("method", ["slepc", "arpack"])
-def test_ground_truth_equals_lapack_and_is_proven_complete(method):
-    model = solids.random_box(8, 5, 4)
-    exact = solids.dense_eigenvalues(model)[:50]
-    result = modal_analysis(model, SolverOptions(method=method, modes=50), COMM)
-    assert np.abs(result.values[6:] / exact[6:] - 1.0).max() < 1e-9
-    assert result.evidence["inertia_count"] == result.evidence["inertia_expected"] >= 50
-    assert result.residuals.max() < 1e-8
-
-
-def test_inertia_counts_eigenvalues():
-    model = solids.random_box(6, 4, 3)
-    exact = solids.dense_eigenvalues(model)
-    system = assemble(distribute(model, 2, comm=COMM), COMM)
-    for count in (6, 7, 30, 100):
-        between = 0.5 * (exact[count - 1] + exact[count])
-        assert count_below(system, between) == count
-
-
-def test_missed_eigenvalue_is_caught(monkeypatch):
-    import solver.truth as truth
-
-    complete = truth.smallest_eigenpairs
-
-    def lose_one(*arguments):
-        values, vectors, iterations = complete(*arguments)
-        keep = np.delete(np.arange(len(values)), 20)
-        return values[keep], np.asfortranarray(vectors[:, keep]), iterations
-
-    monkeypatch.setattr(truth, "smallest_eigenpairs", lose_one)
-    model = solids.random_box(6, 4, 3)
-    system = assemble(distribute(model, 2, comm=COMM), COMM)
-    with pytest.raises(ConvergenceError, match="were missed"):
-        prove_complete(system, solve_truth(system, 40))
 
 
 def test_spectrum_scales_exactly_with_modulus_and_size():

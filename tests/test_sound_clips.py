@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import struct
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -11,6 +14,7 @@ import soundfile
 
 from carillon.errors import UserError
 from sound.__main__ import main
+from sound.bounds import MOST_CHANNELS, MOST_CLIP_SAMPLES, MOST_SAMPLES, require_length
 from sound.clips.clip_command import NAMES
 from sound.clips.damped import damped_sinusoids
 from sound.clips.extraction import extract
@@ -55,6 +59,10 @@ def test_sound_that_16_bits_cannot_hold_is_not_written(tmp_path, samples):
         write_wav(tmp_path / "out.wav", 3.0 * samples, RATE, "16 bit")
     with pytest.raises(UserError, match="not finite"):
         write_wav(tmp_path / "out.wav", np.full(9, np.nan), RATE)
+    with pytest.raises(UserError, match="more than its samples hold"):
+        write_wav(tmp_path / "out.wav", np.full(9, 1e300), RATE)
+    with pytest.raises(UserError, match="expected a name that ends in .wav"):
+        write_wav(tmp_path / "out.mp3", samples, RATE)
     assert not list(tmp_path.iterdir())
 
 
@@ -76,14 +84,18 @@ def bad_clips(samples: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         "clipped": (clipped, rf"is clipped \({sum(runs)} samples at full scale"),
         "broken": (broken, "has 2 samples that are not finite"),
         "cancelling": (np.stack([samples, -samples], axis=1), "is silent once"),
+        "loud": (1e300 * samples, r"reaches .*e\+299 times full scale, expected at most 1e\+06"),
+        "louder": (np.sign(samples) * np.finfo(float).max, "times full scale"),
+        "faint": (1e-300 * samples, "is silent, or nearly so"),
+        "crowded": (np.stack([samples] * (MOST_CHANNELS + 1), axis=1), "has 17 channels"),
     }
 
 
-@pytest.mark.parametrize("case", ["silent", "empty", "clipped", "broken", "cancelling"])
+@pytest.mark.parametrize("case", bad_clips(np.zeros(9)))
 def test_bad_clips_are_answered_in_one_sentence(tmp_path, samples, case):
     content, message = bad_clips(samples)[case]
     path = tmp_path / "clip.wav"
-    soundfile.write(path, content, RATE, subtype="FLOAT")
+    soundfile.write(path, content, RATE, subtype="DOUBLE")
     with pytest.raises(UserError, match=message) as error:
         read_wav(path)
     assert str(error.value).startswith(f"{path}: ")
@@ -96,6 +108,97 @@ def test_missing_and_other_files_are_answered_in_one_sentence(tmp_path):
     (tmp_path / "text.wav").write_text("no sound")
     with pytest.raises(UserError, match="not readable as a sound file"):
         read_wav(tmp_path / "text.wav")
+
+
+def with_field(field: bytes, offset: int, value: int) -> Callable[[bytes], bytes]:
+    """Changes a number of four bytes behind the name of a chunk."""
+
+    def change(content: bytes) -> bytes:
+        place = content.index(field) + offset
+        return content[:place] + struct.pack("<I", value) + content[place + 4 :]
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (with_field(b"fmt ", 12, 0), "is not readable as a sound file"),
+        (with_field(b"fmt ", 12, 999), "has 999 samples per second, expected 1,000 to 768,000"),
+        (with_field(b"fmt ", 12, 768_001), "has 768,001 samples per second"),
+        (with_field(b"fmt ", 12, 2**31 - 1), "has 2,147,483,647 samples per second"),
+        (with_field(b"data", 4, 10**9), "ends before the samples that it claims to hold"),
+        (lambda content: content[: len(content) // 2], "ends before the samples"),
+        (lambda content: content[:20], "is not readable as a sound file"),
+        (lambda content: b"", "is not readable as a sound file"),
+    ],
+)
+def test_headers_that_lie_are_refused(tmp_path, samples, change, message):
+    path = tmp_path / "clip.wav"
+    soundfile.write(path, samples, RATE, subtype="DOUBLE")
+    path.write_bytes(change(path.read_bytes()))
+    with pytest.raises(UserError, match=message):
+        read_wav(path)
+
+
+def test_a_length_that_its_writer_did_not_know_is_none_to_be_missed(tmp_path, samples):
+    path = tmp_path / "clip.wav"
+    soundfile.write(path, samples, RATE, subtype="PCM_16")
+    path.write_bytes(with_field(b"data", 4, 0xFFFF_FFFF)(path.read_bytes()))
+    assert len(read_wav(path)[0]) == len(samples)
+
+
+def test_hours_of_sound_are_refused_before_they_are_read(tmp_path):
+    path = tmp_path / "clip.wav"
+    soundfile.write(path, np.zeros(1), RATE, subtype="PCM_16")
+    length = 2 * (MOST_CLIP_SAMPLES + 1)
+    content = with_field(b"data", 4, length)(path.read_bytes())
+    path.write_bytes(content)
+    os.truncate(path, content.index(b"data") + 8 + length)
+    with pytest.raises(UserError, match="lasts 1,049 s, .*expected a single strike"):
+        read_wav(path)
+
+
+def test_what_is_no_file_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe.wav")
+    (tmp_path / "loop.wav").symlink_to("loop.wav")
+    (tmp_path / "zeros.wav").symlink_to("/dev/zero")
+    for name in ("pipe.wav", "loop.wav", "zeros.wav", ".", "x" * 300 + ".wav", "a\0b.wav"):
+        with pytest.raises(UserError, match="expected a sound clip"):
+            read_wav(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["clip", "wood", "--out", "hit.mp3"], "hit.mp3: ends in .mp3, expected .* .wav"),
+        (["clip", "wood", "--out", "hit"], "hit: ends in nothing, expected .* .wav"),
+        (["clip", "wood", "--note", "", "--out", "hit.wav"], "'' is not a note"),
+        (["clip", "wood", "--rate", "1e11", "--out", "hit.wav"], "is not a whole number"),
+        (["clip", "wood", "--rate", "768001", "--out", "hit.wav"], "expected at most 768000"),
+        (["clip", "wood", "--seed", str(2**64), "--out", "hit.wav"], "is too large"),
+        (["extract", "end.wav", "--residual", "x.mp3"], "x.mp3: ends in .mp3"),
+        (["extract", "end.wav", "--residual", "end.wav"], "is an input and would be replaced"),
+        (["extract", "end.wav", "--residual", "./end.wav"], "is an input and would be replaced"),
+        (["extract", "end.wav", "--out", "x.wav"], "x.wav: ends in .wav, expected .* .json"),
+        (["extract", "end.wav", "--residual", ""], "ends in nothing"),
+    ],
+)
+def test_names_of_results_tell_what_is_in_them(tmp_path, monkeypatch, samples, words, complaint):
+    monkeypatch.chdir(tmp_path)
+    write_wav("end.wav", samples, RATE)
+    before = (tmp_path / "end.wav").read_bytes()
+    with pytest.raises(UserError, match=complaint):
+        main(words)
+    assert [path.name for path in tmp_path.iterdir()] == ["end.wav"]
+    assert (tmp_path / "end.wav").read_bytes() == before
+
+
+def test_sounds_have_a_sample_and_no_more_than_memory_holds():
+    require_length(1.0, 44_100)
+    for seconds in (1e-300, 1.01 * MOST_SAMPLES / 44_100, 1e300):
+        with pytest.raises(UserError, match="samples, expected 1 to"):
+            require_length(seconds, 44_100)
 
 
 def test_notes_are_in_equal_temperament():

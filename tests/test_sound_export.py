@@ -214,6 +214,7 @@ def played(player: Path, *words: float) -> np.ndarray:
     return np.frombuffer(done.stdout)
 
 
+@pytest.mark.system
 @pytest.mark.parametrize("position", [0, 1])
 def test_faust_plays_what_we_render(player: Path, position: int) -> None:
     design = small_design()
@@ -223,6 +224,7 @@ def test_faust_plays_what_we_render(player: Path, position: int) -> None:
     np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
 
 
+@pytest.mark.system
 def test_a_force_that_takes_time_has_the_same_impulse_in_faust(player: Path) -> None:
     from solver.response import half_sine
 
@@ -238,15 +240,24 @@ def test_faust_s_program_names_points_and_units(folder: Path) -> None:
     assert "N s" in text and "kg^-1/2" in text
 
 
+def test_no_more_points_are_struck_than_there_are(folder: Path) -> None:
+    points = ["--points", "10000", "--out", str(folder / "all.dsp")]
+    assert main(["export", str(folder / "design.h5"), *points]) == 0
+    count = len(np.unique(np.round(small_design().surface_vertices, 9), axis=0))
+    assert f"nPositions = {count};" in (folder / "all.dsp").read_text()
+
+
 def test_an_ending_that_tells_no_format_is_refused(folder: Path) -> None:
     with pytest.raises(UserError, match="tells no format"):
         main(["export", str(folder / "design.h5"), "--out", str(folder / "pan.obj")])
+    with pytest.raises(UserError, match="ends in .h5, but --format is glb"):
+        main(["export", str(folder / "design.h5"), "--out", "pan.h5", "--format", "glb"])
     words = ["--out", str(folder / "pan.txt"), "--format", "dsp"]
     assert main(["export", str(folder / "design.h5"), *words]) == 0
 
 
 def test_a_design_is_not_overwritten(folder: Path) -> None:
-    with pytest.raises(UserError, match="is the design itself"):
+    with pytest.raises(UserError, match="is an input and would be replaced"):
         main(["export", str(folder / "design.h5"), "--out", str(folder / "design.h5")])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +14,11 @@ from jsonschema import Draft202012Validator
 from carillon.errors import UserError
 from solver.geometry import FILLS, PIECES
 from solver.problem import ProblemOptions
-from sound import project
-from sound.project import Project, load_project
+from sound import schema
+from sound.project import Project, load_project, with_optimiser
 
 LEAST = {"mesh": "builtin:bell", "targets": [{"name": "rim", "vertex": 3, "clip": "rim.wav"}]}
-SCHEMA = yaml.safe_load(project.SCHEMA.read_text())
+SCHEMA = yaml.safe_load(schema.SCHEMA.read_text())
 
 
 @pytest.fixture
@@ -145,9 +146,9 @@ RIM = LEAST["targets"][0]
             r"\.at\[2\]: found 'x'",
         ),
         ({"targets": [{**RIM, "modes": 0}]}, r"targets\[0\].modes: found 0, expected at least 1"),
-        ({"targets": [RIM, RIM]}, r"targets\[0\] and targets\[1\] are both named 'rim'"),
+        ({"targets": [RIM, dict(RIM)]}, r"targets\[0\] and targets\[1\] are both named 'rim'"),
         ({"targets": "rim"}, "targets: found 'rim', expected a list"),
-        ({"modes": 0}, "modes: found 0, expected at least 1: elastic modes"),
+        ({"modes": 1}, "modes: found 1, expected at least 2: elastic modes"),
         ({"modes": "many"}, "modes: found 'many', expected a whole number: elastic modes"),
         ({"mesh": None}, "mesh: found None, expected a text"),
         (
@@ -156,6 +157,34 @@ RIM = LEAST["targets"][0]
         ),
         ({"poisson": 0.5}, "poisson: found 0.5, expected below 0.5"),
         ({"density": float("nan")}, "density: found nan, expected a finite number"),
+        ({"density": 1e300}, "density: found 1e.300, expected at most 1000000"),
+        ({"density": True}, "density: found True, expected a number"),
+        ({"density": 10**400}, "density: found 1000"),
+        ({"modes": 10**12}, "modes: found 1000000000000, expected at most 10000"),
+        ({"resolution": 10**9}, "resolution: found 1000000000, expected at most 100000"),
+        ({"unit": 1e300}, "unit: found 1e.300, expected at most"),
+        ({"unit": 1e-300}, "unit: found 1e-300, expected at least 1e-12"),
+        ({"weights": {"frequency": 0, "amplitude": 0}}, "weights: found 0 for frequency and 0 for"),
+        ({"weights": {"frequency": 1e-300, "amplitude": 0}}, "weights: .*1e-12 or more"),
+        ({"weights": {"amplitude": 1e300}}, "weights.amplitude: found 1e.300, expected at most"),
+        ({"optimiser": {"evaluations": 10**30}}, "optimiser.evaluations: .*expected at most"),
+        ({"optimiser": {"seconds": 1e300}}, "optimiser.seconds: .*expected at most 100000000"),
+        ({"optimiser": {"workers": 10**6}}, "optimiser.workers: .*expected at most 1024"),
+        ({"optimiser": {"seed": 2**64}}, "optimiser.seed: .*expected at most 4294967294"),
+        ({"optimiser": {"population": 10**9}}, "optimiser.population: .*expected at most 10000"),
+        ({"material": {"young": 1e300}}, "material.young: .*expected at most"),
+        ({"material": {"dimensions": 10**9}}, "material.dimensions: .*expected at most 10000"),
+        ({"targets": [RIM | {"name": "a\0b"}]}, r"targets\[0\].name: .*can be printed"),
+        ({"targets": [RIM | {"name": " "}]}, r"targets\[0\].name: .*not blanks alone"),
+        ({"targets": [RIM | {"name": "x" * 101}]}, r"targets\[0\].name: .*at most 100 characters"),
+        ({"targets": [RIM | {"clip": "x" * 300}]}, r"targets\[0\].clip: there is no file"),
+        ({"targets": [RIM | {"clip": "a\0b"}]}, r"targets\[0\].clip: there is no file"),
+        ({"targets": [RIM | {"vertex": 10**25}]}, r"targets\[0\].vertex: .*expected at most"),
+        ({"targets": [dict(RIM) for _ in range(101)]}, "targets: .*expected at most 100 of them"),
+        (
+            {"targets": [{"name": "a", "at": [10**400, 0, 0], "clip": "rim.wav"}]},
+            r"targets\[0\].at\[0\]: .*expected at most",
+        ),
         ({"optimiser": {"seconds": 0}}, "optimiser.seconds: found 0, expected above 0"),
         ({"optimiser": None}, "optimiser: found None, expected keys and values"),
     ],
@@ -171,9 +200,21 @@ def test_a_mistake_is_answered_in_one_sentence(folder, keys, says):
     ("text", "says"),
     [
         ("mesh: builtin:bell", "the key targets is missing, expected struck points"),
-        ("", "expected keys and values"),
-        ("- a\n- b", "expected keys and values"),
+        ("", "expected a project, keys and values"),
+        ("- a\n- b", "expected a project, keys and values"),
         ("mesh: builtin:bell\ntargets: [", "is not readable as YAML .line 2"),
+        ("mesh: &a [x]\ntargets: *a", "found the reference"),
+        ("[" * 5000, "nested deeper than"),
+        ("mesh: !!python/name:os.system x", "could not determine a constructor"),
+        ("modes: " + "9" * 5000, "is not readable as YAML"),
+        (
+            f"{{mesh: a, targets: [{{name: a, clip: b}}], modes: 0x{'f' * 5000}}}",
+            "modes: found a whole number of 20,000 bits, expected 4,096 at most",
+        ),
+        ("modes: 1e400\nmesh: a\ntargets: []", "modes: found inf, expected a finite number"),
+        ("mesh: 2020-01-01\ntargets: []", "targets: found"),
+        (f"? 0x{'f' * 5000}\n: 1", "found a whole number of 20,000 bits"),
+        ("1: 2", "there is no key 1, only mesh"),
     ],
 )
 def test_a_file_that_is_no_project_is_answered_in_one_sentence(folder, text, says):
@@ -182,8 +223,21 @@ def test_a_file_that_is_no_project_is_answered_in_one_sentence(folder, text, say
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("name", ["a/b", "läute 鐘", "-x", "end "])
+def test_names_are_plain_text_of_any_kind(folder, name):
+    assert load(folder, targets=[RIM | {"name": name}]).targets[0].name == name
+
+
+def test_settings_from_elsewhere_keep_to_the_schema(folder):
+    made = load(folder)
+    changed = with_optimiser(made, seconds=None, workers=2, method="cma")
+    assert changed.optimiser == replace(made.optimiser, workers=2, method="cma")
+    with pytest.raises(UserError, match="workers: found 1000000, expected at most 1024"):
+        with_optimiser(made, workers=10**6)
+
+
 def test_a_missing_project_is_answered_in_one_sentence(folder):
     with pytest.raises(UserError, match="no such file, expected a project"):
         load_project(folder / "none.yaml")
-    with pytest.raises(UserError, match="is not readable as YAML"):
+    with pytest.raises(UserError, match="no such file, expected a project"):
         load_project(folder)

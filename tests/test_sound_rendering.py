@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -253,6 +254,16 @@ def test_modes_too_damped_to_oscillate_are_left_out(tmp_path: Path) -> None:
         (["--at", 9, 9, 9], "m from the surface"),
         (["--target", "side", "--impulse", 0, 0, 0], "not all of them 0"),
         (["--target", "side", "--seconds", 1e9], "expected at most 600"),
+        (["--target", "side", "--seconds", 1e-300], "expected 1 to"),
+        (["--target", "side", "--seconds", 600, "--rate", 768_000], "expected 1 to 67,108,864"),
+        (["--target", "side", "--rate", 10**11], "expected at most 768000"),
+        (["--target", "side", "--strength", "nan"], "out of range, expected 1e-06 to"),
+        (["--target", "side", "--strength", 1e300], "out of range"),
+        (["--target", "side", "--impulse", 1e300, 0, 0], "out of range"),
+        (["--target", "side", "--contact-seconds", 1e9], "expected 0 to 1 s"),
+        (["--at", "nan", 0, 0], "out of range"),
+        (["--at", 1e300, 0, 0], "out of range"),
+        (["--target", "side", "--out", "hit.mp3"], "expected a name that ends in .wav"),
         (["--target", "side", "--damping", 1, 0], "go with modes.h5"),
         (["--target", "side", "--like", "x.h5"], "go with modes.h5"),
     ],
@@ -262,13 +273,16 @@ def test_mistakes_are_answered_in_one_sentence(
 ) -> None:
     write_design(tmp_path / "design.h5", small_design())
     with pytest.raises(UserError, match=complaint):
-        run(["render", tmp_path / "design.h5", *words, "--out", tmp_path / "hit.wav"])
-    assert not (tmp_path / "hit.wav").exists()
+        run(["render", tmp_path / "design.h5", "--out", tmp_path / "hit.wav", *words])
+    assert [path.name for path in tmp_path.iterdir()] == ["design.h5"]
 
 
 def test_other_files_are_refused(tmp_path: Path) -> None:
     (tmp_path / "clip.h5").write_text("no HDF5")
-    for name in ("clip.h5", "absent.h5"):
+    (tmp_path / "empty.h5").touch()
+    (tmp_path / "loop.h5").symlink_to("loop.h5")
+    os.mkfifo(tmp_path / "pipe.h5")
+    for name in ("clip.h5", "absent.h5", "empty.h5", "loop.h5", "pipe.h5", "."):
         words = ["render", tmp_path / name, "--target", "a", "--out", tmp_path / "hit.wav"]
-        with pytest.raises(UserError, match="design file"):
+        with pytest.raises(UserError, match="expected a Carillon design"):
             run(words)

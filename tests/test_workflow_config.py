@@ -135,3 +135,9 @@ def test_materials_and_objectives_of_the_schema_exist():
     assert set(schema["dataset"]["properties"]["objective"]["enum"]) == set(DATASET_OBJECTIVES)
     material = schema["models"]["additionalProperties"]["properties"]["material"]["description"]
     assert all(name in material for name in settings.MATERIALS)
+
+
+def test_built_in_objects_are_those_of_the_solver():
+    from solver.geometry.builtin import BUILTINS
+
+    assert tuple(BUILTINS) == settings.BUILTIN_MESHES

@@ -16,6 +16,7 @@ from dataset_gen.objectives import DATASET_OBJECTIVES, SAMPLED
 from tests.workflow_runs import planned, snakemake
 from workflow.__main__ import main
 from workflow.estimate import command, measure, summary
+from workflow.estimate import sizes as sizes_module
 from workflow.estimate.command import CONFIGURATIONS, estimate, load
 from workflow.estimate.machine import Jobs, Machine
 from workflow.estimate.rates import PACKAGED, load_rates, rates_of
@@ -187,15 +188,25 @@ def test_the_paper_is_set_beside(capsys, monkeypatch):
     ("arguments", "says"),
     [
         (["--preset", "huge"], "huge"),
-        (["--configfile", "absent.yaml"], "absent.yaml: cannot be read"),
-        (["--configfile", "list.yaml"], "object"),
-        (["--configfile", "broken.yaml"], "broken.yaml: is no YAML"),
+        (["--configfile", "absent.yaml"], "absent.yaml: no such file, expected a configuration"),
+        (["--configfile", "list.yaml"], "expected a configuration, keys and values"),
+        (["--configfile", "broken.yaml"], "broken.yaml: is not readable as YAML (line 1: "),
         (["--configfile", "unknown.yaml"], "colour"),
         (["--rates", "absent.json"], "absent.json: cannot be read"),
         (["--rates", "broken.yaml"], "broken.yaml: is no JSON"),
         (["--rates", "partial.json"], "'numbers' is a required property"),
         (["--objective", "guess"], "guess"),
         (["--nodes", "0"], "at least 1"),
+        (["--nodes", "1000000000"], "at most 100000"),
+        (["--cores-per-node", "1000000000"], "at most 10000"),
+        (["--configfile", "metal.wav"], "metal.wav: is not readable as YAML"),
+        (["--configfile", "."], ".: no such file, expected a configuration"),
+        (["--configfile", "/dev/null"], "/dev/null: no such file, expected a configuration"),
+        (["--configfile", 5000 * "x"], "cannot be read (File name too long)"),
+        (["--rates", "."], "cannot be read (Is a directory)"),
+        (["--rates", "metal.wav"], "metal.wav: is no JSON"),
+        (["--rates", "brackets.json"], "brackets.json: is no JSON"),
+        (["--rates", "nan.json"], "numbers.start_seconds: nan is not of type 'number'"),
     ],
 )
 def test_bad_input_is_answered_in_a_sentence(arguments, says, tmp_path, monkeypatch):
@@ -208,6 +219,11 @@ def test_bad_input_is_answered_in_a_sentence(arguments, says, tmp_path, monkeypa
     partial = json.loads(PACKAGED.read_text())
     del partial["numbers"]
     Path("partial.json").write_text(json.dumps(partial))
+    spoiled = json.loads(PACKAGED.read_text())
+    spoiled["numbers"]["start_seconds"] = float("nan")
+    Path("nan.json").write_text(json.dumps(spoiled))
+    Path("brackets.json").write_text(100_000 * "[")
+    Path("metal.wav").write_bytes(b"RIFF\x24\x00\x00\x80WAVEfmt \xff")
     with pytest.raises(UserError) as caught:
         main(["estimate", *arguments])
     assert says in str(caught.value) and "\n" not in str(caught.value)
@@ -270,3 +286,11 @@ def test_packaged_rates_name_no_machine_but_its_processor():
     made = load_rates().made
     assert {"processor", "cores", "blas", "commit", "date"} <= set(made)
     assert set(load_rates().fits_per_second) == set(DATASET_OBJECTIVES)
+
+
+def test_voxels_are_counted_no_finer_than_a_machine_can(monkeypatch):
+    monkeypatch.setattr(sizes_module, "LARGEST_COUNTED", 8)
+    coarse = sizes_module.size_of(Solid("builtin:bar", 8, "centre"))
+    fine = sizes_module.size_of(Solid("builtin:bar", 16, "centre"))
+    assert (fine.fine, fine.coarse) == (8 * coarse.fine, 8 * coarse.coarse)
+    assert fine.basis == "counted on its voxels at resolution 8, times 8.0"

@@ -7,7 +7,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -18,6 +17,7 @@ import pytest
 from carillon.errors import UserError
 from dataset_gen.journal import journal_of
 from solver.modes_file import read_modes
+from tests.patience import HANG_SECONDS, wait_for
 from tests.workflow_runs import CHECKOUT, PROFILE, snakemake
 from workflow.digest.command import digest
 
@@ -117,6 +117,7 @@ def small_disk(folder) -> Iterator[Callable[[int], None]]:
         subprocess.run(["umount", str(results)], capture_output=True)
 
 
+@pytest.mark.system
 def test_a_run_on_a_full_disk_goes_on_when_there_is_room(folder, small_disk, assert_as_undisturbed):
     shard, truth = folder / SHARDS[1], folder / TRUTH
     for path in (shard, truth):
@@ -271,11 +272,8 @@ def start(folder: Path, environment: dict[str, str], *arguments: object) -> subp
 
 def written(folder: Path, run: subprocess.Popen[str], left: int = 0) -> list[Path]:
     """Half-written results: one that a job of a run is about to name, and those left before."""
-    until = time.monotonic() + 60
-    while len(found := unfinished(folder)) == left:
-        assert run.poll() is None and time.monotonic() < until
-        time.sleep(0.02)
-    return found
+    wait_for(lambda: len(unfinished(folder)) != left, "a half-written result", run)
+    return unfinished(folder)
 
 
 def job_of(run: subprocess.Popen[str], name: str) -> list[psutil.Process]:
@@ -284,6 +282,7 @@ def job_of(run: subprocess.Popen[str], name: str) -> list[psutil.Process]:
     return [process for process in processes if any(name in part for part in process.cmdline())]
 
 
+@pytest.mark.system
 def test_killed_while_a_result_is_written(folder, slow_disk, assert_as_undisturbed):
     """First one job alone, then all; the same command finishes, on a disk that is as slow."""
     results = {(folder / file).name: folder / file for file in (FORESTS, TRUTH)}
@@ -302,20 +301,21 @@ def test_killed_while_a_result_is_written(folder, slow_disk, assert_as_undisturb
     assert "Error in rule" in output
     assert not any(path.exists() for path in results.values())
     again = start(folder, slow_disk, *command)
-    output, _ = again.communicate(timeout=120)
+    output, _ = again.communicate(timeout=HANG_SECONDS)
     assert again.returncode == 0, output[-6000:]
     assert "removed the lock of a run that was killed" in output
     assert_as_undisturbed(folder, *SHARDS, FORESTS, TRUTH)
     assert unfinished(folder) == []
 
 
+@pytest.mark.system
 def test_two_processes_make_a_shard_once_on_a_slow_disk(undisturbed, slow_disk, tmp_path):
     (tmp_path / "results").mkdir()
     arguments = "--samples 600 --shard 0 --shards 2 --out results/shard.h5"
     both = [
         start(tmp_path, slow_disk, "dataset_gen", "generate", *arguments.split()) for _ in range(2)
     ]
-    outputs = {process.communicate(timeout=60)[0]: process.returncode for process in both}
+    outputs = {process.communicate(timeout=HANG_SECONDS)[0]: process.returncode for process in both}
     assert sorted(outputs.values()) == [0, 2]
     refused = next(output for output, status in outputs.items() if status == 2)
     assert "another process is generating this shard" in refused

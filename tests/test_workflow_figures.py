@@ -86,7 +86,7 @@ def test_tables_of_nothing_have_no_rows():
 def finished(tmp_path_factory):
     """Folder of the results of the miniature figures."""
     folder = tmp_path_factory.mktemp("figures")
-    done = snakemake(folder, "figures", "--profile", PROFILE, "--configfile", TINY, timeout=600)
+    done = snakemake(folder, "figures", "--profile", PROFILE, "--configfile", TINY)
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-6000:]
     return folder / "results-tiny" / results.FOLDER
 

@@ -58,7 +58,7 @@ def finished(tmp_path_factory):
     """Folder of the results of tiny default forests and of their study."""
     folder = tmp_path_factory.mktemp("forests-study")
     targets = ["default_forest", "forests_study"]
-    done = snakemake(folder, *targets, "--profile", PROFILE, "--configfile", TINY, timeout=500)
+    done = snakemake(folder, *targets, "--profile", PROFILE, "--configfile", TINY)
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-6000:]
     return folder / FOLDER
 

@@ -195,7 +195,7 @@ def finished(tmp_path_factory, run_cli):
     config["objectives"]["objectives"].append("calibrated")
     (folder / "config.yaml").write_text(yaml.safe_dump(config))
     options = ["--profile", PROFILE, "objectives", "--configfile", folder / "config.yaml"]
-    done = snakemake(folder, *options, timeout=300)
+    done = snakemake(folder, *options)
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-6000:]
     return folder / "results" / "objectives"
 

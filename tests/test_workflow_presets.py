@@ -80,6 +80,6 @@ def test_the_page_has_every_key():
 
 def test_the_page_tells_type_default_unit_and_meaning():
     row = next(line for line in schema_page.page().splitlines() if "`dataset.shards`" in line)
-    assert row.split(" | ")[1:4] == ["integer, at least 1", "`2`", "1"]
+    assert row.split(" | ")[1:4] == ["integer, at least 1, at most 10,000", "`2`", "1"]
     density = next(line for line in schema_page.page().splitlines() if ".density`" in line)
     assert "kg/m^3" in density and density.endswith("Mass density of the solid |")

@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+from tests.patience import HANG_SECONDS
 from tests.workflow_runs import CHECKOUT, PROFILE, planned, snakemake
 
 
@@ -27,7 +28,7 @@ def test_default_profile_is_read(tmp_path):
 def test_rules_lint():
     lint = CHECKOUT / ".ci" / "lint_rules.py"
     done = subprocess.run(
-        [sys.executable, lint], cwd=CHECKOUT, capture_output=True, text=True, timeout=120
+        [sys.executable, lint], cwd=CHECKOUT, capture_output=True, text=True, timeout=HANG_SECONDS
     )
     assert done.returncode == 0, done.stdout + done.stderr
 

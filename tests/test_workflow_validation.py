@@ -52,7 +52,7 @@ def solid(tmp_path_factory) -> Path:
 def run(solid) -> Path:
     """Folder of a finished validation."""
     words = ("--unit", 1e-3, "--density", 2000, "--modes", 24, "--strike", 40, 20, 10)
-    out = solid / "out"
+    out = solid / "out of 'one' $(touch run); a"
     status = call(
         *(solid / "block.obj", "--resolution", RESOLUTION, "--material", solid / "young.txt"),
         *(*words, "--tolerances", *LOOSE, "--out", out),
@@ -159,6 +159,14 @@ def test_what_was_not_found_or_is_no_number_does_not_pass():
         (["builtin:bar", "--tolerances", "luck=1"], "'luck=1' names no tolerance"),
         (["builtin:bar", "--tolerances", "residual=0"], "expected a number above 0"),
         (["builtin:bar", "--modes", "6"], "6 is too small, expected at least 12"),
+        (["builtin:bar", "--cores", "1000000000"], "1000000000 is too large, expected at most"),
+        (["builtin:bar", "--seed", str(2**64)], "too large"),
+        (["builtin:bar", "--unit", "1e300"], "unit: 1e+300 is greater than the maximum"),
+        (["builtin:bar", "--density", "1e-300"], "density: 1e-300 is less than the minimum"),
+        (["builtin:bar", "--strike", "nan", "0", "0"], "strike.0: nan is not of type 'number'"),
+        (["builtin:bar", "--name", "a\nb"], "has a line break"),
+        (["a{b}.obj"], "has one of { } < >, which stand for placeholders"),
+        (["ü" * 101], "has a name of more than 200 bytes"),
     ],
 )
 def test_bad_input_is_answered_in_one_sentence(words, says, solid, tmp_path, monkeypatch, capsys):

@@ -7,13 +7,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.patience import HANG_SECONDS
+
 CHECKOUT = Path(__file__).resolve().parent.parent
 TINY = CHECKOUT / "workflow" / "config" / "tiny.yaml"
 PROFILE = CHECKOUT / "workflow" / "profiles" / "default"
 
 
 def snakemake(
-    folder: Path, *arguments: object, timeout: float = 120
+    folder: Path, *arguments: object, timeout: float = HANG_SECONDS
 ) -> subprocess.CompletedProcess[str]:
     """Run Snakemake on the Snakefile of the checkout, with `folder` as working directory."""
     command = [sys.executable, "-m", "snakemake", "-s", CHECKOUT / "Snakefile", *arguments]

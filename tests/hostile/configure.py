@@ -1,0 +1,23 @@
+"""What the Snakefile does with a configuration before any rule: as a program that can be forked."""
+
+from __future__ import annotations
+
+import sys
+
+from snakemake.common.configfile import load_configfile
+from snakemake.utils import validate
+
+from carillon import cli
+from workflow import settings
+
+
+def main() -> None:
+    """Load and check the configuration named."""
+    config = load_configfile(sys.argv[1])
+    settings.check(config)
+    validate(config, str(settings.SCHEMA))
+    settings.check_links(config)
+
+
+if __name__ == "__main__":
+    sys.exit(cli.run("configure", main))

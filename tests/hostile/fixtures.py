@@ -1,0 +1,73 @@
+"""The suite as a fixture of pytest; the zoo is made once, whichever process needs it first."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import time
+from collections.abc import Iterator
+
+import pytest
+from _pytest.mark.structures import ParameterSet
+
+from tests.hostile import summary
+from tests.hostile.cases import Case, Table
+from tests.hostile.known import KNOWN
+from tests.hostile.suite import Suite
+from tests.hostile.zoo import Zoo
+from tests.hostile.zygote import Zygote
+
+
+def parameters(table: Table) -> list[ParameterSet]:
+    """The rows of a table for `pytest.mark.parametrize`."""
+    return [pytest.param(row, id=row.name, marks=_marks(row)) for row in table.rows]
+
+
+def _marks(row: Case) -> list[pytest.MarkDecorator]:
+    marks = [] if row.usual else [pytest.mark.torture]
+    fault = KNOWN.get(row.name.partition(": ")[2])
+    if fault is not None:
+        marks.append(pytest.mark.xfail(reason=fault, strict=False))
+    return marks
+
+
+@pytest.fixture(scope="session")
+def zygote() -> Iterator[Zygote]:
+    found = Zygote()
+    yield found
+    found.close()
+
+
+@pytest.fixture(scope="session")
+def zoo(zygote, tmp_path_factory) -> Zoo:
+    base = tmp_path_factory.getbasetemp()
+    shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    folder = shared / "zoo"
+    with open(shared / "zoo.lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        finished = shared / "zoo.finished"
+        if not finished.exists():
+            made = Zoo.made(folder, zygote)
+            finished.touch()
+            return made
+    return Zoo(folder)
+
+
+@pytest.fixture(scope="session")
+def suite(zygote, zoo, tmp_path_factory) -> Suite:
+    return Suite(zygote, zoo, tmp_path_factory.mktemp("hostile"))
+
+
+@pytest.fixture
+def tried(suite, record_property):
+    """Run one row; what it was and how long it took goes into the summary of the session."""
+
+    def try_one(case: Case) -> None:
+        begin = time.perf_counter()
+        try:
+            suite.check(case)
+        finally:
+            seconds = time.perf_counter() - begin
+            record_property(summary.HOSTILE, [case.room, case.control, seconds])
+
+    return try_one

@@ -1,0 +1,476 @@
+"""Rows of `python -m solver`."""
+
+from __future__ import annotations
+
+from tests.hostile.cases import NO_NUMBERS, NO_WHOLE_NUMBERS, Copy, Place, Table
+from tests.hostile.zoo_meshes import VALID_NAMES
+
+TABLE = Table("solver")
+hostile, control, each = TABLE.hostile, TABLE.control, TABLE.each
+
+BOX = "modes builtin:box --resolution 4 --modes 12 --method slepc"
+OUT = "--out out.h5"
+MODES = f"{BOX} {OUT}"
+
+# The command line ---------------------------------------------------------------------------------
+
+hostile("nothing at all", "", "command")
+hostile("no such command", "mode", "mode")
+hostile("no such command, megabytes", ["x" * 100_000])
+hostile("no such option", f"{MODES} --fast", "--fast")
+hostile("option cut short to several", f"{MODES} --in mumps")
+hostile("no mesh", "modes --resolution 4 --out out.h5", "mesh")
+hostile("no resolution", f"modes builtin:box {OUT}", "--resolution")
+hostile("no out", BOX, "--out")
+hostile("a line break in an option", [*BOX.split(), "--out", "out.h5", "--fa\nst"])
+hostile("an escape sequence in an option", [*BOX.split(), "--out", "out.h5", "--\x1b[2Jfast"])
+hostile("bytes that are no text", [*BOX.split(), "--out", "out.h5", "--fast\udcff"])
+
+# Numbers ------------------------------------------------------------------------------------------
+
+each(
+    "resolution",
+    "modes builtin:box --resolution VALUE --out out.h5",
+    [*NO_WHOLE_NUMBERS, "-1", "0", "1", str(10**30), "9223372036854775807", "1000000"],
+    "resolution",
+)
+each(
+    "modes",
+    "modes builtin:box --resolution 4 --modes VALUE --out out.h5",
+    [*NO_WHOLE_NUMBERS, "-1", "0", "6", str(10**30), "9223372036854775807", "10000"],
+    "modes",
+)
+each("seed", f"{MODES} --seed VALUE", [*NO_WHOLE_NUMBERS, "-1", str(2**64), str(10**30)], "seed")
+each("unit", f"{MODES} --unit VALUE", [*NO_NUMBERS, "0", "-1", "1e300", "1e-300"], "unit")
+each("density", f"{MODES} --density VALUE", [*NO_NUMBERS, "0", "-1", "1e300", "1e-300"], "density")
+each(
+    "Poisson's ratio",
+    f"{MODES} --poisson VALUE",
+    [*NO_NUMBERS, "0.5", "-1", "1e300", "0.49999999999999999"],
+    "poisson",
+)
+each("tolerance", f"{MODES} --tol VALUE", [*NO_NUMBERS, "-1"], "--tol")
+each(
+    "cutoff",
+    "modes builtin:box --resolution 4 --modes 12 --cutoff VALUE --out out.h5",
+    [*NO_NUMBERS, "0", "-1", "1e300", "1e-300"],
+    "cutoff",
+)
+each(
+    "corrections",
+    "modes builtin:box --resolution 4 --modes 12 --corrections VALUE --out out.h5",
+    ["-1", "1.5", str(2**63), str(10**30)],
+    "--corrections",
+)
+each("keep", f"{MODES} --keep VALUE", ["0", "-1", "nan", str(2**63)], "--keep")
+each("subdomains", f"{MODES} --subdomains VALUE", ["0", "-1", "nan", str(2**63)], "--subdomains")
+each(
+    "ranks",
+    "scaling builtin:box --resolution 4 --modes 12 --ranks VALUE",
+    ["0", "-1", "", "1,", "1,a", "1000000", "1,1000000", str(2**63), "1;2", "1.5"],
+    "ranks",
+)
+each(
+    "latency",
+    "scaling builtin:box --resolution 4 --modes 12 --ranks 1 --latency VALUE",
+    ["0", "-1", "nan", "inf"],
+    "--latency",
+)
+each(
+    "bandwidth",
+    "scaling builtin:box --resolution 4 --modes 12 --ranks 1 --bandwidth VALUE",
+    ["0", "-1", "nan", "inf"],
+    "--bandwidth",
+)
+each("runs", "benchmark builtin:box --resolution 4 --modes 12 --runs VALUE", ["0", "-1", "1e3"])
+each(
+    "slow runs",
+    "benchmark builtin:box --resolution 4 --modes 12 --runs 1 --slow-runs VALUE",
+    ["0", "nan"],
+    "--slow-runs",
+)
+each(
+    "modes timed",
+    "benchmark builtin:box --resolution 4 --modes VALUE --runs 1",
+    ["0", "-5", "6", str(2**64), "1e2"],
+    "modes",
+)
+each(
+    "modes compared",
+    "objectives builtin:box --resolution 4 --modes VALUE",
+    ["0", "-5", "6", str(2**64)],
+    "modes",
+)
+each(
+    "modes followed",
+    "convergence builtin:box --resolution 4 --modes VALUE --out out.json",
+    ["0", "-5", "6", str(2**64)],
+    "modes",
+)
+each(
+    "steps",
+    "convergence builtin:box --resolution 4 --modes 12 --out out.json --steps VALUE",
+    ["-1", "nan", str(10**30)],
+    "--steps",
+)
+for option, values in {
+    "solids": ("0", "-1", "nan", str(2**64)),
+    "steps": ("0", "1e3"),
+    "workers": ("0", "-1", str(10**30), "1000000"),
+    "seed": ("-1", str(2**64)),
+}.items():
+    given = f"calibrate --cases cases --out out.json --{option} VALUE"
+    each(f"calibration's {option}", given, values, option)
+
+# Choices ------------------------------------------------------------------------------------------
+
+for option in ("method", "coarsen", "objective", "fill", "pieces", "interface", "inner"):
+    hostile(f"no such {option}", f"{MODES} --{option} best", option, "best")
+hostile("no such acceleration", f"{MODES} --acceleration ''", "acceleration")
+hostile("no such objective to rate", "objectives builtin:box --resolution 4 --objectives a,b", "a")
+hostile(
+    "no objectives to rate", "objectives builtin:box --resolution 4 --objectives ,", "objective"
+)
+hostile("PETSc option without prefix", [*MODES.split(), "--petsc", "-eps_ncv 400"], "prefix")
+hostile("PETSc option of another prefix", [*MODES.split(), "--petsc", "-carillon_x 1 -log_view"])
+hostile("PETSc option unknown", [*MODES.split(), "--petsc", "-carillon_eps_nonsense 3"])
+hostile(
+    "PETSc option refused by PETSc", [*MODES.split(), "--petsc", "-carillon_eps_ncv abc"], "petsc"
+)
+hostile("PETSc option negative", [*MODES.split(), "--petsc", "-carillon_eps_ncv -5"])
+hostile(
+    "PETSc type unknown", [*MODES.split(), "--petsc", "-carillon_st_pc_type nonsense"], "nonsense"
+)
+hostile("PETSc solver unknown", [*MODES.split(), "--petsc", "-carillon_eps_type nonsense"])
+hostile("PETSc quote unclosed", [*MODES.split(), "--petsc", "-carillon_eps_ncv '4"])
+hostile("PETSc nothing", [*MODES.split(), "--petsc", "words"])
+
+# Meshes -------------------------------------------------------------------------------------------
+
+MESH = "modes VALUE --resolution 8 --modes 12 --method slepc --out out.h5"
+each("mesh", MESH, ["builtin:", "builtin:nothing", "builtin:box ", "builtin:$(touch x)"], "builtin")
+each("mesh", MESH, ["", ".", "nowhere.obj", "/", "box.obj/", "~root/x.obj"])
+each("mesh of a long name", MESH, ["x" * 300 + ".obj", "y/" * 3000 + "box.obj"])
+each(
+    "mesh broken",
+    MESH,
+    [
+        *(f"ZOO/empty.{end}" for end in ("obj", "stl", "ply", "glb", "off", "gltf", "3mf")),
+        *(f"ZOO/junk.{end}" for end in ("obj", "stl", "ply", "glb", "off", "gltf", "3mf")),
+        *("ZOO/cut.stl", "ZOO/cut.ply", "ZOO/cut.glb", "ZOO/claims.stl", "ZOO/claims.ply"),
+        *("ZOO/claims.off", "ZOO/claims.glb", "ZOO/foreign.gltf", "ZOO/relative.gltf"),
+        *("ZOO/box.xyzzy", "ZOO/box", "ZOO/words.obj", "ZOO/range.obj", "ZOO/below.obj"),
+        *("ZOO/index.obj", "ZOO/points.obj", "ZOO/nan.obj", "ZOO/inf.obj", "ZOO/beyond.obj"),
+        *("ZOO/latin.obj", "ZOO/nul.obj"),
+    ],
+)
+each(
+    "mesh absurd",
+    MESH,
+    [
+        *("ZOO/flat.obj", "ZOO/line.obj", "ZOO/point.obj", "ZOO/triangle.obj"),
+        *("ZOO/degenerate.obj", "ZOO/huge.obj", "ZOO/largest.obj", "ZOO/tiny.obj", "ZOO/far.obj"),
+        *("ZOO/needle.obj", "ZOO/apart.obj"),
+    ],
+)
+each(
+    "mesh that is",
+    MESH,
+    [
+        *("ZOO/odd/folder.obj", "ZOO/odd/pipe.obj", "ZOO/odd/socket.obj", "ZOO/odd/link.obj"),
+        *("ZOO/odd/dangling.obj", "ZOO/odd/null.obj", "ZOO/odd/zero.obj", "ZOO/odd/full.obj"),
+    ],
+)
+hostile("mesh that is a WAV file", "modes ZOO/metal.wav --resolution 8 --out out.h5", "metal.wav")
+hostile("mesh that is HDF5", "modes ZOO/modes.h5 --resolution 8 --out out.h5", "modes.h5")
+hostile(
+    "mesh that may not be read",
+    "modes box.obj --resolution 8 --out out.h5",
+    "permission",
+    files={"box.obj": Copy("box.obj", rights=0)},
+    plain=True,
+)
+hostile("mesh with a leading dash", "modes -box.obj --resolution 8 --out out.h5")
+hostile(
+    "mesh scaled to nothing", f"modes ZOO/box.obj --resolution 4 --modes 12 --unit 1e-200 {OUT}"
+)
+hostile("mesh finer than memory", f"modes builtin:box --resolution 20000 {OUT}", "20,000")
+
+# Materials ----------------------------------------------------------------------------------------
+
+MATERIAL = f"{MODES} --material VALUE"
+each("material", MATERIAL, ["", "steel", "uniform ", "Uniform", "$(touch x)", "/"], "material")
+each("material of a long name", MATERIAL, ["x" * 300 + ".npy"])
+each(
+    "material",
+    MATERIAL,
+    [
+        f"ZOO/{name}.npy"
+        for name in (
+            *("complex", "bool", "datetime", "duration", "text", "bytes", "structured", "object"),
+            *("short", "long", "none", "scalar", "negative", "nan", "inf", "zero", "zeros"),
+            *("huge", "tiny", "contrast", "denormal", "archive", "cut", "head", "empty", "junk"),
+            *("version", "claims", "square", "below", "code"),
+        )
+    ],
+)
+each(
+    "material",
+    MATERIAL,
+    [
+        f"ZOO/{name}.txt"
+        for name in (
+            *("words", "complex", "true", "short", "ragged", "nan", "empty", "comments"),
+            *("semicolons", "commas", "digits", "underscores", "hexadecimal", "beyond"),
+            *("latin", "nul"),
+        )
+    ],
+)
+each(
+    "material that is",
+    MATERIAL,
+    [
+        *("ZOO/odd/folder.npy", "ZOO/odd/pipe.npy", "ZOO/odd/socket.npy", "ZOO/odd/link.npy"),
+        *("ZOO/odd/zero.npy", "ZOO/odd/null.npy", "ZOO/odd/pipe.txt", "ZOO/odd/zero.txt"),
+        *("ZOO/modes.h5", "ZOO/metal.wav"),
+    ],
+)
+hostile(
+    "material that may not be read",
+    f"{MODES} --material young.npy",
+    "permission",
+    files={"young.npy": Copy("good.npy", rights=0)},
+    plain=True,
+)
+
+# Outputs ------------------------------------------------------------------------------------------
+
+OUTPUT = f"{BOX} --out VALUE"
+each("out", OUTPUT, ["", ".", "/", "nowhere/out.h5", "/proc/out.h5", "out.h5/", "a" * 300 + ".h5"])
+hostile("out that is a folder", MODES, "folder", files={"out.h5": Place("folder")})
+for kind in ("null", "full", "pipe", "socket"):
+    hostile(f"out that is {kind}", MODES, "out.h5", files={"out.h5": Place(kind)})
+hostile("out that links to nowhere", MODES, files={"out.h5": Place("link", "x/y")})
+hostile("out that links to itself", MODES, files={"out.h5": Place("link", "out.h5")})
+hostile(
+    "out that is the mesh",
+    "modes box.obj --resolution 4 --modes 12 --out box.obj",
+    files={"box.obj": Copy("box.obj")},
+)
+hostile(
+    "out that is the material",
+    f"{BOX} --material good.npy --out good.npy",
+    files={"good.npy": Copy("good.npy")},
+)
+hostile(
+    "out that is the start",
+    f"{BOX} --start modes.h5 --out ./modes.h5",
+    files={"modes.h5": Copy("modes.h5")},
+)
+hostile(
+    "out that is the forests",
+    f"{BOX} --coarsen ddfem --forest f.h5 --out f.h5",
+    files={"f.h5": Copy("forests.h5")},
+)
+hostile(
+    "out in a closed folder",
+    f"{BOX} --out closed/out.h5",
+    "closed/out.h5",
+    files={"closed": Place("folder", rights=0o555)},
+    plain=True,
+)
+hostile("out on a full disk", MODES, "make room", file_size=2000)
+hostile("out on a disk full at once", MODES, "make room", file_size=0)
+hostile("audit into a folder", "audit ZOO/modes.h5 --out audits", files={"audits": Place("folder")})
+hostile("audit onto its input", "audit m.h5 --out m.h5", files={"m.h5": Copy("modes.h5")})
+hostile("audit onto a device", "audit ZOO/modes.h5 --out null", files={"null": Place("null")})
+hostile("audit on a full disk", "audit ZOO/modes.h5 --out a.json", "make room", file_size=100)
+hostile("benchmark into nowhere", "benchmark builtin:box --resolution 4 --out nowhere/row.json")
+hostile("objectives into nowhere", "objectives builtin:box --resolution 4 --out nowhere/o.json")
+hostile("scaling into nowhere", "scaling builtin:box --resolution 4 --out nowhere/s.json")
+hostile("plot of no format", "scaling builtin:box --resolution 4 --plot scaling.mp3", "scaling.mp3")
+hostile("plot into nowhere", "scaling builtin:box --resolution 4 --plot nowhere/scaling.png")
+hostile("convergence into nowhere", "convergence builtin:box --resolution 4 --out nowhere/c.json")
+hostile("calibration into nowhere", "calibrate --cases cases --out nowhere/c.json", "nowhere")
+hostile(
+    "calibration of a file",
+    "calibrate --cases cases --out c.json",
+    "cases",
+    files={"cases": "no folder\n"},
+)
+
+# Files that it reads ------------------------------------------------------------------------------
+
+DAMAGES = (
+    *("cut", "flipped", "unsealed", "longer", "missing", "words", "complex", "scalar", "shape"),
+    *("nothing", "group", "nan", "claims", "link", "outside", "virtual", "loop", "kind"),
+    *("schema", "no-kind", "odd-schema", "eigenvalues-nan", "eigenvalues-inf", "young-nan"),
+    *("young-negative", "cells-beyond", "cells-below"),
+)
+NO_MODES = (
+    *("ZOO/shard.h5", "ZOO/forests.h5", "ZOO/design.h5", "ZOO/empty.h5", "ZOO/text.h5"),
+    *("ZOO/signature.h5", "ZOO/foreign.h5", "ZOO/metal.wav", "nowhere.h5", "", "."),
+    *("ZOO/odd/folder.h5", "ZOO/odd/pipe.h5", "ZOO/odd/zero.h5", "ZOO/odd/link.h5"),
+)
+each("audit of", "audit VALUE", [f"ZOO/modes-{damage}.h5" for damage in DAMAGES])
+each("audit of", "audit VALUE", NO_MODES)
+hostile("audit of a long name", ["audit", "x" * 300 + ".h5"])
+hostile("audit of a good and a bad one", "audit ZOO/modes.h5 ZOO/modes-cut.h5", "modes-cut.h5")
+control(
+    "audit of two of one name", "audit ZOO/modes.h5 modes.h5", files={"modes.h5": Copy("modes.h5")}
+)
+each(
+    "comparison of",
+    "compare VALUE ZOO/modes.h5",
+    [
+        *(
+            f"ZOO/modes-{damage}.h5"
+            for damage in ("nan", "eigenvalues-nan", "cut", "shape", "claims")
+        ),
+        *("ZOO/design.h5", "ZOO/bar.h5", "nowhere.h5"),
+    ],
+)
+hostile("comparison with another solid", "compare ZOO/modes.h5 ZOO/bar.h5")
+hostile("comparison with nothing", "compare ZOO/modes.h5", "truth")
+each(
+    "response of",
+    "respond VALUE --out out.h5",
+    [
+        *(f"ZOO/modes-{damage}.h5" for damage in ("nan", "eigenvalues-nan", "flipped", "unsealed")),
+        *("ZOO/shard.h5", "nowhere.h5"),
+    ],
+)
+hostile("response of another solid", "respond ZOO/modes.h5 ZOO/bar.h5 --out out.h5")
+hostile(
+    "response called truth",
+    "respond ZOO/modes.h5 truth.h5 --out out.h5",
+    "truth",
+    files={"truth.h5": Copy("random.h5")},
+)
+hostile(
+    "response of two of one name",
+    "respond ZOO/modes.h5 a/m.h5 b/m.h5 --out out.h5",
+    files={"a/m.h5": Copy("random.h5"), "b/m.h5": Copy("modes.h5")},
+)
+hostile("response onto its input", "respond m.h5 --out m.h5", files={"m.h5": Copy("modes.h5")})
+hostile("response on a full disk", "respond ZOO/modes.h5 --out out.h5", "make room", file_size=3000)
+for option in ("strike", "observed"):
+    for point in ("nan nan nan", "inf 0 0", "1e300 0 0", "5 5 5", "a b c", "1 2"):
+        hostile(
+            f"{option} at {point}", f"respond ZOO/modes.h5 --out out.h5 --{option} {point}", option
+        )
+for option in ("mass-damping", "stiffness-damping", "contact", "periods"):
+    for value in ("nan", "-1", "inf", ""):
+        hostile(
+            f"{option} {value!r}",
+            ["respond", "ZOO/modes.h5", "--out", "out.h5", f"--{option}", value],
+            option,
+        )
+hostile("contact of an hour", "respond ZOO/modes.h5 --out out.h5 --contact 1e300", "contact")
+hostile("periods without end", "respond ZOO/modes.h5 --out out.h5 --periods 1e300", "periods")
+each(
+    "start from",
+    f"{MODES} --start VALUE",
+    [
+        "ZOO/modes-nan.h5",
+        "ZOO/modes-cut.h5",
+        "ZOO/modes-shape.h5",
+        "ZOO/bar.h5",
+        "ZOO/shard.h5",
+        "nowhere.h5",
+        "ZOO/odd/pipe.h5",
+    ],
+)
+each(
+    "truth that is",
+    "convergence builtin:box --resolution 4 --modes 12 --out c.json --truth VALUE",
+    ["ZOO/modes-eigenvalues-nan.h5", "ZOO/modes-cut.h5", "ZOO/bar.h5", "nowhere.h5"],
+)
+each(
+    "forests that are",
+    f"{MODES} --coarsen ddfem --forest VALUE",
+    [
+        *(
+            f"ZOO/forests-{damage}.h5"
+            for damage in (
+                "cut",
+                "flipped",
+                "unsealed",
+                "missing",
+                "words",
+                "complex",
+                "shape",
+                "claims",
+                "kind",
+                "schema",
+            )
+        ),
+        *("ZOO/modes.h5", "ZOO/text.h5", "nowhere.h5", "", "ZOO/odd/pipe.h5"),
+    ],
+)
+hostile("forests of another ratio", f"{MODES} --coarsen ddfem --poisson 0.3", "0.3")
+
+# Honest failures ----------------------------------------------------------------------------------
+
+hostile(
+    "too few corrections",
+    "modes builtin:box --resolution 6 --modes 40 --corrections 1 --tol 1e-15 --out out.h5",
+    status=3,
+)
+hostile("tolerance below rounding", f"{MODES} --tol 1e-300", "--tol")
+
+# Controls -----------------------------------------------------------------------------------------
+
+control("the box", MODES, "out.h5")
+control("component modes", "modes builtin:box --resolution 4 --modes 12 --out out.h5", "out.h5")
+control(
+    "a mesh file by forests",
+    "modes ZOO/box.obj --resolution 8 --modes 12 --coarsen ddfem --out out.h5",
+    "out.h5",
+)
+for name in VALID_NAMES[1:]:
+    control(
+        f"a mesh called {name!r}",
+        [
+            "modes",
+            f"ZOO/{name}",
+            "--resolution",
+            "4",
+            "--modes",
+            "12",
+            "--method",
+            "slepc",
+            "--out",
+            "out.h5",
+        ],
+        "out.h5",
+    )
+for end in ("stl", "ply", "glb", "off"):
+    control(
+        f"a mesh as {end}",
+        f"modes ZOO/box.{end} --resolution 4 --modes 12 --method slepc {OUT}",
+        "out.h5",
+    )
+for name in ("twice", "inside-out"):
+    control(
+        f"a mesh {name}",
+        f"modes ZOO/{name}.obj --resolution 4 --modes 12 --method slepc {OUT}",
+        "out.h5",
+    )
+for name in ("good.npy", "whole.npy", "single.npy", "swapped.npy", "good.txt"):
+    control(f"moduli of {name}", f"{MODES} --material ZOO/{name}", "out.h5")
+control(
+    "an out with blanks and quotes", [*BOX.split(), "--out", "m o'd{e}s \".h5"], "m o'd{e}s \".h5"
+)
+control(
+    "a start",
+    f"modes builtin:box --resolution 4 --modes 10 --material random --start ZOO/modes.h5 {OUT}",
+    "out.h5",
+)
+control("PETSc options", [*MODES.split(), "--petsc", "-carillon_eps_ncv 40"], "out.h5")
+control("audit", "audit ZOO/modes.h5 ZOO/random.h5 --out audit.json", "audit.json")
+control("comparison", "compare ZOO/modes.h5 ZOO/random.h5")
+control(
+    "response", "respond ZOO/modes.h5 ZOO/random.h5 --out out.h5 --strike 0.1 0.075 0.1", "out.h5"
+)
+control("convergence", "convergence builtin:box --resolution 4 --modes 12 --out c.json", "c.json")

@@ -1,0 +1,464 @@
+"""Rows of `python -m sound`."""
+
+from __future__ import annotations
+
+from tests.hostile.cases import NO_NUMBERS, NO_WHOLE_NUMBERS, Copy, Place, Table
+from tests.hostile.zoo import PROJECT
+from tests.hostile.zoo_texts import hostile_yaml
+
+TABLE = Table("sound")
+hostile, control, each = TABLE.hostile, TABLE.control, TABLE.each
+
+# The command line ---------------------------------------------------------------------------------
+
+hostile("nothing at all", "", "command")
+hostile("no such command", "play", "play")
+hostile("no such option", "clip metal --out o.wav --loud", "--loud")
+hostile("no clip", "extract", "clip")
+hostile("no out", "clip metal", "--out")
+hostile("no such instrument", "clip glass --out o.wav", "glass")
+hostile("bytes that are no text", ["clip", "metal\udcff", "--out", "o.wav"])
+
+# extract ------------------------------------------------------------------------------------------
+
+each(
+    "clip",
+    "extract VALUE --out o.json --residual r.wav",
+    [
+        *("ZOO/silence.wav", "ZOO/none.wav", "ZOO/one.wav", "ZOO/brief.wav", "ZOO/constant.wav"),
+        *("ZOO/clipped.wav", "ZOO/opposed.wav", "ZOO/nan.wav", "ZOO/inf.wav", "ZOO/huge.wav"),
+        *("ZOO/large.wav", "ZOO/all-huge.wav", "ZOO/tiny.wav", "ZOO/slow.wav", "ZOO/head.wav"),
+        *("ZOO/empty.wav", "ZOO/junk.wav", "ZOO/riff.wav", "ZOO/text.wav", "ZOO/rate-zero.wav"),
+        *("ZOO/rate-huge.wav", "ZOO/no-channels.wav", "ZOO/many-channels.wav", "ZOO/claims.wav"),
+        *("ZOO/noise.wav", "ZOO/modes.h5", "ZOO/box.obj", "ZOO/project.yaml"),
+        *("nowhere.wav", "", ".", "/"),
+        *("ZOO/odd/folder.wav", "ZOO/odd/pipe.wav", "ZOO/odd/socket.wav", "ZOO/odd/link.wav"),
+        *("ZOO/odd/dangling.wav", "ZOO/odd/null.wav", "ZOO/odd/zero.wav", "ZOO/odd/full.wav"),
+    ],
+)
+hostile("clip of a long name", ["extract", "x" * 300 + ".wav"])
+hostile("clip called like an option", "extract -- -x.wav", "-x.wav")
+hostile("a good clip and a bad one", "extract ZOO/metal.wav ZOO/nan.wav", "nan.wav")
+hostile(
+    "clip that may not be read",
+    "extract clip.wav",
+    "permission",
+    files={"clip.wav": Copy("metal.wav", rights=0)},
+    plain=True,
+)
+each("modes", "extract ZOO/metal.wav --modes VALUE", [*NO_WHOLE_NUMBERS, "0", "-1"], "--modes")
+hostile("residual of two", "extract ZOO/metal.wav ZOO/wood.wav --residual r.wav", "--residual")
+each(
+    "out",
+    "extract ZOO/metal.wav --out VALUE",
+    [".", "nowhere/o.json", "/proc/o.json", "x" * 300, "o.json/"],
+)
+for kind in ("folder", "null", "full", "pipe", "socket"):
+    hostile(
+        f"out that is {kind}", "extract ZOO/metal.wav --out o.json", files={"o.json": Place(kind)}
+    )
+    hostile(
+        f"residual that is {kind}",
+        "extract ZOO/metal.wav --residual r.wav",
+        files={"r.wav": Place(kind)},
+    )
+hostile("residual as MP3", "extract ZOO/metal.wav --residual r.mp3", "r.mp3")
+hostile(
+    "residual that is the clip",
+    "extract c.wav --residual c.wav",
+    files={"c.wav": Copy("metal.wav")},
+)
+hostile("out that is the clip", "extract c.wav --out c.wav", files={"c.wav": Copy("metal.wav")})
+hostile("out that is the residual", "extract ZOO/metal.wav --out o.wav --residual ./o.wav")
+hostile("out on a full disk", "extract ZOO/metal.wav --out o.json", "make room", file_size=10)
+hostile(
+    "residual on a full disk", "extract ZOO/metal.wav --residual r.wav", "make room", file_size=1000
+)
+
+# clip ---------------------------------------------------------------------------------------------
+
+each(
+    "seconds",
+    "clip metal --seconds VALUE --out o.wav",
+    [*NO_NUMBERS, "0", "-1", "1e300", "1e-300", "61"],
+    "seconds",
+)
+each(
+    "rate",
+    "clip metal --rate VALUE --out o.wav",
+    [*NO_WHOLE_NUMBERS, "0", "-1", "999", "100000000000", str(2**64)],
+    "rate",
+)
+each("seed", "clip metal --seed VALUE --out o.wav", ["-1", "nan", str(2**64), "1.5"], "seed")
+each(
+    "pitch",
+    "clip metal --pitch VALUE --out o.wav",
+    [*NO_NUMBERS, "0", "-1", "1e300", "1e-300", "1e9"],
+    "pitch",
+)
+each(
+    "note",
+    "clip metal --note VALUE --out o.wav",
+    ["", "H4", "C", "C99", "C-99", "C4; ls", "c##4", "４", "C" + "9" * 400],
+    "note",
+)
+hostile("note and pitch", "clip metal --note C4 --pitch 200 --out o.wav", "--pitch")
+each(
+    "clip to",
+    "clip metal --seconds 0.3 --out VALUE",
+    ["o.mp3", "o.flac", "o", "", ".", "nowhere/o.wav", "/proc/o.wav", "x" * 300 + ".wav", "o.wav/"],
+)
+for kind in ("folder", "null", "full", "pipe", "socket"):
+    hostile(f"clip to {kind}", "clip metal --seconds 0.3 --out o.wav", files={"o.wav": Place(kind)})
+hostile("clip on a full disk", "clip metal --seconds 0.3 --out o.wav", "make room", file_size=1000)
+hostile(
+    "clip on a disk full at once", "clip metal --seconds 0.3 --out o.wav", "make room", file_size=0
+)
+hostile(
+    "clip into a closed folder",
+    "clip metal --seconds 0.3 --out closed/o.wav",
+    files={"closed": Place("folder", rights=0o555)},
+    plain=True,
+)
+
+# design: the project ------------------------------------------------------------------------------
+
+DESIGN = "design p.yaml --evaluations 1 --out d.h5"
+
+
+def project(old: str, new: str, whole: str = PROJECT) -> dict[str, str]:
+    """A project in whose text something is replaced."""
+    assert old in whole
+    whole = whole.replace("metal.wav", "ZOO/metal.wav").replace("wood.wav", "ZOO/wood.wav")
+    return {"p.yaml": whole.replace(old.replace("metal.wav", "ZOO/metal.wav"), new)}
+
+
+for number, (name, content) in enumerate(hostile_yaml().items()):
+    usual = number % 3 == 0  # workflow estimate is tried with all of them
+    hostile(f"project: {name}", DESIGN, "p.yaml", files={"p.yaml": content}, usual=usual)
+each(
+    "project",
+    "design VALUE --out d.h5",
+    [
+        *(
+            f"ZOO/project-{name}.yaml"
+            for name in ("twice", "bomb", "nested", "long", "nul", "latin", "tag", "second", "cut")
+        ),
+        *(
+            "ZOO/metal.wav",
+            "ZOO/modes.h5",
+            "ZOO/box.obj",
+            "ZOO/config.yaml",
+            "nowhere.yaml",
+            "",
+            ".",
+        ),
+        *("ZOO/odd/folder.yaml", "ZOO/odd/pipe.yaml", "ZOO/odd/zero.yaml", "ZOO/odd/link.yaml"),
+        "ZOO/odd/null.yaml",
+    ],
+)
+CHANGES = {
+    "an unknown key": ("modes: 6", "mdoes: 6"),
+    "no targets": ("targets:", "target:"),
+    "one mode": ("modes: 6", "modes: 1"),
+    "no modes": ("modes: 6", "modes: 0"),
+    "modes beyond 64 bits": ("modes: 6", f"modes: {10**30}"),
+    "more modes than the clips have": ("modes: 6", "modes: 5000"),
+    "modes that are true": ("modes: 6", "modes: true"),
+    "modes in words": ("modes: 6", "modes: six"),
+    "modes that are a date": ("modes: 6", "modes: 2020-01-01"),
+    "resolution 0": ("resolution: 16", "resolution: 0"),
+    "resolution 1.5": ("resolution: 16", "resolution: 1.5"),
+    "resolution 1e9": ("resolution: 16", "resolution: 1e9"),
+    "resolution nan": ("resolution: 16", "resolution: .nan"),
+    "resolution of thirty digits": ("resolution: 16", f"resolution: {10**30}"),
+    "resolution in octal": ("resolution: 16", "resolution: 0o20"),
+    "unit nan": ("resolution: 16", "unit: .nan"),
+    "unit 1e300": ("resolution: 16", "unit: 1e300"),
+    "unit 1e-300": ("resolution: 16", "unit: 1e-300"),
+    "unit 0": ("resolution: 16", "unit: 0"),
+    "unit infinite": ("resolution: 16", "unit: .inf"),
+    "density 1e300": ("resolution: 16", "density: 1e300"),
+    "density 1e-300": ("resolution: 16", "density: 1e-300"),
+    "density negative": ("resolution: 16", "density: -1"),
+    "Poisson's ratio 0.5": ("resolution: 16", "poisson: 0.5"),
+    "modulus 1e300": ("material: {dimensions: 10}", "material: {young: 1e300}"),
+    "modulus 1e-300": ("material: {dimensions: 10}", "material: {young: 1e-300}"),
+    "modulus 0": ("material: {dimensions: 10}", "material: {young: 0}"),
+    "one dimension": ("dimensions: 10", "dimensions: 1"),
+    "a billion dimensions": ("dimensions: 10", "dimensions: 1000000000"),
+    "no such law": ("dimensions: 10", "law: cubic"),
+    "all weights 0": ("resolution: 16", "weights: {frequency: 0, amplitude: 0, regulariser: 0}"),
+    "all weights that matter 0": ("resolution: 16", "weights: {frequency: 0, amplitude: 0}"),
+    "a weight of 1e300": ("resolution: 16", "weights: {frequency: 1e300, amplitude: 1e300}"),
+    "a weight negative": ("resolution: 16", "weights: {frequency: -1}"),
+    "a mesh that is missing": ("builtin:bar", "nowhere.obj"),
+    "a mesh unknown": ("builtin:bar", "builtin:bra"),
+    "a mesh that is a folder": ("builtin:bar", "."),
+    "a mesh that is nothing": ("builtin:bar", "''"),
+    "a mesh with NUL": ("builtin:bar", '"a\\0b.obj"'),
+    "a mesh of a long name": ("builtin:bar", "x" * 300 + ".obj"),
+    "a mesh of NaN": ("builtin:bar", "ZOO/nan.obj"),
+    "a clip that is missing": ("metal.wav", "nowhere.wav"),
+    "a clip with NUL": ("metal.wav", '"a\\0b.wav"'),
+    "a clip of a long name": ("metal.wav", "x" * 300 + ".wav"),
+    "a clip of NaN": ("metal.wav", "ZOO/nan.wav"),
+    "a clip that is huge": ("metal.wav", "ZOO/huge.wav"),
+    "a clip that is a mesh": ("metal.wav", "ZOO/box.obj"),
+    "a clip that is a pipe": ("metal.wav", "ZOO/odd/pipe.wav"),
+    "a clip that is a folder": ("metal.wav", "ZOO/odd/folder.wav"),
+    "a target with NUL in its name": ("name: end", 'name: "e\\0nd"'),
+    "a target without name": ("name: end", "name: ''"),
+    "a target that is a number": ("name: end", "name: 5"),
+    "two targets of one name": ("name: end", "name: side"),
+    "a target in the air": ("-0.12, 0.0, 0.03", "5, 5, 5"),
+    "a target at nan": ("-0.12, 0.0, 0.03", ".nan, 0, 0"),
+    "a target at 1e300": ("-0.12, 0.0, 0.03", "1e300, 0, 0"),
+    "a target in a plane": ("-0.12, 0.0, 0.03", "0, 0"),
+    "two targets at one place": ("-0.12, 0.0, 0.03", "0.04, 0.0225, 0.02"),
+    "a vertex that is not there": ("at: [-0.12, 0.0, 0.03]", "vertex: 1000000"),
+    "a vertex below 0": ("at: [-0.12, 0.0, 0.03]", "vertex: -1"),
+    "a vertex beyond 64 bits": ("at: [-0.12, 0.0, 0.03]", f"vertex: {10**30}"),
+    "a place twice": ("at: [-0.12, 0.0, 0.03]", "at: [-0.12, 0.0, 0.03], vertex: 1"),
+    "no place": ("at: [-0.12, 0.0, 0.03], ", ""),
+    "seconds nan": ("seconds: null", "seconds: .nan"),
+    "seconds infinite": ("seconds: null", "seconds: .inf"),
+    "seconds 0": ("seconds: null", "seconds: 0"),
+    "a seed beyond 64 bits": ("seconds: null", f"seed: {2**64}"),
+    "a seed below 0": ("seconds: null", "seed: -1"),
+    "a population of 1": ("seconds: null", "population: 1"),
+    "a population of a billion": ("seconds: null", "population: 1000000000"),
+    "a million workers": ("workers: 1", "workers: 1000000"),
+    "no workers": ("workers: 1", "workers: 0"),
+    "no such method": ("seconds: null", "method: best"),
+    "forests that are missing": ("coarsen: none", "coarsen: ddfem\nforest: nowhere.h5"),
+    "forests that are modes": ("coarsen: none", "coarsen: ddfem\nforest: ZOO/modes.h5"),
+    "forests with NUL": ("coarsen: none", 'coarsen: ddfem\nforest: "a\\0b"'),
+}
+for number, (name, (old, new)) in enumerate(CHANGES.items()):
+    usual = number % 2 == 0 or any(word in name for word in ("NUL", "weights", "1e"))
+    hostile(f"project with {name}", DESIGN, files=project(old, new), usual=usual)
+
+# design: the command line and the file ------------------------------------------------------------
+
+RUN = "design ZOO/project.yaml --evaluations 1 --out d.h5"
+for option, values in {
+    "seconds": ("nan", "inf", "0", "-1", ""),
+    "evaluations": ("0", "-1", "nan", "1.5", str(2**64), ""),
+    "workers": ("0", "-1", "1.5", "1000000", str(2**64)),
+    "method": ("best", ""),
+}.items():
+    each(option, f"design ZOO/project.yaml --out d.h5 --{option} VALUE", values, option)
+each(
+    "design to",
+    "design ZOO/project.yaml --evaluations 1 --out VALUE",
+    [".", "", "nowhere/d.h5", "/proc/d.h5", "x" * 300, "d.h5/"],
+)
+for kind in ("folder", "null", "full", "pipe", "socket"):
+    hostile(f"design to {kind}", RUN, files={"d.h5": Place(kind)})
+hostile(
+    "design onto the project",
+    "design p.yaml --evaluations 1 --out p.yaml",
+    files=project("modes: 6", "modes: 5"),
+)
+for damage in ("cut", "flipped", "unsealed", "nan", "kind", "missing", "claims", "shape"):
+    hostile(
+        f"design goes on from one {damage}",
+        RUN,
+        "d.h5",
+        files={"d.h5": Copy(f"design-{damage}.h5")},
+    )
+hostile("design goes on from modes", RUN, "d.h5", files={"d.h5": Copy("modes.h5")})
+each(
+    "design starts from",
+    f"{RUN} --start VALUE",
+    [
+        "ZOO/modes.h5",
+        "ZOO/design-cut.h5",
+        "nowhere.h5",
+        "ZOO/odd/pipe.h5",
+        "",
+        "ZOO/text.h5",
+    ],
+)
+hostile("design on a full disk", RUN, "make room", file_size=1000)
+each("benchmark's runs", "benchmark ZOO/project.yaml --runs VALUE", ["0", "-1", "1e3"], "--runs")
+hostile("benchmark's seconds", "benchmark ZOO/project.yaml --seconds nan", "--seconds")
+hostile("benchmark without project", "benchmark nowhere.yaml", "nowhere.yaml")
+
+# render -------------------------------------------------------------------------------------------
+
+RENDER = "render ZOO/design.h5 --target end --out o.wav"
+each(
+    "strike at",
+    ["render", "ZOO/design.h5", "--out", "o.wav", "--at", "VALUE", "0", "0"],
+    ["nan", "inf", "1e300", "a", "", "5"],
+)
+each(
+    "strike of modes at",
+    ["render", "ZOO/modes.h5", "--out", "o.wav", "--at", "VALUE", "0", "0"],
+    ["nan", "inf", "1e300", "5"],
+)
+each(
+    "impulse",
+    [*RENDER.split(), "--impulse", "VALUE", "0", "0"],
+    ["nan", "inf", "0", "1e300", "1e-300", "a"],
+    "impulse",
+)
+for option, values in {
+    "strength": (*NO_NUMBERS, "0", "-1", "1e300", "1e-300"),
+    "seconds": (*NO_NUMBERS, "0", "-1", "601", "1e300"),
+    "rate": ("nan", "0", "999", "100000000000", str(2**64), "1e5"),
+    "contact-seconds": ("nan", "-1", "inf", "1e300"),
+}.items():
+    each(option, f"{RENDER} --{option} VALUE", values, option)
+each(
+    "target",
+    "render ZOO/design.h5 --out o.wav --target VALUE",
+    ["", "middle", "end\n", "*"],
+    "--target",
+)
+each(
+    "vertex",
+    "render ZOO/design.h5 --out o.wav --vertex VALUE",
+    ["-1", "1.5", "1000000", str(2**64), "nan"],
+    "vertex",
+)
+hostile("nothing struck", "render ZOO/design.h5 --out o.wav", "--target")
+hostile("two things struck", f"{RENDER} --vertex 3", "--vertex")
+hostile("modes struck at a target", "render ZOO/modes.h5 --target end --out o.wav", "--at")
+hostile("damping of a design", f"{RENDER} --damping 1 1", "--damping")
+for value in ("nan 1", "-1 1", "inf 1", "1"):
+    hostile(
+        f"damping {value}",
+        f"render ZOO/modes.h5 --at 0 0 0 --out o.wav --damping {value}",
+        "--damping",
+    )
+each(
+    "render",
+    "render VALUE --target end --out o.wav",
+    [
+        *(
+            f"ZOO/design-{damage}.h5"
+            for damage in (
+                "cut",
+                "flipped",
+                "unsealed",
+                "missing",
+                "words",
+                "complex",
+                "shape",
+                "group",
+                "nan",
+                "claims",
+                "link",
+                "outside",
+                "virtual",
+                "kind",
+                "schema",
+                "frequencies-nan",
+                "faces-below",
+            )
+        ),
+        *("ZOO/shard.h5", "ZOO/forests.h5", "ZOO/text.h5", "ZOO/empty.h5", "nowhere.h5", "", "."),
+        *("ZOO/metal.wav", "ZOO/odd/pipe.h5", "ZOO/odd/zero.h5", "ZOO/odd/folder.h5"),
+    ],
+)
+each(
+    "render modes of",
+    "render VALUE --at 0.1 0.075 0.1 --out o.wav",
+    [
+        "ZOO/modes-cut.h5",
+        "ZOO/modes-unsealed.h5",
+        "ZOO/modes-nan.h5",
+        "ZOO/modes-eigenvalues-nan.h5",
+        "ZOO/modes-claims.h5",
+    ],
+)
+hostile("render like no design", "render ZOO/modes.h5 --at 0 0 0 --like ZOO/modes.h5 --out o.wav")
+hostile(
+    "render like another solid", "render ZOO/modes.h5 --target end --like ZOO/design.h5 --out o.wav"
+)
+each(
+    "render to",
+    "render ZOO/design.h5 --target end --out VALUE",
+    ["o.mp3", "o", ".", "", "nowhere/o.wav", "/proc/o.wav", "x" * 300 + ".wav"],
+)
+for kind in ("folder", "null", "full", "pipe", "socket"):
+    hostile(f"render to {kind}", RENDER, files={"o.wav": Place(kind)})
+hostile(
+    "render onto the design",
+    "render d.wav --target end --out d.wav",
+    files={"d.wav": Copy("design.h5")},
+)
+hostile("render on a full disk", RENDER, "make room", file_size=1000)
+
+# export -------------------------------------------------------------------------------------------
+
+for end in ("h5", "gltf", "glb", "dsp"):
+    hostile(
+        f"export {end} on a full disk",
+        f"export ZOO/design.h5 --out o.{end}",
+        "make room",
+        file_size=200,
+    )
+    hostile(
+        f"export {end} to a device",
+        f"export ZOO/design.h5 --out o.{end}",
+        files={f"o.{end}": Place("null")},
+    )
+each(
+    "export to",
+    "export ZOO/design.h5 --out VALUE",
+    ["o.obj", "o", ".", "", "nowhere/o.glb", "/proc/o.glb", "x" * 300 + ".glb", "o.glb/"],
+)
+each(
+    "export of",
+    "export VALUE --out o.glb",
+    [
+        "ZOO/modes.h5",
+        "ZOO/design-cut.h5",
+        "ZOO/design-unsealed.h5",
+        "ZOO/design-nan.h5",
+        "ZOO/design-faces-below.h5",
+        "nowhere.h5",
+        "ZOO/text.h5",
+        "ZOO/odd/pipe.h5",
+        "",
+    ],
+)
+hostile("export onto the design", "export d.h5 --out ./d.h5", files={"d.h5": Copy("design.h5")})
+hostile(
+    "export onto the design by a link",
+    "export d.h5 --out l.h5",
+    files={"d.h5": Copy("design.h5"), "l.h5": Place("link", "d.h5")},
+)
+each(
+    "points",
+    "export ZOO/design.h5 --out o.dsp --points VALUE",
+    ["-1", "1.5", str(2**64), "1000000000"],
+    "points",
+)
+hostile("no such format", "export ZOO/design.h5 --out o.glb --format obj", "--format")
+
+# Controls -----------------------------------------------------------------------------------------
+
+control("extract", "extract ZOO/metal.wav ZOO/wood.wav --out o.json", "o.json")
+control("extract with its residual", "extract ZOO/tone.wav --modes 1 --residual r.wav", "r.wav")
+control("extract from 24 bits", "extract ZOO/24-bit.wav")
+control("clip", "clip metal --seconds 0.3 --note F#3 --out o.wav", "o.wav")
+control(
+    "clip under an odd name",
+    ["clip", "wood", "--seconds", "0.3", "--out", "{o} 'x'.wav"],
+    "{o} 'x'.wav",
+)
+control("clip by a link", "clip metal --seconds 0.3 --out ./o.wav", "o.wav")
+control(
+    "project with a mark of its order of bytes",
+    "design ZOO/project-marked.yaml --evaluations 1 --out d.h5",
+    "d.h5",
+)
+control("render", RENDER, "o.wav")
+control("render modes", "render ZOO/modes.h5 --at 0.1 0.075 0.1 --seconds 0.1 --out o.wav", "o.wav")
+for end in ("h5", "gltf", "glb", "dsp"):
+    control(f"export {end}", f"export ZOO/design.h5 --out o.{end}", f"o.{end}")

@@ -1,0 +1,148 @@
+"""However a program ends, it says so in one sentence, and no rank is left waiting."""
+
+from __future__ import annotations
+
+import errno
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from carillon import cli
+from carillon.errors import ConvergenceError, LocalUserError, UserError
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+
+
+class Ranks:
+    """A communicator that remembers with which status its job was aborted."""
+
+    def __init__(self, rank, size):
+        self.rank, self.size, self.aborted = rank, size, None
+
+    def Abort(self, status):  # noqa: N802
+        self.aborted = status
+
+
+def raising(error):
+    def main():
+        raise error
+
+    return main
+
+
+def too_much():
+    np.empty(1 << 60, dtype=np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("main", "status", "said"),
+    [
+        (raising(UserError("no such\nmesh")), 2, "no such mesh"),
+        (raising(ConvergenceError("missed")), 3, "missed"),
+        (raising(MemoryError()), 2, "out of memory; ask for"),
+        (too_much, 2, "out of memory (Unable to allocate 1.00 EiB"),
+        (raising(OSError(errno.ENOSPC, "?")), 2, "No space left on device; make room"),
+        (
+            raising(PermissionError(errno.EACCES, "Permission denied", "a.h5")),
+            2,
+            "a.h5: Permission",
+        ),
+        (raising(BrokenPipeError(errno.EPIPE, "Broken pipe")), 2, "Broken pipe"),
+        (raising(KeyboardInterrupt()), 130, "interrupted"),
+    ],
+)
+def test_errors_are_one_sentence_and_a_status(main, status, said, capsys):
+    assert cli.run("program", main) == status
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"program: {said}")
+
+
+def test_a_fault_of_the_program_keeps_its_traceback():
+    with pytest.raises(ZeroDivisionError):
+        cli.run("program", raising(ZeroDivisionError()))
+
+
+def test_what_all_ranks_raise_is_told_by_the_first_and_aborts_nothing(capsys):
+    for rank in range(3):
+        ranks = Ranks(rank, 3)
+        assert cli.run("program", raising(UserError("bad")), ranks) == 2
+        assert ranks.aborted is None
+    assert capsys.readouterr().err == "program: bad\n"
+
+
+@pytest.mark.parametrize(
+    ("error", "status"),
+    [(LocalUserError("bad"), 2), (MemoryError(), 2), (KeyboardInterrupt(), 130), (KeyError(), 1)],
+)
+def test_what_one_rank_alone_raises_ends_the_others(error, status, capsys):
+    ranks = Ranks(1, 2)
+    cli.run("program", raising(error), ranks)
+    assert ranks.aborted == status
+    assert capsys.readouterr().err
+
+
+# Standard streams ---------------------------------------------------------------------------------
+
+PROGRAM = """
+import sys
+from carillon import cli
+
+def main():
+    with open(sys.argv[1], "w") as file:
+        print(file.fileno(), file=file)
+        print("results " * int(sys.argv[2]))
+
+sys.exit(cli.run("program", main))
+"""
+
+
+def run_shell(redirection, tmp_path, words=1):
+    out = tmp_path / "out"
+    command = f'"$0" -c "$1" {out} {words} {redirection}'
+    return subprocess.run(
+        ["bash", "-c", command, sys.executable, PROGRAM],
+        cwd=CHECKOUT,
+        capture_output=True,
+        text=True,
+    ), out.read_text()
+
+
+@pytest.mark.parametrize("words", [1, 100_000])
+def test_output_that_nobody_takes_is_a_sentence(words, tmp_path):
+    done, _ = run_shell("> /dev/full", tmp_path, words)
+    assert done.returncode == 2
+    assert (
+        done.stderr.startswith("program: No space left on device") and done.stderr.count("\n") == 1
+    )
+
+
+@pytest.mark.parametrize("words", [1, 100_000])
+def test_a_reader_who_has_seen_enough_is_no_error(words, tmp_path):
+    out = tmp_path / "out"
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, str(out), str(words)],
+        cwd=CHECKOUT,
+        stdout=write,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    os.close(write)
+    assert done.returncode == 0 and done.stderr == ""
+
+
+def test_files_do_not_take_the_place_of_closed_streams(tmp_path):
+    done, number = run_shell(">&- 2>&- <&-", tmp_path)
+    assert done.returncode == 0 and int(number) > 2
+
+
+def test_complaints_that_nobody_takes_change_no_status(tmp_path):
+    command = '"$0" -c "from carillon import cli; from carillon.errors import UserError\n'
+    command += 'def main(): raise UserError(1)\nraise SystemExit(cli.run(1, main))" 2> /dev/full'
+    done = subprocess.run(["bash", "-c", command, sys.executable], cwd=CHECKOUT)
+    assert done.returncode == 2

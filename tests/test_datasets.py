@@ -1,0 +1,70 @@
+"""What is read from HDF5 files has the shape and the kind of numbers that it should have."""
+
+from __future__ import annotations
+
+import h5py
+import numpy as np
+import pytest
+
+from carillon.datasets import INTEGER, find, number, read
+from carillon.errors import UserError
+
+
+@pytest.fixture
+def group(tmp_path):
+    with h5py.File(tmp_path / "file.h5", "w") as file:
+        part = file.create_group("part")
+        part["real"] = np.linspace(0.0, 1.0, 6).reshape(2, 3)
+        part["whole"] = np.arange(4)
+        part["nan"] = np.array([1.0, np.nan, np.inf])
+        part["complex"] = np.ones(3, dtype=complex)
+        part["text"] = np.array([b"a", b"b"])
+        part["scalar"] = 1.0
+        part["empty"] = h5py.Empty("f8")
+        part.create_group("group")
+        part.create_dataset("huge", (1 << 40, 1 << 20), float, chunks=(8, 8))
+        part.attrs["one"], part.attrs["nan"], part.attrs["text"] = 1.0, np.nan, "a"
+        part.attrs["several"] = np.ones(3)
+        yield part
+
+
+def test_what_fits_is_read(group):
+    assert read(group, "real", (2, 3)).shape == read(group, "real", (None, 3)).shape == (2, 3)
+    assert read(group, "whole", (4,), INTEGER).tolist() == [0, 1, 2, 3]
+    assert number(group, "one", 0.0, 1.0) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "fault"),
+    [
+        ("absent", (None,), "has no dataset 'absent'"),
+        ("group", (None,), "has no dataset 'group'"),
+        ("real", (3, 2), "has shape (2, 3), expected (3, 2)"),
+        ("real", (None,), "has shape (2, 3), expected (any,)"),
+        ("scalar", (1,), "has shape (), expected (1,)"),
+        ("empty", (1,), "has shape None"),
+        ("whole", (4,), "holds int64, expected real numbers"),
+        ("complex", (3,), "holds complex128"),
+        ("text", (2,), "holds |S1"),
+        ("nan", (3,), "holds 2 values that are not finite"),
+        ("huge", (None, None), "'huge' is incomplete"),
+    ],
+)
+def test_anything_else_is_one_sentence(group, name, shape, fault):
+    with pytest.raises(UserError) as caught:
+        read(group, name, shape)
+    text = str(caught.value)
+    assert "file.h5: " in text and fault in text and "generate the file again" in text
+
+
+def test_nothing_is_read_to_find_a_dataset(group):
+    with pytest.raises(UserError, match="incomplete"):
+        find(group, "huge", (1 << 40, 1 << 20))
+
+
+@pytest.mark.parametrize("name", ["absent", "nan", "text", "several"])
+def test_an_attribute_is_a_finite_number(group, name):
+    with pytest.raises(UserError):
+        number(group, name)
+    with pytest.raises(UserError, match="expected 2 to 3"):
+        number(group, "one", 2.0, 3.0)

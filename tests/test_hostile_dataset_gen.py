@@ -1,0 +1,13 @@
+"""`python -m dataset_gen` meets hostile command lines and files; see `tests.hostile`."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.hostile.dataset_cases import TABLE
+from tests.hostile.fixtures import parameters, suite, tried, zoo, zygote  # noqa: F401
+
+
+@pytest.mark.parametrize("case", parameters(TABLE))
+def test_dataset_gen(case, tried):  # noqa: F811
+    tried(case)

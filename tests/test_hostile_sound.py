@@ -1,0 +1,13 @@
+"""`python -m sound` meets hostile command lines and files; see `tests.hostile`."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.hostile.fixtures import parameters, suite, tried, zoo, zygote  # noqa: F401
+from tests.hostile.sound_cases import TABLE
+
+
+@pytest.mark.parametrize("case", parameters(TABLE))
+def test_sound(case, tried):  # noqa: F811
+    tried(case)

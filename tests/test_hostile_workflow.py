@@ -1,0 +1,23 @@
+"""`python -m workflow`, `python -m carillon` and configurations; see `tests.hostile`."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.hostile import carillon_cases, configuration_cases, workflow_cases
+from tests.hostile.fixtures import parameters, suite, tried, zoo, zygote  # noqa: F401
+
+
+@pytest.mark.parametrize("case", parameters(workflow_cases.TABLE))
+def test_workflow(case, tried):  # noqa: F811
+    tried(case)
+
+
+@pytest.mark.parametrize("case", parameters(configuration_cases.TABLE))
+def test_configuration(case, tried):  # noqa: F811
+    tried(case)
+
+
+@pytest.mark.parametrize("case", parameters(carillon_cases.TABLE))
+def test_carillon(case, tried):  # noqa: F811
+    tried(case)

@@ -1,0 +1,108 @@
+"""SIGKILL at any moment: the same command run again ends as if nothing had happened.
+
+A part of the kills is tried with every change, all of them by `make torture`.
+"""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from tests.hostile import summary
+from tests.hostile.fixtures import zoo, zygote  # noqa: F401
+from tests.hostile.killing import Killed, kill_and_repeat, moments, run_undisturbed, snakemake
+from tests.hostile.zoo import CONFIGURATION
+
+pytestmark = pytest.mark.slow
+
+SHARDS = ("results/dataset/uniform-0.h5", "results/dataset/uniform-1.h5")
+FORESTS, TRUTH = "results/forests/forests.h5", "results/models/bar/truth.h5"
+GENERATE = "dataset_gen generate --samples 30000 --out shard.h5".split()
+WORKERS = [*GENERATE, "--workers", 2]
+TRAIN = "forests train shard.h5 --trees 2 --depth 8 --out forests.h5".split()
+MODES = "solver modes builtin:box --resolution 8 --modes 20 --out modes.h5".split()
+# MUMPS, the default on several ranks, repeats itself but for the last digits.
+ON_RANKS = [*MODES, "--inner", "icc-pcg"]
+BENCHMARK = (
+    "solver benchmark builtin:bar --resolution 10 --modes 12 --runs 1 --skip-arpack --out row.json"
+).split()
+DESIGN = "sound design project.yaml --evaluations 4 --restart --workers 2 --out design.h5".split()
+
+NUMBERS = {
+    "generate": (7, 1),
+    "generate by workers": (3, 1),
+    "train": (7, 1),
+    "modes": (8, 1),
+    "modes, one rank": (6, 1),
+    "modes, mpiexec": (5, 1),
+    "benchmark": (4, 0),
+    "design": (3, 0),
+    "design, its first process": (2, 1),
+    "rules": (3, 0),
+    "rules, Snakemake alone": (2, 0),
+}
+"""Kills in all, 50, and those of them that are tried with every change."""
+
+
+@pytest.fixture(scope="module")
+def commands(zoo):  # noqa: F811
+    shard = {"shard.h5": zoo.folder / "shard.h5"}
+    project = {name: zoo.folder / name for name in ("project.yaml", "metal.wav", "wood.wav")}
+    rules = {"config.yaml": CONFIGURATION}
+    results = (*SHARDS, FORESTS, TRUTH)
+    found = [
+        Killed("generate", GENERATE, ["shard.h5"]),
+        Killed("generate by workers", WORKERS, ["shard.h5"], "first"),
+        Killed("train", TRAIN, ["forests.h5"], files=shard),
+        Killed("modes", MODES, ["modes.h5"]),
+        Killed("modes, one rank", ON_RANKS, ["modes.h5"], "rank", ranks=2),
+        Killed("modes, mpiexec", ON_RANKS, ["modes.h5"], "first", ranks=2),
+        Killed("benchmark", BENCHMARK, ["row.json"]),
+        Killed("design", DESIGN, ["design.h5"], files=project),
+        Killed("design, its first process", DESIGN, ["design.h5"], "first", files=project),
+        Killed("rules", snakemake(FORESTS, TRUTH), results, files=rules),
+        Killed("rules, Snakemake alone", snakemake(FORESTS, TRUTH), results, "first", files=rules),
+    ]
+    assert [each.name for each in found] == list(NUMBERS)
+    return {each.name: each for each in found}
+
+
+@pytest.fixture(scope="module")
+def undisturbed(commands, tmp_path_factory):
+    """How a command runs that nothing disturbs, found out once for equal ones."""
+    known = {}
+
+    def of(name):
+        key = (tuple(commands[name].command), commands[name].ranks)
+        if key not in known:
+            folder = tmp_path_factory.mktemp("undisturbed") / "run"
+            known[key] = run_undisturbed(commands[name], folder)
+        return known[key]
+
+    return of
+
+
+def kills():
+    """Every kill: the command's name and the share of its time after which it is killed."""
+    for name, (count, usual) in NUMBERS.items():
+        for number, moment in enumerate(moments(name, count)):
+            marks = [] if number < usual else [pytest.mark.torture]
+            yield pytest.param(name, moment, id=f"{name} {number}", marks=marks)
+
+
+def test_there_are_fifty_kills():
+    assert sum(count for count, _ in NUMBERS.values()) == 50
+
+
+@pytest.mark.parametrize(("name", "moment"), list(kills()))
+def test_a_killed_run_ends_as_one_undisturbed(
+    name, moment, commands, undisturbed, tmp_path, record_property
+):
+    before = undisturbed(name)
+    begin = time.monotonic()
+    try:
+        found = kill_and_repeat(commands[name], tmp_path / "run", moment * before.seconds)
+        assert found == before.found
+    finally:
+        record_property(summary.KILL, [name, time.monotonic() - begin])

@@ -1,0 +1,76 @@
+"""Where no room is left, commands say so in one sentence and leave nothing behind."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from carillon.errors import UserError
+from sound.__main__ import main
+from sound.design_file import write_design
+from sound.export.embedded import write_embedded
+from tests.small_design import small_design
+
+KIB = 1024
+NO_ROOM = r"could not be written \(No space left on device; make room and run the same command"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("inputs")
+    write_design(path / "design.h5", small_design())
+    assert main(["clip", "wood", "--seconds", "0.5", "--out", str(path / "wood.wav")]) == 0
+    return path
+
+
+@pytest.fixture(scope="module")
+def small_disk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A file system of 8 KiB."""
+    path = tmp_path_factory.mktemp("disk")
+    if os.geteuid() != 0:
+        pytest.skip("only root can mount a small file system")
+    command = ["mount", "-t", "tmpfs", "-o", f"size={8 * KIB}", "tmpfs", str(path)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode:
+        pytest.skip(f"no file system can be mounted here: {done.stderr}")
+    try:
+        yield path
+    finally:
+        subprocess.run(["umount", str(path)], capture_output=True)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["clip", "metal", "--out", "OUT.wav"],
+        ["render", "design.h5", "--target", "side", "--seconds", "1", "--out", "OUT.wav"],
+        ["extract", "wood.wav", "--residual", "OUT.wav"],
+        ["export", "design.h5", "--out", "OUT.h5"],
+        ["export", "design.h5", "--out", "OUT.gltf"],
+        ["export", "design.h5", "--out", "OUT.glb"],
+        ["export", "design.h5", "--points", "300", "--out", "OUT.dsp"],
+    ],
+    ids=" ".join,
+)
+def test_a_full_disk_is_told_in_a_sentence(folder, small_disk, monkeypatch, words):
+    monkeypatch.chdir(folder)
+    with pytest.raises(UserError, match=NO_ROOM):
+        main([word.replace("OUT", str(small_disk / "out")) for word in words])
+    assert not list(small_disk.iterdir())
+
+
+@pytest.mark.parametrize("write", [write_design, partial(write_embedded, parameters={})])
+def test_a_file_that_finds_no_room_leaves_the_one_before(small_disk, write):
+    path = small_disk / "design.h5"
+    path.write_bytes(b"an older one")
+    try:
+        with pytest.raises(UserError, match=NO_ROOM):
+            write(path, small_design())
+        assert path.read_bytes() == b"an older one" and len(list(small_disk.iterdir())) == 1
+    finally:
+        path.unlink()
