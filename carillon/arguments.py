@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Callable
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from carillon.errors import UserError
 from carillon.runtime import allowed_cores
@@ -18,11 +18,19 @@ MOST_WORKERS = 64
 WORKERS_OF_CORE = 4
 """The same for each core of a machine with more."""
 
+_NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$", re.ASCII)
 _WHOLE = re.compile(r"[-+]?[0-9]{1,30}", re.ASCII)
 
 
 class Parser(argparse.ArgumentParser):
-    """Argument parser that raises UserError instead of printing its usage."""
+    """Argument parser that raises UserError instead of printing its usage.
+
+    It takes -1e-3 for a number, as later versions of Python do by themselves, not for an option.
+    """
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self._negative_number_matcher = _NEGATIVE
 
     def error(self, message: str) -> NoReturn:
         """Raise the mistake as a UserError; `carillon.cli.run` prints it and exits with 2."""

@@ -15,6 +15,7 @@ from typing import Any
 
 import h5py
 
+from carillon.datasets import require_whole
 from carillon.errors import ConvergenceError, UserError
 from carillon.places import cause as cause
 from carillon.places import first_line, require_file, target_of
@@ -246,6 +247,7 @@ def open_h5(path: str | Path, kind: str, schema: int, sealed: bool = False) -> I
             raise UserError(
                 f"{path}: is damaged (its checksum is gone); remove it and generate the file again"
             )
+        _require_whole(path, file)
         try:
             yield file
         except ConvergenceError:
@@ -255,6 +257,31 @@ def open_h5(path: str | Path, kind: str, schema: int, sealed: bool = False) -> I
             raise UserError(
                 f"{path}: is {fault} ({first_line(error)}); generate the file again"
             ) from error
+
+
+def kind_of(path: str | Path) -> tuple[str, int]:
+    """Kind and schema version that a file claims; no kind if it is no file of this project.
+
+    Raises
+    ------
+    UserError
+        If there is no such file.
+    """
+    require_file(path, "a Carillon file (HDF5)")
+    try:
+        with h5py.File(path, "r") as file:
+            return str(file.attrs["kind"]), int(file.attrs["schema_version"])
+    except Exception:  # HDF5 has many ways to say that bytes make no sense
+        return "", -1
+
+
+def _require_whole(path: Path, file: h5py.File) -> None:
+    try:
+        require_whole(file)
+    except _NONSENSE as error:
+        raise UserError(
+            f"{path}: is damaged ({first_line(error)}); generate the file again"
+        ) from None
 
 
 def _require_kind(path: Path, file: h5py.File, kind: str, schema: int) -> None:

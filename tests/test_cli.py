@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from carillon import cli
+from carillon.arguments import Parser
 from carillon.errors import ConvergenceError, LocalUserError, UserError
 
 CHECKOUT = Path(__file__).resolve().parent.parent
@@ -32,6 +33,15 @@ def raising(error):
         raise error
 
     return main
+
+
+def test_negative_numbers_are_no_options():
+    parser = Parser()
+    parser.add_argument("--at", nargs=3, type=float)
+    for words in (["-1e-3", "-2", "-.5E+2"], ["-3.", "0", "-1.5"]):
+        assert parser.parse_args(["--at", *words]).at == [float(word) for word in words]
+    with pytest.raises(UserError, match="unrecognized|expected 3"):
+        parser.parse_args(["--at", "0", "0", "-e3"])
 
 
 def too_much():
@@ -90,6 +100,7 @@ def test_what_one_rank_alone_raises_ends_the_others(error, status, capsys):
 PROGRAM = """
 import sys
 from carillon import cli
+from carillon.arguments import Parser
 
 def main():
     with open(sys.argv[1], "w") as file:

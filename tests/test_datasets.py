@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from carillon.datasets import INTEGER, find, number, read
+from carillon.datasets import INTEGER, number, read, require_whole
 from carillon.errors import UserError
 
 
@@ -22,7 +22,6 @@ def group(tmp_path):
         part["scalar"] = 1.0
         part["empty"] = h5py.Empty("f8")
         part.create_group("group")
-        part.create_dataset("huge", (1 << 40, 1 << 20), float, chunks=(8, 8))
         part.attrs["one"], part.attrs["nan"], part.attrs["text"] = 1.0, np.nan, "a"
         part.attrs["several"] = np.ones(3)
         yield part
@@ -47,7 +46,6 @@ def test_what_fits_is_read(group):
         ("complex", (3,), "holds complex128"),
         ("text", (2,), "holds |S1"),
         ("nan", (3,), "holds 2 values that are not finite"),
-        ("huge", (None, None), "'huge' is incomplete"),
     ],
 )
 def test_anything_else_is_one_sentence(group, name, shape, fault):
@@ -57,9 +55,36 @@ def test_anything_else_is_one_sentence(group, name, shape, fault):
     assert "file.h5: " in text and fault in text and "generate the file again" in text
 
 
-def test_nothing_is_read_to_find_a_dataset(group):
-    with pytest.raises(UserError, match="incomplete"):
-        find(group, "huge", (1 << 40, 1 << 20))
+def claim(part):
+    part.create_dataset("x", (1 << 40, 1 << 20), float, chunks=(8, 8))
+
+
+def borrow(part):
+    part.create_dataset("x", (4,), float, external=[("other.raw", 0, 32)])
+
+
+def look_elsewhere(part):
+    layout = h5py.VirtualLayout(shape=(4,), dtype=float)
+    layout[...] = h5py.VirtualSource("other.h5", "x", shape=(4,))
+    part.create_virtual_dataset("x", layout)
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        (claim, "'x' is incomplete"),
+        (borrow, "'x' takes its numbers from another file"),
+        (look_elsewhere, "'x' takes its numbers from another file"),
+        (lambda part: part.__setitem__("x", h5py.ExternalLink("other.h5", "/x")), "a link, 'x'"),
+        (lambda part: part.__setitem__("x", h5py.SoftLink("/part/whole")), "a link, 'x'"),
+    ],
+)
+def test_a_file_holds_all_that_it_says(group, change, fault):
+    require_whole(group.file)
+    change(group)
+    with pytest.raises(UserError) as caught:
+        require_whole(group.file)
+    assert fault in str(caught.value) and "(in /part)" in str(caught.value)
 
 
 @pytest.mark.parametrize("name", ["absent", "nan", "text", "several"])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -14,9 +12,9 @@ from carillon.errors import UserError
 from sound.__main__ import main
 from sound.design_file import write_design
 from sound.export.embedded import write_embedded
+from tests.disks import KIB, disk_on
 from tests.small_design import small_design
 
-KIB = 1024
 NO_ROOM = r"could not be written \(No space left on device; make room and run the same command"
 
 
@@ -32,16 +30,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def small_disk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A file system of 8 KiB."""
     path = tmp_path_factory.mktemp("disk")
-    if os.geteuid() != 0:
-        pytest.skip("only root can mount a small file system")
-    command = ["mount", "-t", "tmpfs", "-o", f"size={8 * KIB}", "tmpfs", str(path)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    if done.returncode:
-        pytest.skip(f"no file system can be mounted here: {done.stderr}")
-    try:
+    with disk_on(path, 8 * KIB):
         yield path
-    finally:
-        subprocess.run(["umount", str(path)], capture_output=True)
 
 
 @pytest.mark.parametrize(

@@ -79,9 +79,9 @@ def test_a_file_that_is_not_whole_has_none(design, tmp_path, change, says):
 @pytest.mark.parametrize(
     ("attributes", "says"),
     [
-        ({}, "says its kind"),
-        ({"kind": "design"}, "is damaged"),
-        ({"kind": "design", "schema_version": "x"}, "is damaged"),
+        ({}, "no HDF5 file of this project"),
+        ({"kind": "design"}, "no HDF5 file of this project"),
+        ({"kind": "design", "schema_version": "x"}, "no HDF5 file of this project"),
         ({"kind": "design", "schema_version": SCHEMA}, "its checksum is gone"),
     ],
 )

@@ -17,6 +17,7 @@ import pytest
 from carillon.errors import UserError
 from dataset_gen.journal import journal_of
 from solver.modes_file import read_modes
+from tests.disks import KIB, disk_on
 from tests.patience import HANG_SECONDS, wait_for
 from tests.workflow_runs import CHECKOUT, PROFILE, snakemake
 from workflow.digest.command import digest
@@ -34,7 +35,6 @@ FORESTS = "results/forests/forests.h5"
 SHARD_LOG = "results/logs/dataset/uniform-1.log"
 TRUTH = "results/models/bar/truth.h5"
 HCMS = "results/models/bar/hcms.h5"
-KIB = 1024
 
 
 def run(folder: Path, *targets: str) -> subprocess.CompletedProcess[str]:
@@ -95,29 +95,13 @@ def assert_as_undisturbed(undisturbed) -> Callable[..., None]:
 def small_disk(folder) -> Iterator[Callable[[int], None]]:
     """Puts the results on a file system with so many bytes to spare; again to change that."""
     results, aside = folder / "results", folder / "aside"
-
-    def resize(spare: int) -> None:
-        used = shutil.disk_usage(results).used if results.is_mount() else 0
-        change = "remount," if results.is_mount() else ""
-        size = f"{change}size={(used + spare) // KIB}k"
-        command = ["mount", "-t", "tmpfs", "-o", size, "tmpfs", str(results)]
-        done = subprocess.run(command, capture_output=True, text=True)
-        if done.returncode:
-            pytest.skip(f"no file system can be mounted here: {done.stderr}")
-
-    if os.geteuid() != 0:
-        pytest.skip("only root can mount a small file system")
     results.rename(aside)
     results.mkdir()
-    try:
-        resize(64 * KIB * KIB)
+    with disk_on(results, 64 * KIB * KIB) as give:
         shutil.copytree(aside, results, dirs_exist_ok=True)
-        yield resize
-    finally:
-        subprocess.run(["umount", str(results)], capture_output=True)
+        yield give
 
 
-@pytest.mark.system
 def test_a_run_on_a_full_disk_goes_on_when_there_is_room(folder, small_disk, assert_as_undisturbed):
     shard, truth = folder / SHARDS[1], folder / TRUTH
     for path in (shard, truth):

@@ -28,6 +28,31 @@ def make_folder(folder: Path) -> None:
         raise UserError(f"{folder}: cannot be made ({cause(error)}); name another folder") from None
 
 
+def require_place(folder: Path, what: str) -> None:
+    """Check that a folder for results is there or can be made.
+
+    Parameters
+    ----------
+    what
+        Names it, for messages.
+
+    Raises
+    ------
+    UserError
+        If something else is there, or nothing can be written where it would be made.
+    """
+    try:
+        there = next(each for each in (folder, *folder.parents) if each.exists())
+        if not there.is_dir():
+            raise UserError(f"{what}: {there} is no folder; name another")
+        with tempfile.TemporaryFile(dir=there):
+            pass
+    except OSError as error:
+        raise UserError(
+            f"{what}: {folder} cannot be written ({cause(error)}); name another folder"
+        ) from None
+
+
 def tell_if_full(folder: Path) -> None:
     """Say in a sentence that no megabyte can be written to `folder`, if that is so."""
     try:

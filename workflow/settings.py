@@ -18,6 +18,7 @@ from forests import model as forest_model
 from solver.materials import NAMES as MATERIALS
 from workflow import training
 from workflow.arguments import path_word
+from workflow.room import require_place
 from workflow.strict_schema import first_mistake, reason
 
 PLACES = ("results_dir", "mesh_folder", "baseline")
@@ -106,9 +107,7 @@ def check_links(config: Mapping[str, Any]) -> None:
         If a model's mesh or material or the forests do not exist, a list of models names none,
         `objectives.objectives` names no objective, or training data make no sense.
     """
-    results = Path(config["results_dir"])
-    if results.exists() and not results.is_dir():
-        raise UserError(f"results_dir: {results} is no folder; name another")
+    require_place(Path(config["results_dir"]), "results_dir")
     for name in config["models"]:
         mesh = mesh_of(config, name)
         if mesh.startswith(BUILTIN) and mesh.removeprefix(BUILTIN) not in BUILTIN_MESHES:

@@ -27,6 +27,8 @@ LONGEST_SECONDS = 600.0
 """Length of a sound that somebody may want to hear."""
 LONGEST_CONTACT = 1.0
 """Duration of a force [s] that still strikes rather than pushes."""
+LEAST_IMPULSE, LARGEST_IMPULSE = 1e-6, 1e6
+"""What somebody may strike with [N s]."""
 
 
 @dataclass
@@ -55,14 +57,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     impulse = parser.add_mutually_exclusive_group()
     impulse.add_argument(
         "--impulse",
-        type=number_between(-1e6, 1e6, "N s"),
+        type=number_between(-LARGEST_IMPULSE, LARGEST_IMPULSE, "N s"),
         nargs=3,
         metavar=("FX", "FY", "FZ"),
         help="impulse [N s]",
     )
     impulse.add_argument(
         "--strength",
-        type=number_between(1e-6, 1e6, "N s"),
+        type=number_between(LEAST_IMPULSE, LARGEST_IMPULSE, "N s"),
         default=1.0,
         help="impulse along the inward normal [N s] (default 1, which sounds as loud as the clip)",
     )
@@ -104,7 +106,7 @@ def run(arguments: argparse.Namespace) -> int:
     from sound.outputs import require_output
     from sound.rendering.render import Hit, render, ringing_seconds
 
-    require_output(arguments.out, ENDINGS)
+    require_output(arguments.out, ENDINGS, [arguments.file, arguments.like or arguments.file])
     if arguments.seconds is not None and arguments.seconds > LONGEST_SECONDS:
         raise UserError(f"--seconds {arguments.seconds:g}: expected at most {LONGEST_SECONDS:g}")
     if arguments.seconds is not None:
@@ -140,8 +142,11 @@ def _scene(arguments: argparse.Namespace) -> _Scene:
     if arguments.impulse is None:
         return _Scene(solid, listening, position, arguments.strength * inward)
     impulse = np.array(arguments.impulse)
-    if not impulse.any():
-        raise UserError("--impulse: expected three numbers [N s], not all of them 0")
+    strength = float(np.linalg.norm(impulse))
+    if strength < LEAST_IMPULSE:
+        raise UserError(
+            f"--impulse: {strength:g} N s in all, expected at least {LEAST_IMPULSE:g} N s"
+        )
     return _Scene(solid, listening, position, impulse)
 
 
@@ -149,13 +154,14 @@ def _point_of_solid(
     arguments: argparse.Namespace,
 ) -> tuple[Array, Array, SoundingSolid, Listening | None]:
     """Struck point, inward normal there, the solid, and how its clips are heard if it has some."""
+    from carillon.files import kind_of
     from solver.modes_file import read_modes
     from solver.response import Damping
     from sound.design_file import read_design
     from sound.rendering.listening import Listening
     from sound.rendering.solid import SoundingSolid
 
-    has_modes = _kind(arguments.file) == "modes"
+    has_modes = kind_of(arguments.file)[0] == "modes"
     if not has_modes and (arguments.damping or arguments.like):
         raise UserError("--damping and --like go with modes.h5; a design has dampings of its own")
     if arguments.damping and arguments.like:
@@ -170,20 +176,6 @@ def _point_of_solid(
     else:
         solid = SoundingSolid.of_design(design)
     return *_surface_point(arguments, design), solid, Listening.of_design(design, solid)
-
-
-def _kind(path: str) -> str:
-    """Kind of a Carillon file; nothing if it is none, which whoever reads it will say."""
-    import h5py
-
-    from carillon.places import require_file
-
-    require_file(path, "a Carillon design or modes file (HDF5)")
-    try:
-        with h5py.File(path) as file:
-            return str(file.attrs.get("kind", ""))
-    except Exception:  # HDF5 has many ways to say that bytes make no sense
-        return ""
 
 
 def _surface_point(arguments: argparse.Namespace, design: Design) -> tuple[Array, Array]:

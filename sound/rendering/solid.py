@@ -74,7 +74,7 @@ class SoundingSolid:
         Raises
         ------
         UserError
-            If the file holds fewer elastic modes than the design.
+            If the file holds fewer elastic modes than the design, or those of another object.
         """
         assert file.modes is not None
         count = len(design.frequencies)
@@ -83,6 +83,7 @@ class SoundingSolid:
                 f"found {len(file.frequencies)} modes, expected {RIGID_MODES} rigid and {count} "
                 f"elastic ones as in the design; compute {RIGID_MODES + count}"
             )
+        _require_same_object(file.mesh, design.model.mesh)
         kept = slice(RIGID_MODES, RIGID_MODES + count)
         dampings = design.targets.dampings
         return cls(file.frequencies[kept], dampings, file.mesh, file.modes[:, kept])
@@ -107,3 +108,17 @@ class SoundingSolid:
         joint = np.sqrt(np.add.reduceat(square, [group.start for group in groups], axis=1))
         joint = np.repeat(joint, [group.stop - group.start for group in groups], axis=1)
         return np.asarray(np.divide(square, joint, out=np.zeros_like(square), where=joint > 0.0))
+
+
+def _require_same_object(mesh: HexMesh, designed: HexMesh) -> None:
+    """Refuse a mesh that fills another box than that of the design, by more than a cell."""
+    boxes = [
+        np.stack([each.nodes.min(axis=0), each.nodes.max(axis=0)]) for each in (mesh, designed)
+    ]
+    if np.abs(boxes[0] - boxes[1]).max() > max(mesh.edge, designed.edge):
+        sizes = [" x ".join(f"{side:.3g}" for side in np.ptp(box, axis=0)) for box in boxes]
+        raise UserError(
+            f"the modes are of another object than the design: one of {sizes[0]} m at "
+            f"{boxes[0][0].round(4).tolist()}, expected one of {sizes[1]} m at "
+            f"{boxes[1][0].round(4).tolist()}"
+        )

@@ -12,7 +12,6 @@ from _pytest.mark.structures import ParameterSet
 
 from tests.hostile import summary
 from tests.hostile.cases import Case, Table
-from tests.hostile.known import KNOWN
 from tests.hostile.suite import Suite
 from tests.hostile.zoo import Zoo
 from tests.hostile.zygote import Zygote
@@ -20,15 +19,10 @@ from tests.hostile.zygote import Zygote
 
 def parameters(table: Table) -> list[ParameterSet]:
     """The rows of a table for `pytest.mark.parametrize`."""
-    return [pytest.param(row, id=row.name, marks=_marks(row)) for row in table.rows]
-
-
-def _marks(row: Case) -> list[pytest.MarkDecorator]:
-    marks = [] if row.usual else [pytest.mark.torture]
-    fault = KNOWN.get(row.name.partition(": ")[2])
-    if fault is not None:
-        marks.append(pytest.mark.xfail(reason=fault, strict=False))
-    return marks
+    return [
+        pytest.param(row, id=row.name, marks=[] if row.usual else pytest.mark.torture)
+        for row in table.rows
+    ]
 
 
 @pytest.fixture(scope="session")

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
-from pathlib import Path
 
 from carillon.errors import UserError
 from workflow.compare import report
 from workflow.compare.cells import compare
-from workflow.compare.folders import read_folder
+from workflow.compare.folders import read_folder, require_apart
 from workflow.compare.noise import WORSE
 
 EXIT_WORSE = 1
@@ -34,19 +33,21 @@ def run(arguments: argparse.Namespace) -> int:
     UserError
         If one does not exist or holds no tables, or if they have none in common.
     """
-    comparison = compare(read_folder(arguments.before), read_folder(arguments.now))
+    before, now = read_folder(arguments.before), read_folder(arguments.now)
+    out = None if arguments.out is None else require_apart(arguments.out, before, now)
+    comparison = compare(before, now)
     if not comparison.cells:
         raise UserError(
             f"{arguments.before} and {arguments.now} have no table and row in common; expected "
             "results of the same models"
         )
-    if arguments.out is not None:
-        report.write(comparison, Path(arguments.out))
+    if out is not None:
+        report.write(comparison, out)
     if arguments.json:
         print(json.dumps(report.as_json(comparison), indent=1))
     else:
         print(report.as_text(comparison))
-        if arguments.out is not None:
-            print(f"all of it: {Path(arguments.out, report.NAME)}.html")
+        if out is not None:
+            print(f"all of it: {out / report.NAME}.html")
     moved = {cell.verdict for cell in comparison.moved}
     return EXIT_WORSE if arguments.fail_on_move and moved & {*WORSE} else 0

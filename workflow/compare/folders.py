@@ -11,6 +11,7 @@ from typing import Any
 from carillon.documents import read_yaml
 from carillon.errors import UserError
 from carillon.files import cause
+from carillon.places import require_file
 from workflow.compare.noise import Value, verdict
 from workflow.report.numbers import show
 from workflow.report.table import Table, kind_in, read_csv_table, read_table
@@ -55,7 +56,7 @@ def read_folder(path: str | Path) -> Folder:
     return Folder(
         path,
         {str(stem.relative_to(path)): _read(stem) for stem in _stems(path)},
-        read_yaml(config, "the configuration of a run") if config.is_file() else {},
+        read_yaml(config, "the configuration of a run") if config.exists() else {},
     )
 
 
@@ -82,6 +83,20 @@ def require_tables(path: str | Path) -> Path:
     return path
 
 
+def require_apart(out: str | Path, *compared: Folder) -> Path:
+    """Check that a comparison is not written among the tables compared, one of which it would be.
+
+    Raises
+    ------
+    UserError
+        If it is.
+    """
+    out = Path(out)
+    if out.resolve() in {(folder.path / part).resolve() for folder in compared for part in PARTS}:
+        raise UserError(f"{out}: holds tables that are compared; name another folder to write to")
+    return out
+
+
 def require_baseline(config: Mapping[str, Any]) -> list[str]:
     """Check before anything runs that a configuration names a baseline, for the rule's input.
 
@@ -104,7 +119,7 @@ def _stems(path: Path) -> list[Path]:
     files = (file for part in PARTS for file in sorted((path / part).glob("*")))
     return list(
         dict.fromkeys(
-            file.with_suffix("") for file in files if file.suffix in READERS and file.is_file()
+            file.with_suffix("") for file in files if file.suffix in READERS and file.exists()
         )
     )
 
@@ -112,7 +127,8 @@ def _stems(path: Path) -> list[Path]:
 def _read(stem: Path) -> Table:
     for ending, read in READERS.items():
         file = stem.with_suffix(ending)
-        if file.is_file():
+        if file.exists():
+            require_file(file, "a table")
             try:
                 table = read(file)
                 _try(table)

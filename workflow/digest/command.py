@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 
 from carillon.errors import UserError
-from carillon.files import cause, open_h5
+from carillon.files import cause, kind_of, open_h5
 
 CIRCUMSTANCES = frozenset(
     {
@@ -63,25 +63,15 @@ def digest(path: Path) -> str:
             found.update(f"{entry.dtype}{entry.shape}".encode())
             found.update(_bytes_of(entry))
 
-    try:
-        with open_h5(path, *_kind(path), sealed=True) as file:
-            add("/", file)
-            file.visititems(add)
-    except UserError:
-        raise
-    except Exception as error:  # HDF5 has many ways to say that bytes make no sense
-        raise UserError(
-            f"{path}: is damaged or no HDF5 file ({error}); name a result file"
-        ) from None
+    kind, schema = kind_of(path)
+    if not kind:
+        raise UserError(f"{path}: is damaged or no HDF5 file of this project; name a result file")
+    with open_h5(path, kind, schema, sealed=True) as file:
+        entries: list[tuple[str, h5py.Group | h5py.Dataset]] = [("/", file)]
+        file.visititems(lambda name, entry: entries.append((name, entry)))
+        for name, entry in entries:
+            add(name, entry)
     return found.hexdigest()
-
-
-def _kind(path: Path) -> tuple[str, int]:
-    """Kind and schema version that a file claims."""
-    with h5py.File(path, "r") as file:
-        if "kind" not in file.attrs:
-            raise UserError(f"{path}: holds nothing that says its kind, expected a result file")
-        return str(file.attrs["kind"]), int(file.attrs["schema_version"])
 
 
 def _bytes_of(dataset: h5py.Dataset) -> bytes:

@@ -64,7 +64,8 @@ def run(arguments: argparse.Namespace) -> int:
     UserError
         For a bad configuration or bad rates, or if a solid cannot be voxelised.
     """
-    path = Path(arguments.configfile or _preset(arguments.preset or DEFAULT_PRESET))
+    file, preset = arguments.configfile, arguments.preset or DEFAULT_PRESET
+    path = _preset(preset) if file is None else Path(file)
     config = load(path, arguments.objective)
     rates = _rates(arguments)
     machine = Machine(arguments.nodes, arguments.cores_per_node)
@@ -120,7 +121,7 @@ def _preset(name: str) -> Path:
 
 def _rates(arguments: argparse.Namespace) -> Rates:
     if not arguments.measure:
-        return load_rates(arguments.rates or PACKAGED)
+        return load_rates(PACKAGED if arguments.rates is None else arguments.rates)
     from workflow.estimate.measure import measure
 
     if arguments.rates is not None:

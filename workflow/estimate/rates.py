@@ -12,6 +12,7 @@ import yaml
 
 from carillon.errors import UserError
 from carillon.files import atomic_path, cause
+from carillon.places import require_file
 from workflow.strict_schema import first_mistake, reason
 
 SCHEMA = Path(__file__).parent.parent / "schemas" / "rates.schema.yaml"
@@ -138,7 +139,7 @@ def load_rates(path: str | Path = PACKAGED) -> Rates:
         If it cannot be read, is no JSON, or holds anything else.
     """
     try:
-        values = json.loads(Path(path).read_text())
+        values = json.loads(require_file(path, "rates (JSON)").read_text())
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({cause(error)}), expected rates") from None
     except (ValueError, RecursionError) as error:

@@ -1,0 +1,38 @@
+"""Small file systems, to be full on."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+KIB = 1024
+
+
+@contextmanager
+def disk_on(folder: Path, size: int) -> Iterator[Callable[[int], None]]:
+    """Mount a file system of `size` bytes on a folder; yields what gives it other bytes to spare.
+
+    The test is skipped where none can be mounted.
+    """
+    if os.geteuid() != 0:
+        pytest.skip("only root can mount a small file system")
+    _mount(folder, f"size={size // KIB}k")
+    try:
+        yield lambda spare: _mount(
+            folder, f"remount,size={(shutil.disk_usage(folder).used + spare) // KIB}k"
+        )
+    finally:
+        subprocess.run(["umount", str(folder)], capture_output=True)
+
+
+def _mount(folder: Path, options: str) -> None:
+    command = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(folder)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode:
+        pytest.skip(f"no file system can be mounted here: {done.stderr}")
