@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.polynomial import legendre
 
 from sound.clips.wav import write_wav
 from sound.design.designing import prepare
@@ -44,8 +45,21 @@ def project(folder, **changes):
     return replace(made, optimiser=replace(made.optimiser, **changes))
 
 
+def smooth_fields(grid):
+    """Nine smooth functions (m, 9) of the cells' places, of mean 0 and root mean square 1."""
+    x, y, z = (2.0 * (grid - grid.mean(axis=0)) / np.ptp(grid, axis=0)).T
+    along = legendre.legvander(x, 4)[:, 1:]
+    fields = np.column_stack([along, y, z, x * y, x * z, y * z])
+    fields -= fields.mean(axis=0)
+    return fields / np.sqrt((fields**2).mean(axis=0))
+
+
 def targets(made, seed=0, names=("end", "side")):
-    """What the bar sounds like with a material of other coordinates."""
+    """What the bar sounds like with another material.
+
+    That is given by moduli, not coordinates: modes of the Laplacian come in pairs here, of which
+    every processor finds others.
+    """
     count = made.modes
     empty = Targets(
         ("end", "side"),
@@ -55,9 +69,11 @@ def targets(made, seed=0, names=("end", "side")):
         (np.zeros(1),) * 2,
         (RATE,) * 2,
     )
-    simulation = prepare(made, empty).setting.simulation()
-    random = np.random.default_rng(seed)
-    found = simulation.evaluate(0.3 * random.standard_normal(simulation.material.dimensions))
+    setting = prepare(made, empty).setting
+    moduli = np.exp(
+        0.3 * smooth_fields(setting.mesh.grid) @ np.random.default_rng(seed).normal(size=9)
+    )
+    found = setting.simulation().evaluate(setting.material.coordinates(moduli))
     frequencies = np.sqrt(found.eigenvalues) / (2.0 * np.pi)
     chosen = [("end", "side").index(name) for name in names]
     return replace(
