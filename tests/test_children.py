@@ -21,8 +21,9 @@ print("ready", file=pipe, flush=True)
 signal.pause()
 """
 PARENT = """
-import os, sys
+import os, signal, sys
 from carillon.children import run_child
+signal.signal(signal.SIGINT, signal.default_int_handler)  # which a job in the background ignores
 run_child([sys.executable, "-c", sys.argv[1], sys.argv[2]], os.environ)
 """
 

@@ -59,7 +59,7 @@ def test_blocks_of_one_material_get_the_factors():
     calibration = default_calibration()
     images, _ = orientations()
     one = (np.array(least_patterns())[:, None] >> np.arange(8) & 1).astype(float)
-    ratio = fit("calibrated", 3.0 * one).moduli / (3.0 * fit("factored", one).moduli)
+    ratio = fit("calibrated", 3.0 * one).moduli / fit("factored", 3.0 * one).moduli
     np.testing.assert_allclose(ratio, calibration.factors[least_patterns()], rtol=1e-9)
     assert set(images[1:]) == set(least_patterns())
 
