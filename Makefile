@@ -29,6 +29,9 @@ export OMPI_ALLOW_RUN_AS_ROOT := 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 endif
 
+# Tests start thousands of processes, which need not compile the same modules.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: help env run test torture check clean
 
 help:  ## list the targets

@@ -6,7 +6,6 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
-from sklearn.cluster import KMeans
 
 from carillon.errors import UserError
 from solver.geometry import HexMesh
@@ -38,6 +37,8 @@ def partition_cells(mesh: HexMesh, parts: int, seed: int = 0) -> NDArray[np.int3
         )
     if parts == 1:
         return np.zeros(mesh.n_cells, dtype=np.int32)
+    from sklearn.cluster import KMeans  # whose import takes a second
+
     values, vectors = laplacian_modes(mesh, EMBEDDING_MODES + 1)
     # Commute-time weights: distances in the embedding follow distances along the solid.
     embedding = vectors[:, 1:] / np.sqrt(np.maximum(values[1:], 1e-12))

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.tree import DecisionTreeRegressor, ExtraTreeRegressor
 
 from dataset_gen.element import Array
 from forests.scaling import FEATURES, PATTERNS, Features
@@ -100,11 +99,13 @@ def flatten(tree: Any) -> Tree:
     )
 
 
-def _by_variance(kind: Callable[..., Any], split_features: int) -> Callable[..., Tree]:
-    """Grower of scikit-learn, whose splits leave the least variance."""
+def _by_variance(kind: str, split_features: int) -> Callable[..., Tree]:
+    """Grower by scikit-learn's estimator of that name, whose splits leave the least variance."""
 
     def grow(rows: Rows, limits: Limits, seed: int) -> Tree:
-        estimator = kind(
+        from sklearn import tree  # whose import takes a second, and only training has use of it
+
+        estimator = getattr(tree, kind)(
             max_depth=limits.depth,
             max_leaf_nodes=max(2, limits.max_leaves),
             min_samples_leaf=limits.min_leaf,
@@ -142,7 +143,7 @@ def _by_linear_fit(rows: Rows, limits: Limits, seed: int) -> Tree:
 
 GROWERS: dict[str, Callable[[Rows, Limits, int], Tree]] = {
     "linear": _by_linear_fit,
-    "best": _by_variance(DecisionTreeRegressor, SPLIT_FEATURES),
-    "extra": _by_variance(ExtraTreeRegressor, FEATURES),
+    "best": _by_variance("DecisionTreeRegressor", SPLIT_FEATURES),
+    "extra": _by_variance("ExtraTreeRegressor", FEATURES),
 }
 """How trees are grown; `best` is that of the paper and of random forests."""
