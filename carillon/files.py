@@ -259,15 +259,20 @@ def open_h5(path: str | Path, kind: str, schema: int, sealed: bool = False) -> I
             ) from error
 
 
-def kind_of(path: str | Path) -> tuple[str, int]:
+def kind_of(path: str | Path, what: str) -> tuple[str, int]:
     """Kind and schema version that a file claims; no kind if it is no file of this project.
+
+    Parameters
+    ----------
+    what
+        What it should be, for messages.
 
     Raises
     ------
     UserError
         If there is no such file.
     """
-    require_file(path, "a Carillon file (HDF5)")
+    require_file(path, what)
     try:
         with h5py.File(path, "r") as file:
             return str(file.attrs["kind"]), int(file.attrs["schema_version"])

@@ -145,7 +145,8 @@ def _scene(arguments: argparse.Namespace) -> _Scene:
     strength = float(np.linalg.norm(impulse))
     if strength < LEAST_IMPULSE:
         raise UserError(
-            f"--impulse: {strength:g} N s in all, expected at least {LEAST_IMPULSE:g} N s"
+            "--impulse: expected three numbers [N s], not all of them 0; "
+            f"{strength:g} N s in all is less than {LEAST_IMPULSE:g}"
         )
     return _Scene(solid, listening, position, impulse)
 
@@ -161,7 +162,7 @@ def _point_of_solid(
     from sound.rendering.listening import Listening
     from sound.rendering.solid import SoundingSolid
 
-    has_modes = kind_of(arguments.file)[0] == "modes"
+    has_modes = kind_of(arguments.file, "a Carillon design or modes file (HDF5)")[0] == "modes"
     if not has_modes and (arguments.damping or arguments.like):
         raise UserError("--damping and --like go with modes.h5; a design has dampings of its own")
     if arguments.damping and arguments.like:

@@ -63,7 +63,7 @@ def digest(path: Path) -> str:
             found.update(f"{entry.dtype}{entry.shape}".encode())
             found.update(_bytes_of(entry))
 
-    kind, schema = kind_of(path)
+    kind, schema = kind_of(path, "a result file (HDF5)")
     if not kind:
         raise UserError(f"{path}: is damaged or no HDF5 file of this project; name a result file")
     with open_h5(path, kind, schema, sealed=True) as file:
