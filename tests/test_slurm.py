@@ -44,11 +44,14 @@ def cluster(tmp_path_factory):
 def finish(run: subprocess.Popen[str], folder: Path) -> str:
     """Output of a run that has to end well."""
     try:
-        status = run.wait(HANG_SECONDS)
+        run.wait(HANG_SECONDS)
+    except subprocess.TimeoutExpired:
+        jobs = subprocess.run(["squeue", "--long"], capture_output=True, text=True).stdout
+        pytest.fail(f"it hangs:\n{(folder / 'snakemake.log').read_text()[-6000:]}{jobs}")
     finally:
         run.kill()
     output = (folder / "snakemake.log").read_text()
-    assert status == 0, output[-6000:]
+    assert run.returncode == 0, output[-6000:]
     return output
 
 
