@@ -26,7 +26,10 @@ LONGEST_SECONDS = 600.0
 """Of a run; only one that hangs takes so long."""
 ORPHAN_SECONDS = 90.0
 """Within which what is left of a killed run has to end by itself, on a machine under load."""
-TIMES = ("seconds", "provenance", "memory", "speedup", "slow_runs", "load")
+TIMES = (
+    *("seconds", "precompute", "phases", "spread", "speedup", "slow_runs"),
+    *("load", "memory", "provenance"),
+)
 """Parts of the names of what a benchmark finds different every time."""
 
 
