@@ -13,7 +13,7 @@ import pytest
 
 from tests.patience import HANG_SECONDS
 from tests.workflow_runs import CHECKOUT, planned
-from workflow import sources
+from workflow import source_files, sources
 
 PACKAGES = ("carillon", "dataset_gen", "forests", "solver", "sound", "workflow")
 CONFIG = """\
@@ -36,11 +36,13 @@ def project(tmp_path, monkeypatch):
     (folder / "room" / "data.json").write_text("1")
     (folder / "room" / "third.py").write_text("import room.first\n")
     monkeypatch.setattr(sources, "ROOT", folder)
+    monkeypatch.setattr(source_files, "PROJECT", folder)
+    monkeypatch.setattr(source_files, "KEPT", folder / "kept.json")
     return folder / "room"
 
 
 def fingerprint(*modules):
-    for cached in (sources._file_of, sources._named_in, sources._content, sources._read):
+    for cached in (sources._file_of, sources._named_in, sources._content):
         cached.cache_clear()
     return sources.fingerprint(*modules)
 
@@ -76,6 +78,48 @@ def test_a_command_line_counts_alone(project):
     before = fingerprint("room.__main__")
     (project / "second.py").write_text("VALUE = 3\n")
     assert fingerprint("room.__main__") == before
+
+
+def again(project):
+    """Keep what was read and forget it, as between two runs."""
+    source_files._keep()
+    source_files._known.cache_clear()
+    return project.parent / "kept.json"
+
+
+@pytest.fixture
+def parsed(project, monkeypatch):
+    """How often a file was parsed, after a first run."""
+    source_files._known.cache_clear()
+    fingerprint("room.first")
+    again(project)
+    calls = []
+    parse = source_files._parsed
+    monkeypatch.setattr(source_files, "_parsed", lambda text: calls.append(text) or parse(text))
+    yield calls
+    source_files._known.cache_clear()
+
+
+def test_files_are_parsed_once_for_all_runs(project, parsed):
+    before = fingerprint("room.first")
+    again(project)
+    assert fingerprint("room.first") == before
+    assert not parsed
+
+
+def test_a_changed_file_is_parsed_again(project, parsed):
+    before = fingerprint("room.first")
+    (project / "second.py").write_text("VALUE = open('data.json', 'rb')\n")
+    assert fingerprint("room.first") != before
+    assert len(parsed) == 1
+
+
+@pytest.mark.parametrize("damage", ["", "{", "[]", '{"a": 1}', '{"a": ["b", ["c"]]}'])
+def test_what_was_kept_may_be_damaged(project, parsed, damage):
+    before = fingerprint("room.first")
+    again(project).write_text(damage)
+    assert fingerprint("room.first") == before
+    assert len(parsed) == 3
 
 
 def test_a_module_that_does_not_exist_is_an_error(project):

@@ -7,17 +7,16 @@ texts do not count.
 
 from __future__ import annotations
 
-import ast
 import hashlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
+
+from workflow import source_files
 
 ROOT = Path(__file__).resolve().parent.parent
 ENTRY = ".__main__"
 """End of the name of a command line, whose own source counts but not all that it can start."""
-_TEXTS = frozenset({"help", "description", "metavar"})
-_DATA = (".json", ".css", ".j2", ".yaml")
 
 
 def fingerprint(*modules: str) -> str:
@@ -51,10 +50,9 @@ def _needed(modules: Iterable[str]) -> set[Path]:
         if not name.endswith(ENTRY):
             waiting.append(path)
     while waiting:
-        named, data = _named_in(waiting.pop())
-        found.update(data)
-        new = {path for path in map(_file_of, named) if path is not None} - found
-        found |= new
+        modules_named, data = _named_in(waiting.pop())
+        new = modules_named - found
+        found |= new | data
         waiting.extend(new)
     return found
 
@@ -70,62 +68,15 @@ def _file_of(module: str) -> Path | None:
 
 
 @cache
-def _named_in(path: Path) -> tuple[frozenset[str], frozenset[Path]]:
-    """Names that may be modules, and files of the same folder, that a source file mentions."""
-    names, data, _ = _read(path)
-    packages = {parent for name in names for parent in _parents(name)}
-    return frozenset(names | packages), frozenset(data)
-
-
-def _data_beside(path: Path, text: str) -> list[Path]:
-    """The data file beside a source file that a text names, if there is one."""
-    return [path.with_name(text)] if _is_data(text) and path.with_name(text).is_file() else []
-
-
-def _is_data(text: str) -> bool:
-    return text.endswith(_DATA) and "/" not in text
-
-
-def _parents(name: str) -> Iterator[str]:
-    """Packages that are imported before a module of theirs."""
-    parts = name.split(".")
-    return (".".join(parts[:end]) for end in range(1, len(parts)))
+def _named_in(path: Path) -> tuple[frozenset[Path], frozenset[Path]]:
+    """Modules of the project and data files of the same folder that a source file mentions."""
+    source = source_files.read(path)
+    modules = filter(None, map(_file_of, source.names))
+    data = (path.with_name(name) for name in source.data)
+    return frozenset(modules), frozenset(each for each in data if each.is_file())
 
 
 @cache
 def _content(path: Path) -> bytes:
     """What counts of a file: the syntax tree of a module, all bytes of another file."""
-    return _read(path)[2] if path.suffix == ".py" else path.read_bytes()
-
-
-@cache
-def _read(path: Path) -> tuple[set[str], set[Path], bytes]:
-    """Imported names, data files beside it, and syntax tree of a source file.
-
-    The tree is without docstrings and help texts.
-    """
-    names: set[str] = set()
-    data: set[Path] = set()
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    for node in ast.walk(tree):
-        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)):
-            # A string that stands alone, wherever: of attributes as well.
-            node.body = [part for part in node.body if not _is_text(part)]
-        elif isinstance(node, ast.Call):
-            node.keywords = [part for part in node.keywords if part.arg not in _TEXTS]
-        elif isinstance(node, ast.Import):
-            names.update(alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            names.add(node.module)
-            names.update(f"{node.module}.{alias.name}" for alias in node.names)
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-            data.update(_data_beside(path, node.value))
-    return names, data, ast.dump(tree).encode()
-
-
-def _is_text(statement: ast.stmt) -> bool:
-    return (
-        isinstance(statement, ast.Expr)
-        and isinstance(statement.value, ast.Constant)
-        and isinstance(statement.value.value, str)
-    )
+    return source_files.read(path).digest.encode() if path.suffix == ".py" else path.read_bytes()
