@@ -31,6 +31,8 @@ endif
 
 # Tests start thousands of processes, which need not compile the same modules.
 unexport PYTHONDONTWRITEBYTECODE
+# They run beside each other, so that more threads would only wait for each other.
+test torture: export OMP_NUM_THREADS ?= 1
 
 .PHONY: help env run test torture check clean
 

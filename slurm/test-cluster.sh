@@ -38,7 +38,8 @@ free_port() { python3 -c 'import socket; s = socket.socket(); s.bind(("", 0)); p
 configure() {
     local node cpus memory
     node=$(hostname -s)
-    cpus=${CPUS:-$(nproc)}
+    # Without what limits the threads of a program, which nproc minds too.
+    cpus=${CPUS:-$(env -u OMP_NUM_THREADS -u OMP_THREAD_LIMIT nproc)}
     memory=${MEMORY_MB:-$(awk '/MemTotal/ { print int($2 / 1024 * 3 / 4) }' /proc/meminfo)}
     mkdir -p "$FOLDER/state" "$FOLDER/spool" "$FOLDER/log"
     cat >"$FOLDER/slurm.conf" <<END

@@ -11,14 +11,9 @@ from numpy.typing import NDArray
 
 from dataset_gen.element import DEFAULT_POISSON
 from dataset_gen.objectives import DEFAULT_OBJECTIVE
+from solver import geometry
 from solver.coarsening import build_model
-from solver.geometry import (
-    HexMesh,
-    hexmesh_from_voxels,
-    load_surface,
-    surface_name,
-    voxelize,
-)
+from solver.geometry import HexMesh, hexmesh_from_voxels, voxelize
 from solver.limits import require_constants
 from solver.materials import young_modulus
 from solver.model import DEFAULT_DENSITY, ElasticModel
@@ -100,8 +95,8 @@ def build_problem(options: ProblemOptions) -> Problem:
     """
     require_constants(options.poisson, options.density)
     begin = time.perf_counter()
-    surface = load_surface(options.mesh, options.unit)
-    name = surface_name(options.mesh)
+    surface = geometry.load_surface(options.mesh, options.unit)
+    name = geometry.surface_name(options.mesh)
     voxels = voxelize(surface, options.resolution, options.fill, options.pieces, name)
     fine = hexmesh_from_voxels(voxels)
     meshed = time.perf_counter()

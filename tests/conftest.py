@@ -6,16 +6,31 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import pytest
 
+from carillon.runtime import allowed_threads
 from tests.hostile import summary
+from tests.hostile.fixtures import suite, tried, zoo  # noqa: F401
 from tests.patience import HANG_SECONDS
+from tests.zygote import Job, Limits, Zygote
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 MESH_FILES = ("stanford-bunny.obj", "teapot.obj")
+
+RANKS = {
+    # Open MPI refuses to run as root, the usual user of a container, unless told twice.
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    # More ranks than cores, told to Open MPI 4 and 5; other MPIs allow it anyway.
+    "OMPI_MCA_rmaps_base_oversubscribe": "1",
+    "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
+    # Other tests run beside them: ranks let those work while they wait, on whichever core.
+    "OMPI_MCA_mpi_yield_when_idle": "1",
+    "OMPI_MCA_hwloc_base_binding_policy": "none",
+}
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
@@ -51,19 +66,8 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 
 def _environment(threads: int, extra: Mapping[str, str] | None) -> dict[str, str]:
-    environment = dict(os.environ)
-    environment.update(
-        OMP_NUM_THREADS=str(threads),
-        PYTHONPATH=str(CHECKOUT),
-        # Open MPI refuses to run as root, the usual user of a container, unless told twice.
-        OMPI_ALLOW_RUN_AS_ROOT="1",
-        OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1",
-        # More ranks than cores, told to Open MPI 4 and 5; other MPIs allow it anyway.
-        OMPI_MCA_rmaps_base_oversubscribe="1",
-        PRTE_MCA_rmaps_default_mapping_policy=":oversubscribe",
-    )
-    environment.update(extra or {})
-    return environment
+    own = {"OMP_NUM_THREADS": str(threads), "PYTHONPATH": str(CHECKOUT)}
+    return {**os.environ, **own, **RANKS, **(extra or {})}
 
 
 def _run(
@@ -73,7 +77,6 @@ def _run(
     check: bool,
     cwd: Path | str | None,
 ) -> subprocess.CompletedProcess[str]:
-    shown = " ".join(command)
     try:
         done = subprocess.run(
             command,
@@ -86,15 +89,49 @@ def _run(
     except subprocess.TimeoutExpired as error:
         output = error.stderr or b""
         text = output.decode(errors="replace") if isinstance(output, bytes) else output
-        pytest.fail(f"no end after {timeout:g} s: {shown}\n{text}")
-    if check and done.returncode != 0:
+        pytest.fail(f"no end after {timeout:g} s: {' '.join(command)}\n{text}")
+    return _checked(done) if check else done
+
+
+def _checked(done: subprocess.CompletedProcess[str]) -> subprocess.CompletedProcess[str]:
+    if done.returncode != 0:
+        shown = " ".join(done.args)
         pytest.fail(f"exit status {done.returncode}: {shown}\n{done.stdout}\n{done.stderr}")
     return done
 
 
 @pytest.fixture(scope="session")
-def run_cli() -> Run:
-    """Run `python -m MODULE ARGUMENTS...` and return the CompletedProcess.
+def zygote() -> Iterator[Zygote]:
+    """A process that has imported everything, and forks for each program that tests run."""
+    found = Zygote(RANKS)
+    yield found
+    found.close()
+
+
+@pytest.fixture(scope="session")
+def run_cli(zygote: Zygote) -> Run:
+    """Run `python -m MODULE ARGUMENTS...`, forked, and return the CompletedProcess.
+
+    On one thread. Keywords: `check` (fail the test unless the exit status is 0), `cwd`.
+    """
+    limits = Limits(cpu_seconds=int(HANG_SECONDS), address_space=16 << 30, file_size=4 << 30)
+
+    def run(
+        module: str, *arguments: object, check: bool = False, cwd: Path | str = CHECKOUT
+    ) -> subprocess.CompletedProcess[str]:
+        words = [str(word) for word in arguments]
+        outcome = zygote.run(Job(module, words, str(cwd), limits=limits))
+        done = subprocess.CompletedProcess(
+            [module, *words], outcome.status, outcome.stdout, outcome.stderr
+        )
+        return _checked(done) if check else done
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def start_cli() -> Run:
+    """Start `python -m MODULE ARGUMENTS...` as people do and return the CompletedProcess.
 
     Keywords: `timeout` [s], `check` (fail the test unless the exit status is 0), `env` (variables
     added to the environment), `cwd`.
@@ -109,7 +146,7 @@ def run_cli() -> Run:
         cwd: Path | str | None = None,
     ) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", module, *map(str, arguments)]
-        return _run(command, _environment(_cores(), env), timeout, check, cwd)
+        return _run(command, _environment(allowed_threads(), env), timeout, check, cwd)
 
     return run
 
@@ -137,7 +174,7 @@ def mpiexec() -> Run:
         target = [str(module)] if str(module).endswith(".py") else ["-m", str(module)]
         program = [sys.executable, "-m", "mpi4py", *target, *map(str, arguments)]
         command = [launcher, "-n", str(ranks), *program]
-        threads = max(1, _cores() // ranks)
+        threads = max(1, allowed_threads() // ranks)
         return _run(command, _environment(threads, env), timeout, check, cwd)
 
     return run
@@ -154,7 +191,3 @@ def meshes() -> Path:
             f"no {' and '.join(missing)} in {folder}; set CARILLON_MESHES to a folder that has them"
         )
     return folder
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0))

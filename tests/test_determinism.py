@@ -20,12 +20,12 @@ CIRCUMSTANCES = {
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory, run_cli):
+def results(tmp_path_factory, start_cli):
     folder = tmp_path_factory.mktemp("results")
     found = {}
     for name, variables in CIRCUMSTANCES.items():
         path = folder / f"{name}.npz"
-        run_cli("tests.repeated_results", path, folder, env=variables, check=True, timeout=600)
+        start_cli("tests.repeated_results", path, folder, env=variables, check=True, timeout=600)
         found[name] = dict(np.load(path))
     return found
 

@@ -47,8 +47,8 @@ def test_the_packages_import_from_any_folder_without_pythonpath():
 
 
 @pytest.fixture(scope="module")
-def environment(run_cli) -> dict:
-    return json.loads(run_cli("carillon", "--json", check=True).stdout)
+def environment(start_cli) -> dict:
+    return json.loads(start_cli("carillon", "--json", check=True).stdout)
 
 
 def test_the_start_up_check_names_what_is_used(environment):
@@ -64,8 +64,8 @@ def test_petsc_does_not_run_on_the_reference_blas(environment):
     assert "reference" not in environment["blas"]
 
 
-def test_the_start_up_check_is_readable(run_cli):
-    done = run_cli("carillon", check=True)
+def test_the_start_up_check_is_readable(start_cli):
+    done = start_cli("carillon", check=True)
     for word in ("Carillon", "PETSc", "SLEPc", "BLAS", "MUMPS"):
         assert word in done.stdout
 

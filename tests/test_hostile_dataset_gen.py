@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from tests.hostile.dataset_cases import TABLE
-from tests.hostile.fixtures import parameters, suite, tried, zoo, zygote  # noqa: F401
+from tests.hostile.fixtures import parameters
 
 
 @pytest.mark.parametrize("case", parameters(TABLE))
-def test_dataset_gen(case, tried):  # noqa: F811
+def test_dataset_gen(case, tried):
     tried(case)

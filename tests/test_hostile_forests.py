@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from tests.hostile.fixtures import parameters, suite, tried, zoo, zygote  # noqa: F401
+from tests.hostile.fixtures import parameters
 from tests.hostile.forests_cases import TABLE
 
 
 @pytest.mark.parametrize("case", parameters(TABLE))
-def test_forests(case, tried):  # noqa: F811
+def test_forests(case, tried):
     tried(case)

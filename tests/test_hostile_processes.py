@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from tests.hostile.fixtures import zoo, zygote  # noqa: F401
 from tests.hostile.suite import snapshot
 from tests.hostile.zoo import CONFIGURATION
 from tests.workflow_runs import PROFILE, snakemake
@@ -32,7 +31,7 @@ RANKS = {
 }
 
 
-def words_of(command, zoo):  # noqa: F811
+def words_of(command, zoo):
     return command.replace("ZOO", str(zoo.folder)).split()
 
 
@@ -46,16 +45,16 @@ def assert_refused(done, room, folder):
 
 
 @pytest.mark.parametrize("name", ALONE)
-def test_alone(name, zoo, run_cli, tmp_path):  # noqa: F811
+def test_alone(name, zoo, start_cli, tmp_path):
     room, *words = words_of(ALONE[name], zoo)
-    done = run_cli(room, *words, cwd=tmp_path)
+    done = start_cli(room, *words, cwd=tmp_path)
     assert_refused(done, room, tmp_path)
     assert done.stderr.count("\n") == 1
 
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("name", RANKS)
-def test_on_two_ranks_it_is_said_once_and_both_end(name, zoo, mpiexec, tmp_path):  # noqa: F811
+def test_on_two_ranks_it_is_said_once_and_both_end(name, zoo, mpiexec, tmp_path):
     room, *words = words_of(RANKS[name], zoo)
     assert_refused(mpiexec(2, room, *words, cwd=tmp_path), room, tmp_path)
 
@@ -81,7 +80,7 @@ def test_a_launcher_is_no_other_command(launcher, tmp_path):
     assert not (tmp_path / "x").exists()
 
 
-def test_snakemake_takes_odd_names(zoo, tmp_path):  # noqa: F811
+def test_snakemake_takes_odd_names(zoo, tmp_path):
     """All that a shell could stumble over, in the names of a folder and of a mesh."""
     folder = "my results; $(touch x) 'a' {b}"
     text = CONFIGURATION.replace("'builtin:bar'", f'"{zoo.folder}/my box.obj"')

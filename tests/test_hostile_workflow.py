@@ -5,19 +5,19 @@ from __future__ import annotations
 import pytest
 
 from tests.hostile import carillon_cases, configuration_cases, workflow_cases
-from tests.hostile.fixtures import parameters, suite, tried, zoo, zygote  # noqa: F401
+from tests.hostile.fixtures import parameters
 
 
 @pytest.mark.parametrize("case", parameters(workflow_cases.TABLE))
-def test_workflow(case, tried):  # noqa: F811
+def test_workflow(case, tried):
     tried(case)
 
 
 @pytest.mark.parametrize("case", parameters(configuration_cases.TABLE))
-def test_configuration(case, tried):  # noqa: F811
+def test_configuration(case, tried):
     tried(case)
 
 
 @pytest.mark.parametrize("case", parameters(carillon_cases.TABLE))
-def test_carillon(case, tried):  # noqa: F811
+def test_carillon(case, tried):
     tried(case)

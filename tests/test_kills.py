@@ -10,7 +10,6 @@ import time
 import pytest
 
 from tests.hostile import summary
-from tests.hostile.fixtures import zoo, zygote  # noqa: F401
 from tests.hostile.killing import Killed, kill_and_repeat, moments, run_undisturbed, snakemake
 from tests.hostile.zoo import CONFIGURATION
 
@@ -46,7 +45,7 @@ NUMBERS = {
 
 
 @pytest.fixture(scope="module")
-def commands(zoo):  # noqa: F811
+def commands(zoo):
     shard = {"shard.h5": zoo.folder / "shard.h5"}
     project = {name: zoo.folder / name for name in ("project.yaml", "metal.wav", "wood.wav")}
     rules = {"config.yaml": CONFIGURATION}

@@ -25,7 +25,6 @@ from solver.moduli_file import read_moduli
 from solver.response_file import read_response
 from sound.clips.wav import read_wav
 from sound.design_file import read_design
-from tests.hostile.fixtures import zoo, zygote  # noqa: F401
 from tests.hostile.fuzzing import damaged, examples, or_refused
 from tests.solids import box_mesh
 
@@ -57,7 +56,7 @@ def plain(value):
 @pytest.mark.parametrize("kind", READERS)
 @examples(60)
 @given(data=st.data())
-def test_a_damaged_file_says_the_same_or_is_refused(kind, data, zoo, tmp_path_factory):  # noqa: F811
+def test_a_damaged_file_says_the_same_or_is_refused(kind, data, zoo, tmp_path_factory):
     content = (zoo.folder / f"{kind}.h5").read_bytes()
     path = folder_of(tmp_path_factory) / f"{kind}.h5"
     rewrite(path, data.draw(damaged(content)))
@@ -80,13 +79,13 @@ def rewrite(path: Path, content: bytes) -> None:
 
 
 @pytest.mark.parametrize("kind", ["shard", "forests", "modes", "response", "design"])
-def test_an_undamaged_file_is_read(kind, zoo):  # noqa: F811
+def test_an_undamaged_file_is_read(kind, zoo):
     assert READERS[kind](zoo.folder / f"{kind}.h5") is not None
 
 
 @pytest.mark.parametrize("kind", READERS)
 @pytest.mark.parametrize("other", READERS)
-def test_a_file_of_another_kind_is_refused(kind, other, zoo):  # noqa: F811
+def test_a_file_of_another_kind_is_refused(kind, other, zoo):
     if kind != other:
         with pytest.raises(UserError, match="holds"):
             READERS[kind](zoo.folder / f"{other}.h5")
@@ -146,7 +145,7 @@ def test_a_damaged_journal_ends_in_the_same_shard_or_is_refused(data, begun, tmp
 @pytest.mark.parametrize("end", ["obj", "stl", "ply", "off", "glb"])
 @examples(60)
 @given(data=st.data())
-def test_a_damaged_mesh_is_a_finite_surface_or_refused(end, data, zoo, tmp_path_factory):  # noqa: F811
+def test_a_damaged_mesh_is_a_finite_surface_or_refused(end, data, zoo, tmp_path_factory):
     path = folder_of(tmp_path_factory) / f"mesh.{end}"
     rewrite(path, data.draw(damaged((zoo.folder / f"box.{end}").read_bytes())))
     found = or_refused(lambda: load_surface(str(path)))
@@ -163,7 +162,7 @@ VOXELS = box_mesh(4, 3, 2)
 @pytest.mark.parametrize("name", ["good.npy", "whole.npy", "single.npy", "good.txt"])
 @examples(80)
 @given(data=st.data())
-def test_damaged_moduli_are_moduli_or_refused(name, data, zoo, tmp_path_factory):  # noqa: F811
+def test_damaged_moduli_are_moduli_or_refused(name, data, zoo, tmp_path_factory):
     path = folder_of(tmp_path_factory) / name
     rewrite(path, data.draw(damaged((zoo.folder / name).read_bytes())))
     found = or_refused(lambda: read_moduli(path, VOXELS.n_cells, "the box"))
@@ -195,7 +194,7 @@ def test_any_array_is_moduli_or_refused(data, tmp_path_factory):
 @pytest.mark.parametrize("name", ["tone.wav", "24-bit.wav", "tone.flac"])
 @examples(80)
 @given(data=st.data())
-def test_a_damaged_clip_is_a_finite_sound_or_refused(name, data, zoo, tmp_path_factory):  # noqa: F811
+def test_a_damaged_clip_is_a_finite_sound_or_refused(name, data, zoo, tmp_path_factory):
     path = folder_of(tmp_path_factory) / name
     content = (zoo.folder / name).read_bytes()
     rewrite(

@@ -141,9 +141,9 @@ def run(tmp_path_factory):
     """A copy of the project beside a finished run of some of its rules."""
     copy = tmp_path_factory.mktemp("copy")
     for package in PACKAGES:
-        shutil.copytree(
-            CHECKOUT / package, copy / package, ignore=shutil.ignore_patterns("__pycache__")
-        )
+        # With its compiled kernels, but for what others are writing.
+        others = shutil.ignore_patterns("*.pyc*", "*.tmp.*", ".*")
+        shutil.copytree(CHECKOUT / package, copy / package, ignore=others)
     shutil.copy(CHECKOUT / "Snakefile", copy)
     write_config(copy)
     done = snakemake(copy)

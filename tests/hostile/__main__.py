@@ -14,7 +14,7 @@ from tests.hostile.cases import Case
 from tests.hostile.suite import Suite
 from tests.hostile.tables import TABLES
 from tests.hostile.zoo import Zoo
-from tests.hostile.zygote import Zygote
+from tests.zygote import Zygote
 
 
 def main() -> int:

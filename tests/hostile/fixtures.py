@@ -5,7 +5,6 @@ from __future__ import annotations
 import fcntl
 import os
 import time
-from collections.abc import Iterator
 
 import pytest
 from _pytest.mark.structures import ParameterSet
@@ -14,7 +13,6 @@ from tests.hostile import summary
 from tests.hostile.cases import Case, Table
 from tests.hostile.suite import Suite
 from tests.hostile.zoo import Zoo
-from tests.hostile.zygote import Zygote
 
 
 def parameters(table: Table) -> list[ParameterSet]:
@@ -23,13 +21,6 @@ def parameters(table: Table) -> list[ParameterSet]:
         pytest.param(row, id=row.name, marks=[] if row.usual else pytest.mark.torture)
         for row in table.rows
     ]
-
-
-@pytest.fixture(scope="session")
-def zygote() -> Iterator[Zygote]:
-    found = Zygote()
-    yield found
-    found.close()
 
 
 @pytest.fixture(scope="session")

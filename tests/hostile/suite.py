@@ -12,7 +12,7 @@ from pathlib import Path
 from tests.hostile.cases import ZOO, Case, Copy, Place
 from tests.hostile.places import put_place
 from tests.hostile.zoo import Zoo
-from tests.hostile.zygote import Job, Limits, Outcome, Zygote
+from tests.zygote import Job, Limits, Outcome, Zygote
 
 LONGEST_SENTENCE = 1300
 PEAK_BYTES = 2 << 30

@@ -10,7 +10,7 @@ from pathlib import Path
 from tests.hostile import zoo_hdf5, zoo_meshes, zoo_numbers, zoo_texts
 from tests.hostile.cases import Place
 from tests.hostile.places import KINDS, put_place
-from tests.hostile.zygote import Job, Zygote
+from tests.zygote import Job, Zygote
 
 SOLID = "builtin:box --resolution 4"
 """Of 24 voxels, which the materials of the zoo are for."""

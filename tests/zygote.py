@@ -1,7 +1,7 @@
 """Programs run by forking a process that has imported them already.
 
 Starting Python and importing MPI, PETSc, numba and the rooms takes seconds, running into a mistake
-milliseconds. `python -m tests.hostile.zygote` imports everything, initialises nothing, and forks
+milliseconds. `python -m tests.zygote` imports everything, initialises nothing, and forks
 for every job that it reads as a line of JSON; the fork is bounded in time, memory and size of
 files, has a session of its own, and ends with everything that it has started.
 """
@@ -28,7 +28,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
 
-CHECKOUT = Path(__file__).resolve().parents[2]
+CHECKOUT = Path(__file__).resolve().parent.parent
 ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "workflow")
 WITHOUT_MPI = ("dataset_gen", "forests", "tests.hostile.configure")
 """Programs that import no MPI unless they are started on several ranks."""
@@ -103,11 +103,12 @@ class Outcome:
 
 
 class Zygote:
-    """The forking process, as its user sees it."""
+    """The forking process, as its user sees it; `variables` are what all programs find."""
 
-    def __init__(self) -> None:
+    def __init__(self, variables: Mapping[str, str] = {}) -> None:
         environment = {
             **os.environ,
+            **variables,
             **_ALONE,
             "PYTHONPATH": str(CHECKOUT),
             "OMP_NUM_THREADS": "1",
@@ -115,7 +116,7 @@ class Zygote:
             "MPLBACKEND": "agg",
         }
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "tests.hostile.zygote"],
+            [sys.executable, "-m", "tests.zygote"],
             cwd=CHECKOUT,
             env=environment,
             stdin=subprocess.PIPE,
@@ -221,6 +222,7 @@ def _be(job: Job, mark: str, libraries: tuple[Any, Any, Any], pipes: list[int]) 
             sys.stdout.flush()
         with suppress(Exception):
             sys.stderr.flush()
+        ctypes.CDLL(None).fflush(None)  # what libraries print
         os._exit(status)
 
 
