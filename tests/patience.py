@@ -6,6 +6,8 @@ import subprocess
 import time
 from collections.abc import Callable
 
+import psutil
+
 HANG_SECONDS = 1200.0
 """What takes longer hangs, on however busy a machine."""
 
@@ -34,3 +36,11 @@ def wait_for(
         assert run is None or run.poll() is None or met(), f"{what}: the run has ended before"
         assert time.monotonic() < until, f"{what}: not within {HANG_SECONDS:g} s"
         time.sleep(0.05)
+
+
+def words_of(process: psutil.Process) -> list[str]:
+    """The command line of a process; nothing once it has ended, which it may at any moment."""
+    try:
+        return process.cmdline()
+    except psutil.NoSuchProcess:
+        return []

@@ -29,7 +29,7 @@ from sound.design.simulation import Simulation
 from sound.design_file import HISTORY_TYPE, read_design, write_design
 from sound.project import Weights, project_of
 from tests import small_project
-from tests.patience import HANG_SECONDS
+from tests.patience import HANG_SECONDS, words_of
 
 
 @pytest.fixture(scope="module")
@@ -320,4 +320,4 @@ def workers_of(process):
 
 def is_at_work(process):
     """Whether it is a worker that has begun, and so waits for its parent's death as well."""
-    return "spawn_main" in " ".join(process.cmdline()) and process.num_threads() > 1
+    return "spawn_main" in " ".join(words_of(process)) and process.num_threads() > 1

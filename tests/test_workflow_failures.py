@@ -18,7 +18,7 @@ from carillon.errors import UserError
 from dataset_gen.journal import journal_of
 from solver.modes_file import read_modes
 from tests.disks import KIB, disk_on
-from tests.patience import HANG_SECONDS, wait_for
+from tests.patience import HANG_SECONDS, wait_for, words_of
 from tests.workflow_runs import CHECKOUT, PROFILE, snakemake
 from workflow.digest.command import digest
 
@@ -263,7 +263,7 @@ def written(folder: Path, run: subprocess.Popen[str], left: int = 0) -> list[Pat
 def job_of(run: subprocess.Popen[str], name: str) -> list[psutil.Process]:
     """Processes of the job that makes a file."""
     processes = psutil.Process(run.pid).children(recursive=True)
-    return [process for process in processes if any(name in part for part in process.cmdline())]
+    return [process for process in processes if any(name in word for word in words_of(process))]
 
 
 @pytest.mark.system

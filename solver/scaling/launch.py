@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from textwrap import shorten
 from typing import Any
 
 from carillon.children import run_child
@@ -95,5 +97,6 @@ def _run(command: list[str], environment: dict[str, str]) -> str | None:
     done = run_child(command, environment)
     if done.returncode == 0:
         return None
-    said = [line for line in done.stderr.splitlines() if line.startswith("solver")]
-    return said[0] if said else f"exit status {done.returncode}\n{done.stderr.strip()}"
+    lines = [line for line in done.stderr.splitlines() if re.search(r"\w", line)]
+    said = [line for line in lines if line.startswith("solver")]
+    return said[0] if said else shorten(f"exit status {done.returncode} {' '.join(lines)}", 300)
