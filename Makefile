@@ -13,9 +13,9 @@ PYTHON_OF_VENV = $(VENV)/bin/python
 CORES ?= all
 TARGETS ?= all
 PYTEST_OPTIONS ?=
-# Test files run beside each other, each in one process, the long ones first: two more than there are
-# cores, as those of SLURM wait most of the time and others now and then, but no more than eight.
-PYTEST_PROCESSES ?= $(shell n=$$(nproc); echo $$((n < 6 ? n + 2 : 8)))
+# Test files run beside each other, each in one process, the long ones first. Those of SLURM wait most
+# of the time, which is what the third process is for.
+PYTEST_PROCESSES ?= 3
 TORTURE_PROCESSES ?= 2
 PACKAGES = $(patsubst %/__init__.py,%,$(wildcard */__init__.py))
 RULES = $(wildcard Snakefile workflow/rules/*.smk)

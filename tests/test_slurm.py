@@ -7,13 +7,15 @@ import re
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import h5py
+import psutil
 import pytest
 
 from tests import slurm_cluster, workflow_runs
-from tests.patience import HANG_SECONDS, wait_for
+from tests.patience import HANG_SECONDS, wait_for, words_of
 from tests.slurm_cluster import Cluster
 from tests.workflow_runs import CHECKOUT
 from workflow import orphans
@@ -150,13 +152,17 @@ LONG_SAMPLES = 600_000
 
 
 def worker(shard: Path) -> int | None:
-    """Process that makes a shard; None if there is none."""
-    found = subprocess.run(
-        ["pgrep", "-f", f"^python -m dataset_gen generate .*{shard.name}"],
-        capture_output=True,
-        text=True,
-    ).stdout.split()
-    return int(found[0]) if found else None
+    """Process of this run that makes a shard; None if there is none.
+
+    Another run, in a clean root beside this one, makes a shard of the same name.
+    """
+    for process in psutil.process_iter():
+        words = words_of(process)
+        if words[1:4] == ["-m", "dataset_gen", "generate"] and shard.name in " ".join(words):
+            with suppress(psutil.Error):
+                if Path(process.cwd(), words[words.index("--out") + 1]) == shard:
+                    return int(process.pid)
+    return None
 
 
 def test_a_job_outlives_all_that_befalls_it(cluster: Cluster, tmp_path):
