@@ -76,7 +76,6 @@ def remote(cluster, tmp_path_factory):
     return folder
 
 
-@pytest.mark.system
 def test_jobs_of_slurm_find_the_same_bits_as_a_local_run(local, remote):
     for file in (*DATASET, FORESTS, MODES):
         assert digest(remote / file) == digest(local / file), file
