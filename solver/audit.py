@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from carillon.errors import UserError
 from solver.comparison import recomputed_residuals
-from solver.eigensolver import distributed_matrix
 from solver.model import RIGID_MODES
 from solver.modes_file import ModesFile, read_modes
+from solver.petsc_matrix import distributed_matrix
 from solver.sparse import assembled
 from solver.truth import can_count, count_negative
 from solver.verification import count_rigid

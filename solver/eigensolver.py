@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from carillon.errors import UserError
 from solver.petsc_options import OPTIONS_PREFIX, require_known_options
-
-if TYPE_CHECKING:
-    from solver.system import System
+from solver.system import System
 
 Array = NDArray[np.float64]
 
@@ -40,19 +37,6 @@ def factor_package(ranks: int) -> str:
         "this PETSc was built without MUMPS, which a parallel factorisation needs; run on one rank "
         "or rebuild PETSc with MUMPS"
     )
-
-
-def distributed_matrix(rows: sp.csr_matrix, comm: Any) -> Any:
-    """Symmetric PETSc matrix from this rank's rows (local, n), in blocks of three unknowns."""
-    local, total = rows.shape
-    csr = (
-        rows.indptr.astype(PETSc.IntType),
-        rows.indices.astype(PETSc.IntType),
-        rows.data.astype(PETSc.ScalarType),
-    )
-    matrix = PETSc.Mat().createAIJ(((local, total), (local, total)), bsize=3, csr=csr, comm=comm)
-    matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    return matrix
 
 
 def smallest_eigenpairs(

@@ -20,9 +20,9 @@ from dataset_gen.block import degrees_of_freedom
 from dataset_gen.element import rigid_motions
 from solver.decomposition import keep_on_root
 from solver.distribution import Share
-from solver.eigensolver import distributed_matrix
 from solver.model import Elements
 from solver.node_rows import Halo, NodeRows, Pattern
+from solver.petsc_matrix import distributed_matrix
 
 Array = NDArray[np.float64]
 Number = TypeVar("Number", np.float64, np.int64)

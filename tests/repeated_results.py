@@ -14,7 +14,8 @@ from dataset_gen.generate import generate
 from forests.training.dataset import dataset_of
 from forests.training.train import Training, train
 from solver.analysis import SolverOptions, modal_analysis
-from sound.design.designing import design, prepare
+from sound.design.designing import design
+from sound.design.preparation import prepare
 from tests import small_project, solids
 
 TOLERANCE = 1e-7

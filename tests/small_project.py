@@ -8,7 +8,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from sound.clips.wav import write_wav
-from sound.design.designing import prepare
+from sound.design.preparation import prepare
 from sound.project import project_of
 from sound.targets import Targets
 

@@ -19,11 +19,12 @@ import yaml
 
 from carillon.errors import ConvergenceError, UserError
 from sound.design import pool
-from sound.design.designing import design, prepare, targets_of
+from sound.design.designing import design
 from sound.design.objective import Cost, Objective
 from sound.design.optimisers import OPTIMISERS
 from sound.design.outcome import Outcome
 from sound.design.pool import Pool, Task, Trial
+from sound.design.preparation import prepare, targets_of
 from sound.design.search import Moment
 from sound.design.simulation import Simulation
 from sound.design_file import HISTORY_TYPE, read_design, write_design

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.threads import one_thread
-from sound.design.designing import Prepared, design
+from sound.design.designing import design
 from sound.design.objective import fall
 from sound.design.optimisers import OPTIMISERS
+from sound.design.preparation import Prepared
 from sound.design.simulation import Evaluation
 from sound.design_file import Design
 

@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Measure and print."""
     from sound.design.benchmark import benchmark
-    from sound.design.designing import prepare
+    from sound.design.preparation import prepare
     from sound.project import load_project, with_optimiser
 
     given = {key: getattr(arguments, key) for key in ("seconds", "evaluations", "workers")}

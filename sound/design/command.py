@@ -60,7 +60,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _search(arguments: argparse.Namespace) -> int:
     """Search, writing the design every half minute and at the end."""
-    from sound.design.designing import design, prepare, require_same_voxels
+    from sound.design.designing import design
+    from sound.design.preparation import prepare, require_same_voxels
     from sound.design_file import read_design, write_design
     from sound.outputs import require_output
     from sound.project import load_project, with_optimiser

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +16,10 @@ from solver.modes_file import frequencies
 from sound.design.descent import cost_of
 from sound.design.objective import Cost
 from sound.design.pool import Trial
+from sound.design.preparation import Prepared
 from sound.design.search import Moment, Search
 from sound.design.simulation import Evaluation, Simulation
 from sound.design_file import HISTORY_TYPE, Design
-
-if TYPE_CHECKING:
-    from sound.design.designing import Prepared
 
 FINAL_TOLERANCE = 1e-8
 """Relative error of the eigenvalues that a design is written with."""
