@@ -53,7 +53,7 @@ test: env  ## the whole test suite
 	@$(PYTHON_OF_VENV) -m pytest -q -n $(PYTEST_PROCESSES) --dist loadfile \
 		--no-loadscope-reorder $(PYTEST_OPTIONS)
 
-torture: env  ## all hostile inputs, many more random ones, fifty kills; takes an hour or two
+torture: env  ## all hostile inputs, many more random ones, fifty kills; a quarter of an hour or more
 	@CARILLON_TORTURE=1 $(PYTHON_OF_VENV) -m pytest -q -n $(TORTURE_PROCESSES) --dist loadfile \
 		$(wildcard tests/test_hostile_*.py tests/test_properties*.py tests/test_kills.py) $(PYTEST_OPTIONS)
 
