@@ -16,6 +16,8 @@ set -euo pipefail
 # Where all of SLURM's programs look, also in jobs, whose environment may be another one.
 LINK=/etc/slurm/slurm.conf
 PACKAGES=$(dirname "${BASH_SOURCE[0]}")/../workflow/envs/packages.sh
+# The daemons are where a root by cron, or by su without -, does not look.
+PATH=$PATH:/usr/local/sbin:/usr/sbin:/sbin
 
 fail() {
     echo "test-cluster: $*" >&2
@@ -25,7 +27,13 @@ fail() {
 # SLURM's plug-in for MPI ranks loads the library by this name, which no dependency brings.
 has_pmix() { python3 -c 'import ctypes; ctypes.CDLL("libpmix.so")' 2>/dev/null; }
 
-complete() { command -v slurmctld slurmd sbatch munged ps pgrep >/dev/null && has_pmix; }
+complete() {
+    local program
+    for program in slurmctld slurmd sbatch munged ps pgrep; do
+        command -v "$program" >/dev/null || return
+    done
+    has_pmix
+}
 
 install() {
     complete || bash "$PACKAGES" install slurm >/dev/null ||
@@ -111,7 +119,7 @@ start() {
             sleep 0.2
         done
     fi
-    tail -n 5 "$FOLDER"/log/*.log >&2
+    tail -n 5 "$FOLDER"/log/*.log >&2 || true
     stop
     fail "the node did not become idle within a minute; the last lines of the logs are above"
 }

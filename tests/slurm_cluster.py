@@ -19,6 +19,11 @@ from tests.workflow_runs import CHECKOUT
 
 SCRIPT = CHECKOUT / "slurm" / "test-cluster.sh"
 PROFILE = CHECKOUT / "slurm"
+FOLDERS = os.environ["PATH"].split(os.pathsep)
+DAEMONS = os.pathsep.join((*FOLDERS, "/usr/local/sbin", "/usr/sbin", "/sbin"))
+"""Where SLURM's daemons are, although not every root looks there."""
+PLAIN = os.pathsep.join(folder for folder in FOLDERS if not folder.endswith("sbin"))
+"""Where a root by cron, or by su without -, looks."""
 QUICK = (
     *("--slurm-no-account", "--slurm-init-seconds-before-status-checks", "1"),
     *("--max-status-checks-per-second", "1", "--latency-wait", "20"),
@@ -58,7 +63,7 @@ class Cluster:
         while process.exists():
             time.sleep(0.1)
         time.sleep(pause)
-        subprocess.run(["slurmctld"], check=True)
+        subprocess.run([str(shutil.which("slurmctld", path=DAEMONS))], check=True)
 
     def log(self) -> str:
         """What slurmd has to say."""
@@ -77,6 +82,7 @@ def control(*arguments: object) -> None:
         capture_output=True,
         text=True,
         timeout=HANG_SECONDS,
+        env={**os.environ, "PATH": PLAIN},
     )
     if done.returncode:
         raise RuntimeError(f"{SCRIPT.name} {arguments[0]}: {done.stderr}")
@@ -86,7 +92,7 @@ def started(folder: Path) -> Cluster:
     """Install SLURM where it is missing and start a cluster; skip where that is impossible."""
     if os.geteuid() != 0:
         pytest.skip("a SLURM cluster can only be started by root")
-    if not shutil.which("slurmctld") and not shutil.which("apt-get"):
+    if not shutil.which("slurmctld", path=DAEMONS) and not shutil.which("apt-get"):
         pytest.skip("no SLURM here, and no apt-get to install it by")
     control("install")
     try:

@@ -7,6 +7,8 @@
 #                                  and a sentence that says how
 set -euo pipefail
 TABLE=$(dirname "${BASH_SOURCE[0]}")/packages.txt
+# dpkg insists on programs that are where a root by cron, or by su without -, does not look.
+PATH=$PATH:/usr/local/sbin:/usr/sbin:/sbin
 
 fail() {
     printf '%s\n' "$*" >&2
