@@ -214,7 +214,6 @@ def played(player: Path, *words: float) -> np.ndarray:
     return np.frombuffer(done.stdout)
 
 
-@pytest.mark.system
 @pytest.mark.parametrize("position", [0, 1])
 def test_faust_plays_what_we_render(player: Path, position: int) -> None:
     design = small_design()
@@ -224,7 +223,6 @@ def test_faust_plays_what_we_render(player: Path, position: int) -> None:
     np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
 
 
-@pytest.mark.system
 def test_a_force_that_takes_time_has_the_same_impulse_in_faust(player: Path) -> None:
     from solver.response import half_sine
 
