@@ -16,9 +16,9 @@ from carillon.arguments import (
     whole_number,
 )
 from carillon.errors import UserError
+from carillon.fem.element import DEFAULT_POISSON
 from carillon.progress import say
 from dataset_gen import benchmark, ranks, summary
-from dataset_gen.element import DEFAULT_POISSON
 from dataset_gen.generate import Engine, engine_of, generate_file
 from dataset_gen.objectives import DATASET_OBJECTIVES, DEFAULT_OBJECTIVE, OBJECTIVES
 from dataset_gen.sampling import DISTRIBUTIONS

@@ -9,13 +9,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from carillon.fem.element import DEFAULT_POISSON, Array
 from carillon.progress import track
 from carillon.provenance import processor
-from dataset_gen.element import DEFAULT_POISSON, Array
+from carillon.serial import serial_blas
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, OBJECTIVES, fit, flops, sampled_energy
 from dataset_gen.objectives.lanes import LANES, add_product, compiled, empty, store_tile, zeros
 from dataset_gen.sampling import samples
-from dataset_gen.serial import serial_blas
 
 RUNS = 7
 """Timed runs after one that is not; the median counts."""

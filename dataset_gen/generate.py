@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from carillon.errors import UserError
+from carillon.fem.element import DEFAULT_POISSON
 from carillon.files import require_writable
 from carillon.progress import say, track
-from dataset_gen.element import DEFAULT_POISSON
 from dataset_gen.journal import Journal, discard_journal, journal_of
 from dataset_gen.objectives import DEFAULT_OBJECTIVE
 from dataset_gen.settings import settings_of

@@ -13,8 +13,8 @@ from numpy.random import Generator, Philox
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from dataset_gen.block import least_patterns, pattern_images, symmetries
-from dataset_gen.element import Array
+from carillon.fem.block import least_patterns, pattern_images, symmetries
+from carillon.fem.element import Array
 
 DISTRIBUTIONS = {"uniform": (0.0, 10.0), "log-uniform": (0.01, 1000.0)}
 """Distributions of the fine moduli and their ranges in GPa unless told otherwise.

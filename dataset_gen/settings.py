@@ -11,7 +11,7 @@ from typing import Any, get_type_hints
 
 from carillon import __version__
 from carillon.errors import UserError
-from dataset_gen.element import DEFAULT_POISSON
+from carillon.fem.element import DEFAULT_POISSON
 from dataset_gen.objectives import (
     DATASET_OBJECTIVES,
     DEFAULT_OBJECTIVE,

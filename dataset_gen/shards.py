@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from carillon import provenance
 from carillon.errors import UserError
+from carillon.fem.element import Array
 from carillon.files import create_h5, open_h5
-from dataset_gen.element import Array
 from dataset_gen.sampling import Moduli
 from dataset_gen.settings import Settings, settings_from
 from dataset_gen.tasks import ROW

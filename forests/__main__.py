@@ -13,14 +13,16 @@ from carillon.files import atomic_path, require_writable
 from carillon.measurement import measured
 from carillon.pictures import require_plottable
 from dataset_gen.ranks import refuse, world
-from forests import benchmark, summary
+from forests import summary
 from forests.comparison import table
 from forests.comparison.cases import CASES
 from forests.comparison.database import MATERIALS, MOST_MATERIALS
 from forests.comparison.methods import common_poisson, databases_of, load_models
 from forests.comparison.plot import plot
 from forests.model import default_path
-from forests.training import command, studies
+from forests.studies import benchmark
+from forests.studies import training as studies
+from forests.training import command
 from forests.training.command import PROGRAM
 from forests.training.dataset import open_dataset
 

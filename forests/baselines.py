@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from dataset_gen.block import galerkin_moduli
-from dataset_gen.element import Array
+from carillon.fem.block import galerkin_moduli
+from carillon.fem.element import Array
 
 
 def average(young: Array) -> Array:
@@ -14,5 +14,5 @@ def average(young: Array) -> Array:
 
 
 def galerkin(young: Array) -> Array:
-    """Galerkin projection (m, 8) -> (m, 8), see `dataset_gen.block.galerkin_moduli`."""
+    """Galerkin projection (m, 8) -> (m, 8), see `carillon.fem.block.galerkin_moduli`."""
     return galerkin_moduli(young)

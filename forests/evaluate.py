@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from carillon.errors import UserError
-from dataset_gen.element import Array
+from carillon.fem.element import Array
 from forests.layout import FEATURE_BITS, FEATURE_MASK
 from forests.model import CONSTANT, HIGH, LOW, Model
 from forests.ordering import FLIPS, order_code

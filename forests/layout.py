@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from carillon.errors import UserError
-from dataset_gen.element import Array
+from carillon.fem.element import Array
 
 NODE = np.dtype([("threshold", np.float32), ("link", np.int32)])
 """A node: the threshold of its split; `left child << 3 | feature`, or `~leaf` in leaves.

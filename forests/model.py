@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import h5py
 import numba
@@ -16,12 +15,8 @@ from numpy.typing import NDArray
 from carillon import provenance
 from carillon.errors import UserError
 from carillon.files import create_h5, open_h5
-from forests.layout import FEATURE_BITS, FEATURE_MASK, NODE, aligned, pack
+from forests.layout import FEATURE_BITS, FEATURE_MASK, NODE, aligned
 from forests.scaling import FEATURES, PATTERNS, TRANSFORMS
-
-if TYPE_CHECKING:  # The training needs scikit-learn, whose import takes long; models do without.
-    from forests.training.leaves import Leaves
-    from forests.training.structure import Tree
 
 KIND = "forests"
 SCHEMA = 2
@@ -88,37 +83,6 @@ class Model:
     def nbytes(self) -> int:
         """Memory of the arrays."""
         return sum(getattr(self.forests, f.name).nbytes for f in fields(Forests))
-
-
-def join(void: Sequence[tuple[Tree, Leaves]], filled: Sequence[tuple[Tree, Leaves]]) -> Forests:
-    """Put the trees of both forests, equally many, into one set of arrays.
-
-    Raises
-    ------
-    UserError
-        See `forests.layout.pack`.
-    """
-    trees = [tree for tree, _ in (*void, *filled)]
-    leaves = [part for _, part in (*void, *filled)]
-    nodes = np.cumsum([0] + [len(tree.left) for tree in trees])
-    count = np.cumsum([0] + [tree.leaves for tree in trees])
-
-    def shifted(name: str, offsets: NDArray[np.int64]) -> NDArray[np.int32]:
-        parts = [getattr(tree, name) for tree in trees]
-        moved = [np.where(part < 0, -1, part + o) for part, o in zip(parts, offsets)]
-        return np.concatenate(moved).astype(np.int32)
-
-    records = [np.column_stack([part.coefficients, part.low, part.high]) for part in leaves]
-    roots, packed, ordered = pack(
-        np.concatenate([tree.feature for tree in trees]),
-        np.concatenate([tree.threshold for tree in trees]),
-        shifted("left", nodes),
-        shifted("right", nodes),
-        shifted("leaf", count),
-        shifted("roots", nodes).reshape(2, len(void), PATTERNS),
-        np.concatenate(records).astype(np.float32),
-    )
-    return Forests(roots, packed, ordered)
 
 
 def save_model(path: str | Path, model: Model) -> None:

@@ -12,7 +12,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from dataset_gen.element import Array
+from carillon.fem.element import Array
 
 _AXES = np.array([1, 2, 4])
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dataset_gen.element import Array
+from carillon.fem.element import Array
 from forests.layout import FEATURE_BITS, FEATURE_MASK
 from forests.model import CONSTANT, FILLED, HIGH, LOW, VOID, Forests, Model
 from forests.scaling import (

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from dataset_gen.element import Array
+from carillon.fem.element import Array
 from forests.ordering import FLIPS, order_code
 
 TRANSFORMS = ("log", "ratio")

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import carillon
 
 if TYPE_CHECKING:
-    from solver.library import Solution, solve
+    from solver.analysis.library import Solution, solve
 
 __all__ = ["Solution", "solve"]
 
@@ -13,7 +13,7 @@ __all__ = ["Solution", "solve"]
 def __getattr__(name: str) -> Any:
     """`solve` and `Solution`, loaded when first asked for: they bring PETSc with them."""
     if name in __all__:
-        from solver import library
+        from solver.analysis import library
 
         return getattr(library, name)
     raise AttributeError(f"module 'solver' has no attribute {name!r}")

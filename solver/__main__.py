@@ -18,21 +18,25 @@ from petsc4py import PETSc
 from carillon import cli
 from carillon.arguments import Parser, number_between, number_of_workers, whole_number
 from carillon.errors import UserError
+from carillon.fem import materials
+from carillon.fem.element import DEFAULT_POISSON
+from carillon.fem.geometry import FILLS, PIECES
 from carillon.files import atomic_path, require_writable
+from carillon.limits import EXTENTS, FARTHEST
 from carillon.pictures import require_plottable
 from carillon.progress import say
 from carillon.runtime import limit_threads, warn_about_reference_blas
-from dataset_gen.element import DEFAULT_POISSON
 from dataset_gen.objectives import OBJECTIVES, require_objective
-from solver import coarsening, inner, materials, petsc_options
-from solver.analysis import METHODS, ModalSolver, Modes, SolverOptions
-from solver.correction import ACCELERATIONS, EIGENVALUE_TOLERANCE, INTERACTIVE_TOLERANCE
-from solver.decomposition import keep_on_root, on_root
-from solver.geometry import FILLS, PIECES
+from solver import linear
+from solver.analysis.modal_solver import ModalSolver, Modes
+from solver.analysis.options import METHODS, SolverOptions
+from solver.analysis.problem import Problem, ProblemOptions, build_problem
+from solver.coarsening.coarsen import METHODS as COARSENINGS
+from solver.correction.correct import ACCELERATIONS, EIGENVALUE_TOLERANCE, INTERACTIVE_TOLERANCE
+from solver.distribution.collective import keep_on_root, on_root
 from solver.hcms.condense import INTERFACES
-from solver.limits import EXTENTS, FARTHEST, MOST_RANKS
-from solver.problem import Problem, ProblemOptions, build_problem
-from solver.truth import RESIDUAL_TOLERANCE
+from solver.linear import petsc_options
+from solver.reference.truth import RESIDUAL_TOLERANCE
 
 _PROBLEM_FIELDS = tuple(ProblemOptions.__dataclass_fields__)
 _INPUTS = ("mesh", "material", "forest", "truth", "start")
@@ -77,8 +81,8 @@ def _require_outputs(options: argparse.Namespace) -> None:
 
 
 def _modes(options: argparse.Namespace, comm: MPI.Comm) -> None:
-    from solver.modes_file import write_modes
-    from solver.start import start_from_file
+    from solver.files.modes_file import write_modes
+    from solver.files.start import start_from_file
 
     on_root(comm, lambda: _require_outputs(options))
     parameters = _problem_options(options)
@@ -155,7 +159,7 @@ def _modes_attributes(
 
 
 def _print_summary(attributes: dict[str, Any], values: Any, options: argparse.Namespace) -> None:
-    from solver.modes_file import frequencies
+    from solver.files.modes_file import frequencies
 
     hertz = frequencies(values)
     if options.json:
@@ -176,7 +180,7 @@ def _print_summary(attributes: dict[str, Any], values: Any, options: argparse.Na
 
 def _compare(options: argparse.Namespace, comm: MPI.Comm) -> None:
     from carillon.provenance import record
-    from solver.comparison import compare_files
+    from solver.studies.comparison import compare_files
 
     comparison = on_root(comm, lambda: compare_files(options.candidate, options.truth).as_dict())
     if comm.rank:
@@ -202,7 +206,7 @@ def _compare(options: argparse.Namespace, comm: MPI.Comm) -> None:
 
 def _audit(options: argparse.Namespace, comm: MPI.Comm) -> None:
     from carillon.provenance import record
-    from solver.audit import audit_files
+    from solver.studies.audit import audit_files
 
     _require_one_rank(options, comm)
     _require_outputs(options)
@@ -223,8 +227,8 @@ def _audit(options: argparse.Namespace, comm: MPI.Comm) -> None:
 
 
 def _respond(options: argparse.Namespace, comm: MPI.Comm) -> None:
-    from solver.response import Damping
-    from solver.response_file import TRUTH, StrikeOptions, respond, write_response
+    from solver.response.response import Damping
+    from solver.response.response_file import TRUTH, StrikeOptions, respond, write_response
 
     _require_one_rank(options, comm)
     _require_outputs(options)
@@ -257,7 +261,7 @@ def _require_one_rank(options: argparse.Namespace, comm: MPI.Comm) -> None:
 
 def _convergence(options: argparse.Namespace, comm: MPI.Comm) -> None:
     from carillon.measurement import measured
-    from solver.convergence import correction_history
+    from solver.studies.convergence import correction_history
 
     on_root(comm, lambda: _require_outputs(options))
     problem = keep_on_root(comm, lambda: build_problem(_problem_options(options)))
@@ -271,7 +275,7 @@ def _convergence(options: argparse.Namespace, comm: MPI.Comm) -> None:
 
 def _benchmark(options: argparse.Namespace, comm: MPI.Comm) -> None:
     from carillon.measurement import measured
-    from solver.benchmark import BenchmarkOptions, benchmark_row, row_lines
+    from solver.studies.benchmark import BenchmarkOptions, benchmark_row, row_lines
 
     on_root(comm, lambda: _require_outputs(options))
     benchmark = BenchmarkOptions(
@@ -292,7 +296,7 @@ def _benchmark(options: argparse.Namespace, comm: MPI.Comm) -> None:
 
 def _scaling(options: argparse.Namespace, comm: MPI.Comm) -> None:
     from carillon.measurement import measured
-    from solver.scaling import ScalingOptions, measure, scaling_study, study_lines
+    from solver.studies.scaling import ScalingOptions, measure, scaling_study, study_lines
 
     on_root(comm, lambda: _require_outputs(options))
     if options.here or comm.size > 1:
@@ -322,7 +326,7 @@ def _scaling(options: argparse.Namespace, comm: MPI.Comm) -> None:
     if comm.rank:
         return
     if options.plot is not None and "strong" in found:
-        from solver.scaling.plot import save_plot
+        from solver.studies.scaling.plot import save_plot
 
         save_plot(found, options.plot)
     print(json.dumps(found, indent=2) if options.json else "\n".join(lines))
@@ -343,7 +347,7 @@ def _repeated(options: argparse.Namespace) -> list[str]:
 
 def _objectives(options: argparse.Namespace, comm: MPI.Comm) -> None:
     from carillon.provenance import record
-    from solver.objectives import rate_objectives
+    from solver.studies.objectives import rate_objectives
 
     on_root(comm, lambda: _require_outputs(options))
     found = rate_objectives(_problem_options(options), options.modes, options.objectives, comm)
@@ -360,9 +364,9 @@ def _objectives(options: argparse.Namespace, comm: MPI.Comm) -> None:
 
 def _calibrate(options: argparse.Namespace, comm: MPI.Comm) -> None:
     from carillon.provenance import record
-    from solver.calibration.constants import Constants
-    from solver.calibration.exact import make_cases
-    from solver.calibration.gauss_newton import calibrate_in_turn, rms_by_material, say_step
+    from solver.studies.calibration.constants import Constants
+    from solver.studies.calibration.exact import make_cases
+    from solver.studies.calibration.gauss_newton import calibrate_in_turn, rms_by_material, say_step
 
     if comm.size > 1:
         raise UserError("calibrate runs on one rank; share its work with --workers instead")
@@ -450,6 +454,8 @@ def _objective_names(text: str) -> list[str]:
 
 def _rank_counts(text: str) -> list[int]:
     """Argument type: numbers of ranks, separated by commas, each once and ascending."""
+    from solver.studies.scaling.launch import MOST_RANKS
+
     return sorted({whole_number(1, MOST_RANKS)(part) for part in text.split(",")})
 
 
@@ -482,7 +488,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     modes.add_argument(
         "--inner",
-        choices=inner.METHODS,
+        choices=linear.METHODS,
         default=SolverOptions.inner,
         help="inner solver of the corrections (default: the fastest direct one)",
     )
@@ -605,7 +611,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     scaling.add_argument(
         "--inner",
-        choices=inner.METHODS,
+        choices=linear.METHODS,
         default="mumps",
         help="inner solver, the same on any number of ranks (default %(default)s)",
     )
@@ -672,8 +678,8 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_respond(parser: argparse.ArgumentParser) -> None:
-    from solver.response import Damping
-    from solver.response_file import StrikeOptions
+    from solver.response.response import Damping
+    from solver.response.response_file import StrikeOptions
 
     parser.add_argument("truth", help="modes file taken for the truth")
     parser.add_argument(
@@ -720,7 +726,7 @@ def _add_problem(parser: argparse.ArgumentParser) -> None:
     _add_solid(parser)
     defaults = ProblemOptions
     parser.add_argument(
-        "--coarsen", choices=coarsening.METHODS, default=defaults.coarsen, help="default: none"
+        "--coarsen", choices=COARSENINGS, default=defaults.coarsen, help="default: none"
     )
     parser.add_argument("--forest", help="forests for --coarsen ddfem (HDF5; default: packaged)")
     parser.add_argument(

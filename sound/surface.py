@@ -25,7 +25,7 @@ def struck_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
     Parameters
     ----------
     mesh, unit
-        See `solver.geometry.load_surface`.
+        See `carillon.fem.geometry.load_surface`.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def struck_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
     """
     import trimesh
 
-    from solver.geometry import load_surface
+    from carillon.fem.geometry import load_surface
 
     surface = load_surface(mesh, unit)
     longest = LONGEST_EDGE * longest_side(surface)

@@ -6,8 +6,8 @@ from functools import cache
 
 import numpy as np
 
-from dataset_gen.block import cell_stiffness
-from dataset_gen.element import Array
+from carillon.fem.block import cell_stiffness
+from carillon.fem.element import Array
 from dataset_gen.objectives import chen2015, inertial, oversampled
 from dataset_gen.objectives.patterns import (
     corner_strains,

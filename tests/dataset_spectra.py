@@ -8,8 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import eigsh
 
-from dataset_gen.block import COARSE_EDGE, coarse_cell_mass
-from dataset_gen.element import CORNERS, DEFAULT_POISSON, Array, nodal_mass, quadrature_stiffness
+from carillon.fem.block import COARSE_EDGE, coarse_cell_mass
+from carillon.fem.element import CORNERS, DEFAULT_POISSON, Array, nodal_mass, quadrature_stiffness
 
 Coarsen = Callable[[Array], Array]
 

@@ -16,20 +16,21 @@ import numpy as np
 from mpi4py import MPI
 
 from carillon.errors import UserError
-from dataset_gen.block import degrees_of_freedom
-from solver.analysis import SolverOptions, modal_analysis
-from solver.distribution import Share, distribute
-from solver.geometry import hexmesh_from_grid
+from carillon.fem.block import degrees_of_freedom
+from carillon.fem.geometry import hexmesh_from_grid
+from carillon.fem.model import ElasticModel
+from solver.analysis.modal_solver import modal_analysis
+from solver.analysis.options import SolverOptions
+from solver.analysis.problem import ProblemOptions, build_problem
+from solver.assembly.sparse import assembled
+from solver.assembly.system import assemble
+from solver.distribution.local_mesh import Share, distribute
+from solver.distribution.messages import receive_arrays, send_arrays
+from solver.files.modes_file import write_modes
 from solver.hcms.condense import INTERFACES
 from solver.hcms.synthesis import synthesize
-from solver.inner.multigrid import Multigrid
-from solver.messages import receive_arrays, send_arrays
-from solver.model import ElasticModel
-from solver.modes_file import write_modes
-from solver.problem import ProblemOptions, build_problem
-from solver.sparse import assembled
-from solver.system import assemble
-from solver.truth import complete, count_beyond, solve_truth, start_vector
+from solver.linear.multigrid import Multigrid
+from solver.reference.truth import complete, count_beyond, solve_truth, start_vector
 from tests import solids
 
 COMM = MPI.COMM_WORLD

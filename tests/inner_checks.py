@@ -13,14 +13,14 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from carillon.errors import ConvergenceError
-from solver.distribution import distribute
-from solver.inner.block_rows import BlockRows
-from solver.inner.iterative import METHODS, IterativeInverse
-from solver.inner.multigrid import Multigrid
-from solver.model import ElasticModel
-from solver.rayleigh_ritz import safe_shift
-from solver.sparse import assembled
-from solver.system import System, assemble
+from carillon.fem.model import ElasticModel
+from solver.assembly.sparse import assembled
+from solver.assembly.system import System, assemble
+from solver.distribution.local_mesh import distribute
+from solver.linear.block_rows import BlockRows
+from solver.linear.iterative import METHODS, IterativeInverse
+from solver.linear.multigrid import Multigrid
+from solver.subspace.rayleigh_ritz import safe_shift
 from tests import solids
 
 COMM = MPI.COMM_WORLD

@@ -9,7 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from solver.geometry import builtin_surface
+from carillon.fem.geometry import builtin_surface
 from tests.conftest import MESH_FILES
 from tests.patience import HANG_SECONDS
 

@@ -13,7 +13,8 @@ import numpy as np
 from dataset_gen.generate import generate
 from forests.training.dataset import dataset_of
 from forests.training.train import Training, train
-from solver.analysis import SolverOptions, modal_analysis
+from solver.analysis.modal_solver import modal_analysis
+from solver.analysis.options import SolverOptions
 from sound.design.designing import design
 from sound.design.preparation import prepare
 from tests import small_project, solids

@@ -7,12 +7,12 @@ from functools import cache
 import numpy as np
 import trimesh
 
+from carillon.fem.model import RIGID_MODES
 from solver import solve
-from solver.coarsening import build_model
-from solver.model import RIGID_MODES
-from sound.design_file import HISTORY_TYPE, Design
+from solver.coarsening.coarsen import build_model
+from sound.clips.targets import Targets
+from sound.project.design_file import HISTORY_TYPE, Design
 from sound.strikes import Strike
-from sound.targets import Targets
 from tests.solids import box_mesh
 
 SIDES = (0.24, 0.16, 0.08)

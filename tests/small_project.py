@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.polynomial import legendre
 
+from sound.clips.targets import Targets
 from sound.clips.wav import write_wav
 from sound.design.preparation import prepare
-from sound.project import project_of
-from sound.targets import Targets
+from sound.project.project import project_of
 
 RATE = 22_050
 PROJECT = {

@@ -9,10 +9,10 @@ import numpy as np
 import scipy.linalg as la
 from numpy.polynomial import legendre
 
-from dataset_gen.element import elasticity_matrix
-from solver.geometry import HexMesh, hexmesh_from_grid
-from solver.model import ElasticModel, fine_model
-from solver.sparse import assembled
+from carillon.fem.element import elasticity_matrix
+from carillon.fem.geometry import HexMesh, hexmesh_from_grid
+from carillon.fem.model import ElasticModel, fine_model
+from solver.assembly.sparse import assembled
 
 
 def box_mesh(nx: int, ny: int, nz: int, edge: float = 0.01) -> HexMesh:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dataset_gen.block import CELL_NODES
+from carillon.fem.block import CELL_NODES
 from dataset_gen.objectives import (
     bounded,
     coarse_response,

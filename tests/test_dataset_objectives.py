@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from carillon.errors import UserError
-from dataset_gen.block import cell_stiffness, prolongation, symmetries
-from dataset_gen.element import CORNERS, quadrature_stiffness, rigid_motions
+from carillon.fem.block import cell_stiffness, prolongation, symmetries
+from carillon.fem.element import CORNERS, quadrature_stiffness, rigid_motions
 from dataset_gen.objectives import OBJECTIVES, energy, fit, sampled_energy
 from dataset_gen.objectives.bounded import minimise_above
 from dataset_gen.objectives.coarse_response import coarse_of

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from carillon.errors import UserError
-from dataset_gen.block import symmetries
+from carillon.fem.block import symmetries
 from dataset_gen.objectives import fit
 from dataset_gen.sampling import moduli
 from forests.comparison.cases import CASES

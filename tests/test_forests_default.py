@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from dataset_gen.element import DEFAULT_POISSON
+from carillon.fem.element import DEFAULT_POISSON
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, fit
 from dataset_gen.sampling import moduli, samples
 from forests import coarsen, load_model

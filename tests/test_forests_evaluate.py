@@ -7,14 +7,15 @@ import pytest
 from sklearn.tree import ExtraTreeRegressor
 
 from carillon.errors import UserError
-from dataset_gen.block import symmetries
+from carillon.fem.block import symmetries
 from forests import coarsen, coarsen_with_derivatives
 from forests.evaluate import leaf_numbers
 from forests.layout import pack, positions, rounded_down
-from forests.model import CONSTANT, FILLED, HIGH, LOW, VOID, Model, join
+from forests.model import CONSTANT, FILLED, HIGH, LOW, VOID, Model
 from forests.ordering import cell_order
 from forests.reference import coarsen_reference, leaf_numbers_reference, prepare_reference
 from forests.scaling import FEATURES, LOG_FLOOR, LOG_VOID, PATTERNS, TRANSFORMS, prepare
+from forests.training.join import join
 from forests.training.leaves import Leaves
 from forests.training.structure import flatten
 

@@ -7,17 +7,18 @@ import numpy as np
 import pytest
 
 from carillon.errors import UserError
+from carillon.fem.block import symmetries
 from carillon.files import create_h5
-from dataset_gen.block import symmetries
 from dataset_gen.generate import generate
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, fit
 from dataset_gen.sampling import samples
 from forests import coarsen, load_model, save_model
 from forests import model as forests_model
 from forests.baselines import average, galerkin
-from forests.model import FILLED, HIGH, KIND, LOW, SCHEMA, VOID, Forests, join
+from forests.model import FILLED, HIGH, KIND, LOW, SCHEMA, VOID, Forests
 from forests.scaling import PATTERNS
 from forests.summary import as_text, describe
+from forests.training.join import join
 from forests.training.leaves import Leaves
 from forests.training.structure import tree_of
 from forests.training.train import Training, train
@@ -117,8 +118,8 @@ def test_file_round_trip_is_exact(models, transform, blocks, tmp_path):
 
 
 def test_galerkin_moduli_give_the_projected_stiffness():
-    from dataset_gen.block import COARSE_EDGE, cell_stiffness, prolongation
-    from dataset_gen.element import quadrature_stiffness
+    from carillon.fem.block import COARSE_EDGE, cell_stiffness, prolongation
+    from carillon.fem.element import quadrature_stiffness
 
     young = np.random.default_rng(0).uniform(0, 10, 8)
     projected = prolongation().T @ np.einsum("j,jab->ab", young, cell_stiffness()) @ prolongation()

@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 
-from dataset_gen.block import symmetries
+from carillon.fem.block import symmetries
 from dataset_gen.sampling import samples
 from forests.ordering import cell_order, ordered_moduli
 from forests.reference import cell_order_reference

@@ -7,7 +7,7 @@ import pytest
 
 from carillon import cli
 from carillon.errors import UserError
-from dataset_gen.block import (
+from carillon.fem.block import (
     CORNER_NODES,
     active_nodes,
     cell_mass,
@@ -16,7 +16,7 @@ from dataset_gen.block import (
     prolongation,
     symmetries,
 )
-from dataset_gen.element import CORNERS, quadrature_stiffness, rigid_motions
+from carillon.fem.element import CORNERS, quadrature_stiffness, rigid_motions
 from dataset_gen.generate import generate
 from dataset_gen.objectives import fit
 from dataset_gen.objectives.patterns import straining_motions

@@ -8,7 +8,7 @@ import trimesh
 from scipy import ndimage
 
 from carillon.errors import UserError
-from solver.geometry import (
+from carillon.fem.geometry import (
     BUILTINS,
     CORNER_OFFSETS,
     blocks_from_mesh,
@@ -19,8 +19,9 @@ from solver.geometry import (
     surface_name,
     voxelize,
 )
-from solver.geometry.picture import draw, guess_up, surface_quads
-from solver.geometry.topology import is_simple, thin_to
+from carillon.fem.geometry.boundary import surface_quads
+from carillon.fem.geometry.picture import draw, guess_up
+from carillon.fem.geometry.topology import is_simple, thin_to
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 {z}\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
 

@@ -17,10 +17,10 @@ from hypothesis import strategies as st
 from carillon import arguments
 from carillon.documents import parse_yaml
 from carillon.errors import LONGEST_MESSAGE, one_line
-from forests.training.studies import require_counts
+from forests.studies.training import require_counts
 from solver.__main__ import _rank_counts
 from sound.clips.instruments import note_hertz
-from sound.project import project_of
+from sound.project.project import project_of
 from tests.hostile.fuzzing import damaged, examples, or_refused, values, yaml_texts
 from tests.hostile.zoo import CONFIGURATION, PROJECT
 from workflow import settings as configuration

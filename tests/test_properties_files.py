@@ -12,6 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from carillon.errors import UserError
+from carillon.fem.geometry.surface import load_surface
+from carillon.fem.moduli_file import read_moduli
 from dataset_gen.generate import generate_file
 from dataset_gen.journal import journal_of
 from dataset_gen.settings import settings_of
@@ -19,12 +21,10 @@ from dataset_gen.shards import origin_of, read_shard
 from dataset_gen.tasks import Plan
 from forests.model import load_model
 from forests.training.tree_file import load_trees
-from solver.geometry.surface import load_surface
-from solver.modes_file import read_modes
-from solver.moduli_file import read_moduli
-from solver.response_file import read_response
+from solver.files.modes_file import read_modes
+from solver.response.response_file import read_response
 from sound.clips.wav import read_wav
-from sound.design_file import read_design
+from sound.project.design_file import read_design
 from tests.hostile.fuzzing import damaged, examples, or_refused
 from tests.solids import box_mesh
 

@@ -8,15 +8,19 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-import solver.truth as truth
+import solver.reference.truth as truth
 from carillon.errors import ConvergenceError
-from solver.benchmark import BenchmarkOptions, benchmark_row, row_lines
-from solver.benchmark.methods import Methods, Run
-from solver.benchmark.rivals import SlepcConfiguration, configurations, smallest_without_factor
-from solver.benchmark.row import _alternate
-from solver.benchmark.scores import BASES, median, speedups, spread, tone_error
-from solver.benchmark.solid import CHANGE, make_solid
-from solver.problem import ProblemOptions
+from solver.analysis.problem import ProblemOptions
+from solver.studies.benchmark import BenchmarkOptions, benchmark_row, row_lines
+from solver.studies.benchmark.methods import Methods, Run
+from solver.studies.benchmark.rivals import (
+    SlepcConfiguration,
+    configurations,
+    smallest_without_factor,
+)
+from solver.studies.benchmark.row import _alternate
+from solver.studies.benchmark.scores import BASES, median, speedups, spread, tone_error
+from solver.studies.benchmark.solid import CHANGE, make_solid
 from tests import solids
 
 BAR = ProblemOptions("builtin:bar", 20, "smooth")
@@ -124,7 +128,7 @@ def test_a_method_that_fails_is_told_and_the_others_go_on(monkeypatch):
         raise ConvergenceError("planted")
 
     monkeypatch.setattr(Methods, "ddfem_hcms_ec", fail)
-    monkeypatch.setattr("solver.benchmark.row._run_once", lambda *_: None)
+    monkeypatch.setattr("solver.studies.benchmark.row._run_once", lambda *_: None)
     found = benchmark_row(BAR, BenchmarkOptions(MODES, runs=2, arpack=False))
     assert found["failed"] == {"ddfem_hcms_ec": "planted"}
     assert found["seconds"]["ddfem_hcms_ec"] is None

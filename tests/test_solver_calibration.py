@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from carillon.errors import UserError
-from dataset_gen.block import ALL_FILLED, least_patterns
+from carillon.fem.block import ALL_FILLED, least_patterns
+from carillon.fem.model import ElasticModel
 from dataset_gen.objectives import fit, orientations
 from dataset_gen.objectives.calibrated import combine
 from dataset_gen.objectives.calibration import (
@@ -18,12 +19,11 @@ from dataset_gen.objectives.calibration import (
     octant_orbits,
     parse,
 )
-from solver.calibration.cases import read_case
-from solver.calibration.constants import LUMPED, Constants, filled_places
-from solver.calibration.exact import make_cases
-from solver.calibration.gauss_newton import bounds, calibrate, calibrate_in_turn
-from solver.calibration.solids import CELLS, random_solid
-from solver.model import ElasticModel
+from solver.studies.calibration.cases import read_case
+from solver.studies.calibration.constants import LUMPED, Constants, filled_places
+from solver.studies.calibration.exact import make_cases
+from solver.studies.calibration.gauss_newton import bounds, calibrate, calibrate_in_turn
+from solver.studies.calibration.solids import CELLS, random_solid
 from tests import solids
 
 

@@ -9,8 +9,8 @@ import h5py
 import numpy as np
 import pytest
 
-from solver.geometry import hexmesh_from_voxels, load_surface, voxelize
-from solver.modes_file import read_modes
+from carillon.fem.geometry import hexmesh_from_voxels, load_surface, voxelize
+from solver.files.modes_file import read_modes
 from tests.edited_files import edited
 
 BAR = ("builtin:bar", "--resolution", "16")

@@ -8,10 +8,11 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from mpi4py import MPI
 
-from solver.analysis import SolverOptions, modal_analysis
-from solver.coarsening import build_model
-from solver.geometry import blocks_from_mesh, hexmesh_from_grid, prolongation
-from solver.sparse import assembled
+from carillon.fem.geometry import blocks_from_mesh, hexmesh_from_grid, prolongation
+from solver.analysis.modal_solver import modal_analysis
+from solver.analysis.options import SolverOptions
+from solver.assembly.sparse import assembled
+from solver.coarsening.coarsen import build_model
 from tests import solids
 
 

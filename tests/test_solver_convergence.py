@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from solver.convergence import STARTS, STEPWISE
-from solver.correction import ACCELERATIONS
+from solver.correction.correct import ACCELERATIONS
 from solver.hcms.condense import INTERFACES
+from solver.studies.convergence import STARTS, STEPWISE
 
 BAR = ("builtin:bar", "--resolution", "24", "--material", "smooth")
 MODES = 50

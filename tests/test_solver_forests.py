@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from carillon.errors import UserError
+from carillon.fem.geometry import blocks_from_mesh
 from forests import coarsen
 from forests import model as forest_model
-from solver.benchmark import BenchmarkOptions, benchmark_row
-from solver.coarsening import block_moduli
-from solver.geometry import blocks_from_mesh
-from solver.modes_file import read_modes
-from solver.objectives import BASELINES, rate_objectives
-from solver.problem import ProblemOptions, build_problem
-from solver.trained import load_trained, trained_or_reason
+from solver.analysis.problem import ProblemOptions, build_problem
+from solver.coarsening.coarsen import block_moduli
+from solver.coarsening.trained import load_trained, trained_or_reason
+from solver.files.modes_file import read_modes
+from solver.studies.benchmark import BenchmarkOptions, benchmark_row
+from solver.studies.objectives import BASELINES, rate_objectives
 from tests.small_forests import train_small_forests
 
 BOX = ProblemOptions("builtin:box", 8, "noise")

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-import solver.decomposition as decomposition
+import solver.distribution.decomposition as decomposition
 from carillon.errors import UserError
-from dataset_gen.block import degrees_of_freedom
-from solver.distribution import distribute
+from carillon.fem.block import degrees_of_freedom
+from solver.assembly.sparse import assembled
+from solver.distribution.local_mesh import distribute
+from solver.distribution.partition import connect_subdomains, partition_nodes, subdomain_pieces
+from solver.distribution.tree import assign_ranks, build_tree
 from solver.hcms.counts import eigen_flops, krylov_flops
 from solver.hcms.merge import boundary_of, interface
 from solver.hcms.synthesis import make_subdomains, modes_to_keep, synthesize
-from solver.hcms.tree import assign_ranks, build_tree
-from solver.partition import connect_subdomains, partition_nodes, subdomain_pieces
-from solver.sparse import assembled
 from tests import solids
 
 COMM = MPI.COMM_SELF

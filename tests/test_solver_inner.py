@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from carillon.errors import ConvergenceError
-from solver.inner import iterative
-from solver.inner.iterative import METHODS, IterativeInverse
-from solver.model import fine_model
-from solver.rayleigh_ritz import safe_shift
+from carillon.fem.model import fine_model
+from solver.linear import iterative
+from solver.linear.iterative import METHODS, IterativeInverse
+from solver.subspace.rayleigh_ritz import safe_shift
 from tests import inner_checks, solids
 from tests.patience import HANG_SECONDS
 

@@ -7,14 +7,15 @@ import pytest
 from mpi4py import MPI
 
 from carillon.errors import ConvergenceError
-from solver.analysis import ModalSolver, SolverOptions
-from solver.correction import correct
-from solver.distribution import distribute
-from solver.inner import InnerSolver
-from solver.lanczos import lanczos
-from solver.model import fine_model
-from solver.rayleigh_ritz import rayleigh_ritz
-from solver.system import Layout, assemble
+from carillon.fem.model import fine_model
+from solver.analysis.modal_solver import ModalSolver
+from solver.analysis.options import SolverOptions
+from solver.assembly.system import Layout, assemble
+from solver.correction.correct import correct
+from solver.correction.lanczos import lanczos
+from solver.distribution.local_mesh import distribute
+from solver.linear import InnerSolver
+from solver.subspace.rayleigh_ritz import rayleigh_ritz
 from tests import solids
 
 COMM = MPI.COMM_SELF
@@ -75,7 +76,7 @@ def test_a_shift_near_an_eigenvalue_does_no_harm(box, distance):
 def test_a_shift_on_an_eigenvalue_is_moved(box, monkeypatch):
     on_it = box.exact[25] * (1.0 + 1e-12)
     assert box.run(on_it, 60, 1e-8).resonant
-    monkeypatch.setattr("solver.correction.SHIFT_SHARE", on_it / box.values[59])
+    monkeypatch.setattr("solver.correction.correct.SHIFT_SHARE", on_it / box.values[59])
     result = correct(box.system, box.start, 60, box.inner, box.values, tolerance=1e-8)
     assert np.abs(result.values / box.exact[:60] - 1.0).max() <= 1e-8
 
@@ -110,7 +111,7 @@ def test_a_mode_that_the_iteration_misses_is_noticed_and_found(box, monkeypatch)
         return found
 
     start = box.run(0.5 * box.exact[59], 60, 1e-2)
-    monkeypatch.setattr("solver.correction.lanczos", one_missing)
+    monkeypatch.setattr("solver.correction.correct.lanczos", one_missing)
     result = correct(box.system, start.vectors, 60, box.inner, start.values, tolerance=1e-6)
     assert np.abs(result.values / box.exact[:60] - 1.0).max() <= 1e-6
 

@@ -8,8 +8,9 @@ from mpi4py import MPI
 
 import solver
 from carillon.errors import UserError
-from solver.analysis import ModalSolver, SolverOptions
-from solver.comparison import compare_files
+from solver.analysis.modal_solver import ModalSolver
+from solver.analysis.options import SolverOptions
+from solver.studies.comparison import compare_files
 from tests import solids
 
 COMM = MPI.COMM_SELF

@@ -12,12 +12,14 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from carillon.errors import UserError
-from solver import analysis, petsc_options
-from solver.analysis import ModalSolver, SolverOptions
-from solver.geometry import hexmesh_from_grid, load_surface, voxelize
-from solver.model import fine_model
-from solver.problem import ProblemOptions, build_problem
-from solver.scaling.launch import require_ranks
+from carillon.fem.geometry import hexmesh_from_grid, load_surface, voxelize
+from carillon.fem.model import fine_model
+from solver.analysis import bounds
+from solver.analysis.modal_solver import ModalSolver
+from solver.analysis.options import SolverOptions
+from solver.analysis.problem import ProblemOptions, build_problem
+from solver.linear import petsc_options
+from solver.studies.scaling.launch import require_ranks
 
 BOX = trimesh.creation.box()
 OBJ = BOX.export(file_type="obj")
@@ -162,7 +164,7 @@ def test_solids_at_the_limits_are_solved_as_others_are(unit, density, young):
 def test_modes_that_memory_cannot_hold_are_refused(monkeypatch):
     cells = hexmesh_from_grid(np.argwhere(np.ones((4, 4, 4))), np.zeros(3), 0.1)
     model = fine_model(cells, np.full(cells.n_cells, 1e9))
-    monkeypatch.setattr(analysis, "available_memory", lambda: 100_000)
+    monkeypatch.setattr(bounds, "available_memory", lambda: 100_000)
     with pytest.raises(UserError, match="20 modes of 375 unknowns take"):
         ModalSolver(model, SolverOptions(modes=20), MPI.COMM_SELF)
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.comparison import compare_files
-from solver.modes_file import read_modes
+from solver.files.modes_file import read_modes
+from solver.studies.comparison import compare_files
 from tests.patience import HANG_SECONDS
 
 pytestmark = pytest.mark.mpi

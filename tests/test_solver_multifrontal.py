@@ -8,11 +8,11 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from carillon.errors import ConvergenceError
-from solver.inner import multifrontal
-from solver.inner.dissection import dissect
-from solver.inner.multifrontal import Factor, Plan
-from solver.model import fine_model
-from solver.node_rows import NodeRows, Pattern
+from carillon.fem.model import fine_model
+from solver.assembly.node_rows import NodeRows, Pattern
+from solver.linear import multifrontal
+from solver.linear.dissection import dissect
+from solver.linear.multifrontal import Factor, Plan
 from tests import solids
 
 

@@ -7,15 +7,16 @@ import json
 import numpy as np
 import pytest
 
+from carillon.fem.geometry import hexmesh_from_voxels, load_surface, voxelize
+from carillon.fem.materials import NAMES, young_modulus
 from dataset_gen.objectives import OBJECTIVES, fit
-from solver.analysis import SolverOptions, modal_analysis
-from solver.coarsening import build_model, fit_distinct
-from solver.comparison import frequency_errors
-from solver.geometry import hexmesh_from_voxels, load_surface, voxelize
-from solver.materials import NAMES, young_modulus
-from solver.modes_file import frequencies, read_modes
-from solver.objectives import BASELINES, FOREST, rate_objectives
-from solver.problem import ProblemOptions, build_problem
+from solver.analysis.modal_solver import modal_analysis
+from solver.analysis.options import SolverOptions
+from solver.analysis.problem import ProblemOptions, build_problem
+from solver.coarsening.coarsen import build_model, fit_distinct
+from solver.files.modes_file import frequencies, read_modes
+from solver.studies.comparison import frequency_errors
+from solver.studies.objectives import BASELINES, FOREST, rate_objectives
 from tests import solids
 
 BOX = ProblemOptions("builtin:box", 8, "noise")

@@ -10,13 +10,13 @@ import pytest
 import scipy.linalg as la
 
 from carillon.errors import UserError
+from carillon.fem.geometry import blocks_from_mesh, prolongation
+from carillon.fem.model import RIGID_MODES, ElasticModel
 from solver.__main__ import main
-from solver.audit import audit
-from solver.contact import Contact, choose_contacts, interpolation, surface_normals
-from solver.geometry import blocks_from_mesh, prolongation
-from solver.model import RIGID_MODES, ElasticModel
-from solver.modes_file import ModesFile, frequencies, read_modes, write_modes
-from solver.response import (
+from solver.assembly.sparse import assembled
+from solver.files.modes_file import ModesFile, frequencies, read_modes, write_modes
+from solver.response.contact import Contact, choose_contacts, interpolation, surface_normals
+from solver.response.response import (
     SAMPLE_RATE_HERTZ,
     Contacts,
     Damping,
@@ -29,8 +29,8 @@ from solver.response import (
     spectral_distance,
     spectrogram,
 )
-from solver.response_file import StrikeOptions, read_response, respond, write_response
-from solver.sparse import assembled
+from solver.response.response_file import StrikeOptions, read_response, respond, write_response
+from solver.studies.audit import audit
 from tests.edited_files import edited
 from tests.solids import box_mesh, random_box
 

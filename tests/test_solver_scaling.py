@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from carillon.errors import UserError
-from solver.decomposition import decompose
-from solver.geometry import hexmesh_from_voxels, load_surface, voxelize
+from carillon.fem.geometry import hexmesh_from_voxels, load_surface, voxelize
+from solver.distribution.decomposition import decompose
 from solver.hcms.counts import Tally
-from solver.scaling import launch
-from solver.scaling.model import (
+from solver.studies.scaling import launch
+from solver.studies.scaling.model import (
     ASSUMED_BANDWIDTH,
     Correction,
     Machine,
@@ -22,22 +22,22 @@ from solver.scaling.model import (
     predict,
     work_of_busiest,
 )
-from solver.scaling.plan import planned_counts, tally_arrays
-from solver.scaling.plot import save_plot
-from solver.scaling.sizes import sizes_of_box, sizes_of_mesh
-from solver.scaling.study import PREDICTED, study_lines
-from solver.scaling.work import elimination
+from solver.studies.scaling.plan import planned_counts, tally_arrays
+from solver.studies.scaling.plot import save_plot
+from solver.studies.scaling.sizes import sizes_of_box, sizes_of_mesh
+from solver.studies.scaling.study import PREDICTED, study_lines
+from solver.studies.scaling.work import elimination
 
 BAR = ("builtin:bar", "--resolution", 24, "--material", "smooth")
 COUNT = """
 import json
 from mpi4py import MPI
-from solver.distribution import distribute
+from solver.distribution.local_mesh import distribute
 from solver.hcms.synthesis import synthesize
-from solver.problem import ProblemOptions, build_problem
-from solver.scaling.plan import planned_counts, tally_arrays
-from solver.scaling.sizes import sizes_of_mesh
-from solver.decomposition import decompose
+from solver.analysis.problem import ProblemOptions, build_problem
+from solver.studies.scaling.plan import planned_counts, tally_arrays
+from solver.studies.scaling.sizes import sizes_of_mesh
+from solver.distribution.decomposition import decompose
 
 comm, keep = MPI.COMM_WORLD, 60
 model = build_problem(ProblemOptions("builtin:bar", 24, "smooth")).model

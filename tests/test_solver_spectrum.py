@@ -9,19 +9,20 @@ import scipy.sparse as sp
 from mpi4py import MPI
 
 from carillon.errors import ConvergenceError, UserError
-from dataset_gen.block import degrees_of_freedom
-from dataset_gen.element import rigid_motions
-from solver.analysis import RIGID_MODES, SolverOptions, modal_analysis
-from solver.clusters import clusters
-from solver.comparison import subspace_angles
-from solver.correction import correct
-from solver.distribution import distribute
+from carillon.fem.block import degrees_of_freedom
+from carillon.fem.element import rigid_motions
+from carillon.fem.model import RIGID_MODES, fine_model
+from solver.analysis.modal_solver import modal_analysis
+from solver.analysis.options import SolverOptions
+from solver.assembly.sparse import assembled
+from solver.assembly.system import Layout, assemble
+from solver.correction.correct import correct
+from solver.distribution.local_mesh import distribute
 from solver.hcms.condense import restrict_stiffness
 from solver.hcms.synthesis import synthesize
-from solver.inner import InnerSolver
-from solver.model import fine_model
-from solver.sparse import assembled
-from solver.system import Layout, assemble
+from solver.linear import InnerSolver
+from solver.studies.comparison import subspace_angles
+from solver.subspace.spectrum import clusters
 from tests import solids
 
 COMM = MPI.COMM_SELF

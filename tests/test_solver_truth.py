@@ -9,14 +9,16 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-import solver.analysis as analysis
-import solver.truth as truth
+import solver.analysis.modal_solver as analysis
+import solver.reference.truth as truth
 from carillon.errors import ConvergenceError
-from solver.analysis import RIGID_MODES, SolverOptions, modal_analysis
-from solver.distribution import distribute
-from solver.system import assemble
-from solver.truth import complete, count_below, count_beyond, solve_truth, start_vector
-from solver.verification import residual_ratios
+from carillon.fem.model import RIGID_MODES
+from solver.analysis.modal_solver import modal_analysis
+from solver.analysis.options import SolverOptions
+from solver.assembly.system import assemble
+from solver.distribution.local_mesh import distribute
+from solver.reference.truth import complete, count_below, count_beyond, solve_truth, start_vector
+from solver.subspace.verification import residual_ratios
 from tests import solids
 
 COMM = MPI.COMM_SELF

@@ -27,8 +27,8 @@ from sound.design.pool import Pool, Task, Trial
 from sound.design.preparation import prepare, targets_of
 from sound.design.search import Moment
 from sound.design.simulation import Simulation
-from sound.design_file import HISTORY_TYPE, read_design, write_design
-from sound.project import Weights, project_of
+from sound.project.design_file import HISTORY_TYPE, read_design, write_design
+from sound.project.project import Weights, project_of
 from tests import small_project
 from tests.patience import HANG_SECONDS, words_of
 

@@ -16,16 +16,16 @@ import pytest
 import trimesh
 
 from carillon.errors import UserError
-from solver.audit import audit
-from solver.coarsening import build_model
-from solver.comparison import compare_files
-from solver.contact import interpolation
-from solver.model import fine_model
-from solver.modes_file import read_modes
+from carillon.fem.model import fine_model
+from solver.coarsening.coarsen import build_model
+from solver.files.modes_file import read_modes
+from solver.response.contact import interpolation
+from solver.studies.audit import audit
+from solver.studies.comparison import compare_files
 from sound.__main__ import main
-from sound.design_file import write_design
 from sound.export.gltf import EXTENSION, UNSIGNED_INT
 from sound.export.rigid import mass_properties
+from sound.project.design_file import write_design
 from sound.rendering.bank import Bank, ring
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
@@ -224,7 +224,7 @@ def test_faust_plays_what_we_render(player: Path, position: int) -> None:
 
 
 def test_a_force_that_takes_time_has_the_same_impulse_in_faust(player: Path) -> None:
-    from solver.response import half_sine
+    from solver.response.response import half_sine
 
     impulse, push = (played(player, 4, 1.0, contact) for contact in (0.0, 2.0))
     expected = np.convolve(impulse, half_sine(2e-3, RATE))[: len(impulse)]

@@ -10,8 +10,8 @@ import pytest
 
 from carillon.errors import UserError
 from sound.__main__ import main
-from sound.design_file import write_design
 from sound.export.embedded import write_embedded
+from sound.project.design_file import write_design
 from tests.disks import KIB, disk_on
 from tests.small_design import small_design
 

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import eigsh
 
-from solver.geometry import hexmesh_from_grid
-from solver.problem import ProblemOptions
-from solver.sparse import assembled
+from carillon.fem.geometry import hexmesh_from_grid
+from solver.analysis.problem import ProblemOptions
+from solver.assembly.sparse import assembled
+from sound.clips.targets import Targets
 from sound.design.bark import bark, bark_slope
 from sound.design.material import LAWS, ReducedMaterial
 from sound.design.objective import Objective
 from sound.design.simulation import Simulation
-from sound.project import Weights
+from sound.project.project import Weights
 from sound.strikes import Strike
-from sound.targets import Targets
 
 EDGE = 0.01
 MODES, SIZE = 8, 6

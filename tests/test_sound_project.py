@@ -12,10 +12,10 @@ import yaml
 from jsonschema import Draft202012Validator
 
 from carillon.errors import UserError
-from solver.geometry import FILLS, PIECES
-from solver.problem import ProblemOptions
-from sound import schema
-from sound.project import Project, load_project, with_optimiser
+from carillon.fem.geometry import FILLS, PIECES
+from solver.analysis.problem import ProblemOptions
+from sound.project import schema
+from sound.project.project import Project, load_project, with_optimiser
 
 LEAST = {"mesh": "builtin:bell", "targets": [{"name": "rim", "vertex": 3, "clip": "rim.wav"}]}
 SCHEMA = yaml.safe_load(schema.SCHEMA.read_text())

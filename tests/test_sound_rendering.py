@@ -13,14 +13,14 @@ import soundfile
 from scipy.signal import find_peaks
 
 from carillon.errors import UserError
+from carillon.fem.model import RIGID_MODES
 from solver import solve
-from solver.contact import interpolation
-from solver.model import RIGID_MODES
-from solver.modes_file import read_modes, write_modes
-from solver.response import Damping
+from solver.files.modes_file import read_modes, write_modes
+from solver.response.contact import interpolation
+from solver.response.response import Damping
 from sound.__main__ import main
 from sound.clips.wav import PEAK
-from sound.design_file import write_design
+from sound.project.design_file import write_design
 from sound.rendering.bank import Bank, ring
 from sound.rendering.listening import Listening, resampled
 from sound.rendering.render import Hit, render

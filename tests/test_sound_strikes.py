@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from carillon.errors import UserError
-from solver.geometry import BUILTINS, builtin_surface
+from carillon.fem.geometry import BUILTINS, builtin_surface
 from sound.strikes import Place, inward_normals, locate, locate_all
 from sound.surface import struck_surface
 

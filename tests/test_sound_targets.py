@@ -10,8 +10,8 @@ import pytest
 from carillon.errors import UserError
 from sound.__main__ import main
 from sound.clips.extraction import ModalSound
+from sound.clips.targets import share_frequencies
 from sound.clips.wav import read_wav, write_wav
-from sound.targets import share_frequencies
 
 RATE = 8000
 

@@ -1,30 +1,159 @@
-"""The rooms stand in one chain, and imports point left only."""
+"""Which package may import which: every arrow is listed, and none points back."""
 
 from __future__ import annotations
 
 import ast
+from collections.abc import Iterator
+from functools import cache
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 CHECKOUT = Path(__file__).resolve().parent.parent
-CHAIN = ("carillon", "dataset_gen", "forests", "solver", "sound", "workflow")
+ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "workflow")
+COMMAND_LINES = ("__main__", "command", "clip_command", "benchmark_command")
+"""Modules that stand above all packages of their room, and that nothing imports."""
+
+EVERYBODY = ("carillon", "carillon.fem", "carillon.fem.geometry")
+"""Packages that all others may import."""
+
+ARROWS = {
+    "carillon": "",
+    "carillon.fem.geometry": "carillon",
+    "carillon.fem": "carillon carillon.fem.geometry",
+    #
+    "dataset_gen.objectives": "",
+    "dataset_gen": "dataset_gen.objectives",
+    #
+    "forests": "",
+    "forests.training": "dataset_gen dataset_gen.objectives forests",
+    "forests.comparison": "dataset_gen dataset_gen.objectives forests",
+    "forests.studies": "dataset_gen forests forests.training",
+    #
+    "solver.coarsening": "dataset_gen.objectives forests",
+    "solver.distribution": "",
+    "solver.files": "solver.distribution",
+    "solver.response": "solver.files",
+    "solver.assembly": "solver.distribution",
+    "solver.linear": "solver.assembly",
+    "solver.subspace": "solver.distribution solver.assembly",
+    "solver.hcms": "solver.distribution solver.assembly solver.linear solver.subspace",
+    "solver.correction": "solver.distribution solver.assembly solver.linear solver.subspace",
+    "solver.reference": "solver.assembly solver.linear solver.subspace",
+    "solver.analysis": """dataset_gen.objectives solver.coarsening solver.distribution solver.files
+        solver.assembly solver.linear solver.subspace solver.hcms solver.correction
+        solver.reference""",
+    "solver": "solver.analysis",
+    "solver.studies": """dataset_gen.objectives solver.coarsening solver.distribution solver.files
+        solver.assembly solver.linear solver.subspace solver.hcms solver.correction
+        solver.reference solver.analysis""",
+    "solver.studies.benchmark": """solver.coarsening solver.distribution solver.files
+        solver.assembly solver.linear solver.subspace solver.correction solver.analysis
+        solver.studies""",
+    "solver.studies.calibration": """dataset_gen.objectives solver.coarsening solver.assembly
+        solver.analysis""",
+    "solver.studies.scaling": """solver.distribution solver.assembly solver.linear solver.hcms
+        solver.correction solver.analysis""",
+    #
+    "sound": "",
+    "sound.clips": "sound",
+    "sound.project": "solver.files solver.analysis sound sound.clips",
+    "sound.design": """dataset_gen.objectives forests solver.coarsening solver.files solver.response
+        solver.linear solver.analysis sound sound.clips sound.project""",
+    "sound.rendering": "solver.files solver.response solver.subspace sound.project",
+    "sound.export": """solver.files solver.response solver.assembly solver.studies sound
+        sound.project sound.rendering""",
+    #
+    "workflow.digest": "",
+    "workflow": "dataset_gen dataset_gen.objectives forests forests.studies sound.project",
+    "workflow.estimate": """dataset_gen dataset_gen.objectives forests.training forests.comparison
+        workflow""",
+    "workflow.report": "solver.files solver.response solver.hcms solver.studies workflow",
+    "workflow.compare": "workflow workflow.report",
+    "workflow.figures": "workflow workflow.report",
+    "workflow.forests_study": "dataset_gen.objectives workflow workflow.report",
+    "workflow.sounds": """solver.files solver.response sound sound.clips sound.project sound.design
+        sound.rendering workflow workflow.report""",
+    "workflow.study": "dataset_gen.objectives solver.coarsening workflow workflow.report",
+    "workflow.validate": "solver.files solver.response solver.studies workflow workflow.report",
+    "workflow.scripts": """solver.analysis solver.studies.scaling sound.project
+        workflow.report workflow.compare workflow.figures workflow.forests_study workflow.sounds
+        workflow.study workflow.validate""",
+}
+"""Packages, from the bottom to the top, with those that they import beside `EVERYBODY`."""
 
 
-def imported_rooms(source: Path) -> set[str]:
-    rooms = set()
-    for node in ast.walk(ast.parse(source.read_text())):
+@cache
+def modules() -> dict[str, Path]:
+    """Source files of all rooms by module name."""
+    files = (path for room in ROOMS for path in (CHECKOUT / room).rglob("*.py"))
+    return {_module_of(path): path for path in files}
+
+
+def _module_of(path: Path) -> str:
+    parts = path.relative_to(CHECKOUT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def package_of(module: str) -> str:
+    """Package that a module lies in, or is."""
+    return module if modules()[module].name == "__init__.py" else module.rpartition(".")[0]
+
+
+def is_command_line(module: str) -> bool:
+    """Whether a module is a command line."""
+    return module.rpartition(".")[2] in COMMAND_LINES
+
+
+def imported(module: str) -> Iterator[str]:
+    """Modules of the project that a module imports, wherever in it."""
+    for node in ast.walk(ast.parse(modules()[module].read_text())):
+        names: list[str] = []
         if isinstance(node, ast.Import):
-            rooms |= {alias.name.split(".")[0] for alias in node.names}
+            names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
-            rooms.add(node.module.split(".")[0])
-    return rooms & set(CHAIN)
+            whole = [f"{node.module}.{alias.name}" for alias in node.names]
+            names = [name if name in modules() else node.module for name in whole]
+        yield from (name for name in names if name in modules())
 
 
-@pytest.mark.parametrize("room", CHAIN)
-def test_imports_point_left_only(room):
-    left = set(CHAIN[: CHAIN.index(room) + 1])
-    sources = list((CHECKOUT / room).rglob("*.py"))
-    assert sources
-    for source in sources:
-        assert imported_rooms(source) <= left, source
+@cache
+def arrows() -> dict[str, set[str]]:
+    """Packages that each package imports."""
+    found: dict[str, set[str]] = {}
+    for module in modules():
+        if not is_command_line(module):
+            others = {package_of(name) for name in imported(module)}
+            found.setdefault(package_of(module), set()).update(others)
+    return {package: others - {package} for package, others in found.items()}
+
+
+def test_every_package_has_its_arrows_listed():
+    assert set(ARROWS) == set(arrows())
+
+
+@pytest.mark.parametrize("package", ARROWS)
+def test_packages_import_what_is_listed_and_nothing_else(package):
+    listed = set(ARROWS[package].split())
+    found = arrows()[package]
+    if package not in EVERYBODY:
+        found = found - set(EVERYBODY)
+    assert found == listed
+
+
+def test_no_arrow_points_back():
+    order = list(TopologicalSorter(arrows()).static_order())
+    assert set(order) == set(ARROWS)
+
+
+@pytest.mark.parametrize("package", ARROWS)
+def test_rooms_stand_in_one_chain(package):
+    place = ROOMS.index(package.split(".")[0])
+    assert {other.split(".")[0] for other in arrows()[package]} <= set(ROOMS[: place + 1])
+
+
+def test_nothing_imports_a_command_line():
+    for module in modules():
+        if not is_command_line(module):
+            assert not [name for name in imported(module) if is_command_line(name)], module

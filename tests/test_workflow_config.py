@@ -138,6 +138,6 @@ def test_materials_and_objectives_of_the_schema_exist():
 
 
 def test_built_in_objects_are_those_of_the_solver():
-    from solver.geometry.builtin import BUILTINS
+    from carillon.fem.geometry.builtin import BUILTINS
 
     assert tuple(BUILTINS) == settings.BUILTIN_MESHES

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from carillon.errors import UserError
-from sound.design_file import SCHEMA, write_design
+from sound.project.design_file import SCHEMA, write_design
 from tests.small_design import small_design
 from workflow.__main__ import main
 from workflow.digest.command import digest

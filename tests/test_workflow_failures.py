@@ -16,7 +16,7 @@ import pytest
 
 from carillon.errors import UserError
 from dataset_gen.journal import journal_of
-from solver.modes_file import read_modes
+from solver.files.modes_file import read_modes
 from tests.disks import KIB, disk_on
 from tests.patience import HANG_SECONDS, wait_for, words_of
 from tests.workflow_runs import CHECKOUT, PROFILE, snakemake

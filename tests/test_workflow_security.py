@@ -15,11 +15,12 @@ import pytest
 import yaml
 
 from carillon.errors import UserError
+from carillon.fem import limits
+from carillon.fem.geometry import builtin_surface
 from forests.__main__ import MOST_BLOCKS
 from forests.comparison.database import MOST_MATERIALS
 from forests.layout import MOST_LEAVES
-from solver import limits
-from solver.geometry import builtin_surface
+from solver.studies.scaling import launch
 from tests.workflow_runs import CHECKOUT, snakemake
 from workflow import settings
 from workflow.arguments import options, path_word, quoted
@@ -228,8 +229,8 @@ def test_bounds_are_those_of_the_commands():
     assert bounds["models.*.unit"] == limits.UNITS
     assert bounds["models.*.density"] == limits.DENSITIES
     for place, most in {
-        "scaling.ranks.[]": limits.MOST_RANKS,
-        "figures.ranks.[]": limits.MOST_RANKS,
+        "scaling.ranks.[]": launch.MOST_RANKS,
+        "figures.ranks.[]": launch.MOST_RANKS,
         "forests.blocks": MOST_BLOCKS,
         "forests_study.blocks": MOST_BLOCKS,
         "forests_study.timed_blocks": MOST_BLOCKS,

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 import yaml
 
+from carillon.fem.model import RIGID_MODES, fine_model
 from carillon.provenance import record
 from solver import solve
-from solver.model import RIGID_MODES, fine_model
-from solver.modes_file import write_modes
+from solver.files.modes_file import write_modes
 from sound.clips.wav import read_wav, write_wav
-from sound.design_file import HISTORY_TYPE, Design, read_design, write_design
-from sound.project import load_project
+from sound.project.design_file import HISTORY_TYPE, Design, read_design, write_design
+from sound.project.project import load_project
 from sound.rendering.listening import Listening
 from sound.rendering.render import Hit, render
 from sound.rendering.solid import SoundingSolid

@@ -14,9 +14,9 @@ import trimesh
 import yaml
 
 from carillon import cli
-from solver.audit import audit_files
-from solver.comparison import compare_files
-from solver.response_file import StrikeOptions, read_response, respond, write_response
+from solver.response.response_file import StrikeOptions, read_response, respond, write_response
+from solver.studies.audit import audit_files
+from solver.studies.comparison import compare_files
 from tests.edited_files import edited
 from tests.pages import Page, assert_self_contained
 from workflow.__main__ import main

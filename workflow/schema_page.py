@@ -13,6 +13,7 @@ from typing import Any
 
 import yaml
 
+from sound.project.schema import SCHEMA as PROJECT_SCHEMA
 from workflow import settings
 
 _CONFIGURATION = """# Configuration
@@ -43,7 +44,6 @@ targets:
 ```
 
 A plain number has the unit 1. `[]` stands for an entry of a list."""
-_PROJECT_SCHEMA = settings.SCHEMA.parents[2] / "sound" / "project.schema.yaml"
 _TABLE = "| key | type | default | unit | meaning |\n| --- | --- | --- | --- | --- |"
 _BOUNDS = {
     "minimum": "at least {}",
@@ -66,7 +66,7 @@ def page() -> str:
 
 def project_page() -> str:
     """The page of a project of `sound design` as Markdown."""
-    schema = yaml.safe_load(_PROJECT_SCHEMA.read_text(encoding="utf-8"))
+    schema = yaml.safe_load(PROJECT_SCHEMA.read_text(encoding="utf-8"))
     return _page(_PROJECT, schema, "The solid")
 
 

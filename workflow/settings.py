@@ -13,9 +13,9 @@ from jsonschema.exceptions import ValidationError
 from carillon import provenance
 from carillon.documents import read_yaml
 from carillon.errors import UserError
+from carillon.fem.materials import NAMES as MATERIALS
 from dataset_gen.objectives import OBJECTIVES, require_objective
 from forests import model as forest_model
-from solver.materials import NAMES as MATERIALS
 from workflow import training
 from workflow.arguments import path_word
 from workflow.room import require_place
@@ -29,7 +29,7 @@ SCHEMA = Path(__file__).parent / "schemas" / "config.schema.yaml"
 CONFIGURATION = "a configuration"
 BUILTIN = "builtin:"
 BUILTIN_MESHES = ("bar", "bell", "bowl", "box", "frying-pan", "pitcher", "plate", "snare-drum")
-"""As in `solver.geometry.builtin`, which takes too long to load for every job that is planned."""
+"""As in `carillon.fem.geometry.builtin`, which takes too long to load for every planned job."""
 
 
 @cache

@@ -134,7 +134,7 @@ def check_study(config: Mapping[str, Any]) -> None:
 
 
 def _check_variants(names: list[str]) -> None:
-    from forests.training.studies import VARIANTS  # Needs scikit-learn, whose import takes long.
+    from forests.studies.training import VARIANTS  # Needs scikit-learn, whose import takes long.
 
     for name in names:
         if name not in VARIANTS:

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from carillon.errors import UserError
-from dataset_gen.block import pattern_images, symmetries
-from dataset_gen.element import DEFAULT_POISSON, Array
+from carillon.fem.block import pattern_images, symmetries
+from carillon.fem.element import DEFAULT_POISSON, Array
 from dataset_gen.objectives import (
     calibrated,
     chen2015,

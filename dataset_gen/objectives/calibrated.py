@@ -16,8 +16,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from dataset_gen.block import ALL_FILLED, galerkin_moduli
-from dataset_gen.element import Array
+from carillon.fem.block import ALL_FILLED, galerkin_moduli
+from carillon.fem.element import Array
 from dataset_gen.objectives import oversampled
 from dataset_gen.objectives.calibration import Calibration, default_calibration
 from dataset_gen.objectives.factored import held_unit_moduli, unit_block, unit_moduli

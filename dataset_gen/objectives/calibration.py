@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from dataset_gen.block import least_patterns, pattern_images, symmetries
-from dataset_gen.element import Array
+from carillon.fem.block import least_patterns, pattern_images, symmetries
+from carillon.fem.element import Array
 
 FILE = "calibration.json"
 """Beside this module; written by `python -m solver calibrate`."""

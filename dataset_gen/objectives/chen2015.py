@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dataset_gen.block import CORNER_NODES, degrees_of_freedom
-from dataset_gen.element import Array
+from carillon.fem.block import CORNER_NODES, degrees_of_freedom
+from carillon.fem.element import Array
+from carillon.serial import serial_blas
 from dataset_gen.objectives import flops
 from dataset_gen.objectives.elimination import TILE, elimination_of
 from dataset_gen.objectives.free_block import (
@@ -48,7 +49,6 @@ from dataset_gen.objectives.quadratic import (
     bounded_moduli,
     form_equations,
 )
-from dataset_gen.serial import serial_blas
 
 WEIGHT = 0.02
 """Pull towards the fine moduli, as a share of the mean diagonal of the normal matrix."""

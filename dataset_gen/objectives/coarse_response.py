@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from dataset_gen.element import Array
+from carillon.fem.element import Array
+from carillon.serial import serial_blas
 from dataset_gen.objectives.descent import CURVATURE, GRADIENT
 from dataset_gen.objectives.elimination import Sum, elimination_of, lower_tiles_of, sum_of
 from dataset_gen.objectives.free_block import FreeBlock, free_block_of
@@ -31,7 +32,6 @@ from dataset_gen.objectives.kernel import (
 )
 from dataset_gen.objectives.lanes import LANES, compiled, empty, load, root, spread, store
 from dataset_gen.objectives.patterns import corner_strains, pattern_of, straining_motions
-from dataset_gen.serial import serial_blas
 
 
 class Coarse(NamedTuple):

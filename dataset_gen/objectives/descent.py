@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dataset_gen.element import Array
+from carillon.fem.element import Array
 from dataset_gen.objectives.bounded import solve_free
 from dataset_gen.objectives.lanes import (
     LANES,

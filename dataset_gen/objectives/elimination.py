@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dataset_gen.block import CELL_NODES, degrees_of_freedom
-from dataset_gen.element import Array
+from carillon.fem.block import CELL_NODES, degrees_of_freedom
+from carillon.fem.element import Array
 
 Indices = NDArray[np.int64]
 

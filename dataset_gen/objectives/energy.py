@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dataset_gen.element import Array
+from carillon.fem.element import Array
 from dataset_gen.objectives.coarse_response import (
     Coarse,
     Response,

@@ -13,7 +13,7 @@ from functools import cache
 
 import numpy as np
 
-from dataset_gen.element import Array
+from carillon.fem.element import Array
 from dataset_gen.objectives import hybrid, oversampled
 from dataset_gen.objectives.quadratic import PatternFits
 

@@ -12,8 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import qr
 
-from dataset_gen.block import cell_stiffness
-from dataset_gen.element import Array
+from carillon.fem.block import cell_stiffness
+from carillon.fem.element import Array
+from carillon.serial import serial_blas
 from dataset_gen.objectives.elimination import (
     Factor,
     Sum,
@@ -32,7 +33,6 @@ from dataset_gen.objectives.kernel import (
 )
 from dataset_gen.objectives.lanes import Vector, compiled, empty, load, spread, store
 from dataset_gen.objectives.patterns import pattern_of
-from dataset_gen.serial import serial_blas
 
 
 class FreeBlock(NamedTuple):

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dataset_gen.element import Array
+from carillon.fem.element import Array
+from carillon.serial import serial_blas
 from dataset_gen.objectives import flops
 from dataset_gen.objectives.elimination import TILE, elimination_of
 from dataset_gen.objectives.free_block import FreeBlock, free_block_of
@@ -35,7 +36,6 @@ from dataset_gen.objectives.quadratic import (
     form_equations,
     reference_moduli,
 )
-from dataset_gen.serial import serial_blas
 
 LOADS = 24
 

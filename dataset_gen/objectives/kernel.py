@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dataset_gen.element import Array
+from carillon.fem.element import Array
 from dataset_gen.objectives.elimination import TILE, Factor, Links, Sum, factor_of
 from dataset_gen.objectives.lanes import (
     LANES,

@@ -21,7 +21,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic as numba_intrinsic
 from numba.extending import models, overload, register_model
 
-from dataset_gen.element import Array
+from carillon.fem.element import Array
 
 LANES = 8
 BYTES = 8 * LANES

@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dataset_gen.block import COARSE_EDGE, NODES, cell_stiffness, degrees_of_freedom
-from dataset_gen.element import CORNERS, Array, shape_functions, uniform_stiffness
+from carillon.fem.block import COARSE_EDGE, NODES, cell_stiffness, degrees_of_freedom
+from carillon.fem.element import CORNERS, Array, shape_functions, uniform_stiffness
+from carillon.serial import serial_blas
 from dataset_gen.objectives import flops
 from dataset_gen.objectives.elimination import (
     TILE,
@@ -55,7 +56,6 @@ from dataset_gen.objectives.quadratic import (
     form_equations,
     reference_moduli,
 )
-from dataset_gen.serial import serial_blas
 
 RIGID_SHARE = 1e-8
 """Energy added to every field before whitening, as a share of all fields' energy.

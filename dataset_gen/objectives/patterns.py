@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dataset_gen.block import (
+from carillon.fem.block import (
     COARSE_EDGE,
     NODES,
     active_nodes,
@@ -17,7 +17,7 @@ from dataset_gen.block import (
     degrees_of_freedom,
     prolongation,
 )
-from dataset_gen.element import (
+from carillon.fem.element import (
     CORNERS,
     GAUSS_POINTS,
     Array,
@@ -26,7 +26,7 @@ from dataset_gen.element import (
     shape_gradients,
     strain_displacement,
 )
-from dataset_gen.serial import serial_blas
+from carillon.serial import serial_blas
 
 NULL_TOLERANCE = 1e-10
 """Eigenvalues below this share of the largest count as motions without strain."""

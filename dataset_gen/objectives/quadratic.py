@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dataset_gen.element import Array
+from carillon.fem.element import Array
 from dataset_gen.objectives.bounded import minimise_above
 from dataset_gen.objectives.flops import count
 

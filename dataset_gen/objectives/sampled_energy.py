@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dataset_gen.element import DEFAULT_POISSON, Array
+from carillon.fem.element import DEFAULT_POISSON, Array
+from carillon.serial import serial_blas
 from dataset_gen.objectives.coarse_response import (
     Coarse,
     Response,
@@ -57,7 +58,6 @@ from dataset_gen.objectives.lanes import (
 )
 from dataset_gen.objectives.patterns import pattern_of
 from dataset_gen.objectives.quadratic import MODULUS_FLOOR, PatternFits, reference_moduli
-from dataset_gen.serial import serial_blas
 
 DIRECTIONS = 1000
 """Force directions of one fit (section 8.1)."""

@@ -40,10 +40,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dataset_gen.element import Array
+from carillon.fem.element import Array
+from carillon.serial import serial_blas
 from dataset_gen.objectives.chen2015 import corner_selection
 from dataset_gen.objectives.patterns import corner_strains, pattern_of, straining_motions
-from dataset_gen.serial import serial_blas
 
 LOADS = ("nodal", "inertial", "corner")
 """Load cases."""

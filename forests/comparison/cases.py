@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dataset_gen.element import Array
+from carillon.fem.element import Array
 from dataset_gen.objectives import orientations
 from dataset_gen.sampling import Mixture, Moduli, moduli, samples
 

@@ -10,8 +10,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from dataset_gen.block import symmetries
-from dataset_gen.element import Array
+from carillon.fem.block import symmetries
+from carillon.fem.element import Array
 
 
 def places(materials: int) -> NDArray[np.int64]:

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dataset_gen.element import DEFAULT_POISSON, Array
+from carillon.fem.element import DEFAULT_POISSON, Array
+from carillon.serial import serial_blas
 from dataset_gen.objectives.chen2015 import Corners, corners_of
 from dataset_gen.objectives.elimination import TILE
 from dataset_gen.objectives.kernel import (
@@ -24,7 +25,6 @@ from dataset_gen.objectives.kernel import (
 )
 from dataset_gen.objectives.lanes import LANES, compiled, empty
 from dataset_gen.objectives.patterns import straining_motions
-from dataset_gen.serial import serial_blas
 from forests.comparison.block_error import pattern_rows
 
 

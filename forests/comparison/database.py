@@ -24,10 +24,10 @@ from numpy.typing import ArrayLike, NDArray
 from carillon import provenance
 from carillon.datasets import INTEGER, number, read, refused
 from carillon.errors import UserError
+from carillon.fem.block import symmetries
+from carillon.fem.element import DEFAULT_POISSON, Array
 from carillon.files import create_h5, open_h5
 from carillon.progress import track
-from dataset_gen.block import symmetries
-from dataset_gen.element import DEFAULT_POISSON, Array
 from dataset_gen.objectives import fit, require_poisson
 from dataset_gen.sampling import Moduli
 from forests.comparison.combinations import cells_of, combination_keys, places

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
+from carillon.fem.element import Array
 from carillon.progress import track
-from dataset_gen.element import Array
 
 BOX_POINTS = 128
 """Most points of a box."""

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from carillon.errors import UserError
+from carillon.fem.element import Array
 from carillon.files import require_writable
-from dataset_gen.element import Array
 from dataset_gen.objectives import closed_form, fit
 from forests import model as forest_model
 from forests.baselines import average, galerkin

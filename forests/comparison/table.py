@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
+from carillon.fem.element import Array
 from carillon.progress import track
-from dataset_gen.element import Array
-from dataset_gen.serial import serial_blas
+from carillon.serial import serial_blas
 from forests.comparison.block_error import AT_ONCE, Errors, displacement_errors
 from forests.comparison.cases import CASES, Case
 from forests.comparison.database import Database

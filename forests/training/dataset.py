@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dataset_gen.element import Array
+from carillon.fem.element import Array
 from dataset_gen.sampling import HYPERCUBE
 from dataset_gen.settings import Settings
 from dataset_gen.shards import PIECE_ROWS, Shard, in_order, iterate_shard, read_settings

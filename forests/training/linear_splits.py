@@ -14,7 +14,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from dataset_gen.element import Array
+from carillon.fem.element import Array
 from forests.scaling import FEATURES, Features
 from forests.training.moments import ENTRIES, fit_error, products
 

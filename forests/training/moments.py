@@ -9,7 +9,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from dataset_gen.element import Array
+from carillon.fem.element import Array
 from forests.scaling import FEATURES
 
 ONE, TARGET = FEATURES, FEATURES + 1

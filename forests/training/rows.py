@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dataset_gen.element import Array
+from carillon.fem.element import Array
 from forests.scaling import TRANSFORMS, Features, prepare
 from forests.training.dataset import Samples
 from forests.training.structure import Rows

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dataset_gen.element import Array
+from carillon.fem.element import Array
 from forests.scaling import FEATURES, PATTERNS, Features
 from forests.training.linear_splits import grow_linear
 

@@ -15,9 +15,10 @@ from carillon import provenance
 from carillon.errors import UserError
 from carillon.progress import say, track
 from dataset_gen.shards import Shard
-from forests.model import FILLED, VOID, Model, join
+from forests.model import FILLED, VOID, Model
 from forests.scaling import TRANSFORMS
 from forests.training.dataset import Dataset, Samples, dataset_of, joined
+from forests.training.join import join
 from forests.training.leaves import Leaves, Sums, add_rows, solve_leaves
 from forests.training.ranks import Ranks
 from forests.training.rows import STUDIED, rows_of

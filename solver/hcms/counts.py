@@ -16,8 +16,8 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from solver.lowest import BLOCK_SHARE, STEPS
-from solver.messages import Sent
+from solver.distribution.messages import Sent
+from solver.hcms.lowest import BLOCK_SHARE, STEPS
 
 Array = NDArray[np.float64]
 
@@ -146,7 +146,7 @@ def eigen_flops(size: int, generalised: bool) -> float:
 
 
 def krylov_flops(size: int, modes: int, steps: int = STEPS) -> float:
-    """Lowest `modes` of a compact solid of `size` unknowns by block Krylov, see `solver.lowest`.
+    """Lowest `modes` of a compact solid of `size` unknowns, see `solver.hcms.lowest`.
 
     Nested dissection of a cube of N nodes has a separator of s = 3 N^(2/3) unknowns at the top;
     summed over the levels, the factorisation by dense products takes about 4 s^3 and the factor has

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
-from solver.distribution import Cells
+from carillon.fem.model import RIGID_MODES, Elements
+from solver.assembly.node_rows import NodeRows, Pattern
+from solver.distribution.local_mesh import Cells
 from solver.hcms.condense import restrict_mass, restrict_stiffness
-from solver.inner.multifrontal import Plan
-from solver.lowest import STEPS, all_modes, lowest_modes, ritz_pairs
-from solver.model import RIGID_MODES, Elements
-from solver.node_rows import NodeRows, Pattern
+from solver.hcms.lowest import STEPS, all_modes, lowest_modes, ritz_pairs
+from solver.linear.multifrontal import Plan
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -113,7 +113,7 @@ class Subdomain:
         cutoff
             Eigenvalue [rad^2/s^2] up to which all modes come back, instead of `keep`.
         steps
-            Of the eigensolver, see `solver.lowest`.
+            Of the eigensolver, see `solver.hcms.lowest`.
 
         Returns
         -------

@@ -18,13 +18,13 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from dataset_gen.block import degrees_of_freedom
-from solver.distribution import Cells
+from carillon.fem.block import degrees_of_freedom
+from carillon.fem.model import RIGID_MODES
+from solver.assembly.sparse import assemble_elements
+from solver.distribution.local_mesh import Cells
+from solver.distribution.messages import AnyArray
 from solver.hcms.condense import restrict_stiffness
 from solver.hcms.counts import Tally, eigen_flops, product_flops, sparse_product_flops
-from solver.messages import AnyArray
-from solver.model import RIGID_MODES
-from solver.sparse import assemble_elements
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]

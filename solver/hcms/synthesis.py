@@ -15,12 +15,16 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from carillon.fem.block import degrees_of_freedom
+from carillon.fem.model import RIGID_MODES
 from carillon.threads import in_parallel
-from dataset_gen.block import degrees_of_freedom
-from solver.distribution import Cells, Share
+from solver.distribution.local_mesh import Cells, Share
+from solver.distribution.messages import Sent, receive_arrays, send_arrays
+from solver.distribution.tree import Merge
 from solver.hcms.condense import DEFAULT_INTERFACE
 from solver.hcms.counts import Counts, Tally, krylov_flops, product_flops
 from solver.hcms.local import Subdomain
+from solver.hcms.lowest import FEWER_STEPS, STEPS
 from solver.hcms.merge import (
     Group,
     Interface,
@@ -33,10 +37,6 @@ from solver.hcms.merge import (
     reduced_pencil,
     right_projection,
 )
-from solver.hcms.tree import Merge
-from solver.lowest import FEWER_STEPS, STEPS
-from solver.messages import Sent, receive_arrays, send_arrays
-from solver.model import RIGID_MODES
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from carillon.errors import UserError
 
 if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     from sound.clips.extraction import ModalSound
-    from sound.targets import Targets
+    from sound.clips.targets import Targets
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,9 +35,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     from carillon.files import atomic_path
     from sound.clips.files import extract_file
+    from sound.clips.targets import share_frequencies
     from sound.clips.wav import ENDINGS, write_wav
     from sound.outputs import require_output
-    from sound.targets import share_frequencies
 
     if arguments.residual is not None and len(arguments.clips) > 1:
         raise UserError(

@@ -17,7 +17,7 @@ from sound.design.objective import fall
 from sound.design.optimisers import OPTIMISERS
 from sound.design.preparation import Prepared
 from sound.design.simulation import Evaluation
-from sound.design_file import Design
+from sound.project.design_file import Design
 
 Array = NDArray[np.float64]
 

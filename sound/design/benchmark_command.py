@@ -25,7 +25,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Measure and print."""
     from sound.design.benchmark import benchmark
     from sound.design.preparation import prepare
-    from sound.project import load_project, with_optimiser
+    from sound.project.project import load_project, with_optimiser
 
     given = {key: getattr(arguments, key) for key in ("seconds", "evaluations", "workers")}
     project = with_optimiser(load_project(arguments.project), **given)

@@ -22,7 +22,7 @@ from sound.design.objective import fall
 
 if TYPE_CHECKING:
     from sound.design.search import Search
-    from sound.design_file import Design
+    from sound.project.design_file import Design
 
 ENDINGS = (".h5", ".hdf5")
 """Of designs."""
@@ -62,9 +62,9 @@ def _search(arguments: argparse.Namespace) -> int:
     """Search, writing the design every half minute and at the end."""
     from sound.design.designing import design
     from sound.design.preparation import prepare, require_same_voxels
-    from sound.design_file import read_design, write_design
     from sound.outputs import require_output
-    from sound.project import load_project, with_optimiser
+    from sound.project.design_file import read_design, write_design
+    from sound.project.project import load_project, with_optimiser
 
     _require_one_rank()
     project = load_project(arguments.project)

@@ -13,7 +13,7 @@ from sound.design.outcome import Outcome, require_modes
 from sound.design.pool import Pool, Task
 from sound.design.preparation import Prepared, coordinates_of
 from sound.design.search import BudgetSpentError, Search
-from sound.design_file import HISTORY_TYPE, Design
+from sound.project.design_file import HISTORY_TYPE, Design
 
 
 def design(

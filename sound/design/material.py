@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from solver.geometry import HexMesh
-from solver.laplacian import laplacian_modes
+from carillon.fem.geometry import HexMesh
+from carillon.fem.laplacian import laplacian_modes
 
 Array = NDArray[np.float64]
 

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from sound.design.bark import bark, bark_slope
 
 if TYPE_CHECKING:
-    from sound.project import Weights
-    from sound.targets import Targets
+    from sound.clips.targets import Targets
+    from sound.project.project import Weights
 
 Array = NDArray[np.float64]
 

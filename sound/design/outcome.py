@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError, UserError
 from carillon.threads import one_thread
-from solver.modes_file import frequencies
+from solver.files.modes_file import frequencies
 from sound.design.descent import cost_of
 from sound.design.objective import Cost
 from sound.design.pool import Trial
 from sound.design.preparation import Prepared
 from sound.design.search import Moment, Search
 from sound.design.simulation import Evaluation, Simulation
-from sound.design_file import HISTORY_TYPE, Design
+from sound.project.design_file import HISTORY_TYPE, Design
 
 FINAL_TOLERANCE = 1e-8
 """Relative error of the eigenvalues that a design is written with."""

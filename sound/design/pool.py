@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError, UserError
+from carillon.fem.geometry import HexMesh
 from carillon.threads import one_thread
-from solver.geometry import HexMesh
-from solver.problem import ProblemOptions
+from solver.analysis.problem import ProblemOptions
 from sound.design.descent import (
     Descent,
     LimitedMemory,

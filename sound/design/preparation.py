@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
+from carillon.fem.geometry import hexmesh_from_voxels, voxelize
+from carillon.fem.geometry.surface import surface_name
 from carillon.runtime import allowed_cores
-from solver.geometry import hexmesh_from_voxels, voxelize
-from solver.geometry.surface import surface_name
 from sound.clips.files import extract_file
+from sound.clips.targets import Targets, share_frequencies
 from sound.design.material import ReducedMaterial
 from sound.design.objective import Objective
 from sound.design.pool import Setting
-from sound.design_file import Design
-from sound.project import Project
-from sound.targets import Targets, share_frequencies
+from sound.project.design_file import Design
+from sound.project.project import Project
 
 Array = NDArray[np.float64]
 

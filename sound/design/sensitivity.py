@@ -12,9 +12,9 @@ import numpy as np
 import scipy.linalg as la
 from numpy.typing import NDArray
 
-from dataset_gen.element import quadrature_stiffness
-from solver.analysis import Modes
-from solver.inner import Inverse
+from carillon.fem.element import quadrature_stiffness
+from solver.analysis.modal_solver import Modes
+from solver.linear import Inverse
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

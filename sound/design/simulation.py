@@ -10,18 +10,19 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from dataset_gen.block import degrees_of_freedom
+from carillon.fem.block import degrees_of_freedom
+from carillon.fem.geometry import HexMesh, blocks_from_mesh
+from carillon.fem.model import RIGID_MODES, Constants, ElasticModel, fine_model
 from dataset_gen.objectives import lumped_share
 from forests import coarsen
 from forests.baselines import average, galerkin
 from forests.evaluate import coarsen_with_derivatives
-from solver.analysis import ModalSolver, Modes, SolverOptions
-from solver.coarsening import CoarseMaterial, block_moduli, coarse_model
-from solver.contact import interpolation
-from solver.geometry import HexMesh, blocks_from_mesh
-from solver.model import RIGID_MODES, Constants, ElasticModel, fine_model
-from solver.problem import ProblemOptions
-from solver.trained import Trained, load_trained
+from solver.analysis.modal_solver import ModalSolver, Modes
+from solver.analysis.options import SolverOptions
+from solver.analysis.problem import ProblemOptions
+from solver.coarsening.coarsen import CoarseMaterial, block_moduli, coarse_model
+from solver.coarsening.trained import Trained, load_trained
+from solver.response.contact import interpolation
 from sound.design.material import ReducedMaterial
 from sound.design.objective import Sensitivity
 from sound.design.sensitivity import (

@@ -32,8 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the file and say what it holds."""
-    from sound.design_file import read_design
     from sound.outputs import require_output
+    from sound.project.design_file import read_design
 
     wanted = _format(arguments.out, arguments.format)
     require_output(arguments.out, [Path(arguments.out).suffix.lower()], [arguments.design])

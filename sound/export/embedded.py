@@ -7,11 +7,11 @@ from typing import Any
 
 import h5py
 
-from solver.comparison import recomputed_residuals
-from solver.contact import embedding
-from solver.modes_file import ModesFile, frequencies, put, write_modes
-from solver.sparse import assembled
-from sound.design_file import Design, put_object
+from solver.assembly.sparse import assembled
+from solver.files.modes_file import ModesFile, frequencies, put, write_modes
+from solver.response.contact import embedding
+from solver.studies.comparison import recomputed_residuals
+from sound.project.design_file import Design, put_object
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
 

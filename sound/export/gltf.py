@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 
 from carillon import __version__
 from carillon.files import atomic_path
-from sound.design_file import Design
 from sound.export.rigid import mass_properties
+from sound.project.design_file import Design
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.model import ElasticModel
+from carillon.fem.model import ElasticModel
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     import numpy as np
     from numpy.typing import NDArray
 
-    from sound.design_file import Design
+    from sound.project.design_file import Design
     from sound.rendering.listening import Listening
     from sound.rendering.solid import SoundingSolid
 
@@ -156,9 +156,9 @@ def _point_of_solid(
 ) -> tuple[Array, Array, SoundingSolid, Listening | None]:
     """Struck point, inward normal there, the solid, and how its clips are heard if it has some."""
     from carillon.files import kind_of
-    from solver.modes_file import read_modes
-    from solver.response import Damping
-    from sound.design_file import read_design
+    from solver.files.modes_file import read_modes
+    from solver.response.response import Damping
+    from sound.project.design_file import read_design
     from sound.rendering.listening import Listening
     from sound.rendering.solid import SoundingSolid
 
@@ -204,7 +204,7 @@ def _voxel_point(arguments: argparse.Namespace, mesh: Any) -> tuple[Array, Array
     """Struck point of the voxels' surface and inward normal there."""
     import numpy as np
 
-    from solver.contact import surface_node, surface_normals
+    from solver.response.contact import surface_node, surface_normals
 
     if arguments.at is None:
         raise UserError(

@@ -8,7 +8,7 @@ from math import gcd
 import numpy as np
 from numpy.typing import NDArray
 
-from sound.design_file import Design
+from sound.project.design_file import Design
 from sound.rendering.solid import SoundingSolid
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.response import SAMPLE_RATE_HERTZ, half_sine
+from solver.response.response import SAMPLE_RATE_HERTZ, half_sine
 from sound.rendering.bank import Bank, ring
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from solver.clusters import clusters
-from solver.contact import interpolation
-from solver.geometry import HexMesh
-from solver.model import RIGID_MODES
-from solver.modes_file import ModesFile
-from solver.response import Damping
-from sound.design_file import Design
+from carillon.fem.geometry import HexMesh
+from carillon.fem.model import RIGID_MODES
+from solver.files.modes_file import ModesFile
+from solver.response.contact import interpolation
+from solver.response.response import Damping
+from solver.subspace.spectrum import clusters
+from sound.project.design_file import Design
 
 Array = NDArray[np.float64]
 

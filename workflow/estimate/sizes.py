@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
-from solver.geometry import blocks_from_mesh, hexmesh_from_voxels, load_surface, voxelize
+from carillon.fem.geometry import blocks_from_mesh, hexmesh_from_voxels, load_surface, voxelize
 from workflow.settings import BUILTIN
 
 TYPICAL_FINE, TYPICAL_COARSE = 0.8, 0.15

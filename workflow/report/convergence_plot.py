@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
-from solver.model import RIGID_MODES
+from carillon.fem.model import RIGID_MODES
 from workflow.report.convergence_tables import ACCELERATIONS, PAPER, RANDOM, start_label
 from workflow.report.style import COLOURS, SETTINGS
 from workflow.variants import TRUTH

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from solver.modes_file import ModesFile
+from solver.files.modes_file import ModesFile
 from workflow.report.results import Results
 from workflow.report.table import Column, Table
 from workflow.variants import VARIANTS

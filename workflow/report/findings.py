@@ -91,3 +91,10 @@ def _median_ratio(rows: list[dict[str, Any]], above: str, below: str) -> float:
 def _counted(row: dict[str, Any]) -> bool:
     found, counted = row["inertia"].split(" / ")
     return bool(found == counted)
+
+
+def headline(count: int, missed: int) -> str:
+    """How many of the criteria are met."""
+    if missed == 0:
+        return f"Passed: all {count} criteria are met."
+    return f"Failed: {missed} of {count} criteria {'is' if missed == 1 else 'are'} missed."

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from solver.geometry import HexMesh
-from solver.geometry.picture import DRAWN_AMPLITUDE, draw, guess_up, surface_quads
-from solver.model import RIGID_MODES
-from solver.modes_file import ModesFile, read_modes
+from carillon.fem.geometry import HexMesh
+from carillon.fem.geometry.boundary import surface_quads
+from carillon.fem.geometry.picture import DRAWN_AMPLITUDE, draw, guess_up
+from carillon.fem.model import RIGID_MODES
+from solver.files.modes_file import ModesFile, read_modes
 from workflow.report.results import Results
 from workflow.report.style import SETTINGS, pixels, save_pixels
 from workflow.variants import SHOWN, TRUTH
@@ -94,8 +95,8 @@ class View:
     Attributes
     ----------
     scale, limits, up
-        Arguments of `solver.geometry.picture.draw`. Colours end at the largest motion that can be
-        seen: inside, a body may move more than its surface does.
+        Arguments of `carillon.fem.geometry.picture.draw`. Colours end at the largest motion that
+        can be seen: inside, a body may move more than its surface does.
     """
 
     def __init__(self, mesh: HexMesh, motion: Array) -> None:

@@ -7,9 +7,9 @@ from typing import Any
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
-from solver.geometry.picture import draw
-from solver.model import RIGID_MODES
-from solver.modes_file import read_modes
+from carillon.fem.geometry.picture import draw
+from carillon.fem.model import RIGID_MODES
+from solver.files.modes_file import read_modes
 from workflow.report.mode_pictures import View, aligned, displacement
 from workflow.report.plots import LINES
 from workflow.report.results import Results

@@ -12,14 +12,13 @@ from markupsafe import Markup
 
 from workflow.report.conditions import LABELS
 from workflow.report.convergence_tables import convergence_sentences
-from workflow.report.findings import findings
+from workflow.report.findings import findings, headline
 from workflow.report.numbers import show
 from workflow.report.results import Results
 from workflow.report.scaling_tables import assumptions
 from workflow.report.style import themed
 from workflow.report.table import Table, read_table
 from workflow.report.tables import BUILDERS
-from workflow.validate.verdict import headline
 from workflow.variants import SHOWN, TRUTH, VARIANTS
 
 HERE = Path(__file__).parent

@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from solver.modes_file import ModesFile, read_modes
+from solver.files.modes_file import ModesFile, read_modes
 from workflow import settings
 from workflow.variants import CANDIDATES, VARIANTS
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from solver.comparison import AUDIBLE_FIRST, AUDIBLE_LAST
-from solver.model import RIGID_MODES
+from carillon.fem.model import RIGID_MODES
+from solver.studies.comparison import AUDIBLE_FIRST, AUDIBLE_LAST
 from workflow.report.identity import IDENTITY, identity
 from workflow.report.results import Results
 from workflow.report.table import Column, Table

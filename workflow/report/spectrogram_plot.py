@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from solver.response import FLOOR_DECIBELS, SAMPLE_RATE_HERTZ, decibels, spectrogram
+from solver.response.response import FLOOR_DECIBELS, SAMPLE_RATE_HERTZ, decibels, spectrogram
 from workflow.report.style import MUTED, SETTINGS
 
 Array = NDArray[np.float64]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from solver.modes_file import CHECKS, ModesFile
+from solver.files.modes_file import CHECKS, ModesFile
 from workflow.report.identity import IDENTITY, identity
 from workflow.report.results import Results
 from workflow.report.table import Column, Table

@@ -50,7 +50,7 @@ rule benchmark_forests:
         mem_mb=growing(2000),
         runtime=growing(30),
     params:
-        source=source("forests.benchmark"),
+        source=source("forests.studies.benchmark"),
         blocks=config["forests_study"]["timed_blocks"],
         largest=config["forests_study"]["largest"],
     shell:
@@ -75,7 +75,7 @@ rule compare_trainings:
         mem_mb=growing(8000),
         runtime=growing(240),
     params:
-        source=source("forests.training.studies"),
+        source=source("forests.studies.training"),
         training=STUDY_TRAINING.train_arguments,
         leaves=config["forests_study"]["variant_leaves"],
         variants=[
@@ -102,7 +102,7 @@ rule follow_learning:
         mem_mb=growing(8000),
         runtime=growing(240),
     params:
-        source=source("forests.training.studies"),
+        source=source("forests.studies.training"),
         training=STUDY_TRAINING.train_arguments,
         rows=",".join(map(str, config["forests_study"]["curve_rows"])),
     shell:

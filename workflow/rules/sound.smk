@@ -39,7 +39,7 @@ rule check_design:
         mem_mb=growing(8000),
         runtime=growing(60),
     params:
-        source=source("solver.problem", "solver.modes_file", "solver.__main__"),
+        source=source("solver.analysis.problem", "solver.files.modes_file", "solver.__main__"),
         solid=fine_solid,
     shell:
         "OMP_NUM_THREADS={threads} python -m solver modes {params.solid:q}"

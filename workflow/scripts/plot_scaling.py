@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from solver.scaling.plot import scaling_figure
+from solver.studies.scaling.plot import scaling_figure
 from workflow.report.style import SETTINGS, save
 
 scaling = json.loads(Path(snakemake.input.scaling).read_text())

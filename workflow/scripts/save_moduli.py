@@ -3,7 +3,7 @@
 import numpy as np
 
 from carillon.files import atomic_path
-from sound.design_file import read_design
+from sound.project.design_file import read_design
 
 with atomic_path(snakemake.output[0]) as temporary, open(temporary, "wb") as file:
     np.save(file, read_design(snakemake.input.design).young)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from carillon.files import atomic_path
-from solver.problem import ProblemOptions, build_problem
+from solver.analysis.problem import ProblemOptions, build_problem
 from workflow.sounds.examples import Recording
 
 example = snakemake.params.example

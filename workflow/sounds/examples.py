@@ -76,7 +76,7 @@ class Example:
     name, title, figure, about
         Short name, heading, what it follows in the paper, and a sentence.
     mesh, resolution, density, modes, dimensions, seconds
-        See `sound/project.schema.yaml`.
+        See `sound/project/project.schema.yaml`.
     targets
         In the order of their edits.
     elsewhere

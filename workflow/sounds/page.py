@@ -11,7 +11,7 @@ import yaml
 from numpy.typing import NDArray
 
 from carillon import provenance
-from solver.response import spectrogram
+from solver.response.response import spectrogram
 from sound.strikes import locate
 from workflow.report.audio import wav_uri
 from workflow.report.page import page_template

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.geometry import HexMesh, hexmesh_from_grid
-from solver.geometry.picture import draw, guess_up, looks_at, mark, view_of
-from sound.design_file import Design
+from carillon.fem.geometry import HexMesh, hexmesh_from_grid
+from carillon.fem.geometry.picture import draw, guess_up, looks_at, mark, view_of
+from sound.project.design_file import Design
 from workflow.report.mode_pictures import cropped
 from workflow.report.pictures import COLOUR_MAP, ROOM_FOR_ARROW, Pixels, solid_picture
 from workflow.report.style import COLOURS

@@ -12,9 +12,9 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from solver.modes_file import ModesFile, read_modes
+from solver.files.modes_file import ModesFile, read_modes
 from sound.clips.wav import read_wav
-from sound.design_file import Design, read_design
+from sound.project.design_file import Design, read_design
 from workflow.sounds.examples import DESIGN, FOLDER, START, TRUTH, Example, examples
 
 Array = NDArray[np.float64]

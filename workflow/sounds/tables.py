@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.model import RIGID_MODES
+from carillon.fem.model import RIGID_MODES
 from sound.design.bark import bark
-from sound.design_file import Design
+from sound.project.design_file import Design
 from sound.rendering.solid import SoundingSolid
 from workflow.report.conditions import ONE_COLD_RUN, Conditions, conditions
 from workflow.report.evidence_tables import provenance_table

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.model import RIGID_MODES
+from carillon.fem.model import RIGID_MODES
 from workflow.report.table import Column, Table
 from workflow.study.cases import Case, Study
 from workflow.study.identity import IDENTITY, identity, label

@@ -6,9 +6,9 @@ import inspect
 from collections.abc import Mapping
 from typing import Any
 
-import solver.materials
+import carillon.fem.materials
 from dataset_gen.objectives import OBJECTIVES
-from solver.trained import FOREST
+from solver.coarsening.trained import FOREST
 from workflow.report import evidence_tables
 from workflow.report.table import Column, Table
 from workflow.study.cases import Case, Study
@@ -97,7 +97,7 @@ def materials(study: Study) -> Table:
 
 def _material(name: str) -> str:
     """First line of the documentation of a named material."""
-    documentation = inspect.getdoc(getattr(solver.materials, name.replace("-", "_"))) or ""
+    documentation = inspect.getdoc(getattr(carillon.fem.materials, name.replace("-", "_"))) or ""
     return documentation.split("\n", 1)[0]
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.trained import FOREST
+from solver.coarsening.trained import FOREST
 from workflow.report.table import Column, Table
 from workflow.study.cases import Case, Study
 from workflow.study.errors_tables import FIRST

@@ -21,15 +21,15 @@ from carillon.arguments import (
     whole_number,
 )
 from carillon.errors import UserError
+from carillon.fem.geometry import FILLS, PIECES, surface_name
+from carillon.fem.materials import NAMES as MATERIALS
+from carillon.fem.model import DEFAULT_DENSITY
 from carillon.files import atomic_path
 from carillon.progress import say
 from carillon.runtime import allowed_cores
-from solver.contact import surface_node
-from solver.geometry import FILLS, PIECES, surface_name
-from solver.materials import NAMES as MATERIALS
-from solver.model import DEFAULT_DENSITY
-from solver.problem import ProblemOptions, build_problem
-from solver.trained import load_trained
+from solver.analysis.problem import ProblemOptions, build_problem
+from solver.coarsening.trained import load_trained
+from solver.response.contact import surface_node
 from workflow import settings
 from workflow.report.table import read_table
 from workflow.room import make_folder

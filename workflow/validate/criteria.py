@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from solver.comparison import AUDIBLE_FIRST, AUDIBLE_LAST
-from solver.model import RIGID_MODES
-from solver.modes_file import frequencies
+from carillon.fem.model import RIGID_MODES
+from solver.files.modes_file import frequencies
+from solver.studies.comparison import AUDIBLE_FIRST, AUDIBLE_LAST
 from workflow.report.numbers import show
 from workflow.validate.evidence import COARSENED, SOLVED, Evidence
 from workflow.variants import TRUTH

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from solver.modes_file import ModesFile, read_modes
-from solver.response_file import ResponseFile, read_response
+from solver.files.modes_file import ModesFile, read_modes
+from solver.response.response_file import ResponseFile, read_response
 from workflow.report.results import Results
 from workflow.variants import SHOWN, TRUTH
 

@@ -10,8 +10,8 @@ import numpy as np
 import yaml
 
 from carillon import provenance
-from solver.geometry import load_surface
-from solver.response import STRIKE_SECONDS
+from carillon.fem.geometry import load_surface
+from solver.response.response import STRIKE_SECONDS
 from workflow import settings
 from workflow.report.audio import wav_uri
 from workflow.report.mode_pictures import CLUSTER_WIDTH

@@ -8,9 +8,9 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from solver.contact import Contact
-from solver.geometry import HexMesh
-from solver.geometry.picture import draw, draw_surface, guess_up, mark, view_of
+from carillon.fem.geometry import HexMesh
+from carillon.fem.geometry.picture import draw, draw_surface, guess_up, mark, view_of
+from solver.response.contact import Contact
 from workflow.report.mode_pictures import cropped
 from workflow.report.pictures import COLOUR_MAP, ROOM_FOR_ARROW, Pixels, solid_picture
 from workflow.report.style import COLOURS

@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from solver.response import SAMPLE_RATE_HERTZ, spectrogram
-from solver.response_file import ResponseFile
+from solver.response.response import SAMPLE_RATE_HERTZ, spectrogram
+from solver.response.response_file import ResponseFile
 from workflow.report.convergence_plot import visible
 from workflow.report.pictures import COLOUR_MAP
 from workflow.report.plots import LINES

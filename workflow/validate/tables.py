@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from solver.model import RIGID_MODES
-from solver.response_file import Response
+from carillon.fem.model import RIGID_MODES
+from solver.response.response_file import Response
 from workflow.report.evidence_tables import provenance_table
 from workflow.report.table import Column, Table
 from workflow.validate.criteria import Criterion

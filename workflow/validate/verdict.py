@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from workflow.report.findings import headline
 from workflow.report.numbers import show
 from workflow.validate.criteria import GROUPS, Criterion
 from workflow.validate.evidence import COARSENED, SOLVED
@@ -65,13 +66,6 @@ def verdict(criteria: Sequence[Criterion]) -> Verdict:
     ]
     missed = sum(not criterion.passed for criterion in criteria)
     return Verdict(missed == 0, headline(len(criteria), missed), _advice(parts), parts)
-
-
-def headline(count: int, missed: int) -> str:
-    """How many of the criteria are met."""
-    if missed == 0:
-        return f"Passed: all {count} criteria are met."
-    return f"Failed: {missed} of {count} criteria {'is' if missed == 1 else 'are'} missed."
 
 
 def _part(group: str, criteria: list[Criterion]) -> Part:

@@ -1,0 +1,92 @@
+"""Uniform hexahedral mesh of the filled voxels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from carillon.fem.geometry.voxels import VoxelModel
+
+#: Offset of local corner c = x + 2*y + 4*z from the cell's lowest corner, shape (8, 3).
+CORNER_OFFSETS = np.array([[c & 1, (c >> 1) & 1, (c >> 2) & 1] for c in range(8)], dtype=np.int32)
+
+
+@dataclass(frozen=True, eq=False)
+class HexMesh:
+    """Cubes of one edge length on an integer grid, and the nodes at their corners.
+
+    Attributes
+    ----------
+    cells : (m, 8) int32, node indices of each cell; local corner ``c`` has the offset
+        ``(c & 1, c >> 1 & 1, c >> 2 & 1)``, so x runs fastest.
+    grid : (m, 3) int32, integer coordinates of the cells, ordered by (z, y, x).
+    node_grid : (n, 3) int32, integer coordinates of the nodes, ordered by (z, y, x).
+    origin : (3,) position of node coordinate (0, 0, 0) [m].
+    edge : edge of a cell [m].
+    """
+
+    cells: np.ndarray
+    grid: np.ndarray
+    node_grid: np.ndarray
+    origin: np.ndarray
+    edge: float
+
+    @cached_property
+    def nodes(self) -> np.ndarray:
+        """Positions of the nodes (n, 3) [m]."""
+        return self.origin + self.edge * self.node_grid
+
+    @property
+    def n_nodes(self) -> int:
+        return len(self.node_grid)
+
+    @property
+    def n_dofs(self) -> int:
+        """Three displacements per node."""
+        return 3 * self.n_nodes
+
+    @property
+    def n_cells(self) -> int:
+        return len(self.cells)
+
+    @property
+    def volume(self) -> float:
+        """Volume of all cells [m^3]."""
+        return self.n_cells * self.edge**3
+
+
+def hexmesh_from_grid(grid: np.ndarray, origin: np.ndarray, edge: float) -> HexMesh:
+    """Mesh of the cells at integer coordinates `grid` (m, 3); cells and nodes ordered by (z, y, x).
+
+    Only corners of the given cells become nodes.
+
+    Examples
+    --------
+    >>> mesh = hexmesh_from_grid(np.array([[0, 0, 0], [1, 0, 0]]), np.zeros(3), 0.5)
+    >>> mesh.n_nodes, mesh.cells[1].tolist()
+    (12, [1, 2, 4, 5, 7, 8, 10, 11])
+    """
+    grid = np.asarray(grid, dtype=np.int64).reshape(-1, 3)
+    grid = grid[np.lexsort(grid.T)]
+    corners = grid[:, None, :] + CORNER_OFFSETS
+    # One 64-bit key per node: sorting keys is sorting by (z, y, x).
+    size = corners.reshape(-1, 3).max(axis=0, initial=0) + 1
+    stride = np.array([1, size[0], size[0] * size[1]], dtype=np.int64)
+    keys, cells = np.unique(corners @ stride, return_inverse=True)
+    node_grid = np.stack(
+        [keys % size[0], keys // size[0] % size[1], keys // (size[0] * size[1])], axis=1
+    )
+    return HexMesh(
+        cells=cells.reshape(-1, 8).astype(np.int32),
+        grid=grid.astype(np.int32),
+        node_grid=node_grid.astype(np.int32),
+        origin=np.asarray(origin, dtype=float),
+        edge=float(edge),
+    )
+
+
+def hexmesh_from_voxels(voxels: VoxelModel) -> HexMesh:
+    """Mesh of the filled voxels, with nodes only where a filled voxel has a corner."""
+    return hexmesh_from_grid(np.argwhere(voxels.filled), voxels.origin, voxels.edge)

@@ -1,0 +1,275 @@
+"""Pictures of hexahedral meshes and their motion, for reports."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from carillon.fem.geometry.boundary import boundary_faces, surface_quads
+from carillon.fem.geometry.hexmesh import HexMesh
+
+if TYPE_CHECKING:
+    from mpl_toolkits.mplot3d import Axes3D
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+#: Colour of a body that shows no values.
+PLAIN = (0.90, 0.80, 0.64)
+
+#: Elevation and azimuth of the eye [degrees].
+VIEW = (22.0, -58.0)
+
+#: Shares of the object's diagonal: the largest displacement that is drawn, and an arrow.
+DRAWN_AMPLITUDE = 0.08
+ARROW_LENGTH = 0.22
+
+
+def draw(
+    ax: Axes3D,
+    mesh: HexMesh,
+    displacement: np.ndarray | None = None,
+    values: np.ndarray | None = None,
+    scale: float | str = "auto",
+    up: str = "auto",
+    view: tuple[float, float] = VIEW,
+    cmap: str = "viridis",
+    limits: tuple[float, float] | None = None,
+) -> Poly3DCollection:
+    """Draw the surface of a mesh, deformed if wanted, lit from the upper left.
+
+    Parameters
+    ----------
+    ax : axes made with ``projection="3d"``.
+    mesh : fine or coarse mesh.
+    displacement : (n, 3) or (3*n,) displacement of the nodes, any unit.
+    values : (n,) per node or (m,) per cell, shown in colour; without them a deformed body is
+        coloured by the length of its displacement and a body at rest is plain.
+    scale : factor of the displacement, or ``"auto"``: the largest is drawn as `DRAWN_AMPLITUDE`
+        of the object's diagonal.
+    up : axis that points upwards, ``"x"``, ``"y"`` or ``"z"``; ``"auto"`` asks `guess_up`.
+    view : elevation and azimuth of the eye [degrees].
+    cmap : name of a matplotlib colour map.
+    limits : values at both ends of the colour map; their range by default.
+
+    Returns
+    -------
+    The polygons, with the values as their array, so that ``figure.colorbar`` accepts them.
+
+    Raises
+    ------
+    ValueError
+        If an array's shape or `up` does not fit.
+    """
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    quads, cell = boundary_faces(mesh)
+    turn = _rotation(guess_up(mesh) if up == "auto" else up)
+    if displacement is not None:
+        displacement = np.asarray(displacement, dtype=float).reshape(-1, 3)
+        if len(displacement) != mesh.n_nodes:
+            raise ValueError(f"{len(displacement)} displacements for {mesh.n_nodes} nodes")
+        if values is None:
+            values = np.linalg.norm(displacement, axis=1)
+    points = (mesh.nodes + _drawn_motion(mesh, displacement, scale)) @ turn.T
+    corners = points[quads]
+
+    if values is None:
+        face_values = None
+        colours = np.tile(PLAIN, (len(quads), 1))
+    else:
+        face_values = _on_faces(mesh, np.asarray(values, dtype=float), quads, cell)
+        low, high = limits or (float(face_values.min()), float(face_values.max()))
+        mapping = ScalarMappable(Normalize(low, high if high > low else low + 1.0), cmap)
+        colours = mapping.to_rgba(face_values)[:, :3]
+    colours = np.clip(colours * _light(points, quads, view)[:, None], 0, 1)
+
+    polygons = Poly3DCollection(corners, facecolors=colours, edgecolors=colours * 0.86)
+    polygons.set_linewidth(0.25)
+    if face_values is not None:
+        # Kept for a colour bar; the lit colours above stay as they are.
+        polygons.set_norm(mapping.norm)
+        polygons.set_cmap(cmap)
+        polygons.set_array(face_values)
+        polygons._face_is_mapped = polygons._edge_is_mapped = False
+        polygons.update_scalarmappable = lambda: None
+    ax.add_collection3d(polygons)
+    _frame(ax, points[np.unique(quads)], view)
+    return polygons
+
+
+def draw_surface(
+    ax: Axes3D,
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    mesh: HexMesh,
+    up: str = "auto",
+    view: tuple[float, float] = VIEW,
+) -> None:
+    """Draw triangles as `draw` draws their voxels: in the same place, size and light.
+
+    Parameters
+    ----------
+    vertices, faces : (v, 3) [m] and (f, 3), wound either way.
+    mesh : the voxels.
+    """
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    turn = _rotation(guess_up(mesh) if up == "auto" else up)
+    corners = (np.asarray(vertices) @ turn.T)[faces]
+    normal = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    towards = normal @ _direction(*np.radians(view))
+    normal *= np.where(towards < 0.0, -1.0, 1.0)[:, None]
+    colours = np.clip(np.array(PLAIN) * _brightness(normal, view)[:, None], 0, 1)
+    polygons = Poly3DCollection(corners, facecolors=colours, edgecolors=colours)
+    polygons.set_linewidth(0.2)
+    ax.add_collection3d(polygons)
+    _frame(ax, mesh.nodes[np.unique(surface_quads(mesh))] @ turn.T, view)
+
+
+def mark(
+    ax: Axes3D,
+    mesh: HexMesh,
+    point: np.ndarray,
+    colour: str,
+    inward: np.ndarray | None = None,
+    up: str = "auto",
+) -> None:
+    """Mark a point (3,) [m] of a drawn mesh: by an arrow that pushes `inward`, else by a ring."""
+    from matplotlib.lines import Line2D
+    from mpl_toolkits.mplot3d import proj3d
+
+    turn = _rotation(guess_up(mesh) if up == "auto" else up)
+    tip = proj3d.proj_transform(*(turn @ point), ax.get_proj())[:2]
+    if inward is None:
+        line = Line2D([tip[0]], [tip[1]], color=colour, marker="o", fillstyle="none", zorder=10)
+        line.set(markersize=13, markeredgewidth=2.4, clip_on=False)
+        ax.add_line(line)
+        return
+    length = ARROW_LENGTH * np.linalg.norm(np.ptp(mesh.nodes, axis=0))
+    end = proj3d.proj_transform(*(turn @ (point - length * inward)), ax.get_proj())[:2]
+    style = {"color": colour, "arrowstyle": "-|>", "linewidth": 3.0, "mutation_scale": 18}
+    ax.annotate("", tip, end, annotation_clip=False, arrowprops=style, zorder=10)
+
+
+def view_of(mesh: HexMesh, outward: np.ndarray, up: str = "auto") -> tuple[float, float]:
+    """Elevation and azimuth [degrees] from where the sides that look `outward` (d, 3) are seen."""
+    azimuths = VIEW[1] + np.arange(0.0, 360.0, 15.0)
+    seen = [looks_at(mesh, outward, (VIEW[0], azimuth), up).min() for azimuth in azimuths]
+    return VIEW[0], float(azimuths[int(np.argmax(seen))])
+
+
+def looks_at(
+    mesh: HexMesh, outward: np.ndarray, view: tuple[float, float], up: str = "auto"
+) -> np.ndarray:
+    """Cosines (d,) between directions `outward` (d, 3) and the one that the eye is in."""
+    turned = outward @ _rotation(guess_up(mesh) if up == "auto" else up).T
+    return np.asarray(turned @ _direction(*np.radians(view)))
+
+
+def guess_up(mesh: HexMesh) -> str:
+    """Axis on which the object stands firmly: ``"y"`` or ``"z"``, the two customs of mesh files.
+
+    Firm is a low centre of mass over a wide footprint of the lowest cells; ``"z"`` if in doubt.
+    """
+    firmness = {axis: _firmness(mesh, "xyz".index(axis)) for axis in "yz"}
+    return "y" if firmness["y"] > 1.05 * firmness["z"] else "z"
+
+
+def _firmness(mesh: HexMesh, axis: int) -> float:
+    height = mesh.grid[:, axis] - mesh.grid[:, axis].min() + 0.5
+    foot = np.delete(mesh.grid[height < 2], axis, axis=1)
+    centre = np.delete(mesh.grid.mean(axis=0), axis)
+    reach = np.minimum(foot.max(axis=0) - centre, centre - foot.min(axis=0)).min() + 0.5
+    return float(reach / height.mean())
+
+
+def _rotation(up: str) -> np.ndarray:
+    """Rotation (3, 3) that turns the axis `up` into the z axis of the plot."""
+    rotations = {
+        "x": [[0, 1, 0], [0, 0, 1], [1, 0, 0]],
+        "y": [[1, 0, 0], [0, 0, -1], [0, 1, 0]],
+        "z": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    }
+    if up not in rotations:
+        raise ValueError(f"up is {up!r}, expected 'auto', 'x', 'y' or 'z'")
+    return np.array(rotations[up], dtype=float)
+
+
+def _drawn_motion(
+    mesh: HexMesh, displacement: np.ndarray | None, scale: float | str
+) -> np.ndarray | float:
+    if displacement is None:
+        return 0.0
+    if scale != "auto":
+        return float(scale) * displacement
+    largest = np.linalg.norm(displacement, axis=1).max()
+    diagonal = np.linalg.norm(np.ptp(mesh.nodes, axis=0))
+    return displacement * (DRAWN_AMPLITUDE * diagonal / largest if largest > 0 else 0.0)
+
+
+def _on_faces(mesh: HexMesh, values: np.ndarray, quads: np.ndarray, cell: np.ndarray) -> np.ndarray:
+    if values.shape == (mesh.n_nodes,):
+        return values[quads].mean(axis=1)
+    if values.shape == (mesh.n_cells,):
+        return values[cell]
+    raise ValueError(
+        f"values have shape {values.shape}, expected ({mesh.n_nodes},) per node or "
+        f"({mesh.n_cells},) per cell"
+    )
+
+
+def _light(
+    points: np.ndarray, quads: np.ndarray, view: tuple[float, float], rounds: int = 4
+) -> np.ndarray:
+    """Brightness of each face (q,): ambient, key and fill light.
+
+    The face's own normal shows the voxels; the normal averaged over `rounds` rings of neighbours
+    shows the shape that they approximate. Their sum shows both.
+    """
+    corners = points[quads]
+    normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    normal = _unit(normal)
+    smooth = normal
+    for _ in range(rounds):
+        at_nodes = np.zeros_like(points)
+        np.add.at(at_nodes, quads, smooth[:, None, :])
+        smooth = _unit(_unit(at_nodes)[quads].mean(axis=1))
+    return _brightness(_unit(normal + 1.2 * smooth), view)
+
+
+def _brightness(normal: np.ndarray, view: tuple[float, float]) -> np.ndarray:
+    azimuth = np.radians(view[1])
+    key = _direction(np.radians(48.0), azimuth - np.radians(40.0))
+    fill = _direction(np.radians(15.0), azimuth + np.radians(50.0))
+    return 0.45 + 0.57 * np.clip(normal @ key, 0, 1) + 0.13 * np.clip(normal @ fill, 0, 1)
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300)
+
+
+def _direction(elevation: float, azimuth: float) -> np.ndarray:
+    return np.array(
+        [
+            np.cos(elevation) * np.cos(azimuth),
+            np.cos(elevation) * np.sin(azimuth),
+            np.sin(elevation),
+        ]
+    )
+
+
+def _frame(ax: Axes3D, points: np.ndarray, view: tuple[float, float]) -> None:
+    low, high = points.min(axis=0), points.max(axis=0)
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    elevation, azimuth = np.radians(view)
+    right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+    upwards = _direction(elevation + np.pi / 2, azimuth)
+    seen = (points - (low + high) / 2) @ np.stack([right, upwards], axis=1)
+    # matplotlib scales the box by its diagonal; fill the frame with what is seen of it instead.
+    zoom = 0.42 * np.linalg.norm(high - low) / max(np.abs(seen).max(), 1e-300)
+    ax.set_box_aspect(np.maximum(high - low, 1e-12), zoom=zoom)
+    ax.set_proj_type("persp", focal_length=1.6)
+    ax.view_init(elev=view[0], azim=view[1])
+    ax.set_axis_off()

@@ -1,0 +1,157 @@
+"""Surfaces of struck objects: read from a mesh file or made by code."""
+
+from __future__ import annotations
+
+import logging
+import warnings
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from trimesh.resolvers import FilePathResolver
+
+from carillon.errors import UserError
+from carillon.fem.geometry.builtin import builtin_surface
+from carillon.limits import EXTENTS, FARTHEST, UNITS, require_within
+from carillon.places import require_file
+
+BUILTIN_PREFIX = "builtin:"
+
+# A box thinner than this fraction of its longest side holds no solid that voxels could show.
+FLATNESS = 1e-6
+
+# A few bytes of them may stand for any number.
+_ARCHIVES = {"bz2", "zip", "tar.bz2", "tar.gz"}
+
+# Of a mesh file; triangles take about 50 bytes each.
+MOST_BYTES = 2 << 30
+
+
+def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
+    """Load a triangle surface in metres.
+
+    Parameters
+    ----------
+    mesh : path of a file that trimesh reads (obj, stl, ply, off, glb, ...; the objects of a scene
+        are concatenated), or ``builtin:NAME`` for a built-in object.
+    unit : metres per unit of the mesh's coordinates; built-in objects are in metres already, so
+        for them it is a scale factor.
+
+    Returns
+    -------
+    Surface with vertices in metres. It need not be closed or manifold.
+
+    Raises
+    ------
+    UserError
+        If the file is missing, not readable as a mesh, without faces, flat, or holds coordinates
+        that are not finite; if `unit` is out of range, or the surface too large, too small or too
+        far from the origin (see `carillon.limits`); if the built-in name is unknown.
+    """
+    if not UNITS[0] <= unit <= UNITS[1]:
+        raise UserError(
+            f"unit {unit:g}: expected a positive number of metres per mesh unit, {UNITS[0]:g} to "
+            f"{UNITS[1]:g}"
+        )
+    if mesh.startswith(BUILTIN_PREFIX):
+        surface = builtin_surface(mesh.removeprefix(BUILTIN_PREFIX))
+    else:
+        surface = _read(Path(mesh))
+    _require_solid(mesh, surface, unit)
+    if unit != 1.0:
+        surface.apply_scale(unit)
+    return surface
+
+
+def surface_name(mesh: str) -> str:
+    """Short name of a mesh for messages and files: ``builtin:bell`` -> ``bell``, a path -> stem."""
+    return mesh.removeprefix(BUILTIN_PREFIX) if mesh.startswith(BUILTIN_PREFIX) else Path(mesh).stem
+
+
+class _Beside(FilePathResolver):
+    """Other files that a mesh names: regular ones in its folder, which end, as pipes may not."""
+
+    def absolute(self, name: str) -> Path:
+        """Where the file `name` is; ValueError if it is none."""
+        path = Path(super().absolute(name))
+        if not path.is_file():
+            raise ValueError(f"no file {name!r} beside it")
+        return path
+
+
+def _read(path: Path) -> trimesh.Trimesh:
+    _require_mesh_file(path)
+    # trimesh logs warnings about odd files; the person gets one sentence instead.
+    logger = logging.getLogger("trimesh")
+    level = logger.level
+    logger.setLevel(logging.CRITICAL)
+    try:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            loaded = trimesh.load(path, resolver=_Beside(str(path)), process=False)
+            if isinstance(loaded, trimesh.Scene):
+                loaded = loaded.to_geometry() if loaded.geometry else trimesh.Trimesh()
+            if isinstance(loaded, trimesh.Trimesh):
+                _require_vertices(loaded)
+    except Exception as error:  # parsers of a dozen formats raise anything
+        reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
+        raise UserError(
+            f"{path}: could not be read as a mesh ({reason}); check or export the file again"
+        ) from None
+    finally:
+        logger.setLevel(level)
+    if not isinstance(loaded, trimesh.Trimesh) or len(loaded.faces) == 0:
+        raise UserError(
+            f"{path}: has no faces, expected the triangles of a surface; export it as a mesh"
+        )
+    return loaded
+
+
+def _require_mesh_file(path: Path) -> None:
+    require_file(path, "a mesh (obj, stl, ply, off, glb, ...) or builtin:NAME")
+    formats = sorted(trimesh.available_formats() - _ARCHIVES)
+    if path.suffix.lstrip(".").lower() not in formats:
+        raise UserError(
+            f"{path}: the mesh format {path.suffix or '(no ending)'!r} is unknown; "
+            f"convert the mesh to one of {', '.join(formats)}"
+        )
+    size = path.stat().st_size
+    if size > MOST_BYTES:
+        raise UserError(
+            f"{path}: {size:,} bytes, expected at most {MOST_BYTES:,}; simplify the mesh, whose "
+            "details are far smaller than voxels"
+        )
+
+
+def _require_vertices(surface: trimesh.Trimesh) -> None:
+    """Raise ValueError if a face names a vertex that is not there."""
+    count, faces = len(surface.vertices), np.asarray(surface.faces)
+    strange = faces[(faces < 0) | (faces >= count)]
+    if strange.size:
+        raise ValueError(f"a face names vertex {strange[0]}, there are 0 to {count - 1}")
+
+
+def _require_solid(mesh: str, surface: trimesh.Trimesh, unit: float) -> None:
+    used = np.asarray(surface.vertices)[np.unique(surface.faces)]
+    bad = int(np.count_nonzero(~np.isfinite(used).all(axis=1)))
+    if bad:
+        raise UserError(
+            f"{mesh}: {bad:,} of {len(used):,} vertices have coordinates that are not finite; "
+            f"export the mesh again"
+        )
+    # Floats of Python, which become infinite in silence where numpy's warn.
+    low, high = ([float(x) for x in end] for end in (used.min(axis=0), used.max(axis=0)))
+    extents = [b - a for a, b in zip(low, high)]
+    if min(extents) <= FLATNESS * max(extents):
+        raise UserError(
+            f"{mesh}: is flat, its bounding box measures "
+            f"{' x '.join(f'{side:g}' for side in extents)}, expected a surface around a solid; "
+            f"give the object a thickness"
+        )
+    longest, away = max(extents), max(map(abs, (*low, *high)))
+    require_within(f"{mesh}: the longest side is {longest * unit:g} m", longest * unit, EXTENTS)
+    if away > FARTHEST * longest:
+        raise UserError(
+            f"{mesh}: lies {away:g} from the origin and its longest side is {longest:g}, too far "
+            "to tell voxels apart; move it to the origin"
+        )

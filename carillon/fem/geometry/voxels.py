@@ -1,0 +1,178 @@
+"""Solid voxel models of surfaces."""
+
+from __future__ import annotations
+
+import operator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from carillon.errors import UserError
+from carillon.fem.geometry.fill import FILLS, bounding_grid, cut_triangles
+from carillon.fem.geometry.topology import pieces as label_pieces
+
+if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
+    import trimesh
+
+PIECES = ("error", "largest")
+
+#: Most voxels of a bounding grid; filling takes about 150 bytes for each of them.
+MAX_GRID = 16_000_000
+
+#: Most triangles that a surface may be cut into; each takes about 100 bytes.
+MAX_TRIANGLES = 100_000_000
+
+#: Factors by which a resolution is raised in search of one that leaves the model in one piece,
+#: and the largest grid [voxels] that such a trial may have.
+TRIAL_FACTORS = (1.25, 1.5, 2.0, 3.0)
+TRIAL_GRID = 500_000
+
+
+@dataclass(frozen=True, eq=False)
+class VoxelModel:
+    """Filled cubes of one edge length on a grid with an even number of cells along each axis.
+
+    Attributes
+    ----------
+    filled : (nx, ny, nz) bool with even nx, ny, nz, so that 2x2x2 blocks start at index 0.
+    origin : (3,) corner of the grid with the lowest coordinates [m].
+    edge : edge of a voxel [m].
+    name : name of the model for messages and files.
+    resolution : voxels along the longest side of the surface's bounding box.
+    """
+
+    filled: np.ndarray
+    origin: np.ndarray
+    edge: float
+    name: str
+    resolution: int
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Voxels along x, y and z."""
+        nx, ny, nz = self.filled.shape
+        return nx, ny, nz
+
+    @property
+    def n_cells(self) -> int:
+        """Number of filled voxels."""
+        return int(np.count_nonzero(self.filled))
+
+    @property
+    def volume(self) -> float:
+        """Volume of the filled voxels [m^3]."""
+        return self.n_cells * self.edge**3
+
+    @property
+    def piece_sizes(self) -> np.ndarray:
+        """Voxels in each face-connected piece, descending."""
+        return label_pieces(self.filled)[1]
+
+
+def voxelize(
+    surface: trimesh.Trimesh,
+    resolution: int,
+    fill: str = "winding",
+    pieces: str = "error",
+    name: str = "mesh",
+) -> VoxelModel:
+    """Fill the inside of a surface with cubes that hang together through their faces.
+
+    Parameters
+    ----------
+    surface : triangles in metres; holes and overlapping shells are allowed.
+    resolution : voxels along the longest side of the bounding box, at least 2.
+    fill : how voxels are chosen, a key of `FILLS`; see `carillon.fem.geometry.fill`.
+    pieces : ``"error"`` rejects a model of several face-connected pieces, ``"largest"`` keeps the
+        largest. Cubes that share but an edge or a corner would be joined by a hinge, which adds
+        zero-frequency modes that the object does not have.
+    name : name of the model.
+
+    Returns
+    -------
+    Voxel model, the same for the same input.
+
+    Raises
+    ------
+    UserError
+        If the resolution is not an integer >= 2 or needs too large a grid, if no voxel is filled,
+        or if the model falls into pieces.
+    """
+    resolution = _checked_resolution(surface, resolution, name)
+    if fill not in FILLS:
+        raise UserError(f"fill {fill!r} is unknown, expected one of {', '.join(FILLS)}")
+    if pieces not in PIECES:
+        raise UserError(f"pieces {pieces!r} is unknown, expected one of {', '.join(PIECES)}")
+    model = _filled_model(surface, resolution, fill, name)
+    if model.n_cells == 0:
+        raise UserError(
+            f"mesh {name!r} at resolution {resolution} fills no voxel: its walls are thinner than "
+            f"a voxel of {model.edge:.3g} m, or it encloses nothing; raise --resolution or repair "
+            f"the mesh"
+        )
+    labels, sizes = label_pieces(model.filled)
+    if len(sizes) > 1 and pieces == "error":
+        raise UserError(_pieces_message(surface, model, fill, sizes))
+    return replace(model, filled=labels == 1)
+
+
+def _checked_resolution(surface: trimesh.Trimesh, resolution: int, name: str) -> int:
+    try:
+        checked = operator.index(resolution)
+    except TypeError:
+        checked = 0
+    if checked < 2 or isinstance(resolution, bool):
+        raise UserError(
+            f"resolution {resolution}: expected a whole number of at least 2 voxels along the "
+            f"longest side"
+        )
+    extents = np.ptp(surface.bounds, axis=0)
+    count = float(np.prod(np.ceil(checked * extents / extents.max())))
+    if count > MAX_GRID:
+        largest = int(checked * (MAX_GRID / count) ** (1 / 3))
+        raise UserError(
+            f"mesh {name!r} at resolution {checked:,} needs a grid of {count:,.0f} voxels, the "
+            f"limit is {MAX_GRID:,}; use a resolution of about {largest} or less"
+        )
+    pieces = cut_triangles(surface, float(extents.max()) / checked / 2)
+    if pieces > MAX_TRIANGLES:
+        raise UserError(
+            f"mesh {name!r} at resolution {checked} would be cut into {pieces:.2g} triangles, the "
+            f"limit is {MAX_TRIANGLES:,}; it has too many large triangles, or use a lower "
+            "resolution"
+        )
+    return checked
+
+
+def _filled_model(surface: trimesh.Trimesh, resolution: int, fill: str, name: str) -> VoxelModel:
+    grid = bounding_grid(surface, resolution)
+    filled, origin = FILLS[fill](surface, grid)
+    # Padding at the far end keeps index 0 the start of a block.
+    even = np.pad(filled, [(0, size % 2) for size in filled.shape])
+    return VoxelModel(even, origin, grid.edge, name, resolution)
+
+
+def _pieces_message(
+    surface: trimesh.Trimesh, model: VoxelModel, fill: str, sizes: np.ndarray
+) -> str:
+    shown = [f"{size:,}" for size in sizes[:4]]
+    if len(sizes) > 4:
+        shown = [*shown[:3], f"{len(sizes) - 3:,} smaller ones"]
+    listed = f"{', '.join(shown[:-1])} and {shown[-1]}"
+    better = _connected_resolution(surface, model, fill)
+    hint = f" (at {better} it is one piece)" if better else ""
+    return (
+        f"mesh {model.name!r} at resolution {model.resolution} falls into {len(sizes):,} pieces "
+        f"({listed} voxels); raise --resolution{hint} or pass --pieces largest to keep the largest"
+    )
+
+
+def _connected_resolution(surface: trimesh.Trimesh, model: VoxelModel, fill: str) -> int | None:
+    for factor in TRIAL_FACTORS:
+        resolution = int(np.ceil(model.resolution * factor))
+        if model.filled.size * factor**3 > TRIAL_GRID:
+            return None
+        if len(_filled_model(surface, resolution, fill, model.name).piece_sizes) == 1:
+            return resolution
+    return None

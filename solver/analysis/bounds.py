@@ -1,0 +1,71 @@
+"""How many modes can be asked for, and how many are kept to find them."""
+
+from __future__ import annotations
+
+from typing import cast
+
+from mpi4py import MPI
+
+from carillon.errors import UserError
+from carillon.fem.model import RIGID_MODES, ElasticModel
+from carillon.runtime import available_memory
+from solver.analysis.options import SolverOptions
+from solver.correction.correct import FEWEST_GUARDS, default_guard
+from solver.distribution.collective import on_root
+from solver.reference.truth import SPARE_MODES
+
+FEWEST_SPARE = SPARE_MODES
+"""Vectors that the correction needs beyond the modes asked for, to tell the last from the rest."""
+KEPT_SHARE, TOGETHER_SHARE = 1.6, 1.17
+"""Modes kept at the root of the merge tree, as a share of those asked for, and where a block
+Lanczos iteration corrects them together."""
+FEW_PARTS = 16
+"""Subdomains up to which these shares hold; the best ones grow about like the cube root of more."""
+FEWEST_BLOCKS, FEWEST_SQUARES = 2, 2
+"""Blocks of all vectors, and matrices of their products, that any method keeps at a time."""
+
+
+def check_mode_count(modes: int, n_dofs: int) -> None:
+    """Raise UserError unless there is an elastic mode among `modes` and unknowns for all."""
+    if modes <= RIGID_MODES:
+        raise UserError(
+            f"{modes} modes asked for; the first {RIGID_MODES} are rigid motions, expected "
+            f"{RIGID_MODES + 1} or more"
+        )
+    if modes > n_dofs:
+        raise UserError(
+            f"{modes:,} modes asked for, but the model has {n_dofs:,} unknowns; ask for fewer or "
+            "raise --resolution"
+        )
+
+
+def require_memory(model: ElasticModel | None, options: SolverOptions, comm: MPI.Comm) -> None:
+    """Raise UserError if the vectors of this rank's machine alone are more than its free memory."""
+    node = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    share = node.size / comm.size
+    node.Free()
+
+    def check() -> None:
+        n_dofs = cast(ElasticModel, model).n_dofs
+        vectors = min(max(options.modes, options.keep or 0), n_dofs)
+        needed = 8 * vectors * (FEWEST_BLOCKS * n_dofs * share + FEWEST_SQUARES * vectors)
+        free = available_memory()
+        if free is not None and needed > free:
+            raise UserError(
+                f"{vectors:,} modes of {n_dofs:,} unknowns take {needed / 1e9:,.1f} GB at least, "
+                f"{free / 1e9:,.1f} GB are free; ask for fewer modes or a lower --resolution"
+            )
+
+    on_root(comm, check)
+
+
+def default_keep(modes: int, parts: int, together: bool = False) -> int:
+    """Modes kept at the root: those that the correction iterates, and some to choose from.
+
+    More would be a better start, but take longer than they save where modes are corrected
+    `together`.  Modes of many small subdomains need to be more to be as good.
+    """
+    grown = max(1.0, parts / FEW_PARTS) ** (1.0 / 3.0)
+    if together:
+        return max(int(TOGETHER_SHARE * grown * modes), modes + FEWEST_GUARDS + FEWEST_SPARE)
+    return max(int(KEPT_SHARE * grown * modes), modes + default_guard(modes) + FEWEST_SPARE)

@@ -1,0 +1,144 @@
+"""The solver as a function: arrays in, arrays out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from carillon.errors import UserError
+from carillon.fem.geometry import HexMesh
+from carillon.fem.materials import young_modulus
+from carillon.fem.model import ElasticModel, fine_model
+from carillon.fem.moduli_file import require_moduli
+from solver.analysis.modal_solver import ModalSolver
+from solver.analysis.options import SolverOptions
+from solver.distribution.collective import keep_on_root
+from solver.files.modes_file import frequencies
+from solver.files.start import deal_rows
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Modes of a solid.
+
+    Attributes
+    ----------
+    eigenvalues, frequencies
+        (k,) [rad^2/s^2] and [Hz], ascending, rigid motions first.
+    modes
+        (n_dofs, k) mass-normalised modes [kg^-1/2], row 3 n + i is node n of the mesh along axis i;
+        None on other ranks than 0.
+    residuals
+        (k,) residual ratios, see `solver.subspace.verification.residual_ratios`.
+    evidence
+        What the solver achieved.
+    seconds
+        Wall time by phase.
+    """
+
+    eigenvalues: Array
+    frequencies: Array
+    modes: Array | None
+    residuals: Array
+    evidence: dict[str, Any]
+    seconds: dict[str, float]
+
+
+def solve(
+    model: HexMesh | ElasticModel | None,
+    material: str | Array | None = None,
+    modes: int = 256,
+    start: Solution | Array | None = None,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    **options: Any,
+) -> Solution:
+    """Lowest modes of a solid.
+
+    Parameters
+    ----------
+    model
+        Hexahedral mesh, or a model with material; ranks other than 0 may pass None.
+    material
+        Young's modulus [Pa] of each cell (m,), at its quadrature points (m, 8), or the name of a
+        material (`carillon.fem.materials.NAMES`).  None keeps that of the model.
+    modes
+        Number of modes, rigid ones included.
+    start
+        Modes of a similar material on the same mesh, which are corrected.
+    comm
+        Ranks that share the work.
+    options
+        Other fields of `SolverOptions`: `method`, `tolerance`, `inner` and so on.
+
+    Raises
+    ------
+    UserError
+        For a material that does not fit the mesh, or impossible options.
+    ConvergenceError
+        If a tolerance was missed.
+
+    Notes
+    -----
+    For many materials on one mesh `ModalSolver` computes what depends on the mesh only once.
+
+    Examples
+    --------
+    >>> from carillon.fem.geometry import builtin_surface, hexmesh_from_voxels, voxelize
+    >>> mesh = hexmesh_from_voxels(voxelize(builtin_surface("bar"), 12))
+    >>> found = solve(mesh, "uniform", modes=10, method="slepc")
+    >>> len(found.frequencies), found.modes.shape == (mesh.n_dofs, 10)
+    (10, True)
+    >>> again = solve(mesh, 1.1 * np.full(mesh.n_cells, 1e9), modes=10, start=found)
+    >>> bool(abs(again.frequencies[9] / found.frequencies[9] - 1.1**0.5) < 1e-6)
+    True
+    """
+    solid = keep_on_root(comm, lambda: _with_material(model, material))
+    solver = ModalSolver(solid, SolverOptions(modes=modes, **options), comm)
+    whole = start.modes if isinstance(start, Solution) else start
+    count = comm.bcast(None if whole is None else whole.shape[1])
+    rows = None
+    if count is not None:
+        rows = deal_rows([] if whole is None else [whole], count, solver.share, comm)
+    found = solver.solve(start=rows)
+    return Solution(
+        found.values,
+        frequencies(found.values),
+        found.system.gather(found.vectors),
+        found.residuals,
+        found.evidence,
+        {**solver.seconds, **found.seconds},
+    )
+
+
+def _with_material(
+    model: HexMesh | ElasticModel | None, material: str | Array | None
+) -> ElasticModel:
+    if model is None:
+        raise UserError("no model on rank 0, expected a mesh or an elastic model")
+    if material is None:
+        if isinstance(model, HexMesh):
+            raise UserError("a mesh has no material; pass Young's modulus [Pa] of its cells")
+        return model
+    mesh = model if isinstance(model, HexMesh) else model.mesh
+    young = material
+    if isinstance(young, str):
+        young = young_modulus(young, mesh)
+    if young.shape not in ((mesh.n_cells,), (mesh.n_cells, 8)):
+        raise UserError(
+            f"moduli of shape {young.shape}, expected ({mesh.n_cells},) or ({mesh.n_cells}, 8)"
+        )
+    if young.dtype.kind not in "fiu":
+        raise UserError(f"moduli [Pa]: found an array of {young.dtype}, expected real numbers")
+    young = young.astype(float)
+    if not (np.isfinite(young).all() and (young > 0.0).all()):
+        raise UserError("moduli [Pa]: found negative or no numbers, expected positive ones")
+    require_moduli(young.ravel(), "moduli")
+    points = np.broadcast_to(young if young.ndim == 2 else young[:, None], (mesh.n_cells, 8))
+    solid = fine_model(mesh, points[:, 0]) if isinstance(model, HexMesh) else model
+    return solid.with_young(points)

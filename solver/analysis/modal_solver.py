@@ -1,0 +1,398 @@
+"""Modal analysis of a model by any method, with the evidence that the result is right."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any, cast
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from carillon.errors import UserError
+from carillon.fem.model import RIGID_MODES, ElasticModel
+from carillon.progress import say
+from carillon.runtime import limit_threads, reuse_freed_memory
+from solver.analysis.bounds import FEWEST_SPARE, check_mode_count, default_keep, require_memory
+from solver.analysis.options import SolverOptions
+from solver.analysis.timing import Phases, peak_memory
+from solver.assembly.system import Layout, System, assemble
+from solver.correction.correct import EIGENVALUE_TOLERANCE, correct
+from solver.distribution.collective import on_root
+from solver.distribution.local_mesh import Share, deal_moduli, distribute
+from solver.hcms.synthesis import Synthesis, make_subdomains, synthesize
+from solver.linear import InnerSolver, Inverse
+from solver.reference.truth import (
+    RESIDUAL_TOLERANCE,
+    SPARE_MODES,
+    Truth,
+    can_count,
+    complete,
+    count_beyond,
+    solve_truth,
+)
+from solver.subspace.rayleigh_ritz import rigid_pairs
+from solver.subspace.verification import (
+    count_rigid,
+    require_orthonormal,
+    require_six_rigid,
+    verify,
+)
+
+Array = NDArray[np.float64]
+
+ORTHOGONAL_TO_RIGID = 1e-10
+"""Largest overlap of HCMS modes with the rigid motions that needs no correction."""
+
+
+@dataclass
+class Modes:
+    """Result of a modal analysis.
+
+    Attributes
+    ----------
+    values
+        (k,) eigenvalues [rad^2/s^2], ascending.
+    vectors
+        (local, k) mass-normalised modes, this rank's rows of `system`, row-major.
+    residuals
+        (k,) residual ratios, see `solver.subspace.verification.residual_ratios`.
+    evidence
+        What the solver achieved: orthogonality, error estimate, steps, inertia, rigid modes, ranks,
+        peak memory.
+    seconds
+        Wall time by phase.
+    guard
+        (local, g) less accurate vectors beyond, which a warm start makes use of; None if there are
+        none.
+    inverse
+        Inverse that a warm start makes use of, if there is one.
+    """
+
+    values: Array
+    vectors: Array
+    residuals: Array
+    system: System
+    evidence: dict[str, Any] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    guard: Array | None = None
+    inverse: Inverse | None = None
+
+    def start(self) -> Array:
+        """Elastic modes and guard vectors (local, k - 6 + g), to start a correction from."""
+        blocks = [self.vectors[:, RIGID_MODES:], *([] if self.guard is None else [self.guard])]
+        return np.concatenate(blocks, axis=1)
+
+
+@dataclass
+class _Found:
+    """Eigenpairs, and what a warm start makes use of, see `Modes`."""
+
+    values: Array
+    vectors: Array
+    guard: Array | None = None
+    inverse: Inverse | None = None
+
+
+class ModalSolver:
+    """Modes of one mesh for any material on it.
+
+    Parameters
+    ----------
+    model
+        The solid; only rank 0's is looked at, and dealt out to the others, who may pass None.
+    options
+        What to compute and how.
+    comm
+        Ranks that share the work.
+    verbose
+        Whether to show each phase and its time.
+
+    Attributes
+    ----------
+    share
+        This rank's share of the solid.
+    seconds
+        Wall time of what depends on the mesh alone, by phase.
+
+    Raises
+    ------
+    UserError
+        If more modes are wanted than there are unknowns or than memory can hold, or there are more
+        ranks than subdomains.
+
+    Examples
+    --------
+    A material that changes little by little is followed from one solution to the next::
+
+        solver = ModalSolver(model, SolverOptions(modes=60, tolerance=1e-2))
+        modes = solver.solve()
+        modes = solver.solve(young, start=modes)
+    """
+
+    def __init__(
+        self,
+        model: ElasticModel | None,
+        options: SolverOptions,
+        comm: MPI.Comm = MPI.COMM_WORLD,
+        verbose: bool = False,
+    ) -> None:
+        on_root(comm, lambda: check_mode_count(options.modes, cast(ElasticModel, model).n_dofs))
+        require_memory(model, options, comm)
+        self.options = options
+        self.comm = comm
+        self._verbose = verbose
+        self._threads = _threads_of_rank(comm)
+        reuse_freed_memory()
+        phases = Phases(comm, verbose)
+        with phases("partition"):
+            self.share = distribute(model, options.subdomains, options.seed, comm)
+        with phases("analysis"):
+            self._layout = Layout.of_share(self.share, comm)
+            self._inner = InnerSolver(options.inner, self._layout)
+            self._keep = self._modes_to_keep()
+            if options.method == "hcms":
+                self._subdomains = make_subdomains(self.share, options.interface, comm)
+        self.seconds = phases.seconds
+
+    def solve(self, young: Array | None = None, start: Modes | Array | None = None) -> Modes:
+        """Compute the lowest modes.
+
+        All ranks call it and get the same values.
+
+        Parameters
+        ----------
+        young
+            (m, 8) Young's modulus [Pa] at the cells' quadrature points, on rank 0; that of the
+            model if not given.
+        start
+            Modes of a similar material on the same mesh, or this rank's rows (local, k) of such:
+            they are corrected instead of those of HCMS.
+
+        Raises
+        ------
+        ConvergenceError
+            If a tolerance was missed, the modes are not orthonormal, or the body does not have six
+            zero-frequency modes.
+        """
+        phases = Phases(self.comm, self._verbose)
+        with phases("assembly"):
+            share = self.share
+            if young is not None:
+                share = deal_moduli(share, young, self.comm)
+            elements = share.cells.elements
+            system = assemble(share, self.comm, self._layout, elements, self._threads)
+        evidence: dict[str, Any] = {
+            "ranks": self.comm.size,
+            "threads": self._threads,
+            "subdomains": share.decomposition.tree.parts,
+            "n_dofs": share.n_dofs,
+        }
+        if self.options.method == "hcms":
+            found = self._hcms(share, system, start, phases, evidence)
+        else:
+            found = self._general_solver(system, phases, evidence)
+        values, vectors = found.values, found.vectors
+        with phases("verification"):
+            residuals, orthogonality = verify(system, values, vectors)
+        evidence["orthogonality"] = orthogonality
+        evidence["residual_max"] = float(residuals.max())
+        evidence["rigid_modes"] = count_rigid(values)
+        evidence["peak_memory_bytes"] = peak_memory(self.comm)
+        require_orthonormal(orthogonality)
+        if self._exact:
+            require_six_rigid(evidence["rigid_modes"])
+        return Modes(
+            values,
+            vectors,
+            residuals,
+            system,
+            evidence,
+            phases.seconds,
+            found.guard,
+            found.inverse,
+        )
+
+    def inverse(self, modes: Modes, shift: float) -> Inverse:
+        """(K - shift M)^-1 of the material that `modes` belong to, by the correction's solver."""
+        return self._inner.inverse(modes.system, shift)
+
+    @property
+    def _exact(self) -> bool:
+        """Whether eigenpairs are wanted, not just approximations of them."""
+        options = self.options
+        corrected = options.corrections > 0 and options.tolerance != 0.0
+        return options.method != "hcms" or corrected
+
+    def _modes_to_keep(self) -> int:
+        options, n_dofs = self.options, self.share.n_dofs
+        together = options.acceleration == "lanczos" and self._inner.indefinite
+        together = together and options.corrections > 0 and options.tolerance != 0.0
+        parts = self.share.decomposition.tree.parts
+        keep = options.keep
+        if keep is None:
+            keep = default_keep(options.modes, parts, together)
+        least = options.modes + (FEWEST_SPARE if options.corrections else 0)
+        if options.method == "hcms" and keep < min(least, n_dofs):
+            raise UserError(
+                f"--keep {keep} is too few for {options.modes} modes; expected at least {least}, "
+                "and half more for fast convergence"
+            )
+        return keep
+
+    def _general_solver(self, system: System, phases: Phases, evidence: dict[str, Any]) -> _Found:
+        options = self.options
+        proving = options.prove is not False
+        with phases("eigensolver"):
+            truth = solve_truth(
+                system,
+                options.modes,
+                options.method,
+                options.tolerance or RESIDUAL_TOLERANCE,
+                SPARE_MODES if proving and can_count() else 0,
+                options.seed,
+            )
+        if proving:
+            truth = self._prove(system, truth, phases, evidence)
+        evidence |= {
+            "eigensolver_iterations": truth.iterations,
+            "further_searches": truth.searches,
+            "modes_added": truth.added,
+        }
+        return _Found(*truth.lowest())
+
+    def _prove(
+        self, system: System, truth: Truth, phases: Phases, evidence: dict[str, Any]
+    ) -> Truth:
+        """`truth` with the modes that it lacked."""
+        options = self.options
+        inertia = None
+        if can_count():
+            with phases("inertia"):
+                inertia = count_beyond(system, truth)
+        if inertia is None or inertia.counted != inertia.computed:
+            tolerance = None if options.method == "hcms" else options.tolerance
+            with phases("completion"):
+                truth, inertia = complete(
+                    system, truth, inertia, tolerance or RESIDUAL_TOLERANCE, options.seed
+                )
+        if inertia is not None:
+            evidence |= {
+                "inertia_at": inertia.value,
+                "inertia_count": inertia.counted,
+                "inertia_expected": inertia.computed,
+            }
+        return truth
+
+    def _hcms(
+        self,
+        share: Share,
+        system: System,
+        start: Modes | Array | None,
+        phases: Phases,
+        evidence: dict[str, Any],
+    ) -> _Found:
+        options = self.options
+        values: Array | None = None
+        similar: Inverse | None = None
+        if isinstance(start, Modes):
+            if start.system.rows.pattern is self._layout.pattern:
+                similar = start.inverse
+            start = start.start()
+        if start is None:
+            with phases("hcms"):
+                synthesis = synthesize(
+                    share,
+                    self._keep,
+                    options.interface,
+                    self.comm,
+                    self._subdomains,
+                    self._threads,
+                    None if options.cutoff is None else (2.0 * np.pi * options.cutoff) ** 2,
+                )
+            evidence["hcms"] = synthesis.counts.summary(self.comm)
+            if options.corrections == 0:
+                return self._uncorrected(synthesis)
+            values, start = elastic_part(system, synthesis)
+        wanted = options.modes - RIGID_MODES
+        spare = SPARE_MODES if options.prove else 0
+        with phases("correction"):
+            result = correct(
+                system,
+                start,
+                wanted + spare,
+                self._inner,
+                values,
+                EIGENVALUE_TOLERANCE if options.tolerance is None else options.tolerance,
+                options.corrections,
+                options.acceleration,
+                report=_reporter(self._verbose and self.comm.rank == 0),
+                similar=similar,
+            )
+            rigid_values, rigid = rigid_pairs(system)
+        evidence |= {
+            "inner": self._inner.method,
+            "corrections": result.steps,
+            "right_hand_sides": result.solves,
+            "eigenvalue_error_estimate": float(result.errors[:wanted].max()),
+        }
+        found = Truth(
+            np.concatenate([rigid_values, result.values]),
+            np.concatenate([rigid, result.vectors], axis=1),
+            options.modes,
+            result.steps,
+        )
+        if options.prove and can_count():
+            found = self._prove(system, found, phases, evidence)
+            evidence |= {"further_searches": found.searches, "modes_added": found.added}
+        return _Found(*found.lowest(), result.guard, result.inverse)
+
+    def _uncorrected(self, synthesis: Synthesis) -> _Found:
+        count = self.options.modes
+        if len(synthesis.values) < count:
+            raise UserError(
+                f"HCMS kept {len(synthesis.values)} modes, {count} are wanted; raise --keep or "
+                "lower --subdomains"
+            )
+        return _Found(synthesis.values[:count], np.ascontiguousarray(synthesis.vectors[:, :count]))
+
+
+def modal_analysis(
+    model: ElasticModel | None,
+    options: SolverOptions,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    verbose: bool = False,
+    start: Modes | Array | None = None,
+) -> Modes:
+    """Compute the lowest modes of `model` once, see `ModalSolver`.
+
+    The seconds of the result hold those of the preparation too.
+    """
+    prepared = ModalSolver(model, options, comm, verbose)
+    modes = prepared.solve(start=start)
+    return replace(modes, seconds={**prepared.seconds, **modes.seconds})
+
+
+def elastic_part(system: System, synthesis: Synthesis) -> tuple[Array | None, Array]:
+    """Ritz values and vectors without the rigid motions; no values if the two are not apart."""
+    elastic = np.ascontiguousarray(synthesis.vectors[:, RIGID_MODES:])
+    overlap = system.inner(system.times_mass(system.rigid), elastic)
+    if overlap.size and np.abs(overlap).max() > ORTHOGONAL_TO_RIGID:
+        return None, synthesis.vectors
+    return synthesis.values[RIGID_MODES:], elastic
+
+
+def _threads_of_rank(comm: MPI.Comm) -> int:
+    """Threads of this rank, so that ranks x threads do not exceed the cores of its machine."""
+    node = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    try:
+        return limit_threads(node.size)
+    finally:
+        node.Free()
+
+
+def _reporter(visible: bool) -> Callable[[int, float], None] | None:
+    if not visible:
+        return None
+    return lambda step, worst: say(f"  after {step} corrections: eigenvalue error {worst:.1e}")

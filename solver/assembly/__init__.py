@@ -1,0 +1,1 @@
+"""Stiffness and mass of the whole solid, distributed by rows."""

@@ -1,0 +1,293 @@
+"""A rank's rows of K and M in 3x3 blocks of nodes, and their products with blocks of vectors.
+
+PETSc multiplies a sparse matrix with column-major blocks; here blocks are row-major, so that one
+entry of the matrix meets whole rows of the block, which is several times faster, and the rows that
+a rank needs of others travel in one message a neighbour.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numba
+import numpy as np
+import scipy.sparse as sp
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from carillon.fem.model import Elements
+from carillon.threads import in_parallel, split
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+CELLS_AT_ONCE = 4096
+"""Cells whose element matrices exist together while K is assembled."""
+_HALO = 21
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """Which nodes share an element, for the rows of one rank; the same for any material.
+
+    Attributes
+    ----------
+    indptr, columns
+        Compressed rows of the node graph.  Columns are this rank's nodes, counted from 0, then the
+        ghosts, ascending within a row.
+    entry
+        (c, 8, 8) entry of every pair of corners of every cell, -1 if the row is another rank's.
+    ghosts
+        (g,) distributed numbers of the columns that other ranks own, ascending.
+    start, stop
+        Half-open range of this rank's nodes in the distributed order.
+    """
+
+    indptr: Index
+    columns: Index
+    entry: NDArray[np.int32]
+    ghosts: Index
+    start: int
+    stop: int
+
+    @classmethod
+    def of_cells(cls, corners: Index, start: int, stop: int, ghosts: bool = True) -> Pattern:
+        """Pattern of the cells `corners` (c, 8), which touch the rows [start, stop).
+
+        Without `ghosts` the columns outside are left out as the rows are.
+        """
+        own = (corners >= start) & (corners < stop)
+        ghosts_there = np.unique(corners[~own]) if ghosts else np.empty(0, dtype=np.int64)
+        n_own = stop - start
+        local = np.where(own, corners - start, n_own + np.searchsorted(ghosts_there, corners))
+        width = n_own + len(ghosts_there)
+        key = local[:, :, None] * width + local[:, None, :]
+        kept = own[:, :, None] if ghosts else own[:, :, None] & own[:, None, :]
+        key = np.where(kept, key, -1)
+        present = np.unique(key)
+        present = present[np.searchsorted(present, 0) :]
+        row, columns = np.divmod(present, width)
+        indptr = np.searchsorted(row, np.arange(n_own + 1))
+        entry = np.where(key >= 0, np.searchsorted(present, key), -1).astype(np.int32)
+        return cls(indptr, columns, entry, ghosts_there, start, stop)
+
+    @property
+    def global_columns(self) -> Index:
+        """Columns in the distributed order."""
+        n_own = self.stop - self.start
+        inside = self.columns < n_own
+        result = self.columns + self.start
+        result[~inside] = self.ghosts[self.columns[~inside] - n_own]
+        return result
+
+
+class Halo:
+    """Exchange of the rows that ranks need of each other."""
+
+    def __init__(self, pattern: Pattern, starts: Index, comm: MPI.Comm) -> None:
+        """`starts` (ranks + 1,) is the first node of every rank."""
+        self._comm = comm
+        bounds = np.searchsorted(pattern.ghosts, starts)
+        self._received = [
+            (rank, bounds[rank], bounds[rank + 1])
+            for rank in range(comm.size)
+            if bounds[rank] < bounds[rank + 1]
+        ]
+        wanted = [pattern.ghosts[bounds[rank] : bounds[rank + 1]] for rank in range(comm.size)]
+        self._ghosts = len(pattern.ghosts)
+        asked = comm.alltoall(wanted) if comm.size > 1 else [wanted[0]]
+        self._sent = [(rank, rows - pattern.start) for rank, rows in enumerate(asked) if len(rows)]
+
+    @property
+    def neighbours(self) -> int:
+        """Ranks that this one sends to."""
+        return len(self._sent)
+
+    @property
+    def nodes_sent(self) -> int:
+        """Nodes whose rows this rank sends in one exchange."""
+        return sum(len(rows) for _, rows in self._sent)
+
+    def exchange(self, block: Array) -> Array:
+        """Rows (3 g, k) of the ghosts, of a block (3 local nodes, k) that every rank passes."""
+        if not self._received and not self._sent:
+            return block[:0]
+        width = 3 * block.shape[1]
+        ghosts = np.empty((self._ghosts, width))
+        nodes = np.ascontiguousarray(block).reshape(-1, width)
+        requests = [
+            self._comm.Irecv(ghosts[start:stop], source=rank, tag=_HALO)
+            for rank, start, stop in self._received
+        ]
+        buffers = [(rank, nodes[rows]) for rank, rows in self._sent]
+        requests += [self._comm.Isend(rows, dest=rank, tag=_HALO) for rank, rows in buffers]
+        MPI.Request.Waitall(requests)
+        return ghosts.reshape(-1, block.shape[1])
+
+
+class NodeRows:
+    """This rank's rows of K and M.
+
+    Attributes
+    ----------
+    pattern
+        Node graph.
+    stiffness
+        (e, 3, 3) blocks of K [N/m] along the graph.
+    mass
+        (e,) entries of M [kg], the same for the three components.
+    """
+
+    def __init__(self, pattern: Pattern, halo: Halo | None = None, threads: int = 1) -> None:
+        """Rows of zeros; without `halo` no other rank has a part in the matrix."""
+        self.pattern = pattern
+        self.halo = halo
+        self.threads = threads
+        self.stiffness = np.zeros((len(pattern.columns), 3, 3))
+        self.mass = np.zeros(len(pattern.columns))
+
+    def add(self, cells: slice, stiffness: Array, mass: Array) -> None:
+        """Add element matrices (c, 24, 24) and (c, 8, 8) of some of the pattern's cells."""
+        _add_cells(self.pattern.entry[cells], stiffness, mass, self.stiffness, self.mass)
+
+    def add_elements(self, elements: Elements) -> None:
+        """Add the matrices of the pattern's cells, a few at a time."""
+        for first in range(0, len(elements), CELLS_AT_ONCE):
+            chosen = slice(first, first + CELLS_AT_ONCE)
+            self.add(chosen, elements.stiffness(chosen), elements.nodal_mass(chosen))
+
+    @cached_property
+    def lumped_mass(self) -> Array:
+        """Row sums of M (local nodes,) [kg]."""
+        return np.add.reduceat(self.mass, self.pattern.indptr[:-1])
+
+    def stiffness_csr(self, n_dofs: int) -> sp.csr_matrix:
+        """This rank's rows of K (local unknowns, n_dofs), columns in the distributed order."""
+        data = (self.stiffness, self.pattern.global_columns, self.pattern.indptr)
+        return _sorted(sp.bsr_matrix(data, shape=(3 * self._own, n_dofs)).tocsr())
+
+    def mass_csr(self, n_dofs: int) -> sp.csr_matrix:
+        """This rank's rows of M (local unknowns, n_dofs), columns in the distributed order."""
+        data = (self.mass, self.pattern.global_columns, self.pattern.indptr)
+        nodal = sp.csr_matrix(data, shape=(self._own, n_dofs // 3))
+        return _sorted(sp.kron(nodal, sp.identity(3), format="csr"))
+
+    @property
+    def _own(self) -> int:
+        return self.pattern.stop - self.pattern.start
+
+    @cached_property
+    def has_diagonal_mass(self) -> bool:
+        """Whether this rank's part of M is diagonal."""
+        return bool(np.count_nonzero(self.mass) == self._own)
+
+    def times_stiffness(self, block: Array) -> Array:
+        """K X for a row-major block (3 local nodes, k); collective."""
+        return self._product(block, True)
+
+    def times_mass(self, block: Array) -> Array:
+        """M X for a row-major block (3 local nodes, k); collective."""
+        return self._product(block, False)
+
+    def _product(self, block: Array, stiffness: bool) -> Array:
+        block = np.ascontiguousarray(block)
+        ghosts = block[:0] if self.halo is None else self.halo.exchange(block)
+        result = np.empty_like(block)
+        pattern = self.pattern
+        kernel, entries = (
+            (_multiply_stiffness, self.stiffness) if stiffness else (_multiply_mass, self.mass)
+        )
+
+        def rows(start: int, stop: int) -> None:
+            kernel(start, stop, pattern.indptr, pattern.columns, entries, block, ghosts, result)
+
+        in_parallel(rows, split(self._own, self.threads, max(self._own, 1)), self.threads)
+        return result
+
+
+def _sorted(matrix: sp.csr_matrix) -> sp.csr_matrix:
+    matrix.sort_indices()
+    return matrix
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_cells(entry, stiffness, mass, K, M):  # type: ignore[no-untyped-def]
+    for cell in range(len(entry)):
+        for a in range(8):
+            for b in range(8):
+                number = entry[cell, a, b]
+                if number >= 0:
+                    M[number] += mass[cell, a, b]
+                    for i in range(3):
+                        for j in range(3):
+                            K[number, i, j] += stiffness[cell, 3 * a + i, 3 * b + j]
+
+
+@numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
+def _multiply_stiffness(  # type: ignore[no-untyped-def]
+    start, stop, indptr, columns, blocks, X, ghosts, result
+):
+    own = X.shape[0] // 3
+    width = X.shape[1]
+    for row in range(start, stop):
+        result[3 * row : 3 * row + 3] = 0.0
+        y0, y1, y2 = result[3 * row], result[3 * row + 1], result[3 * row + 2]
+        for number in range(indptr[row], indptr[row + 1]):
+            column = columns[number]
+            if column < own:
+                x = X[3 * column : 3 * column + 3]
+            else:
+                x = ghosts[3 * (column - own) : 3 * (column - own) + 3]
+            x0, x1, x2 = x[0], x[1], x[2]
+            B = blocks[number]
+            b00, b01, b02 = B[0, 0], B[0, 1], B[0, 2]
+            b10, b11, b12 = B[1, 0], B[1, 1], B[1, 2]
+            b20, b21, b22 = B[2, 0], B[2, 1], B[2, 2]
+            for k in range(width):
+                y0[k] += b00 * x0[k] + b01 * x1[k] + b02 * x2[k]
+                y1[k] += b10 * x0[k] + b11 * x1[k] + b12 * x2[k]
+                y2[k] += b20 * x0[k] + b21 * x1[k] + b22 * x2[k]
+
+
+@numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
+def _multiply_mass(  # type: ignore[no-untyped-def]
+    start, stop, indptr, columns, entries, X, ghosts, result
+):
+    # The three components of a node follow each other, and all have the same mass.
+    own = X.shape[0] // 3
+    width = 3 * X.shape[1]
+    inner = X.reshape(own, width)
+    outer = ghosts.reshape(ghosts.shape[0] // 3, width)
+    y = result.reshape(own, width)
+    for row in range(start, stop):
+        sums = y[row]
+        sums[:] = 0.0
+        number = indptr[row]
+        last = indptr[row + 1]
+        # Four neighbours at a time: most of the time goes into loading and storing the sums.
+        while number + 4 <= last:
+            m0, m1, m2, m3 = (
+                entries[number],
+                entries[number + 1],
+                entries[number + 2],
+                entries[number + 3],
+            )
+            x0 = _row(columns[number], own, inner, outer)
+            x1 = _row(columns[number + 1], own, inner, outer)
+            x2 = _row(columns[number + 2], own, inner, outer)
+            x3 = _row(columns[number + 3], own, inner, outer)
+            for k in range(width):
+                sums[k] += m0 * x0[k] + m1 * x1[k] + m2 * x2[k] + m3 * x3[k]
+            number += 4
+        while number < last:
+            m0 = entries[number]
+            x0 = _row(columns[number], own, inner, outer)
+            for k in range(width):
+                sums[k] += m0 * x0[k]
+            number += 1
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _row(column, own, inner, outer):  # type: ignore[no-untyped-def]
+    return inner[column] if column < own else outer[column - own]

@@ -1,0 +1,79 @@
+"""Sparse matrices from element matrices, block by block."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from carillon.fem.model import ElasticModel
+
+Array = NDArray[np.float64]
+
+
+def sum_blocks(
+    rows: NDArray[np.integer], columns: NDArray[np.integer], blocks: Array, shape: tuple[int, int]
+) -> sp.csr_matrix:
+    """Sparse matrix of the summed square `blocks` (k, b, b) at block positions `rows`, `columns`.
+
+    `shape` counts blocks.  Duplicates are added in a fixed order, so the result is reproducible.
+    """
+    width = blocks.shape[-1]
+    key = rows.astype(np.int64) * shape[1] + columns
+    order = np.argsort(key, kind="stable")
+    key = key[order]
+    first = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]])) if len(key) else key
+    if len(key) == 0:
+        return sp.csr_matrix((shape[0] * width, shape[1] * width))
+    data = np.add.reduceat(blocks[order], first, axis=0)
+    row, column = np.divmod(key[first], shape[1])
+    indptr = np.searchsorted(row, np.arange(shape[0] + 1))
+    matrix = sp.bsr_matrix(
+        (data, column, indptr), shape=(shape[0] * width, shape[1] * width), blocksize=(width, width)
+    )
+    return matrix.tocsr()
+
+
+def node_blocks(matrices: Array) -> Array:
+    """Element stiffness (c, 24, 24) as blocks (c, 8, 8, 3, 3) between corners."""
+    return matrices.reshape(-1, 8, 3, 8, 3).transpose(0, 1, 3, 2, 4)
+
+
+def assemble_elements(
+    cells: NDArray[np.integer],
+    stiffness: Array,
+    mass: Array,
+    n_rows: int,
+    n_columns: int | None = None,
+    first_row: int = 0,
+) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    """Stiffness and mass (both on displacement unknowns) from element matrices.
+
+    Parameters
+    ----------
+    cells
+        (c, 8) number of each corner.
+    stiffness, mass
+        (c, 24, 24) and (c, 8, 8) element matrices.
+    n_rows, n_columns
+        Number of node rows and node columns (equal if not given).
+    first_row
+        The number of the first row; numbers outside the `n_rows` from there on have no row.
+    """
+    columns = n_rows if n_columns is None else n_columns
+    rows = np.repeat(cells - first_row, 8, axis=1).ravel()
+    cols = np.tile(cells, (1, 8)).ravel()
+    kept = np.flatnonzero((rows >= 0) & (rows < n_rows))
+    chosen = slice(None) if len(kept) == len(rows) else kept
+    rows, cols = rows[chosen], cols[chosen]
+    shape = (n_rows, columns)
+    stiff = sum_blocks(rows, cols, node_blocks(stiffness).reshape(-1, 3, 3)[chosen], shape)
+    nodal = sum_blocks(rows, cols, mass.reshape(-1, 1, 1)[chosen], shape)
+    return stiff, sp.kron(nodal, sp.identity(3), format="csr")
+
+
+def assembled(model: ElasticModel) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    """Stiffness and mass of the whole model on one rank."""
+    return assemble_elements(
+        model.mesh.cells, model.stiffness(), model.nodal_mass(), model.mesh.n_nodes
+    )

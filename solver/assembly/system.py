@@ -1,0 +1,252 @@
+"""The assembled eigenvalue problem on distributed rows, and dense blocks of vectors over it.
+
+Rows follow a `Decomposition`: each rank owns the unknowns of its subdomains, and holds nothing of
+the others'.  A block of vectors is a row-major numpy array with this rank's rows; products and
+solves take and return them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, TypeVar, cast
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from carillon.fem.block import degrees_of_freedom
+from carillon.fem.element import rigid_motions
+from carillon.fem.model import Elements
+from solver.assembly.node_rows import Halo, NodeRows, Pattern
+from solver.assembly.petsc_matrix import distributed_matrix
+from solver.distribution.collective import keep_on_root
+from solver.distribution.local_mesh import Share
+
+Array = NDArray[np.float64]
+Number = TypeVar("Number", np.float64, np.int64)
+
+COLUMNS_GATHERED = 16
+"""Columns that travel to rank 0 together where a block of vectors is gathered or written."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What the rows of a mesh have to do with each other, whatever the material.
+
+    Attributes
+    ----------
+    share
+        This rank's share of the solid.
+    pattern, halo
+        Node graph of its rows, and the exchange of rows with its neighbours.
+    coordinates
+        (local nodes, 3) positions relative to the centroid, in units of the largest half extent.
+    """
+
+    share: Share
+    pattern: Pattern
+    halo: Halo
+    coordinates: Array
+    comm: MPI.Comm
+
+    @classmethod
+    def of_share(cls, share: Share, comm: MPI.Comm = MPI.COMM_WORLD) -> Layout:
+        """Layout of a share; collective."""
+        pattern = Pattern.of_cells(share.cells.corners, share.start, share.stop)
+        starts = [share.decomposition.local_range(rank)[0] for rank in range(comm.size)]
+        halo = Halo(pattern, np.array([*starts, share.decomposition.n_nodes]), comm)
+        return cls(share, pattern, halo, _centred(share, comm), comm)
+
+
+@dataclass(frozen=True)
+class System:
+    """K u = lambda M u over the ranks of `comm`.
+
+    Attributes
+    ----------
+    rows
+        This rank's rows of K [N/m] and M [kg].
+    rigid
+        (local, 6) this rank's rows of the mass-orthonormal rigid motions.
+    coordinates
+        (local nodes, 3) positions relative to the centroid, in units of the largest half extent.
+    nodes
+        (local nodes,) numbers of this rank's nodes in the mesh.
+    start, stop
+        Half-open range of this rank's rows, one a node.
+    n_dofs
+        Number of unknowns over all ranks.
+    """
+
+    rows: NodeRows
+    rigid: Array
+    coordinates: Array
+    nodes: NDArray[np.int64]
+    start: int
+    stop: int
+    n_dofs: int
+    comm: MPI.Comm
+
+    def times_stiffness(self, block: Array) -> Array:
+        """Product of K with a block of vectors; collective."""
+        return self.rows.times_stiffness(block)
+
+    def times_mass(self, block: Array) -> Array:
+        """Product of M with a block of vectors; collective."""
+        return self.rows.times_mass(block)
+
+    @cached_property
+    def K(self) -> Any:  # noqa: N802
+        """Stiffness as a PETSc matrix, made when first asked for; collective."""
+        return distributed_matrix(self.rows.stiffness_csr(self.n_dofs), self.comm)
+
+    @cached_property
+    def M(self) -> Any:  # noqa: N802
+        """Mass as a PETSc matrix, made when first asked for; collective."""
+        return distributed_matrix(self.rows.mass_csr(self.n_dofs), self.comm)
+
+    def inner(self, left: Array, right: Array) -> Array:
+        """left^T right summed over the ranks; equal on all ranks."""
+        return self._summed(left.T @ right)
+
+    def column_products(self, left: Array, right: Array) -> Array:
+        """Inner product of each column of `left` with the same column of `right`."""
+        return self._summed(np.einsum("ij,ij->j", left, right))
+
+    def _summed(self, local: Array) -> Array:
+        """Sum over the ranks, in place."""
+        if self.comm.size > 1:
+            self.comm.Allreduce(MPI.IN_PLACE, local)
+        return local
+
+    def local_rows(self, block: Array) -> Array:
+        """This rank's rows of a replicated block (n_dofs, k) given in mesh node order."""
+        return np.ascontiguousarray(block[degrees_of_freedom(self.nodes)])
+
+    def pour(
+        self,
+        block: Array,
+        take: Callable[[Iterator[Array]], None],
+        columns: int = COLUMNS_GATHERED,
+    ) -> None:
+        """Give `take`, called on rank 0, the block in mesh node order, a few columns at a time.
+
+        Every rank must call it, and raises what `take` raises.  The iterator's arrays are
+        (n_dofs, c) with c = `columns` or fewer; rank 0 holds two of them at a time.
+        """
+        blocks = self._column_blocks(block, columns)
+
+        def take_all() -> None:
+            try:
+                take(cast(Iterator[Array], blocks))
+            finally:
+                # The other ranks send all columns, whatever became of the first ones.
+                for _ in blocks:
+                    pass
+
+        if self.comm.rank:
+            for _ in blocks:
+                pass
+        keep_on_root(self.comm, take_all)
+
+    def _column_blocks(self, block: Array, columns: int) -> Iterator[Array | None]:
+        """Columns in mesh node order on rank 0, None elsewhere; every rank must take them all."""
+        nodes = self._gathered(self.nodes[:, None], 1)
+        dofs = None if nodes is None else degrees_of_freedom(nodes[:, 0])
+        for first in range(0, block.shape[1], columns):
+            local = np.ascontiguousarray(block[:, first : first + columns])
+            received = self._gathered(local, 3)
+            if received is None or dofs is None:
+                yield None
+            else:
+                whole = np.empty_like(received)
+                whole[dofs] = received
+                yield whole
+
+    def gather(self, block: Array) -> Array | None:
+        """Whole block (n_dofs, k) in mesh node order on rank 0, None elsewhere.
+
+        The one place where something of that size is on one rank: for tests and for models whose
+        modes fit there.  `pour` is for the others.
+        """
+        whole = np.empty((self.n_dofs if self.comm.rank == 0 else 0, block.shape[1]), order="F")
+
+        def collect(blocks: Iterator[Array]) -> None:
+            first = 0
+            for part in blocks:
+                whole[:, first : first + part.shape[1]] = part
+                first += part.shape[1]
+
+        self.pour(block, collect)
+        return whole if self.comm.rank == 0 else None
+
+    def _gathered(self, local: NDArray[Number], per_node: int) -> NDArray[Number] | None:
+        """Rows of all ranks on rank 0, of an array (per_node * local nodes, c)."""
+        columns = local.shape[1]
+        counts = self.comm.gather(local.size)
+        if self.comm.rank:
+            self.comm.Gatherv(local, None)
+            return None
+        whole = np.empty((per_node * self.n_dofs // 3, columns), dtype=local.dtype)
+        self.comm.Gatherv(local, (whole, counts))
+        return whole
+
+    def destroy(self) -> None:
+        """Free the PETSc matrices, if there are any."""
+        for name in ("K", "M"):
+            matrix = self.__dict__.pop(name, None)
+            if matrix is not None:
+                matrix.destroy()
+
+
+def assemble(
+    share: Share,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    layout: Layout | None = None,
+    elements: Elements | None = None,
+    threads: int = 1,
+) -> System:
+    """Assemble stiffness and mass; every rank assembles the rows of the nodes that it owns.
+
+    Parameters
+    ----------
+    share
+        This rank's share of the solid.
+    layout
+        Its layout, if that was made before.
+    elements
+        Its cells with other moduli than the share's.
+    threads
+        Threads for products with blocks of vectors.
+    """
+    layout = Layout.of_share(share, comm) if layout is None else layout
+    elements = share.cells.elements if elements is None else elements
+    rows = NodeRows(layout.pattern, layout.halo, threads)
+    rows.add_elements(elements)
+    # About the centroid of the whole body: every rank must hold rows of the same six motions.
+    motions = np.ascontiguousarray(rigid_motions(layout.coordinates, np.zeros(3)))
+    system = System(
+        rows,
+        motions,
+        layout.coordinates,
+        share.nodes,
+        share.start,
+        share.stop,
+        share.n_dofs,
+        comm,
+    )
+    gram = system.inner(motions, system.times_mass(motions))
+    rigid = np.ascontiguousarray(np.linalg.solve(np.linalg.cholesky(gram), motions.T).T)
+    return replace(system, rigid=rigid)
+
+
+def _centred(share: Share, comm: MPI.Comm) -> Array:
+    """Positions of this rank's nodes about the centroid, in units of the largest half extent."""
+    total = share.positions.sum(axis=0)
+    comm.Allreduce(MPI.IN_PLACE, total)
+    centred = share.positions - total / share.decomposition.n_nodes
+    extent = np.abs(centred).max(keepdims=True)
+    comm.Allreduce(MPI.IN_PLACE, extent, op=MPI.MAX)
+    return np.asarray(centred / extent)

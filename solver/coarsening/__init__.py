@@ -1,0 +1,1 @@
+"""Coarse elements from blocks of fine ones."""

@@ -1,0 +1,399 @@
+"""Error correction by accelerated subspace iteration (section 7.2.1, Eq. 16-21)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.errors import ConvergenceError
+from solver.assembly.system import System
+from solver.correction.enrichment import Ritz, Step, enrich, relax
+from solver.correction.lanczos import HIGHEST_SHIFT, ZERO_SHARE, lanczos
+from solver.distribution.collective import on_root
+from solver.linear import Approximate, InnerSolver, Inverse
+from solver.subspace.rayleigh_ritz import rayleigh_ritz, safe_shift
+from solver.subspace.spectrum import WEYL_EXPONENT
+
+Array = NDArray[np.float64]
+
+EIGENVALUE_TOLERANCE = 1e-7
+"""Relative eigenvalue error that a correction stops at unless told otherwise."""
+TYPICAL = 0.1
+"""Share of the tolerance that the median of the errors has to reach."""
+INTERACTIVE_TOLERANCE = 1e-2
+"""Relative eigenvalue error of the worst mode that is good enough while a material is designed."""
+STEPWISE = ("krylov", "relaxation")
+"""Accelerations that correct every mode by itself, step by step."""
+ACCELERATIONS = ("lanczos", *STEPWISE)
+LOOSE = 1e-3
+"""Tolerance from which on an inverse for a similar material is good enough for a step."""
+NEARLY_ACCURATE = 100.0
+"""Error, as a multiple of the tolerance, below which `lanczos` leaves a start to `krylov`."""
+SHIFT_SHARE = 0.52
+"""Shift of an indefinite factorisation, as a share of the last wanted eigenvalue."""
+TOP, TOP_SHARE, HIGHEST_TOP_SHIFT = 0.8, 0.98, 1.1
+"""With all modes accurate below the first share of the last wanted value, the shift is the second,
+and too high above the third."""
+LANCZOS_RUNS, OFF_RESONANCE = 3, 0.97
+"""Lanczos iterations at most, and by what the shift is moved off an eigenvalue it has hit."""
+GUARD_SHARE, FEWEST_GUARDS = 0.22, 20
+"""Vectors carried beyond the wanted ones, as a share of these, and the fewest of them."""
+IMPROVED_GUARDS = 0.4
+"""Share of the guard vectors that are improved too, for the sake of the last wanted modes."""
+STAGNATION, PROGRESS = 6, 0.8
+"""Steps after which a correction gives up, if the error is not below this share of their worst."""
+ROUGH_MASS = 0.5
+"""Consistent mass of a rough residual, as a share of what the row sums make of it."""
+
+
+@dataclass
+class Correction:
+    """Corrected eigenpairs of the elastic modes.
+
+    Attributes
+    ----------
+    values
+        (k,) Ritz values [rad^2/s^2], ascending.
+    vectors
+        (local, k) mass-orthonormal, orthogonal to the rigid motions, row-major.
+    errors
+        (k,) estimated relative error of each value, from its residual.
+    guard
+        (local, g) what the iteration carried beyond; useful to start again from.
+    steps
+        Number of corrections made.
+    solves, blocks
+        Number of right-hand sides solved, and of the blocks that they came in.
+    history
+        Largest estimated error before each step, and at the end.
+    inverse
+        Inverse for this material that a similar one may start with; None if there is none to keep.
+    """
+
+    values: Array
+    vectors: Array
+    errors: Array
+    guard: Array
+    steps: int = 0
+    solves: int = 0
+    blocks: int = 0
+    history: list[float] = field(default_factory=list)
+    inverse: Inverse | None = None
+
+
+def correct(
+    system: System,
+    start: Array,
+    wanted: int,
+    inner: InnerSolver,
+    values: Array | None = None,
+    tolerance: float = EIGENVALUE_TOLERANCE,
+    max_steps: int = 30,
+    acceleration: str = "lanczos",
+    report: Callable[[int, float], None] | None = None,
+    observe: Callable[[int, Array], None] | None = None,
+    similar: Inverse | None = None,
+) -> Correction:
+    """Improve the `wanted` lowest elastic modes from the block `start` until they are accurate.
+
+    A step solves (K - mu M) Z = K X - X Theta M for every mode that is not yet accurate.  With
+    `krylov` the Rayleigh-Ritz method then runs in the span of X and Z together, which holds what
+    the subspace iteration of Eq. (16)-(21) would reach with the best weights; with `relaxation` in
+    the span of X - w Z with the over-relaxation w of Bathe & Ramaswamy (1980), as in the paper.
+    Accurate modes are locked.  With `lanczos` the first step is a whole block Lanczos iteration
+    from all modes together, see `solver.correction.lanczos`; what it leaves undone, and any start
+    that is nearly good enough, is for `krylov`, as everything is without an exact inner solver.
+
+    Parameters
+    ----------
+    start
+        (local, q) approximate modes, q > wanted for a margin.
+    wanted
+        Number of elastic modes to correct.
+    inner
+        Solver of the linear systems.
+    values
+        (q,) Ritz values of `start`, if its columns are mass-orthonormal Ritz vectors orthogonal to
+        the rigid motions; otherwise a Rayleigh-Ritz step makes such of them first.
+    tolerance
+        Largest accepted relative eigenvalue error, as estimated from the residual; the median has
+        to reach a tenth of it.
+    max_steps
+        Steps allowed; reaching `tolerance` within them is not required when `tolerance` is zero.
+    report
+        Called with the step and the largest estimated error of the wanted modes.
+    observe
+        Called with the step and the Ritz values of the wanted modes.
+    similar
+        Inverse for a similar material, which does for the first step of a nearly accurate start.
+
+    Raises
+    ------
+    ConvergenceError
+        If `tolerance` is positive and not reached.
+
+    Notes
+    -----
+    The residual r = K x - theta M x of a Ritz pair bounds the relative error of theta, to second
+    order, by r^T M^-1 r / (theta (theta_p - theta)), where theta_p is the last value that is
+    improved.  M is replaced by its row sums, of a consistent mass by half of them.
+
+    With a direct solver and anything but `relaxation` the shift mu lies in the middle of the wanted
+    spectrum: the last modes converge like (theta - mu) / (theta_p - mu), and the first are accurate
+    early.  Otherwise it lies below the spectrum.
+    """
+    rough = values is not None
+    if values is None:
+        values, start = rayleigh_ritz(system, start)
+    if len(values) < wanted:
+        raise ConvergenceError(
+            f"the start block spans {len(values)} elastic modes, {wanted} are wanted; keep more"
+        )
+    if observe is not None:
+        observe(0, values[:wanted])
+    if len(values) == system.n_dofs - system.rigid.shape[1]:
+        # The subspace is the whole space, where Ritz pairs are eigenpairs.
+        exact = np.full(wanted, np.finfo(float).eps)
+        found = np.ascontiguousarray(start[:, :wanted])
+        return Correction(values[:wanted], found, exact, start[:, wanted:])
+    ritz = Ritz(system, values, start)
+    iteration = _Iteration(system, inner, ritz, wanted, acceleration, similar)
+    try:
+        result = iteration.run(tolerance, max_steps, rough, report, observe)
+        result.inverse = iteration.lasting(tolerance)
+    finally:
+        iteration.destroy()
+    return result
+
+
+def default_guard(wanted: int) -> int:
+    """Extra vectors that the iteration carries; the more, the faster the last modes converge."""
+    return max(FEWEST_GUARDS, int(GUARD_SHARE * wanted))
+
+
+class _Iteration:
+    """State of the subspace iteration."""
+
+    def __init__(
+        self,
+        system: System,
+        inner: InnerSolver,
+        ritz: Ritz,
+        wanted: int,
+        acceleration: str,
+        similar: Inverse | None,
+    ) -> None:
+        self.system = system
+        self.inner = inner
+        self.ritz = ritz
+        self.wanted = wanted
+        self.inside = acceleration != "relaxation" and inner.indefinite
+        self.lanczos = acceleration == "lanczos" and inner.indefinite
+        self.share = SHIFT_SHARE
+        self.similar = similar
+        self.made: Inverse | None = None
+        guard = default_guard(wanted)
+        self.width = wanted + guard
+        self.reach = self.improved = wanted + int(IMPROVED_GUARDS * guard)
+        self.step: Step = enrich
+        if acceleration == "relaxation":
+            self.width = self.improved = len(ritz.values)
+            self.step = relax
+        self.solves = self.blocks = 0
+        self.history: list[float] = []
+
+    def run(
+        self,
+        tolerance: float,
+        max_steps: int,
+        rough: bool,
+        report: Callable[[int, float], None] | None,
+        observe: Callable[[int, Array], None] | None,
+    ) -> Correction:
+        """Correct until the tolerance, or the last step allowed, is reached."""
+        step = 0
+        if tolerance >= LOOSE:
+            # One step then has to do, for the last modes too.
+            self.improved = self.width
+        lanczos_may_run = self.lanczos and tolerance > 0.0 and max_steps > 0
+        if lanczos_may_run and rough:
+            self._run_lanczos(tolerance, observe)
+            step = 1
+        while True:
+            errors, residual, active = self._residuals(tolerance)
+            worst = float(errors.max(initial=0.0))
+            self.history.append(worst)
+            if report is not None:
+                report(step, worst)
+            accurate = worst <= tolerance and _typical(errors) <= TYPICAL * tolerance
+            if accurate or step >= max_steps:
+                break
+            if step == 0 and lanczos_may_run and worst > NEARLY_ACCURATE * tolerance:
+                self._run_lanczos(tolerance, observe)
+                step = 1
+                continue
+            if tolerance > 0.0:
+                self._require_progress(step, tolerance)
+            inverse = self._inverse(step)
+            correction = inverse.solve(np.ascontiguousarray(residual))
+            self.solves += correction.shape[1]
+            self.blocks += 1
+            self.step(self.system, self.ritz, correction, active, inverse, self.width)
+            step += 1
+            self._require_independent(step)
+            if observe is not None:
+                observe(step, np.sort(self.ritz.values)[: self.wanted])
+        if tolerance > 0.0 and not accurate:
+            raise ConvergenceError(
+                f"error correction reached an eigenvalue error of {worst:.1e} after {step} steps, "
+                f"{tolerance:.1e} was asked for; allow more steps or keep more modes"
+            )
+        values, vectors, found = self.ritz.lowest(len(self.ritz.values))
+        return Correction(
+            values[: self.wanted],
+            np.ascontiguousarray(vectors[:, : self.wanted]),
+            found[: self.wanted],
+            vectors[:, self.wanted :],
+            step,
+            self.solves,
+            self.blocks,
+            self.history,
+        )
+
+    def _run_lanczos(self, tolerance: float, observe: Callable[[int, Array], None] | None) -> None:
+        width = self.width if tolerance >= LOOSE else self.improved + 1
+        # Again where a poor start has put the shift too high, or chance on an eigenvalue; a start
+        # that knows nothing of the spectrum needs one from below.
+        for run in range(LANCZOS_RUNS):
+            self.inside = run < LANCZOS_RUNS - 1
+            inverse, ritz = self._inverse(1), self.ritz
+            found = lanczos(
+                self.system, inverse, ritz.values, ritz.vectors, self.wanted, width, tolerance
+            )
+            self.solves += found.solves
+            self.blocks += found.blocks
+            if found.resonant:
+                self.destroy()
+                self.share *= OFF_RESONANCE
+                continue
+            bounds = (1.0 + tolerance) * ritz.values[: self.wanted]
+            missed = len(found.values) < self.wanted or (found.values[: self.wanted] > bounds).any()
+            self.ritz = Ritz(self.system, found.values, found.vectors)
+            self._require_independent(1)
+            if not self._too_high(inverse):
+                if missed:
+                    # No eigenvalue lies above the start's, so `krylov` has to go on from there.
+                    self.ritz = ritz
+                break
+            self.destroy()
+        self.inside = True
+        if observe is not None:
+            observe(1, self.ritz.values[: self.wanted])
+
+    def _require_independent(self, step: int) -> None:
+        if len(self.ritz.values) < self.wanted:
+            raise ConvergenceError(
+                f"the iterated vectors collapsed to {len(self.ritz.values)} independent ones "
+                f"after {step} steps, {self.wanted} modes are wanted; keep more"
+            )
+
+    def _inverse(self, step: int) -> Inverse:
+        """Inverse for a step; factorised anew if a start far off has put the shift too high."""
+        similar = None if step or self._only_top_is_left() else self.similar
+        if similar is not None and not self._too_high(similar):
+            return Approximate(similar)
+        if self.made is not None and self.inside and self._too_high(self.made):
+            self.destroy()
+        if self.made is None:
+            self.made = self.inner.inverse(self.system, self._shift())
+        return self.made
+
+    def _too_high(self, inverse: Inverse) -> bool:
+        highest = HIGHEST_TOP_SHIFT if self._only_top_is_left() else HIGHEST_SHIFT
+        return inverse.shift > highest * self._last()
+
+    def lasting(self, tolerance: float) -> Inverse | None:
+        """The inverse to keep for a similar material, which only a loose tolerance makes use of."""
+        kept = self.similar if self.made is None else self.made
+        return kept if kept is not None and kept.lasting and tolerance >= LOOSE else None
+
+    def destroy(self) -> None:
+        """Free what the inverse made here holds; of one that lasts, nothing has to be."""
+        if self.made is not None:
+            self.made.destroy()
+            self.made = None
+
+    def _last(self) -> float:
+        """Ritz value of the last wanted mode, the same on all ranks."""
+        return float(np.sort(self.ritz.values)[self.wanted - 1])
+
+    def _shift(self) -> float:
+        if not self.inside:
+            return -safe_shift(self.system)
+        return self._last() * (TOP_SHARE if self._only_top_is_left() else self.share)
+
+    def _only_top_is_left(self) -> bool:
+        """Whether just modes at the end of those wanted are not accurate yet."""
+        lowest = float(self.ritz.values[self.ritz.active].min(initial=np.inf))
+        return self.ritz.locked > 0 and lowest > TOP * self._last()
+
+    def _residuals(self, tolerance: float) -> tuple[Array, Array, NDArray[np.int64]]:
+        """Errors of the wanted modes, and residuals of those to improve with their numbers.
+
+        Wanted modes that have become accurate are locked.
+        """
+        ritz = self.ritz
+        candidates = ritz.active[: max(0, self.improved - ritz.locked)]
+        residual = ritz.residual(candidates)
+        estimate = self._estimate(candidates, residual)
+        ritz.errors[candidates] = on_root(self.system.comm, lambda: estimate)
+        errors = ritz.errors[np.argsort(ritz.values, kind="stable")[: self.wanted]]
+        limit = tolerance if _typical(errors) <= TYPICAL * tolerance else TYPICAL * tolerance
+        inside = candidates[: max(0, self.wanted - ritz.locked)]
+        accurate = inside[ritz.errors[inside] <= limit]
+        chosen = ~np.isin(candidates, accurate)
+        ritz.lock(accurate)
+        return errors, residual[:, chosen], candidates[chosen]
+
+    def _estimate(self, candidates: NDArray[np.int64], residual: Array) -> Array:
+        values = self.ritz.values[candidates]
+        last = self._first_beyond()
+        rows = self.system.rows
+        mass = rows.lumped_mass if rows.has_diagonal_mass else ROUGH_MASS * rows.lumped_mass
+        weighted = residual / np.repeat(mass, 3)[:, None]
+        square = self.system.column_products(residual, weighted)
+        distance = np.maximum(last - values, np.finfo(float).eps * last)
+        size = np.maximum(values, ZERO_SHARE * last)
+        return np.maximum(square / (size * distance), np.finfo(float).eps)
+
+    def _first_beyond(self) -> float:
+        """Value up to which the subspace holds all that is there.
+
+        Those of the guard vectors of another material are far too high: until they are improved
+        they count for no more than Weyl's law says.
+        """
+        values = np.sort(self.ritz.values)
+        if self.step is relax:
+            return float(values[(3 * self.wanted + len(values)) // 4])
+        number = min(self.reach, len(values))
+        found = float(values[number - 1])
+        if self.blocks == 0 and self.similar is not None:
+            grown = (number / self.wanted) ** WEYL_EXPONENT
+            return min(found, grown * float(values[self.wanted - 1]))
+        return found
+
+    def _require_progress(self, step: int, tolerance: float) -> None:
+        recent = self.history[-STAGNATION - 1 :]
+        if len(recent) > STAGNATION and recent[-1] > PROGRESS * max(recent[:-1]):
+            raise ConvergenceError(
+                f"error correction stagnates at an eigenvalue error of {min(self.history):.1e} "
+                f"after {step} steps, {tolerance:.1e} was asked for; use another inner solver "
+                "(--inner) or a looser tolerance"
+            )
+
+
+def _typical(errors: Array) -> float:
+    return float(np.median(errors)) if len(errors) else 0.0

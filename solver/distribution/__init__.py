@@ -1,0 +1,1 @@
+"""The mesh over the ranks: subdomains, the tree that merges them, and what each rank holds."""

@@ -1,0 +1,40 @@
+"""What rank 0 computes for all ranks, errors included."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar, cast
+
+from mpi4py import MPI
+
+T = TypeVar("T")
+
+
+def on_root(comm: MPI.Comm, compute: Callable[[], T]) -> T:
+    """Call `compute` on rank 0 and give every rank its result, or its exception."""
+    result, failure = _attempt(comm, compute)
+    result, failure = comm.bcast((result, failure), root=0)
+    if failure is not None:
+        # Every rank raises it, so that no rank is left waiting for the others.
+        raise failure
+    return cast(T, result)
+
+
+def keep_on_root(comm: MPI.Comm, compute: Callable[[], T]) -> T | None:
+    """Call `compute` on rank 0, which keeps the result; its exception is raised on every rank."""
+    result, failure = _attempt(comm, compute)
+    failure = comm.bcast(failure, root=0)
+    if failure is not None:
+        raise failure
+    return result
+
+
+def _attempt(comm: MPI.Comm, compute: Callable[[], T]) -> tuple[T | None, Exception | None]:
+    """Result of `compute` on rank 0, or the exception, marked as one that all ranks will raise."""
+    if comm.rank == 0:
+        try:
+            return compute(), None
+        except Exception as error:
+            error.collective = True  # type: ignore[attr-defined]
+            return None, error
+    return None, None

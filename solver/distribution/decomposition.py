@@ -1,0 +1,103 @@
+"""Who owns what: subdomains, merge tree, owner ranks, and the numbering of distributed rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.fem.geometry import HexMesh
+from solver.distribution.partition import default_subdomains, partition_mesh
+from solver.distribution.tree import MergeTree, assign_ranks, build_tree
+
+COST_EXPONENT = 1.5
+"""Work on a subdomain grows like this power of its unknowns: so many modes of so many unknowns."""
+
+
+@dataclass(frozen=True)
+class Decomposition:
+    """Subdomains and their owners: small, and identical on every rank.
+
+    Nodes are numbered by subdomain; the number of a node in this order is its row.
+
+    Attributes
+    ----------
+    tree
+        The merge tree, whose leaves are the subdomains from left to right.
+    owner
+        (parts,) rank of each subdomain; contiguous.
+    offsets
+        (parts + 1,) first row of each subdomain.
+    """
+
+    tree: MergeTree
+    owner: NDArray[np.int32]
+    offsets: NDArray[np.int64]
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes of the whole mesh."""
+        return int(self.offsets[-1])
+
+    def subdomains_of(self, rank: int) -> range:
+        """Subdomains that `rank` owns."""
+        first, last = np.searchsorted(self.owner, [rank, rank + 1])
+        return range(int(first), int(last))
+
+    def local_range(self, rank: int) -> tuple[int, int]:
+        """Half-open range of rows that `rank` owns."""
+        owned = self.subdomains_of(rank)
+        return int(self.offsets[owned.start]), int(self.offsets[owned.stop])
+
+    def row_ranges(self) -> list[tuple[int, int]]:
+        """Half-open range of rows of every group of the tree."""
+        return [
+            (int(self.offsets[start]), int(self.offsets[stop]))
+            for start, stop in self.tree.ranges()
+        ]
+
+    def leaders(self) -> list[int]:
+        """Rank of every group of the tree: the owner of its first subdomain."""
+        return [int(self.owner[start]) for start, _ in self.tree.ranges()]
+
+
+def decompose(
+    mesh: HexMesh, subdomains: int | None = None, seed: int = 0, ranks: int = 1
+) -> tuple[Decomposition, NDArray[np.int64]]:
+    """Cut `mesh` into subdomains, build the merge tree and deal subdomains to the ranks.
+
+    The cut and the tree depend on the number of ranks only where there are more ranks than
+    subdomains by default.
+
+    Returns
+    -------
+    The decomposition and the nodes (n,) in its order: by subdomain, then by number.
+
+    Raises
+    ------
+    UserError
+        If there are more subdomains than cells, or more ranks than subdomains.
+    """
+    node_part = _partition(mesh, subdomains, seed, ranks)
+    tree, renumbered = build_tree(node_part[mesh.cells], np.bincount(node_part))
+    node_part = renumbered[node_part]
+    order = np.argsort(node_part, kind="stable").astype(np.int64)
+    sizes = np.bincount(node_part, minlength=tree.parts)
+    offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+    owner = assign_ranks(sizes.astype(float) ** COST_EXPONENT, ranks)
+    return Decomposition(tree, owner, offsets), order
+
+
+def _partition(mesh: HexMesh, subdomains: int | None, seed: int, ranks: int) -> NDArray[np.int32]:
+    """Subdomain (n,) of each node; as many as the ranks at least, unless told how many."""
+    if subdomains is not None:
+        return partition_mesh(mesh, subdomains, seed)
+    asked = min(max(default_subdomains(3 * mesh.n_nodes), ranks), mesh.n_cells)
+    while True:
+        node_part = partition_mesh(mesh, asked, seed)
+        # Parts of a few cells may lose all their nodes to their neighbours.
+        missing = ranks - int(node_part.max()) - 1
+        if missing <= 0 or asked == mesh.n_cells:
+            return node_part
+        asked = min(asked + missing, mesh.n_cells)

@@ -1,0 +1,223 @@
+"""Each rank's share of the solid, dealt out once by rank 0, which alone reads and cuts the mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from carillon.errors import UserError
+from carillon.fem.model import Chosen, ElasticModel, Elements
+from solver.distribution.collective import on_root
+from solver.distribution.decomposition import Decomposition, decompose
+from solver.distribution.messages import AnyArray, receive_arrays, send_arrays
+
+Array = NDArray[np.float64]
+
+_SHARE, _MODULI = 10, 12
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Some cells of the mesh with their material.
+
+    Attributes
+    ----------
+    corners
+        (c, 8) rows of the corners, see `Decomposition`.
+    elements
+        Size and material of the cells.
+    """
+
+    corners: NDArray[np.int64]
+    elements: Elements
+
+    def __len__(self) -> int:
+        return len(self.corners)
+
+    def take(self, chosen: Chosen) -> Cells:
+        """The chosen cells."""
+        elements = self.elements.with_material(
+            self.elements.young[chosen], self.elements.fill[chosen]
+        )
+        return Cells(self.corners[chosen], elements)
+
+    def join(self, others: Cells) -> Cells:
+        """These cells, then the others."""
+        young = np.concatenate([self.elements.young, others.elements.young])
+        fill = np.concatenate([self.elements.fill, others.elements.fill])
+        corners = np.concatenate([self.corners, others.corners])
+        return Cells(corners, self.elements.with_material(young, fill))
+
+    def inside(self, start: int, stop: int) -> NDArray[np.bool_]:
+        """Whether each corner (c, 8) is one of the rows [start, stop)."""
+        return (self.corners >= start) & (self.corners < stop)
+
+    def arrays(self) -> list[AnyArray]:
+        """What differs from cell to cell, for a message; the inverse of `from_arrays`."""
+        return [self.corners, self.elements.young, self.elements.fill]
+
+    def from_arrays(self, arrays: list[AnyArray]) -> Cells:
+        """Cells of the same solid from the arrays of a message."""
+        corners, young, fill = arrays
+        return Cells(corners, self.elements.with_material(young, fill))
+
+
+@dataclass(frozen=True)
+class Share:
+    """What one rank knows of the solid.
+
+    Attributes
+    ----------
+    decomposition
+        Subdomains and owners, the same on every rank.
+    start, stop
+        Half-open range of this rank's rows.
+    cells
+        The cells that touch them, by ascending number.
+    nodes
+        (stop - start,) numbers of this rank's nodes in the mesh.
+    positions
+        (stop - start, 3) their positions [m].
+    numbers
+        (c,) numbers of `cells` in the mesh.
+    """
+
+    decomposition: Decomposition
+    start: int
+    stop: int
+    cells: Cells
+    nodes: NDArray[np.int64]
+    positions: Array
+    numbers: NDArray[np.int64]
+
+    @property
+    def n_dofs(self) -> int:
+        """Number of unknowns of the whole solid."""
+        return 3 * self.decomposition.n_nodes
+
+    def planes(self) -> NDArray[np.int64]:
+        """Integer coordinates (stop - start, 3) of this rank's nodes, in elements' edges."""
+        positions = self.positions / self.cells.elements.edge
+        return np.rint(positions - positions.min(axis=0)).astype(np.int64)
+
+    def cells_by_subdomain(self, parts: range) -> dict[int, NDArray[np.int64]]:
+        """Positions in `cells` of those that touch each subdomain in `parts`, ascending."""
+        corner_part = np.searchsorted(self.decomposition.offsets, self.cells.corners, side="right")
+        part, cell = _incidences(corner_part - 1)
+        ends = np.searchsorted(part, [*parts, parts.stop])
+        return {part: cell[ends[i] : ends[i + 1]] for i, part in enumerate(parts)}
+
+
+def distribute(
+    model: ElasticModel | None,
+    subdomains: int | None = None,
+    seed: int = 0,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+) -> Share:
+    """Cut the solid on rank 0 and give every rank its share.
+
+    Parameters
+    ----------
+    model
+        The solid; only rank 0's is looked at, the others may pass None.
+    subdomains
+        Number of subdomains; from the number of unknowns if not given.
+    seed
+        Seed of the partition.
+
+    Raises
+    ------
+    UserError
+        On every rank, if there are more subdomains than cells or more ranks than subdomains.
+    """
+    order = np.empty(0, dtype=np.int64)
+
+    def cut() -> tuple[Decomposition, Elements]:
+        nonlocal order
+        assert model is not None
+        decomposition, order = decompose(model.mesh, subdomains, seed, comm.size)
+        nothing = model.elements.with_material(np.empty((0, 8)), np.empty(0, dtype=np.uint8))
+        return decomposition, nothing
+
+    decomposition, constants = on_root(comm, cut)
+    if comm.rank == 0:
+        assert model is not None
+        nodes, positions, numbers, cells = _deal(model, decomposition, order, comm)
+    else:
+        nodes, positions, numbers, *arrays = receive_arrays(comm, 0, _SHARE)
+        cells = Cells(np.empty((0, 8), dtype=np.int64), constants).from_arrays(arrays)
+    start, stop = decomposition.local_range(comm.rank)
+    return Share(decomposition, start, stop, cells, nodes, positions, numbers)
+
+
+def deal_moduli(share: Share, young: Array | None, comm: MPI.Comm) -> Share:
+    """The same share of a solid with other moduli.
+
+    Parameters
+    ----------
+    young
+        (m, 8) moduli [Pa] of all cells of the mesh; only rank 0's are looked at.
+
+    Raises
+    ------
+    UserError
+        On every rank, if there are not as many as cells, or one is not a positive number.
+    """
+    everyone = comm.gather(share.numbers)
+
+    def check() -> None:
+        assert young is not None and everyone is not None
+        cells = 1 + max(int(numbers.max()) for numbers in everyone)
+        if young.shape != (cells, 8):
+            raise UserError(f"moduli of shape {young.shape}, expected ({cells}, 8)")
+        if not (np.isfinite(young).all() and (young >= 0.0).all() and young.any()):
+            raise UserError("moduli [Pa]: found negative or no numbers, expected positive ones")
+
+    on_root(comm, check)
+    if comm.rank == 0:
+        assert young is not None and everyone is not None
+        for rank in range(1, comm.size):
+            send_arrays(comm, [young[everyone[rank]]], rank, _MODULI).wait()
+        mine = young[share.numbers]
+    else:
+        (mine,) = receive_arrays(comm, 0, _MODULI)
+    elements = share.cells.elements
+    cells = replace(share.cells, elements=elements.with_material(mine, elements.fill))
+    return replace(share, cells=cells)
+
+
+def _deal(
+    model: ElasticModel, decomposition: Decomposition, order: NDArray[np.int64], comm: MPI.Comm
+) -> tuple[NDArray[np.int64], Array, NDArray[np.int64], Cells]:
+    """Send every rank its nodes, their positions, its cells' numbers and cells; return rank 0's."""
+    row = np.empty(len(order), dtype=np.int64)
+    row[order] = np.arange(len(order))
+    corners = row[model.mesh.cells]
+    whole = Cells(corners, model.elements)
+    ends = [decomposition.local_range(rank)[1] for rank in range(comm.size)]
+    rank_of, cell = _incidences(np.searchsorted(ends, corners, side="right"))
+    first = np.searchsorted(rank_of, np.arange(comm.size + 1))
+
+    def share(rank: int) -> tuple[NDArray[np.int64], Array, NDArray[np.int64], Cells]:
+        start, stop = decomposition.local_range(rank)
+        nodes = order[start:stop].copy()
+        numbers = cell[first[rank] : first[rank + 1]].copy()
+        return nodes, model.mesh.nodes[nodes], numbers, whole.take(numbers)
+
+    for rank in range(1, comm.size):
+        *arrays, cells = share(rank)
+        send_arrays(comm, [*arrays, *cells.arrays()], rank, _SHARE).wait()
+    return share(0)
+
+
+def _incidences(
+    corner_owner: NDArray[np.integer],
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs (owner, cell) from the owner (c, 8) of each corner, each once, sorted."""
+    count = max(len(corner_owner), 1)
+    cell = np.arange(len(corner_owner), dtype=np.int64)[:, None]
+    owner, cells = np.divmod(np.unique(corner_owner.astype(np.int64) * count + cell), count)
+    return owner, cells

@@ -1,0 +1,153 @@
+"""Cutting the mesh into subdomains: k-means++ on low Laplacian eigenvectors (section 7.2)."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from carillon.errors import UserError
+from carillon.fem.geometry import HexMesh
+from carillon.fem.laplacian import laplacian_modes
+
+EMBEDDING_MODES = 12
+"""Laplacian eigenvectors that span the clustering space, the constant left out."""
+SUBDOMAIN_DOFS = 1800
+"""Aimed unknowns of a subdomain."""
+FEWEST_SUBDOMAINS = 4
+"""Subdomains of the smallest models, so that a few ranks can share them."""
+FEWEST_HOLDING = 3
+"""Corners of one cell that a subdomain needs there for the cell to hold them together."""
+MOST_ROUNDS = 10
+"""Rounds of joining pieces of subdomains to their neighbours."""
+
+
+def default_subdomains(n_dofs: int) -> int:
+    """Number of subdomains for a model of `n_dofs` unknowns; independent of the number of ranks."""
+    return max(FEWEST_SUBDOMAINS, round(n_dofs / SUBDOMAIN_DOFS))
+
+
+def partition_cells(mesh: HexMesh, parts: int, seed: int = 0) -> NDArray[np.int32]:
+    """Subdomain (m,) of each cell, by k-means++ in the space of Laplacian eigenvectors."""
+    if not 1 <= parts <= mesh.n_cells:
+        raise UserError(
+            f"{parts} subdomains asked for a mesh of {mesh.n_cells:,} cells; "
+            f"expected 1 to {mesh.n_cells:,}"
+        )
+    if parts == 1:
+        return np.zeros(mesh.n_cells, dtype=np.int32)
+    from sklearn.cluster import KMeans  # whose import takes a second
+
+    values, vectors = laplacian_modes(mesh, EMBEDDING_MODES + 1)
+    # Commute-time weights: distances in the embedding follow distances along the solid.
+    embedding = vectors[:, 1:] / np.sqrt(np.maximum(values[1:], 1e-12))
+    kmeans = KMeans(parts, init="k-means++", n_init=1, random_state=seed % 2**32)
+    labels = kmeans.fit_predict(embedding)
+    return _without_gaps(labels)
+
+
+def partition_nodes(mesh: HexMesh, cell_part: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Subdomain (n,) of each node: the part that most of its cells belong to, ties to the lower.
+
+    Parts that get no node vanish, and the others are numbered without gaps.
+    """
+    parts = int(cell_part.max()) + 1
+    node = mesh.cells.ravel().astype(np.int64)
+    pair, votes = np.unique(node * parts + np.repeat(cell_part, 8), return_counts=True)
+    voter, part = np.divmod(pair, parts)
+    order = np.lexsort([part, -votes, voter])
+    first = np.searchsorted(voter[order], np.arange(mesh.n_nodes))
+    return _without_gaps(part[order][first])
+
+
+def partition_mesh(mesh: HexMesh, parts: int, seed: int = 0) -> NDArray[np.int32]:
+    """Subdomain (n,) of each node: about `parts` connected sets, numbered without gaps, none empty.
+
+    Raises
+    ------
+    UserError
+        If there are more parts than cells.
+    """
+    node_part = partition_nodes(mesh, partition_cells(mesh, parts, seed))
+    return connect_subdomains(mesh.cells, node_part, mesh.n_nodes / (2.0 * parts))
+
+
+def connect_subdomains(
+    cells: NDArray[np.integer], node_part: NDArray[np.int32], smallest: float
+) -> NDArray[np.int32]:
+    """Subdomains (n,) that hang together, from ones that may not.
+
+    Of a subdomain in pieces the largest stays.  Another piece becomes a subdomain of its own if it
+    has `smallest` nodes or more, and is given to the neighbour it shares most corners of cells with
+    otherwise.
+
+    Notes
+    -----
+    What is left after `MOST_ROUNDS` may still be in pieces; such a subdomain has more than six
+    rigid motions, which `solver.hcms.local` keeps.
+    """
+    for _ in range(MOST_ROUNDS):
+        piece = subdomain_pieces(cells, node_part)
+        sizes = np.bincount(piece)
+        owner = np.empty(len(sizes), dtype=np.int64)
+        owner[piece] = node_part
+        by_size = np.lexsort([-sizes, owner])
+        is_largest = np.zeros(len(sizes), dtype=bool)
+        is_largest[by_size[np.unique(owner[by_size], return_index=True)[1]]] = True
+        if is_largest.all():
+            break
+        target = _closest_neighbours(cells, node_part, piece, len(sizes))
+        own = ~is_largest & ((sizes >= smallest) | (target < 0))
+        target[is_largest] = owner[is_largest]
+        target[own] = owner.max() + 1 + np.arange(own.sum())
+        node_part = _without_gaps(target[piece])
+    return node_part
+
+
+def subdomain_pieces(cells: NDArray[np.integer], node_part: NDArray[np.int32]) -> NDArray[np.int64]:
+    """Number (n,) of the piece that each node belongs to; a piece lies in one subdomain.
+
+    Nodes of a subdomain hang together if a cell has `FEWEST_HOLDING` of them or more: fewer hold
+    each other by a spring at most.
+    """
+    n_nodes, parts = len(node_part), int(node_part.max()) + 1
+    cell = np.repeat(np.arange(len(cells), dtype=np.int64), 8)
+    node = cells.ravel()
+    _, patch, corners = np.unique(
+        cell * parts + node_part[node], return_inverse=True, return_counts=True
+    )
+    patch = patch.ravel()
+    holding = corners[patch] >= FEWEST_HOLDING
+    size = n_nodes + len(corners)
+    graph = sp.coo_matrix(
+        (np.ones(holding.sum()), (node[holding], n_nodes + patch[holding])), shape=(size, size)
+    )
+    _, label = connected_components(graph, directed=False)
+    return np.unique(label[:n_nodes], return_inverse=True)[1].ravel().astype(np.int64)
+
+
+def _closest_neighbours(
+    cells: NDArray[np.integer],
+    node_part: NDArray[np.int32],
+    piece: NDArray[np.int64],
+    pieces: int,
+) -> NDArray[np.int64]:
+    """Other subdomain that shares most corners of cells with each piece; -1 without one."""
+    part = node_part[cells]
+    mixed = np.flatnonzero((part != part[:, :1]).any(axis=1))
+    ours, theirs = part[mixed][:, :, None], part[mixed][:, None, :]
+    seen = np.broadcast_to(piece[cells[mixed]][:, :, None], (len(mixed), 8, 8))[ours != theirs]
+    other = np.broadcast_to(theirs, (len(mixed), 8, 8))[ours != theirs].astype(np.int64)
+    parts = int(node_part.max()) + 1
+    pair, votes = np.unique(seen * parts + other, return_counts=True)
+    voter, candidate = np.divmod(pair, parts)
+    order = np.lexsort([candidate, -votes, voter])
+    found, first = np.unique(voter[order], return_index=True)
+    closest = np.full(pieces, -1, dtype=np.int64)
+    closest[found] = candidate[order][first]
+    return closest
+
+
+def _without_gaps(labels: NDArray[np.integer]) -> NDArray[np.int32]:
+    return np.unique(labels, return_inverse=True)[1].ravel().astype(np.int32)

@@ -1,0 +1,1 @@
+"""Modes in files, and solutions that start from them."""

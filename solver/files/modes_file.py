@@ -1,0 +1,312 @@
+"""The file `modes.h5`: eigenpairs, the model they belong to, and the evidence for them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon import provenance
+from carillon.datasets import INTEGER, find, finite, number, read, refused
+from carillon.errors import UserError
+from carillon.fem.geometry import CORNER_OFFSETS, HexMesh
+from carillon.fem.model import RIGID_MODES, ElasticModel
+from carillon.files import create_h5, open_h5
+from carillon.limits import DENSITIES, EDGES, POISSON
+from carillon.measurement import measured
+
+Array = NDArray[np.float64]
+
+KIND = "modes"
+SCHEMA = 1
+CHECKS = ("inertia", "completion", "verification")
+"""Phases that check modes, and find those that the check misses; no method is charged for them."""
+ROUNDING = 1e-6
+"""Of the largest eigenvalue: what those of rigid motions may be below zero."""
+SAME_SOLID = 1.000001
+"""Cell edges by which boxes around voxels of one solid may differ."""
+_COLUMNS_PER_CHUNK = 16
+_ROWS_PER_CHUNK = 1 << 20
+
+
+@dataclass
+class ModesFile:
+    """Contents of a modes file.
+
+    Attributes
+    ----------
+    eigenvalues, frequencies
+        (k,) [rad^2/s^2] and [Hz].
+    modes
+        (n_dofs, k) mass-normalised, unknown 3 n + i is node n along axis i; None if not read.
+    residuals
+        (k,) residual ratios.
+    model
+        The solid that the modes belong to, from which K and M can be assembled again.
+    attributes, provenance
+        Method, tolerances, evidence and timings; origin of the numbers.
+    """
+
+    eigenvalues: Array
+    frequencies: Array
+    modes: Array | None
+    residuals: Array
+    model: ElasticModel
+    attributes: dict[str, Any]
+    provenance: dict[str, Any]
+
+    @property
+    def mesh(self) -> HexMesh:
+        """Mesh of the model."""
+        return self.model.mesh
+
+
+def write_modes(
+    path: str | Path,
+    model: ElasticModel,
+    eigenvalues: Array,
+    modes: Iterable[Array],
+    residuals: Array,
+    attributes: dict[str, Any],
+    parameters: dict[str, Any],
+    more: Callable[[h5py.File], None] | None = None,
+) -> None:
+    """Write a modes file atomically.
+
+    Parameters
+    ----------
+    modes
+        Blocks (n_dofs, c) of the modes in mesh node order, from the lowest up, as
+        `System.pour` gives them; each is on its way to disk before the next one is asked for.
+    attributes, parameters
+        Evidence and timings; the parameters of the command, for the provenance.
+    more
+        Writes what else the file shall hold, under names that are not taken.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be written.
+    """
+    with create_h5(path, KIND, SCHEMA, sealed=True) as file:
+        put_eigenvalues(file, eigenvalues)
+        put_modes(file, modes, (model.n_dofs, len(eigenvalues)))
+        put(file, "residuals", residuals, "1", "|K x - lambda M x| / (lambda |M x|)")
+        put_model(file, model)
+        for key, value in attributes.items():
+            file.attrs[key] = json.dumps(value) if isinstance(value, dict) else value
+        origin = measured(parameters, attributes.get("ranks", 1))
+        file.create_group("provenance").attrs.update(origin)
+        if more is not None:
+            more(file)
+
+
+def put_eigenvalues(group: h5py.Group, eigenvalues: Array) -> None:
+    """Write the eigenvalues (k,) and the frequencies that they belong to."""
+    put(group, "eigenvalues", eigenvalues, "rad^2/s^2", "eigenvalues of K u = lambda M u")
+    put(group, "frequencies", frequencies(eigenvalues), "Hz", "natural frequencies")
+
+
+def put_modes(group: h5py.Group, blocks: Iterable[Array], shape: tuple[int, int]) -> None:
+    """Write mass-normalised modes of the given shape (n_dofs, k), handed over in blocks."""
+    chunks = (min(_ROWS_PER_CHUNK, shape[0]), min(_COLUMNS_PER_CHUNK, shape[1]))
+    dataset = group.create_dataset("modes", shape, float, chunks=chunks, fletcher32=True)
+    dataset.attrs["units"] = "kg^-1/2"
+    dataset.attrs["long_name"] = "mass-normalised modes; row 3 n + i is node n along axis i"
+    first = 0
+    for block in blocks:
+        dataset[:, first : first + block.shape[1]] = block
+        first += block.shape[1]
+    if first != shape[1]:
+        raise ValueError(f"{first} modes for {shape[1]} eigenvalues")
+
+
+def put_model(group: h5py.Group, model: ElasticModel) -> None:
+    """Write a solid, from which K and M can be assembled again."""
+    mesh = model.mesh
+    uniform = bool((model.young == model.young[:, :1]).all())
+    young = model.young[:, 0] if uniform else model.young
+    put(group, "nodes", mesh.nodes, "m", "positions of the nodes")
+    put(group, "node_grid", mesh.node_grid, "1", "integer coordinates of the nodes")
+    put(group, "cells", mesh.cells, "1", "node numbers of the cells, corners in bit order")
+    put(group, "grid", mesh.grid, "1", "integer coordinates of the cells")
+    put(group, "young", young, "Pa", "Young's modulus per cell or per quadrature point")
+    put(group, "fill", model.fill, "1", "bit pattern of the cell's octants that hold mass")
+    group.attrs["poisson"] = model.poisson
+    group.attrs["density"] = model.density
+    group.attrs["lumped"] = model.lumped
+    group.attrs["lumped_share"] = model.lumped_share
+    group.attrs["cell_edge"] = mesh.edge
+    group.attrs["origin"] = mesh.origin
+
+
+def get_model(group: h5py.Group) -> ElasticModel:
+    """Read a solid written by `put_model`.
+
+    Raises
+    ------
+    UserError
+        If it is incomplete or its parts do not fit each other.
+    """
+    grid = read(group, "grid", (None, 3), INTEGER).astype(np.int32)
+    node_grid = read(group, "node_grid", (None, 3), INTEGER).astype(np.int32)
+    cells = read(group, "cells", (len(grid), 8), INTEGER)
+    if not _are_corners(cells, grid, node_grid):
+        raise refused(group, "cells, nodes and their places on the grid do not fit each other")
+    mesh = HexMesh(
+        cells=cells.astype(np.int32),
+        grid=grid,
+        node_grid=node_grid,
+        origin=_origin(group),
+        edge=number(group, "cell_edge", *EDGES),
+    )
+    whole = getattr(group.get("young"), "ndim", 0) == 2
+    young = read(group, "young", (len(grid), 8) if whole else (len(grid),))
+    if (young < 0.0).any():
+        raise refused(group, "dataset 'young' holds negative moduli")
+    if not whole:
+        young = np.repeat(young[:, None], 8, axis=1)
+    return ElasticModel(
+        mesh,
+        young.astype(float, copy=False),
+        read(group, "fill", (len(grid),), INTEGER).astype(np.uint8),
+        number(group, "poisson", *POISSON),
+        number(group, "density", *DENSITIES),
+        bool(number(group, "lumped", 0.0, 1.0)),
+        number(group, "lumped_share", 0.0, 1.0) if "lumped_share" in group.attrs else 0.0,
+    )
+
+
+def _are_corners(
+    cells: NDArray[np.integer], grid: NDArray[np.int32], node_grid: NDArray[np.int32]
+) -> bool:
+    """Whether every cell has the nodes at its corners, and every node a cell."""
+    n_nodes = len(node_grid)
+    if not len(cells) or cells.min() < 0 or cells.max() >= n_nodes:
+        return False
+    if not (np.bincount(cells.ravel(), minlength=n_nodes) > 0).all():
+        return False
+    return np.array_equal(node_grid[cells], grid[:, None, :] + CORNER_OFFSETS)
+
+
+def _origin(group: h5py.Group) -> Array:
+    # Attributes come with an explicit byte order, which MPI does not know.
+    origin = np.asarray(group.attrs["origin"]).astype(float)
+    if origin.shape != (3,) or not np.isfinite(origin).all():
+        raise refused(group, f"'origin' is {origin.tolist()}, expected a point")
+    return origin
+
+
+def read_modes(path: str | Path, with_modes: bool = True) -> ModesFile:
+    """Read a modes file.
+
+    Raises
+    ------
+    UserError
+        If the file is missing, damaged, of another schema, or inconsistent: everything in it is a
+        finite number, eigenvalues ascend, and the parts fit each other.
+    """
+    with open_h5(path, KIND, SCHEMA, sealed=True) as file:
+        attributes = {key: _plain(value) for key, value in file.attrs.items()}
+        eigenvalues, model = get_eigenvalues(file), get_model(file)
+        shape = (model.n_dofs, len(eigenvalues))
+        stored = find(file, "modes", shape)
+        return ModesFile(
+            eigenvalues,
+            read(file, "frequencies", eigenvalues.shape),
+            finite(file, "modes", stored[()]) if with_modes else None,
+            read(file, "residuals", eigenvalues.shape),
+            model,
+            attributes,
+            provenance.read(file),
+        )
+
+
+def read_elastic(path: str | Path) -> ModesFile:
+    """Read a modes file that holds elastic modes, whose frequencies one can divide by.
+
+    Raises
+    ------
+    UserError
+        See `read_modes`; or if there is none, or one at zero frequency.
+    """
+    file = read_modes(path)
+    if len(file.eigenvalues) <= RIGID_MODES:
+        raise UserError(
+            f"{path}: holds {len(file.eigenvalues)} modes, of which {RIGID_MODES} are rigid; "
+            "compute more"
+        )
+    if file.eigenvalues[RIGID_MODES] <= 0.0:
+        raise UserError(
+            f"{path}: more than {RIGID_MODES} of its modes have frequency zero, as of a solid that "
+            "hangs on a hinge; repair the mesh and compute them again"
+        )
+    return file
+
+
+def require_same_solid(paths: Sequence[str | Path], files: Sequence[ModesFile]) -> None:
+    """Check that files are of one solid: boxes around it that agree to cells of the coarsest mesh.
+
+    Raises
+    ------
+    UserError
+        If one differs from the first.
+    """
+    corners = [
+        np.array([file.mesh.nodes.min(axis=0), file.mesh.nodes.max(axis=0)]) for file in files
+    ]
+    for path, file, box in zip(paths, files, corners, strict=True):
+        cell = max(file.mesh.edge, files[0].mesh.edge)
+        if np.abs(box - corners[0]).max() > SAME_SOLID * cell:
+            sides = [
+                " x ".join(f"{x:.4g}" for x in np.ptp(each, axis=0)) for each in (box, corners[0])
+            ]
+            raise UserError(
+                f"{path}: is of another solid ({sides[0]} m) or place than {paths[0]} "
+                f"({sides[1]} m); name files of one"
+            )
+
+
+def get_eigenvalues(group: h5py.Group) -> Array:
+    """Eigenvalues (k,) [rad^2/s^2], ascending but for the rounding of those of rigid motions.
+
+    Raises
+    ------
+    UserError
+        If they are missing, not finite, out of order, or negative beyond rounding.
+    """
+    values = read(group, "eigenvalues", (None,)).astype(float, copy=False)
+    if not len(values):
+        raise refused(group, "holds no modes")
+    slack = ROUNDING * float(np.abs(values).max())
+    rigid, elastic = values[:RIGID_MODES], values[RIGID_MODES:]
+    ascending = rigid.max() <= elastic.min(initial=np.inf) and (np.diff(elastic) >= -slack).all()
+    if values.min() < -slack or not ascending:
+        raise refused(group, "eigenvalues are negative or do not ascend")
+    return values
+
+
+def frequencies(eigenvalues: Array) -> Array:
+    """Natural frequencies [Hz] of eigenvalues [rad^2/s^2]; rounding below zero counts as zero."""
+    return np.asarray(np.sqrt(np.maximum(eigenvalues, 0.0)) / (2.0 * np.pi))
+
+
+def put(group: h5py.Group, name: str, data: NDArray[Any], units: str, long_name: str) -> None:
+    """Write one dataset with a checksum, its unit and what it is."""
+    dataset = group.create_dataset(name, data=data, fletcher32=True, chunks=True)
+    dataset.attrs["units"] = units
+    dataset.attrs["long_name"] = long_name
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, str) and value.startswith("{"):
+        return json.loads(value)
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return value.item() if hasattr(value, "item") else value

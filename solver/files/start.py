@@ -1,0 +1,104 @@
+"""Modes that a correction starts from: read from a file or given whole, dealt out to the ranks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from carillon.datasets import INTEGER, find, finite, read
+from carillon.errors import LocalUserError, UserError
+from carillon.fem.block import degrees_of_freedom
+from carillon.fem.model import ElasticModel
+from carillon.files import open_h5
+from solver.distribution.collective import on_root
+from solver.distribution.local_mesh import Share
+from solver.distribution.messages import receive_arrays, send_arrays
+from solver.files.modes_file import KIND, SCHEMA
+
+Array = NDArray[np.float64]
+
+COLUMNS = 16
+"""Modes that travel together."""
+_ROWS = 13
+
+
+def start_from_file(
+    path: str | Path, model: ElasticModel | None, modes: int, share: Share, comm: MPI.Comm
+) -> Array:
+    """This rank's rows (local unknowns, k) of the modes in a file.
+
+    Parameters
+    ----------
+    path
+        A modes file of the same mesh, of any material; read by rank 0, a few modes at a time.
+    model
+        The solid whose modes are wanted, on rank 0.
+    modes
+        Number of modes wanted.
+
+    Raises
+    ------
+    UserError
+        On every rank, if the file is unusable, of another mesh, or holds fewer modes.
+    """
+
+    def check() -> int:
+        assert model is not None
+        with open_h5(path, KIND, SCHEMA, sealed=True) as file:
+            grid = read(file, "node_grid", (None, 3), INTEGER)
+            modes_there = find(file, "modes", (3 * len(grid), None))
+            count = int(modes_there.shape[1])
+            for first in range(0, count, COLUMNS):
+                finite(file, "modes", modes_there[:, first : first + COLUMNS])
+        if not np.array_equal(grid, model.mesh.node_grid):
+            raise UserError(
+                f"{path}: modes of another mesh ({len(grid):,} nodes), expected the one to solve "
+                f"({model.mesh.n_nodes:,} nodes) with any material"
+            )
+        if count < modes:
+            raise UserError(
+                f"{path}: holds {count} modes, {modes} are wanted; start from a file with as many"
+            )
+        return count
+
+    count = on_root(comm, check)
+    return deal_rows(_read_columns(path, count), count, share, comm)
+
+
+def _read_columns(path: str | Path, count: int) -> Iterator[Array]:
+    """Modes of the file in blocks; what goes wrong now, after the check, this rank alone knows."""
+    try:
+        with open_h5(path, KIND, SCHEMA, sealed=True) as file:
+            modes = find(file, "modes", (None, count))
+            for first in range(0, count, COLUMNS):
+                yield modes[:, first : first + COLUMNS]
+    except UserError as error:
+        raise LocalUserError(str(error)) from None
+
+
+def deal_rows(blocks: Iterable[Array], count: int, share: Share, comm: MPI.Comm) -> Array:
+    """This rank's rows (local unknowns, count) of column blocks in mesh node order.
+
+    `blocks` are looked at on rank 0 alone, where one of them exists at a time.
+    """
+    everyone = comm.gather(share.nodes)
+    rows = np.empty((3 * len(share.nodes), count))
+    first = 0
+    if comm.rank == 0:
+        assert everyone is not None
+        dofs = [degrees_of_freedom(nodes) for nodes in everyone]
+        for block in blocks:
+            for rank in range(1, comm.size):
+                send_arrays(comm, [block[dofs[rank]]], rank, _ROWS).wait()
+            rows[:, first : first + block.shape[1]] = block[dofs[0]]
+            first += block.shape[1]
+        return rows
+    while first < count:
+        (block,) = receive_arrays(comm, 0, _ROWS)
+        rows[:, first : first + block.shape[1]] = block
+        first += block.shape[1]
+    return rows

@@ -1,0 +1,121 @@
+"""Inner solvers of the error correction: the action of (K - shift M)^-1 on blocks of vectors."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.errors import UserError
+from solver.assembly.system import Layout, System
+
+Array = NDArray[np.float64]
+
+METHODS = ("auto", "multifrontal", "mumps", "icc-pcg", "amg-cg")
+ITERATIVE = ("icc-pcg", "amg-cg")
+LARGEST_FRONTS = 120_000
+"""Nodes up to which `auto` uses the multifrontal solver, whose fronts are stored in full."""
+
+
+class Inverse(Protocol):
+    """What the error correction needs of an inner solver.
+
+    Attributes
+    ----------
+    shift
+        (K - shift M) is inverted [rad^2/s^2].
+    exact
+        Whether solutions are exact to rounding.
+    lasting
+        Whether it is nothing but arrays of this rank, which need not be freed together.
+    """
+
+    shift: float
+    exact: bool
+    lasting: bool
+
+    def solve(self, block: Array) -> Array:
+        """Solutions for a row-major block of right-hand sides (local unknowns, k); collective."""
+
+    def destroy(self) -> None:
+        """Free what numpy does not."""
+
+
+class Approximate:
+    """An inverse for a similar material, good for a correction that need not be exact."""
+
+    exact = False
+    lasting = False
+
+    def __init__(self, similar: Inverse) -> None:
+        self._similar = similar
+        self.shift = similar.shift
+
+    def solve(self, block: Array) -> Array:
+        """Solutions of the similar system."""
+        return self._similar.solve(block)
+
+    def destroy(self) -> None:
+        """Leave it to its owner."""
+
+
+class InnerSolver:
+    """Makes inverses of one mesh for any material and shift.
+
+    What depends on the mesh alone is computed once, here.
+
+    Parameters
+    ----------
+    method
+        `multifrontal`: sparse factorisation by blocks, on one rank.  `mumps`: the same by MUMPS, on
+        any number of ranks.  `icc-pcg`: conjugate gradients with incomplete Cholesky, the paper's.
+        `amg-cg`: conjugate gradients with algebraic multigrid, for models too large to factorise.
+        `auto`: the fastest of the direct ones.
+    layout
+        Of the mesh.
+
+    Raises
+    ------
+    UserError
+        For an unknown method, or `multifrontal` on several ranks.
+    """
+
+    def __init__(self, method: str, layout: Layout) -> None:
+        if method not in METHODS:
+            raise UserError(f"inner solver {method!r}, expected one of {', '.join(METHODS)}")
+        nodes = layout.share.n_dofs // 3
+        if method == "auto":
+            alone = layout.comm.size == 1 and nodes <= LARGEST_FRONTS
+            method = "multifrontal" if alone else "mumps"
+        if method == "multifrontal" and layout.comm.size > 1:
+            raise UserError(
+                f"the inner solver multifrontal runs on one rank, not on {layout.comm.size}; "
+                "use mumps"
+            )
+        self.method = method
+        self._plan = None
+        if method == "multifrontal":
+            from solver.linear.multifrontal import Plan
+
+            self._plan = Plan(layout.share.planes(), layout.pattern.indptr, layout.pattern.columns)
+
+    @property
+    def indefinite(self) -> bool:
+        """Whether the shift may lie among the eigenvalues."""
+        return self.method not in ITERATIVE
+
+    def inverse(self, system: System, shift: float) -> Inverse:
+        """Inverse of K - shift M; the shift is negative for an iterative method."""
+        if self._plan is not None:
+            from solver.linear.multifrontal import Factor
+
+            rows = system.rows
+            return Factor(self._plan, rows.stiffness, rows.mass, shift, rows.threads)
+        if self.method == "mumps":
+            from solver.linear.mumps import MumpsInverse
+
+            return MumpsInverse(system, shift)
+        from solver.linear.iterative import IterativeInverse
+
+        return IterativeInverse(system, shift, self.method, threads=system.rows.threads)

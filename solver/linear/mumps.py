@@ -1,0 +1,75 @@
+"""Sparse LDL^T of K - shift M by MUMPS through PETSc, on any number of ranks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from carillon.errors import ConvergenceError
+from solver.assembly.system import System
+from solver.linear.factorisation import factor_package
+from solver.linear.petsc_options import INNER_PREFIX
+
+Array = NDArray[np.float64]
+
+COLUMNS = 128
+"""Right-hand sides that MUMPS carries through its factor together."""
+_ICNTL_BLOCKING = 27
+
+
+class MumpsInverse:
+    """Action of (K - shift M)^-1."""
+
+    exact = True
+    lasting = False
+
+    def __init__(self, system: System, shift: float) -> None:
+        self.shift = shift
+        self._system = system
+        self._matrix = system.K.copy()
+        self._matrix.axpy(-shift, system.M, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        # A negative shift makes the matrix definite, which spares the pivoting.
+        option = PETSc.Mat.Option.SPD if shift < 0.0 else PETSc.Mat.Option.SYMMETRIC
+        self._matrix.setOption(option, True)
+        package = factor_package(system.comm.size)
+        self._pc = PETSc.PC().create(system.comm)
+        self._pc.setOptionsPrefix(INNER_PREFIX)
+        self._pc.setOperators(self._matrix)
+        self._pc.setType(PETSc.PC.Type.CHOLESKY)
+        self._pc.setFactorSolverType(package)
+        self._pc.setFactorSetUpSolverType()
+        if package == "mumps":
+            self._pc.getFactorMatrix().setMumpsIcntl(_ICNTL_BLOCKING, COLUMNS)
+        self._pc.setFromOptions()
+        try:
+            self._pc.setUp()
+        except PETSc.Error as error:
+            raise ConvergenceError(
+                f"the sparse factorisation of {system.n_dofs:,} unknowns failed ({error}); with "
+                "too little memory use more ranks on more machines, or --inner amg-cg"
+            ) from None
+        self._factor = self._pc.getFactorMatrix()
+
+    def solve(self, block: Array) -> Array:
+        """Solutions for a row-major block of right-hand sides (local unknowns, k)."""
+        rhs, out = np.asfortranarray(block), np.empty_like(block, order="F")
+        matrices = [self._wrap(rhs), self._wrap(out)]
+        self._factor.matSolve(*matrices)
+        for matrix in matrices:
+            matrix.destroy()
+        return np.ascontiguousarray(out)
+
+    def _wrap(self, block: Array) -> Any:
+        """PETSc view of a column-major block, without a copy."""
+        size = ((block.shape[0], self._system.n_dofs), (None, block.shape[1]))
+        dense = PETSc.Mat().createDense(size, array=block, comm=self._system.comm)
+        dense.assemble()
+        return dense
+
+    def destroy(self) -> None:
+        """Free the factorisation."""
+        self._pc.destroy()
+        self._matrix.destroy()

@@ -1,0 +1,147 @@
+"""SLEPc's Lanczos methods in shift-and-invert mode, set up in one place."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from slepc4py import SLEPc
+
+from carillon.errors import UserError
+from solver.assembly.system import System
+from solver.linear.factorisation import factor_package
+from solver.linear.petsc_options import OPTIONS_PREFIX, require_known_options
+
+Array = NDArray[np.float64]
+
+TYPES = {"slepc": SLEPc.EPS.Type.KRYLOVSCHUR, "arpack": SLEPc.EPS.Type.ARPACK}
+MAX_ITERATIONS = 500
+ARPACK_MARGIN = 2
+"""Unknowns beyond the pairs wanted that ARPACK needs."""
+
+
+def smallest_eigenpairs(
+    system: System,
+    known: Array,
+    count: int,
+    shift: float,
+    start: Array,
+    tolerance: float,
+    method: str = "slepc",
+    configurable: bool = True,
+) -> tuple[Array, Array, int]:
+    """Eigenpairs of K x = lambda M x that are M-orthogonal to known ones, lowest eigenvalues first.
+
+    The Krylov space of one vector holds one vector of every eigenspace, and more by rounding alone:
+    copies of a multiple eigenvalue may be missed.
+
+    Krylov-Schur deflates the known vectors.  ARPACK cannot, since SLEPc lets it keep its basis
+    where the deflated vectors are: it finds as many pairs more, of which those in the span of the
+    known ones are dropped.
+
+    Parameters
+    ----------
+    system
+        K positive semidefinite, M positive definite.
+    known
+        (local, k) M-orthonormal eigenvectors.
+    count
+        Number of pairs wanted.
+    shift
+        Positive; K + shift M is factorised.
+    start
+        (local,) vector that the Krylov space is made from.
+    tolerance
+        Relative residual.
+    method
+        `slepc` (Krylov-Schur) or `arpack`.
+    configurable
+        Whether PETSc's options database may overrule this set-up.
+
+    Returns
+    -------
+    values (found,) ascending, vectors (local, found), outer iterations; `found` may be smaller than
+    `count`, which is for the caller to judge.  The vectors are M-orthonormal but for copies of a
+    multiple eigenvalue, which are so to the tolerance.
+
+    Raises
+    ------
+    UserError
+        If this SLEPc lacks the method.
+    """
+    solver = SLEPc.EPS().create(system.comm)
+    vectors = [_petsc_vector(start, system.comm)]
+    try:
+        try:
+            solver.setType(TYPES[method])
+        except PETSc.Error:
+            raise UserError(
+                f"this SLEPc was built without {method}; use slepc or rebuild SLEPc with it"
+            ) from None
+        solver.setOperators(system.K, system.M)
+        solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+        solver.setTolerances(tolerance, MAX_ITERATIONS)
+        solver.setInitialSpace(vectors[0])
+        asked = count
+        if method == "arpack":
+            asked = min(count + known.shape[1], system.n_dofs - ARPACK_MARGIN)
+        else:
+            vectors += [_petsc_vector(column, system.comm) for column in known.T]
+            solver.setDeflationSpace(vectors[1:])
+        solver.setDimensions(asked)
+        solver.setTarget(-shift)
+        solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
+        transform = solver.getST()
+        transform.setType(SLEPc.ST.Type.SINVERT)
+        transform.setMatStructure(PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        linear = transform.getKSP()
+        linear.setType(PETSc.KSP.Type.PREONLY)
+        preconditioner = linear.getPC()
+        preconditioner.setType(PETSc.PC.Type.CHOLESKY)
+        preconditioner.setFactorSolverType(factor_package(system.comm.size))
+        if configurable:
+            solver.setOptionsPrefix(OPTIONS_PREFIX)
+            solver.setFromOptions()
+            solver.setUp()
+            require_known_options()
+        solver.solve()
+        values, found = _collect(system, solver, min(solver.getConverged(), asked))
+        values, found = _outside(system, known, values, found)
+        return values[:count], found[:, :count], int(solver.getIterationNumber())
+    finally:
+        for used in (solver, *vectors):
+            used.destroy()
+
+
+def _petsc_vector(entries: Array, comm: Any) -> Any:
+    return PETSc.Vec().createWithArray(np.array(entries), comm=comm)
+
+
+def _collect(system: System, solver: SLEPc.EPS, count: int) -> tuple[Array, Array]:
+    """The first `count` eigenpairs, values ascending, vectors row-major."""
+    values = np.array([solver.getEigenvalue(index).real for index in range(count)])
+    # Two processors may round apart, but have to agree on the order of a multiple eigenvalue.
+    values = system.comm.bcast(values)
+    order = np.argsort(values, kind="stable")
+    vector = system.K.createVecRight()
+    vectors = np.empty((vector.getLocalSize(), count))
+    for column, index in enumerate(order):
+        solver.getEigenpair(int(index), vector)
+        vectors[:, column] = vector.getArray(readonly=True)
+    vector.destroy()
+    return values[order], vectors
+
+
+def _outside(system: System, known: Array, values: Array, vectors: Array) -> tuple[Array, Array]:
+    """The pairs that are not in the span of the known ones, made M-orthogonal to it.
+
+    SLEPc ends with a product with the inverse, which brings back a little of inaccurate known ones.
+    """
+    share = system.inner(system.times_mass(known), vectors)
+    outside = np.einsum("ij,ij->j", share, share) < 0.5
+    if not outside.all():
+        values, vectors, share = values[outside], vectors[:, outside], share[:, outside]
+    vectors -= known @ share
+    return values, vectors

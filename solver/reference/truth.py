@@ -1,0 +1,277 @@
+"""Ground truth by SLEPc: shift-and-invert Krylov-Schur or ARPACK, with proof of completeness."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from carillon.errors import ConvergenceError
+from carillon.fem.block import degrees_of_freedom
+from carillon.fem.model import RIGID_MODES
+from solver.assembly.system import System
+from solver.reference.eigensolver import smallest_eigenpairs
+from solver.subspace.rayleigh_ritz import is_orthonormal, rayleigh_ritz, rigid_pairs, safe_shift
+
+Array = NDArray[np.float64]
+
+RESIDUAL_TOLERANCE = 1e-10
+"""Relative residual of ground truth unless told otherwise."""
+SPARE_MODES = 8
+"""Modes computed beyond those asked for, so that the inertia count finds a gap to look through."""
+FRUITLESS_SEARCHES = 3
+"""Searches in a row that find nothing, after which missing eigenvalues are given up."""
+ABOVE_ALL = 1e-6
+"""Relative distance from the last eigenvalue at which nothing but it is counted."""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Eigenpairs from a general solver.
+
+    Attributes
+    ----------
+    values, vectors
+        (k,) ascending and (local, k), rigid modes included, k = `modes` and a few to spare.
+    modes
+        Number of modes asked for.
+    iterations
+        Outer iterations of the eigensolver.
+    searches
+        Searches in the complement of what was found before that went on where modes were missing.
+    added
+        Modes that these found.
+    """
+
+    values: Array
+    vectors: Array
+    modes: int
+    iterations: int
+    searches: int = 0
+    added: int = 0
+
+    def lowest(self) -> tuple[Array, Array]:
+        """The eigenpairs asked for, vectors row-major."""
+        vectors = np.ascontiguousarray(self.vectors[:, : self.modes])
+        return self.values[: self.modes], vectors
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """Number of eigenvalues below `value` [rad^2/s^2]: counted by a factorisation, and computed."""
+
+    value: float
+    counted: int
+    computed: int
+
+
+def solve_truth(
+    system: System,
+    modes: int,
+    method: str = "slepc",
+    tolerance: float = RESIDUAL_TOLERANCE,
+    spare: int = SPARE_MODES,
+    seed: int = 0,
+) -> Truth:
+    """Compute the `modes` lowest eigenpairs of the assembled system, rigid modes included.
+
+    The six rigid motions are known and deflated.  Of other multiple eigenvalues copies may be
+    missed; see `complete`.
+
+    Parameters
+    ----------
+    method
+        `slepc` (Krylov-Schur) or `arpack`, both in shift-and-invert mode.
+    tolerance
+        Relative residual tolerance of the eigensolver.
+    spare
+        Modes beyond, among which `count_beyond` looks for a gap.
+    seed
+        Of the vector that the eigensolver starts from.
+
+    Raises
+    ------
+    ConvergenceError
+        If too few pairs converge.
+    """
+    truth = Truth(*rigid_pairs(system), modes, 0)
+    wanted = min(modes + spare, system.n_dofs) - RIGID_MODES
+    truth = _with_lowest(system, truth, wanted, start_vector(system, seed), tolerance, method)
+    few = modes - len(truth.values)
+    if few > 0:
+        truth = _search_on(system, truth, np.inf, few, tolerance, seed)
+    if len(truth.values) < modes:
+        raise ConvergenceError(
+            f"{method} converged {len(truth.values)} of {modes} modes to {tolerance:.0e} in "
+            f"{truth.iterations} iterations"
+        )
+    return truth
+
+
+def can_count() -> bool:
+    """Whether this PETSc can count eigenvalues by inertia, for which it needs MUMPS."""
+    return bool(PETSc.Sys.hasExternalPackage("mumps"))
+
+
+def count_beyond(system: System, truth: Truth) -> Inertia:
+    """Count, by the inertia of K - mu M, the eigenvalues below a mu beyond the last wanted one.
+
+    The shift mu lies in the widest gap among the spare modes.
+    """
+    value, computed = _gap(truth.values, truth.modes, system.n_dofs)
+    return Inertia(value, count_below(system, value), computed)
+
+
+def complete(
+    system: System,
+    truth: Truth,
+    inertia: Inertia | None,
+    tolerance: float = RESIDUAL_TOLERANCE,
+    seed: int = 0,
+) -> tuple[Truth, Inertia | None]:
+    """Find the eigenpairs that `truth` lacks, by Krylov-Schur in the complement of those it has.
+
+    Every search starts from another vector and deflates what is there, so that of each multiple
+    eigenvalue it finds one copy at least.  Without a count the first search that finds nothing
+    below the last wanted eigenvalue ends it: evidence, but no proof.
+
+    Parameters
+    ----------
+    inertia
+        What was counted; None where that cannot be done.
+    tolerance, seed
+        See `solve_truth`.
+
+    Returns
+    -------
+    Eigenpairs, of which the first `modes` are complete, and the count with what is computed now.
+
+    Raises
+    ------
+    ConvergenceError
+        If the count contradicts the computed number in the end.
+    """
+    if inertia is None:
+        last = float(truth.values[truth.modes - 1])
+        return _search_on(system, truth, last, None, tolerance, seed), None
+    missing = inertia.counted - inertia.computed
+    before = truth.added
+    truth = _search_on(system, truth, inertia.value, missing, tolerance, seed)
+    inertia = replace(inertia, computed=inertia.computed + truth.added - before)
+    if inertia.computed != inertia.counted:
+        reason = (
+            f"eigenvalues were missed, and {truth.searches} further searches did not find them"
+            if inertia.computed < inertia.counted
+            else "some of them are none, or lie so close to that value that they cannot be counted"
+        )
+        raise ConvergenceError(
+            f"the solver found {inertia.computed} eigenvalues below {inertia.value:.6g} "
+            f"rad^2/s^2, the inertia of K - mu M counts {inertia.counted}: {reason}"
+        )
+    return truth, inertia
+
+
+def _search_on(
+    system: System, truth: Truth, below: float, missing: int | None, tolerance: float, seed: int
+) -> Truth:
+    """`truth` with up to `missing` more eigenpairs below a value; with all there are, if None."""
+    end = 1 if missing is None else FRUITLESS_SEARCHES
+    added = found = fruitless = 0
+    while (missing is None or added < missing) and fruitless < end:
+        count = max(1, 2 * found) if missing is None else missing - added
+        start = start_vector(system, seed, truth.searches + 1)
+        before = len(truth.values)
+        truth = _with_lowest(system, truth, count, start, tolerance, below=below)
+        found = len(truth.values) - before
+        truth = replace(truth, searches=truth.searches + 1, added=truth.added + found)
+        added += found
+        fruitless = 0 if found else fruitless + 1
+    return truth
+
+
+def _with_lowest(
+    system: System,
+    truth: Truth,
+    count: int,
+    start: Array,
+    tolerance: float,
+    method: str | None = None,
+    below: float = np.inf,
+) -> Truth:
+    """`truth` with the lowest eigenpairs below a value that one search finds in its complement.
+
+    Without a method Krylov-Schur as it is set up here does it, whatever PETSc's options say.
+    """
+    values, vectors, iterations = smallest_eigenpairs(
+        system,
+        truth.vectors,
+        count,
+        safe_shift(system),
+        start,
+        tolerance,
+        method or "slepc",
+        configurable=method is not None,
+    )
+    if not is_orthonormal(system, vectors, system.times_mass(vectors)):
+        values, vectors = rayleigh_ritz(system, vectors)
+    inside = values < below
+    values = np.concatenate([truth.values, values[inside]])
+    vectors = np.concatenate([truth.vectors, vectors[:, inside]], axis=1)
+    order = np.argsort(values, kind="stable")
+    return replace(
+        truth,
+        values=values[order],
+        vectors=vectors[:, order],
+        iterations=truth.iterations + iterations,
+    )
+
+
+def start_vector(system: System, seed: int, search: int = 0) -> Array:
+    """Vector (local unknowns,) to start a search from, its entries spread over [-1, 1).
+
+    An entry depends on the seed, the search and the unknown's number in the mesh alone, so that the
+    vector is the same on any number of ranks: SplitMix64 (Steele et al. 2014).
+    """
+    key = np.random.SeedSequence([seed, search]).generate_state(1, np.uint64)
+    bits = degrees_of_freedom(system.nodes).astype(np.uint64) + np.uint64(1)
+    bits = bits * np.uint64(0x9E3779B97F4A7C15) + key
+    bits = (bits ^ (bits >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    bits = (bits ^ (bits >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return (bits ^ (bits >> np.uint64(31))) / 2.0**63 - 1.0
+
+
+def _gap(values: Array, modes: int, n_dofs: int) -> tuple[float, int]:
+    """Middle of the widest relative gap after the last wanted value, and the count below it."""
+    if len(values) <= modes or len(values) == n_dofs:
+        return float(values[-1] * (1.0 + ABOVE_ALL)), len(values)
+    gaps = np.diff(values[modes - 1 :]) / values[modes:]
+    widest = int(np.argmax(gaps)) + modes
+    return float(0.5 * (values[widest - 1] + values[widest])), widest
+
+
+def count_below(system: System, value: float) -> int:
+    """Number of eigenvalues of an assembled system below `value` [rad^2/s^2]."""
+    return count_negative(system.K, system.M, value)
+
+
+def count_negative(K: PETSc.Mat, M: PETSc.Mat, value: float) -> int:
+    """Negative eigenvalues of K - value M, by Sylvester's law of inertia and MUMPS."""
+    shifted = K.copy()
+    shifted.axpy(-value, M, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+    shifted.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    factorisation = PETSc.PC().create(K.comm)
+    factorisation.setOperators(shifted)
+    factorisation.setType(PETSc.PC.Type.CHOLESKY)
+    factorisation.setFactorSolverType("mumps")
+    factorisation.setFactorSetUpSolverType()
+    # Inertia needs the root of the elimination tree on one rank, and its null pivots detected.
+    factor = factorisation.getFactorMatrix()
+    factor.setMumpsIcntl(13, 1)
+    factor.setMumpsIcntl(24, 1)
+    factorisation.setUp()
+    negative, _, _ = factorisation.getFactorMatrix().getInertia()
+    factorisation.destroy()
+    shifted.destroy()
+    return int(negative)

@@ -1,0 +1,1 @@
+"""Motion and sound after a strike, to compare spectra by what they do."""

@@ -1,0 +1,173 @@
+"""Points of a surface where a solid is struck or watched, and any of its meshes seen there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from carillon.errors import UserError
+from carillon.fem.geometry import CORNER_OFFSETS, HexMesh
+from carillon.fem.geometry.boundary import surface_quads
+from carillon.fem.model import RIGID_MODES
+from solver.files.modes_file import ModesFile
+
+Array = NDArray[np.float64]
+
+RULING_MODES = 6
+"""Elastic modes, from the first on, that decide where a solid is struck."""
+FAR = 0.5
+"""Share of the largest distance on the surface from the strike that counts as far from it."""
+SMOOTHING = 2
+"""Rings of faces that a normal is averaged over, since faces of voxels look along the axes only."""
+REACH = 3.0
+"""Cell edges that a point named by a person may be away from the surface of the voxels."""
+VANISHING = 1e-6
+"""Sums of unit normals shorter than this have no direction."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A point of the surface.
+
+    Attributes
+    ----------
+    position : (3,) [m].
+    inward : (3,) unit vector into the solid.
+    """
+
+    position: Array
+    inward: Array
+
+
+def choose_contacts(
+    truth: ModesFile, strike: Sequence[float] | None = None, observed: Sequence[float] | None = None
+) -> list[Contact]:
+    """Three points on the surface: where it is struck, where it is watched, and one far from both.
+
+    Parameters
+    ----------
+    truth
+        The modes that choose: it is struck where the lowest ones give way most to a push along the
+        normal, and watched where, far from there, it then moves most.
+    strike, observed
+        Positions (3,) [m] that a person wants instead; the nearest nodes of the surface are taken.
+
+    Raises
+    ------
+    UserError
+        If a position is away from the surface.
+    """
+    nodes, outward = surface_normals(truth.mesh)
+    points = truth.mesh.nodes[nodes]
+    motion, eigenvalues = _ruling_modes(truth, nodes)
+    along = np.einsum("nik,ni->nk", motion, outward)
+    first = int(np.argmax((along**2 / eigenvalues).sum(axis=1)))
+    if strike is not None:
+        first = surface_node(truth.mesh, np.asarray(strike), "strike")
+    away = np.linalg.norm(points - points[first], axis=1)
+    swing = ((motion**2).sum(axis=1) * (along[first] ** 2 / eigenvalues)).sum(axis=1)
+    second = int(np.argmax(np.where(away >= FAR * away.max(), swing, -1.0)))
+    if observed is not None:
+        second = surface_node(truth.mesh, np.asarray(observed), "observed")
+    third = int(np.argmax(np.minimum(away, np.linalg.norm(points - points[second], axis=1))))
+    return [Contact(points[index], -outward[index]) for index in (first, second, third)]
+
+
+def surface_node(mesh: HexMesh, wanted: Array, what: str) -> int:
+    """Number, among the nodes on the surface, of that nearest to the point `wanted` (3,) [m].
+
+    Raises
+    ------
+    UserError
+        If the point, which the message calls `what`, is away from the surface.
+    """
+    points = mesh.nodes[np.unique(surface_quads(mesh))]
+    distance, index = cKDTree(points).query(wanted)
+    if distance > REACH * mesh.edge:
+        shown = [", ".join(f"{x:.4g}" for x in point) for point in (wanted, points[index])]
+        raise UserError(
+            f"{what}: the point ({shown[0]}) m is {distance:.3g} m from the surface of the voxels, "
+            f"expected at most {REACH:g} cells of {mesh.edge:.3g} m; the nearest one is "
+            f"({shown[1]}) m"
+        )
+    return int(index)
+
+
+def surface_normals(mesh: HexMesh) -> tuple[NDArray[np.int64], Array]:
+    """Nodes on the surface (s,) and their outward unit normals (s, 3).
+
+    The normals of the faces are averaged over `SMOOTHING` rings of neighbours.
+    """
+    quads = surface_quads(mesh)
+    corners = mesh.nodes[quads]
+    own = _unit(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]))
+    faces = own
+    for _ in range(SMOOTHING):
+        faces = _unit(_at_nodes(mesh, quads, faces)[quads].mean(axis=1), own)
+    nodes = np.unique(quads)
+    # Where a sheet of one cell's thickness ends, neighbours may cancel.
+    plain = _unit(_at_nodes(mesh, quads, own), np.array([0.0, 0.0, 1.0]))
+    return nodes, _unit(_at_nodes(mesh, quads, faces), plain)[nodes]
+
+
+def interpolation(mesh: HexMesh, points: Array) -> sp.csr_matrix:
+    """Trilinear interpolation from the nodes to `points` (p, 3) [m], as a matrix (p, n).
+
+    A point outside all cells takes the value of the nearest point of a nearest cell.
+
+    Examples
+    --------
+    >>> from carillon.fem.geometry import hexmesh_from_grid
+    >>> mesh = hexmesh_from_grid(np.array([[0, 0, 0], [1, 0, 0]]), np.zeros(3), 0.5)
+    >>> interpolation(mesh, np.array([[0.25, 0.0, 0.0], [1.0, 0.5, 0.0]])).toarray()[:, :6]
+    array([[0.5, 0.5, 0. , 0. , 0. , 0. ],
+           [0. , 0. , 0. , 0. , 0. , 1. ]])
+    """
+    cells, weights = embedding(mesh, points)
+    rows = np.repeat(np.arange(len(cells)), 8)
+    shape = (len(cells), mesh.n_nodes)
+    matrix = sp.csr_matrix((weights.ravel(), (rows, mesh.cells[cells].ravel())), shape=shape)
+    matrix.eliminate_zeros()
+    return matrix
+
+
+def embedding(mesh: HexMesh, points: Array) -> tuple[NDArray[np.int64], Array]:
+    """Cells (p,) that `points` (p, 3) [m] lie in, and trilinear weights (p, 8) of their corners.
+
+    A point outside all cells belongs to a nearest cell, with the weights of its nearest point.
+    """
+    points = np.atleast_2d(points)
+    centres = mesh.grid + 0.5
+    position = (points - mesh.origin) / mesh.edge
+    # In the largest norm a cell is the ball around its centre.
+    cells = cKDTree(centres).query(position, p=np.inf)[1]
+    local = np.clip(position - mesh.grid[cells], 0.0, 1.0)[:, None, :]
+    return cells, np.where(CORNER_OFFSETS, local, 1.0 - local).prod(axis=2)
+
+
+def _ruling_modes(truth: ModesFile, nodes: NDArray[np.int64]) -> tuple[Array, Array]:
+    assert truth.modes is not None
+    chosen = slice(RIGID_MODES, RIGID_MODES + RULING_MODES)
+    modes = truth.modes[:, chosen]
+    return modes.reshape(truth.mesh.n_nodes, 3, -1)[nodes], truth.eigenvalues[chosen]
+
+
+def _at_nodes(mesh: HexMesh, quads: NDArray[np.int32], faces: Array) -> Array:
+    """Sum (n, 3) of the faces' vectors (q, 3) at their corners."""
+    sums = np.zeros((mesh.n_nodes, 3))
+    np.add.at(sums, quads, faces[:, None, :])
+    return sums
+
+
+def _unit(vectors: Array, otherwise: Array | None = None) -> Array:
+    """The vectors (.., 3) at length one; those that vanish are replaced."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    if otherwise is not None:
+        vectors = np.where(length > VANISHING, vectors, otherwise)
+        length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(vectors / np.maximum(length, np.finfo(float).tiny))

@@ -1,0 +1,219 @@
+"""The file `response.h5`: how one solid moves and sounds when struck, by several spectra."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon import provenance
+from carillon.errors import UserError
+from carillon.files import create_h5, open_h5
+from solver.files.modes_file import read_elastic, require_same_solid
+from solver.response.contact import Contact, choose_contacts
+from solver.response.response import (
+    SAMPLE_RATE_HERTZ,
+    Contacts,
+    Damping,
+    at_contacts,
+    contact_sounds,
+    displacements,
+    in_turn,
+    is_audible,
+    relative_difference,
+    spectral_distance,
+)
+
+Array = NDArray[np.float64]
+
+KIND = "response"
+SCHEMA = 1
+TRUTH = "truth"
+POINTS = ("strike", "observed", "third")
+INSTANTS = 1500
+
+
+@dataclass(frozen=True)
+class StrikeOptions:
+    """How a solid is struck and watched.
+
+    Attributes
+    ----------
+    strike, observed
+        Points (3,) [m], see `solver.response.contact.choose_contacts`; chosen by the truth if None.
+    damping
+        Rayleigh damping.
+    contact_seconds
+        Duration of the force in the sound.
+    periods
+        Time that is watched, in periods of the truth's first elastic mode.
+    """
+
+    strike: Sequence[float] | None = None
+    observed: Sequence[float] | None = None
+    damping: Damping = field(default_factory=Damping)
+    contact_seconds: float = 2e-4
+    periods: float = 6.0
+
+
+@dataclass(frozen=True)
+class Response:
+    """What one spectrum makes of a strike.
+
+    Attributes
+    ----------
+    displacement : (t, 3) [m] of the observed point after an impulse of 1 N s at the struck one.
+    sound : (s,) at `SAMPLE_RATE_HERTZ`, strikes at all points in turn, each relative to the
+        loudest that the truth's is, see `solver.response.response.contact_sounds`.
+    audible : number of modes that sound.
+    difference : relative 2-norm of the displacement's difference from the truth's.
+    distance_decibels : rms difference of the spectrograms; NaN where the truth is not heard.
+    """
+
+    displacement: Array
+    sound: Array
+    audible: int
+    difference: float
+    distance_decibels: float
+
+
+@dataclass(frozen=True)
+class ResponseFile:
+    """Contents of the file.
+
+    Attributes
+    ----------
+    seconds : (t,) instants of the displacements.
+    contacts : the points, by the names `POINTS`.
+    responses : by name of the spectrum, the first being the truth.
+    attributes, provenance : damping and so on; origin of the numbers.
+    """
+
+    seconds: Array
+    contacts: dict[str, Contact]
+    responses: dict[str, Response]
+    attributes: dict[str, Any] = field(default_factory=dict)
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+
+def respond(
+    truth: str | Path, candidates: dict[str, str | Path], options: StrikeOptions
+) -> ResponseFile:
+    """Strike the solid of the modes file `truth`, and what the `candidates` by name take it for.
+
+    Raises
+    ------
+    UserError
+        If a file is unusable or holds no elastic mode, a point is away from the surface, or the
+        motion leaves the range of numbers.
+    """
+    reference = read_elastic(truth)
+    points = choose_contacts(reference, options.strike, options.observed)
+    seen = {TRUTH: at_contacts(reference, points)}
+    for name, path in candidates.items():
+        candidate = read_elastic(path)
+        require_same_solid([truth, path], [reference, candidate])
+        seen[name] = at_contacts(candidate, points)
+    period = 2.0 * np.pi / np.sqrt(seen[TRUTH].eigenvalues[0])
+    seconds = np.linspace(0.0, options.periods * period, INSTANTS)
+    motions = {name: displacements(part, options.damping, seconds) for name, part in seen.items()}
+    sounds = _played(seen, options)
+    for name in seen:
+        if not (np.isfinite(motions[name]).all() and np.isfinite(sounds[name]).all()):
+            raise UserError(
+                f"the response of {name!r} is not a finite number; choose a lower damping or a "
+                "longer contact, or compute its modes again"
+            )
+    return ResponseFile(
+        seconds,
+        dict(zip(POINTS, points, strict=True)),
+        {
+            name: Response(
+                motions[name],
+                sounds[name],
+                int(is_audible(part.eigenvalues).sum()),
+                relative_difference(motions[name], motions[TRUTH]),
+                _distance(sounds[name], sounds[TRUTH]),
+            )
+            for name, part in seen.items()
+        },
+        {
+            "mass_damping": options.damping.mass_per_second,
+            "stiffness_damping": options.damping.stiffness_seconds,
+            "contact_seconds": options.contact_seconds,
+            "periods": options.periods,
+            "sample_rate": SAMPLE_RATE_HERTZ,
+        },
+    )
+
+
+def write_response(path: str | Path, response: ResponseFile, parameters: dict[str, Any]) -> None:
+    """Write the file atomically; `parameters` are those of the command, for the provenance."""
+    with create_h5(path, KIND, SCHEMA, sealed=True) as file:
+        file.attrs.update(response.attributes)
+        _put(file, "seconds", response.seconds, "s")
+        for name, contact in response.contacts.items():
+            _put(file, f"points/{name}/position", contact.position, "m")
+            _put(file, f"points/{name}/inward", contact.inward, "1")
+        for name, part in response.responses.items():
+            _put(file, f"spectra/{name}/displacement", part.displacement, "m")
+            _put(file, f"spectra/{name}/sound", part.sound, "m/s")
+            file[f"spectra/{name}"].attrs.update(
+                audible=part.audible,
+                difference=part.difference,
+                distance_decibels=part.distance_decibels,
+            )
+        file.attrs["order"] = list(response.responses)
+        provenance.write(file, parameters)
+
+
+def read_response(path: str | Path) -> ResponseFile:
+    """Read the file.
+
+    Raises
+    ------
+    UserError
+        If it is missing, damaged or of another kind.
+    """
+    with open_h5(path, KIND, SCHEMA, sealed=True) as file:
+        attributes = dict(file.attrs)
+        contacts = {
+            name: Contact(file[f"points/{name}/position"][()], file[f"points/{name}/inward"][()])
+            for name in POINTS
+        }
+        responses = {}
+        for name in attributes.pop("order"):
+            group = file[f"spectra/{name}"]
+            responses[str(name)] = Response(
+                group["displacement"][()],
+                group["sound"][()],
+                int(group.attrs["audible"]),
+                float(group.attrs["difference"]),
+                float(group.attrs["distance_decibels"]),
+            )
+        return ResponseFile(
+            file["seconds"][()], contacts, responses, attributes, provenance.read(file)
+        )
+
+
+def _played(seen: dict[str, Contacts], options: StrikeOptions) -> dict[str, Array]:
+    """Strikes at all points in turn, by name of the spectrum."""
+    sounds = {
+        name: contact_sounds(part, options.damping, options.contact_seconds)
+        for name, part in seen.items()
+    }
+    loudest = np.abs(sounds[TRUTH]).max(axis=1)
+    return {name: in_turn(sound, loudest) for name, sound in sounds.items()}
+
+
+def _distance(sound: Array, truth: Array) -> float:
+    return spectral_distance(sound, truth) if truth.any() else float("nan")
+
+
+def _put(file: Any, name: str, data: Array, units: str) -> None:
+    dataset = file.create_dataset(name, data=data, fletcher32=True, chunks=True)
+    dataset.attrs["units"] = units

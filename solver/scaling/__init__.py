@@ -1,4 +1,0 @@
-"""How the solver scales over ranks: measured where there are cores, modelled beyond."""
-
-from solver.scaling.measure import measure
-from solver.scaling.study import ScalingOptions, scaling_study, study_lines

@@ -1,0 +1,1 @@
+"""What spectra are worth: compared, audited, timed, scaled, and calibrated."""

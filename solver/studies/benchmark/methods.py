@@ -1,0 +1,220 @@
+"""One timed run of each method, from moduli to modes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from carillon.fem.model import ElasticModel
+from solver.analysis.modal_solver import ModalSolver, Modes
+from solver.analysis.options import SolverOptions
+from solver.correction.correct import INTERACTIVE_TOLERANCE
+from solver.distribution.collective import keep_on_root
+from solver.files.modes_file import CHECKS
+from solver.studies.benchmark.rivals import (
+    SlepcConfiguration,
+    smallest_without_factor,
+    without_purification,
+)
+from solver.studies.benchmark.solid import Solid
+
+Array = NDArray[np.float64]
+
+CORRECTED_TOLERANCE = 1e-6
+"""Eigenvalue error of HCMS with error correction on the fine mesh."""
+RIVAL_TOLERANCE = 1e-6
+"""Relative residual of SLEPc and ARPACK; their eigenvalues are far better, at no cost."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of a method.
+
+    Attributes
+    ----------
+    seconds
+        Wall time from moduli to modes, without checks.
+    values
+        (k,) eigenvalues found.
+    before
+        Wall time [s] of what needs the mesh alone.
+    phases
+        Wall time [s] by phase, checks left out.
+    added
+        Modes that the method missed, and that were found when its result was checked.
+    """
+
+    seconds: float
+    values: Array
+    before: float = 0.0
+    phases: dict[str, float] = field(default_factory=dict)
+    added: int = 0
+
+
+class Methods:
+    """Every way to the lowest modes of one solid; all ranks call the same.
+
+    Parameters
+    ----------
+    solid
+        On rank 0, None elsewhere.
+    modes
+        Number of modes, rigid ones included.
+    configuration
+        Of SLEPc's Krylov-Schur, wherever it is used.
+    seed
+        Of the partition.
+    brief
+        Whether one correction will do, as it does to compile and load everything.
+    """
+
+    def __init__(
+        self,
+        solid: Solid | None,
+        modes: int,
+        configuration: SlepcConfiguration,
+        seed: int = 0,
+        comm: MPI.Comm = MPI.COMM_WORLD,
+        brief: bool = False,
+    ) -> None:
+        self.solid = solid
+        self.modes = modes
+        self.configuration = configuration
+        self.seed = seed
+        self.comm = comm
+        self.brief = brief
+        self._warm: tuple[ModalSolver, Modes] | None = None
+
+    def slepc(self, coarsening: str = "none", changed: bool = False) -> Run:
+        """SLEPc's Krylov-Schur in shift-and-invert mode."""
+        with self.configuration.in_force(self.modes):
+            return self._rival("slepc", *self._model(coarsening, changed))
+
+    def arpack(self) -> Run:
+        """ARPACK in shift-and-invert mode."""
+        with without_purification():
+            return self._rival("arpack", *self._model("none"))
+
+    def arpack_regular(self) -> Run:
+        """ARPACK without a factorisation, on the fine mesh with a diagonal mass."""
+        model = keep_on_root(self.comm, lambda: self._root.lumped())
+        begin = self._now()
+        values = smallest_without_factor(model, self.modes, RIVAL_TOLERANCE, self.seed, self.comm)
+        return Run(self._now() - begin, values)
+
+    def hcms(self) -> Run:
+        """Component mode synthesis alone."""
+        return self._cold(*self._model("none"), self._options(corrections=0))
+
+    def hcms_ec(self) -> Run:
+        """Component mode synthesis and error correction."""
+        return self._cold(*self._model("none"), self._options(tolerance=CORRECTED_TOLERANCE))
+
+    def ddfem_hcms_ec_accurate(self) -> Run:
+        """The same on the mesh coarsened by forests."""
+        return self._cold(*self._model("ddfem"), self._options(tolerance=CORRECTED_TOLERANCE))
+
+    def ddfem_hcms_ec(self) -> Run:
+        """The same on the mesh coarsened by forests, to the interactive tolerance."""
+        return self._cold(*self._model("ddfem"), self._interactive)
+
+    def ddfem_hcms_ec_warm(self) -> Run:
+        """The same for the changed material, from the modes of the unchanged one."""
+        solver, start = self._prepared()
+        model, coarsened = self._model("ddfem", changed=True)
+        begin = self._now()
+        # Only rank 0's moduli are looked at, but every rank must pass some.
+        young = np.empty((0, 8)) if model is None else model.young
+        result = solver.solve(young, start=start)
+        return self._run(result, begin, coarsened)
+
+    def release(self) -> None:
+        """Free what warm runs start from."""
+        if self._warm is not None:
+            self._warm[1].system.destroy()
+            self._warm = None
+
+    def _prepared(self) -> tuple[ModalSolver, Modes]:
+        if self._warm is None:
+            model, _ = self._model("ddfem")
+            solver = ModalSolver(model, self._interactive, self.comm)
+            self._warm = solver, solver.solve()
+        return self._warm
+
+    @property
+    def _interactive(self) -> SolverOptions:
+        return self._options(tolerance=INTERACTIVE_TOLERANCE)
+
+    def _options(self, **changes: Any) -> SolverOptions:
+        options = SolverOptions(modes=self.modes, seed=self.seed, **changes)
+        if self.brief and options.method == "hcms":
+            options = replace(options, tolerance=0.0, corrections=min(1, options.corrections))
+        return options
+
+    @property
+    def _root(self) -> Solid:
+        assert self.solid is not None
+        return self.solid
+
+    def _model(self, coarsening: str, changed: bool = False) -> tuple[ElasticModel | None, float]:
+        """Model on rank 0, and the seconds that coarsening took, on every rank."""
+        if coarsening == "none":
+            return (None if self.solid is None else self.solid.fine), 0.0
+        made = keep_on_root(self.comm, lambda: self._root.coarsened(coarsening, changed))
+        model, seconds = made or (None, 0.0)
+        return model, self.comm.bcast(seconds)
+
+    def _cold(self, model: ElasticModel | None, coarsened: float, options: SolverOptions) -> Run:
+        begin = self._now()
+        solver = ModalSolver(model, options, self.comm)
+        prepared = self._now()
+        result = solver.solve()
+        return replace(self._run(result, prepared, coarsened), before=prepared - begin)
+
+    def _rival(self, method: str, model: ElasticModel | None, coarsened: float) -> Run:
+        """A general eigensolver, which needs nothing of what is prepared of the mesh.
+
+        It is given the rigid motions, finds a few modes to spare, and is charged for one search.
+        Modes that this missed, by the count of eigenvalues, are found by others off the clock: its
+        eigenvalues are a reference, which must be complete, and its time is favoured.
+        """
+        options = self._options(method=method, tolerance=RIVAL_TOLERANCE)
+        return replace(self._cold(model, coarsened, options), before=0.0)
+
+    def _run(self, result: Modes, begin: float, coarsened: float) -> Run:
+        elapsed = self._now() - begin
+        phases = {name: time for name, time in result.seconds.items() if name not in CHECKS}
+        checking = sum(result.seconds.values()) - sum(phases.values())
+        values = result.values
+        result.system.destroy()
+        if coarsened:
+            phases = {"coarsening": coarsened, **phases}
+        added = result.evidence.get("modes_added", 0)
+        return Run(coarsened + elapsed - checking, values, phases=phases, added=added)
+
+    def _now(self) -> float:
+        """Time at which all ranks are here."""
+        self.comm.barrier()
+        return time.perf_counter()
+
+
+def named(methods: Methods) -> dict[str, Callable[[], Run]]:
+    """The methods of the table by name, in its order."""
+    return {
+        "arpack": methods.arpack,
+        "slepc": methods.slepc,
+        "ddfem": partial(methods.slepc, "ddfem"),
+        "hcms": methods.hcms,
+        "hcms_ec": methods.hcms_ec,
+        "ddfem_hcms_ec_accurate": methods.ddfem_hcms_ec_accurate,
+        "ddfem_hcms_ec": methods.ddfem_hcms_ec,
+        "ddfem_hcms_ec_warm": methods.ddfem_hcms_ec_warm,
+        "arpack_regular": methods.arpack_regular,
+    }

@@ -1,0 +1,312 @@
+"""One row of the time table: all methods in alternating runs, with what they are worth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, cast
+
+from mpi4py import MPI
+
+from carillon.errors import ConvergenceError
+from carillon.fem.geometry import surface_name
+from carillon.progress import say, track
+from carillon.runtime import blas_name, loaded_blas
+from solver.analysis.problem import ProblemOptions
+from solver.distribution.collective import keep_on_root, on_root
+from solver.studies.benchmark.methods import Methods, Run, named
+from solver.studies.benchmark.rivals import SlepcConfiguration, configurations
+from solver.studies.benchmark.scores import (
+    BASES,
+    median,
+    spectrum_error,
+    speedups,
+    spread,
+    tone_error,
+)
+from solver.studies.benchmark.solid import Solid, make_solid
+from solver.studies.comparison import AUDIBLE_LAST
+
+Runs = dict[str, list[Run]]
+
+SLOW = ("arpack", "arpack_regular")
+NEED_FORESTS = ("ddfem", "ddfem_hcms_ec_accurate", "ddfem_hcms_ec", "ddfem_hcms_ec_warm")
+WARM_UP_MODES = 20
+"""Modes of the runs that compile the kernels and load what they need."""
+
+PROBLEMS = {
+    "arpack_regular": "fine mesh with a row-sum lumped mass, which ARPACK needs to do without any "
+    "factorisation; its spectrum is another than that of the consistent mass",
+}
+"""What a method solves, where it is another problem than its name says."""
+
+MEANING = {
+    "seconds": "median wall time from moduli to modes: coarsening, assembly and solution; what "
+    "needs the mesh alone is in precompute, checks of the result are in neither",
+    "precompute": "voxels, material, blocks, and for each mesh partition, sparsity and elimination "
+    "plan, made once for any material",
+    "speedup": "seconds of the inner name over seconds of the outer name",
+    "speedup_with_precompute": "the same, with the partition, sparsity and elimination plan of the "
+    "outer name added to its seconds, and nothing to those of the inner name",
+    "ddfem": "coarsened by forests, then SLEPc on the coarse model (DDFEM* alone)",
+    "ddfem_hcms_ec_accurate": "coarsened by forests, then HCMS and error correction to the same "
+    "accuracy as on the fine mesh",
+    "ddfem_hcms_ec": "coarsened by forests, then HCMS and error correction to the interactive "
+    "tolerance, from nothing",
+    "ddfem_hcms_ec_warm": "the same for moduli that differ by a smooth field of 5 %, starting from "
+    "the modes of the unchanged ones",
+    "eigenvalue_error": "relative to SLEPc's eigenvalues of the same operator, fine or coarse",
+    "missed": "modes that a general eigensolver's search missed in some run, found by further "
+    "searches that it is not charged for",
+    "frequency_error": "of the coarse model, by mode number, relative to SLEPc on the fine mesh",
+}
+"""What the figures of a row mean, for the row itself."""
+
+
+@dataclass(frozen=True)
+class BenchmarkOptions:
+    """How a row is measured.
+
+    Attributes
+    ----------
+    modes
+        Number of modes, rigid ones included.
+    runs
+        Rounds; in each, every method runs once.
+    slow_runs
+        Rounds in which ARPACK takes part; all if None.
+    arpack, arpack_regular
+        Whether ARPACK runs in shift-and-invert mode, and without a factorisation.
+    tune
+        Whether SLEPc runs in its fastest configuration of several, each tried once before.
+    """
+
+    modes: int = 256
+    runs: int = 5
+    slow_runs: int | None = None
+    arpack: bool = True
+    arpack_regular: bool = False
+    tune: bool = False
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Methods that the options leave out."""
+        wanted = {"arpack": self.arpack, "arpack_regular": self.arpack_regular}
+        return tuple(name for name, runs in wanted.items() if not runs)
+
+    def rounds(self, method: str) -> int:
+        """Runs of a method."""
+        if method in SLOW and self.slow_runs is not None:
+            return min(self.runs, self.slow_runs)
+        return self.runs
+
+
+def benchmark_row(
+    options: ProblemOptions,
+    benchmark: BenchmarkOptions = BenchmarkOptions(),
+    comm: MPI.Comm = MPI.COMM_WORLD,
+) -> dict[str, Any]:
+    """Time every method on one solid and compare what they find.
+
+    Without forests, neither named nor default ones, the methods that need them are left out with a
+    sentence, and their figures are None.
+
+    Returns
+    -------
+    Plain values: `seconds`, `spread`, `eigenvalue_error`, `frequency_error`, `speedup` by method,
+    sizes, the machine; `meaning` explains them.
+
+    Raises
+    ------
+    UserError
+        For anything wrong with the solid, the forests or the number of modes.
+    ConvergenceError
+        If SLEPc fails; another method that does is told in `failed` and has no figures.
+    """
+    solid = keep_on_root(comm, partial(make_solid, options, benchmark.modes))
+    reason = comm.bcast(None if solid is None else solid.reason)
+    say(reason, visible=comm.rank == 0 and bool(reason))
+    left_out = benchmark.left_out + (NEED_FORESTS if reason else ())
+    default = SlepcConfiguration.default(comm.size)
+    _run_once(Methods(solid, _few(benchmark.modes), default, options.seed, comm, True), left_out)
+    methods = Methods(solid, benchmark.modes, default, options.seed, comm)
+    tried = _tune(methods) if benchmark.tune else {}
+    if tried:
+        methods.configuration = min(tried, key=tried.__getitem__)
+    runs, failed = _alternate(methods, benchmark, left_out)
+    spectra = _references(methods, runs, with_forests=not reason)
+    row = {
+        **on_root(comm, lambda: _describe(options, cast(Solid, solid))),
+        "modes": benchmark.modes,
+        **_times(runs, comm.bcast(None if solid is None else solid.seconds)),
+        **_errors(runs, spectra),
+        "slepc_configuration": methods.configuration.as_dict(),
+        "slepc_configurations_tried": [
+            {**configuration.as_dict(), "seconds": seconds}
+            for configuration, seconds in tried.items()
+        ],
+        "runs": {name: len(found) for name, found in runs.items()},
+        "failed": failed,
+        "missed": {name: most for name, found in runs.items() if (most := _missed(found))},
+        "ranks": comm.size,
+        "threads": max((int(found["num_threads"]) for found in loaded_blas()), default=1),
+        "blas": blas_name(),
+        "problem": {name: text for name, text in PROBLEMS.items() if name not in left_out},
+        "meaning": MEANING,
+    }
+    methods.release()
+    return row
+
+
+def row_lines(row: Mapping[str, Any]) -> list[str]:
+    """A row as people read it."""
+    lines = [f"{row['dof_fine']:,} unknowns, coarsened {row['dof_coarse']:,}, {row['modes']} modes"]
+    for name, seconds in row["seconds"].items():
+        if seconds is None:
+            continue
+        between = row["spread"].get(name)
+        shown = f" ({between['min']:.2f} to {between['max']:.2f})" if between else ""
+        error = row["eigenvalue_error"].get(name)
+        worst = f"  worst eigenvalue error {error['max']:.1e}" if error else ""
+        lines.append(f"{name:<20s}{seconds:8.2f} s{shown}{worst}")
+    lines += [
+        f"{name:<20s}missed {count} modes, found off the clock"
+        for name, count in row["missed"].items()
+    ]
+    lines += [f"{name:<20s}failed: {reason}" for name, reason in row["failed"].items()]
+    last = min(AUDIBLE_LAST, row["modes"])
+    for name, error in row["frequency_error"].items():
+        lines.append(
+            f"{name:<20s}frequencies of modes 7 to {last} off by {error['rms_7_60']:.2%} rms"
+        )
+    return lines
+
+
+def _few(modes: int) -> int:
+    return min(WARM_UP_MODES, modes)
+
+
+def _chosen(methods: Methods, left_out: tuple[str, ...]) -> dict[str, Callable[[], Run]]:
+    return {name: run for name, run in named(methods).items() if name not in left_out}
+
+
+def _run_once(methods: Methods, left_out: tuple[str, ...]) -> None:
+    """Compile and load what every method needs."""
+    for run in _chosen(methods, left_out).values():
+        run()
+    methods.release()
+
+
+def _tune(methods: Methods) -> dict[SlepcConfiguration, float]:
+    """Seconds of SLEPc on the fine mesh in each configuration, tried once."""
+    visible = methods.comm.rank == 0
+    tried = {}
+    for configuration in track(configurations(methods.comm.size), "tuning", visible=visible):
+        methods.configuration = configuration
+        tried[configuration] = methods.comm.bcast(methods.slepc().seconds)
+        say(f"SLEPc with {configuration}: {tried[configuration]:.2f} s", visible=visible)
+    return tried
+
+
+def _alternate(
+    methods: Methods, benchmark: BenchmarkOptions, left_out: tuple[str, ...]
+) -> tuple[Runs, dict[str, str]]:
+    """Runs of every method, one a round, and why a method has none."""
+    chosen = _chosen(methods, left_out)
+    runs: Runs = {name: [] for name in chosen}
+    plan = [
+        name
+        for number in range(benchmark.runs)
+        for name in chosen
+        if number < benchmark.rounds(name)
+    ]
+    failed: dict[str, str] = {}
+    for name in track(plan, "runs", visible=methods.comm.rank == 0):
+        if name in failed:
+            continue
+        try:
+            runs[name].append(chosen[name]())
+        except ConvergenceError as error:
+            # The others are worth knowing; without SLEPc's there is nothing to compare with.
+            if name == "slepc" or not error.collective:
+                raise
+            failed[name] = str(error)
+            runs.pop(name)
+            say(f"{name}: {error}", visible=methods.comm.rank == 0)
+    return runs, failed
+
+
+def _references(methods: Methods, runs: Runs, with_forests: bool) -> dict[str, Run]:
+    """Spectra by SLEPc that the others are compared with."""
+    spectra = {"fine": runs["slepc"][0], "average": methods.slepc("average")}
+    if with_forests:
+        spectra["coarse"] = runs["ddfem"][0] if "ddfem" in runs else methods.slepc("ddfem")
+        spectra["coarse_changed"] = methods.slepc("ddfem", changed=True)
+    return spectra
+
+
+def _missed(runs: list[Run]) -> int:
+    return max((run.added for run in runs), default=0)
+
+
+def _describe(options: ProblemOptions, solid: Solid) -> dict[str, Any]:
+    return {
+        "model": surface_name(options.mesh),
+        "mesh": options.mesh,
+        "resolution": options.resolution,
+        "material": options.material,
+        "lumped": options.lumped,
+        "dof_fine": solid.fine.n_dofs,
+        "dof_coarse": 3 * solid.blocks.coarse.n_nodes,
+        "forest": None if solid.forest is None else solid.forest.record(),
+        "without_forest": solid.reason,
+    }
+
+
+def _times(runs: Runs, before: dict[str, float]) -> dict[str, Any]:
+    """Medians, spreads and ratios; `before` is what the mesh alone needed."""
+    seconds = {name: median([run.seconds for run in found]) for name, found in runs.items()}
+    planned = {name: median([run.before for run in found]) or 0.0 for name, found in runs.items()}
+    parts = {
+        **before,
+        "fine_solver": planned.get("hcms_ec", 0.0),
+        "coarse_solver": planned.get("ddfem_hcms_ec", 0.0),
+    }
+    names = ["arpack", "slepc", *BASES]
+    if "arpack_regular" in seconds:
+        names.append("arpack_regular")
+    return {
+        "seconds": {
+            "precompute": sum(parts.values()),
+            **{name: seconds.get(name) for name in names},
+        },
+        "spread": {name: spread([run.seconds for run in found]) for name, found in runs.items()},
+        "precompute_parts": parts,
+        "phases": {name: found[-1].phases for name, found in runs.items()},
+        "speedup": speedups(seconds),
+        "speedup_with_precompute": speedups(seconds, planned),
+    }
+
+
+def _errors(runs: Runs, spectra: dict[str, Run]) -> dict[str, Any]:
+    same_operator = {
+        "arpack": "fine",
+        "hcms": "fine",
+        "hcms_ec": "fine",
+        "ddfem_hcms_ec_accurate": "coarse",
+        "ddfem_hcms_ec": "coarse",
+        "ddfem_hcms_ec_warm": "coarse_changed",
+    }
+    fine = spectra["fine"].values
+    coarse = {"average": spectra["average"].values}
+    if "coarse" in spectra:
+        coarse["ddfem"] = spectra["coarse"].values
+    return {
+        "eigenvalue_error": {
+            name: spectrum_error(runs[name][-1].values, spectra[operator].values)
+            for name, operator in same_operator.items()
+            if name in runs
+        },
+        "frequency_error": {name: tone_error(values, fine) for name, values in coarse.items()},
+    }

@@ -1,0 +1,113 @@
+"""The solid of a row: meshed once, with a second material that is close to its own."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.errors import UserError
+from carillon.fem.geometry import Blocks, HexMesh, blocks_from_mesh
+from carillon.fem.materials import smooth_field
+from carillon.fem.model import ElasticModel
+from solver.analysis.bounds import check_mode_count
+from solver.analysis.problem import Problem, ProblemOptions, build_problem
+from solver.coarsening.coarsen import CoarseMaterial, block_moduli, coarse_material, coarse_model
+from solver.coarsening.trained import Trained, trained_or_reason
+
+Array = NDArray[np.float64]
+
+CHANGE = 0.05
+"""Largest relative change of a modulus between the two materials."""
+_CHANGE_SEED = 1
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A meshed solid, held by rank 0 alone.
+
+    Attributes
+    ----------
+    problem
+        The fine mesh with its material.
+    blocks
+        The coarse mesh.
+    changed
+        (m,) moduli [Pa] that differ from the material's by a smooth field of `CHANGE`.
+    forest, reason
+        The forests, or None and why there are none.
+    seconds
+        Wall time of what needs the mesh alone.
+    """
+
+    problem: Problem
+    blocks: Blocks
+    changed: Array
+    forest: Trained | None
+    reason: str
+    seconds: dict[str, float]
+
+    @property
+    def fine(self) -> ElasticModel:
+        """The fine model."""
+        return self.problem.model
+
+    def coarsened(self, method: str, changed: bool = False) -> tuple[ElasticModel, float]:
+        """Model of the blocks by `average` or `ddfem`, and the seconds from fine moduli to it."""
+        young = self.changed if changed else self.problem.young
+        begin = time.perf_counter()
+        material = self._material(method, block_moduli(self.blocks, young))
+        model = coarse_model(
+            self.blocks,
+            material,
+            poisson=self.fine.poisson,
+            density=self.fine.density,
+            lumped=self.fine.lumped,
+        )
+        return model, time.perf_counter() - begin
+
+    def lumped(self) -> ElasticModel:
+        """The fine model with a diagonal mass."""
+        return replace(self.fine, lumped=True)
+
+    def _material(self, method: str, e: Array) -> CoarseMaterial:
+        return coarse_material(e, method, self.fine.poisson, self.forest)
+
+
+def make_solid(options: ProblemOptions, modes: int) -> Solid:
+    """Voxelise the solid and give it both materials.
+
+    Raises
+    ------
+    UserError
+        For anything wrong with the mesh, the material or the forests, or if the fine or the coarse
+        model has fewer unknowns than modes are wanted.
+    """
+    found = trained_or_reason(options.forest, options.poisson)
+    forest, reason = (None, found) if isinstance(found, str) else (found, "")
+    problem = build_problem(replace(options, coarsen="none"))
+    begin = time.perf_counter()
+    blocks = blocks_from_mesh(problem.fine)
+    blocked = time.perf_counter() - begin
+    check_mode_count(modes, problem.model.n_dofs)
+    unknowns = 3 * blocks.coarse.n_nodes
+    if modes > unknowns:
+        raise UserError(
+            f"{modes:,} modes asked for, but the coarsened model has {unknowns:,} unknowns; ask "
+            "for fewer or raise --resolution"
+        )
+    return Solid(
+        problem,
+        blocks,
+        problem.young * _change(problem.fine, options.seed),
+        forest,
+        reason,
+        {**problem.seconds, "blocks": blocked},
+    )
+
+
+def _change(mesh: HexMesh, seed: int) -> Array:
+    """Factors (m,) within 1 - `CHANGE` and 1 + `CHANGE`, smooth over the solid."""
+    return 1.0 + CHANGE * smooth_field(mesh, seed + _CHANGE_SEED)

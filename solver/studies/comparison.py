@@ -1,0 +1,210 @@
+"""How far a spectrum is from another that is taken for the truth."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from carillon.fem.geometry import prolongation
+from carillon.fem.model import RIGID_MODES
+from solver.assembly.sparse import assembled
+from solver.files.modes_file import ModesFile, read_elastic, require_same_solid
+from solver.subspace.spectrum import clusters
+from solver.subspace.verification import residual_scale
+
+Array = NDArray[np.float64]
+
+AUDIBLE_FIRST, AUDIBLE_LAST = 7, 60
+"""Mode numbers, from 1, of the frequency errors that are reported for coarsened models."""
+
+
+@dataclass
+class Comparison:
+    """Errors of a candidate against the truth; rigid modes are left out.
+
+    Attributes
+    ----------
+    eigenvalue_relative_error
+        Median, 90th percentile and maximum of |lambda - truth| / truth.
+    frequency_rms_relative_error
+        Root mean square over all compared modes.
+    frequency_rms_relative_error_7_60, frequency_max_relative_error_7_60
+        The same and the maximum over modes 7..60, or as many as there are.
+    subspace_angle_max
+        Largest M-weighted principal angle [rad] between a cluster of the truth and the same modes
+        of the candidate; the last cluster, which the end of the spectrum may cut, is left out.  NaN
+        if the meshes are not related.
+    residual_max
+        Largest residual ratio of the candidate, recomputed from the K and M in its file.
+    modes_compared
+        Number of elastic modes compared.
+    clusters
+        First and last mode number of every cluster of the truth but the last, and its angle [rad];
+        empty if the meshes are not related.
+    """
+
+    candidate: str
+    truth: str
+    eigenvalue_relative_error: dict[str, float]
+    frequency_rms_relative_error: float
+    frequency_rms_relative_error_7_60: float
+    frequency_max_relative_error_7_60: float
+    subspace_angle_max: float
+    residual_max: float
+    modes_compared: int
+    clusters: list[dict[str, Any]]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain dictionary, ready for JSON."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class FrequencyErrors:
+    """Relative errors of the frequencies of modes `first`..`last`, matched by index.
+
+    Attributes
+    ----------
+    rms, mean
+        Root mean square and signed mean.
+    worst, worst_mode
+        The error of largest magnitude, with its sign, and the mode that has it.
+    """
+
+    first: int
+    last: int
+    rms: float
+    mean: float
+    worst: float
+    worst_mode: int
+
+
+def frequency_errors(errors: Array, last: int) -> FrequencyErrors:
+    """Summary of the relative `errors` (k,) of modes 7, 8, ... up to `last`, if there are so many.
+
+    Examples
+    --------
+    >>> frequency_errors(np.array([0.25, -0.5, 1.0]), last=8)
+    FrequencyErrors(first=7, last=8, rms=0.395..., mean=-0.125, worst=-0.5, worst_mode=8)
+    """
+    part = errors[: last - RIGID_MODES]
+    worst = int(np.argmax(np.abs(part)))
+    first = RIGID_MODES + 1
+    return FrequencyErrors(
+        first,
+        RIGID_MODES + len(part),
+        float(np.sqrt(np.mean(part**2))),
+        float(np.mean(part)),
+        float(part[worst]),
+        first + worst,
+    )
+
+
+def eigenvalue_errors(values: Array, exact: Array) -> dict[str, float]:
+    """Median, 90th percentile and maximum of |values - exact| / exact, matched by index.
+
+    Examples
+    --------
+    >>> eigenvalue_errors(np.array([1.0, 2.5, 4.0]), np.array([1.0, 2.0, 4.0]))["max"]
+    0.25
+    """
+    error = np.abs(values / exact - 1.0)
+    return {
+        "median": float(np.median(error)),
+        "p90": float(np.quantile(error, 0.9)),
+        "max": float(error.max()),
+    }
+
+
+def compare_files(candidate: str | Path, truth: str | Path) -> Comparison:
+    """Compare two modes files, of the same mesh or of a mesh and its coarsening.
+
+    Raises
+    ------
+    UserError
+        If a file is unusable or holds no elastic mode to compare, or they are of other solids.
+    """
+    a, b = read_elastic(candidate), read_elastic(truth)
+    require_same_solid([truth, candidate], [b, a])
+    count = min(len(a.eigenvalues), len(b.eigenvalues))
+    elastic = slice(RIGID_MODES, count)
+    values, exact = a.eigenvalues[elastic], b.eigenvalues[elastic]
+    shift = a.frequencies[elastic] / b.frequencies[elastic] - 1.0
+    audible = frequency_errors(shift, AUDIBLE_LAST)
+    angles = _cluster_angles(a, b, count)
+    return Comparison(
+        str(candidate),
+        str(truth),
+        eigenvalue_errors(values, exact),
+        frequency_errors(shift, count).rms,
+        audible.rms,
+        abs(audible.worst),
+        max((cluster["angle"] for cluster in angles), default=float("nan")),
+        float(recomputed_residuals(a, *assembled(a.model)).max()),
+        count - RIGID_MODES,
+        angles,
+    )
+
+
+def recomputed_residuals(file: ModesFile, K: sp.csr_matrix, M: sp.csr_matrix) -> Array:
+    """Residual ratios (k,) by these matrices, see `solver.subspace.verification`."""
+    assert file.modes is not None
+    mass_modes = M @ file.modes
+    residual = K @ file.modes - mass_modes * file.eigenvalues
+    scale = residual_scale(file.eigenvalues) * np.linalg.norm(mass_modes, axis=0)
+    return np.asarray(np.linalg.norm(residual, axis=0) / scale)
+
+
+def subspace_angles(modes: Array, truth: Array, M: sp.csr_matrix, groups: list[slice]) -> Array:
+    """Largest M-weighted principal angle [rad] of each group of columns.
+
+    Both blocks are M-orthonormal (n, k).  The sine is taken from the part of the truth outside the
+    candidate's span, which is accurate for small angles too.
+    """
+    angles = np.empty(len(groups))
+    for index, group in enumerate(groups):
+        inside, wanted = modes[:, group], truth[:, group]
+        outside = wanted - inside @ (inside.T @ (M @ wanted))
+        square = np.linalg.eigvalsh(outside.T @ (M @ outside))[-1]
+        angles[index] = np.arcsin(min(1.0, np.sqrt(max(square, 0.0))))
+    return angles
+
+
+def _cluster_angles(a: ModesFile, b: ModesFile, count: int) -> list[dict[str, Any]]:
+    """Angle of every cluster of `b` but the last; nothing if the meshes are not related."""
+    assert a.modes is not None and b.modes is not None
+    elastic = slice(RIGID_MODES, count)
+    groups = clusters(b.eigenvalues[elastic])[:-1]
+    modes = _on_mesh_of(b, a)
+    if modes is None or not groups:
+        return []
+    _, M = assembled(b.model)
+    angles = subspace_angles(modes[:, elastic], b.modes[:, elastic], M, groups)
+    return [
+        {
+            "first": RIGID_MODES + 1 + group.start,
+            "last": RIGID_MODES + group.stop,
+            "angle": float(angle),
+        }
+        for group, angle in zip(groups, angles, strict=True)
+    ]
+
+
+def _on_mesh_of(fine: ModesFile, file: ModesFile) -> Array | None:
+    """Modes of `file` on the nodes of `fine`, whose coarsening it may be; else None."""
+    assert file.modes is not None
+    if np.array_equal(file.mesh.node_grid, fine.mesh.node_grid):
+        return file.modes
+    if not np.isclose(file.mesh.edge, 2.0 * fine.mesh.edge):
+        return None
+    try:
+        return np.asarray(
+            sp.kron(prolongation(fine.mesh, file.mesh), sp.identity(3), format="csr") @ file.modes
+        )
+    except ValueError:
+        return None

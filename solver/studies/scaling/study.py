@@ -1,0 +1,201 @@
+"""Strong and weak scaling of one solid: runs on the ranks asked for, and the model beyond them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from carillon.fem.model import ElasticModel
+from solver.analysis.problem import ProblemOptions, build_problem
+from solver.distribution.decomposition import decompose
+from solver.studies.scaling.launch import measure_each, require_ranks
+from solver.studies.scaling.model import (
+    ASSUMPTIONS,
+    WEAK_ASSUMPTIONS,
+    Correction,
+    Machine,
+    fit_machine,
+    predict,
+    work_of_busiest,
+)
+from solver.studies.scaling.sizes import TreeSizes, sizes_of_box, sizes_of_mesh
+from solver.studies.scaling.work import Elimination, elimination
+
+PREDICTED = tuple(1 << power for power in range(11))
+"""Numbers of ranks that the model is asked for: 1 to 1024."""
+FEWEST_CELLS = 4
+"""Cells that a subdomain should have; the model stops where there would be fewer."""
+NOTE = "A model, not a measurement, beyond the runs; see its assumptions."
+
+Result = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class ScalingOptions:
+    """What is run and modelled.
+
+    Attributes
+    ----------
+    modes
+        Number of modes, rigid ones included.
+    tolerance
+        Relative eigenvalue error that is corrected to.
+    ranks
+        Numbers of ranks to run on.
+    weak
+        Whether to let the solid grow with the ranks too, to the same unknowns a rank.
+    inner
+        Inner solver of the correction, the same on any number of ranks.
+    latency, bandwidth
+        Of the network that is modelled, [s] and [B/s]; what was measured if None.
+    """
+
+    modes: int = 256
+    tolerance: float = 1e-2
+    ranks: tuple[int, ...] = (1, 2)
+    weak: bool = False
+    inner: str = "mumps"
+    latency: float | None = None
+    bandwidth: float | None = None
+
+
+def scaling_study(
+    options: ProblemOptions, scaling: ScalingOptions, arguments: Sequence[str]
+) -> Result:
+    """Run on every number of ranks, fit the model, and predict.
+
+    Parameters
+    ----------
+    options
+        The solid.
+    arguments
+        Command-line arguments of a run, without mesh and resolution.
+
+    Returns
+    -------
+    Plain values: `strong` and `weak` (None unless asked for), each with `runs`, what was said by
+    those that `failed`, and `model`.
+
+    Raises
+    ------
+    UserError
+        For anything wrong with the solid, or if all runs fail.
+    """
+    require_ranks(max(scaling.ranks))
+    problem = build_problem(options)
+
+    def runs(resolutions: dict[int, int]) -> tuple[list[Result], dict[int, str]]:
+        return measure_each(
+            {
+                ranks: [options.mesh, "--resolution", str(resolution), *arguments]
+                for ranks, resolution in resolutions.items()
+            }
+        )
+
+    strong, failed = runs(dict.fromkeys(scaling.ranks, options.resolution))
+    machine = fit_machine(strong, scaling.latency, scaling.bandwidth)
+    work = elimination(problem.model.mesh)
+    result: Result = {
+        "mesh": options.mesh,
+        "resolution": options.resolution,
+        "options": asdict(scaling),
+        "machine": machine.as_dict(),
+        "strong": {
+            "runs": strong,
+            "failed": failed,
+            "model": _modelled(
+                _strong(problem.model, options.seed, machine, work, strong, scaling), ASSUMPTIONS
+            ),
+        },
+        "weak": None,
+    }
+    if scaling.weak:
+        grown = {ranks: round(options.resolution * ranks ** (1 / 3)) for ranks in scaling.ranks}
+        weak, failed = runs(grown)
+        result["weak"] = {
+            "runs": weak,
+            "failed": failed,
+            "model": _modelled(
+                _weak(machine, work, strong[0], weak), ASSUMPTIONS + WEAK_ASSUMPTIONS
+            ),
+        }
+    return result
+
+
+def study_lines(result: Result) -> list[str]:
+    """A result as people read it."""
+    lines = []
+    for kind in ("strong", "weak"):
+        part = result[kind]
+        if part is None:
+            continue
+        lines.append(f"{kind} scaling, wall seconds")
+        modelled = {row["ranks"]: row["total"] for row in part["model"]["rows"]}
+        for run in part["runs"]:
+            model = modelled.get(run["ranks"])
+            beside = "" if model is None else f"   model {model:8.2f} s"
+            note = f"   oversubscribed: {run['cores']} cores" if run["oversubscribed"] else ""
+            lines.append(
+                f"{run['ranks']:6d} ranks {run['n_dofs']:>10,d} unknowns "
+                f"{run['seconds']:8.2f} s{beside}{note}"
+            )
+        measured = {run["ranks"] for run in part["runs"]}
+        lines += [f"{ranks:6} ranks failed: {reason}" for ranks, reason in part["failed"].items()]
+        lines += [
+            f"{ranks:6d} ranks {'':19s} {'':10s}   model {seconds:8.2f} s"
+            for ranks, seconds in modelled.items()
+            if ranks not in measured
+        ]
+    return lines
+
+
+def _strong(
+    model: ElasticModel,
+    seed: int,
+    machine: Machine,
+    work: Elimination,
+    runs: list[Result],
+    scaling: ScalingOptions,
+) -> list[Result]:
+    correction = Correction.measured(runs[0])
+    rows = []
+    sizes: TreeSizes | None = None
+    most = model.mesh.n_cells // FEWEST_CELLS
+    for ranks in sorted({*PREDICTED, *scaling.ranks}):
+        if ranks > most:
+            break
+        if sizes is None or ranks > sizes.tree.parts:
+            sizes = sizes_of_mesh(model.mesh, *decompose(model.mesh, None, seed, ranks))
+        busiest = work_of_busiest(sizes, work, runs[0]["keep"], correction, ranks)
+        rows.append(_row(ranks, model.n_dofs, sizes, predict(machine, busiest)))
+    return rows
+
+
+def _weak(machine: Machine, work: Elimination, alone: Result, runs: list[Result]) -> list[Result]:
+    correction = Correction.measured(runs[0])
+    unknowns = runs[0]["n_dofs"] / runs[0]["ranks"]
+    parts = 1 << max(0, round(np.log2(runs[0]["subdomains"] / runs[0]["ranks"])))
+    rows = []
+    for ranks in PREDICTED:
+        sizes = sizes_of_box(parts * ranks, unknowns / 3.0 / parts)
+        grown = work.grown(ranks * unknowns / alone["n_dofs"])
+        busiest = work_of_busiest(sizes, grown, runs[0]["keep"], correction, ranks)
+        rows.append(_row(ranks, ranks * unknowns, sizes, predict(machine, busiest)))
+    return rows
+
+
+def _row(ranks: int, n_dofs: float, sizes: TreeSizes, seconds: dict[str, float]) -> Result:
+    return {
+        "ranks": ranks,
+        "n_dofs": round(n_dofs),
+        "subdomains": sizes.tree.parts,
+        "seconds": seconds,
+        "total": sum(seconds.values()),
+    }
+
+
+def _modelled(rows: list[Result], assumptions: Sequence[str]) -> Result:
+    return {"note": NOTE, "assumptions": list(assumptions), "rows": rows}

@@ -1,0 +1,261 @@
+"""The file `design.h5`: the material found for a set of targets, and the modes it gives."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon import provenance
+from carillon.errors import UserError
+from carillon.fem.model import RIGID_MODES, ElasticModel
+from carillon.files import create_h5, open_h5
+from carillon.measurement import measured
+from solver.files.modes_file import (
+    frequencies,
+    get_model,
+    put,
+    put_eigenvalues,
+    put_model,
+    put_modes,
+)
+from sound.clips.targets import Targets
+from sound.strikes import Strike
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.integer]
+
+KIND = "design"
+SCHEMA = 1
+HISTORY = {
+    "seconds": ("s", "wall time since the optimisation began"),
+    "evaluations": ("1", "modal analyses made so far"),
+    "cost": ("1", "w_f E_f + w_a E_a + w_r R of the best material so far (Eq. 4)"),
+    "frequency_cost": ("bark^2", "its E_f (Eq. 1)"),
+    "amplitude_cost": ("1", "its E_a (Eq. 2)"),
+    "regulariser": ("1", "its R = z^T Q z / 2 (Eq. 4)"),
+}
+"""Columns of a design's history: unit and meaning."""
+HISTORY_TYPE = np.dtype([(name, float) for name in HISTORY])
+
+
+@dataclass
+class Design:
+    """A material that lets struck points sound as their clips do.
+
+    Attributes
+    ----------
+    strikes
+        The T struck points.
+    targets
+        What they shall sound like; its dampings are those of the elastic modes, too (§5).
+    coordinates
+        (m,) z of the reduced material Y = Phi z (§6), dimensionless: of a reference modulus.
+    young
+        (M,) Young's modulus of the fine cells [Pa], scaled so that the first elastic mode sounds
+        at the first target frequency.
+    model
+        The coarse solid that was analysed, with its moduli.
+    eigenvalues
+        (6 + N,) [rad^2/s^2], ascending, those of the rigid motions first.
+    modes
+        (n_dofs, 6 + N) of the coarse model, mass-normalised [kg^-1/2].
+    surface_vertices, surface_faces
+        (V, 3) [m] and (F, 3) of the surface that was voxelised.
+    fine_grid, fine_origin, fine_edge
+        Integer coordinates (M, 3) of the fine cells, position (3,) [m] of their origin, edge [m].
+    history
+        Rows of `HISTORY_TYPE`, see `HISTORY`.
+    settings
+        The project as resolved.
+    evidence
+        How the result was come by and how good it is.
+    provenance
+        Origin of the numbers; filled in on reading.
+    """
+
+    strikes: list[Strike]
+    targets: Targets
+    coordinates: Array
+    young: Array
+    model: ElasticModel
+    eigenvalues: Array
+    modes: Array
+    surface_vertices: Array
+    surface_faces: Integers
+    fine_grid: Integers
+    fine_origin: Array
+    fine_edge: float
+    history: NDArray[np.void]
+    settings: dict[str, Any]
+    evidence: dict[str, Any]
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def frequencies(self) -> Array:
+        """Frequencies (N,) [Hz] of the elastic modes."""
+        return frequencies(self.eigenvalues[RIGID_MODES:])
+
+    @property
+    def elastic_modes(self) -> Array:
+        """Elastic modes (n_dofs, N) [kg^-1/2]."""
+        return self.modes[:, RIGID_MODES:]
+
+
+def write_design(path: str | Path, design: Design) -> None:
+    """Write a design atomically.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be written.
+    ValueError
+        If the design's parts do not fit each other.
+    """
+    fault = _fault(design)
+    if fault:
+        raise ValueError(fault)
+    with create_h5(path, KIND, SCHEMA, sealed=True) as file:
+        put_object(file, design)
+        put(file, "coordinates", design.coordinates, "1", "z of the reduced material, Y = Phi z")
+        put_eigenvalues(file, design.eigenvalues)
+        put_modes(file, [design.modes], (design.model.n_dofs, len(design.eigenvalues)))
+        put_model(file.create_group("coarse"), design.model)
+        for name, (units, meaning) in HISTORY.items():
+            put(file, f"history/{name}", design.history[name], units, meaning)
+        _put_text(file, "settings", json.dumps(design.settings), "the project as resolved, JSON")
+        _put_text(file, "evidence", json.dumps(design.evidence), "how the result was got, JSON")
+        file.create_group("provenance").attrs.update(measured(design.settings))
+
+
+def put_object(file: h5py.File, design: Design) -> None:
+    """Write what does not depend on the analysis: struck points, targets, surface, fine cells."""
+    _put_strikes(file.create_group("strikes"), design.strikes)
+    _put_targets(file.create_group("targets"), design.targets)
+    put(file, "surface/vertices", design.surface_vertices, "m", "vertices of the surface")
+    put(file, "surface/faces", design.surface_faces, "1", "vertex numbers of the triangles")
+    put(file, "fine/grid", design.fine_grid, "1", "integer coordinates of the fine cells")
+    put(file, "fine/young", design.young, "Pa", "Young's modulus of the fine cells")
+    put(file, "fine/origin", design.fine_origin, "m", "position of grid coordinates (0, 0, 0)")
+    put(file, "fine/edge", np.array([design.fine_edge]), "m", "edge of a fine cell")
+
+
+def read_design(path: str | Path) -> Design:
+    """Read a design.
+
+    Raises
+    ------
+    UserError
+        If the file is missing, damaged, of another kind or schema, or inconsistent.
+    """
+    with open_h5(path, KIND, SCHEMA, sealed=True) as file:
+        columns = [file[f"history/{name}"][()] for name in HISTORY]
+        design = Design(
+            _get_strikes(file["strikes"]),
+            _get_targets(file["targets"]),
+            file["coordinates"][()],
+            file["fine/young"][()],
+            get_model(file["coarse"]),
+            file["eigenvalues"][()],
+            file["modes"][()],
+            file["surface/vertices"][()],
+            file["surface/faces"][()],
+            file["fine/grid"][()],
+            file["fine/origin"][()],
+            float(file["fine/edge"][0]),
+            np.rec.fromarrays(columns, dtype=HISTORY_TYPE).view(np.ndarray),
+            json.loads(file["settings"].asstr()[()]),
+            json.loads(file["evidence"].asstr()[()]),
+            provenance.read(file),
+        )
+    fault = _fault(design)
+    if fault:
+        raise UserError(f"{path}: {fault}; make the design again")
+    return design
+
+
+def _fault(design: Design) -> str:
+    """What does not fit together, in a few words; nothing if all does."""
+    targets = design.targets
+    T, N = len(targets.names), len(targets.frequencies)
+    kept = RIGID_MODES + N
+    expected: list[tuple[str, Any, tuple[int | None, ...]]] = [
+        ("strikes", design.strikes, (T,)),
+        ("dampings", targets.dampings, (N,)),
+        ("amplitudes", targets.amplitudes, (T, N)),
+        ("residuals", targets.residuals, (T,)),
+        ("rates", targets.rates, (T,)),
+        ("eigenvalues", design.eigenvalues, (kept,)),
+        ("modes", design.modes, (design.model.n_dofs, kept)),
+        ("moduli of the coarse cells", design.model.young, (design.model.mesh.n_cells, 8)),
+        ("coordinates", design.coordinates, (None,)),
+        ("fine cells", design.fine_grid, (len(design.young), 3)),
+        ("surface vertices", design.surface_vertices, (None, 3)),
+        ("surface faces", design.surface_faces, (None, 3)),
+    ]
+    for name, data, shape in expected:
+        found = (len(data),) if isinstance(data, (list, tuple)) else data.shape
+        if not _matches(found, shape):
+            wanted = str(shape).replace("None", "any")
+            return f"holds {name} of shape {found}, expected {wanted}"
+    numbers = [(name, data) for name, data, _ in expected if isinstance(data, np.ndarray)]
+    for name, data in [*numbers, ("frequencies", targets.frequencies), ("moduli", design.young)]:
+        if data.dtype.kind not in "fiu" or not np.isfinite(data).all():
+            return f"holds {name} that are no finite real numbers"
+    count = len(design.surface_vertices)
+    named = [design.surface_faces.min(), design.surface_faces.max()]
+    for vertex in (*named, *(strike.vertex for strike in design.strikes)):
+        if not 0 <= vertex < count:
+            return f"names the surface's vertex {vertex}, of which there are {count}"
+    return ""
+
+
+def _matches(found: tuple[int, ...], shape: tuple[int | None, ...]) -> bool:
+    return len(found) == len(shape) and all(b in (a, None) for a, b in zip(found, shape))
+
+
+def _put_strikes(group: h5py.Group, strikes: Sequence[Strike]) -> None:
+    _put_text(group, "names", [strike.name for strike in strikes], "names of the targets")
+    put(group, "vertices", np.array([s.vertex for s in strikes]), "1", "struck surface vertices")
+    put(group, "positions", np.array([s.position for s in strikes]), "m", "where they are")
+    put(group, "inward", np.array([s.inward for s in strikes]), "1", "unit vectors into the solid")
+
+
+def _get_strikes(group: h5py.Group) -> list[Strike]:
+    names, vertices = group["names"].asstr()[()], group["vertices"][()]
+    rows = zip(names, vertices, group["positions"][()], group["inward"][()])
+    return [Strike(str(name), int(vertex), at, inward) for name, vertex, at, inward in rows]
+
+
+def _put_targets(group: h5py.Group, targets: Targets) -> None:
+    _put_text(group, "names", list(targets.names), "names of the clips")
+    put(group, "frequencies", targets.frequencies, "Hz", "frequencies shared by the clips")
+    put(group, "dampings", targets.dampings, "1/s", "d of a mode that decays as exp(-d t)")
+    put(group, "amplitudes", targets.amplitudes, "full scale", "amplitudes at the strike, per clip")
+    put(group, "rates", np.array(targets.rates), "Hz", "sampling rates of the clips")
+    for number, residual in enumerate(targets.residuals):
+        put(group, f"residuals/{number}", residual, "full scale", "a clip less its modes")
+
+
+def _get_targets(group: h5py.Group) -> Targets:
+    names = tuple(str(name) for name in group["names"].asstr()[()])
+    return Targets(
+        names,
+        group["frequencies"][()],
+        group["dampings"][()],
+        group["amplitudes"][()],
+        tuple(group[f"residuals/{number}"][()] for number in range(len(names))),
+        tuple(int(rate) for rate in group["rates"][()]),
+    )
+
+
+def _put_text(group: h5py.Group, name: str, text: str | list[str], long_name: str) -> None:
+    dataset = group.create_dataset(name, data=text, dtype=h5py.string_dtype())
+    dataset.attrs["units"] = "1"
+    dataset.attrs["long_name"] = long_name

@@ -1,0 +1,217 @@
+"""A project: the file that describes a sound design."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from carillon.documents import read_yaml
+from carillon.errors import UserError
+from carillon.fem.geometry.surface import BUILTIN_PREFIX
+from solver.analysis.problem import ProblemOptions
+from sound.project.schema import check, project_schema, with_defaults
+from sound.strikes import Place, Strike, locate_all
+from sound.surface import struck_surface
+
+if TYPE_CHECKING:
+    import trimesh
+
+_SOLID = ("mesh", "resolution", "unit", "fill", "pieces", "poisson", "density", "coarsen", "forest")
+LEAST_WEIGHT = 1e-12
+"""Of frequencies or of amplitudes: what is smaller leaves a search with nothing to lower."""
+
+
+@dataclass(frozen=True)
+class TargetEntry:
+    """A struck point, `at` a position (3,) [mesh unit] or a `vertex`, and the clip it sounds like.
+
+    `modes` are taken from the clip, its strongest; None takes all that it has.
+    """
+
+    name: str
+    clip: str
+    at: tuple[float, float, float] | None = None
+    vertex: int | None = None
+    modes: int | None = None
+
+
+@dataclass(frozen=True)
+class MaterialSettings:
+    """Modulus to start from [Pa], eigenvectors that make the field, and how they do."""
+
+    young: float
+    dimensions: int
+    law: str
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Weights of the parts of the cost (Eq. 4)."""
+
+    frequency: float
+    amplitude: float
+    regulariser: float
+
+
+@dataclass(frozen=True)
+class OptimiserSettings:
+    """How the material is sought; None leaves it to the method, or sets no limit."""
+
+    method: str
+    seconds: float | None
+    evaluations: int | None
+    seed: int
+    population: int | None
+    workers: int | None
+
+
+@dataclass(frozen=True)
+class Project:
+    """A solid, targets at points of its surface, and how a material is sought.
+
+    Every key is described in `project.schema.yaml`, which also has the defaults.  Paths are
+    no longer relative to the project's file: they hold in the working directory.
+    """
+
+    solid: ProblemOptions
+    modes: int
+    targets: tuple[TargetEntry, ...]
+    material: MaterialSettings
+    weights: Weights
+    optimiser: OptimiserSettings
+
+    def as_dict(self) -> dict[str, Any]:
+        """The project as its file has it, with all defaults and its paths as they are here."""
+        described = asdict(self)
+        solid = described.pop("solid")
+        described["targets"] = [asdict(target) for target in self.targets]
+        for target in described["targets"]:
+            target["at"] = None if target["at"] is None else list(target["at"])
+        return {key: solid[key] for key in _SOLID} | described
+
+    def surface(self) -> trimesh.Trimesh:
+        """Surface that is struck, in metres.
+
+        Raises
+        ------
+        UserError
+            If there is no such mesh.
+        """
+        return struck_surface(self.solid.mesh, self.solid.unit)
+
+    def strikes(self, surface: trimesh.Trimesh) -> list[Strike]:
+        """The targets' points on `surface`, which `Project.surface` made.
+
+        Raises
+        ------
+        UserError
+            If one is not on the surface, or two are at one place; see `sound.strikes`.
+        """
+        return locate_all(surface, [self._place_of(target) for target in self.targets])
+
+    def _place_of(self, target: TargetEntry) -> Place:
+        if target.at is None:
+            return Place(target.name, vertex=target.vertex)
+        return Place(target.name, at=[self.solid.unit * x for x in target.at])
+
+
+def load_project(path: str | Path) -> Project:
+    """Read a project file (YAML).
+
+    Raises
+    ------
+    UserError
+        With one sentence about the first thing that is wrong with it.
+    """
+    path = Path(path)
+    described = read_yaml(path, "a project")
+    try:
+        return project_of(described, path.parent)
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
+
+
+def project_of(described: Mapping[str, Any], folder: Path) -> Project:
+    """The project that the keys and values of a file in `folder` describe.
+
+    Raises
+    ------
+    UserError
+        With one sentence about the first thing that is wrong.
+    """
+    check(described, project_schema())
+    filled = with_defaults(described, project_schema())
+    targets = tuple(_target(number, each, folder) for number, each in enumerate(filled["targets"]))
+    _require_distinct([target.name for target in targets])
+    _require_something_to_lower(filled["weights"])
+    solid = {key: filled[key] for key in _SOLID}
+    if not solid["mesh"].startswith(BUILTIN_PREFIX):
+        solid["mesh"] = str(folder / solid["mesh"])
+    if solid["forest"] is not None:
+        solid["forest"] = str(folder / solid["forest"])
+    return Project(
+        ProblemOptions(**solid),
+        filled["modes"],
+        targets,
+        MaterialSettings(**filled["material"]),
+        Weights(**filled["weights"]),
+        OptimiserSettings(**filled["optimiser"]),
+    )
+
+
+def with_optimiser(project: Project, **given: Any) -> Project:
+    """The project with other settings of its optimiser; those that are None stay as they are.
+
+    Raises
+    ------
+    UserError
+        If one is beyond what the schema allows.
+    """
+    changes = {key: value for key, value in given.items() if value is not None}
+    check(changes, project_schema()["properties"]["optimiser"])
+    return replace(project, optimiser=replace(project.optimiser, **changes))
+
+
+def _target(number: int, entry: Mapping[str, Any], folder: Path) -> TargetEntry:
+    at, vertex = entry["at"], entry["vertex"]
+    if (at is None) == (vertex is None):
+        found = "neither" if at is None else "both"
+        raise UserError(f"targets[{number}]: expected at or vertex, found {found}")
+    name = entry["name"]
+    if name.isspace() or not name.isprintable():
+        raise UserError(
+            f"targets[{number}].name: found {name!r}, expected characters that can be printed, and "
+            "not blanks alone"
+        )
+    clip = folder / entry["clip"]
+    if not _is_file(clip):
+        raise UserError(f"targets[{number}].clip: there is no file {clip}; name a WAV file")
+    return TargetEntry(**{**entry, "clip": str(clip), "at": None if at is None else tuple(at)})
+
+
+def _is_file(path: Path) -> bool:
+    """Whether there is such a file; a name that no file can have is not one."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
+
+
+def _require_something_to_lower(weights: Mapping[str, float]) -> None:
+    if max(weights["frequency"], weights["amplitude"]) < LEAST_WEIGHT:
+        raise UserError(
+            f"weights: found {weights['frequency']:g} for frequency and {weights['amplitude']:g} "
+            f"for amplitude, expected at least one of them to be {LEAST_WEIGHT:g} or more"
+        )
+
+
+def _require_distinct(names: Sequence[str]) -> None:
+    for number, name in enumerate(names):
+        if name in names[:number]:
+            first = names.index(name)
+            raise UserError(
+                f"targets[{first}] and targets[{number}] are both named {name!r}; give each a name "
+                "of its own"
+            )
