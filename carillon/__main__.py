@@ -1,85 +1,43 @@
-"""`python -m carillon`: what the numerical environment consists of, and whether it is slow."""
+"""Command line: `carillon COMMAND`, all commands by one name; `--help` lists them.
+
+`python -m dataset_gen`, `forests`, `solver`, `sound` and `workflow` have the same commands, some of
+them by shorter names.
+"""
 
 from __future__ import annotations
 
-import json
-import os
 import sys
-from typing import Any
+from collections.abc import Sequence
+from importlib import import_module
 
-from carillon import cli, provenance, runtime
-from carillon.arguments import Parser
-from carillon.errors import UserError
+from carillon.commands import Command, run_program
 
-
-def describe() -> dict[str, Any]:
-    """Versions, MPI, PETSc and SLEPc with their solvers, BLAS and cores of this environment.
-
-    Raises
-    ------
-    UserError
-        If PETSc, SLEPc or MPI cannot be imported.
-    """
-    try:
-        from mpi4py import MPI
-        from petsc4py import PETSc
-        from slepc4py import SLEPc
-    except ImportError as error:
-        raise UserError(
-            f"{error}; expected MPI, PETSc and SLEPc in the environment of {sys.executable}, "
-            "run `make env`"
-        ) from None
-    return {
-        "versions": provenance.versions(),
-        "mpi": MPI.Get_library_version().split(",")[0].strip("\0 \n"),
-        "petsc": _dotted(PETSc.Sys.getVersion()),
-        "slepc": _dotted(SLEPc.Sys.getVersion()),
-        "mumps": bool(PETSc.Sys.hasExternalPackage("mumps")),
-        "cholmod": bool(PETSc.Sys.hasExternalPackage("suitesparse")),
-        "arpack": bool(SLEPc.Sys.hasExternalPackage("arpack")),
-        "blas": runtime.blas_name(),
-        "reference_blas": runtime.is_reference_blas(),
-        "processor": provenance.processor(),
-        "cores": len(os.sched_getaffinity(0)),
-    }
+ROOMS = ("dataset_gen", "forests", "solver", "sound", "workflow")
+LONGER = {
+    "dataset_gen": {"benchmark": "benchmark-fits", "inspect": "inspect-shard"},
+    "forests": {"benchmark": "benchmark-forests", "inspect": "inspect-forests"},
+    "sound": {"benchmark": "benchmark-design"},
+    "workflow": {"compare": "compare-runs"},
+}
+"""Names of commands of a room that another room has too."""
 
 
-def _dotted(version: tuple[int, ...]) -> str:
-    return ".".join(str(part) for part in version)
+def commands() -> dict[str, Command]:
+    """All commands by name."""
+    found = {"environment": Command("carillon.environment", "versions, BLAS and cores in use")}
+    for room in ROOMS:
+        own: dict[str, Command] = import_module(f"{room}.commands").COMMANDS
+        found |= {LONGER.get(room, {}).get(name, name): command for name, command in own.items()}
+    return found
 
 
-def _print_table(found: dict[str, Any]) -> None:
-    versions = dict(found["versions"])
-    rows = {
-        "Carillon": f"{versions.pop('carillon')} on Python {versions.pop('python')}",
-        "packages": ", ".join(f"{name} {version}" for name, version in versions.items()),
-        "MPI": found["mpi"],
-        "PETSc": found["petsc"],
-        "SLEPc": found["slepc"],
-        "solvers": ", ".join(
-            f"{label} {'yes' if found[key] else 'no'}"
-            for key, label in (("mumps", "MUMPS"), ("cholmod", "CHOLMOD"), ("arpack", "ARPACK"))
-        ),
-        "BLAS": found["blas"],
-        "processor": f"{found['processor']}, {found['cores']} cores usable",
-    }
-    for name, text in rows.items():
-        print(f"{name:<10} {text}")
-
-
-def main() -> int:
-    """Print the description of the environment, as a table or as JSON."""
-    parser = Parser(prog="carillon", description=__doc__)
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    arguments = parser.parse_args()
-    found = describe()
-    if arguments.json:
-        print(json.dumps(found, indent=2))
-    else:
-        _print_table(found)
-    runtime.warn_about_reference_blas()
-    return 0
+def main(words: Sequence[str] | None = None) -> int:
+    """Run one command; returns the exit status, the same on every rank."""
+    description = (
+        "Vibration modes of solids with spatially varying material, fast enough to design sound."
+    )
+    return run_program("carillon", description, commands(), words)
 
 
 if __name__ == "__main__":
-    sys.exit(cli.run("carillon", main))
+    sys.exit(main())

@@ -11,7 +11,7 @@ from contextlib import suppress
 from typing import Any
 
 from carillon.errors import ConvergenceError, UserError, one_line
-from carillon.files import cause
+from carillon.places import cause
 
 EXIT_BAD_INPUT = 2
 EXIT_NOT_CONVERGED = 3

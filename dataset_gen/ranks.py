@@ -5,47 +5,19 @@ from __future__ import annotations
 import os
 import sys
 import time
-import traceback
 from collections.abc import Callable, Generator
 from functools import partial
-from typing import Any
 
-from carillon import cli
 from carillon.cli import EXIT_BAD_INPUT
 from carillon.errors import UserError
 from carillon.progress import say
+from carillon.ranks import Comm, give_up
 from dataset_gen.crew import lead
 from dataset_gen.generate import Engine
 from dataset_gen.tasks import Plan
 
-Comm = Any
-"""mpi4py's communicator; mpi4py is imported only where a launcher started several ranks."""
-
 PAUSE = 1e-3
 """Seconds between two looks for messages, so that waiting takes no core from the work."""
-
-_LAUNCHERS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS")
-
-
-def world() -> Comm | None:
-    """All ranks of this job; None unless it has several.
-
-    Raises
-    ------
-    UserError
-        If a launcher started several ranks and there is no mpi4py.
-    """
-    launched = any(os.environ.get(name, "1") != "1" for name in _LAUNCHERS)
-    if not launched and "mpi4py" not in sys.modules:
-        return None
-    try:
-        from mpi4py import MPI
-    except ImportError as error:
-        raise UserError(
-            f"started as one of several ranks, but {error}; install mpi4py, or start one process "
-            "with --workers"
-        ) from None
-    return MPI.COMM_WORLD if MPI.COMM_WORLD.size > 1 else None
 
 
 def share(comm: Comm, program: str, make: Callable[[Engine], int]) -> int:
@@ -71,23 +43,6 @@ def share(comm: Comm, program: str, make: Callable[[Engine], int]) -> int:
     for rank in range(1, comm.size):
         comm.send(_End(status), dest=rank)
     return status
-
-
-def refuse(comm: Comm, program: str, error: UserError) -> None:
-    """Print a mistake that all ranks have found once, before any of them ends."""
-    if comm.rank == 0:
-        print(f"{program}: {error}", file=sys.stderr, flush=True)
-    comm.Barrier()
-
-
-def give_up(comm: Comm, program: str, error: BaseException) -> None:
-    """Say what has happened to this rank alone, and end all of them."""
-    status, sentence = cli.meaning(error)
-    if sentence is None:
-        traceback.print_exc()
-    else:
-        cli.tell(f"{program}: {sentence}")
-    comm.Abort(status)
 
 
 class _End:

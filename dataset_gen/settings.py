@@ -11,7 +11,9 @@ from typing import Any, get_type_hints
 
 from carillon import __version__
 from carillon.errors import UserError
+from carillon.fem import block, element
 from carillon.fem.element import DEFAULT_POISSON
+from dataset_gen import objectives, sampling
 from dataset_gen.objectives import (
     DATASET_OBJECTIVES,
     DEFAULT_OBJECTIVE,
@@ -24,8 +26,13 @@ SEED_BITS = 63
 """Seeds fit into a signed integer of the file format."""
 
 
-_ROW_MAKERS = ("block.py", "element.py", "sampling.py", "objectives")
-"""Files and folders of this package that samples and fits come from."""
+_ROW_MAKERS = (
+    Path(block.__file__),
+    Path(element.__file__),
+    Path(sampling.__file__),
+    Path(objectives.__file__).parent,
+)
+"""Files and folders that samples and fits come from."""
 
 
 @cache
@@ -35,7 +42,7 @@ def code_of_rows() -> str:
     Rows of one version of Carillon may still change while it is being worked on.
     """
     digest = hashlib.sha256()
-    for path in (Path(__file__).parent / name for name in _ROW_MAKERS):
+    for path in _ROW_MAKERS:
         for file in sorted(path.iterdir()) if path.is_dir() else [path]:
             if file.suffix in (".py", ".json"):
                 digest.update(file.name.encode() + b"\0" + file.read_bytes())

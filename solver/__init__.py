@@ -1,19 +1,23 @@
 """Modal analysis of voxel solids, from the mesh file to the modes file."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import carillon
+from carillon import lazily
 
 if TYPE_CHECKING:
     from solver.analysis.library import Solution, solve
+    from solver.analysis.modal_solver import ModalSolver, Modes
+    from solver.analysis.options import SolverOptions
 
-__all__ = ["Solution", "solve"]
+__all__ = ["ModalSolver", "Modes", "Solution", "SolverOptions", "solve"]
 
-
-def __getattr__(name: str) -> Any:
-    """`solve` and `Solution`, loaded when first asked for: they bring PETSc with them."""
-    if name in __all__:
-        from solver.analysis import library
-
-        return getattr(library, name)
-    raise AttributeError(f"module 'solver' has no attribute {name!r}")
+__getattr__ = lazily.exports(
+    __name__,
+    {
+        "Solution": "analysis.library",
+        "solve": "analysis.library",
+        "ModalSolver": "analysis.modal_solver",
+        "Modes": "analysis.modal_solver",
+        "SolverOptions": "analysis.options",
+    },
+)

@@ -191,3 +191,16 @@ def meshes() -> Path:
             f"no {' and '.join(missing)} in {folder}; set CARILLON_MESHES to a folder that has them"
         )
     return folder
+
+
+@pytest.fixture
+def refuses(capsys):
+    """Function that has a program's `main` refuse its words, and returns the sentence."""
+
+    def refusal(main, *words) -> str:
+        capsys.readouterr()
+        assert main([str(word) for word in words]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        return line
+
+    return refusal

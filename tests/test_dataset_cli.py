@@ -7,10 +7,9 @@ from functools import partial
 import numpy as np
 import pytest
 
-from carillon import cli
-from dataset_gen import __main__ as program
 from dataset_gen import summary
 from dataset_gen.__main__ import main
+from dataset_gen.commands import generate as program
 from dataset_gen.generate import generate
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, OBJECTIVES
 from dataset_gen.objectives.quadratic import MODULUS_FLOOR
@@ -18,7 +17,7 @@ from dataset_gen.shards import iterate_shard, write_shard
 
 
 def run(*arguments):
-    return cli.run("dataset_gen", lambda: main([str(a) for a in arguments]))
+    return main([str(a) for a in arguments])
 
 
 def test_generate_then_inspect(tmp_path, capsys):

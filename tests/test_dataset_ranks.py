@@ -17,8 +17,10 @@ SAMPLES, TASK = 3000, 128
 PROGRAM = f"""
 import sys, time
 from carillon.errors import UserError
-from dataset_gen import __main__ as program
-from dataset_gen import ranks, tasks
+from carillon import ranks
+from dataset_gen import tasks
+from dataset_gen.__main__ import main
+from dataset_gen.commands import generate as program
 
 class Plan(tasks.Plan):
     def work(self, task):
@@ -30,7 +32,7 @@ class Plan(tasks.Plan):
         return super().work(task)
 
 program.Plan = lambda settings: Plan(settings, {TASK})
-sys.exit(program.cli.run("dataset_gen", program.main))
+sys.exit(main())
 """
 
 
@@ -76,7 +78,7 @@ def test_bytes_do_not_depend_on_the_number_of_ranks(ranks, path, program, refere
 
 
 def sentences(done):
-    return [line for line in done.stderr.splitlines() if line.startswith("dataset_gen: ")]
+    return [line for line in done.stderr.splitlines() if line.startswith("dataset_gen")]
 
 
 @pytest.mark.parametrize("rank", [0, 2])
@@ -87,7 +89,7 @@ def test_an_error_on_one_rank_ends_all_and_what_was_done_is_kept(
     failing = str(tuple((rank, task) for task in range(13, 24)))
     done = mpiexec(3, program(failing), *options(path))
     assert done.returncode == 2
-    assert sentences(done) == ["dataset_gen: planted"]
+    assert sentences(done) == ["dataset_gen generate: planted"]
     assert journal_of(path).stat().st_size > TASK * 137 and not path.exists()
     done = mpiexec(2, program(), *options(path), check=True)
     assert "going on after" in done.stderr

@@ -4,7 +4,6 @@ import json
 
 import pytest
 
-from carillon import cli
 from dataset_gen.generate import generate
 from dataset_gen.objectives import DEFAULT_OBJECTIVE
 from dataset_gen.shards import write_shard
@@ -12,7 +11,7 @@ from forests.__main__ import main
 
 
 def run(*arguments):
-    return cli.run("forests", lambda: main([str(a) for a in arguments]))
+    return main([str(a) for a in arguments])
 
 
 @pytest.fixture(scope="module")

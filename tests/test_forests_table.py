@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pytest
 
-from carillon import cli
 from carillon.errors import UserError
 from carillon.fem.block import (
     CORNER_NODES,
@@ -216,7 +215,7 @@ def test_blocks_are_what_their_case_says(case):
 
 
 def run(*arguments):
-    return cli.run("forests", lambda: main([str(a) for a in arguments]))
+    return main([str(a) for a in arguments])
 
 
 @pytest.fixture(scope="module")

@@ -18,14 +18,14 @@ from carillon import arguments
 from carillon.documents import parse_yaml
 from carillon.errors import LONGEST_MESSAGE, one_line
 from forests.studies.training import require_counts
-from solver.__main__ import _rank_counts
+from solver.studies.scaling.study import rank_counts
 from sound.clips.instruments import note_hertz
 from sound.project.project import project_of
 from tests.hostile.fuzzing import damaged, examples, or_refused, values, yaml_texts
 from tests.hostile.zoo import CONFIGURATION, PROJECT
 from workflow import settings as configuration
+from workflow.commands.validate import _tolerance
 from workflow.estimate.rates import PACKAGED, rates_of
-from workflow.validate.command import _tolerance
 
 NUMBERS = st.one_of(
     st.text(max_size=30),
@@ -59,11 +59,11 @@ def test_a_number_is_in_its_range_or_refused(name, text):
 @given(text=NUMBERS | st.lists(NUMBERS, max_size=3).map(",".join))
 def test_numbers_of_ranks_ascend_or_are_refused(text):
     try:
-        counts = _rank_counts(text)
+        counts = rank_counts(text)
     except argparse.ArgumentTypeError as error:
         assert str(error)
     else:
-        assert counts and counts == sorted(set(counts)) and counts[0] >= 1
+        assert counts and list(counts) == sorted(set(counts)) and counts[0] >= 1
 
 
 @examples(150)

@@ -19,7 +19,7 @@ from tests.patience import HANG_SECONDS, wait_for, words_of
 from tests.slurm_cluster import Cluster
 from tests.workflow_runs import CHECKOUT
 from workflow import orphans
-from workflow.digest.command import digest
+from workflow.commands.digest import digest
 
 pytestmark = [pytest.mark.slurm, pytest.mark.mpi, pytest.mark.slow]
 

@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 import yaml
 
-from carillon import cli
 from tests.pages import Page, assert_self_contained
 from tests.workflow_runs import TINY, snakemake
 from workflow.__main__ import main
@@ -74,7 +73,7 @@ def compared(before: Path, now: Path) -> Comparison:
 
 
 def run(*arguments: object) -> int:
-    return cli.run("workflow", lambda: main(["compare", *map(str, arguments)]))
+    return main(["compare", *map(str, arguments)])
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ from solver.files.modes_file import read_modes
 from tests.disks import KIB, disk_on
 from tests.patience import HANG_SECONDS, wait_for, words_of
 from tests.workflow_runs import CHECKOUT, PROFILE, snakemake
-from workflow.digest.command import digest
+from workflow.commands.digest import digest
 
 pytestmark = pytest.mark.slow
 

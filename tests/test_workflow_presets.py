@@ -7,7 +7,7 @@ import pytest
 from tests.test_workflow_config import every_key
 from tests.workflow_runs import CHECKOUT, planned, snakemake
 from workflow import schema_page, settings
-from workflow.estimate.command import CONFIGURATIONS, load
+from workflow.commands.estimate import CONFIGURATIONS, load
 from workflow.estimate.rates import load_rates
 
 PRESETS = ("tiny", "laptop", "cluster", "paper")

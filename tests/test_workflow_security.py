@@ -14,10 +14,10 @@ from typing import Any
 import pytest
 import yaml
 
+from carillon import limits
 from carillon.errors import UserError
-from carillon.fem import limits
 from carillon.fem.geometry import builtin_surface
-from forests.__main__ import MOST_BLOCKS
+from forests.commands.table import MOST_BLOCKS
 from forests.comparison.database import MOST_MATERIALS
 from forests.layout import MOST_LEAVES
 from solver.studies.scaling import launch

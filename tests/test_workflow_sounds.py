@@ -24,7 +24,7 @@ from tests.pages import Page, assert_same_numbers, assert_self_contained
 from tests.small_design import N_MODES, SIDES, small_design
 from tests.workflow_runs import TINY, planned, snakemake
 from workflow import settings
-from workflow.estimate.command import CONFIGURATIONS, load
+from workflow.commands.estimate import CONFIGURATIONS, load
 from workflow.report.table import write_table
 from workflow.sounds import index, page
 from workflow.sounds.examples import (

@@ -73,13 +73,6 @@ def test_comments_docstrings_and_help_do_not_count(project):
     assert fingerprint("room.first") == before
 
 
-def test_a_command_line_counts_alone(project):
-    (project / "__main__.py").write_text("import room.second\n")
-    before = fingerprint("room.__main__")
-    (project / "second.py").write_text("VALUE = 3\n")
-    assert fingerprint("room.__main__") == before
-
-
 def again(project):
     """Keep what was read and forget it, as between two runs."""
     source_files._keep()

@@ -50,20 +50,9 @@ _ALONE = {
     "OMPI_MCA_osc": "^ucx,rdma",
 }
 _LATER = (
-    *("sound.clips.command", "sound.clips.clip_command", "sound.design.command"),
-    *("sound.design.benchmark_command", "sound.design.designing", "sound.export.command"),
-    *("sound.export.faust", "sound.export.gltf", "sound.export.embedded"),
-    *(
-        "sound.rendering.command",
-        "sound.rendering.render",
-        "sound.project.project",
-        "sound.project.design_file",
-    ),
-    *("workflow.estimate.command", "workflow.compare.command", "workflow.digest.command"),
-    *("workflow.validate.command", "solver.files.modes_file", "solver.studies.comparison"),
-    *("solver.studies.audit", "solver.response.response_file", "solver.studies.convergence"),
-    *("solver.studies.benchmark", "solver.studies.scaling", "solver.studies.objectives"),
-    *("solver.studies.calibration.exact", "solver.studies.calibration.gauss_newton"),
+    *("sound.design.designing", "sound.export.faust", "sound.export.gltf", "sound.export.embedded"),
+    *("sound.rendering.render", "sound.project.project", "sound.project.design_file"),
+    *("solver.studies.calibration.gauss_newton", "solver.studies.scaling.plot"),
     *("snakemake.utils", "soundfile", "igl", "scipy.signal", "scipy.optimize", "trimesh"),
     *("networkx", "multiprocessing.pool", "matplotlib.pyplot"),
 )
@@ -191,10 +180,10 @@ def _import_all() -> tuple[Any, Any, Any]:
     from slepc4py.lib import ImportSLEPc
 
     PETSc, SLEPc = ImportPETSc(), ImportSLEPc()
-    for name in (*(f"{room}.__main__" for room in ROOMS), *_LATER):
+    programs = importlib.import_module("carillon.__main__")
+    for name in (*(each.module for each in programs.commands().values()), *_LATER):
         importlib.import_module(name)
-    for room in ROOMS:
-        del sys.modules[f"{room}.__main__"]
+    del sys.modules["carillon.__main__"]
     assert not MPI.Is_initialized()
     return MPI, PETSc, SLEPc
 

@@ -15,8 +15,6 @@ from pathlib import Path
 from workflow import source_files
 
 ROOT = Path(__file__).resolve().parent.parent
-ENTRY = ".__main__"
-"""End of the name of a command line, whose own source counts but not all that it can start."""
 
 
 def fingerprint(*modules: str) -> str:
@@ -24,7 +22,7 @@ def fingerprint(*modules: str) -> str:
 
     Parameters
     ----------
-    modules : names such as `dataset_gen.generate`; for `PACKAGE.__main__` the file alone.
+    modules : names such as `dataset_gen.generate`.
 
     Raises
     ------
@@ -47,8 +45,7 @@ def _needed(modules: Iterable[str]) -> set[Path]:
         if path is None:
             raise ValueError(f"there is no module {name} in {ROOT}")
         found.add(path)
-        if not name.endswith(ENTRY):
-            waiting.append(path)
+        waiting.append(path)
     while waiting:
         modules_named, data = _named_in(waiting.pop())
         new = modules_named - found

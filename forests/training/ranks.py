@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from carillon.errors import UserError
-from dataset_gen.ranks import give_up
+from carillon.ranks import give_up
 from dataset_gen.shards import PIECE_ROWS
 from forests.training.leaves import Sums
 

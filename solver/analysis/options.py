@@ -4,58 +4,90 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from solver.hcms.condense import DEFAULT_INTERFACE
+from carillon.arguments import number_between, whole_number
+from carillon.options import option
+from solver import linear
+from solver.correction.correct import ACCELERATIONS, EIGENVALUE_TOLERANCE
+from solver.hcms.condense import DEFAULT_INTERFACE, INTERFACES
 from solver.reference.eigensolver import TYPES
+from solver.reference.truth import RESIDUAL_TOLERANCE
 
 METHODS = ("hcms", *TYPES)
 MAX_CORRECTIONS = 40
+
+number_of_modes = whole_number(1, 2**31 - 1)
+"""Argument type: a number of modes, or of whatever else is at most as many as unknowns."""
+number_of_steps = whole_number(0, 10_000)
+"""Argument type: a number of steps."""
+positive_tolerance = number_between(1e-15, 1.0)
+"""Argument type: a relative tolerance that double precision can reach."""
+
+
+def tolerance(text: str) -> float:
+    """Argument type: a relative tolerance that double precision can reach, or 0 for none."""
+    value = number_between(0.0, 1.0)(text)
+    return value if value == 0.0 else positive_tolerance(text)
 
 
 @dataclass(frozen=True)
 class SolverOptions:
     """What to compute and how; the defaults suit a model of some ten thousand unknowns.
 
-    Attributes
-    ----------
-    method
-        `hcms` (with error correction), `slepc` or `arpack` (ground truth).
-    modes
-        Number of modes, rigid ones included.
-    tolerance
-        `hcms`: relative eigenvalue error at which the correction stops; 0 makes exactly
-        `corrections` steps.  Ground truth: relative residual of the eigensolver.
-    corrections
-        Largest number of correction steps; 0 is plain HCMS.
-    keep
-        Modes kept at the root of the merge tree; a margin above `modes` if not given.
-    cutoff
-        Frequency [Hz] up to which subdomains and groups of them keep their modes; numbers of modes
-        that grow with their size if not given.
-    subdomains
-        Number of subdomains; from the number of unknowns if not given.
-    interface
-        Interface treatment, see `solver.hcms.condense`.
-    seed
-        Seed of the partition, and of the vectors that ground truth starts from.
-    prove
-        Whether an inertia count proves that no eigenvalue was missed, and those that were are
-        searched for; by default for ground truth alone, for which further searches have to do where
-        nothing can be counted.
-    inner
-        Inner solver of the correction, see `solver.linear.InnerSolver`.
-    acceleration
-        `lanczos`, `krylov` or `relaxation`, see `solver.correction.correct.correct`.
+    The interface treatments are told in `solver.hcms.condense`, the inner solvers in
+    `solver.linear.InnerSolver`, the accelerations in `solver.correction.correct`.
     """
 
-    method: str = "hcms"
-    modes: int = 256
-    tolerance: float | None = None
-    corrections: int = MAX_CORRECTIONS
-    keep: int | None = None
-    cutoff: float | None = None
-    subdomains: int | None = None
-    interface: str = DEFAULT_INTERFACE
-    seed: int = 0
-    prove: bool | None = None
-    inner: str = "auto"
-    acceleration: str = "lanczos"
+    method: str = option(
+        "hcms",
+        "hcms with error correction, or ground truth by slepc or arpack",
+        choices=METHODS,
+    )
+    modes: int = option(256, "number of modes, rigid ones included", type=number_of_modes)
+    tolerance: float | None = option(
+        None,
+        "hcms: relative eigenvalue error to correct to "
+        f"(default {EIGENVALUE_TOLERANCE:g}; 0 makes exactly --corrections steps); "
+        f"slepc, arpack: residual tolerance (default {RESIDUAL_TOLERANCE:g})",
+        type=tolerance,
+    )
+    corrections: int = option(
+        MAX_CORRECTIONS,
+        "largest number of correction steps; 0 is plain HCMS",
+        type=number_of_steps,
+    )
+    keep: int | None = option(
+        None,
+        "modes kept at the root of the merge tree (default: some more than --modes)",
+        type=number_of_modes,
+    )
+    cutoff: float | None = option(
+        None,
+        "frequency [Hz] up to which HCMS keeps modes below the root (default: numbers of modes "
+        "that grow with the subdomains)",
+        type=number_between(1e-9, 1e15, "Hz"),
+        metavar="HZ",
+    )
+    subdomains: int | None = option(
+        None, "number of subdomains (default: from the unknowns)", type=number_of_modes
+    )
+    interface: str = option(
+        DEFAULT_INTERFACE, "treatment of interfaces by HCMS", choices=INTERFACES
+    )
+    seed: int = option(
+        0,
+        "of random materials, the partition, and the vectors that slepc and arpack start from",
+        type=whole_number(0),
+    )
+    prove: bool | None = option(
+        None,
+        "count the eigenvalues by inertia, and find those that are missing (default: for slepc "
+        "and arpack)",
+    )
+    inner: str = option(
+        "auto",
+        "inner solver of the corrections; auto is the fastest direct one",
+        choices=linear.METHODS,
+    )
+    acceleration: str = option(
+        "lanczos", "of the corrections; relaxation is the paper's", choices=ACCELERATIONS
+    )

@@ -9,13 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem import geometry
+from carillon.arguments import whole_number
+from carillon.fem import geometry, materials
 from carillon.fem.element import DEFAULT_POISSON
-from carillon.fem.geometry import HexMesh, hexmesh_from_voxels, voxelize
+from carillon.fem.geometry import FILLS, PIECES, HexMesh, hexmesh_from_voxels, voxelize
 from carillon.fem.materials import young_modulus
 from carillon.fem.model import DEFAULT_DENSITY, ElasticModel
 from carillon.limits import require_constants
-from dataset_gen.objectives import DEFAULT_OBJECTIVE
+from carillon.options import REQUIRED, option
+from dataset_gen.objectives import DEFAULT_OBJECTIVE, OBJECTIVES
+from solver.coarsening.coarsen import METHODS as COARSENINGS
 from solver.coarsening.coarsen import build_model
 from solver.coarsening.trained import load_trained
 
@@ -24,47 +27,33 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ProblemOptions:
-    """The solid to analyse.
+    """The solid to analyse."""
 
-    Attributes
-    ----------
-    mesh
-        Surface mesh file, or `builtin:NAME`.
-    resolution
-        Voxels along the longest side.
-    material
-        Name of a material or file with one modulus [Pa] per voxel.
-    coarsen
-        `none`, `average`, `galerkin`, `ddfem` or `fit`.
-    forest
-        File of forests for `ddfem`; None takes the default ones.
-    objective
-        Objective for `fit`.
-    unit
-        Metres per mesh unit.
-    fill, pieces
-        See `carillon.fem.geometry.voxelize`.
-    poisson, density
-        Poisson's ratio and mass density [kg/m^3].
-    lumped
-        Whether the mass is lumped.
-    seed
-        Seed of random materials.
-    """
-
-    mesh: str
-    resolution: int
-    material: str = "uniform"
-    coarsen: str = "none"
-    forest: str | None = None
-    objective: str = DEFAULT_OBJECTIVE
-    unit: float = 1.0
-    fill: str = "winding"
-    pieces: str = "error"
-    poisson: float = DEFAULT_POISSON
-    density: float = DEFAULT_DENSITY
-    lumped: bool = False
-    seed: int = 0
+    mesh: str = option(REQUIRED, "surface mesh file, or builtin:NAME")
+    resolution: int = option(REQUIRED, "voxels along the longest side", type=whole_number(2))
+    material: str = option(
+        "uniform",
+        f"{', '.join(materials.NAMES)}, or a file with one Young's modulus [Pa] per voxel",
+        metavar="NAME|FILE",
+    )
+    coarsen: str = option("none", "coarsening of the blocks", choices=COARSENINGS)
+    forest: str | None = option(
+        None, "forests for --coarsen ddfem (HDF5; default: those of the package)", metavar="FILE"
+    )
+    objective: str = option(
+        DEFAULT_OBJECTIVE, "fit objective for --coarsen fit", choices=tuple(OBJECTIVES)
+    )
+    unit: float = option(1.0, "metres per unit of the mesh", type=float)
+    fill: str = option("winding", "which voxels are inside", choices=sorted(FILLS))
+    pieces: str = option("error", "if the voxels fall apart", choices=PIECES)
+    poisson: float = option(DEFAULT_POISSON, "Poisson's ratio", type=float)
+    density: float = option(DEFAULT_DENSITY, "mass density [kg/m^3]", type=float)
+    lumped: bool = option(False, "lump the mass")
+    seed: int = option(
+        0,
+        "of random materials, the partition, and the vectors that slepc and arpack start from",
+        type=whole_number(0),
+    )
 
     def as_dict(self) -> dict[str, Any]:
         """Plain dictionary, for provenance."""

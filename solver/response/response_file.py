@@ -11,8 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon import provenance
+from carillon.arguments import number_between
 from carillon.errors import UserError
 from carillon.files import create_h5, open_h5
+from carillon.limits import EXTENTS, FARTHEST
+from carillon.options import option
 from solver.files.modes_file import read_elastic, require_same_solid
 from solver.response.contact import Contact, choose_contacts
 from solver.response.response import (
@@ -37,27 +40,43 @@ POINTS = ("strike", "observed", "third")
 INSTANTS = 1500
 
 
+_coordinate = number_between(-EXTENTS[1] * FARTHEST, EXTENTS[1] * FARTHEST, "m")
+_POINT: dict[str, Any] = {"type": _coordinate, "nargs": 3, "metavar": ("X", "Y", "Z")}
+
+
 @dataclass(frozen=True)
 class StrikeOptions:
-    """How a solid is struck and watched.
+    """How a solid is struck and watched; for the points see `choose_contacts`."""
 
-    Attributes
-    ----------
-    strike, observed
-        Points (3,) [m], see `solver.response.contact.choose_contacts`; chosen by the truth if None.
-    damping
-        Rayleigh damping.
-    contact_seconds
-        Duration of the force in the sound.
-    periods
-        Time that is watched, in periods of the truth's first elastic mode.
-    """
+    strike: Sequence[float] | None = option(
+        None, "point of the surface that is struck [m] (default: chosen by the truth)", **_POINT
+    )
+    observed: Sequence[float] | None = option(
+        None,
+        "point of the surface whose motion is watched [m] (default: chosen by the truth)",
+        **_POINT,
+    )
+    mass_damping: float = option(
+        Damping.mass_per_second,
+        "coefficient of the mass in Rayleigh damping [1/s]",
+        type=number_between(0.0, 1e12, "1/s"),
+    )
+    stiffness_damping: float = option(
+        Damping.stiffness_seconds,
+        "coefficient of the stiffness in Rayleigh damping [s]",
+        type=number_between(0.0, 1e6, "s"),
+    )
+    contact_seconds: float = option(
+        2e-4, "duration of the force in the sound [s]", type=number_between(1e-9, 10.0, "s")
+    )
+    periods: float = option(
+        6.0, "time watched, in periods of the first elastic mode", type=number_between(1e-6, 1e6)
+    )
 
-    strike: Sequence[float] | None = None
-    observed: Sequence[float] | None = None
-    damping: Damping = field(default_factory=Damping)
-    contact_seconds: float = 2e-4
-    periods: float = 6.0
+    @property
+    def damping(self) -> Damping:
+        """Rayleigh damping."""
+        return Damping(self.mass_damping, self.stiffness_damping)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.workflow_runs import CHECKOUT, PROFILE
-from workflow.digest.command import digest
+from workflow.commands.digest import digest
 
 MARK = "CARILLON_KILLED"
 """Environment variable that all processes of a run inherit."""

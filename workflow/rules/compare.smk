@@ -21,7 +21,7 @@ rule compare:
         mem_mb=500,
         runtime="5m",
     params:
-        source=source("workflow.compare.command", "workflow.__main__"),
+        source=source("workflow.commands.compare"),
         baseline=config["baseline"],
         results=lambda wildcards, input: str(Path(input.config).parent),
     shell:

@@ -16,7 +16,7 @@ rule generate_shard:
         mem_mb=growing(500 + 500 * OWN.dataset["workers"]),
         runtime=growing(120),
     params:
-        source=source("dataset_gen.generate"),
+        source=source("dataset_gen.commands.generate"),
         samples=lambda wildcards: OWN.generate_arguments(wildcards.distribution, wildcards.shard),
     shell:
         "python -m dataset_gen generate {params.samples:q} --workers {threads} --out {output:q}"
@@ -35,7 +35,7 @@ rule describe_shard:
         mem_mb=1000,
         runtime="10m",
     params:
-        source=source("dataset_gen.summary"),
+        source=source("dataset_gen.commands.inspect"),
     shell:
         "python -m dataset_gen inspect {input:q} --json > {output:q}.partial 2> {log:q}"
         " && mv {output:q}.partial {output:q}"

@@ -27,7 +27,7 @@ use rule generate_shard as generate_default_shard with:
         mem_mb=growing(500 + 500 * DEFAULT.dataset["workers"]),
         runtime=growing(240),
     params:
-        source=source("dataset_gen.generate"),
+        source=source("dataset_gen.commands.generate"),
         samples=lambda wildcards: DEFAULT.generate_arguments(
             wildcards.distribution, wildcards.shard
         ),
@@ -48,7 +48,7 @@ rule grow_tree:
         mem_mb=growing(tree_memory(DEFAULT)),
         runtime=growing(240),
     params:
-        source=source("forests.training.command"),
+        source=source("forests.commands.grow"),
         training=DEFAULT.train_arguments,
     shell:
         "python -m forests grow {input:q} {params.training:q} --tree {wildcards.tree:q}"
@@ -73,7 +73,7 @@ rule train_default_forest:
         mem_mb=growing(training_memory(DEFAULT)),
         runtime=growing(240),
     params:
-        source=source("forests.training.command"),
+        source=source("forests.commands.train"),
         on_ranks=on_ranks(DEFAULT.forests["ranks"]),
         training=DEFAULT.train_arguments,
     shell:

@@ -20,7 +20,7 @@ use rule time_methods as time_methods_in_full with:
     benchmark:
         f"{BENCHMARKS}/{FIGURES_FOLDER}/{{shape}}/methods.tsv"
     params:
-        source=source("solver.studies.benchmark", "solver.__main__"),
+        source=source("solver.commands.benchmark"),
         ranks=RANKS,
         on_ranks=on_ranks(RANKS),
         model=shape_arguments,
@@ -42,7 +42,7 @@ rule follow_convergence_in_full:
         mem_mb=growing(16000),
         runtime=growing(120),
     params:
-        source=source("solver.studies.convergence", "solver.__main__"),
+        source=source("solver.commands.convergence"),
         shape=shape_arguments,
         modes=config["figures"]["modes"],
         steps=config["figures"]["steps"],
@@ -66,7 +66,7 @@ rule measure_scaling:
         mem_mb=growing(16000),
         runtime=growing(120),
     params:
-        source=source("solver.studies.scaling", "solver.__main__"),
+        source=source("solver.commands.scaling"),
         shape=shape_arguments,
         modes=config["figures"]["modes"],
         ranks=",".join(map(str, config["figures"]["ranks"])),

@@ -20,7 +20,7 @@ rule train_forests:
         mem_mb=growing(training_memory(OWN)),
         runtime=growing(240),
     params:
-        source=source("forests.training.command"),
+        source=source("forests.commands.train"),
         on_ranks=on_ranks(OWN.forests["ranks"]),
         training=OWN.train_arguments,
     shell:
@@ -40,7 +40,7 @@ rule describe_forests:
         mem_mb=1000,
         runtime="10m",
     params:
-        source=source("forests.summary"),
+        source=source("forests.commands.inspect"),
     shell:
         "python -m forests inspect {input:q} --json > {output:q}.partial 2> {log:q}"
         " && mv {output:q}.partial {output:q}"
@@ -61,7 +61,7 @@ rule rate_forests:
         mem_mb=growing(2000),
         runtime=growing(30),
     params:
-        source=source("forests.comparison.table"),
+        source=source("forests.commands.table"),
         blocks=OWN.forests["blocks"],
         materials=OWN.forests["materials"],
     shell:

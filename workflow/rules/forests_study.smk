@@ -33,7 +33,7 @@ use rule rate_forests as compare_on_blocks with:
     benchmark:
         f"{BENCHMARKS}/forests_study/blocks.tsv"
     params:
-        source=source("forests.comparison.table"),
+        source=source("forests.commands.table"),
         blocks=config["forests_study"]["blocks"],
         materials=config["forests_study"]["materials"],
 
@@ -50,7 +50,7 @@ rule benchmark_forests:
         mem_mb=growing(2000),
         runtime=growing(30),
     params:
-        source=source("forests.studies.benchmark"),
+        source=source("forests.commands.benchmark"),
         blocks=config["forests_study"]["timed_blocks"],
         largest=config["forests_study"]["largest"],
     shell:
@@ -75,7 +75,7 @@ rule compare_trainings:
         mem_mb=growing(8000),
         runtime=growing(240),
     params:
-        source=source("forests.studies.training"),
+        source=source("forests.commands.variants"),
         training=STUDY_TRAINING.train_arguments,
         leaves=config["forests_study"]["variant_leaves"],
         variants=[
@@ -102,7 +102,7 @@ rule follow_learning:
         mem_mb=growing(8000),
         runtime=growing(240),
     params:
-        source=source("forests.studies.training"),
+        source=source("forests.commands.curve"),
         training=STUDY_TRAINING.train_arguments,
         rows=",".join(map(str, config["forests_study"]["curve_rows"])),
     shell:

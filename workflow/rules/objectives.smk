@@ -21,7 +21,7 @@ rule rate_objectives:
         mem_mb=growing(3000),
         runtime=growing(60),
     params:
-        source=source("solver.studies.objectives", "solver.__main__"),
+        source=source("solver.commands.objectives"),
         case=case_arguments,
         modes=config["objectives"]["modes"],
         objectives=",".join(settings.studied_objectives(config)),

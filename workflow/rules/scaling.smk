@@ -12,7 +12,7 @@ use rule measure_scaling as measure_scaling_of_run with:
     benchmark:
         f"{BENCHMARKS}/models/{{model}}/scaling.tsv"
     params:
-        source=source("solver.studies.scaling", "solver.__main__"),
+        source=source("solver.commands.scaling"),
         shape=lambda wildcards: model_arguments(wildcards, config["scaling"]["resolution"]),
         modes=config["scaling"]["modes"],
         ranks=",".join(map(str, config["scaling"]["ranks"])),

@@ -19,7 +19,7 @@ rule synthesise_clip:
         mem_mb=growing(1000),
         runtime=growing(10),
     params:
-        source=source("sound.clips.clip_command"),
+        source=source("sound.commands.clip"),
         how=clip_arguments,
     shell:
         "OMP_NUM_THREADS={threads} python -m sound clip {params.how:q} --out {output:q}"
@@ -39,7 +39,7 @@ rule check_design:
         mem_mb=growing(8000),
         runtime=growing(60),
     params:
-        source=source("solver.analysis.problem", "solver.files.modes_file", "solver.__main__"),
+        source=source("solver.commands.modes"),
         solid=fine_solid,
     shell:
         "OMP_NUM_THREADS={threads} python -m solver modes {params.solid:q}"
@@ -89,7 +89,7 @@ rule record_clip:
         mem_mb=growing(1000),
         runtime=growing(10),
     params:
-        source=source("sound.rendering.command"),
+        source=source("sound.commands.render"),
         how=strike_of_recording,
     shell:
         "OMP_NUM_THREADS={threads} python -m sound render {input:q} {params.how:q}"
@@ -131,7 +131,7 @@ rule design_sound:
         mem_mb=growing(8000),
         runtime=growing(60),
     params:
-        source=source("sound.design.command"),
+        source=source("sound.commands.design"),
         start=start_argument,
     shell:
         "OMP_NUM_THREADS={threads} python -m sound design {input.project:q} {params.start:q}"
@@ -154,7 +154,7 @@ rule begin_design:
         mem_mb=growing(8000),
         runtime=growing(30),
     params:
-        source=source("sound.design.command"),
+        source=source("sound.commands.design"),
     shell:
         "OMP_NUM_THREADS={threads} python -m sound design {input.project:q} --evaluations 1"
         " --out {output:q} > {log:q} 2>&1"
@@ -177,7 +177,7 @@ rule compare_optimisers:
         mem_mb=growing(8000),
         runtime=growing(60),
     params:
-        source=source("sound.design.benchmark_command"),
+        source=source("sound.commands.benchmark"),
         seconds=config["sound"]["compare_seconds"],
     shell:
         "OMP_NUM_THREADS={threads} python -m sound benchmark {input.project:q}"
@@ -214,7 +214,7 @@ rule render_before:
         mem_mb=growing(1000),
         runtime=growing(10),
     params:
-        source=source("sound.rendering.command"),
+        source=source("sound.commands.render"),
         place=place_arguments,
     shell:
         "OMP_NUM_THREADS={threads} python -m sound render {input:q} {params.place:q}"
@@ -243,7 +243,7 @@ rule render_fine:
         mem_mb=growing(2000),
         runtime=growing(10),
     params:
-        source=source("sound.rendering.command"),
+        source=source("sound.commands.render"),
         place=place_arguments,
     shell:
         "OMP_NUM_THREADS={threads} python -m sound render {input.truth:q} --like {input.design:q}"

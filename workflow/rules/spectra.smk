@@ -19,7 +19,7 @@ rule find_modes:
         mem_mb=growing(8000),
         runtime=growing(120),
     params:
-        source=source("solver.analysis.problem", "solver.files.modes_file", "solver.__main__"),
+        source=source("solver.commands.modes"),
         ranks=RANKS,
         on_ranks=on_ranks(RANKS),
         model=model_arguments,
@@ -47,7 +47,7 @@ rule follow_convergence:
         mem_mb=growing(8000),
         runtime=growing(120),
     params:
-        source=source("solver.studies.convergence", "solver.__main__"),
+        source=source("solver.commands.convergence"),
         model=model_arguments,
         modes=lambda wildcards: min(config["convergence"]["modes"], model_modes(wildcards)),
         steps=config["convergence"]["steps"],
@@ -70,7 +70,7 @@ rule compare_with_truth:
         mem_mb=growing(4000),
         runtime=growing(30),
     params:
-        source=source("solver.studies.comparison"),
+        source=source("solver.commands.compare"),
     shell:
         "OMP_NUM_THREADS={threads} python -m solver compare {input.candidate:q} {input.truth:q}"
         " --json > {output:q}.partial 2> {log:q} && mv {output:q}.partial {output:q}"
@@ -95,7 +95,7 @@ rule time_methods:
         mem_mb=growing(8000),
         runtime=growing(240),
     params:
-        source=source("solver.studies.benchmark", "solver.__main__"),
+        source=source("solver.commands.benchmark"),
         ranks=RANKS,
         on_ranks=on_ranks(RANKS),
         model=timed_arguments,

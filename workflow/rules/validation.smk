@@ -19,7 +19,7 @@ rule audit_spectra:
         mem_mb=growing(6000),
         runtime=growing(30),
     params:
-        source=source("solver.studies.audit"),
+        source=source("solver.commands.audit"),
     shell:
         "OMP_NUM_THREADS={threads} python -m solver audit {input:q} --out {output:q} > {log:q} 2>&1"
 
@@ -36,7 +36,7 @@ rule strike_solid:
         mem_mb=growing(4000),
         runtime=growing(30),
     params:
-        source=source("solver.response.response_file"),
+        source=source("solver.commands.respond"),
         strike=strike_arguments,
     shell:
         "OMP_NUM_THREADS={threads} python -m solver respond {input:q} {params.strike:q}"

@@ -1,8 +1,8 @@
 """From a surface to voxels, hexahedra and 2x2x2 blocks."""
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from carillon import lazily
 from carillon.fem.geometry.blocks import Blocks, blocks_from_mesh, prolongation
 from carillon.fem.geometry.hexmesh import (
     CORNER_OFFSETS,
@@ -34,16 +34,13 @@ __all__ = [
     "voxelize",
 ]
 
-_OF_SURFACES = {
-    "BUILTINS": "builtin",
-    "builtin_surface": "builtin",
-    "load_surface": "surface",
-    "surface_name": "surface",
-}
-
-
-def __getattr__(name: str) -> Any:
-    """What needs trimesh, loaded when first asked for: its import takes long."""
-    if name in _OF_SURFACES:
-        return getattr(import_module(f"carillon.fem.geometry.{_OF_SURFACES[name]}"), name)
-    raise AttributeError(f"module 'carillon.fem.geometry' has no attribute {name!r}")
+# They need trimesh.
+__getattr__ = lazily.exports(
+    __name__,
+    {
+        "BUILTINS": "builtin",
+        "builtin_surface": "builtin",
+        "load_surface": "surface",
+        "surface_name": "surface",
+    },
+)

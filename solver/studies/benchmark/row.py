@@ -9,10 +9,13 @@ from typing import Any, cast
 
 from mpi4py import MPI
 
+from carillon.arguments import whole_number
 from carillon.errors import ConvergenceError
 from carillon.fem.geometry import surface_name
+from carillon.options import option
 from carillon.progress import say, track
 from carillon.runtime import blas_name, loaded_blas
+from solver.analysis.options import number_of_modes
 from solver.analysis.problem import ProblemOptions
 from solver.distribution.collective import keep_on_root, on_root
 from solver.studies.benchmark.methods import Methods, Run, named
@@ -64,30 +67,24 @@ MEANING = {
 """What the figures of a row mean, for the row itself."""
 
 
+number_of_rounds = whole_number(1, 10_000)
+"""Argument type: a number of rounds."""
+
+
 @dataclass(frozen=True)
 class BenchmarkOptions:
-    """How a row is measured.
+    """How a row is measured."""
 
-    Attributes
-    ----------
-    modes
-        Number of modes, rigid ones included.
-    runs
-        Rounds; in each, every method runs once.
-    slow_runs
-        Rounds in which ARPACK takes part; all if None.
-    arpack, arpack_regular
-        Whether ARPACK runs in shift-and-invert mode, and without a factorisation.
-    tune
-        Whether SLEPc runs in its fastest configuration of several, each tried once before.
-    """
-
-    modes: int = 256
-    runs: int = 5
-    slow_runs: int | None = None
-    arpack: bool = True
-    arpack_regular: bool = False
-    tune: bool = False
+    modes: int = option(256, "number of modes, rigid ones included", type=number_of_modes)
+    runs: int = option(5, "rounds; in each, every method runs once", type=number_of_rounds)
+    slow_runs: int | None = option(
+        None, "rounds that ARPACK takes part in (default: all)", type=number_of_rounds
+    )
+    arpack: bool = option(True, "run ARPACK, the slowest method, too")
+    arpack_regular: bool = option(False, "also ARPACK without a factorisation, on a lumped mass")
+    tune: bool = option(
+        False, "SLEPc in its fastest configuration of several, each tried once before"
+    )
 
     @property
     def left_out(self) -> tuple[str, ...]:

@@ -8,10 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from carillon.arguments import number_between, whole_number
 from carillon.fem.model import ElasticModel
+from carillon.options import option
+from solver import linear
+from solver.analysis.options import number_of_modes, positive_tolerance
 from solver.analysis.problem import ProblemOptions, build_problem
+from solver.correction.correct import INTERACTIVE_TOLERANCE
 from solver.distribution.decomposition import decompose
-from solver.studies.scaling.launch import measure_each, require_ranks
+from solver.studies.scaling.launch import MOST_RANKS, measure_each, require_ranks
 from solver.studies.scaling.model import (
     ASSUMPTIONS,
     WEAK_ASSUMPTIONS,
@@ -33,33 +38,38 @@ NOTE = "A model, not a measurement, beyond the runs; see its assumptions."
 Result = dict[str, Any]
 
 
+def rank_counts(text: str) -> tuple[int, ...]:
+    """Argument type: numbers of ranks, separated by commas, each once and ascending."""
+    return tuple(sorted({whole_number(1, MOST_RANKS)(part) for part in text.split(",")}))
+
+
 @dataclass(frozen=True)
 class ScalingOptions:
-    """What is run and modelled.
+    """What is run and modelled."""
 
-    Attributes
-    ----------
-    modes
-        Number of modes, rigid ones included.
-    tolerance
-        Relative eigenvalue error that is corrected to.
-    ranks
-        Numbers of ranks to run on.
-    weak
-        Whether to let the solid grow with the ranks too, to the same unknowns a rank.
-    inner
-        Inner solver of the correction, the same on any number of ranks.
-    latency, bandwidth
-        Of the network that is modelled, [s] and [B/s]; what was measured if None.
-    """
-
-    modes: int = 256
-    tolerance: float = 1e-2
-    ranks: tuple[int, ...] = (1, 2)
-    weak: bool = False
-    inner: str = "mumps"
-    latency: float | None = None
-    bandwidth: float | None = None
+    modes: int = option(256, "number of modes, rigid ones included", type=number_of_modes)
+    ranks: tuple[int, ...] = option(
+        (1, 2), "numbers of ranks to run on, separated by commas (default 1,2)", type=rank_counts
+    )
+    weak: bool = option(False, "also a solid that grows with the ranks, as many unknowns a rank")
+    tolerance: float = option(
+        INTERACTIVE_TOLERANCE, "relative eigenvalue error to correct to", type=positive_tolerance
+    )
+    inner: str = option(
+        "mumps",
+        "inner solver of the correction, the same on any number of ranks",
+        choices=linear.METHODS,
+    )
+    latency: float | None = option(
+        None,
+        "of the modelled network [s] (default: measured)",
+        type=number_between(1e-12, 1e3, "s"),
+    )
+    bandwidth: float | None = option(
+        None,
+        "of the modelled network [B/s] (default: measured)",
+        type=number_between(1.0, 1e18, "B/s"),
+    )
 
 
 def scaling_study(

@@ -1,0 +1,113 @@
+"""Options that are described once, where they are defined: as fields of a dataclass.
+
+Command lines are made from the fields, and what was given there is collected into the dataclass
+again; the documentation shows the same words.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+_HELP = "help"
+
+
+def option(
+    default: Any,
+    help: str,
+    *,
+    type: Callable[[str], Any] | None = None,
+    choices: Iterable[str] | None = None,
+    metavar: str | tuple[str, ...] | None = None,
+    nargs: int | str | None = None,
+) -> Any:
+    """A field of a dataclass that is an option of commands.
+
+    Parameters
+    ----------
+    default
+        Its default; with `REQUIRED` it has to be given.
+    help
+        What it is, with its unit in brackets.
+    type
+        Reads it from a word, and refuses it with a reason, see `carillon.arguments`; not needed
+        for switches and texts.
+    """
+    metadata = {
+        _HELP: help,
+        "type": type,
+        "choices": None if choices is None else tuple(choices),
+        "metavar": metavar,
+        "nargs": nargs,
+    }
+    if default is REQUIRED:
+        return dataclasses.field(metadata=metadata)
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+REQUIRED: Any = dataclasses.MISSING
+"""Default of an option that has none."""
+
+
+def add_options(
+    parser: argparse.ArgumentParser,
+    options: type,
+    leave_out: Sequence[str] = (),
+    positional: Sequence[str] = (),
+    **defaults: Any,
+) -> None:
+    """Add the options of a dataclass to a command line.
+
+    Parameters
+    ----------
+    options
+        A dataclass with fields made by `option`; others are left alone.
+    leave_out
+        Names of fields that are no options of this command.
+    positional
+        Names of fields that are given by their place.
+    defaults
+        Defaults of this command, in the place of the fields'.
+    """
+    for field in dataclasses.fields(options):
+        if field.name not in leave_out and _HELP in field.metadata:
+            default = defaults.get(field.name, field.default)
+            _add(parser, field, default, field.name in positional)
+
+
+def collect(options: type[T], arguments: argparse.Namespace, **others: Any) -> T:
+    """The dataclass from what a command line gave, its defaults for what the command leaves out."""
+    names = {field.name for field in dataclasses.fields(options)}  # type: ignore[arg-type]
+    given = {name: value for name, value in vars(arguments).items() if name in names}
+    return options(**{**given, **others})
+
+
+def _add(
+    parser: argparse.ArgumentParser, field: dataclasses.Field[Any], default: Any, positional: bool
+) -> None:
+    told = {key: value for key, value in field.metadata.items() if value is not None}
+    if positional:
+        parser.add_argument(field.name, **{"metavar": field.name.upper(), **told})
+        return
+    flag = f"--{field.name.replace('_', '-')}"
+    told["help"] = f"{told['help']}{_told_default(default, told['help'])}"
+    if default is REQUIRED:
+        parser.add_argument(flag, required=True, **told)
+    elif default is False:
+        parser.add_argument(flag, action="store_true", help=told["help"])
+    elif field.type in ("bool | None", "bool"):
+        action = argparse.BooleanOptionalAction
+        parser.add_argument(flag, action=action, default=default, help=told["help"])
+    else:
+        parser.add_argument(flag, default=default, **told)
+
+
+def _told_default(default: Any, help: str) -> str:
+    if default in (REQUIRED, None, False) or "default" in help:
+        return ""
+    shown = f"{default:g}" if isinstance(default, float) else default
+    return f" (default {shown})"

@@ -1,0 +1,40 @@
+"""Grow one tree on shards of training data: its splits, without the answers of its leaves.
+
+`forests train --structure` takes the trees that such jobs have grown.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+
+from carillon.arguments import whole_number
+from carillon.errors import UserError
+from carillon.files import require_writable
+from carillon.progress import say
+from forests.commands.training import add_training, training_of
+from forests.training.dataset import open_dataset
+from forests.training.train import grow_trees, parameters_of
+from forests.training.tree_file import save_tree
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command line."""
+    add_training(parser)
+    parser.add_argument("--out", required=True, help="HDF5 file to write")
+    parser.add_argument("--tree", type=whole_number(0), required=True, help="its number, from 0")
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Grow one tree and write it."""
+    require_writable(arguments.out, arguments.datasets)
+    training = training_of(arguments)
+    job = arguments.tree
+    if job not in training.jobs:
+        raise UserError(f"tree {job} of 2 x {training.trees}: expected 0 to {training.jobs[-1]}")
+    dataset = open_dataset(arguments.datasets)
+    begin = time.perf_counter()
+    tree = grow_trees(dataset, training, training.jobs[job : job + 1])[job]
+    seconds = time.perf_counter() - begin
+    save_tree(arguments.out, tree, job, parameters_of(dataset, training), seconds)
+    say(f"{arguments.out}: tree {job}, {tree.leaves:,} leaves, depth {tree.depth}")

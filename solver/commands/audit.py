@@ -1,0 +1,43 @@
+"""Check modes files by themselves: residuals, orthogonality, and a count of eigenvalues by inertia.
+
+The matrices are assembled anew from what the files say of the solid.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from carillon.provenance import record
+from solver.commands.running import on_ranks, parameters, require_outputs, write_json
+from solver.studies.audit import audit_files
+
+EXAMPLES = """example:
+  audit bunny.h5 truth.h5
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command line."""
+    parser.add_argument("files", nargs="+", metavar="FILE", help="modes files")
+    parser.add_argument("--out", help="also write the result to this JSON file")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Audit and print."""
+    with on_ranks():
+        require_outputs(arguments)
+        audits = {name: found.as_dict() for name, found in audit_files(arguments.files).items()}
+    content = {"spectra": audits, "provenance": record(parameters(arguments))}
+    write_json(arguments, content)
+    if arguments.json:
+        print(json.dumps(content, indent=2))
+        return
+    for name, found in audits.items():
+        print(
+            f"{name}: {found['modes']} modes of {found['unknowns']:,} unknowns, "
+            f"{found['rigid_modes']} rigid; largest residual {found['residual_max']:.1e}, "
+            f"orthogonal to {found['orthogonality']:.1e}; {found['expected']} below "
+            f"{found['counted_below']:.6g} rad^2/s^2, counted {found['counted']}"
+        )

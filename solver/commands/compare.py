@@ -1,0 +1,48 @@
+"""Errors of the eigenvalues and modes of one modes file, another being taken for the truth."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from carillon.provenance import record
+from solver.commands.running import on_ranks, parameters
+from solver.distribution.collective import on_root
+from solver.studies.comparison import compare_files
+
+EXAMPLES = """examples:
+  compare bunny.h5 truth.h5
+  compare bunny.h5 truth.h5 --json
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command line."""
+    parser.add_argument("candidate", help="modes file to judge")
+    parser.add_argument("truth", help="modes file taken for the truth")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Compare and print."""
+    with on_ranks() as comm:
+        found = on_root(comm, lambda: compare_files(arguments.candidate, arguments.truth).as_dict())
+        if comm.rank:
+            return
+    if arguments.json:
+        found["provenance"] = record(parameters(arguments))
+        print(json.dumps(found, indent=2))
+        return
+    error = found["eigenvalue_relative_error"]
+    print(f"modes compared            {found['modes_compared']} (elastic)")
+    print(
+        f"eigenvalue error          median {error['median']:.2e}, 90 % below {error['p90']:.2e}, "
+        f"max {error['max']:.2e}"
+    )
+    print(f"frequency error, rms      {found['frequency_rms_relative_error']:.2e}")
+    print(
+        f"frequency error, 7..60    rms {found['frequency_rms_relative_error_7_60']:.2e}, "
+        f"max {found['frequency_max_relative_error_7_60']:.2e}"
+    )
+    print(f"largest subspace angle    {found['subspace_angle_max']:.2e} rad")
+    print(f"largest residual          {found['residual_max']:.2e}")

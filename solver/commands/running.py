@@ -1,0 +1,85 @@
+"""What the solver's commands share: ranks and threads, PETSc's errors, outputs and their origin."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from carillon.files import atomic_path, require_writable
+from carillon.options import add_options
+from carillon.pictures import require_plottable
+from carillon.runtime import limit_threads, warn_about_reference_blas
+from solver.analysis.problem import ProblemOptions
+from solver.distribution.collective import on_root
+from solver.linear import petsc_options
+
+INPUTS = ("mesh", "material", "forest", "truth", "start", "files", "candidates")
+"""Arguments that name files which a command reads."""
+HIDDEN = ("out", "json")
+"""Arguments on which a result does not depend."""
+
+
+@contextmanager
+def on_ranks(petsc: str | None = None) -> Iterator[MPI.Comm]:
+    """All ranks, with their share of the cores as threads; what PETSc refuses becomes a sentence.
+
+    Parameters
+    ----------
+    petsc
+        Options that the user gave to PETSc.
+    """
+    comm = MPI.COMM_WORLD
+    node = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    limit_threads(node.size)
+    node.Free()
+    if comm.rank == 0:
+        warn_about_reference_blas()
+    try:
+        yield comm
+    except PETSc.Error as error:
+        raise petsc_options.meaning(error, petsc) from error
+
+
+def add_solid(parser: argparse.ArgumentParser, *leave_out: str) -> None:
+    """Add the arguments that describe a solid, some of them left out."""
+    add_options(parser, ProblemOptions, leave_out, positional=("mesh",))
+
+
+def require_outputs(arguments: argparse.Namespace, comm: MPI.Comm = MPI.COMM_SELF) -> None:
+    """Check that the results can be written, and not in the place of what they are made from."""
+
+    def check() -> None:
+        given = vars(arguments)
+        inputs = [given[name] for name in INPUTS if given.get(name) is not None]
+        files = [path for each in inputs for path in (each if isinstance(each, list) else [each])]
+        if given.get("plot") is not None:
+            require_plottable(given["plot"])
+        for name in ("out", "plot"):
+            if given.get(name) is not None:
+                require_writable(given[name], files)
+
+    on_root(comm, check)
+
+
+def parameters(arguments: argparse.Namespace) -> dict[str, Any]:
+    """What a result was computed with, for its provenance."""
+    return {key: value for key, value in vars(arguments).items() if key not in HIDDEN}
+
+
+def write_json(
+    arguments: argparse.Namespace, content: dict[str, Any], comm: MPI.Comm = MPI.COMM_SELF
+) -> None:
+    """Write a result to the file that `--out` names, if it names one."""
+
+    def write() -> None:
+        with atomic_path(arguments.out) as temporary:
+            temporary.write_text(json.dumps(content))
+
+    if arguments.out is not None:
+        on_root(comm, write)

@@ -1,0 +1,82 @@
+"""Time one solid on several numbers of ranks, and model more of them.
+
+It starts the ranks by itself; started on several ranks, it measures these.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+from typing import Any
+
+from mpi4py import MPI
+
+from carillon.measurement import measured
+from carillon.options import add_options, collect
+from solver.analysis.options import SolverOptions
+from solver.analysis.problem import ProblemOptions, build_problem
+from solver.commands.running import add_solid, on_ranks, parameters, require_outputs, write_json
+from solver.distribution.collective import keep_on_root
+from solver.studies.scaling import ScalingOptions, measure, scaling_study, study_lines
+
+EXAMPLES = """example:
+  scaling builtin:bell --resolution 40 --ranks 1,2,4 --plot scaling.svg
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command line."""
+    add_solid(parser)
+    add_options(parser, ScalingOptions)
+    parser.add_argument("--here", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--out", help="also write the result to this JSON file")
+    parser.add_argument("--plot", help="figure to draw (PNG, SVG or PDF)")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Measure, model and print."""
+    with on_ranks() as comm:
+        require_outputs(arguments, comm)
+        if arguments.here or comm.size > 1:
+            found, lines = _measured_here(arguments, comm)
+        else:
+            options = collect(ScalingOptions, arguments)
+            found = scaling_study(collect(ProblemOptions, arguments), options, _repeated(arguments))
+            lines = study_lines(found)
+            found["provenance"] = measured(parameters(arguments), options.ranks, threads=1)
+        write_json(arguments, found, comm)
+        if comm.rank:
+            return
+    if arguments.plot is not None and "strong" in found:
+        from solver.studies.scaling.plot import save_plot
+
+        save_plot(found, arguments.plot)
+    print(json.dumps(found, indent=2) if arguments.json else "\n".join(lines))
+
+
+def _measured_here(
+    arguments: argparse.Namespace, comm: MPI.Comm
+) -> tuple[dict[str, Any], list[str]]:
+    """What these ranks need for the solid."""
+    described = collect(ProblemOptions, arguments)
+    problem = keep_on_root(comm, lambda: build_problem(described))
+    model = None if problem is None else problem.model
+    found = measure(model, collect(SolverOptions, arguments), comm)
+    found["provenance"] = measured(parameters(arguments), comm.size)
+    return found, [f"{comm.size} ranks: {found['seconds']:.2f} s"]
+
+
+def _repeated(arguments: argparse.Namespace) -> list[str]:
+    """Arguments with which the same solid is solved again, but for mesh and resolution."""
+    fields = [field.name for field in dataclasses.fields(ProblemOptions)]
+    names = [name for name in fields if name not in ("mesh", "resolution")]
+    words: list[str] = []
+    for name in (*names, "modes", "tolerance", "inner"):
+        value = getattr(arguments, name)
+        if value is True:
+            words.append(f"--{name}")
+        elif value is not None and value is not False:
+            words += [f"--{name}", str(value)]
+    return words

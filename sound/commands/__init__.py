@@ -1,0 +1,16 @@
+"""Commands from example clips to a material to a sound."""
+
+from carillon.commands import Command
+
+COMMANDS = {
+    "extract": Command(
+        "sound.commands.extract", "modes of a sound clip: frequency, damping, amplitude"
+    ),
+    "clip": Command("sound.commands.clip", "synthesise a clip of a struck metal, wood or string"),
+    "design": Command(
+        "sound.commands.design", "optimise the material until struck points sound as clips"
+    ),
+    "render": Command("sound.commands.render", "the sound of a strike, as WAV"),
+    "export": Command("sound.commands.export", "modes on the mesh, glTF or Faust, for other tools"),
+    "benchmark": Command("sound.commands.benchmark", "time of an evaluation, optimisers compared"),
+}

@@ -1,0 +1,22 @@
+"""Commands around the rules: before, after, and for one solid."""
+
+from carillon.commands import Command
+
+COMMANDS = {
+    "estimate": Command(
+        "workflow.commands.estimate",
+        "core-hours, memory and storage of a configuration, before anything runs",
+    ),
+    "compare": Command(
+        "workflow.commands.compare",
+        "two folders of results side by side, and what moved beyond noise",
+    ),
+    "digest": Command(
+        "workflow.commands.digest",
+        "what result files say, as one number: equal for runs that found the same bits",
+    ),
+    "validate": Command(
+        "workflow.commands.validate",
+        "one solid against ground truth, ending at a page that says how far to trust it",
+    ),
+}
