@@ -8,44 +8,47 @@ from workflow import orphans, room, settings, submission
 
 min_version("9.0")
 
+# This file is also in the folder of the rules, where an installed Carillon has it.
+RULES = settings.FOLDER / "rules"
+
 
 # A configuration file on the command line takes the place of the default one, it does not extend it:
 # otherwise the default models could not be left out.
 if not workflow.overwrite_configfiles:
 
-    configfile: str(Path(workflow.basedir, "workflow/config/laptop.yaml"))
+    configfile: str(settings.FOLDER / "config" / "laptop.yaml")
 
 
 try:
     config = settings.read(workflow.configfiles, workflow.config_settings.config)
     settings.check(config)
-    validate(config, schema="workflow/schemas/config.schema.yaml")
+    validate(config, schema=str(settings.SCHEMA))
     settings.check_links(config)
 except UserError as error:
     raise WorkflowError(str(error)) from None
 
 
-report: "workflow/report/captions/workflow.rst"
+report: str(settings.FOLDER / "report" / "captions" / "workflow.rst")
 
 
-include: "workflow/rules/common.smk"
-include: "workflow/rules/dataset.smk"
-include: "workflow/rules/forests.smk"
-include: "workflow/rules/model.smk"
-include: "workflow/rules/spectra.smk"
-include: "workflow/rules/tables.smk"
-include: "workflow/rules/report.smk"
-include: "workflow/rules/validation.smk"
-include: "workflow/rules/shapes.smk"
-include: "workflow/rules/figures.smk"
-include: "workflow/rules/scaling.smk"
-include: "workflow/rules/study.smk"
-include: "workflow/rules/objectives.smk"
-include: "workflow/rules/default_forest.smk"
-include: "workflow/rules/forests_study.smk"
-include: "workflow/rules/examples.smk"
-include: "workflow/rules/sound.smk"
-include: "workflow/rules/compare.smk"
+include: f"{RULES}/common.smk"
+include: f"{RULES}/dataset.smk"
+include: f"{RULES}/forests.smk"
+include: f"{RULES}/model.smk"
+include: f"{RULES}/spectra.smk"
+include: f"{RULES}/tables.smk"
+include: f"{RULES}/report.smk"
+include: f"{RULES}/validation.smk"
+include: f"{RULES}/shapes.smk"
+include: f"{RULES}/figures.smk"
+include: f"{RULES}/scaling.smk"
+include: f"{RULES}/study.smk"
+include: f"{RULES}/objectives.smk"
+include: f"{RULES}/default_forest.smk"
+include: f"{RULES}/forests_study.smk"
+include: f"{RULES}/examples.smk"
+include: f"{RULES}/sound.smk"
+include: f"{RULES}/compare.smk"
 
 
 onstart:

@@ -11,13 +11,12 @@ import re
 import subprocess
 import sys
 import tempfile
-from pathlib import Path
 
 from carillon import cli
 from carillon.errors import UserError
+from workflow import settings
 
 PROGRAM = "workflow.rule_graph"
-ROOT = Path(__file__).resolve().parent.parent
 TARGET = "all"
 """The rule that computes nothing, which is left out."""
 STYLE = """\
@@ -29,7 +28,14 @@ edge [color="#8a94a0", arrowsize=0.6]"""
 
 def needs() -> list[tuple[str, str]]:
     """Pairs of a rule of the default run and one that needs its files."""
-    command = [sys.executable, "-m", "snakemake", "-s", str(ROOT / "Snakefile"), "--rulegraph"]
+    command = [
+        sys.executable,
+        "-m",
+        "snakemake",
+        "-s",
+        str(settings.FOLDER / "Snakefile"),
+        "--rulegraph",
+    ]
     with tempfile.TemporaryDirectory() as folder:
         return pairs(_output_of([*command, "--cores", "1"], folder))
 
@@ -59,7 +65,7 @@ def _output_of(command: list[str], folder: str | None = None, text: str | None =
         done = subprocess.run(
             command,
             cwd=folder,
-            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            env={**os.environ, "PYTHONPATH": str(settings.FOLDER.parent)},
             input=text,
             capture_output=True,
             text=True,

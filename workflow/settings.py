@@ -25,7 +25,9 @@ PLACES = ("results_dir", "mesh_folder", "baseline")
 """Keys that say where something lies, on which no result depends."""
 DEFAULT_FORESTS = "default"
 """Name of the forests that come with the package."""
-SCHEMA = Path(__file__).parent / "schemas" / "config.schema.yaml"
+FOLDER = Path(__file__).resolve().parent
+"""Of the rules and all that belongs to them."""
+SCHEMA = FOLDER / "schemas" / "config.schema.yaml"
 CONFIGURATION = "a configuration"
 BUILTIN = "builtin:"
 BUILTIN_MESHES = ("bar", "bell", "bowl", "box", "frying-pan", "pitcher", "plate", "snare-drum")

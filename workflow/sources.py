@@ -15,6 +15,8 @@ from pathlib import Path
 from workflow import source_files
 
 ROOT = Path(__file__).resolve().parent.parent
+PACKAGES = ("carillon", "dataset_gen", "forests", "solver", "sound", "workflow")
+"""Of the project; what lies beside them where it is installed is none of its code."""
 
 
 def fingerprint(*modules: str) -> str:
@@ -57,7 +59,10 @@ def _needed(modules: Iterable[str]) -> set[Path]:
 @cache
 def _file_of(module: str) -> Path | None:
     """File of a module of the project; None if it is another package's, or no module."""
-    path = ROOT.joinpath(*module.split("."))
+    parts = module.split(".")
+    if parts[0] not in PACKAGES:
+        return None
+    path = ROOT.joinpath(*parts)
     for candidate in (path.with_suffix(".py"), path / "__init__.py"):
         if candidate.is_file():
             return candidate

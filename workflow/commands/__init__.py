@@ -3,6 +3,9 @@
 from carillon.commands import Command
 
 COMMANDS = {
+    "rules": Command(
+        "workflow.commands.rules", "where Snakemake finds the rules: snakemake -s $(carillon rules)"
+    ),
     "estimate": Command(
         "workflow.commands.estimate",
         "core-hours, memory and storage of a configuration, before anything runs",

@@ -42,7 +42,6 @@ FAILED = 1
 """Exit status if a criterion is missed."""
 LONGEST_NAME = 64
 """Characters of a model's name; a title may be longer."""
-ROOT = Path(__file__).resolve().parents[2]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -199,11 +198,11 @@ def _run_rules(folder: Path, cores: int) -> None:
     """Snakemake's target `validation`, with its own files in the folder of the results."""
     command = [
         *(sys.executable, "-m", "snakemake", "validation"),
-        *("--snakefile", str(ROOT / "Snakefile"), "--directory", str(folder)),
+        *("--snakefile", str(settings.FOLDER / "Snakefile"), "--directory", str(folder)),
         *("--configfile", str(folder / CONFIGURATION), "--cores", str(cores)),
-        *("--profile", str(ROOT / "workflow" / "profiles" / "default")),
+        *("--profile", str(settings.FOLDER / "profiles" / "default")),
     ]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    environment = {**os.environ, "PYTHONPATH": str(settings.FOLDER.parent)}
     log = folder / "validate.log"
     say(f"running on {cores} cores, see {log}")
     with open(log, "w") as stream:

@@ -153,7 +153,10 @@ install_python_packages() {
     LOCK=$ENVS/lock.txt
     [ "$NUMPY_ABI" -ge 2 ] && LOCK=$ENVS/lock-numpy2.txt
     say "Installing Python packages from $(display "$LOCK") (one or two minutes)"
-    local files=(-r "$ENVS/requirements.txt" -r "$ENVS/requirements-dev.txt")
+    local part files=(-r "$ENVS/requirements.txt")
+    for part in sound workflow dev; do
+        files+=(-r "$ENVS/requirements-$part.txt")
+    done
     [ "$KIND" = source ] && files+=(-r "$ENVS/petsc-source-build.txt")
     pip install "${files[@]}" -c "$LOCK" || fail "pip could not install the Python packages, see $LOG"
 }
@@ -168,6 +171,9 @@ write_checkout_pth() {
     defaults+='os.environ.setdefault("PATH", os.defpath); '
     defaults+='os.environ.setdefault("HOME", os.path.expanduser("~"))'
     printf '%s\n' "$ROOT" "$defaults" >"$(site_packages)/carillon-checkout.pth"
+    printf '#!%s\nimport sys\n\nfrom carillon.__main__ import main\n\nsys.exit(main())\n' \
+        "$VENV/bin/python" >"$VENV/bin/carillon"
+    chmod +x "$VENV/bin/carillon"
 }
 
 # Debian keeps petsc4py and slepc4py out of Python's path, one folder per version, architecture and
@@ -320,7 +326,7 @@ check_environment() {
     # Debian's must start in an empty environment; a cluster's MPI may need what its module has set.
     local empty=()
     [ "$KIND" = debian ] && empty=(env -i HOME="${HOME:-/}")
-    ${empty[@]+"${empty[@]}"} "$VENV/bin/python" -m carillon ||
+    ${empty[@]+"${empty[@]}"} "$VENV/bin/python" -m carillon environment ||
         fail "the environment was installed but does not start (above); the log is $LOG"
 }
 

@@ -58,7 +58,7 @@ def templates(package):
     """Templates of a page: those of its package, and what all pages share."""
     shared = [f"report/{name}" for name in ("base.html.j2", "macros.html.j2", "page.css")]
     names = [f"{package}/page.html.j2", *shared]
-    return [Path(workflow.basedir, "workflow", name) for name in names]
+    return [settings.FOLDER / name for name in names]
 
 
 def growing(first):
@@ -84,7 +84,7 @@ ALONE = workflow.is_main_process and locks.take()
 
 # Jobs run the interpreter that Snakemake runs in, and the packages of this checkout.
 prepend("PATH", Path(sys.executable).parent)
-prepend("PYTHONPATH", Path(workflow.basedir))
+prepend("PYTHONPATH", settings.FOLDER.parent)
 # Ranks get their share of the cores as threads, which a rank bound to one core could not use; and
 # Open MPI refuses to start as root, the usual user of a container, unless told twice.
 for name, value in {

@@ -289,7 +289,7 @@ rule build_sounds_index:
             example=EXAMPLES,
             table=["designs", "frequencies"],
         ),
-        templates=[Path(workflow.basedir, "workflow/sounds/index.html.j2"), *templates("sounds")],
+        templates=[settings.FOLDER / "sounds" / "index.html.j2", *templates("sounds")],
     output:
         page=report(
             f"{SOUND}/index.html",

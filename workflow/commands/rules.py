@@ -1,0 +1,20 @@
+"""Print the path of Snakemake's rules, which an installed Carillon has in a folder of its own."""
+
+from __future__ import annotations
+
+import argparse
+
+from workflow import settings
+
+EXAMPLES = """example:
+  snakemake -s "$(carillon rules)" --configfile workflow.yaml --cores 2
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """There are no arguments."""
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Print the path."""
+    print(settings.FOLDER / "Snakefile")
