@@ -10,6 +10,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
+from carillon import logs
 from carillon.errors import ConvergenceError, UserError, one_line
 from carillon.places import cause
 
@@ -37,6 +38,7 @@ def run(program: str, main: Callable[[], int | None], comm: Comm = None) -> int:
     interrupt from the keyboard.
     """
     _require_streams()
+    logs.show()
     try:
         try:
             status = main() or 0

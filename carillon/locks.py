@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import fcntl
+import logging
 import os
 import stat
 from collections.abc import Iterator
@@ -12,7 +13,8 @@ from pathlib import Path
 
 from carillon.errors import UserError
 from carillon.files import cause, require_writable
-from carillon.progress import say
+
+logger = logging.getLogger(__name__)
 
 _NO_LOCKS = (errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOLCK, errno.EINVAL)
 
@@ -75,7 +77,7 @@ def _lock(name: Path, file: int, refusal: str) -> None:
     except OSError as error:
         if error.errno not in _NO_LOCKS:
             raise UserError(f"{name}: cannot be locked ({cause(error)})") from None
-        say(f"{name}: this file system has no locks; write no result twice at a time")
+        logger.warning(f"{name}: this file system has no locks; write no result twice at a time")
 
 
 def _is_at(name: Path, file: int) -> bool:

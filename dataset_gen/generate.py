@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import shutil
 from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
@@ -14,13 +15,15 @@ import numpy as np
 from carillon.errors import UserError
 from carillon.fem.element import DEFAULT_POISSON
 from carillon.files import require_writable
-from carillon.progress import say, track
+from carillon.progress import track
 from dataset_gen.journal import Journal, discard_journal, journal_of
 from dataset_gen.objectives import DEFAULT_OBJECTIVE
 from dataset_gen.settings import settings_of
 from dataset_gen.shards import Shard, origin_of, read_settings, shard_of, write_rows
 from dataset_gen.tasks import ROW, Plan, rows_of
 from dataset_gen.workers import in_this_process, in_workers
+
+logger = logging.getLogger(__name__)
 
 Engine = Callable[[Plan, range], Generator[bytes, None, None]]
 """Yields the results of tasks in order; see `dataset_gen.workers` and `dataset_gen.ranks`."""
@@ -159,7 +162,9 @@ def _results(journal: Journal, engine: Engine) -> Iterator[bytes]:
     """Rows of all tasks in order: those in the journal, then new ones, once they are in it too."""
     plan = journal.plan
     if journal.tasks:
-        say(f"{journal.path}: going on after {journal.rows:,} of {plan.settings.count:,} samples")
+        logger.info(
+            f"{journal.path}: going on after {journal.rows:,} of {plan.settings.count:,} samples"
+        )
     before = journal.rows
     left = range(journal.tasks, plan.tasks)
     yield from journal.work()

@@ -9,6 +9,7 @@ frame that is cut off or whose checksum differs ends the journal; what follows i
 from __future__ import annotations
 
 import json
+import logging
 import os
 import struct
 import time
@@ -21,9 +22,10 @@ from typing import Any
 from carillon.errors import UserError
 from carillon.files import cause, sync_folder
 from carillon.locks import take
-from carillon.progress import say
 from dataset_gen.settings import settings_from
 from dataset_gen.tasks import Plan
+
+logger = logging.getLogger(__name__)
 
 SYNC_SECONDS = 1.0
 """Work that is lost with a machine that loses power; a process that is killed loses none of it."""
@@ -136,7 +138,9 @@ class Journal:
             end = position
         lost = os.fstat(self._file).st_size - end
         if lost:
-            say(f"{self.path}: the last {lost:,} bytes are damaged or incomplete, done again")
+            logger.warning(
+                f"{self.path}: the last {lost:,} bytes are damaged or incomplete, done again"
+            )
             os.ftruncate(self._file, end)
         return end
 

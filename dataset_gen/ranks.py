@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 import time
@@ -10,11 +11,12 @@ from functools import partial
 
 from carillon.cli import EXIT_BAD_INPUT
 from carillon.errors import UserError
-from carillon.progress import say
 from carillon.ranks import Comm, give_up
 from dataset_gen.crew import lead
 from dataset_gen.generate import Engine
 from dataset_gen.tasks import Plan
+
+logger = logging.getLogger(__name__)
 
 PAUSE = 1e-3
 """Seconds between two looks for messages, so that waiting takes no core from the work."""
@@ -110,5 +112,7 @@ def _warn_about_cores(comm: Comm) -> None:
     node = comm.Split_type(MPI.COMM_TYPE_SHARED)
     cores = set[int]().union(*node.allgather(os.sched_getaffinity(0)))
     if node.rank == 0 and node.size > len(cores):
-        say(f"{node.size} ranks share {len(cores)} cores, more than that make nothing faster")
+        logger.warning(
+            f"{node.size} ranks share {len(cores)} cores, more than that make nothing faster"
+        )
     node.Free()

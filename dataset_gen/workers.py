@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import traceback
@@ -11,9 +12,10 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 
 from carillon.errors import UserError
-from carillon.progress import say
 from dataset_gen.crew import lead
 from dataset_gen.tasks import Plan
+
+logger = logging.getLogger(__name__)
 
 PATIENCE = 1e-2
 """Seconds to wait for the others at most; a result ends the waiting at once."""
@@ -38,7 +40,7 @@ def in_workers(plan: Plan, tasks: range, workers: int) -> Generator[bytes, None,
     """
     cores = len(os.sched_getaffinity(0))
     if workers > cores:
-        say(f"{workers} workers share {cores} cores, more than that make nothing faster")
+        logger.warning(f"{workers} workers share {cores} cores, more than that make nothing faster")
     others = _Workers(plan, min(workers, len(tasks)) - 1)
     try:
         yield from lead(plan, tasks, others)

@@ -106,10 +106,11 @@ def test_sampled_forces_are_each_samples_own_and_come_near_the_closed_form():
     np.testing.assert_allclose(found.moduli.mean(axis=1), exact, rtol=0.1)
 
 
-def test_an_interrupted_shard_goes_on_and_has_the_same_bytes(begun, reference, capsys):
+def test_an_interrupted_shard_goes_on_and_has_the_same_bytes(begun, reference, caplog):
+    caplog.set_level("INFO")
     assert make(begun, engine=engine_of(2)) == SAMPLES - 5 * TASK
     assert begun.read_bytes() == reference
-    assert f"going on after {5 * TASK} of 3,000 samples" in capsys.readouterr().err
+    assert f"going on after {5 * TASK} of 3,000 samples" in caplog.text
     assert list(begun.parent.iterdir()) == [begun]
 
 
@@ -260,23 +261,24 @@ def test_a_worker_that_dies_is_told_in_a_sentence(path, monkeypatch):
 
 
 @pytest.mark.parametrize("cut", [1, 7, 100, 5000])
-def test_a_torn_journal_goes_on_after_the_last_whole_task(begun, reference, cut, capsys):
+def test_a_torn_journal_goes_on_after_the_last_whole_task(begun, reference, cut, caplog):
+    caplog.set_level("INFO")
     journal = journal_of(begun)
     with open(journal, "rb+") as stream:
         stream.truncate(journal.stat().st_size - cut)
     make(begun)
-    assert f"going on after {4 * TASK}" in capsys.readouterr().err
+    assert f"going on after {4 * TASK}" in caplog.text
     assert begun.read_bytes() == reference
 
 
 @pytest.mark.parametrize("place", np.linspace(0.05, 0.95, 7))
-def test_a_damaged_journal_goes_on_before_the_damage(begun, reference, place, capsys):
+def test_a_damaged_journal_goes_on_before_the_damage(begun, reference, place, caplog):
     journal = journal_of(begun)
     content = bytearray(journal.read_bytes())
     content[int(place * len(content))] ^= 4
     journal.write_bytes(content)
     make(begun)
-    assert "done again" in capsys.readouterr().err
+    assert "done again" in caplog.text
     assert begun.read_bytes() == reference
 
 
@@ -333,13 +335,13 @@ def test_one_shard_is_generated_once_at_a_time(path, start):
     assert process.poll() is None and journal_of(path).exists()
 
 
-def test_a_file_system_without_locks_is_told(path, monkeypatch, capsys):
+def test_a_file_system_without_locks_is_told(path, monkeypatch, caplog):
     def unsupported(*_):
         raise OSError(95, "Operation not supported")
 
     monkeypatch.setattr(fcntl, "flock", unsupported)
     make(path, plan_of(200))
-    assert "has no locks" in capsys.readouterr().err
+    assert "has no locks" in caplog.text
 
 
 # What is there already ---------------------------------------------------------------------------

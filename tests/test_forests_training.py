@@ -222,13 +222,13 @@ def test_thinned_dataset_keeps_the_proportions(shards):
     assert part.count == 800 and len(next(part.read(0, 800)).young) == 300
 
 
-def test_too_few_rows_for_the_depth_are_told(shards, capsys):
+def test_too_few_rows_for_the_depth_are_told(shards, caplog):
     model = train(shards, replace(QUICK, max_leaves=30_000))
-    told = capsys.readouterr().err
-    assert "too few for trees of depth 20 with 30,000 leaves of 30 rows each" in told
+    assert "too few for trees of depth 20 with 30,000 leaves of 30 rows each" in caplog.text
     assert model.scores["leaves"] < 4 * 30_000
+    caplog.clear()
     train(shards, replace(QUICK, max_leaves=30))
-    assert "too few" not in capsys.readouterr().err
+    assert "too few" not in caplog.text
 
 
 def test_too_few_samples_are_refused():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import statistics
 import time
 from collections.abc import Callable, Sequence
@@ -14,12 +15,14 @@ import numpy as np
 
 from carillon import provenance
 from carillon.fem.element import Array
-from carillon.progress import say, track
+from carillon.progress import track
 from forests.evaluate import coarsen, coarsen_with_derivatives
 from forests.model import FILLED, VOID, Model, default_path, load_model
 from forests.scaling import FEATURES, prepare
 from forests.studies.synthetic import coherent_blocks, complete_forests, random_blocks
 from forests.training.join import join
+
+logger = logging.getLogger(__name__)
 
 RUNS = 7
 """Timed runs, after one that is not; medians are reported."""
@@ -227,7 +230,7 @@ def benchmark(
     }
     evaluation["coarsen, 1 thread, blocks of a mesh"] = timed(partial(coarsen, model, mesh), blocks)
     leaves = len(model.forests.leaves)
-    say("growing trees of scikit-learn")
+    logger.info("growing trees of scikit-learn")
     rival = against_scikit_learn(young, model.forests.trees, leaves // (2 * model.forests.trees))
     sizes = [
         (trees, depth)

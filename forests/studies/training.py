@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -12,7 +13,6 @@ from carillon.arguments import LARGEST
 from carillon.errors import UserError
 from carillon.fem.element import Array
 from carillon.files import atomic_path
-from carillon.progress import say
 from dataset_gen.generate import generate
 from forests.layout import NODE
 from forests.model import RECORD
@@ -23,6 +23,8 @@ from forests.training.rows import modulus_over_scale, rows_of
 from forests.training.scores import scores_of
 from forests.training.structure import Tree
 from forests.training.train import Trained, Training, train_trees
+
+logger = logging.getLogger(__name__)
 
 TEST_SAMPLES = 20_000
 """Fresh samples of each distribution that the studies are scored on."""
@@ -126,7 +128,7 @@ def variants(
     for name in names:
         changed = replace(training, **VARIANTS[name])
         changed = replace(changed, max_leaves=max(1, leaves // changed.trees))
-        say(name)
+        logger.info(name)
         rows.append({"variant": name, **_row(dataset, changed, workers, test)})
     return rows
 
@@ -150,7 +152,7 @@ def learning_curve(
     found = []
     for count in rows:
         part = dataset.thinned(-(-count // 8))
-        say(f"{8 * part.count:,} rows")
+        logger.info(f"{8 * part.count:,} rows")
         found.append({"rows": 8 * part.count, **_row(part, training, workers, test)})
     return found
 

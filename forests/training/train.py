@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -13,7 +14,7 @@ from joblib import Parallel, delayed
 
 from carillon import provenance
 from carillon.errors import UserError
-from carillon.progress import say, track
+from carillon.progress import track
 from dataset_gen.shards import Shard
 from forests.model import FILLED, VOID, Model
 from forests.scaling import TRANSFORMS
@@ -24,6 +25,8 @@ from forests.training.ranks import Ranks
 from forests.training.rows import STUDIED, rows_of
 from forests.training.scores import held_out_scores, uniform_scores
 from forests.training.structure import GROWERS, Limits, Rows, Tree
+
+logger = logging.getLogger(__name__)
 
 T = TypeVar("T")
 
@@ -130,12 +133,11 @@ def _require_rows(rows: Rows, kind: int, training: Training, tell: bool) -> None
             f"{2 * training.min_leaf}; generate more samples"
         )
     leaves = min(training.max_leaves, 1 << min(training.depth, 62))
-    if len(rows) < leaves * training.min_leaf:
-        say(
+    if tell and len(rows) < leaves * training.min_leaf:
+        logger.warning(
             f"{len(rows):,} rows with a {KINDS[kind]} origin are too few for trees of depth "
             f"{training.depth} with {leaves:,} leaves of {training.min_leaf} rows each: they stop "
-            f"at {len(rows) // training.min_leaf:,} leaves or less",
-            tell,
+            f"at {len(rows) // training.min_leaf:,} leaves or less"
         )
 
 

@@ -16,7 +16,7 @@ from carillon.provenance import record
 from solver.commands.running import on_ranks, require_outputs
 from solver.studies.calibration.constants import Constants
 from solver.studies.calibration.exact import make_cases
-from solver.studies.calibration.gauss_newton import calibrate_in_turn, rms_by_material, say_step
+from solver.studies.calibration.gauss_newton import calibrate_in_turn, log_step, rms_by_material
 
 EXAMPLES = """example:
   calibrate --workers 2 --cases calibration/cases --out calibration.json
@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> None:
         )
         start = Constants.neutral()
         found = calibrate_in_turn(
-            paths, start, DEFAULT_POISSON, arguments.workers, arguments.steps, report=say_step
+            paths, start, DEFAULT_POISSON, arguments.workers, arguments.steps, report=log_step
         )
         source = record(
             {name: getattr(arguments, name) for name in ("solids", "random_only", "seed", "steps")}

@@ -5,6 +5,7 @@ And by forests, which have learned one of the fits: what is lost by that.
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from carillon.errors import ConvergenceError
 from carillon.fem.geometry import Blocks, blocks_from_mesh
 from carillon.fem.model import RIGID_MODES, ElasticModel
-from carillon.progress import say, track
+from carillon.progress import track
 from dataset_gen.objectives import lumped_share
 from solver.analysis.modal_solver import Modes, modal_analysis
 from solver.analysis.options import SolverOptions
@@ -33,6 +34,8 @@ from solver.coarsening.trained import FOREST, Trained, trained_or_reason
 from solver.distribution.collective import keep_on_root, on_root
 from solver.files.modes_file import CHECKS, frequencies
 from solver.studies.comparison import AUDIBLE_LAST, frequency_errors
+
+logger = logging.getLogger(__name__)
 
 Array = NDArray[np.float64]
 
@@ -63,8 +66,8 @@ def rate_objectives(
     truth = _solve(None if solid is None else solid.problem.model, modes, comm)
     exact = frequencies(truth.values)
     names = on_root(comm, lambda: _names(cast(_Solid, solid), objectives))
-    if solid is not None:
-        say(solid.reason, visible=bool(solid.reason))
+    if solid is not None and solid.reason:
+        logger.warning(solid.reason)
     rows = [
         _row(name, solid, exact, comm)
         for name in track(names, "coarsenings", visible=comm.rank == 0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -13,7 +14,7 @@ from carillon.arguments import whole_number
 from carillon.errors import ConvergenceError
 from carillon.fem.geometry import surface_name
 from carillon.options import option
-from carillon.progress import say, track
+from carillon.progress import track
 from carillon.runtime import blas_name, loaded_blas
 from solver.analysis.options import number_of_modes
 from solver.analysis.problem import ProblemOptions
@@ -30,6 +31,8 @@ from solver.studies.benchmark.scores import (
 )
 from solver.studies.benchmark.solid import Solid, make_solid
 from solver.studies.comparison import AUDIBLE_LAST
+
+logger = logging.getLogger(__name__)
 
 Runs = dict[str, list[Run]]
 
@@ -123,7 +126,8 @@ def benchmark_row(
     """
     solid = keep_on_root(comm, partial(make_solid, options, benchmark.modes))
     reason = comm.bcast(None if solid is None else solid.reason)
-    say(reason, visible=comm.rank == 0 and bool(reason))
+    if comm.rank == 0 and reason:
+        logger.warning(reason)
     left_out = benchmark.left_out + (NEED_FORESTS if reason else ())
     default = SlepcConfiguration.default(comm.size)
     _run_once(Methods(solid, _few(benchmark.modes), default, options.seed, comm, True), left_out)
@@ -202,7 +206,8 @@ def _tune(methods: Methods) -> dict[SlepcConfiguration, float]:
     for configuration in track(configurations(methods.comm.size), "tuning", visible=visible):
         methods.configuration = configuration
         tried[configuration] = methods.comm.bcast(methods.slepc().seconds)
-        say(f"SLEPc with {configuration}: {tried[configuration]:.2f} s", visible=visible)
+        if visible:
+            logger.info(f"SLEPc with {configuration}: {tried[configuration]:.2f} s")
     return tried
 
 
@@ -230,7 +235,8 @@ def _alternate(
                 raise
             failed[name] = str(error)
             runs.pop(name)
-            say(f"{name}: {error}", visible=methods.comm.rank == 0)
+            if methods.comm.rank == 0:
+                logger.warning(f"{name}: {error}")
     return runs, failed
 
 

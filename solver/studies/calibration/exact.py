@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import product
@@ -21,12 +22,14 @@ from carillon.fem.geometry import (
 from carillon.fem.geometry.builtin import BUILTINS
 from carillon.fem.materials import NAMES, young_modulus
 from carillon.fem.model import RIGID_MODES, fine_model
-from carillon.progress import say, track
+from carillon.progress import track
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.coarsening.coarsen import CoarseMaterial, block_moduli, coarse_model
 from solver.studies.calibration.cases import Case, write_case
 from solver.studies.calibration.solids import random_solid
+
+logger = logging.getLogger(__name__)
 
 MODES = 60
 """Modes of a case, rigid ones included."""
@@ -81,7 +84,7 @@ def make_cases(folder: Path, seed: int, count: int, objects: bool = True) -> lis
         _made(folder, seed, count, objects), "exact spectra", total=wanted + count, unit="solid"
     )
     paths = [path for path in with_progress if path is not None]
-    say(f"{len(paths)} solids with exact spectra in {folder}")
+    logger.info(f"{len(paths)} solids with exact spectra in {folder}")
     return paths
 
 

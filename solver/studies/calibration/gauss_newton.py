@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -12,12 +13,13 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from carillon.fem.block import least_patterns
-from carillon.progress import say
 from carillon.serial import serial_blas
 from dataset_gen.objectives.calibration import octant_orbits
 from dataset_gen.objectives.factored import unit_moduli
 from solver.studies.calibration.cases import Case, read_case
 from solver.studies.calibration.constants import Constants, filled_places
+
+logger = logging.getLogger(__name__)
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -187,6 +189,6 @@ def _squares(path: Path, vector: Array) -> tuple[str, float]:
     return case.name.rsplit(":", 1)[1], float(np.mean(errors**2))
 
 
-def say_step(number: int, state: Progress) -> None:
+def log_step(number: int, state: Progress) -> None:
     """One line about a step."""
-    say(f"step {number}: rms error {np.expm1(state.rms):.2%}")
+    logger.info(f"step {number}: rms error {np.expm1(state.rms):.2%}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import re
 import shutil
@@ -15,8 +16,10 @@ from typing import Any
 
 from carillon.children import run_child
 from carillon.errors import UserError
-from carillon.progress import say, track
+from carillon.progress import track
 from carillon.runtime import allowed_cores
+
+logger = logging.getLogger(__name__)
 
 LAUNCHER = "mpiexec"
 MOST_RANKS = 1024
@@ -67,10 +70,10 @@ def measure_each(
             failure = _run(command, {**_ALLOWED, **environment, "OMP_NUM_THREADS": "1"})
             if failure is None:
                 found.append(json.loads(out.read_text()))
-                say(f"{ranks} ranks: {found[-1]['seconds']:.2f} s", visible=sys.stderr.isatty())
+                logger.info(f"{ranks} ranks: {found[-1]['seconds']:.2f} s")
             else:
                 failed[ranks] = failure
-                say(f"the run on {ranks} ranks failed: {failure}")
+                logger.warning(f"the run on {ranks} ranks failed: {failure}")
     if not found:
         ranks, failure = next(iter(failed.items()))
         raise UserError(f"the run on {ranks} ranks failed: {failure}")

@@ -1,0 +1,33 @@
+"""What a program shows of the messages that modules log: a line each, on standard error.
+
+Modules log under their own names, `logging.getLogger(__name__)`; whoever imports them decides with
+the standard library what becomes of it.
+"""
+
+from __future__ import annotations
+
+import logging
+
+from carillon.progress import say
+
+ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "workflow")
+
+
+class _Lines(logging.Handler):
+    """Messages as lines among those of the progress."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Show a message."""
+        warning = "warning: " if record.levelno >= logging.WARNING else ""
+        say(f"{warning}{self.format(record)}")
+
+
+_LINES = _Lines()
+
+
+def show() -> None:
+    """Show messages of all rooms from now on."""
+    for room in ROOMS:
+        logger = logging.getLogger(room)
+        logger.setLevel(logging.INFO)
+        logger.addHandler(_LINES)  # once, however often it is asked for
