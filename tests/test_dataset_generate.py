@@ -347,7 +347,7 @@ def test_a_file_system_without_locks_is_told(path, monkeypatch, caplog):
 # What is there already ---------------------------------------------------------------------------
 
 
-def test_the_same_shard_is_not_made_twice(path, monkeypatch, capsys):
+def test_the_same_shard_is_not_made_twice(path, monkeypatch):
     plan = plan_of(200)
     make(path, plan)
     before = path.stat().st_mtime_ns

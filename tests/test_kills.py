@@ -24,7 +24,7 @@ MODES = "solver modes builtin:box --resolution 8 --modes 20 --out modes.h5".spli
 # MUMPS, the default on several ranks, repeats itself but for the last digits.
 ON_RANKS = [*MODES, "--inner", "icc-pcg"]
 BENCHMARK = (
-    "solver benchmark builtin:bar --resolution 10 --modes 12 --runs 1 --skip-arpack --out row.json"
+    "solver benchmark builtin:bar --resolution 10 --modes 12 --runs 1 --no-arpack --out row.json"
 ).split()
 DESIGN = "sound design project.yaml --evaluations 4 --restart --workers 2 --out design.h5".split()
 

@@ -180,7 +180,7 @@ def change(path: Path, addition: str) -> None:
 @pytest.mark.slow
 def test_what_did_not_change_is_not_repeated(run):
     change(run / "dataset_gen" / "generate.py", "# A remark.\n")
-    change(run / "solver" / "lanczos.py", "CHANGED = True\n")
+    change(run / "solver" / "correction" / "lanczos.py", "CHANGED = True\n")
     write_config(run, blocks=20)
     assert repeated(run) == set()
 
