@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -46,8 +48,12 @@ def test_warm_start_reaches_the_same_modes_with_fewer_solves():
     ("material", "sentence"),
     [
         (np.ones(3), r"shape \(3,\), expected \(12,\) or \(12, 8\)"),
-        (np.full(12, -1.0), "expected positive"),
-        (np.full(12, np.nan), "expected positive"),
+        (np.full(12, -1.0), "moduli: 12 values are negative"),
+        (np.full(12, np.nan), "moduli: 12 values are not finite"),
+        (np.zeros((12, 8)), "moduli: all 96 values are zero"),
+        (np.r_[0.0, np.ones(11)], "moduli: 1 voxels have modulus zero"),
+        (np.full(12, 1e20), r"expected 0.001 to 1e\+15 Pa"),
+        (np.full(12, 1.0 + 1.0j), "an array of complex128, expected real numbers"),
         (None, "a mesh has no material"),
         ("cheese", "cheese"),
     ],
@@ -55,6 +61,30 @@ def test_warm_start_reaches_the_same_modes_with_fewer_solves():
 def test_material_that_does_not_fit_is_refused(material, sentence):
     with pytest.raises(UserError, match=sentence):
         solver.solve(solids.box_mesh(3, 2, 2), material, modes=10, comm=COMM)
+    if isinstance(material, np.ndarray):
+        prepared = ModalSolver(solids.random_box(3, 2, 2), SolverOptions(modes=10), COMM)
+        with pytest.raises(UserError, match=sentence):
+            prepared.solve(material)
+
+
+def test_moduli_of_cells_are_those_of_all_their_points():
+    model = solids.random_box(4, 3, 3)
+    prepared = ModalSolver(model, SolverOptions(modes=20), COMM)
+    cells = prepared.solve(2.0 * model.young[:, 0])
+    assert np.array_equal(cells.values, prepared.solve(2.0 * model.young).values)
+
+
+def test_coarse_moduli_may_be_zero_but_not_negative():
+    model = solids.random_box(4, 3, 3)
+    prepared = ModalSolver(model, SolverOptions(modes=20), COMM)
+    moduli = model.young.copy()
+    moduli[0, :2] = 0.0
+    exact = solids.dense_eigenvalues(replace(model, young=moduli))[6:20]
+    found = prepared.solve_coarse(moduli).values[6:]
+    assert np.abs(found / exact - 1.0).max() < 1e-5
+    for wrong, sentence in ((-moduli, "are negative"), (moduli[:, 0], r"expected \(36, 8\)")):
+        with pytest.raises(UserError, match=f"coarse moduli: .*{sentence}"):
+            prepared.solve_coarse(wrong)
 
 
 @pytest.mark.mpi

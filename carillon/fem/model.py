@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from carillon.fem.block import ALL_FILLED, coarse_cell_mass
 from carillon.fem.element import DEFAULT_POISSON, quadrature_stiffness
 from carillon.fem.geometry import HexMesh
+from carillon.fem.moduli import at_points, require_moduli
 
 Array = NDArray[np.float64]
 Chosen = NDArray[np.integer] | NDArray[np.bool_] | slice
@@ -83,7 +84,8 @@ class ElasticModel:
     mesh
         Nodes and cells.
     young
-        (m, 8) Young's modulus [Pa] at each cell's quadrature points.
+        (m, 8) Young's modulus [Pa] at each cell's quadrature points, taken as it is: what users
+        give goes through `fine_model` and `with_young`.
     fill
         (m,) bit pattern of the octants of each cell that hold mass; 255 everywhere on a fine mesh.
     poisson
@@ -124,8 +126,14 @@ class ElasticModel:
         )
 
     def with_young(self, young: Array) -> ElasticModel:
-        """The same solid with other moduli (m, 8) [Pa]."""
-        return replace(self, young=np.ascontiguousarray(young))
+        """The same solid with other moduli, (m,) or (m, 8) [Pa].
+
+        Raises
+        ------
+        UserError
+            For what `carillon.fem.moduli.require_moduli` refuses.
+        """
+        return replace(self, young=at_points(require_moduli(young, self.mesh.n_cells)))
 
     def stiffness(self, cells: Chosen = slice(None)) -> Array:
         """Element stiffness matrices (c, 24, 24) [N/m] of the chosen cells."""
@@ -151,10 +159,16 @@ class Constants(TypedDict, total=False):
 
 
 def fine_model(mesh: HexMesh, young: Array, **constants: Unpack[Constants]) -> ElasticModel:
-    """Model of a fine mesh with one modulus per cell; `young` is (m,) [Pa]."""
+    """Model of a fine mesh with moduli `young`, (m,) or (m, 8) [Pa].
+
+    Raises
+    ------
+    UserError
+        For what `carillon.fem.moduli.require_moduli` refuses.
+    """
     return ElasticModel(
         mesh,
-        np.repeat(young[:, None], 8, axis=1),
+        at_points(require_moduli(young, mesh.n_cells)),
         np.full(mesh.n_cells, ALL_FILLED, dtype=np.uint8),
         **constants,
     )

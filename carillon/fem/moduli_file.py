@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from carillon.limits import LARGEST_CONTRAST, MODULI
+from carillon.fem.moduli import require_moduli
 
 Array = NDArray[np.float64]
 
@@ -49,8 +49,7 @@ def read_moduli(path: Path, count: int, label: str) -> Array:
         ) from None
     if isinstance(values, int):
         raise UserError(f"{path}: {values:,} values for {count:,} voxels ({label})")
-    require_moduli(values, str(path))
-    return values
+    return require_moduli(values, count, str(path))
 
 
 def _from_npy(path: Path, count: int) -> Array | int:
@@ -93,40 +92,3 @@ def _real(word: str) -> float:
     if not word.isascii() or "_" in word:  # a number for Python alone
         raise ValueError(f"found {word[:40]!r}")
     return float(word)
-
-
-def require_moduli(values: Array, source: str) -> None:
-    """Check that `values` (m,) are moduli [Pa] of the cells of one solid.
-
-    Raises
-    ------
-    UserError
-        If not; `source` is where they are from.
-    """
-    bad = np.flatnonzero(~np.isfinite(values))
-    if len(bad):
-        raise UserError(
-            f"{source}: {len(bad):,} values are not finite (the first at index {bad[0]}); "
-            "expected Young's moduli [Pa]"
-        )
-    bad = np.flatnonzero(values < 0.0)
-    if len(bad):
-        raise UserError(
-            f"{source}: {len(bad):,} values are negative (the first at index {bad[0]}: "
-            f"{values[bad[0]]:g}); expected Young's moduli [Pa]"
-        )
-    if not values.any():
-        raise UserError(f"{source}: all {len(values):,} values are zero; expected moduli [Pa]")
-    bad = np.flatnonzero(values == 0.0)
-    if len(bad):
-        raise UserError(
-            f"{source}: {len(bad):,} voxels have modulus zero (the first at index {bad[0]}); give "
-            "them a small positive modulus or take them out of the mesh, since mass without "
-            "stiffness has no place in a spectrum"
-        )
-    low, high = float(values.min()), float(values.max())
-    if low < MODULI[0] or high > MODULI[1] or high > LARGEST_CONTRAST * low:
-        raise UserError(
-            f"{source}: moduli from {low:g} to {high:g} Pa, expected {MODULI[0]:g} to "
-            f"{MODULI[1]:g} Pa, the largest at most {LARGEST_CONTRAST:g} times the least"
-        )

@@ -13,7 +13,6 @@ from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
 from carillon.fem.materials import young_modulus
 from carillon.fem.model import ElasticModel, fine_model
-from carillon.fem.moduli_file import require_moduli
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
 from solver.distribution.collective import keep_on_root
@@ -65,8 +64,8 @@ def solve(
     model
         Hexahedral mesh, or a model with material; ranks other than 0 may pass None.
     material
-        Young's modulus [Pa] of each cell (m,), at its quadrature points (m, 8), or the name of a
-        material (`carillon.fem.materials.NAMES`).  None keeps that of the model.
+        Young's modulus [Pa], (m,) of the cells or (m, 8) at their quadrature points, or the name
+        of a material (`carillon.fem.materials.NAMES`).  None keeps that of the model.
     modes
         Number of modes, rigid ones included.
     start
@@ -126,19 +125,5 @@ def _with_material(
             raise UserError("a mesh has no material; pass Young's modulus [Pa] of its cells")
         return model
     mesh = model if isinstance(model, HexMesh) else model.mesh
-    young = material
-    if isinstance(young, str):
-        young = young_modulus(young, mesh)
-    if young.shape not in ((mesh.n_cells,), (mesh.n_cells, 8)):
-        raise UserError(
-            f"moduli of shape {young.shape}, expected ({mesh.n_cells},) or ({mesh.n_cells}, 8)"
-        )
-    if young.dtype.kind not in "fiu":
-        raise UserError(f"moduli [Pa]: found an array of {young.dtype}, expected real numbers")
-    young = young.astype(float)
-    if not (np.isfinite(young).all() and (young > 0.0).all()):
-        raise UserError("moduli [Pa]: found negative or no numbers, expected positive ones")
-    require_moduli(young.ravel(), "moduli")
-    points = np.broadcast_to(young if young.ndim == 2 else young[:, None], (mesh.n_cells, 8))
-    solid = fine_model(mesh, points[:, 0]) if isinstance(model, HexMesh) else model
-    return solid.with_young(points)
+    young = young_modulus(material, mesh) if isinstance(material, str) else material
+    return fine_model(mesh, young) if isinstance(model, HexMesh) else model.with_young(young)

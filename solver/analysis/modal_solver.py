@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES, ElasticModel
+from carillon.fem.moduli import at_points, require_coarse_moduli, require_moduli
 from carillon.progress import say
 from carillon.runtime import limit_threads, reuse_freed_memory
 from solver.analysis.bounds import FEWEST_SPARE, check_mode_count, default_keep, require_memory
@@ -19,7 +20,7 @@ from solver.analysis.options import SolverOptions
 from solver.analysis.timing import Phases, peak_memory
 from solver.assembly.system import Layout, System, assemble
 from solver.correction.correct import EIGENVALUE_TOLERANCE, correct
-from solver.distribution.collective import on_root
+from solver.distribution.collective import keep_on_root, on_root
 from solver.distribution.local_mesh import Share, deal_moduli, distribute
 from solver.hcms.synthesis import Synthesis, make_subdomains, synthesize
 from solver.linear import InnerSolver, Inverse
@@ -139,6 +140,7 @@ class ModalSolver:
         verbose: bool = False,
     ) -> None:
         on_root(comm, lambda: check_mode_count(options.modes, cast(ElasticModel, model).n_dofs))
+        self._n_cells = on_root(comm, lambda: cast(ElasticModel, model).mesh.n_cells)
         require_memory(model, options, comm)
         self.options = options
         self.comm = comm
@@ -164,23 +166,50 @@ class ModalSolver:
         Parameters
         ----------
         young
-            (m, 8) Young's modulus [Pa] at the cells' quadrature points, on rank 0; that of the
-            model if not given.
+            Young's modulus [Pa], (m,) of the cells or (m, 8) at their quadrature points, on rank
+            0; that of the model if not given.
         start
             Modes of a similar material on the same mesh, or this rank's rows (local, k) of such:
             they are corrected instead of those of HCMS.
 
         Raises
         ------
+        UserError
+            For what `carillon.fem.moduli.require_moduli` refuses.
         ConvergenceError
             If a tolerance was missed, the modes are not orthonormal, or the body does not have six
             zero-frequency modes.
         """
+        return self._solve(young, start, require_moduli)
+
+    def solve_coarse(self, moduli: Array | None, start: Modes | Array | None = None) -> Modes:
+        """The same with the moduli (m, 8) [Pa] that a coarsening made, on rank 0.
+
+        They may lie beyond the limits of those that users give.
+
+        Raises
+        ------
+        UserError
+            For what `carillon.fem.moduli.require_coarse_moduli` refuses.
+        ConvergenceError
+            See `solve`.
+        """
+        return self._solve(moduli, start, require_coarse_moduli)
+
+    def _solve(
+        self,
+        young: Array | None,
+        start: Modes | Array | None,
+        require: Callable[[Array, int], Array],
+    ) -> Modes:
         phases = Phases(self.comm, self._verbose)
         with phases("assembly"):
             share = self.share
-            if young is not None:
-                share = deal_moduli(share, young, self.comm)
+            if self.comm.bcast(young is not None):
+                moduli = keep_on_root(
+                    self.comm, lambda: at_points(require(cast(Array, young), self._n_cells))
+                )
+                share = deal_moduli(share, moduli, self.comm)
             elements = share.cells.elements
             system = assemble(share, self.comm, self._layout, elements, self._threads)
         evidence: dict[str, Any] = {

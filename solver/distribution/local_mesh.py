@@ -8,7 +8,6 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.errors import UserError
 from carillon.fem.model import Chosen, ElasticModel, Elements
 from solver.distribution.collective import on_root
 from solver.distribution.decomposition import Decomposition, decompose
@@ -160,23 +159,8 @@ def deal_moduli(share: Share, young: Array | None, comm: MPI.Comm) -> Share:
     ----------
     young
         (m, 8) moduli [Pa] of all cells of the mesh; only rank 0's are looked at.
-
-    Raises
-    ------
-    UserError
-        On every rank, if there are not as many as cells, or one is not a positive number.
     """
     everyone = comm.gather(share.numbers)
-
-    def check() -> None:
-        assert young is not None and everyone is not None
-        cells = 1 + max(int(numbers.max()) for numbers in everyone)
-        if young.shape != (cells, 8):
-            raise UserError(f"moduli of shape {young.shape}, expected ({cells}, 8)")
-        if not (np.isfinite(young).all() and (young >= 0.0).all() and young.any()):
-            raise UserError("moduli [Pa]: found negative or no numbers, expected positive ones")
-
-    on_root(comm, check)
     if comm.rank == 0:
         assert young is not None and everyone is not None
         for rank in range(1, comm.size):

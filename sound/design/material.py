@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
 from carillon.fem.laplacian import laplacian_modes
+from carillon.fem.moduli import require_moduli
 
 Array = NDArray[np.float64]
 
@@ -61,7 +62,7 @@ class ReducedMaterial:
         Raises
         ------
         UserError
-            If the mesh has too few cells, or the law is unknown.
+            If the mesh has too few cells, the law is unknown or the modulus out of range.
         """
         if law not in LAWS:
             raise UserError(f"material law {law!r} is unknown, expected one of {', '.join(LAWS)}")
@@ -70,6 +71,7 @@ class ReducedMaterial:
                 f"{dimensions} material coordinates for {mesh.n_cells:,} voxels; expected at least "
                 "1 and fewer than voxels"
             )
+        require_moduli(np.full(mesh.n_cells, young), mesh.n_cells, "material to start from")
         values, modes = laplacian_modes(mesh, dimensions + 1)
         basis = np.sqrt(mesh.n_cells) * modes[:, 1:]
         return cls(np.ascontiguousarray(basis), np.maximum(values[1:], 0.0), young, law)

@@ -130,9 +130,7 @@ class Methods:
         solver, start = self._prepared()
         model, coarsened = self._model("ddfem", changed=True)
         begin = self._now()
-        # Only rank 0's moduli are looked at, but every rank must pass some.
-        young = np.empty((0, 8)) if model is None else model.young
-        result = solver.solve(young, start=start)
+        result = solver.solve_coarse(None if model is None else model.young, start)
         return self._run(result, begin, coarsened)
 
     def release(self) -> None:
