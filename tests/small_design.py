@@ -9,7 +9,8 @@ import trimesh
 
 from carillon.fem.model import RIGID_MODES
 from solver import solve
-from solver.coarsening.coarsen import build_model
+from solver.coarsening.choice import make_coarsening
+from solver.coarsening.model import build_model
 from sound.clips.targets import Targets
 from sound.project.design_file import HISTORY_TYPE, Design
 from sound.strikes import Strike
@@ -26,7 +27,7 @@ def small_design() -> Design:
     fine = box_mesh(6, 4, 2, 0.04)
     random = np.random.default_rng(7)
     young = 2e8 * 10.0 ** random.uniform(-0.5, 0.5, fine.n_cells)
-    model = build_model(fine, young, "average")
+    model = build_model(fine, young, make_coarsening("average"))
     found = solve(model, modes=RIGID_MODES + N_MODES, method="slepc")
     assert found.modes is not None
     surface = box_surface()

@@ -13,8 +13,8 @@ from carillon.fem.geometry import blocks_from_mesh
 from forests import coarsen
 from forests import model as forest_model
 from solver.analysis.problem import ProblemOptions, build_problem
-from solver.coarsening.coarsen import block_moduli
-from solver.coarsening.trained import load_trained, trained_or_reason
+from solver.coarsening.forest import forest_or_reason, load_forest
+from solver.coarsening.model import block_moduli
 from solver.files.modes_file import read_modes
 from solver.studies.benchmark import BenchmarkOptions, benchmark_row
 from solver.studies.objectives import BASELINES, rate_objectives
@@ -51,13 +51,13 @@ def test_named_and_default_forests_coarsen_by_the_model_they_hold(forests, as_de
     named = build_problem(options(forest=str(forests)))
     default = build_problem(options())
     e = block_moduli(blocks_from_mesh(named.fine), named.young)
-    assert np.array_equal(named.model.young, coarsen(load_trained(forests, 0.25).model, e))
+    assert np.array_equal(named.model.young, coarsen(load_forest(forests, 0.25).model, e))
     assert np.array_equal(named.model.young, default.model.young)
     digest = hashlib.sha256(forests.read_bytes()).hexdigest()
     for problem, name in ((named, str(forests)), (default, "default")):
-        assert problem.forest["forest"] == name
-        assert digest.startswith(problem.forest["forest_sha256"])
-    assert build_problem(BOX).forest == {}
+        assert problem.coarsening["forest"] == name
+        assert digest.startswith(problem.coarsening["forest_sha256"])
+    assert build_problem(BOX).coarsening == {}
 
 
 def test_another_poisson_ratio_is_answered_with_what_to_train(forests, as_default):
@@ -70,13 +70,13 @@ def test_another_poisson_ratio_is_answered_with_what_to_train(forests, as_defaul
 
 
 def test_absent_default_forests_are_left_out_with_a_sentence(no_default, capsys):
-    assert trained_or_reason(None, 0.25) == "without ddfem: default.h5: no such file"
+    assert forest_or_reason(None, 0.25) == (None, "without ddfem: default.h5: no such file")
     row = benchmark_row(BOX, BRIEFLY)
     assert row["seconds"]["ddfem_hcms_ec"] is None and "ddfem" not in row["frequency_error"]
     assert row["without_forest"] == "without ddfem: default.h5: no such file"
     assert capsys.readouterr().err.startswith("without ddfem: default.h5: no such file\n")
     with pytest.raises(UserError):
-        trained_or_reason("absent.h5", 0.25)
+        forest_or_reason("absent.h5", 0.25)
 
 
 def test_modes_tell_which_forests_coarsened(forests, tmp_path, run_cli):

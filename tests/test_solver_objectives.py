@@ -13,7 +13,9 @@ from dataset_gen.objectives import OBJECTIVES, fit
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem
-from solver.coarsening.coarsen import build_model, fit_distinct
+from solver.coarsening.choice import make_coarsening
+from solver.coarsening.fit import FitCoarsening
+from solver.coarsening.model import build_model
 from solver.files.modes_file import frequencies, read_modes
 from solver.studies.comparison import frequency_errors
 from solver.studies.objectives import BASELINES, FOREST, rate_objectives
@@ -58,7 +60,8 @@ def test_blocks_fitted_once_are_blocks_fitted_each():
     e = np.random.default_rng(0).choice([0.0, 1e8, 1e10], (40, 8))
     e = np.concatenate([e, e[::-1]])
     e[:, 0] = 1e9
-    for once, each in zip(fit_distinct("oversampled", e, 0.25), fit("oversampled", e, 0.25)):
+    found = FitCoarsening("oversampled", 0.25).fits(e)
+    for once, each in zip(found, fit("oversampled", e, 0.25)):
         assert np.array_equal(once, each)
 
 
@@ -69,7 +72,8 @@ def test_errors_are_those_of_the_model_coarsened_by_the_objective(rated):
     for row in rated["rows"]:
         name = row["coarsening"]
         method = name if name in BASELINES else "fit"
-        model = build_model(problem.fine, problem.young, method, objective=_objective(name))
+        coarsening = make_coarsening(method, objective=_objective(name))
+        model = build_model(problem.fine, problem.young, coarsening)
         options = SolverOptions(method="slepc", modes=60, prove=False)
         found = frequencies(modal_analysis(model, options).values)
         error = found[6:] / exact[6:60] - 1.0

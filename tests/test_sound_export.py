@@ -16,7 +16,8 @@ import pytest
 import trimesh
 
 from carillon.fem.model import fine_model
-from solver.coarsening.coarsen import build_model
+from solver.coarsening.choice import make_coarsening
+from solver.coarsening.model import build_model
 from solver.files.modes_file import read_modes
 from solver.response.contact import interpolation
 from solver.studies.audit import audit
@@ -189,7 +190,10 @@ def test_mass_properties_of_a_box() -> None:
 def test_partly_filled_coarse_cells_weigh_what_their_fine_ones_do() -> None:
     mesh = box_mesh(5, 3, 3, 0.02)
     young = np.full(mesh.n_cells, 1e9)
-    coarse, fine = (mass_properties(build_model(mesh, young, m)) for m in ("average", "none"))
+    coarse, fine = (
+        mass_properties(build_model(mesh, young, make_coarsening(method)))
+        for method in ("average", "none")
+    )
     assert coarse.mass == pytest.approx(fine.mass)
     np.testing.assert_allclose(coarse.centre, fine.centre)
     np.testing.assert_allclose(coarse.moments, fine.moments)

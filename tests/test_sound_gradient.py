@@ -69,7 +69,7 @@ def exact(simulation, z):
     The solver leaves an error of 3e-9 in its modes, more or less of it on each processor; in a
     difference over a step of 1e-6 that would be 3e-3.
     """
-    young = simulation.coarsening.moduli(simulation.material.moduli(z))
+    young = simulation.elements.moduli(simulation.material.moduli(z))
     K, M = assembled(simulation.model.with_young(young))
     shift = -1e-2 * young.max() / (simulation.model.density * EDGE**2)
     start = np.random.default_rng(0).standard_normal(K.shape[0])

@@ -45,8 +45,8 @@ ARROWS = {
         solver.assembly solver.linear solver.subspace solver.hcms solver.correction
         solver.reference""",
     "solver": "solver.analysis",
-    "solver.studies": """dataset_gen.objectives solver.coarsening solver.distribution solver.files
-        solver.assembly solver.linear solver.subspace solver.hcms solver.correction
+    "solver.studies": """solver.coarsening solver.distribution solver.files solver.assembly
+        solver.linear solver.subspace solver.hcms solver.correction
         solver.reference solver.analysis""",
     "solver.studies.benchmark": """solver.coarsening solver.distribution solver.files
         solver.assembly solver.linear solver.subspace solver.correction solver.analysis
@@ -62,8 +62,8 @@ ARROWS = {
     "sound": "",
     "sound.clips": "sound",
     "sound.project": "solver.files solver.analysis sound sound.clips",
-    "sound.design": """dataset_gen.objectives forests solver.coarsening solver.files solver.response
-        solver.linear solver.analysis sound sound.clips sound.project""",
+    "sound.design": """solver.coarsening solver.files solver.response solver.linear solver.analysis
+        sound sound.clips sound.project""",
     "sound.rendering": "solver.files solver.response solver.subspace sound.project",
     "sound.export": """solver.files solver.response solver.assembly solver.studies sound
         sound.project sound.rendering""",

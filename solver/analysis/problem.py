@@ -18,9 +18,10 @@ from carillon.fem.model import DEFAULT_DENSITY, ElasticModel
 from carillon.limits import require_constants
 from carillon.options import REQUIRED, option
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, OBJECTIVES
-from solver.coarsening.coarsen import METHODS as COARSENINGS
-from solver.coarsening.coarsen import build_model
-from solver.coarsening.trained import load_trained
+from solver.coarsening.choice import METHODS as COARSENINGS
+from solver.coarsening.choice import make_coarsening
+from solver.coarsening.coarsening import Coarsening
+from solver.coarsening.model import build_model
 
 Array = NDArray[np.float64]
 
@@ -59,19 +60,29 @@ class ProblemOptions:
         """Plain dictionary, for provenance."""
         return asdict(self)
 
+    def coarsening(self) -> Coarsening | None:
+        """The coarsening of the blocks; None if the fine mesh itself is to be analysed.
+
+        Raises
+        ------
+        UserError
+            See `solver.coarsening.choice.make_coarsening`.
+        """
+        return make_coarsening(self.coarsen, self.poisson, self.forest, self.objective)
+
 
 @dataclass(frozen=True)
 class Problem:
     """Fine mesh, its moduli (m,) [Pa], the model to solve, and how long making them took.
 
-    `forest` tells which forests coarsened it; nothing if none did.
+    `coarsening` tells what the coarse elements rest on, see `Coarsening.record`.
     """
 
     fine: HexMesh
     young: Array
     model: ElasticModel
     seconds: dict[str, float]
-    forest: dict[str, str] = field(default_factory=dict)
+    coarsening: dict[str, str] = field(default_factory=dict)
 
 
 def build_problem(options: ProblemOptions) -> Problem:
@@ -92,19 +103,17 @@ def build_problem(options: ProblemOptions) -> Problem:
     label = f"mesh '{name}', resolution {options.resolution}"
     young = young_modulus(options.material, fine, options.seed, label)
     assigned = time.perf_counter()
-    needs_forest = options.coarsen == "ddfem"
-    forest = load_trained(options.forest, options.poisson) if needs_forest else None
+    coarsening = options.coarsening()
     model = build_model(
         fine,
         young,
-        options.coarsen,
-        forest,
-        options.objective,
+        coarsening,
         poisson=options.poisson,
         density=options.density,
         lumped=options.lumped,
     )
     seconds = {"mesh": meshed - begin, "material": assigned - meshed}
-    if options.coarsen != "none":
-        seconds["coarsening"] = time.perf_counter() - assigned
-    return Problem(fine, young, model, seconds, forest.record() if forest else {})
+    if coarsening is None:
+        return Problem(fine, young, model, seconds)
+    seconds["coarsening"] = time.perf_counter() - assigned
+    return Problem(fine, young, model, seconds, coarsening.record())

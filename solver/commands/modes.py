@@ -100,12 +100,10 @@ def _attributes(arguments: argparse.Namespace, problem: Problem, result: Modes) 
         "seed": arguments.seed,
         "interface": arguments.interface,
         "fine_n_dofs": problem.fine.n_dofs,
-        **problem.forest,
+        **problem.coarsening,
         **result.evidence,
         "timings": {**problem.seconds, **result.seconds},
     }
-    if arguments.coarsen == "fit":
-        attributes["objective"] = arguments.objective
     if arguments.tolerance is not None:
         attributes["tolerance"] = arguments.tolerance
     return attributes

@@ -19,18 +19,14 @@ from carillon.errors import ConvergenceError
 from carillon.fem.geometry import Blocks, blocks_from_mesh
 from carillon.fem.model import RIGID_MODES, ElasticModel
 from carillon.progress import track
-from dataset_gen.objectives import lumped_share
 from solver.analysis.modal_solver import Modes, modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import Problem, ProblemOptions, build_problem
-from solver.coarsening.coarsen import (
-    CoarseMaterial,
-    block_moduli,
-    coarse_material,
-    coarse_model,
-    fit_distinct,
-)
-from solver.coarsening.trained import FOREST, Trained, trained_or_reason
+from solver.coarsening.coarsening import Coarsening
+from solver.coarsening.fit import FitCoarsening
+from solver.coarsening.forest import FOREST, ForestCoarsening, forest_or_reason
+from solver.coarsening.linear import LinearCoarsening
+from solver.coarsening.model import block_moduli, coarse_model
 from solver.distribution.collective import keep_on_root, on_root
 from solver.files.modes_file import CHECKS, frequencies
 from solver.studies.comparison import AUDIBLE_LAST, frequency_errors
@@ -62,10 +58,10 @@ def rate_objectives(
     (evidence, seconds, frequencies [Hz]) and `rows`, one a coarsening with the errors over modes
     7..60 (`audible`) and 7..`modes` (`all`), or as many as the coarse model has.
     """
-    solid = keep_on_root(comm, lambda: _read(options))
+    solid = keep_on_root(comm, lambda: _read(options, objectives))
     truth = _solve(None if solid is None else solid.problem.model, modes, comm)
     exact = frequencies(truth.values)
-    names = on_root(comm, lambda: _names(cast(_Solid, solid), objectives))
+    names = on_root(comm, lambda: list(cast(_Solid, solid).coarsenings))
     if solid is not None and solid.reason:
         logger.warning(solid.reason)
     rows = [
@@ -97,6 +93,8 @@ class _Solid:
     ----------
     e
         (mc, 8) fine moduli of the blocks.
+    coarsenings
+        To rate, by the names of their rows.
     forest, reason
         The forests, or None and why.
     """
@@ -104,20 +102,23 @@ class _Solid:
     problem: Problem
     blocks: Blocks
     e: Array
-    forest: Trained | None
+    coarsenings: dict[str, Coarsening]
+    forest: ForestCoarsening | None
     reason: str
 
 
-def _read(options: ProblemOptions) -> _Solid:
-    found = trained_or_reason(options.forest, options.poisson)
-    forest, reason = (None, found) if isinstance(found, str) else (found, "")
+def _read(options: ProblemOptions, objectives: Sequence[str]) -> _Solid:
+    forest, reason = forest_or_reason(options.forest, options.poisson)
     problem = build_problem(replace(options, coarsen="none"))
     blocks = blocks_from_mesh(problem.fine)
-    return _Solid(problem, blocks, block_moduli(blocks, problem.young), forest, reason)
-
-
-def _names(solid: _Solid, objectives: Sequence[str]) -> list[str]:
-    return [*objectives, *([FOREST] if solid.forest else []), *BASELINES]
+    e = block_moduli(blocks, problem.young)
+    coarsenings: dict[str, Coarsening] = {
+        name: FitCoarsening(name, options.poisson) for name in objectives
+    }
+    if forest is not None:
+        coarsenings[FOREST] = forest
+    coarsenings |= {name: LinearCoarsening(name) for name in BASELINES}
+    return _Solid(problem, blocks, e, coarsenings, forest, reason)
 
 
 def _sizes(solid: _Solid) -> dict[str, Any]:
@@ -152,14 +153,19 @@ class _Coarsened:
 
 
 def _coarsen(name: str, solid: _Solid) -> _Coarsened:
-    fine = solid.problem.model
+    fine, coarsening = solid.problem.model, solid.coarsenings[name]
     # Compiling, or loading what was compiled, is not part of fitting.
-    _material(name, solid.forest, solid.e[:1], fine.poisson)
+    _moduli(coarsening, solid.e[:1])
     begin = time.perf_counter()
-    material, converged = _material(name, solid.forest, solid.e, fine.poisson)
+    moduli, converged = _moduli(coarsening, solid.e)
     fitted = time.perf_counter() - begin
     model = coarse_model(
-        solid.blocks, material, poisson=fine.poisson, density=fine.density, lumped=fine.lumped
+        solid.blocks,
+        moduli,
+        coarsening.lumped_fraction,
+        poisson=fine.poisson,
+        density=fine.density,
+        lumped=fine.lumped,
     )
     return _Coarsened(model, fitted, converged)
 
@@ -187,11 +193,9 @@ def _row(name: str, solid: _Solid | None, exact: Array, comm: MPI.Comm) -> dict[
     }
 
 
-def _material(
-    name: str, forest: Trained | None, e: Array, poisson: float
-) -> tuple[CoarseMaterial, float | None]:
-    """Coarse material and the share of blocks whose fit converged, None without a fit."""
-    if name in (FOREST, *BASELINES):
-        return coarse_material(e, name, poisson, forest), None
-    fits = fit_distinct(name, e, poisson)
-    return CoarseMaterial(fits.moduli, lumped_share(name)), float(fits.converged.mean())
+def _moduli(coarsening: Coarsening, e: Array) -> tuple[Array, float | None]:
+    """Coarse moduli and the share of blocks whose fit converged, None without a fit."""
+    if isinstance(coarsening, FitCoarsening):
+        fits = coarsening.fits(e)
+        return fits.moduli, float(fits.converged.mean())
+    return coarsening.moduli(e), None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -100,7 +100,7 @@ class Outcome:
             targets=targets,
             coordinates=found.z,
             young=factor * moduli,
-            model=simulation.model.with_young(factor * simulation.coarsening.moduli(moduli)),
+            model=replace(simulation.model, young=factor * simulation.elements.moduli(moduli)),
             eigenvalues=factor * found.modes.values,
             modes=simulation.mesh_rows(found.modes.vectors),
             surface_vertices=prepared.vertices,

@@ -9,20 +9,14 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.errors import UserError
 from carillon.fem.block import degrees_of_freedom
-from carillon.fem.geometry import HexMesh, blocks_from_mesh
-from carillon.fem.model import RIGID_MODES, Constants, ElasticModel, fine_model
-from dataset_gen.objectives import lumped_share
-from forests import coarsen
-from forests.baselines import average, galerkin
-from forests.evaluate import coarsen_with_derivatives
+from carillon.fem.geometry import HexMesh
+from carillon.fem.model import RIGID_MODES, ElasticModel
 from solver.analysis.modal_solver import ModalSolver, Modes
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
-from solver.coarsening.coarsen import CoarseMaterial, block_moduli, coarse_model
-from solver.coarsening.trained import Trained, load_trained
 from solver.response.contact import interpolation
+from sound.design.elements import AnalysedElements
 from sound.design.material import ReducedMaterial
 from sound.design.objective import Sensitivity
 from sound.design.sensitivity import (
@@ -40,8 +34,6 @@ TOLERANCE = 1e-3
 bark."""
 KRYLOV_BLOCKS = 6
 """Blocks of the Krylov space for what lies outside the computed modes, see `outside_response`."""
-LINEAR = {"average": average, "galerkin": galerkin}
-"""Coarsenings that are linear in the fine moduli."""
 
 
 @dataclass
@@ -67,61 +59,6 @@ class Evaluation:
     pushed: Array
     modes: Modes
     sensitivity: Sensitivity | None = None
-
-
-class Coarsening:
-    """Moduli at the quadrature points of the analysed mesh from those of the fine cells.
-
-    Parameters
-    ----------
-    mesh
-        Fine mesh.
-    options
-        The solid; `coarsen` is `none`, `average`, `galerkin` or `ddfem`.
-    """
-
-    def __init__(self, mesh: HexMesh, options: ProblemOptions) -> None:
-        self.method = options.coarsen
-        self.trained: Trained | None = None
-        constants: Constants = {"poisson": options.poisson, "density": options.density}
-        if self.method == "none":
-            self.model = fine_model(mesh, np.ones(mesh.n_cells), **constants)
-            return
-        self.blocks = blocks_from_mesh(mesh)
-        share = 0.0
-        if self.method == "ddfem":
-            self.trained = load_trained(options.forest, options.poisson)
-            share = lumped_share(self.trained.model.objective)
-        elif self.method not in LINEAR:
-            raise UserError(
-                f"coarsening {self.method!r} has no derivative here, expected none, ddfem, "
-                f"{' or '.join(LINEAR)}"
-            )
-        else:
-            self._rows = LINEAR[self.method](np.eye(8)).T
-        ones = np.ones((self.blocks.coarse.n_cells, 8))
-        self.model = coarse_model(self.blocks, CoarseMaterial(ones, share), **constants)
-
-    def moduli(self, young: Array) -> Array:
-        """Moduli (c, 8) [Pa] at the quadrature points from those (M,) [Pa] of the fine cells."""
-        if self.method == "none":
-            return np.repeat(young[:, None], 8, axis=1)
-        e = block_moduli(self.blocks, young)
-        if self.trained is not None:
-            return coarsen(self.trained.model, e)
-        return np.asarray(e @ self._rows.T)
-
-    def slopes(self, young: Array, directions: Array) -> Array:
-        """Derivatives (8 c, m) of `moduli` along `directions` (M, m) of the fine moduli."""
-        if self.method == "none":
-            return np.repeat(directions, 8, axis=0)
-        fine = self.blocks.fine_of_block
-        inside = np.where(self.blocks.mask[:, :, None], directions[fine], 0.0)
-        if self.trained is not None:
-            _, rows = coarsen_with_derivatives(self.trained.model, block_moduli(self.blocks, young))
-        else:
-            rows = self._rows[None]
-        return np.asarray((rows @ inside).reshape(-1, directions.shape[1]))
 
 
 class Simulation:
@@ -153,7 +90,7 @@ class Simulation:
         tolerance: float = TOLERANCE,
     ) -> None:
         self.material = material
-        self.coarsening = Coarsening(mesh, options)
+        self.elements = AnalysedElements(mesh, options)
         self.modes = modes
         wanted = SolverOptions(modes=RIGID_MODES + modes, tolerance=tolerance)
         self.solver = ModalSolver(self.model, wanted, MPI.COMM_SELF)
@@ -165,7 +102,7 @@ class Simulation:
     @property
     def model(self) -> ElasticModel:
         """The solid that is analysed, with moduli of 1 Pa."""
-        return self.coarsening.model
+        return self.elements.model
 
     def evaluate(
         self, z: Array, start: Modes | Array | None = None, derivatives: bool = False
@@ -180,7 +117,7 @@ class Simulation:
             Whether their derivatives are wanted.
         """
         young = self.material.moduli(z)
-        modes = self.solver.solve(self.coarsening.moduli(young), start)
+        modes = self.solver.solve_coarse(self.elements.moduli(young), start)
         elastic = modes.vectors[:, RIGID_MODES:]
         found = Evaluation(z, modes.values[RIGID_MODES:], self._pushes.T @ elastic, modes)
         return self.differentiate(found) if derivatives else found
@@ -193,7 +130,7 @@ class Simulation:
 
     def _sensitivity(self, young: Array, found: Evaluation, elastic: Array) -> Sensitivity:
         directions = self.material.slopes(young)[:, None] * self.material.basis
-        slopes = self.coarsening.slopes(young, directions)
+        slopes = self.elements.slopes(young, directions)
         inverse = self.solver.inverse(found.modes, shift_between(found.eigenvalues))
         outside = outside_response(
             found.modes, inverse, elastic, found.eigenvalues, self._pushes, KRYLOV_BLOCKS

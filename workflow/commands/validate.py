@@ -28,7 +28,7 @@ from carillon.files import atomic_path
 from carillon.progress import say
 from carillon.runtime import allowed_cores
 from solver.analysis.problem import ProblemOptions, build_problem
-from solver.coarsening.trained import load_trained
+from solver.coarsening.forest import load_forest
 from solver.response.contact import surface_node
 from workflow import settings
 from workflow.report.table import read_table
@@ -179,7 +179,7 @@ def _checked_size(arguments: argparse.Namespace) -> str:
     """The size of the solid, made once to tell all that is wrong with it before anything runs."""
     names = ("mesh", "resolution", "material", "unit", "fill", "pieces", "poisson", "density")
     given = {name: getattr(arguments, name) for name in names}
-    load_trained(arguments.forest, arguments.poisson)
+    load_forest(arguments.forest, arguments.poisson)
     solid = build_problem(ProblemOptions(**given, seed=arguments.seed))
     for name in ("strike", "observed"):
         point = getattr(arguments, name)

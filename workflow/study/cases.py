@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from solver.coarsening.trained import FOREST
+from solver.coarsening.forest import FOREST
 from workflow import settings
 from workflow.study_folder import StudyFolder
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import carillon.fem.materials
 from dataset_gen.objectives import OBJECTIVES
-from solver.coarsening.trained import FOREST
+from solver.coarsening.forest import FOREST
 from workflow.report import evidence_tables
 from workflow.report.table import Column, Table
 from workflow.study.cases import Case, Study

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.coarsening.trained import FOREST
+from solver.coarsening.forest import FOREST
 from workflow.report.table import Column, Table
 from workflow.study.cases import Case, Study
 from workflow.study.errors_tables import FIRST

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from solver.coarsening.trained import FOREST
+from solver.coarsening.forest import FOREST
 from workflow.study.cases import Case, Study
 from workflow.study.identity import label
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from solver.coarsening.trained import FOREST
+from solver.coarsening.forest import FOREST
 from workflow.report.page import inline, page_template
 from workflow.report.table import Table, read_table
 from workflow.study.cases import Study, without

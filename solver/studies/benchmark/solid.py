@@ -14,8 +14,9 @@ from carillon.fem.materials import smooth_field
 from carillon.fem.model import ElasticModel
 from solver.analysis.bounds import check_mode_count
 from solver.analysis.problem import Problem, ProblemOptions, build_problem
-from solver.coarsening.coarsen import CoarseMaterial, block_moduli, coarse_material, coarse_model
-from solver.coarsening.trained import Trained, trained_or_reason
+from solver.coarsening.choice import make_coarsening
+from solver.coarsening.forest import FOREST, ForestCoarsening, forest_or_reason
+from solver.coarsening.model import block_moduli, coarse_model
 
 Array = NDArray[np.float64]
 
@@ -45,7 +46,7 @@ class Solid:
     problem: Problem
     blocks: Blocks
     changed: Array
-    forest: Trained | None
+    forest: ForestCoarsening | None
     reason: str
     seconds: dict[str, float]
 
@@ -58,10 +59,12 @@ class Solid:
         """Model of the blocks by `average` or `ddfem`, and the seconds from fine moduli to it."""
         young = self.changed if changed else self.problem.young
         begin = time.perf_counter()
-        material = self._material(method, block_moduli(self.blocks, young))
+        coarsening = self.forest if method == FOREST else make_coarsening(method)
+        assert coarsening is not None
         model = coarse_model(
             self.blocks,
-            material,
+            coarsening.moduli(block_moduli(self.blocks, young)),
+            coarsening.lumped_fraction,
             poisson=self.fine.poisson,
             density=self.fine.density,
             lumped=self.fine.lumped,
@@ -71,9 +74,6 @@ class Solid:
     def lumped(self) -> ElasticModel:
         """The fine model with a diagonal mass."""
         return replace(self.fine, lumped=True)
-
-    def _material(self, method: str, e: Array) -> CoarseMaterial:
-        return coarse_material(e, method, self.fine.poisson, self.forest)
 
 
 def make_solid(options: ProblemOptions, modes: int) -> Solid:
@@ -85,8 +85,7 @@ def make_solid(options: ProblemOptions, modes: int) -> Solid:
         For anything wrong with the mesh, the material or the forests, or if the fine or the coarse
         model has fewer unknowns than modes are wanted.
     """
-    found = trained_or_reason(options.forest, options.poisson)
-    forest, reason = (None, found) if isinstance(found, str) else (found, "")
+    forest, reason = forest_or_reason(options.forest, options.poisson)
     problem = build_problem(replace(options, coarsen="none"))
     begin = time.perf_counter()
     blocks = blocks_from_mesh(problem.fine)

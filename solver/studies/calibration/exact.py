@@ -25,7 +25,7 @@ from carillon.fem.model import RIGID_MODES, fine_model
 from carillon.progress import track
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
-from solver.coarsening.coarsen import CoarseMaterial, block_moduli, coarse_model
+from solver.coarsening.model import block_moduli, coarse_model
 from solver.studies.calibration.cases import Case, write_case
 from solver.studies.calibration.solids import random_solid
 
@@ -48,7 +48,7 @@ def _case(name: str, mesh: HexMesh, young: Array) -> Case | None:
     """Case of a solid, None if it is too large or too small."""
     blocks = blocks_from_mesh(mesh)
     e = block_moduli(blocks, young)
-    coarse = coarse_model(blocks, CoarseMaterial(np.ones_like(e), 0.0))
+    coarse = coarse_model(blocks, np.ones_like(e))
     if coarse.n_dofs > LARGEST or coarse.n_dofs < 3 * MODES:
         return None
     options = SolverOptions(method="slepc", modes=MODES)

@@ -1,0 +1,100 @@
+"""Coarsening by regression forests: a file that is named, or those that come with the package."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+from carillon.errors import UserError
+from dataset_gen.objectives import lumped_share
+from forests import Model, coarsen, load_model
+from forests import model as forest_model
+from forests.evaluate import coarsen_with_derivatives
+from solver.coarsening.coarsening import Array, Coarsening
+
+FOREST = "ddfem"
+"""What coarsening by forests is called."""
+
+DEFAULT = "default"
+"""Name of the forests that come with the package."""
+
+_DIGITS = 16
+
+
+class ForestCoarsening(Coarsening):
+    """Forests and where they are from.
+
+    Parameters
+    ----------
+    source
+        File as it was named, or `DEFAULT`.
+    model
+        The forests.
+    sha256
+        First digits of the file's SHA-256.
+    """
+
+    def __init__(self, source: str, model: Model, sha256: str) -> None:
+        super().__init__(FOREST, lumped_share(model.objective))
+        self.source = source
+        self.model = model
+        self.sha256 = sha256
+
+    def moduli(self, e: Array) -> Array:
+        """See `Coarsening.moduli`."""
+        return coarsen(self.model, e)
+
+    def moduli_with_derivatives(self, e: Array) -> tuple[Array, Array]:
+        """See `forests.evaluate.coarsen_with_derivatives`."""
+        return coarsen_with_derivatives(self.model, e)
+
+    def record(self) -> dict[str, str]:
+        """The file, its checksum and the objective that its forests learned."""
+        return {
+            "forest": self.source,
+            "forest_objective": self.model.objective,
+            "forest_sha256": self.sha256,
+        }
+
+
+def load_forest(path: str | Path | None, poisson: float) -> ForestCoarsening:
+    """Forests of the file `path`, or the default ones, for a solid of this Poisson's ratio.
+
+    Raises
+    ------
+    UserError
+        If there are none, the file is not a model, or they are for another Poisson's ratio.
+    """
+    source = DEFAULT if path is None else str(path)
+    file = forest_model.default_path() if path is None else Path(path)
+    model = load_model(file)
+    if abs(model.poisson - poisson) > 1e-12:
+        raise UserError(_mismatch(path, model.poisson, poisson))
+    with open(file, "rb") as stream:
+        digest = hashlib.file_digest(stream, "sha256").hexdigest()
+    return ForestCoarsening(source, model, digest[:_DIGITS])
+
+
+def forest_or_reason(
+    path: str | Path | None, poisson: float
+) -> tuple[ForestCoarsening | None, str]:
+    """The same, or None and why there are no default forests for this solid, which is no error."""
+    try:
+        return load_forest(path, poisson), ""
+    except UserError as error:
+        if path is not None:
+            raise
+        return None, f"without ddfem: {error}"
+
+
+def _mismatch(path: str | Path | None, trained: float, wanted: float) -> str:
+    if path is None:
+        return (
+            f"the default forests are for Poisson's ratio {trained:g}, the model has {wanted:g}; "
+            f"train others (python -m dataset_gen generate --poisson {wanted:g}, then python -m "
+            "forests train) and name them with --forest"
+        )
+    return (
+        f"{path}: trained for Poisson's ratio {trained:g}, the model has {wanted:g}; train forests "
+        "for it or pass --poisson"
+    )

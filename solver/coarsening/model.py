@@ -1,0 +1,62 @@
+"""From the fine mesh to the mesh of its 2x2x2 blocks (section 7.1)."""
+
+from __future__ import annotations
+
+from typing import Unpack
+
+import numpy as np
+
+from carillon.errors import UserError
+from carillon.fem.geometry import Blocks, HexMesh, blocks_from_mesh
+from carillon.fem.model import Constants, ElasticModel, fine_model
+from carillon.fem.moduli import require_moduli
+from solver.coarsening.coarsening import Array, Coarsening
+
+
+def block_moduli(blocks: Blocks, young: Array) -> Array:
+    """Fine moduli (mc, 8) of every block, 0 where a cell is void; `young` is (m,) [Pa]."""
+    return np.where(blocks.mask, young[blocks.fine_of_block], 0.0)
+
+
+def build_model(
+    mesh: HexMesh,
+    young: Array,
+    coarsening: Coarsening | None = None,
+    **constants: Unpack[Constants],
+) -> ElasticModel:
+    """Model of the fine mesh, or of its blocks if there is a coarsening.
+
+    Parameters
+    ----------
+    mesh
+        Fine mesh.
+    young
+        (m,) modulus [Pa] of each fine cell; without a coarsening also (m, 8).
+    constants
+        `poisson`, `density` [kg/m^3], `lumped`, see `ElasticModel`.
+
+    Raises
+    ------
+    UserError
+        For what `carillon.fem.moduli.require_moduli` refuses.
+    """
+    if coarsening is None:
+        return fine_model(mesh, young, **constants)
+    given = require_moduli(young, mesh.n_cells)
+    if given.ndim > 1:
+        raise UserError(f"moduli: an array of shape {given.shape}, expected ({mesh.n_cells},)")
+    blocks = blocks_from_mesh(mesh)
+    moduli = coarsening.moduli(block_moduli(blocks, given))
+    return coarse_model(blocks, moduli, coarsening.lumped_fraction, **constants)
+
+
+def coarse_model(
+    blocks: Blocks, moduli: Array, lumped_fraction: float = 0.0, **constants: Unpack[Constants]
+) -> ElasticModel:
+    """Model of the blocks with moduli (mc, 8) [Pa] that a coarsening made.
+
+    The consistent part of the mass is P^T M P over the filled cells; `lumped_fraction` is that of
+    the coarsening.
+    """
+    pattern = np.packbits(blocks.mask, axis=1, bitorder="little").ravel()
+    return ElasticModel(blocks.coarse, moduli, pattern, lumped_share=lumped_fraction, **constants)
