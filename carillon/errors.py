@@ -48,7 +48,7 @@ class ConvergenceError(RuntimeError):
 
 
 class LocalConvergenceError(ConvergenceError):
-    """A solver that one rank runs on its own missed its tolerance; the other ranks do not know."""
+    """A solver that one rank runs on its own failed; the other ranks do not know."""
 
     collective = False
 

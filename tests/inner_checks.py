@@ -36,7 +36,7 @@ def system_of(model: ElasticModel) -> System:
 def right_hand_sides(system: System, columns: int) -> np.ndarray:
     """Random loads, the same on any number of ranks; one holds nothing but a rigid motion."""
     block = np.random.default_rng(7).standard_normal((system.n_dofs, columns))
-    rhs = system.local_rows(block)
+    rhs = solids.local_rows(system, block)
     rhs[:, 1:2] = system.times_mass(np.ascontiguousarray(system.rigid[:, 2:3]))
     rhs[:, 2] = 0.0
     return rhs
@@ -108,7 +108,7 @@ def multigrid_is_symmetric_positive_definite() -> None:
     matrix.axpy(safe_shift(system), system.M, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
     grid = Multigrid(matrix, system.rigid, COMM, dtype=np.float64)
     assert len(grid.sizes) > 1 and grid.sizes[-1] == system.n_dofs
-    rhs = system.local_rows(np.random.default_rng(0).standard_normal((system.n_dofs, 12)))
+    rhs = solids.local_rows(system, np.random.default_rng(0).standard_normal((system.n_dofs, 12)))
     gram = system.inner(rhs, grid.apply(rhs))
     assert np.abs(gram - gram.T).max() < 1e-12 * np.abs(gram).max()
     assert np.linalg.eigvalsh(gram)[0] > 0.0

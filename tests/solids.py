@@ -9,10 +9,12 @@ import numpy as np
 import scipy.linalg as la
 from numpy.polynomial import legendre
 
+from carillon.fem.block import degrees_of_freedom
 from carillon.fem.element import elasticity_matrix
 from carillon.fem.geometry import HexMesh, hexmesh_from_grid
 from carillon.fem.model import ElasticModel, fine_model
 from solver.assembly.sparse import assembled
+from solver.assembly.system import System
 
 
 def box_mesh(nx: int, ny: int, nz: int, edge: float = 0.01) -> HexMesh:
@@ -44,6 +46,11 @@ def symmetric_solid(inside: Callable[[np.ndarray], np.ndarray], cells: int) -> E
     grid = grid[inside(2 * grid - cells + 1)]
     mesh = hexmesh_from_grid(grid - grid.min(axis=0), np.zeros(3), 0.01)
     return fine_model(mesh, np.full(mesh.n_cells, 1e9))
+
+
+def local_rows(system: System, block: np.ndarray) -> np.ndarray:
+    """This rank's rows of a block (n_dofs, k) in mesh node order that every rank holds."""
+    return np.ascontiguousarray(block[degrees_of_freedom(system.nodes)])
 
 
 def dense_eigenvalues(model: ElasticModel) -> np.ndarray:

@@ -391,15 +391,13 @@ def modal_analysis(
     model: ElasticModel | None,
     options: SolverOptions,
     comm: MPI.Comm = MPI.COMM_WORLD,
-    verbose: bool = False,
-    start: Modes | Array | None = None,
 ) -> Modes:
     """Compute the lowest modes of `model` once, see `ModalSolver`.
 
     The seconds of the result hold those of the preparation too.
     """
-    prepared = ModalSolver(model, options, comm, verbose)
-    modes = prepared.solve(start=start)
+    prepared = ModalSolver(model, options, comm)
+    modes = prepared.solve()
     return replace(modes, seconds={**prepared.seconds, **modes.seconds})
 
 

@@ -104,11 +104,6 @@ class Halo:
         """Ranks that this one sends to."""
         return len(self._sent)
 
-    @property
-    def nodes_sent(self) -> int:
-        """Nodes whose rows this rank sends in one exchange."""
-        return sum(len(rows) for _, rows in self._sent)
-
     def exchange(self, block: Array) -> Array:
         """Rows (3 g, k) of the ghosts, of a block (3 local nodes, k) that every rank passes."""
         if not self._received and not self._sent:

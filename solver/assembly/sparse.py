@@ -43,32 +43,24 @@ def assemble_elements(
     cells: NDArray[np.integer],
     stiffness: Array,
     mass: Array,
-    n_rows: int,
-    n_columns: int | None = None,
-    first_row: int = 0,
+    n_nodes: int,
 ) -> tuple[sp.csr_matrix, sp.csr_matrix]:
     """Stiffness and mass (both on displacement unknowns) from element matrices.
 
     Parameters
     ----------
     cells
-        (c, 8) number of each corner.
+        (c, 8) node number of each corner.
     stiffness, mass
         (c, 24, 24) and (c, 8, 8) element matrices.
-    n_rows, n_columns
-        Number of node rows and node columns (equal if not given).
-    first_row
-        The number of the first row; numbers outside the `n_rows` from there on have no row.
+    n_nodes
+        Number of nodes.
     """
-    columns = n_rows if n_columns is None else n_columns
-    rows = np.repeat(cells - first_row, 8, axis=1).ravel()
-    cols = np.tile(cells, (1, 8)).ravel()
-    kept = np.flatnonzero((rows >= 0) & (rows < n_rows))
-    chosen = slice(None) if len(kept) == len(rows) else kept
-    rows, cols = rows[chosen], cols[chosen]
-    shape = (n_rows, columns)
-    stiff = sum_blocks(rows, cols, node_blocks(stiffness).reshape(-1, 3, 3)[chosen], shape)
-    nodal = sum_blocks(rows, cols, mass.reshape(-1, 1, 1)[chosen], shape)
+    rows = np.repeat(cells, 8, axis=1).ravel()
+    columns = np.tile(cells, (1, 8)).ravel()
+    shape = (n_nodes, n_nodes)
+    stiff = sum_blocks(rows, columns, node_blocks(stiffness).reshape(-1, 3, 3), shape)
+    nodal = sum_blocks(rows, columns, mass.reshape(-1, 1, 1), shape)
     return stiff, sp.kron(nodal, sp.identity(3), format="csr")
 
 

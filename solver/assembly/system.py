@@ -121,10 +121,6 @@ class System:
             self.comm.Allreduce(MPI.IN_PLACE, local)
         return local
 
-    def local_rows(self, block: Array) -> Array:
-        """This rank's rows of a replicated block (n_dofs, k) given in mesh node order."""
-        return np.ascontiguousarray(block[degrees_of_freedom(self.nodes)])
-
     def pour(
         self,
         block: Array,

@@ -18,7 +18,6 @@ from scipy.sparse.csgraph import connected_components
 
 from carillon.fem.model import RIGID_MODES, Elements
 from solver.assembly.node_rows import NodeRows, Pattern
-from solver.distribution.local_mesh import Cells
 from solver.hcms.condense import restrict_mass, restrict_stiffness
 from solver.hcms.lowest import STEPS, all_modes, lowest_modes, ritz_pairs
 from solver.linear.multifrontal import Plan
@@ -160,13 +159,6 @@ def _up_to(cutoff: float | None, values: Array, vectors: Array) -> tuple[Array, 
         return values, vectors
     count = max(RIGID_MODES, int(np.searchsorted(values, cutoff, side="right")))
     return values[:count], np.ascontiguousarray(vectors[:, :count])
-
-
-def local_modes(
-    cells: Cells, start: int, stop: int, planes: Index, keep: int, interface: str
-) -> tuple[Array, Array]:
-    """Modes of the rows [start, stop) once, see `Subdomain`."""
-    return Subdomain(cells.corners, start, stop, planes, interface).modes(cells.elements, keep)
 
 
 def _planes_around(

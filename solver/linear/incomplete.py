@@ -23,7 +23,7 @@ class IncompleteCholesky:
     of the identity added, which then stands in the same proportion to soft elements and stiff ones.
     """
 
-    def __init__(self, matrix: Any, levels: int = FILL_LEVELS) -> None:
+    def __init__(self, matrix: Any) -> None:
         """`matrix` is a symmetric positive definite PETSc matrix (AIJ)."""
         # The diagonal block is not ours to change on several ranks.
         self._block = matrix.getDiagonalBlock().copy()
@@ -36,7 +36,7 @@ class IncompleteCholesky:
         self._pc = PETSc.PC().create(PETSc.COMM_SELF)
         self._pc.setOperators(self._block)
         self._pc.setType(PETSc.PC.Type.ICC)
-        self._pc.setFactorLevels(levels)
+        self._pc.setFactorLevels(FILL_LEVELS)
         self._pc.setFactorOrdering(PETSc.Mat.OrderingType.NATURAL)
         self._pc.setFactorShift(PETSc.Mat.FactorShiftType.POSITIVE_DEFINITE)
         self._pc.setUp()

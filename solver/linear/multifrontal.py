@@ -15,7 +15,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.errors import ConvergenceError
+from carillon.errors import LocalConvergenceError
 from carillon.runtime import available_memory
 from carillon.threads import in_parallel, split
 from solver.linear.dissection import Fronts, dissect
@@ -199,7 +199,7 @@ class Factor:
 
     Raises
     ------
-    ConvergenceError
+    LocalConvergenceError
         If it would not fit in memory.
     """
 
@@ -317,7 +317,7 @@ def _require_memory(plan: Plan) -> None:
     """The system lends memory that it has not got, and kills who uses it."""
     available = available_memory()
     if available is not None and plan.bytes > available:
-        raise ConvergenceError(
+        raise LocalConvergenceError(
             f"the sparse factorisation of {3 * len(plan.position):,} unknowns takes about "
             f"{plan.bytes / 1e9:.1f} GB, {available / 1e9:.1f} GB are free; use --inner amg-cg, or "
             "mumps on more ranks of more machines"

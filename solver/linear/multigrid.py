@@ -46,8 +46,6 @@ class Multigrid:
         (local, 6) rigid motions: what smoothing cannot reduce, and coarse levels must represent.
     comm
         Its ranks.
-    threshold
-        See `THRESHOLD`.
     dtype
         Numbers that the cycle computes with.  Single precision halves the traffic of memory, and is
         enough for a preconditioner.
@@ -58,13 +56,12 @@ class Multigrid:
         matrix: Any,
         near_null: Array,
         comm: MPI.Comm,
-        threshold: float = THRESHOLD,
         dtype: Any = np.float32,
         threads: int = 1,
     ) -> None:
         self._dtype = np.dtype(dtype)
         self._threads = threads
-        pc = _aggregate(matrix, near_null, comm, threshold)
+        pc = _aggregate(matrix, near_null, comm)
         count = pc.getMGLevels()
         self._levels = [self._level(pc, number, comm) for number in range(count - 1, 0, -1)]
         coarsest, _ = pc.getMGSmoother(0).getOperators()
@@ -176,7 +173,7 @@ class _Inverse:
         return whole
 
 
-def _aggregate(matrix: Any, near_null: Array, comm: MPI.Comm, threshold: float) -> Any:
+def _aggregate(matrix: Any, near_null: Array, comm: MPI.Comm) -> Any:
     """GAMG preconditioner whose levels are set up; `near_null` is made orthonormal for PETSc."""
     gram = near_null.T @ near_null
     comm.Allreduce(MPI.IN_PLACE, gram)
@@ -187,7 +184,7 @@ def _aggregate(matrix: Any, near_null: Array, comm: MPI.Comm, threshold: float) 
     settings = {
         "pc_type": "gamg",
         "pc_gamg_type": "agg",
-        "pc_gamg_threshold": threshold,
+        "pc_gamg_threshold": THRESHOLD,
         "pc_gamg_coarse_eq_limit": COARSEST_UNKNOWNS,
     }
     options = PETSc.Options(MULTIGRID_PREFIX)

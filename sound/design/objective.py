@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.subspace.spectrum import clusters
 from sound.design.bark import bark, bark_slope
 
 if TYPE_CHECKING:
@@ -154,16 +155,9 @@ def _slopes(eigenvalues: Array, sensitivity: Sensitivity) -> Array:
     a change that keeps them together; of a pair, it is what central differences find.
     """
     slopes = np.einsum("mii->mi", sensitivity.stiffness).copy()
-    for group in _clusters(eigenvalues):
+    for group in clusters(eigenvalues, CLUSTER):
         slopes[:, group] = slopes[:, group].mean(axis=1, keepdims=True)
     return np.asarray(slopes)
-
-
-def _clusters(eigenvalues: Array) -> list[slice]:
-    """Ranges of eigenvalues taken for equal."""
-    apart = np.flatnonzero(np.diff(eigenvalues) > CLUSTER * eigenvalues[1:]) + 1
-    bounds = [0, *apart.tolist(), len(eigenvalues)]
-    return [slice(a, b) for a, b in zip(bounds[:-1], bounds[1:]) if b - a > 1]
 
 
 def _average_slopes(

@@ -23,6 +23,8 @@ CELLS_AT_ONCE = 128
 """Cells whose strain energies exist together."""
 STRAINS = 6
 """Rank of the stiffness of a quadrature point."""
+SHIFT_FRACTION = 0.6
+"""Fraction of the last eigenvalue above which a shift is sought."""
 DEPENDENT = 1e-10
 """Share (squared) of a vector below which it lies in the space that it was made orthogonal to."""
 
@@ -117,11 +119,11 @@ def outside_response(
     return solution.reshape(len(pushes), pushes.shape[1], -1)
 
 
-def shift_between(values: Array, share: float = 0.6) -> float:
-    """A shift in the widest gap of the eigenvalues (N,) above `share` of the last one."""
-    top = values[values >= share * values[-1]]
+def shift_between(values: Array) -> float:
+    """A shift in the widest gap of the eigenvalues (N,) above `SHIFT_FRACTION` of the last one."""
+    top = values[values >= SHIFT_FRACTION * values[-1]]
     if len(top) < 2:
-        return float(share * values[-1])
+        return float(SHIFT_FRACTION * values[-1])
     gap = int(np.argmax(np.diff(top)))
     return float(0.5 * (top[gap] + top[gap + 1]))
 

@@ -39,7 +39,7 @@ _ALLOWED = {
 
 
 def measure_each(
-    arguments: Mapping[int, Sequence[str]], environment: Mapping[str, str] = os.environ
+    arguments: Mapping[int, Sequence[str]],
 ) -> tuple[list[dict[str, Any]], dict[int, str]]:
     """Run `solver scaling ARGUMENTS` on each number of ranks, with one thread a rank.
 
@@ -67,7 +67,7 @@ def measure_each(
             out = Path(folder) / f"{ranks}.json"
             command = [launcher, "-n", str(ranks), sys.executable, "-m", "mpi4py", "-m", "solver"]
             command += ["scaling", *given, "--here", "--out", str(out)]
-            failure = _run(command, {**_ALLOWED, **environment, "OMP_NUM_THREADS": "1"})
+            failure = _run(command, {**_ALLOWED, **os.environ, "OMP_NUM_THREADS": "1"})
             if failure is None:
                 found.append(json.loads(out.read_text()))
                 logger.info(f"{ranks} ranks: {found[-1]['seconds']:.2f} s")

@@ -29,9 +29,7 @@ _GROUP_MESSAGES = 8
 """Announcement, eigenvalues, boundary, modes there, three arrays of cells, projection."""
 
 
-def planned_counts(
-    sizes: TreeSizes, owner: NDArray[np.integer], keep: int, lumped: bool = False
-) -> list[Counts]:
+def planned_counts(sizes: TreeSizes, owner: NDArray[np.integer], keep: int) -> list[Counts]:
     """Counts of every rank, without seconds.
 
     Parameters
@@ -42,8 +40,6 @@ def planned_counts(
         (parts,) rank of each subdomain.
     keep
         Modes kept at the root.
-    lumped
-        Whether the mass is diagonal, so that merges need no mass matrix.
     """
     tree = sizes.tree
     levels = tree.levels()
@@ -66,7 +62,6 @@ def planned_counts(
             modes,
             counts[here].merges[level],
             counts[there].merges[level],
-            lumped,
             here != there,
         )
         last = step.group == len(levels) - 1
@@ -103,7 +98,6 @@ def _plan_merge(
     modes: list[int],
     here: Tally,
     there: Tally,
-    lumped: bool,
     apart: bool,
 ) -> None:
     """Add a merge to the tallies of the rank that makes it and of the right group's leader."""
@@ -114,9 +108,8 @@ def _plan_merge(
     here.flops += _projection(left, rows_left, left, 9 * sizes.pairs_left[number])
     there.flops += _projection(right, rows_right, right, 9 * sizes.pairs_right[number])
     here.flops += _projection(right, rows_right, left, 9 * sizes.pairs_across[number])
-    if not lumped:
-        here.flops += _projection(right, rows_right, left, 3 * sizes.pairs_across[number])
-    here.flops += eigen_flops(left + right, not lumped)
+    here.flops += _projection(right, rows_right, left, 3 * sizes.pairs_across[number])
+    here.flops += eigen_flops(left + right, True)
     boundary_left = int(3 * sizes.boundary_left[number])
     boundary_right = int(3 * sizes.boundary[step.group]) - boundary_left
     here.flops += product_flops(boundary_left, left, joined)
@@ -131,14 +124,3 @@ def _plan_merge(
 def _projection(rows: int, inner: int, columns: int, entries: float) -> float:
     """Flops of modes^T matrix others."""
     return sparse_product_flops(int(entries), columns) + product_flops(rows, inner, columns)
-
-
-def tally_arrays(counts: list[Counts]) -> dict[str, dict[str, NDArray[np.float64]]]:
-    """Quantities (ranks,) by phase."""
-    return {
-        phase: {
-            name: np.array([getattr(each.phases()[phase], name) for each in counts])
-            for name in ("messages", "bytes", "flops")
-        }
-        for phase in counts[0].phases()
-    }
