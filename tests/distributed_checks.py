@@ -24,7 +24,7 @@ from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.assembly.sparse import assembled
 from solver.assembly.system import assemble
-from solver.distribution.local_mesh import Share, distribute
+from solver.distribution.local_mesh import LocalMesh, distribute
 from solver.distribution.messages import receive_arrays, send_arrays
 from solver.files.modes_file import write_modes
 from solver.hcms.condense import INTERFACES
@@ -46,15 +46,21 @@ def on_first(model: ElasticModel) -> ElasticModel | None:
 
 def shares_make_up_the_solid() -> None:
     model = solids.random_box(9, 6, 5)
-    share = distribute(on_first(model), PARTS, comm=COMM)
-    touching = np.isin(model.mesh.cells, share.nodes).any(axis=1)
-    assert len(share.cells) == touching.sum()
-    assert (share.cells.elements.young == model.young[touching]).all()
-    assert (share.positions == model.mesh.nodes[share.nodes]).all()
-    own = share.cells.inside(share.start, share.stop)
+    local_mesh = distribute(on_first(model), PARTS, comm=COMM)
+    touching = np.isin(model.mesh.cells, local_mesh.nodes).any(axis=1)
+    assert len(local_mesh.cells) == touching.sum()
+    assert (local_mesh.cells.elements.young == model.young[touching]).all()
+    assert (local_mesh.positions == model.mesh.nodes[local_mesh.nodes]).all()
+    own = local_mesh.cells.inside(local_mesh.start, local_mesh.stop)
     corners = model.mesh.cells[touching]
-    assert (share.nodes[share.cells.corners[own] - share.start] == corners[own]).all()
-    assert COMM.allreduce(len(share.nodes)) == model.mesh.n_nodes == share.decomposition.n_nodes
+    assert (
+        local_mesh.nodes[local_mesh.cells.corners[own] - local_mesh.start] == corners[own]
+    ).all()
+    assert (
+        COMM.allreduce(len(local_mesh.nodes))
+        == model.mesh.n_nodes
+        == local_mesh.decomposition.n_nodes
+    )
 
 
 def products_are_those_of_the_whole_matrices() -> None:
@@ -93,7 +99,7 @@ def only_the_first_rank_holds_arrays_of_the_length_of_the_mesh() -> None:
     mine = on_first(model)
     sys.setprofile(spy)
     result = modal_analysis(mine, SolverOptions(modes=modes, subdomains=PARTS), COMM)
-    result.system.pour(result.vectors, lambda blocks: [None for _ in blocks] and None)
+    result.system.stream_to_root(result.vectors, lambda blocks: [None for _ in blocks] and None)
     sys.setprofile(None)
     assert bool(seen) == (COMM.rank == 0), seen[:5]
     whole = (model.n_dofs, modes)
@@ -114,7 +120,7 @@ def modes_are_the_same_however_many_columns_travel_together(folder: Path) -> Non
             path = folder / f"{columns}.h5"
             write_modes(path, model, result.values, blocks, result.residuals, {}, {})
 
-        result.system.pour(result.vectors, write, columns)
+        result.system.stream_to_root(result.vectors, write, columns)
 
 
 def failure_of_the_writer_is_everyones() -> None:
@@ -127,7 +133,7 @@ def failure_of_the_writer_is_everyones() -> None:
         raise UserError("planted")
 
     try:
-        system.pour(block, fail, columns=3)
+        system.stream_to_root(block, fail, columns=3)
     except UserError as error:
         assert str(error) == "planted"
     else:
@@ -150,9 +156,9 @@ def bad_input_is_everyones() -> None:
 def a_share_is_no_larger_than_its_part_of_the_mesh() -> None:
     # A long bar: what a rank holds beyond its part is one layer of cells at either end.
     model = solids.random_box(2, 2, 20 * COMM.size)
-    share = distribute(on_first(model), COMM.size, comm=COMM)
-    assert len(share.cells) < 0.8 * model.mesh.n_cells
-    assert len(share.nodes) < 0.8 * model.mesh.n_nodes
+    local_mesh = distribute(on_first(model), COMM.size, comm=COMM)
+    assert len(local_mesh.cells) < 0.8 * model.mesh.n_cells
+    assert len(local_mesh.nodes) < 0.8 * model.mesh.n_nodes
 
 
 class CountingComm:
@@ -177,9 +183,9 @@ class CountingComm:
 
 
 def messages_counted_are_messages_sent() -> None:
-    share = distribute(on_first(solids.random_box(9, 6, 5)), PARTS, comm=COMM)
+    local_mesh = distribute(on_first(solids.random_box(9, 6, 5)), PARTS, comm=COMM)
     counting = CountingComm(COMM)
-    result = synthesize(share, 60, "free", counting)
+    result = synthesize(local_mesh, 60, "free", counting)
     tallies = result.counts.phases().values()
     for quantity in ("messages", "bytes"):
         assert sum(getattr(tally, quantity) for tally in tallies) == counting.sent[quantity]
@@ -188,15 +194,15 @@ def messages_counted_are_messages_sent() -> None:
     assert sent[COMM.rank] == counting.sent["messages"]
     assert (COMM.size == 1) == (sent.sum() == 0)
     # Each merge of two ranks: an announcement and at most seven arrays up, two messages down.
-    crossing = _crossing_merges(share)
+    crossing = _crossing_merges(local_mesh)
     assert sent.sum() <= 10 * crossing + 2 * (COMM.size - 1)
     flops = sum(phase["flops"] for phase in per_rank.values())
     assert (flops > 0).all()
 
 
-def _crossing_merges(share: Share) -> int:
-    leader = share.decomposition.leaders()
-    merges = share.decomposition.tree.merges
+def _crossing_merges(local_mesh: LocalMesh) -> int:
+    leader = local_mesh.decomposition.leaders()
+    merges = local_mesh.decomposition.tree.merges
     return sum(leader[merge.left] != leader[merge.right] for merge in merges)
 
 
@@ -221,10 +227,10 @@ def arrays_arrive_as_they_were() -> None:
 def synthesis_bounds_the_spectrum() -> None:
     model = solids.random_box(7, 5, 4)
     exact = solids.dense_eigenvalues(model)[:40]
-    share = distribute(on_first(model), PARTS, comm=COMM)
-    result = synthesize(share, 80, "free", COMM)
+    local_mesh = distribute(on_first(model), PARTS, comm=COMM)
+    result = synthesize(local_mesh, 80, "free", COMM)
     assert (result.values[:40] >= exact - 1e-9 * exact[-1]).all()
-    system = assemble(share, COMM)
+    system = assemble(local_mesh, COMM)
     vectors = result.vectors
     gram = system.inner(vectors, system.times_mass(vectors))
     assert np.abs(gram - np.eye(len(gram))).max() < 1e-9
@@ -248,12 +254,12 @@ def groups_that_do_not_touch_can_be_merged() -> None:
     grid = np.array([[x, 0, 0] for x in (*range(4), *range(10, 14))])
     mesh = hexmesh_from_grid(grid, np.zeros(3), 0.01)
     model = solids.fine_model(mesh, np.full(len(grid), 1e9))
-    share = distribute(on_first(model), 4, comm=COMM)
-    result = synthesize(share, 40, "free", COMM)
+    local_mesh = distribute(on_first(model), 4, comm=COMM)
+    result = synthesize(local_mesh, 40, "free", COMM)
     exact = solids.dense_eigenvalues(model)
     assert (result.values[:12] < 1e-9 * exact[-1]).all()
     assert result.values[12] > 1e-9 * exact[-1]
-    assert len(degrees_of_freedom(share.nodes)) == len(result.vectors)
+    assert len(degrees_of_freedom(local_mesh.nodes)) == len(result.vectors)
 
 
 def missed_copies_are_found() -> None:

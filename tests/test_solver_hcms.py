@@ -158,10 +158,10 @@ def in_pieces(monkeypatch):
 
 
 def test_all_rigid_motions_of_a_subdomain_in_pieces_are_kept(in_pieces):
-    share = distribute(in_pieces, comm=COMM)
-    part = int(np.argmax(np.diff(share.decomposition.offsets)))
-    cells = share.cells.take(share.cells_by_subdomain(range(part, part + 1))[part])
-    subdomain = make_subdomains(share, "free", COMM)[part]
+    local_mesh = distribute(in_pieces, comm=COMM)
+    part = int(np.argmax(np.diff(local_mesh.decomposition.offsets)))
+    cells = local_mesh.cells.take(local_mesh.cells_by_subdomain(range(part, part + 1))[part])
+    subdomain = make_subdomains(local_mesh, "free", COMM)[part]
     values, vectors = subdomain.modes(cells.elements, 3)
     assert len(values) == vectors.shape[1] > 12
     assert (np.abs(values[:12]) < 1e-9 * values[-1]).all()
@@ -180,21 +180,21 @@ def test_subdomain_in_pieces_spoils_no_spectrum(in_pieces):
 def test_local_modes_are_good_for_smooth_motions_of_any_material(share_of_modes):
     model = solids.random_box(9, 7, 6)
     exact = solids.dense_eigenvalues(model)
-    share = distribute(model, 1, comm=COMM)
-    (subdomain,) = make_subdomains(share, "free", COMM).values()
+    local_mesh = distribute(model, 1, comm=COMM)
+    (subdomain,) = make_subdomains(local_mesh, "free", COMM).values()
     count = int(share_of_modes * model.n_dofs)
-    values, vectors = subdomain.modes(share.cells.elements, count)
+    values, vectors = subdomain.modes(local_mesh.cells.elements, count)
     assert len(values) == count
     assert np.abs(values[:6]).max() < 1e-10 * values[-1]
     error = values[6:] / exact[6:count] - 1.0
     assert (error > -1e-10).all()
     assert np.median(error) < 0.1
-    gram = vectors.T @ assembled_mass(model, share) @ vectors
+    gram = vectors.T @ assembled_mass(model, local_mesh) @ vectors
     assert np.abs(gram - np.eye(count)).max() < 1e-11
 
 
-def assembled_mass(model, share):
-    order = degrees_of_freedom(share.nodes)
+def assembled_mass(model, local_mesh):
+    order = degrees_of_freedom(local_mesh.nodes)
     return assembled(model)[1][order][:, order]
 
 
@@ -214,15 +214,15 @@ def test_overlapping_subdomains_give_better_values_than_free_ones_and_these_than
 def test_a_cutoff_takes_the_place_of_numbers_of_modes(treatment):
     model = solids.random_box(9, 5, 4)
     exact = solids.dense_eigenvalues(model)[6:46]
-    share = distribute(model, 4, comm=COMM)
+    local_mesh = distribute(model, 4, comm=COMM)
     errors = []
     for factor in (2.0, 6.0, 15.0):
-        found = synthesize(share, 60, treatment, COMM, cutoff=factor * exact[-1])
+        found = synthesize(local_mesh, 60, treatment, COMM, cutoff=factor * exact[-1])
         assert len(found.values) == 60
         errors.append(np.median(found.values[6:46] / exact - 1.0))
     assert errors[0] > errors[1] > errors[2] > -1e-9
     # With every mode below the root, the result is exact.
-    whole = synthesize(share, 60, treatment, COMM, cutoff=np.inf)
+    whole = synthesize(local_mesh, 60, treatment, COMM, cutoff=np.inf)
     assert np.abs(whole.values[6:46] / exact - 1.0).max() < 1e-9
 
 
@@ -233,9 +233,9 @@ def test_rigid_motions_are_kept_of_the_smallest_group():
 
 def test_boundary_and_interface_are_those_of_the_whole_mesh():
     model = solids.random_box(8, 6, 5)
-    share = distribute(model, 6, comm=COMM)
-    merges, ranges = share.decomposition.tree.merges, share.decomposition.row_ranges()
-    everything = share.cells
+    local_mesh = distribute(model, 6, comm=COMM)
+    merges, ranges = local_mesh.decomposition.tree.merges, local_mesh.decomposition.row_ranges()
+    everything = local_mesh.cells
     for step in merges:
         start, middle = ranges[step.left]
         _, stop = ranges[step.right]

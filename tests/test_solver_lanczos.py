@@ -26,9 +26,9 @@ class Case:
 
     def __init__(self, model, width):
         self.model = model
-        share = distribute(model, 4, comm=COMM)
-        layout = Layout.of_share(share, COMM)
-        self.system = assemble(share, COMM, layout)
+        local_mesh = distribute(model, 4, comm=COMM)
+        layout = Layout.of_local_mesh(local_mesh, COMM)
+        self.system = assemble(local_mesh, COMM, layout)
         self.inner = InnerSolver("multifrontal", layout)
         self.exact = solids.dense_eigenvalues(model)[6:]
         block = np.random.default_rng(3).standard_normal((model.n_dofs, width))
@@ -76,7 +76,7 @@ def test_a_shift_near_an_eigenvalue_does_no_harm(box, distance):
 def test_a_shift_on_an_eigenvalue_is_moved(box, monkeypatch):
     on_it = box.exact[25] * (1.0 + 1e-12)
     assert box.run(on_it, 60, 1e-8).resonant
-    monkeypatch.setattr("solver.correction.correct.SHIFT_SHARE", on_it / box.values[59])
+    monkeypatch.setattr("solver.correction.correct.SHIFT_FRACTION", on_it / box.values[59])
     result = correct(box.system, box.start, 60, box.inner, box.values, tolerance=1e-8)
     assert np.abs(result.values / box.exact[:60] - 1.0).max() <= 1e-8
 

@@ -41,8 +41,8 @@ from solver.distribution.decomposition import decompose
 
 comm, keep = MPI.COMM_WORLD, 60
 model = build_problem(ProblemOptions("builtin:bar", 24, "smooth")).model
-share = distribute(model, 6, 0, comm)
-found = synthesize(share, keep, "free", comm).counts.per_rank(comm)
+local_mesh = distribute(model, 6, 0, comm)
+found = synthesize(local_mesh, keep, "free", comm).counts.per_rank(comm)
 if comm.rank == 0:
     decomposition, order = decompose(model.mesh, 6, 0, comm.size)
     sizes = sizes_of_mesh(model.mesh, decomposition, order)

@@ -39,10 +39,10 @@ def spectrum(model, **options) -> np.ndarray:
 def test_ritz_values_bound_the_spectrum_and_fall_with_more_modes(lumped):
     model = solids.random_box(8, 5, 3, lumped=lumped)
     exact = solids.dense_eigenvalues(model)
-    share = distribute(model, 5, comm=COMM)
+    local_mesh = distribute(model, 5, comm=COMM)
     before = np.full(40, np.inf)
     for keep in (60, 110, 200):
-        values = synthesize(share, keep, "free", COMM).values[:40]
+        values = synthesize(local_mesh, keep, "free", COMM).values[:40]
         slack = 1e-9 * exact[40]
         assert (values >= exact[:40] - slack).all()
         assert (values <= before + slack).all()
@@ -55,12 +55,12 @@ def test_ritz_values_bound_the_spectrum_and_fall_with_more_modes(lumped):
 def test_all_modes_kept_equal_the_full_solve(interface, subdomains, lumped):
     model = solids.random_box(6, 4, 3, lumped=lumped)
     exact = solids.dense_eigenvalues(model)
-    share = distribute(model, subdomains, comm=COMM)
-    result = synthesize(share, 10**6, interface, COMM)
+    local_mesh = distribute(model, subdomains, comm=COMM)
+    result = synthesize(local_mesh, 10**6, interface, COMM)
     # The eigenvalues of a backward stable solver are off by rounding of the largest one.
     assert np.abs(result.values - exact).max() <= 1e-12 * exact[-1]
     K, M = assembled(model)
-    order = degrees_of_freedom(share.nodes)
+    order = degrees_of_freedom(local_mesh.nodes)
     vectors = np.empty_like(result.vectors)
     vectors[order] = result.vectors
     gram = vectors.T @ (M @ vectors)
@@ -108,15 +108,15 @@ def test_corrected_modes_are_as_accurate_as_the_solver_says(interface, accelerat
 def test_error_estimate_follows_the_true_error(acceleration):
     model = solids.random_box(12, 6, 5)
     exact = solids.dense_eigenvalues(model)
-    share = distribute(model, 6, comm=COMM)
-    system = assemble(share, COMM)
-    start = synthesize(share, 110, "free", COMM).vectors
+    local_mesh = distribute(model, 6, comm=COMM)
+    system = assemble(local_mesh, COMM)
+    start = synthesize(local_mesh, 110, "free", COMM).vectors
     steps = {}
     result = correct(
         system,
         start,
         50,
-        InnerSolver("multifrontal", Layout.of_share(share, COMM)),
+        InnerSolver("multifrontal", Layout.of_local_mesh(local_mesh, COMM)),
         tolerance=0.0,
         max_steps=3,
         acceleration=acceleration,

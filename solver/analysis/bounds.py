@@ -11,12 +11,12 @@ from carillon.fem.model import RIGID_MODES, ElasticModel
 from carillon.runtime import available_memory
 from solver.analysis.options import SolverOptions
 from solver.correction.correct import FEWEST_GUARDS, default_guard
-from solver.distribution.collective import on_root
+from solver.distribution.collective import bcast_from_root
 from solver.reference.truth import SPARE_MODES
 
 FEWEST_SPARE = SPARE_MODES
 """Vectors that the correction needs beyond the modes asked for, to tell the last from the rest."""
-KEPT_SHARE, TOGETHER_SHARE = 1.6, 1.17
+KEPT_FRACTION, TOGETHER_FRACTION = 1.6, 1.17
 """Modes kept at the root of the merge tree, as a share of those asked for, and where a block
 Lanczos iteration corrects them together."""
 FEW_PARTS = 16
@@ -56,7 +56,7 @@ def require_memory(model: ElasticModel | None, options: SolverOptions, comm: MPI
                 f"{free / 1e9:,.1f} GB are free; ask for fewer modes or a lower --resolution"
             )
 
-    on_root(comm, check)
+    bcast_from_root(comm, check)
 
 
 def default_keep(modes: int, parts: int, together: bool = False) -> int:
@@ -67,5 +67,5 @@ def default_keep(modes: int, parts: int, together: bool = False) -> int:
     """
     grown = max(1.0, parts / FEW_PARTS) ** (1.0 / 3.0)
     if together:
-        return max(int(TOGETHER_SHARE * grown * modes), modes + FEWEST_GUARDS + FEWEST_SPARE)
-    return max(int(KEPT_SHARE * grown * modes), modes + default_guard(modes) + FEWEST_SPARE)
+        return max(int(TOGETHER_FRACTION * grown * modes), modes + FEWEST_GUARDS + FEWEST_SPARE)
+    return max(int(KEPT_FRACTION * grown * modes), modes + default_guard(modes) + FEWEST_SPARE)

@@ -15,9 +15,9 @@ from carillon.fem.materials import young_modulus
 from carillon.fem.model import ElasticModel, fine_model
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
-from solver.distribution.collective import keep_on_root
+from solver.distribution.collective import compute_on_root
 from solver.files.modes_file import frequencies
-from solver.files.start import deal_rows
+from solver.files.start import scatter_rows
 
 Array = NDArray[np.float64]
 
@@ -97,13 +97,13 @@ def solve(
     >>> bool(abs(again.frequencies[9] / found.frequencies[9] - 1.1**0.5) < 1e-6)
     True
     """
-    solid = keep_on_root(comm, lambda: _with_material(model, material))
+    solid = compute_on_root(comm, lambda: _with_material(model, material))
     solver = ModalSolver(solid, SolverOptions(modes=modes, **options), comm)
     whole = start.modes if isinstance(start, Solution) else start
     count = comm.bcast(None if whole is None else whole.shape[1])
     rows = None
     if count is not None:
-        rows = deal_rows([] if whole is None else [whole], count, solver.share, comm)
+        rows = scatter_rows([] if whole is None else [whole], count, solver.local_mesh, comm)
     found = solver.solve(start=rows)
     return Solution(
         found.values,

@@ -20,8 +20,8 @@ from solver.analysis.options import SolverOptions
 from solver.analysis.timing import Phases, peak_memory
 from solver.assembly.system import Layout, System, assemble
 from solver.correction.correct import EIGENVALUE_TOLERANCE, correct
-from solver.distribution.collective import keep_on_root, on_root
-from solver.distribution.local_mesh import Share, deal_moduli, distribute
+from solver.distribution.collective import bcast_from_root, compute_on_root
+from solver.distribution.local_mesh import LocalMesh, distribute, scatter_moduli
 from solver.hcms.synthesis import Synthesis, make_subdomains, synthesize
 from solver.linear import InnerSolver, Inverse
 from solver.reference.truth import (
@@ -102,7 +102,7 @@ class ModalSolver:
     Parameters
     ----------
     model
-        The solid; only rank 0's is looked at, and dealt out to the others, who may pass None.
+        The solid; only rank 0's is looked at, and scattered to the others, who may pass None.
     options
         What to compute and how.
     comm
@@ -112,8 +112,8 @@ class ModalSolver:
 
     Attributes
     ----------
-    share
-        This rank's share of the solid.
+    local_mesh
+        This rank's part of the solid.
     seconds
         Wall time of what depends on the mesh alone, by phase.
 
@@ -139,8 +139,7 @@ class ModalSolver:
         comm: MPI.Comm = MPI.COMM_WORLD,
         verbose: bool = False,
     ) -> None:
-        on_root(comm, lambda: check_mode_count(options.modes, cast(ElasticModel, model).n_dofs))
-        self._n_cells = on_root(comm, lambda: cast(ElasticModel, model).mesh.n_cells)
+        self._n_cells = bcast_from_root(comm, lambda: _checked_cells(model, options.modes))
         require_memory(model, options, comm)
         self.options = options
         self.comm = comm
@@ -149,13 +148,13 @@ class ModalSolver:
         reuse_freed_memory()
         phases = Phases(comm, verbose)
         with phases("partition"):
-            self.share = distribute(model, options.subdomains, options.seed, comm)
+            self.local_mesh = distribute(model, options.subdomains, options.seed, comm)
         with phases("analysis"):
-            self._layout = Layout.of_share(self.share, comm)
+            self._layout = Layout.of_local_mesh(self.local_mesh, comm)
             self._inner = InnerSolver(options.inner, self._layout)
             self._keep = self._modes_to_keep()
             if options.method == "hcms":
-                self._subdomains = make_subdomains(self.share, options.interface, comm)
+                self._subdomains = make_subdomains(self.local_mesh, options.interface, comm)
         self.seconds = phases.seconds
 
     def solve(self, young: Array | None = None, start: Modes | Array | None = None) -> Modes:
@@ -204,22 +203,22 @@ class ModalSolver:
     ) -> Modes:
         phases = Phases(self.comm, self._verbose)
         with phases("assembly"):
-            share = self.share
+            local_mesh = self.local_mesh
             if self.comm.bcast(young is not None):
-                moduli = keep_on_root(
+                moduli = compute_on_root(
                     self.comm, lambda: at_points(require(cast(Array, young), self._n_cells))
                 )
-                share = deal_moduli(share, moduli, self.comm)
-            elements = share.cells.elements
-            system = assemble(share, self.comm, self._layout, elements, self._threads)
+                local_mesh = scatter_moduli(local_mesh, moduli, self.comm)
+            elements = local_mesh.cells.elements
+            system = assemble(local_mesh, self.comm, self._layout, elements, self._threads)
         evidence: dict[str, Any] = {
             "ranks": self.comm.size,
             "threads": self._threads,
-            "subdomains": share.decomposition.tree.parts,
-            "n_dofs": share.n_dofs,
+            "subdomains": local_mesh.decomposition.tree.parts,
+            "n_dofs": local_mesh.n_dofs,
         }
         if self.options.method == "hcms":
-            found = self._hcms(share, system, start, phases, evidence)
+            found = self._hcms(local_mesh, system, start, phases, evidence)
         else:
             found = self._general_solver(system, phases, evidence)
         values, vectors = found.values, found.vectors
@@ -255,10 +254,10 @@ class ModalSolver:
         return options.method != "hcms" or corrected
 
     def _modes_to_keep(self) -> int:
-        options, n_dofs = self.options, self.share.n_dofs
+        options, n_dofs = self.options, self.local_mesh.n_dofs
         together = options.acceleration == "lanczos" and self._inner.indefinite
         together = together and options.corrections > 0 and options.tolerance != 0.0
-        parts = self.share.decomposition.tree.parts
+        parts = self.local_mesh.decomposition.tree.parts
         keep = options.keep
         if keep is None:
             keep = default_keep(options.modes, parts, together)
@@ -316,7 +315,7 @@ class ModalSolver:
 
     def _hcms(
         self,
-        share: Share,
+        local_mesh: LocalMesh,
         system: System,
         start: Modes | Array | None,
         phases: Phases,
@@ -332,7 +331,7 @@ class ModalSolver:
         if start is None:
             with phases("hcms"):
                 synthesis = synthesize(
-                    share,
+                    local_mesh,
                     self._keep,
                     options.interface,
                     self.comm,
@@ -399,6 +398,13 @@ def modal_analysis(
     prepared = ModalSolver(model, options, comm)
     modes = prepared.solve()
     return replace(modes, seconds={**prepared.seconds, **modes.seconds})
+
+
+def _checked_cells(model: ElasticModel | None, modes: int) -> int:
+    """Number of cells of a model that has so many modes."""
+    assert model is not None
+    check_mode_count(modes, model.n_dofs)
+    return model.mesh.n_cells
 
 
 def elastic_part(system: System, synthesis: Synthesis) -> tuple[Array | None, Array]:

@@ -21,8 +21,8 @@ from carillon.fem.element import rigid_motions
 from carillon.fem.model import Elements
 from solver.assembly.node_rows import Halo, NodeRows, Pattern
 from solver.assembly.petsc_matrix import distributed_matrix
-from solver.distribution.collective import keep_on_root
-from solver.distribution.local_mesh import Share
+from solver.distribution.collective import compute_on_root
+from solver.distribution.local_mesh import LocalMesh
 
 Array = NDArray[np.float64]
 Number = TypeVar("Number", np.float64, np.int64)
@@ -37,27 +37,27 @@ class Layout:
 
     Attributes
     ----------
-    share
-        This rank's share of the solid.
+    local_mesh
+        This rank's part of the solid.
     pattern, halo
         Node graph of its rows, and the exchange of rows with its neighbours.
     coordinates
         (local nodes, 3) positions relative to the centroid, in units of the largest half extent.
     """
 
-    share: Share
+    local_mesh: LocalMesh
     pattern: Pattern
     halo: Halo
     coordinates: Array
     comm: MPI.Comm
 
     @classmethod
-    def of_share(cls, share: Share, comm: MPI.Comm = MPI.COMM_WORLD) -> Layout:
-        """Layout of a share; collective."""
-        pattern = Pattern.of_cells(share.cells.corners, share.start, share.stop)
-        starts = [share.decomposition.local_range(rank)[0] for rank in range(comm.size)]
-        halo = Halo(pattern, np.array([*starts, share.decomposition.n_nodes]), comm)
-        return cls(share, pattern, halo, _centred(share, comm), comm)
+    def of_local_mesh(cls, local_mesh: LocalMesh, comm: MPI.Comm = MPI.COMM_WORLD) -> Layout:
+        """Layout of a local mesh; collective."""
+        pattern = Pattern.of_cells(local_mesh.cells.corners, local_mesh.start, local_mesh.stop)
+        starts = [local_mesh.decomposition.local_range(rank)[0] for rank in range(comm.size)]
+        halo = Halo(pattern, np.array([*starts, local_mesh.decomposition.n_nodes]), comm)
+        return cls(local_mesh, pattern, halo, _centred(local_mesh, comm), comm)
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class System:
             self.comm.Allreduce(MPI.IN_PLACE, local)
         return local
 
-    def pour(
+    def stream_to_root(
         self,
         block: Array,
         take: Callable[[Iterator[Array]], None],
@@ -145,7 +145,7 @@ class System:
         if self.comm.rank:
             for _ in blocks:
                 pass
-        keep_on_root(self.comm, take_all)
+        compute_on_root(self.comm, take_all)
 
     def _column_blocks(self, block: Array, columns: int) -> Iterator[Array | None]:
         """Columns in mesh node order on rank 0, None elsewhere; every rank must take them all."""
@@ -165,7 +165,7 @@ class System:
         """Whole block (n_dofs, k) in mesh node order on rank 0, None elsewhere.
 
         The one place where something of that size is on one rank: for tests and for models whose
-        modes fit there.  `pour` is for the others.
+        modes fit there.  `stream_to_root` is for the others.
         """
         whole = np.empty((self.n_dofs if self.comm.rank == 0 else 0, block.shape[1]), order="F")
 
@@ -175,7 +175,7 @@ class System:
                 whole[:, first : first + part.shape[1]] = part
                 first += part.shape[1]
 
-        self.pour(block, collect)
+        self.stream_to_root(block, collect)
         return whole if self.comm.rank == 0 else None
 
     def _gathered(self, local: NDArray[Number], per_node: int) -> NDArray[Number] | None:
@@ -198,7 +198,7 @@ class System:
 
 
 def assemble(
-    share: Share,
+    local_mesh: LocalMesh,
     comm: MPI.Comm = MPI.COMM_WORLD,
     layout: Layout | None = None,
     elements: Elements | None = None,
@@ -208,17 +208,17 @@ def assemble(
 
     Parameters
     ----------
-    share
-        This rank's share of the solid.
+    local_mesh
+        This rank's part of the solid.
     layout
         Its layout, if that was made before.
     elements
-        Its cells with other moduli than the share's.
+        Its cells with other moduli than the local mesh's.
     threads
         Threads for products with blocks of vectors.
     """
-    layout = Layout.of_share(share, comm) if layout is None else layout
-    elements = share.cells.elements if elements is None else elements
+    layout = Layout.of_local_mesh(local_mesh, comm) if layout is None else layout
+    elements = local_mesh.cells.elements if elements is None else elements
     rows = NodeRows(layout.pattern, layout.halo, threads)
     rows.add_elements(elements)
     # About the centroid of the whole body: every rank must hold rows of the same six motions.
@@ -227,10 +227,10 @@ def assemble(
         rows,
         motions,
         layout.coordinates,
-        share.nodes,
-        share.start,
-        share.stop,
-        share.n_dofs,
+        local_mesh.nodes,
+        local_mesh.start,
+        local_mesh.stop,
+        local_mesh.n_dofs,
         comm,
     )
     gram = system.inner(motions, system.times_mass(motions))
@@ -238,11 +238,11 @@ def assemble(
     return replace(system, rigid=rigid)
 
 
-def _centred(share: Share, comm: MPI.Comm) -> Array:
+def _centred(local_mesh: LocalMesh, comm: MPI.Comm) -> Array:
     """Positions of this rank's nodes about the centroid, in units of the largest half extent."""
-    total = share.positions.sum(axis=0)
+    total = local_mesh.positions.sum(axis=0)
     comm.Allreduce(MPI.IN_PLACE, total)
-    centred = share.positions - total / share.decomposition.n_nodes
+    centred = local_mesh.positions - total / local_mesh.decomposition.n_nodes
     extent = np.abs(centred).max(keepdims=True)
     comm.Allreduce(MPI.IN_PLACE, extent, op=MPI.MAX)
     return np.asarray(centred / extent)

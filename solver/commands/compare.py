@@ -7,7 +7,7 @@ import json
 
 from carillon.provenance import record
 from solver.commands.running import on_ranks, parameters
-from solver.distribution.collective import on_root
+from solver.distribution.collective import bcast_from_root
 from solver.studies.comparison import compare_files
 
 EXAMPLES = """examples:
@@ -26,7 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Compare and print."""
     with on_ranks() as comm:
-        found = on_root(comm, lambda: compare_files(arguments.candidate, arguments.truth).as_dict())
+        found = bcast_from_root(
+            comm, lambda: compare_files(arguments.candidate, arguments.truth).as_dict()
+        )
         if comm.rank:
             return
     if arguments.json:

@@ -9,7 +9,7 @@ from carillon.options import collect
 from solver.analysis.options import number_of_modes, number_of_steps
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.commands.running import add_solid, on_ranks, parameters, require_outputs, write_json
-from solver.distribution.collective import keep_on_root
+from solver.distribution.collective import compute_on_root
 from solver.studies.convergence import correction_history
 
 EXAMPLES = """example:
@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> None:
     with on_ranks() as comm:
         require_outputs(arguments, comm)
         described = collect(ProblemOptions, arguments)
-        problem = keep_on_root(comm, lambda: build_problem(described))
+        problem = compute_on_root(comm, lambda: build_problem(described))
         model = None if problem is None else problem.model
         history = correction_history(
             model, arguments.modes, arguments.steps, arguments.seed, arguments.truth, comm

@@ -21,7 +21,7 @@ from solver.analysis.modal_solver import ModalSolver, Modes
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import Problem, ProblemOptions, build_problem
 from solver.commands.running import add_solid, on_ranks, parameters, require_outputs
-from solver.distribution.collective import keep_on_root
+from solver.distribution.collective import compute_on_root
 from solver.files.modes_file import frequencies, write_modes
 from solver.files.start import start_from_file
 from solver.linear import petsc_options
@@ -55,13 +55,15 @@ def run(arguments: argparse.Namespace) -> None:
         require_outputs(arguments, comm)
         described = collect(ProblemOptions, arguments)
         options = collect(SolverOptions, arguments)
-        problem = keep_on_root(comm, lambda: build_problem(described))
+        problem = compute_on_root(comm, lambda: build_problem(described))
         model = None if problem is None else problem.model
         petsc_options.insert_options(arguments.petsc, options.method)
         prepared = ModalSolver(model, options, comm, verbose=sys.stderr.isatty())
         start = None
         if arguments.start is not None:
-            start = start_from_file(arguments.start, model, options.modes, prepared.share, comm)
+            start = start_from_file(
+                arguments.start, model, options.modes, prepared.local_mesh, comm
+            )
         result = prepared.solve(start=start)
         result.seconds = {**prepared.seconds, **result.seconds}
         attributes = {} if problem is None else _attributes(arguments, problem, result)
@@ -78,7 +80,7 @@ def run(arguments: argparse.Namespace) -> None:
                 parameters(arguments),
             )
 
-        result.system.pour(result.vectors, write)
+        result.system.stream_to_root(result.vectors, write)
         if comm.rank == 0:
             _warn_about_options()
             _print_summary(attributes, result.values, arguments)

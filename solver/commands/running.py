@@ -16,7 +16,7 @@ from carillon.options import add_options
 from carillon.pictures import require_plottable
 from carillon.runtime import limit_threads, warn_about_reference_blas
 from solver.analysis.problem import ProblemOptions
-from solver.distribution.collective import on_root
+from solver.distribution.collective import bcast_from_root
 from solver.linear import petsc_options
 
 INPUTS = ("mesh", "material", "forest", "truth", "start", "files", "candidates")
@@ -64,7 +64,7 @@ def require_outputs(arguments: argparse.Namespace, comm: MPI.Comm = MPI.COMM_SEL
             if given.get(name) is not None:
                 require_writable(given[name], files)
 
-    on_root(comm, check)
+    bcast_from_root(comm, check)
 
 
 def parameters(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -82,4 +82,4 @@ def write_json(
             temporary.write_text(json.dumps(content))
 
     if arguments.out is not None:
-        on_root(comm, write)
+        bcast_from_root(comm, write)

@@ -17,7 +17,7 @@ from carillon.options import add_options, collect
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.commands.running import add_solid, on_ranks, parameters, require_outputs, write_json
-from solver.distribution.collective import keep_on_root
+from solver.distribution.collective import compute_on_root
 from solver.studies.scaling import ScalingOptions, measure, scaling_study, study_lines
 
 EXAMPLES = """example:
@@ -61,7 +61,7 @@ def _measured_here(
 ) -> tuple[dict[str, Any], list[str]]:
     """What these ranks need for the solid."""
     described = collect(ProblemOptions, arguments)
-    problem = keep_on_root(comm, lambda: build_problem(described))
+    problem = compute_on_root(comm, lambda: build_problem(described))
     model = None if problem is None else problem.model
     found = measure(model, collect(SolverOptions, arguments), comm)
     found["provenance"] = measured(parameters(arguments), comm.size)

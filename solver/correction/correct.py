@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from carillon.errors import ConvergenceError
 from solver.assembly.system import System
 from solver.correction.enrichment import Ritz, Step, enrich, relax
-from solver.correction.lanczos import HIGHEST_SHIFT, ZERO_SHARE, lanczos
-from solver.distribution.collective import on_root
+from solver.correction.lanczos import HIGHEST_SHIFT, ZERO_FRACTION, lanczos
+from solver.distribution.collective import bcast_from_root
 from solver.linear import Approximate, InnerSolver, Inverse
 from solver.subspace.rayleigh_ritz import rayleigh_ritz, safe_shift
 from solver.subspace.spectrum import WEYL_EXPONENT
@@ -32,14 +32,14 @@ LOOSE = 1e-3
 """Tolerance from which on an inverse for a similar material is good enough for a step."""
 NEARLY_ACCURATE = 100.0
 """Error, as a multiple of the tolerance, below which `lanczos` leaves a start to `krylov`."""
-SHIFT_SHARE = 0.52
+SHIFT_FRACTION = 0.52
 """Shift of an indefinite factorisation, as a share of the last wanted eigenvalue."""
-TOP, TOP_SHARE, HIGHEST_TOP_SHIFT = 0.8, 0.98, 1.1
+TOP, TOP_FRACTION, HIGHEST_TOP_SHIFT = 0.8, 0.98, 1.1
 """With all modes accurate below the first share of the last wanted value, the shift is the second,
 and too high above the third."""
 LANCZOS_RUNS, OFF_RESONANCE = 3, 0.97
 """Lanczos iterations at most, and by what the shift is moved off an eigenvalue it has hit."""
-GUARD_SHARE, FEWEST_GUARDS = 0.22, 20
+GUARD_FRACTION, FEWEST_GUARDS = 0.22, 20
 """Vectors carried beyond the wanted ones, as a share of these, and the fewest of them."""
 IMPROVED_GUARDS = 0.4
 """Share of the guard vectors that are improved too, for the sake of the last wanted modes."""
@@ -171,7 +171,7 @@ def correct(
 
 def default_guard(wanted: int) -> int:
     """Extra vectors that the iteration carries; the more, the faster the last modes converge."""
-    return max(FEWEST_GUARDS, int(GUARD_SHARE * wanted))
+    return max(FEWEST_GUARDS, int(GUARD_FRACTION * wanted))
 
 
 class _Iteration:
@@ -192,7 +192,7 @@ class _Iteration:
         self.wanted = wanted
         self.inside = acceleration != "relaxation" and inner.indefinite
         self.lanczos = acceleration == "lanczos" and inner.indefinite
-        self.share = SHIFT_SHARE
+        self.share = SHIFT_FRACTION
         self.similar = similar
         self.made: Inverse | None = None
         guard = default_guard(wanted)
@@ -333,7 +333,7 @@ class _Iteration:
     def _shift(self) -> float:
         if not self.inside:
             return -safe_shift(self.system)
-        return self._last() * (TOP_SHARE if self._only_top_is_left() else self.share)
+        return self._last() * (TOP_FRACTION if self._only_top_is_left() else self.share)
 
     def _only_top_is_left(self) -> bool:
         """Whether just modes at the end of those wanted are not accurate yet."""
@@ -349,7 +349,7 @@ class _Iteration:
         candidates = ritz.active[: max(0, self.improved - ritz.locked)]
         residual = ritz.residual(candidates)
         estimate = self._estimate(candidates, residual)
-        ritz.errors[candidates] = on_root(self.system.comm, lambda: estimate)
+        ritz.errors[candidates] = bcast_from_root(self.system.comm, lambda: estimate)
         errors = ritz.errors[np.argsort(ritz.values, kind="stable")[: self.wanted]]
         limit = tolerance if _typical(errors) <= TYPICAL * tolerance else TYPICAL * tolerance
         inside = candidates[: max(0, self.wanted - ritz.locked)]
@@ -366,7 +366,7 @@ class _Iteration:
         weighted = residual / np.repeat(mass, 3)[:, None]
         square = self.system.column_products(residual, weighted)
         distance = np.maximum(last - values, np.finfo(float).eps * last)
-        size = np.maximum(values, ZERO_SHARE * last)
+        size = np.maximum(values, ZERO_FRACTION * last)
         return np.maximum(square / (size * distance), np.finfo(float).eps)
 
     def _first_beyond(self) -> float:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
 from solver.assembly.system import System
-from solver.distribution.collective import on_root
+from solver.distribution.collective import bcast_from_root
 from solver.linear import Inverse
 from solver.subspace.orthonormal import WELL_CONDITIONED, orthonormal
 from solver.subspace.rayleigh_ritz import rayleigh_ritz
@@ -76,7 +76,7 @@ class Ritz:
         vectors = np.ascontiguousarray(self.vectors[:, chosen])
         residual = self.system.times_stiffness(vectors)
         quotients = self.system.column_products(vectors, residual)
-        self.values[numbers] = on_root(self.system.comm, lambda: quotients)
+        self.values[numbers] = bcast_from_root(self.system.comm, lambda: quotients)
         mass_vectors, values = self.mass_vectors[:, chosen], self.values[numbers]
         for first in range(0, len(residual), ROWS_AT_ONCE):
             rows = slice(first, first + ROWS_AT_ONCE)
@@ -164,7 +164,7 @@ def enrich(
     keep = max(0, width - ritz.locked)
 
     # Solved once: two processors may round apart, and an eigenvector's sign hangs on rounding.
-    values, of_all, of_corrections = on_root(
+    values, of_all, of_corrections = bcast_from_root(
         system.comm,
         lambda: _lowest(ritz.values, ritz.active, overlap, gram, across, stiff, keep),
     )
@@ -190,7 +190,7 @@ def _independent(system: System, ritz: Ritz, Z: Array) -> tuple[Array, Array, Ar
         overlap = system.inner(ritz.mass_vectors, Z)
         gram = system.inner(Z, system.times_mass(Z))
         outside = _outside(overlap, gram)
-        basis, condition = on_root(system.comm, partial(orthonormal, outside))
+        basis, condition = bcast_from_root(system.comm, partial(orthonormal, outside))
         alone = bool((np.diag(outside) > NEARLY_INSIDE * np.diag(gram)).all())
         # Locked vectors are coupled to the active ones by K, which no formula below accounts for.
         good = alone and condition > WELL_CONDITIONED and not (ritz.locked and passes == 0)

@@ -15,7 +15,7 @@ import scipy.linalg as la
 from numpy.typing import NDArray
 
 from solver.assembly.system import System
-from solver.distribution.collective import on_root
+from solver.distribution.collective import bcast_from_root
 from solver.linear import Inverse
 from solver.subspace.orthonormal import WELL_CONDITIONED, is_cancelled, orthonormal
 
@@ -41,9 +41,9 @@ LONGEST = 4
 """Dimension at which the iteration ends in any case, as a multiple of the modes wanted."""
 PESSIMISM = 4.0
 """What the estimated errors are above those of the Ritz values that the result has, at least."""
-ZERO_SHARE = 1e-8
+ZERO_FRACTION = 1e-8
 """Share of the last wanted eigenvalue below which one is zero, and its error absolute."""
-ROUNDING_SHARE = 1e-3
+ROUNDING_FRACTION = 1e-3
 """Share of the shift by which rounding may take a small eigenvalue below zero."""
 RESOLVED = 1e-2
 """Share (squared) of the residual in the image of a Ritz vector below which it is resolved."""
@@ -222,14 +222,14 @@ class _Basis:
     def _continue_with(self, block: Array, mass_block: Array, gram: Array) -> None:
         """Q and M Q with Q^T M Q = I and Q R = `block`, and R, come next."""
         system = self._system
-        weights, condition = on_root(system.comm, lambda: orthonormal(gram))
+        weights, condition = bcast_from_root(system.comm, lambda: orthonormal(gram))
         self.remainder = block @ weights
         self._mass_remainder = mass_block @ weights
         self._coupling = weights.T @ gram
         if condition <= WELL_CONDITIONED:
             # Twice is enough.
             again = system.inner(self.remainder, system.times_mass(self.remainder))
-            weights, _ = on_root(system.comm, lambda: orthonormal(again))
+            weights, _ = bcast_from_root(system.comm, lambda: orthonormal(again))
             self.remainder = self.remainder @ weights
             self._mass_remainder = system.times_mass(self.remainder)
             self._coupling = system.inner(self._mass_remainder, block)
@@ -251,7 +251,7 @@ class _Basis:
         first = min([*unresolved[unresolved >= wanted], len(order) - 1])
         distance = np.abs(inverted - inverted[first])[:wanted]
         values = values[:wanted]
-        size = np.maximum(values, ZERO_SHARE * values[-1])
+        size = np.maximum(values, ZERO_FRACTION * values[-1])
         error = square[:wanted] / distance * (values - mu) ** 2 / size
         return float(error.max()) / PESSIMISM, float(values[wanted - 1])
 
@@ -266,7 +266,7 @@ class _Basis:
             inverted, vectors = la.eigh(T, driver="evd", check_finite=False)
             return inverted, vectors, self._coupling @ vectors[self._last]
 
-        return on_root(self._system.comm, solve)
+        return bcast_from_root(self._system.comm, solve)
 
     def ritz_pairs(self, count: int) -> tuple[Array, Array]:
         """The lowest `count` Ritz pairs of K, in the span of the operator's and the remainder.
@@ -293,7 +293,7 @@ class _Basis:
             weights = weights[:, :size]
             return values[:size] + mu, vectors[:, order] @ weights[:size], weights[size:]
 
-        values, weights, of_last = on_root(system.comm, project)
+        values, weights, of_last = bcast_from_root(system.comm, project)
         found = self._vectors[:, self._rigid : self._rigid + self.size] @ weights
         found += block @ of_last
         return values, found
@@ -330,6 +330,6 @@ def _lowest(inverted: Array, shift: float, count: int) -> tuple[NDArray[np.int64
     for the stiffness to say.
     """
     values = shift + 1.0 / inverted
-    possible = np.flatnonzero(values > -ROUNDING_SHARE * abs(shift))
+    possible = np.flatnonzero(values > -ROUNDING_FRACTION * abs(shift))
     order = possible[np.argsort(values[possible])][:count]
     return order, values[order]

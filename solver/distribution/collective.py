@@ -10,7 +10,7 @@ from mpi4py import MPI
 T = TypeVar("T")
 
 
-def on_root(comm: MPI.Comm, compute: Callable[[], T]) -> T:
+def bcast_from_root(comm: MPI.Comm, compute: Callable[[], T]) -> T:
     """Call `compute` on rank 0 and give every rank its result, or its exception."""
     result, failure = _attempt(comm, compute)
     result, failure = comm.bcast((result, failure), root=0)
@@ -20,7 +20,7 @@ def on_root(comm: MPI.Comm, compute: Callable[[], T]) -> T:
     return cast(T, result)
 
 
-def keep_on_root(comm: MPI.Comm, compute: Callable[[], T]) -> T | None:
+def compute_on_root(comm: MPI.Comm, compute: Callable[[], T]) -> T | None:
     """Call `compute` on rank 0, which keeps the result; its exception is raised on every rank."""
     result, failure = _attempt(comm, compute)
     failure = comm.bcast(failure, root=0)

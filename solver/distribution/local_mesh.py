@@ -1,4 +1,4 @@
-"""Each rank's share of the solid, dealt out once by rank 0, which alone reads and cuts the mesh."""
+"""Each rank's part of the solid, scattered once by rank 0, which alone reads and cuts the mesh."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.fem.model import Chosen, ElasticModel, Elements
-from solver.distribution.collective import on_root
+from solver.distribution.collective import bcast_from_root
 from solver.distribution.decomposition import Decomposition, decompose
 from solver.distribution.messages import AnyArray, receive_arrays, send_arrays
 
 Array = NDArray[np.float64]
 
-_SHARE, _MODULI = 10, 12
+_LOCAL_MESH, _MODULI = 10, 12
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Cells:
 
 
 @dataclass(frozen=True)
-class Share:
+class LocalMesh:
     """What one rank knows of the solid.
 
     Attributes
@@ -115,8 +115,8 @@ def distribute(
     subdomains: int | None = None,
     seed: int = 0,
     comm: MPI.Comm = MPI.COMM_WORLD,
-) -> Share:
-    """Cut the solid on rank 0 and give every rank its share.
+) -> LocalMesh:
+    """Cut the solid on rank 0 and give every rank its part.
 
     Parameters
     ----------
@@ -141,39 +141,39 @@ def distribute(
         nothing = model.elements.with_material(np.empty((0, 8)), np.empty(0, dtype=np.uint8))
         return decomposition, nothing
 
-    decomposition, constants = on_root(comm, cut)
+    decomposition, constants = bcast_from_root(comm, cut)
     if comm.rank == 0:
         assert model is not None
-        nodes, positions, numbers, cells = _deal(model, decomposition, order, comm)
+        nodes, positions, numbers, cells = _scatter(model, decomposition, order, comm)
     else:
-        nodes, positions, numbers, *arrays = receive_arrays(comm, 0, _SHARE)
+        nodes, positions, numbers, *arrays = receive_arrays(comm, 0, _LOCAL_MESH)
         cells = Cells(np.empty((0, 8), dtype=np.int64), constants).from_arrays(arrays)
     start, stop = decomposition.local_range(comm.rank)
-    return Share(decomposition, start, stop, cells, nodes, positions, numbers)
+    return LocalMesh(decomposition, start, stop, cells, nodes, positions, numbers)
 
 
-def deal_moduli(share: Share, young: Array | None, comm: MPI.Comm) -> Share:
-    """The same share of a solid with other moduli.
+def scatter_moduli(local_mesh: LocalMesh, young: Array | None, comm: MPI.Comm) -> LocalMesh:
+    """A rank's part of the solid with other moduli.
 
     Parameters
     ----------
     young
         (m, 8) moduli [Pa] of all cells of the mesh; only rank 0's are looked at.
     """
-    everyone = comm.gather(share.numbers)
+    everyone = comm.gather(local_mesh.numbers)
     if comm.rank == 0:
         assert young is not None and everyone is not None
         for rank in range(1, comm.size):
             send_arrays(comm, [young[everyone[rank]]], rank, _MODULI).wait()
-        mine = young[share.numbers]
+        mine = young[local_mesh.numbers]
     else:
         (mine,) = receive_arrays(comm, 0, _MODULI)
-    elements = share.cells.elements
-    cells = replace(share.cells, elements=elements.with_material(mine, elements.fill))
-    return replace(share, cells=cells)
+    elements = local_mesh.cells.elements
+    cells = replace(local_mesh.cells, elements=elements.with_material(mine, elements.fill))
+    return replace(local_mesh, cells=cells)
 
 
-def _deal(
+def _scatter(
     model: ElasticModel, decomposition: Decomposition, order: NDArray[np.int64], comm: MPI.Comm
 ) -> tuple[NDArray[np.int64], Array, NDArray[np.int64], Cells]:
     """Send every rank its nodes, their positions, its cells' numbers and cells; return rank 0's."""
@@ -185,16 +185,16 @@ def _deal(
     rank_of, cell = _incidences(np.searchsorted(ends, corners, side="right"))
     first = np.searchsorted(rank_of, np.arange(comm.size + 1))
 
-    def share(rank: int) -> tuple[NDArray[np.int64], Array, NDArray[np.int64], Cells]:
+    def part(rank: int) -> tuple[NDArray[np.int64], Array, NDArray[np.int64], Cells]:
         start, stop = decomposition.local_range(rank)
         nodes = order[start:stop].copy()
         numbers = cell[first[rank] : first[rank + 1]].copy()
         return nodes, model.mesh.nodes[nodes], numbers, whole.take(numbers)
 
     for rank in range(1, comm.size):
-        *arrays, cells = share(rank)
-        send_arrays(comm, [*arrays, *cells.arrays()], rank, _SHARE).wait()
-    return share(0)
+        *arrays, cells = part(rank)
+        send_arrays(comm, [*arrays, *cells.arrays()], rank, _LOCAL_MESH).wait()
+    return part(0)
 
 
 def _incidences(

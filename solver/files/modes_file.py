@@ -83,7 +83,8 @@ def write_modes(
     ----------
     modes
         Blocks (n_dofs, c) of the modes in mesh node order, from the lowest up, as
-        `System.pour` gives them; each is on its way to disk before the next one is asked for.
+        `System.stream_to_root` gives them; each is on its way to disk before the next one is
+        asked for.
     attributes, parameters
         Evidence and timings; the parameters of the command, for the provenance.
     more

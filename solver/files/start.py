@@ -1,4 +1,4 @@
-"""Modes that a correction starts from: read from a file or given whole, dealt out to the ranks."""
+"""Modes that a correction starts from: read from a file or given whole, scattered to the ranks."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from carillon.errors import LocalUserError, UserError
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.model import ElasticModel
 from carillon.files import open_h5
-from solver.distribution.collective import on_root
-from solver.distribution.local_mesh import Share
+from solver.distribution.collective import bcast_from_root
+from solver.distribution.local_mesh import LocalMesh
 from solver.distribution.messages import receive_arrays, send_arrays
 from solver.files.modes_file import KIND, SCHEMA
 
@@ -27,7 +27,7 @@ _ROWS = 13
 
 
 def start_from_file(
-    path: str | Path, model: ElasticModel | None, modes: int, share: Share, comm: MPI.Comm
+    path: str | Path, model: ElasticModel | None, modes: int, local_mesh: LocalMesh, comm: MPI.Comm
 ) -> Array:
     """This rank's rows (local unknowns, k) of the modes in a file.
 
@@ -65,8 +65,8 @@ def start_from_file(
             )
         return count
 
-    count = on_root(comm, check)
-    return deal_rows(_read_columns(path, count), count, share, comm)
+    count = bcast_from_root(comm, check)
+    return scatter_rows(_read_columns(path, count), count, local_mesh, comm)
 
 
 def _read_columns(path: str | Path, count: int) -> Iterator[Array]:
@@ -80,13 +80,15 @@ def _read_columns(path: str | Path, count: int) -> Iterator[Array]:
         raise LocalUserError(str(error)) from None
 
 
-def deal_rows(blocks: Iterable[Array], count: int, share: Share, comm: MPI.Comm) -> Array:
+def scatter_rows(
+    blocks: Iterable[Array], count: int, local_mesh: LocalMesh, comm: MPI.Comm
+) -> Array:
     """This rank's rows (local unknowns, count) of column blocks in mesh node order.
 
     `blocks` are looked at on rank 0 alone, where one of them exists at a time.
     """
-    everyone = comm.gather(share.nodes)
-    rows = np.empty((3 * len(share.nodes), count))
+    everyone = comm.gather(local_mesh.nodes)
+    rows = np.empty((3 * len(local_mesh.nodes), count))
     first = 0
     if comm.rank == 0:
         assert everyone is not None

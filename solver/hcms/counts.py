@@ -17,7 +17,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from solver.distribution.messages import Sent
-from solver.hcms.lowest import BLOCK_SHARE, STEPS
+from solver.hcms.lowest import BLOCK_FRACTION, STEPS
 
 Array = NDArray[np.float64]
 
@@ -154,7 +154,7 @@ def krylov_flops(size: int, modes: int, steps: int = STEPS) -> float:
     itself or coefficients; the reduced problem is dense.
     """
     separator = 3.0 * (size / 3.0) ** (2.0 / 3.0)
-    vectors = min((1 + steps) * BLOCK_SHARE * modes, float(size))
+    vectors = min((1 + steps) * BLOCK_FRACTION * modes, float(size))
     solves = 8.0 * separator**2 * vectors
     products = 8.0 * size * vectors**2
     return 4.0 * separator**3 + solves + products + 2.0 * eigen_flops(int(vectors), False)

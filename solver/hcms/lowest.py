@@ -23,14 +23,14 @@ Index = NDArray[np.int64]
 
 DENSE_UNKNOWNS = 200
 """Up to this size all pairs by LAPACK are as fast."""
-DENSE_SHARE = 0.4
+DENSE_FRACTION = 0.4
 """Above this share of wanted pairs LAPACK is faster too."""
-BLOCK_SHARE = 0.55
+BLOCK_FRACTION = 0.55
 """Width of the start block as a share of the wanted pairs."""
 STEPS, FEWER_STEPS = 2, 1
 """Blocks that are added to the start block and its first correction, for modes that have to be good
 by themselves, and where what is done with them errs more."""
-FIRST_SHIFT_SHARE, SHIFT_SHARE = 0.05, 0.3
+FIRST_SHIFT_FRACTION, SHIFT_FRACTION = 0.05, 0.3
 """Shifts as shares of the last wanted eigenvalue, estimated from the start and after one step."""
 INDEPENDENT = 1e-10
 """Directions whose share (squared) of the basis is below this are dropped."""
@@ -68,15 +68,15 @@ def lowest_modes(
     the values are upper bounds, and close for all but the last ones.
     """
     size = 3 * len(planes)
-    if size <= DENSE_UNKNOWNS or count > DENSE_SHARE * size:
+    if size <= DENSE_UNKNOWNS or count > DENSE_FRACTION * size:
         return all_modes(rows, count)
-    width = max(LEAST_BLOCK, int(BLOCK_SHARE * count))
+    width = max(LEAST_BLOCK, int(BLOCK_FRACTION * count))
     values, start = ritz_pairs(rows, smooth_motions(planes, width, pieces))
-    shift = FIRST_SHIFT_SHARE * _extrapolated(values, count)
+    shift = FIRST_SHIFT_FRACTION * _extrapolated(values, count)
     basis = _krylov(rows, Factor(plan, rows.stiffness, rows.mass, shift), start, 1)
     # Smooth motions tell little about a material of high contrast, once corrected they do.
     values = np.linalg.eigvalsh(basis.T @ rows.times_stiffness(basis))
-    shift = SHIFT_SHARE * _extrapolated(values, count)
+    shift = SHIFT_FRACTION * _extrapolated(values, count)
     factor = Factor(plan, rows.stiffness, rows.mass, shift)
     basis = _krylov(rows, factor, basis, steps, start.shape[1])
     if basis.shape[1] < count:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.model import RIGID_MODES
 from carillon.threads import in_parallel
-from solver.distribution.local_mesh import Cells, Share
+from solver.distribution.local_mesh import Cells, LocalMesh
 from solver.distribution.messages import Sent, receive_arrays, send_arrays
 from solver.distribution.tree import Merge
 from solver.hcms.condense import DEFAULT_INTERFACE
@@ -64,14 +64,14 @@ class Synthesis:
     counts: Counts
 
 
-def modes_to_keep(share: float, keep: int) -> int:
-    """Modes that a group with `share` of the unknowns keeps when the whole keeps `keep`.
+def modes_to_keep(fraction: float, keep: int) -> int:
+    """Modes that a group with `fraction` of the unknowns keeps when the whole keeps `keep`.
 
     Modes below a common frequency scale with the volume; those that carry the interface with its
     surface.  The square root lies between and grows by 1.4 at each merge.  The rigid motions are
     always among them.
     """
-    return max(RIGID_MODES, int(np.ceil(keep * np.sqrt(share))))
+    return max(RIGID_MODES, int(np.ceil(keep * np.sqrt(fraction))))
 
 
 def local_steps(parts: int) -> int:
@@ -79,22 +79,22 @@ def local_steps(parts: int) -> int:
     return STEPS if parts <= FEW_SUBDOMAINS else FEWER_STEPS
 
 
-def make_subdomains(share: Share, treatment: str, comm: MPI.Comm) -> dict[int, Subdomain]:
+def make_subdomains(local_mesh: LocalMesh, treatment: str, comm: MPI.Comm) -> dict[int, Subdomain]:
     """Geometry of this rank's subdomains, by number; `treatment` is that of the interfaces."""
-    planes = share.planes()
-    ranges = share.decomposition.row_ranges()
+    planes = local_mesh.planes()
+    ranges = local_mesh.decomposition.row_ranges()
     found = {}
-    for part, cells in share.cells_by_subdomain(
-        share.decomposition.subdomains_of(comm.rank)
+    for part, cells in local_mesh.cells_by_subdomain(
+        local_mesh.decomposition.subdomains_of(comm.rank)
     ).items():
         start, stop = ranges[part]
-        own = planes[start - share.start : stop - share.start]
-        found[part] = Subdomain(share.cells.corners[cells], start, stop, own, treatment)
+        own = planes[start - local_mesh.start : stop - local_mesh.start]
+        found[part] = Subdomain(local_mesh.cells.corners[cells], start, stop, own, treatment)
     return found
 
 
 def synthesize(
-    share: Share,
+    local_mesh: LocalMesh,
     keep: int = 512,
     treatment: str = DEFAULT_INTERFACE,
     comm: MPI.Comm = MPI.COMM_WORLD,
@@ -106,8 +106,8 @@ def synthesize(
 
     Parameters
     ----------
-    share
-        This rank's share of the solid.
+    local_mesh
+        This rank's part of the solid.
     keep
         Modes kept at the root; groups below keep `modes_to_keep`.
     treatment
@@ -126,8 +126,8 @@ def synthesize(
     method there and the values bound the exact eigenvalues from above.
     """
     if subdomains is None:
-        subdomains = make_subdomains(share, treatment, comm)
-    climb = _Climb(share, keep, treatment, comm, cutoff)
+        subdomains = make_subdomains(local_mesh, treatment, comm)
+    climb = _Climb(local_mesh, keep, treatment, comm, cutoff)
     with climb.counts.local.running():
         climb.solve_subdomains(subdomains, threads)
     climb.merge_groups()
@@ -153,16 +153,16 @@ class _Climb:
     """
 
     def __init__(
-        self, share: Share, keep: int, treatment: str, comm: MPI.Comm, cutoff: float | None
+        self, local_mesh: LocalMesh, keep: int, treatment: str, comm: MPI.Comm, cutoff: float | None
     ) -> None:
-        self.share = share
+        self.local_mesh = local_mesh
         self.keep = keep
         self.cutoff = cutoff
         self.treatment = treatment
         self.comm = comm
-        self.tree = share.decomposition.tree
-        self.leader = share.decomposition.leaders()
-        self.ranges = share.decomposition.row_ranges()
+        self.tree = local_mesh.decomposition.tree
+        self.leader = local_mesh.decomposition.leaders()
+        self.ranges = local_mesh.decomposition.row_ranges()
         self.levels = self.tree.levels()
         self.counts = Counts(self.levels[-1])
         self.groups: dict[int, Group] = {}
@@ -171,14 +171,14 @@ class _Climb:
 
     def solve_subdomains(self, subdomains: dict[int, Subdomain], threads: int) -> None:
         """Lowest modes of every subdomain of this rank."""
-        cells_of = self.share.cells_by_subdomain(
-            self.share.decomposition.subdomains_of(self.comm.rank)
+        cells_of = self.local_mesh.cells_by_subdomain(
+            self.local_mesh.decomposition.subdomains_of(self.comm.rank)
         )
 
         steps = local_steps(self.tree.parts)
 
         def solve(part: int) -> tuple[Array, Array]:
-            elements = self.share.cells.take(cells_of[part]).elements
+            elements = self.local_mesh.cells.take(cells_of[part]).elements
             return subdomains[part].modes(elements, self._wanted(part), self._cutoff(part), steps)
 
         # The largest first, so that no thread is left with one at the end.
@@ -186,7 +186,7 @@ class _Climb:
         modes = dict(zip(order, in_parallel(solve, [(part,) for part in order], threads)))
         for part in sorted(subdomains):
             start, stop = self.ranges[part]
-            cells = self.share.cells.take(cells_of[part])
+            cells = self.local_mesh.cells.take(cells_of[part])
             values, basis = modes[part]
             self.counts.local.flops += krylov_flops(3 * (stop - start), len(values), steps)
             boundary, crossing = boundary_of(cells, start, stop)
@@ -294,7 +294,7 @@ class _Climb:
 
     def form_basis(self, weights: dict[int, Array]) -> Array:
         """This rank's rows of the final modes; frees the local bases."""
-        start, stop = self.share.start, self.share.stop
+        start, stop = self.local_mesh.start, self.local_mesh.stop
         if not weights:
             return np.ascontiguousarray(self.bases.pop(0))
         count = next(iter(weights.values())).shape[1]

@@ -84,7 +84,7 @@ class InnerSolver:
     def __init__(self, method: str, layout: Layout) -> None:
         if method not in METHODS:
             raise UserError(f"inner solver {method!r}, expected one of {', '.join(METHODS)}")
-        nodes = layout.share.n_dofs // 3
+        nodes = layout.local_mesh.n_dofs // 3
         if method == "auto":
             alone = layout.comm.size == 1 and nodes <= LARGEST_FRONTS
             method = "multifrontal" if alone else "mumps"
@@ -98,7 +98,9 @@ class InnerSolver:
         if method == "multifrontal":
             from solver.linear.multifrontal import Plan
 
-            self._plan = Plan(layout.share.planes(), layout.pattern.indptr, layout.pattern.columns)
+            self._plan = Plan(
+                layout.local_mesh.planes(), layout.pattern.indptr, layout.pattern.columns
+            )
 
     @property
     def indefinite(self) -> bool:

@@ -27,7 +27,7 @@ COLUMNS = 128
 """Right-hand sides that are carried through the fronts together."""
 BRANCHES = 3
 """Branches for each thread, at least: their work is not equal."""
-UPDATES_SHARE = 1.3
+UPDATES_FRACTION = 1.3
 """Memory at its peak, when updates wait for their parents, as a share of what the factor takes."""
 PANEL = 192
 """Columns of a symmetric product that are formed together."""
@@ -113,7 +113,9 @@ class Plan:
         outside = 3 * np.array([len(boundary) for boundary in fronts.boundary])
         self.inverse_offset = np.concatenate([[0], np.cumsum(own**2)])
         self.coupling_offset = np.concatenate([[0], np.cumsum(own * outside)])
-        self.bytes = int(UPDATES_SHARE * 8 * (self.inverse_offset[-1] + self.coupling_offset[-1]))
+        self.bytes = int(
+            UPDATES_FRACTION * 8 * (self.inverse_offset[-1] + self.coupling_offset[-1])
+        )
         self._work = 2 * own**2 + 4 * own * outside
         self._shares: dict[int, Shares] = {}
 

@@ -17,8 +17,8 @@ from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import Layout, System, assemble
 from solver.correction.correct import STEPWISE, correct
-from solver.distribution.collective import on_root
-from solver.distribution.local_mesh import Share, distribute
+from solver.distribution.collective import bcast_from_root
+from solver.distribution.local_mesh import LocalMesh, distribute
 from solver.files.modes_file import read_modes
 from solver.hcms.condense import INTERFACES
 from solver.hcms.synthesis import synthesize
@@ -66,16 +66,16 @@ def correction_history(
     UserError
         If there are too few unknowns for so many modes, or `truth` is not of this solid.
     """
-    on_root(comm, lambda: check_mode_count(modes, cast(ElasticModel, model).n_dofs))
+    bcast_from_root(comm, lambda: check_mode_count(modes, cast(ElasticModel, model).n_dofs))
     exact = _exact(model, modes, truth, comm)[RIGID_MODES:]
-    share = distribute(model, None, seed, comm)
-    layout = Layout.of_share(share, comm)
-    system = assemble(share, comm, layout)
+    local_mesh = distribute(model, None, seed, comm)
+    layout = Layout.of_local_mesh(local_mesh, comm)
+    system = assemble(local_mesh, comm, layout)
     inner = InnerSolver("auto", layout)
     histories = []
-    keep = default_keep(modes, share.decomposition.tree.parts)
+    keep = default_keep(modes, local_mesh.decomposition.tree.parts)
     for start in track(STARTS, "starts", visible=comm.rank == 0):
-        block = _start_block(start, share, keep, seed, comm)
+        block = _start_block(start, local_mesh, keep, seed, comm)
         for acceleration in STEPWISE:
             values = _correct(system, inner, block, modes - RIGID_MODES, steps, acceleration)
             histories.append(
@@ -89,7 +89,7 @@ def correction_history(
     return {
         "modes": modes,
         "steps": steps,
-        "n_dofs": share.n_dofs,
+        "n_dofs": local_mesh.n_dofs,
         "exact": exact.tolist(),
         "histories": histories,
     }
@@ -100,7 +100,7 @@ def _exact(
 ) -> Array:
     """The lowest eigenvalues (modes,) from the file `truth` or by SLEPc."""
     if truth is not None:
-        return on_root(comm, lambda: _read_exact(cast(ElasticModel, model), modes, truth))
+        return bcast_from_root(comm, lambda: _read_exact(cast(ElasticModel, model), modes, truth))
     result = modal_analysis(model, SolverOptions(method="slepc", modes=modes), comm)
     result.system.destroy()
     return result.values
@@ -140,22 +140,22 @@ def _correct(
     return history
 
 
-def _start_block(start: str, share: Share, keep: int, seed: int, comm: MPI.Comm) -> Array:
+def _start_block(start: str, local_mesh: LocalMesh, keep: int, seed: int, comm: MPI.Comm) -> Array:
     if start == RANDOM:
-        return random_block(share, keep, seed, comm)
-    return synthesize(share, keep, start.removeprefix("hcms-"), comm).vectors
+        return random_block(local_mesh, keep, seed, comm)
+    return synthesize(local_mesh, keep, start.removeprefix("hcms-"), comm).vectors
 
 
-def random_block(share: Share, columns: int, seed: int, comm: MPI.Comm) -> Array:
+def random_block(local_mesh: LocalMesh, columns: int, seed: int, comm: MPI.Comm) -> Array:
     """This rank's rows (local unknowns, columns) of a Gaussian block.
 
     Drawn by subdomain, so that it does not depend on who owns which.
     """
-    offsets = share.decomposition.offsets
+    offsets = local_mesh.decomposition.offsets
     drawn = [
         np.random.default_rng([seed, part]).standard_normal(
             (3 * int(offsets[part + 1] - offsets[part]), columns)
         )
-        for part in share.decomposition.subdomains_of(comm.rank)
+        for part in local_mesh.decomposition.subdomains_of(comm.rank)
     ]
     return np.concatenate(drawn)

@@ -27,7 +27,7 @@ from solver.coarsening.fit import FitCoarsening
 from solver.coarsening.forest import FOREST, ForestCoarsening, forest_or_reason
 from solver.coarsening.linear import LinearCoarsening
 from solver.coarsening.model import block_moduli, coarse_model
-from solver.distribution.collective import keep_on_root, on_root
+from solver.distribution.collective import bcast_from_root, compute_on_root
 from solver.files.modes_file import CHECKS, frequencies
 from solver.studies.comparison import AUDIBLE_LAST, frequency_errors
 
@@ -58,10 +58,10 @@ def rate_objectives(
     (evidence, seconds, frequencies [Hz]) and `rows`, one a coarsening with the errors over modes
     7..60 (`audible`) and 7..`modes` (`all`), or as many as the coarse model has.
     """
-    solid = keep_on_root(comm, lambda: _read(options, objectives))
+    solid = compute_on_root(comm, lambda: _read(options, objectives))
     truth = _solve(None if solid is None else solid.problem.model, modes, comm)
     exact = frequencies(truth.values)
-    names = on_root(comm, lambda: list(cast(_Solid, solid).coarsenings))
+    names = bcast_from_root(comm, lambda: list(cast(_Solid, solid).coarsenings))
     if solid is not None and solid.reason:
         logger.warning(solid.reason)
     rows = [
@@ -75,7 +75,7 @@ def rate_objectives(
         "seed": options.seed,
         "poisson": options.poisson,
         "modes": modes,
-        **on_root(comm, lambda: _sizes(cast(_Solid, solid))),
+        **bcast_from_root(comm, lambda: _sizes(cast(_Solid, solid))),
         "truth": {
             **truth.evidence,
             "seconds": solve_seconds(truth),
@@ -171,7 +171,7 @@ def _coarsen(name: str, solid: _Solid) -> _Coarsened:
 
 
 def _row(name: str, solid: _Solid | None, exact: Array, comm: MPI.Comm) -> dict[str, Any]:
-    coarse = keep_on_root(comm, lambda: _coarsen(name, cast(_Solid, solid)))
+    coarse = compute_on_root(comm, lambda: _coarsen(name, cast(_Solid, solid)))
     model = None if coarse is None else coarse.model
     modes, fitted, converged = comm.bcast(
         coarse and (min(len(exact), coarse.model.n_dofs), coarse.seconds, coarse.converged)

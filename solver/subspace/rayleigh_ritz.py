@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
 from solver.assembly.system import System
-from solver.distribution.collective import on_root
+from solver.distribution.collective import bcast_from_root
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ def rayleigh_ritz(system: System, block: Array, count: int | None = None) -> tup
     stiff = system.inner(block, system.times_stiffness(block))
     gram = None if is_orthonormal(system, block, mass_block) else system.inner(block, mass_block)
     # Solved once: two processors may round apart, and an eigenvector's sign hangs on rounding.
-    values, weights = on_root(system.comm, lambda: _reduced_eigenpairs(stiff, gram))
+    values, weights = bcast_from_root(system.comm, lambda: _reduced_eigenpairs(stiff, gram))
     count = len(values) if count is None else min(count, len(values))
     return values[:count], block @ weights[:, :count]
 

@@ -16,7 +16,7 @@ BAND_SAMPLES = 512
 """Length of a band's signal, from the strike on; narrow bands last longer."""
 BAND_DECAY = 5.0
 """Nepers of decay within a band's length from which on a mode is sought again in wider bands."""
-LOWEST_HERTZ, HIGHEST_SHARE = 20.0, 0.97
+LOWEST_HERTZ, HIGHEST_FRACTION = 20.0, 0.97
 """Lowest frequency of a mode, and the highest in half sampling rates."""
 LEAST_QUALITY = 2.0
 """pi f / d of a mode; what dies away faster is a knock rather than a mode."""
@@ -57,7 +57,7 @@ def _band_exponents(band: Band, rate: int) -> tuple[Complex, Array]:
     exponents = own * band.rate / rate
     inside = np.abs(exponents.imag) * rate <= np.pi * band.width
     exponents = exponents[inside] + 2j * np.pi * band.centre / rate
-    low, high = 2.0 * np.pi * LOWEST_HERTZ / rate, HIGHEST_SHARE * np.pi
+    low, high = 2.0 * np.pi * LOWEST_HERTZ / rate, HIGHEST_FRACTION * np.pi
     sounds = (exponents.imag > low) & (exponents.imag < high) & rings(exponents)
     grows = exponents.real * len(band.signal) * rate / band.rate > _MOST_GROWTH
     kept = sounds & ~grows

@@ -10,7 +10,7 @@ Complex = NDArray[np.complex128]
 
 MOST = 40
 """Most exponents that are looked for in one signal."""
-_ESTER_SHARE = 0.02
+_ESTER_FRACTION = 0.02
 
 
 def esprit(signal: Complex, most: int = MOST) -> Complex:
@@ -38,7 +38,7 @@ def ester(vectors: Complex) -> int:
     orders = np.arange(1, vectors.shape[1] + 1)
     squares = [_shift_error(vectors[:, :p], across[:p, :p]) for p in orders]
     criterion = 1.0 / np.maximum(squares, np.finfo(float).eps)
-    return int(orders[criterion >= _ESTER_SHARE * criterion.max()][-1])
+    return int(orders[criterion >= _ESTER_FRACTION * criterion.max()][-1])
 
 
 def _subspace(signal: Complex, most: int) -> Complex:

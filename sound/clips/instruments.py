@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 CONCERT_HERTZ = 440.0
 """A4."""
-HIGHEST_SHARE = 0.4
+HIGHEST_FRACTION = 0.4
 """Partials above this share of the sampling rate are left out."""
 LEAST_AMPLITUDE = 0.02
 """Amplitude relative to the largest (-34 dB) below which a partial is left out."""
@@ -105,7 +105,7 @@ def synthesised(
     """
     kind = INSTRUMENTS[instrument]
     pitch = kind.pitch if pitch is None else pitch
-    highest = HIGHEST_SHARE * rate
+    highest = HIGHEST_FRACTION * rate
     if not 20.0 <= pitch < highest:
         raise UserError(
             f"a pitch of {pitch:g} Hz cannot be sampled at {rate} Hz, expected 20 Hz to "

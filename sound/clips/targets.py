@@ -13,7 +13,7 @@ from sound.clips.extraction import ModalSound
 
 Array = NDArray[np.float64]
 
-SAME_HERTZ, SAME_SHARE = 1.0, 0.002
+SAME_HERTZ, SAME_FRACTION = 1.0, 0.002
 """Modes of different clips closer than 1 Hz or 0.2 %, whichever is more, are one: about what
 listeners can tell apart in pure tones (Moore, An Introduction to the Psychology of Hearing, ch. 6).
 """
@@ -109,7 +109,7 @@ def _groups(frequencies: Array, owners: NDArray[np.intp]) -> NDArray[np.intp]:
 
 def _same(frequencies: Array) -> bool:
     low, high = frequencies.min(), frequencies.max()
-    return bool(high - low <= max(SAME_HERTZ, SAME_SHARE * low))
+    return bool(high - low <= max(SAME_HERTZ, SAME_FRACTION * low))
 
 
 def _chosen(shares: Array, modes: int) -> NDArray[np.intp]:

@@ -95,7 +95,7 @@ class Simulation:
         wanted = SolverOptions(modes=RIGID_MODES + modes, tolerance=tolerance)
         self.solver = ModalSolver(self.model, wanted, MPI.COMM_SELF)
         # Rows of the analysis are in the order of its partition.
-        self._order = degrees_of_freedom(self.solver.share.nodes)
+        self._order = degrees_of_freedom(self.solver.local_mesh.nodes)
         self._pushes = pushes(self.model.mesh, strikes)[self._order]
         self._strains = np.sqrt(self.model.mesh.edge) * strain_factors(self.model.poisson)
 

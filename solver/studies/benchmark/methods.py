@@ -16,7 +16,7 @@ from carillon.fem.model import ElasticModel
 from solver.analysis.modal_solver import ModalSolver, Modes
 from solver.analysis.options import SolverOptions
 from solver.correction.correct import INTERACTIVE_TOLERANCE
-from solver.distribution.collective import keep_on_root
+from solver.distribution.collective import compute_on_root
 from solver.files.modes_file import CHECKS
 from solver.studies.benchmark.rivals import (
     SlepcConfiguration,
@@ -104,7 +104,7 @@ class Methods:
 
     def arpack_regular(self) -> Run:
         """ARPACK without a factorisation, on the fine mesh with a diagonal mass."""
-        model = keep_on_root(self.comm, lambda: self._root.lumped())
+        model = compute_on_root(self.comm, lambda: self._root.lumped())
         begin = self._now()
         values = smallest_without_factor(model, self.modes, RIVAL_TOLERANCE, self.seed, self.comm)
         return Run(self._now() - begin, values)
@@ -165,7 +165,7 @@ class Methods:
         """Model on rank 0, and the seconds that coarsening took, on every rank."""
         if coarsening == "none":
             return (None if self.solid is None else self.solid.fine), 0.0
-        made = keep_on_root(self.comm, lambda: self._root.coarsened(coarsening, changed))
+        made = compute_on_root(self.comm, lambda: self._root.coarsened(coarsening, changed))
         model, seconds = made or (None, 0.0)
         return model, self.comm.bcast(seconds)
 

@@ -18,7 +18,7 @@ from carillon.progress import track
 from carillon.runtime import blas_name, loaded_blas
 from solver.analysis.options import number_of_modes
 from solver.analysis.problem import ProblemOptions
-from solver.distribution.collective import keep_on_root, on_root
+from solver.distribution.collective import bcast_from_root, compute_on_root
 from solver.studies.benchmark.methods import Methods, Run, named
 from solver.studies.benchmark.rivals import SlepcConfiguration, configurations
 from solver.studies.benchmark.scores import (
@@ -124,7 +124,7 @@ def benchmark_row(
     ConvergenceError
         If SLEPc fails; another method that does is told in `failed` and has no figures.
     """
-    solid = keep_on_root(comm, partial(make_solid, options, benchmark.modes))
+    solid = compute_on_root(comm, partial(make_solid, options, benchmark.modes))
     reason = comm.bcast(None if solid is None else solid.reason)
     if comm.rank == 0 and reason:
         logger.warning(reason)
@@ -138,7 +138,7 @@ def benchmark_row(
     runs, failed = _alternate(methods, benchmark, left_out)
     spectra = _references(methods, runs, with_forests=not reason)
     row = {
-        **on_root(comm, lambda: _describe(options, cast(Solid, solid))),
+        **bcast_from_root(comm, lambda: _describe(options, cast(Solid, solid))),
         "modes": benchmark.modes,
         **_times(runs, comm.bcast(None if solid is None else solid.seconds)),
         **_errors(runs, spectra),

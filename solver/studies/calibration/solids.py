@@ -29,7 +29,7 @@ CELLS = (150, 6500)
 HALF_THICKNESS = (0.6, 3.0)
 """Of plates, rods and shells, in voxels."""
 
-BOX_SHARE = 0.15
+BOX_FRACTION = 0.15
 """Share of solids that are boxes of whole blocks, where nothing is void."""
 
 
@@ -122,7 +122,7 @@ def random_solid(seed: int, number: int) -> tuple[HexMesh, Array, str]:
     along each axis by chance, so walls lie across blocks in all ways; a box starts with a block.
     """
     rng = np.random.default_rng([seed, number])
-    boxed = rng.random() < BOX_SHARE
+    boxed = rng.random() < BOX_FRACTION
     while True:
         filled = _box(rng) if boxed else _joined(rng)
         if CELLS[0] <= filled.sum() < CELLS[1]:

@@ -18,8 +18,8 @@ from solver.analysis.modal_solver import elastic_part
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import Layout, System, assemble
 from solver.correction.correct import Correction, correct, default_guard
-from solver.distribution.collective import on_root
-from solver.distribution.local_mesh import Share, distribute
+from solver.distribution.collective import bcast_from_root
+from solver.distribution.local_mesh import LocalMesh, distribute
 from solver.hcms.counts import Counts, Tally
 from solver.hcms.synthesis import make_subdomains, synthesize
 from solver.linear import InnerSolver
@@ -54,13 +54,13 @@ def measure(
     UserError
         If there are too few unknowns for so many modes, or more ranks than subdomains.
     """
-    on_root(comm, lambda: check_mode_count(options.modes, cast(ElasticModel, model).n_dofs))
+    bcast_from_root(comm, lambda: check_mode_count(options.modes, cast(ElasticModel, model).n_dofs))
     _Run(model, replace(options, modes=min(20, options.modes), tolerance=0.0, corrections=1), comm)
     runs = [_Run(model, options, comm) for _ in range(REPEATS)]
     seconds = comm.bcast([run.seconds for run in runs])
     run = runs[int(np.argmin(seconds))]
     ends = comm.gather(_this_machine())
-    machines = on_root(comm, lambda: dict(cast("list[tuple[str, int]]", ends)))
+    machines = bcast_from_root(comm, lambda: dict(cast("list[tuple[str, int]]", ends)))
     cores = sum(machines.values())
     return {
         "ranks": comm.size,
@@ -69,11 +69,11 @@ def measure(
         "repeats": REPEATS,
         "seconds": min(seconds),
         "slowest_seconds": max(seconds),
-        "n_dofs": run.share.n_dofs,
+        "n_dofs": run.local_mesh.n_dofs,
         "modes": options.modes,
         "keep": run.keep,
         "width": run.width,
-        "subdomains": run.share.decomposition.tree.parts,
+        "subdomains": run.local_mesh.decomposition.tree.parts,
         "corrections": run.result.steps,
         "blocks": run.result.blocks,
         "right_hand_sides": run.result.solves,
@@ -92,18 +92,23 @@ class _Run:
         wanted = options.modes - RIGID_MODES
         self.width = wanted + default_guard(wanted)
         with self._phase() as self.partition:
-            self.share: Share = distribute(model, None, options.seed, self.comm)
-            parts = self.share.decomposition.tree.parts
+            self.local_mesh: LocalMesh = distribute(model, None, options.seed, self.comm)
+            parts = self.local_mesh.decomposition.tree.parts
             self.keep = default_keep(options.modes, parts, together=True)
-            layout = Layout.of_share(self.share, self.comm)
-            subdomains = make_subdomains(self.share, options.interface, self.comm)
+            layout = Layout.of_local_mesh(self.local_mesh, self.comm)
+            subdomains = make_subdomains(self.local_mesh, options.interface, self.comm)
             self.inner = TimedInner.of(InnerSolver(options.inner, layout))
         begin = self._together()
         with self._phase() as self.assembly:
-            system: System = assemble(self.share, self.comm, layout)
+            system: System = assemble(self.local_mesh, self.comm, layout)
         self.comm.barrier()
         synthesis = synthesize(
-            self.share, self.keep, options.interface, self.comm, subdomains, system.rows.threads
+            self.local_mesh,
+            self.keep,
+            options.interface,
+            self.comm,
+            subdomains,
+            system.rows.threads,
         )
         self.counts: Counts = synthesis.counts
         self.comm.barrier()
@@ -155,14 +160,14 @@ class _Run:
 
     def _count_flops(self, model: ElasticModel | None) -> None:
         ranks = self.comm.size
-        work = on_root(self.comm, lambda: elimination(cast(ElasticModel, model).mesh))
+        work = bcast_from_root(self.comm, lambda: elimination(cast(ElasticModel, model).mesh))
         shared, alone = dense_flops(
-            self.share.n_dofs, self.result.blocks, self.result.solves, self.width
+            self.local_mesh.n_dofs, self.result.blocks, self.result.solves, self.width
         )
-        self.assembly.flops = ASSEMBLY_FLOPS * len(self.share.cells)
+        self.assembly.flops = ASSEMBLY_FLOPS * len(self.local_mesh.cells)
         self.inner.factor.flops = work.flops / ranks
         self.inner.solving.flops = work.solve_flops(self.result.solves) / ranks
-        own = 3 * (self.share.stop - self.share.start) / self.share.n_dofs
+        own = 3 * (self.local_mesh.stop - self.local_mesh.start) / self.local_mesh.n_dofs
         self.correction.flops = own * shared + (alone if self.comm.rank == 0 else 0.0)
 
 
