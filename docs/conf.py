@@ -8,7 +8,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / "docs" / "extensions")]
 
-import carillon
+import carillon  # noqa: E402 - found by the path above
 
 project = "Carillon"
 author = "The Carillon developers"
@@ -26,9 +26,9 @@ myst_dmath_double_inline = True
 # In docstrings `name` is code.
 default_role = "literal"
 autodoc_member_order = "bysource"
-autodoc_type_aliases = {"Array": "Array", "NDArray": "NDArray", "ArrayLike": "ArrayLike"}
-autodoc_typehints_format = "short"
-python_use_unqualified_type_names = True
+# Docstrings tell shapes and units, which types do not.
+autodoc_typehints = "none"
+autodoc_preserve_defaults = True
 maximum_signature_line_length = 70
 numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from graphlib import TopologicalSorter
 from html import escape
 
@@ -34,43 +33,56 @@ def of_rooms() -> str:
 
 
 def of_packages(room: str) -> str:
-    """The packages of a room; arrows that follow from others are left out."""
-    inside = {name: set(needs.split()) & set(ARROWS) for name, needs in ARROWS.items()}
-    inside = {
-        name: {other for other in needs if _belongs(other, room)}
-        for name, needs in inside.items()
-        if _belongs(name, room)
-    }
-    levels = _levels(inside)
+    """The packages of a room, but its commands; arrows that follow from others are left out."""
+    needs = _between(room)
     places = {}
-    for row, names in enumerate(reversed(levels)):
+    rows = _rows(needs)
+    for row, names in enumerate(rows):
         step = WIDTH / len(names)
         for column, name in enumerate(names):
-            places[name] = (step * (column + 0.5), row * (HEIGHT + 2 * GAP) + 1, step - 10)
+            places[name] = (step * (column + 0.5), row * (HEIGHT + 2 * GAP) + 1, step - 6)
     arrows = [
         _arrow(places[name][0], places[name][1] + HEIGHT, places[other][0], places[other][1])
-        for name, needs in _reduced(inside).items()
-        for other in sorted(needs)
+        for name, others in _reduced(needs).items()
+        for other in sorted(others)
     ]
     boxes = [
-        _box(x - width / 2, y, width, HEIGHT, name.removeprefix(f"{room}.") or name, [])
+        _box(x - width / 2, y, width, HEIGHT, name, [], 14 if width > 80 else 11)
         for name, (x, y, width) in places.items()
     ]
-    height = len(levels) * (HEIGHT + 2 * GAP) - 2 * GAP + 2
+    height = len(rows) * (HEIGHT + 2 * GAP) - 2 * GAP + 2
     return _picture("".join(arrows + boxes), height, f"The packages of {room} and what they import")
 
 
-def _belongs(name: str, room: str) -> bool:
-    return name == room or name.startswith(f"{room}.")
+def _between(room: str) -> Needs:
+    """What the packages directly in a room import of each other, those below them included."""
+    found: Needs = {}
+    for package, others in ARROWS.items():
+        name = _name(package, room)
+        if name is not None:
+            inside = {_name(other, room) for other in others.split()} - {None, name}
+            found.setdefault(name, set()).update(other for other in inside if other is not None)
+    return found
 
 
-def _levels(needs: Mapping[str, set[str]]) -> list[list[str]]:
-    """Packages by the length of the longest way down from them, at most three beside each other."""
-    level: dict[str, int] = {}
-    for name in TopologicalSorter(needs).static_order():
-        level[name] = max((level[other] + 1 for other in needs[name]), default=0)
-    rows = [sorted(n for n in level if level[n] == k) for k in range(max(level.values()) + 1)]
-    return [row[k : k + 3] for row in rows for k in range(0, len(row), 3)]
+def _name(package: str, room: str) -> str | None:
+    """A package's part of a room's picture; none for others, and for commands, which use all."""
+    parts = package.split(".")
+    if parts[0] != room or parts[1:2] == ["commands"]:
+        return None
+    return parts[1] if len(parts) > 1 else room
+
+
+def _rows(needs: Needs) -> list[list[str]]:
+    """Packages in rows from the top: each below what imports it, unused ones above what they do."""
+    users = {name: {user for user in needs if name in needs[user]} for name in needs}
+    row: dict[str, int] = {}
+    for name in TopologicalSorter(users).static_order():
+        row[name] = max((row[user] + 1 for user in users[name]), default=0)
+    for name in needs:
+        if needs[name] and not users[name]:
+            row[name] = min(row[other] for other in needs[name]) - 1
+    return [sorted(name for name in row if row[name] == k) for k in range(max(row.values()) + 1)]
 
 
 def _reduced(needs: Needs) -> Needs:
@@ -95,7 +107,9 @@ def _lines(names: list[str]) -> list[str]:
     return lines
 
 
-def _box(x: float, y: float, width: float, height: float, title: str, lines: list[str]) -> str:
+def _box(
+    x: float, y: float, width: float, height: float, title: str, lines: list[str], size: int = 14
+) -> str:
     middle = x + width / 2
     small = "".join(
         f'<text class="small" x="{middle:.0f}" y="{y + 37 + LINE * k:.0f}" font-size="12" '
@@ -104,7 +118,7 @@ def _box(x: float, y: float, width: float, height: float, title: str, lines: lis
     )
     return (
         f'<rect x="{x:.0f}" y="{y:.0f}" width="{width:.0f}" height="{height:.0f}" rx="5"/>'
-        f'<text x="{middle:.0f}" y="{y + 20:.0f}" font-size="14" '
+        f'<text x="{middle:.0f}" y="{y + 20:.0f}" font-size="{size}" '
         f'text-anchor="middle">{escape(title)}</text>{small}'
     )
 
