@@ -151,7 +151,16 @@ class Constants(TypedDict, total=False):
 
 
 def fine_model(mesh: HexMesh, young: Array, **constants: Unpack[Constants]) -> ElasticModel:
-    """Model of a fine mesh with one modulus per cell; `young` is (m,) [Pa]."""
+    """Model of a fine mesh with one modulus per cell; `young` is (m,) [Pa].
+
+    Examples
+    --------
+    >>> from carillon.fem.geometry import hexmesh_from_grid
+    >>> mesh = hexmesh_from_grid(np.array([[0, 0, 0], [1, 0, 0]]), np.zeros(3), 0.5)
+    >>> model = fine_model(mesh, np.array([1e9, 2e9]), density=1000.0)
+    >>> model.n_dofs, model.mass
+    (36, 250.0)
+    """
     return ElasticModel(
         mesh,
         np.repeat(young[:, None], 8, axis=1),

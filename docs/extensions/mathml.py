@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from docutils import nodes
@@ -11,6 +12,9 @@ from sphinx.application import Sphinx
 from sphinx.util import logging
 
 _LOGGER = logging.getLogger(__name__)
+
+_BAR = re.compile("<mo[^>]*>([|‖])</mo>")
+"""Bars of a norm, of which the first would grow with what follows and the second would not."""
 
 
 def _inline(writer: Any, node: nodes.math) -> None:
@@ -25,7 +29,8 @@ def _block(writer: Any, node: nodes.math_block) -> None:
 
 def _mathml(node: nodes.math | nodes.math_block, as_block: bool) -> str:
     try:
-        return str(tex2mathml(node.astext(), as_block=as_block))
+        equation = str(tex2mathml(node.astext(), as_block=as_block))
+        return _BAR.sub('<mo stretchy="false">\\1</mo>', equation)
     except MathError as error:
         _LOGGER.warning("%s in %s", error, node.astext(), location=node)
         return ""

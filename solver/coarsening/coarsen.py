@@ -96,6 +96,15 @@ def build_model(
         See `coarse_material`.
     constants
         `poisson`, `density` [kg/m^3], `lumped`, see `ElasticModel`.
+
+    Examples
+    --------
+    >>> from carillon.fem.geometry import hexmesh_from_grid
+    >>> grid = np.argwhere(np.ones((4, 2, 2)))
+    >>> mesh = hexmesh_from_grid(grid, np.zeros(3), 0.5)
+    >>> coarse = build_model(mesh, np.full(16, 1e9), "ddfem")
+    >>> coarse.mesh.n_cells, coarse.young.shape
+    (2, (2, 8))
     """
     fine = fine_model(mesh, young, **constants)
     if method == "none":
