@@ -34,7 +34,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # They run beside each other, so that more threads would only wait for each other.
 test torture: export OMP_NUM_THREADS ?= 1
 
-.PHONY: help env run test torture check clean
+.PHONY: help env run test torture check docs clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-7s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -62,6 +62,13 @@ check: env  ## lint, formatting, types, Snakemake rules
 	@ruff format --check --quiet || { ruff format --diff --quiet; exit 1; }
 	@mypy $(PACKAGES)
 	@if [ -n "$(RULES)" ]; then snakefmt --check $(RULES); python .ci/lint_rules.py; fi
+
+# All pages are read anew: they depend on sources that Sphinx does not know of, and a warning would
+# else be given once alone.
+docs: env  ## the documentation; ends at build/docs/index.html
+	@bash workflow/envs/docs.sh build/docs-venv
+	@build/docs-venv/bin/python -m sphinx -q -E -W --keep-going -d build/doctrees docs build/docs
+	@echo "documentation: $(abspath build/docs/index.html)"
 
 clean:  ## remove the environment, caches and built files; results/ stays
 	@rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache *.egg-info

@@ -346,6 +346,13 @@ def coarsen(model: Model, e: ArrayLike, threads: int = 1) -> Array:
     ------
     UserError
         See `require_blocks`.
+
+    Examples
+    --------
+    >>> from forests import load_model
+    >>> soft, stiff = coarsen(load_model(), [[1, 1, 1, 1, 2, 2, 2, 2], [3, 3, 3, 3, 6, 6, 6, 6]])
+    >>> bool(np.allclose(stiff, 3.0 * soft))
+    True
     """
     young = require_blocks(e)
     moduli = np.empty_like(young)
@@ -366,6 +373,14 @@ def coarsen_with_derivatives(model: Model, e: ArrayLike, threads: int = 1) -> tu
     `(1 - sum of the slopes) e_j / (8 mean(e))` of the scale.
 
     Parameters and errors are those of `coarsen`.
+
+    Examples
+    --------
+    >>> from forests import load_model
+    >>> e = np.array([[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]])
+    >>> moduli, derivatives = coarsen_with_derivatives(load_model(), e)
+    >>> bool(np.allclose(derivatives[0] @ e[0], moduli[0]))
+    True
     """
     young = require_blocks(e)
     moduli, derivatives = np.empty_like(young), np.empty((len(young), 8, 8))

@@ -166,6 +166,12 @@ def load_model(path: str | Path | None = None) -> Model:
     ------
     UserError
         If the file is missing, damaged, of another kind or schema, or inconsistent.
+
+    Examples
+    --------
+    >>> model = load_model()
+    >>> model.objective, model.poisson, model.forests.trees
+    ('calibrated', 0.25, 3)
     """
     path = default_path() if path is None else Path(path)
     with open_h5(path, KIND, SCHEMA, sealed=True) as file:

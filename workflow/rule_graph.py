@@ -1,4 +1,4 @@
-"""The picture of the rules in the README: `python -m workflow.rule_graph > docs/rules.svg`.
+"""The picture of the rules in the documentation: `python -m workflow.rule_graph > docs/rules.svg`.
 
 Snakemake says which rule of the default run needs which; Graphviz, which nothing else needs, leaves
 out what follows from other arrows and lays out the rest.

@@ -99,6 +99,11 @@ def galerkin_moduli(young: Array) -> Array:
 
     Along each axis a quadrature point takes 1/2 + sqrt(3)/4 from its own half and the rest from the
     other one: the weights that integrate 1 and x over either half of the element.
+
+    Examples
+    --------
+    >>> galerkin_moduli(np.ones((1, 8))).round(12).tolist()
+    [[1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]]
     """
     near = 0.5 + np.sqrt(3.0) / 4.0
     line = np.array([[near, 1.0 - near], [1.0 - near, near]])

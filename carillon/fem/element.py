@@ -69,6 +69,15 @@ def quadrature_stiffness(poisson: float = DEFAULT_POISSON) -> Array:
     """Stiffness contributions K_q (8, 24, 24) of the quadrature points for unit edge and modulus.
 
     An element of edge h with moduli E_q has the stiffness `h * sum_q E_q K_q`.
+
+    Examples
+    --------
+    >>> stiffness = quadrature_stiffness(0.25)
+    >>> stiffness.shape
+    (8, 24, 24)
+    >>> rigid = rigid_motions(CORNERS.astype(float))
+    >>> bool(abs(stiffness @ rigid).max() < 1e-12)
+    True
     """
     strain = strain_displacement(shape_gradients(GAUSS_POINTS))
     elasticity = elasticity_matrix(poisson)
@@ -91,6 +100,13 @@ def nodal_mass(lumped: bool = False) -> Array:
     """Mass (8, 8) between corners for unit edge and density; row sums on the diagonal if `lumped`.
 
     Each displacement component has this same matrix; an edge h and density rho scale it by rho h^3.
+
+    Examples
+    --------
+    >>> nodal_mass(lumped=True).diagonal().tolist()
+    [0.125, 0.125, 0.125, 0.125, 0.125, 0.125, 0.125, 0.125]
+    >>> float(nodal_mass().sum().round(12))
+    1.0
     """
     line = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
     matrix = np.kron(np.kron(line, line), line)

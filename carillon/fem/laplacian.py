@@ -52,6 +52,14 @@ def laplacian_modes(mesh: HexMesh, count: int) -> tuple[Array, Array]:
 
     The first is the constant.  Vectors have unit length and a sign that makes their largest entry
     positive; the start vector is fixed, so the result is the same in every run.
+
+    Examples
+    --------
+    >>> from carillon.fem.geometry import hexmesh_from_grid
+    >>> row = hexmesh_from_grid(np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0]]), np.zeros(3), 1.0)
+    >>> values, vectors = laplacian_modes(row, 3)
+    >>> (values.round(6) + 0.0).tolist(), vectors.shape
+    ([0.0, 1.0, 3.0], (3, 3))
     """
     matrix = cell_laplacian(mesh)
     size = mesh.n_cells

@@ -79,6 +79,13 @@ def young_modulus(name: str, mesh: HexMesh, seed: int = 0, label: str = "mesh") 
     ------
     UserError
         If there is no such file, or for what `carillon.fem.moduli_file.read_moduli` refuses.
+
+    Examples
+    --------
+    >>> from carillon.fem.geometry import hexmesh_from_grid
+    >>> mesh = hexmesh_from_grid(np.array([[0, 0, 0], [1, 0, 0]]), np.zeros(3), 0.5)
+    >>> young_modulus("two-region", mesh).tolist()
+    [10000000000.0, 100000000.0]
     """
     match name:
         case "uniform":

@@ -165,6 +165,14 @@ def fine_model(mesh: HexMesh, young: Array, **constants: Unpack[Constants]) -> E
     ------
     UserError
         For what `carillon.fem.moduli.require_moduli` refuses.
+
+    Examples
+    --------
+    >>> from carillon.fem.geometry import hexmesh_from_grid
+    >>> mesh = hexmesh_from_grid(np.array([[0, 0, 0], [1, 0, 0]]), np.zeros(3), 0.5)
+    >>> model = fine_model(mesh, np.array([1e9, 2e9]), density=1000.0)
+    >>> model.n_dofs, model.mass
+    (36, 250.0)
     """
     return ElasticModel(
         mesh,

@@ -132,6 +132,12 @@ def fit(objective: str, e: ArrayLike, poisson: float = DEFAULT_POISSON) -> Fits:
     Blocks are turned so that 21 void patterns stand for all 255, and those of one pattern are
     fitted together. A row's result does not depend on the other rows, bit for bit. One core is
     used: share many rows among processes.
+
+    Examples
+    --------
+    >>> moduli = fit("oversampled", [[1, 1, 1, 1, 1, 1, 1, 1], [2, 2, 2, 2, 2, 2, 2, 2]]).moduli
+    >>> bool(np.allclose(moduli[1], 2.0 * moduli[0])), moduli.shape
+    (True, (2, 8))
     """
     require_objective(objective)
     require_poisson(poisson)

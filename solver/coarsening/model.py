@@ -39,6 +39,15 @@ def build_model(
     ------
     UserError
         For what `carillon.fem.moduli.require_moduli` refuses.
+
+    Examples
+    --------
+    >>> from carillon.fem.geometry import hexmesh_from_grid
+    >>> from solver.coarsening.choice import make_coarsening
+    >>> mesh = hexmesh_from_grid(np.argwhere(np.ones((4, 2, 2))), np.zeros(3), 0.5)
+    >>> coarse = build_model(mesh, np.full(16, 1e9), make_coarsening("ddfem"))
+    >>> coarse.mesh.n_cells, coarse.young.shape
+    (2, (2, 8))
     """
     if coarsening is None:
         return fine_model(mesh, young, **constants)

@@ -101,6 +101,16 @@ def extract(
     UserError
         If the clip is silent or far beyond full scale, has no modes or fewer than asked for, does
         not decay, or is shorter than three periods of its lowest mode.
+
+    Examples
+    --------
+    >>> from sound.clips.damped import damped_sinusoids
+    >>> clip = damped_sinusoids(
+    ...     np.array([440.0]), np.array([8.0]), np.array([0.5]), np.zeros(1), rate=8000, count=8000
+    ... )
+    >>> found = extract(clip, 8000)
+    >>> found.frequencies.round(3).tolist(), found.dampings.round(3).tolist()
+    ([440.0], [8.0])
     """
     clip = np.asarray(samples, dtype=float)
     _require_sound(clip)

@@ -33,7 +33,15 @@ class Blocks:
 
 
 def blocks_from_mesh(fine: HexMesh) -> Blocks:
-    """Pair `fine` with its coarse mesh; a block starts at every even cell coordinate."""
+    """Pair `fine` with its coarse mesh; a block starts at every even cell coordinate.
+
+    Examples
+    --------
+    >>> fine = hexmesh_from_grid(np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0]]), np.zeros(3), 0.5)
+    >>> blocks = blocks_from_mesh(fine)
+    >>> blocks.coarse.n_cells, blocks.fine_of_block[:, :2].tolist()
+    (2, [[0, 1], [2, -1]])
+    """
     coarse = hexmesh_from_grid(
         np.unique(fine.grid >> 1, axis=0), origin=fine.origin, edge=2 * fine.edge
     )

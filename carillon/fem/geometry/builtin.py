@@ -178,6 +178,11 @@ def builtin_surface(name: str) -> trimesh.Trimesh:
     ------
     UserError
         If there is no such object; the message lists the names.
+
+    Examples
+    --------
+    >>> builtin_surface("bar").is_watertight
+    True
     """
     if name not in BUILTINS:
         raise UserError(

@@ -47,6 +47,12 @@ def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
         If the file is missing, not readable as a mesh, without faces, flat, or holds coordinates
         that are not finite; if `unit` is out of range, or the surface too large, too small or too
         far from the origin (see `carillon.limits`); if the built-in name is unknown.
+
+    Examples
+    --------
+    >>> surface = load_surface("builtin:bell", unit=2.0)
+    >>> bool((surface.extents > load_surface("builtin:bell").extents).all())
+    True
     """
     if not UNITS[0] <= unit <= UNITS[1]:
         raise UserError(

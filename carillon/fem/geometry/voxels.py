@@ -98,6 +98,13 @@ def voxelize(
     UserError
         If the resolution is not an integer >= 2 or needs too large a grid, if no voxel is filled,
         or if the model falls into pieces.
+
+    Examples
+    --------
+    >>> from carillon.fem.geometry.builtin import builtin_surface
+    >>> voxels = voxelize(builtin_surface("box"), 8)
+    >>> max(voxels.shape), voxels.n_cells == voxels.filled.sum()
+    (8, True)
     """
     resolution = _checked_resolution(surface, resolution, name)
     if fill not in FILLS:

@@ -1,13 +1,13 @@
-"""Every command of the README's section on sound runs as it stands there."""
+"""Every command of the tutorial on sound runs as it stands there."""
 
 from __future__ import annotations
 
 import pytest
 
-from tests.readme_commands import SOUND, run_commands, section
+from tests.documentation import SOUND, Reader
 
 
 @pytest.mark.slow
 def test_commands_of_sound_run_in_the_order_of_the_page(tmp_path):
-    assert run_commands(section(SOUND), tmp_path) > 5
+    assert len(Reader(tmp_path).follow(SOUND)) > 5
     assert {"hit.wav", "elsewhere.wav", "pan.glb"} <= {path.name for path in tmp_path.iterdir()}

@@ -1,0 +1,34 @@
+"""Parts of pages that are made from the sources: `<!-- made here: NAME WORDS -->` is replaced."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import command_help
+import rooms_picture
+from sphinx.application import Sphinx
+
+PARTS: dict[str, Callable[..., str]] = {
+    "commands": command_help.of_room,
+    "rooms": rooms_picture.of_rooms,
+    "packages": rooms_picture.of_packages,
+}
+_PLACE = re.compile(r"^<!-- made here: (.+) -->$", re.MULTILINE)
+
+
+def fill(app: Sphinx, page: str, source: list[str]) -> None:
+    """Put the parts into the text of a page."""
+
+    def part(place: re.Match[str]) -> str:
+        name, *words = place[1].split()
+        return PARTS[name](*words)
+
+    source[0] = _PLACE.sub(part, source[0])
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Fill pages in as they are read."""
+    app.connect("source-read", fill)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
