@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
 from carillon.fem.laplacian import laplacian_modes
+from solver.distribution.clustering import k_means
 
 EMBEDDING_MODES = 12
 """Laplacian eigenvectors that span the clustering space, the constant left out."""
@@ -37,14 +38,10 @@ def partition_cells(mesh: HexMesh, parts: int, seed: int = 0) -> NDArray[np.int3
         )
     if parts == 1:
         return np.zeros(mesh.n_cells, dtype=np.int32)
-    from sklearn.cluster import KMeans  # whose import takes a second
-
     values, vectors = laplacian_modes(mesh, EMBEDDING_MODES + 1)
     # Commute-time weights: distances in the embedding follow distances along the solid.
     embedding = vectors[:, 1:] / np.sqrt(np.maximum(values[1:], 1e-12))
-    kmeans = KMeans(parts, init="k-means++", n_init=1, random_state=seed % 2**32)
-    labels = kmeans.fit_predict(embedding)
-    return _without_gaps(labels)
+    return _without_gaps(k_means(embedding, parts, np.random.default_rng(seed)))
 
 
 def partition_nodes(mesh: HexMesh, cell_part: NDArray[np.int32]) -> NDArray[np.int32]:
