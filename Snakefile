@@ -28,7 +28,7 @@ except UserError as error:
     raise WorkflowError(str(error)) from None
 
 
-report: str(settings.FOLDER / "report" / "captions" / "workflow.rst")
+report: f"{settings.FOLDER}/report/captions/workflow.rst"
 
 
 include: f"{RULES}/common.smk"

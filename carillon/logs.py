@@ -18,8 +18,7 @@ class _Lines(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Show a message."""
-        warning = "warning: " if record.levelno >= logging.WARNING else ""
-        say(f"{warning}{self.format(record)}")
+        say(self.format(record))
 
 
 _LINES = _Lines()
