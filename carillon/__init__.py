@@ -1,7 +1,7 @@
 """Carillon's common ground: what every room needs and no room owns.
 
-Errors meant for the user, atomic HDF5 files, provenance, progress, and the check of the numerical
-runtime (BLAS, threads).  Nothing in here knows any mathematics of the method.
+Errors meant for the user, commands and options, atomic HDF5 files, provenance, progress, the check
+of the numerical runtime (BLAS, threads), and the finite element (`fem`), on which all else rests.
 """
 
 import os as _os
@@ -14,3 +14,6 @@ _openblas.configure(_os.environ)
 _step.leave_lone_step(_os.environ)
 
 __version__ = "0.1.0"
+
+ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "workflow")
+"""Packages of the project; each imports those before it."""

@@ -10,9 +10,9 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
+from carillon import ROOMS
 from carillon.commands import Command, run_program
 
-ROOMS = ("dataset_gen", "forests", "solver", "sound", "workflow")
 LONGER = {
     "dataset_gen": {"benchmark": "benchmark-fits", "inspect": "inspect-shard"},
     "forests": {"benchmark": "benchmark-forests", "inspect": "inspect-forests"},
@@ -25,7 +25,7 @@ LONGER = {
 def commands() -> dict[str, Command]:
     """All commands by name."""
     found = {"environment": Command("carillon.environment", "versions, BLAS and cores in use")}
-    for room in ROOMS:
+    for room in ROOMS[1:]:
         own: dict[str, Command] = import_module(f"{room}.commands").COMMANDS
         found |= {LONGER.get(room, {}).get(name, name): command for name, command in own.items()}
     return found

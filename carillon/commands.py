@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
-from types import ModuleType
 
 from carillon import cli
 from carillon.arguments import Parser
@@ -87,14 +86,10 @@ def _parser(
         part = parts.add_parser(
             each,
             help=command.summary,
-            description=_description(module),
+            description=None if module is None else module.__doc__,
             epilog=getattr(module, "EXAMPLES", None),
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         if module is not None:
             module.add_arguments(part)
     return parser
-
-
-def _description(module: ModuleType | None) -> str | None:
-    return module.__doc__ if module is not None else None

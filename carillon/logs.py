@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import logging
 
+from carillon import ROOMS
 from carillon.progress import say
-
-ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "workflow")
 
 
 class _Lines(logging.Handler):

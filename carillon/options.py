@@ -13,6 +13,9 @@ from typing import Any, TypeVar
 
 T = TypeVar("T")
 
+REQUIRED: Any = dataclasses.MISSING
+"""Default of an option that has none."""
+
 _HELP = "help"
 
 
@@ -49,16 +52,11 @@ def option(
     return dataclasses.field(default=default, metadata=metadata)
 
 
-REQUIRED: Any = dataclasses.MISSING
-"""Default of an option that has none."""
-
-
 def add_options(
     parser: argparse.ArgumentParser,
     options: type,
     leave_out: Sequence[str] = (),
     positional: Sequence[str] = (),
-    **defaults: Any,
 ) -> None:
     """Add the options of a dataclass to a command line.
 
@@ -70,25 +68,20 @@ def add_options(
         Names of fields that are no options of this command.
     positional
         Names of fields that are given by their place.
-    defaults
-        Defaults of this command, in the place of the fields'.
     """
     for field in dataclasses.fields(options):
         if field.name not in leave_out and _HELP in field.metadata:
-            default = defaults.get(field.name, field.default)
-            _add(parser, field, default, field.name in positional)
+            _add(parser, field, field.name in positional)
 
 
-def collect(options: type[T], arguments: argparse.Namespace, **others: Any) -> T:
+def collect(options: type[T], arguments: argparse.Namespace) -> T:
     """The dataclass from what a command line gave, its defaults for what the command leaves out."""
     names = {field.name for field in dataclasses.fields(options)}  # type: ignore[arg-type]
-    given = {name: value for name, value in vars(arguments).items() if name in names}
-    return options(**{**given, **others})
+    return options(**{name: value for name, value in vars(arguments).items() if name in names})
 
 
-def _add(
-    parser: argparse.ArgumentParser, field: dataclasses.Field[Any], default: Any, positional: bool
-) -> None:
+def _add(parser: argparse.ArgumentParser, field: dataclasses.Field[Any], positional: bool) -> None:
+    default = field.default
     told = {key: value for key, value in field.metadata.items() if value is not None}
     if positional:
         parser.add_argument(field.name, **{"metavar": field.name.upper(), **told})
@@ -107,7 +100,7 @@ def _add(
 
 
 def _told_default(default: Any, help: str) -> str:
-    if default in (REQUIRED, None, False) or "default" in help:
+    if default is REQUIRED or default is None or default is False or "default" in help:
         return ""
     shown = f"{default:g}" if isinstance(default, float) else default
     return f" (default {shown})"

@@ -12,10 +12,11 @@ from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
+from carillon import ROOMS
 from workflow import source_files
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGES = ("carillon", "dataset_gen", "forests", "solver", "sound", "workflow")
+PACKAGES = ROOMS
 """Of the project; what lies beside them where it is installed is none of its code."""
 
 
