@@ -300,7 +300,7 @@ def repetitions_give_the_same_bits() -> None:
     model = on_first(solids.random_box(9, 6, 5))
     for options in (
         SolverOptions(modes=20, corrections=0),
-        SolverOptions(modes=20, tolerance=1e-4, inner="icc-pcg"),
+        SolverOptions(modes=20, tolerance=1e-4, linear_solver="icc-pcg"),
     ):
         first, *others = (modal_analysis(model, options, COMM) for _ in range(REPETITIONS))
         for other in others:
@@ -310,7 +310,7 @@ def repetitions_give_the_same_bits() -> None:
 
 def repetitions_with_mumps_agree_to_the_tolerance() -> None:
     model = on_first(solids.random_box(9, 6, 5))
-    corrected = SolverOptions(modes=20, tolerance=1e-7, inner="mumps")
+    corrected = SolverOptions(modes=20, tolerance=1e-7, linear_solver="mumps")
     for options, bound in ((corrected, 2e-7), (SolverOptions(modes=20, method="slepc"), 1e-9)):
         first, *others = (modal_analysis(model, options, COMM) for _ in range(REPETITIONS))
         for other in others:

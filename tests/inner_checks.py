@@ -1,4 +1,4 @@
-"""Checks of the inner solvers on any number of ranks: `tests/inner_checks.py NAME[,NAME]`.
+"""Checks of the linear solvers on any number of ranks: `tests/inner_checks.py NAME[,NAME]`.
 
 Every rank makes the same checks, and one that fails ends them all.
 """

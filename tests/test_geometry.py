@@ -187,11 +187,11 @@ def test_pieces_are_an_error_that_counts_them(two_boxes):
     assert sentence.startswith(
         "mesh 'boxes' at resolution 22 falls into 2 pieces (512 and 64 voxels)"
     )
-    assert "--pieces largest" in sentence
+    assert "--components largest" in sentence
 
 
 def test_largest_piece_is_kept_on_request(two_boxes):
-    voxels = voxelize(two_boxes, 22, pieces="largest")
+    voxels = voxelize(two_boxes, 22, components="largest")
     assert voxels.piece_sizes.tolist() == [512]
 
 
@@ -215,7 +215,7 @@ def test_resolution_beyond_memory_names_one_that_fits():
     one_sentence(error)
 
 
-@pytest.mark.parametrize("option", [{"fill": "magic"}, {"pieces": "some"}])
+@pytest.mark.parametrize("option", [{"fill": "magic"}, {"components": "some"}])
 def test_unknown_option_lists_the_known_ones(option):
     with pytest.raises(UserError, match="expected one of"):
         voxelize(trimesh.creation.box(), 8, **option)
@@ -358,10 +358,10 @@ def test_surface_quads_enclose_the_volume():
 
 def test_objects_stand_upright(meshes):
     for name in BUILTINS:
-        voxels = voxelize(load_surface(f"builtin:{name}"), 20, pieces="largest")
+        voxels = voxelize(load_surface(f"builtin:{name}"), 20, components="largest")
         assert guess_up(hexmesh_from_voxels(voxels)) == "z", name
     for file in ("stanford-bunny", "teapot"):
-        voxels = voxelize(load_surface(str(meshes / f"{file}.obj")), 20, pieces="largest")
+        voxels = voxelize(load_surface(str(meshes / f"{file}.obj")), 20, components="largest")
         assert guess_up(hexmesh_from_voxels(voxels)) == "y", file
 
 

@@ -22,7 +22,7 @@ WORKERS = [*GENERATE, "--workers", 2]
 TRAIN = "forests train shard.h5 --trees 2 --depth 8 --out forests.h5".split()
 MODES = "solver modes builtin:box --resolution 8 --modes 20 --out modes.h5".split()
 # MUMPS, the default on several ranks, repeats itself but for the last digits.
-ON_RANKS = [*MODES, "--inner", "icc-pcg"]
+ON_RANKS = [*MODES, "--linear-solver", "icc-pcg"]
 BENCHMARK = (
     "solver benchmark builtin:bar --resolution 10 --modes 12 --runs 1 --no-arpack --out row.json"
 ).split()

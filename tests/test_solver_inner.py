@@ -1,4 +1,4 @@
-"""The iterative inner solvers of the error correction."""
+"""The iterative linear solvers of the error correction."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_contrast_converges_or_says_that_it_does_not(change, ratio, method):
     try:
         solution = inverse.solve(rhs)
     except ConvergenceError as error:
-        assert "inner solver" in str(error)
+        assert "linear solver" in str(error)
     else:
         residuals = inner_checks.relative_residuals(system, inverse, rhs, solution)
         assert residuals.max() <= 1.01 * tolerance
@@ -84,5 +84,5 @@ def test_indefinite_matrix_is_an_error():
     system = inner_checks.system_of(solids.random_box(5, 4, 4))
     with pytest.raises(ValueError, match="shift must be negative"):
         IterativeInverse(system, safe_shift(system))
-    with pytest.raises(ValueError, match="'cg' is none of the inner solvers"):
+    with pytest.raises(ValueError, match="'cg' is none of the linear solvers"):
         IterativeInverse(system, -1.0, "cg")

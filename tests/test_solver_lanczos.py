@@ -14,7 +14,7 @@ from solver.assembly.system import Layout, assemble
 from solver.correction.correct import correct
 from solver.correction.lanczos import lanczos
 from solver.distribution.local_mesh import distribute
-from solver.linear import InnerSolver
+from solver.linear import LinearSolver
 from solver.subspace.rayleigh_ritz import rayleigh_ritz
 from tests import solids
 
@@ -29,7 +29,7 @@ class Case:
         local_mesh = distribute(model, 4, comm=COMM)
         layout = Layout.of_local_mesh(local_mesh, COMM)
         self.system = assemble(local_mesh, COMM, layout)
-        self.inner = InnerSolver("multifrontal", layout)
+        self.inner = LinearSolver("multifrontal", layout)
         self.exact = solids.dense_eigenvalues(model)[6:]
         block = np.random.default_rng(3).standard_normal((model.n_dofs, width))
         # Once smoothed: a start that knows roughly where the spectrum lies.

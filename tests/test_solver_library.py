@@ -130,6 +130,6 @@ def test_petsc_options_reach_slepc_and_strangers_are_refused(tmp_path, run_cli):
 
 def test_ghost_of_an_eigenvalue_is_proven_absent_for_corrected_modes():
     model = solids.random_box(8, 5, 4)
-    options = SolverOptions(modes=30, prove=True, tolerance=1e-9)
+    options = SolverOptions(modes=30, check_inertia=True, tolerance=1e-9)
     evidence = ModalSolver(model, options, COMM).solve().evidence
     assert evidence["inertia_count"] == evidence["inertia_expected"] >= 30

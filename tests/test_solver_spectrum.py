@@ -20,7 +20,7 @@ from solver.correction.correct import correct
 from solver.distribution.local_mesh import distribute
 from solver.hcms.condense import restrict_stiffness
 from solver.hcms.synthesis import synthesize
-from solver.linear import InnerSolver
+from solver.linear import LinearSolver
 from solver.studies.comparison import subspace_angles
 from solver.subspace.spectrum import clusters
 from tests import solids
@@ -94,7 +94,7 @@ def test_corrected_modes_are_as_accurate_as_the_solver_says(interface, accelerat
     model = solids.random_box(12, 6, 5)
     exact = solids.dense_eigenvalues(model)[:60]
     options = SolverOptions(
-        modes=60, interface=interface, acceleration=acceleration, subdomains=6, keep=110
+        modes=60, interface=interface, acceleration=acceleration, subdomains=6, retained_modes=110
     )
     result = modal_analysis(model, options, COMM)
     error = np.abs(result.values[6:] / exact[6:] - 1.0)
@@ -116,7 +116,7 @@ def test_error_estimate_follows_the_true_error(acceleration):
         system,
         start,
         50,
-        InnerSolver("multifrontal", Layout.of_local_mesh(local_mesh, COMM)),
+        LinearSolver("multifrontal", Layout.of_local_mesh(local_mesh, COMM)),
         tolerance=0.0,
         max_steps=3,
         acceleration=acceleration,

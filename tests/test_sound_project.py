@@ -12,7 +12,7 @@ import yaml
 from jsonschema import Draft202012Validator
 
 from carillon.errors import UserError
-from carillon.fem.geometry import FILLS, PIECES
+from carillon.fem.geometry import FILLS, COMPONENTS
 from solver.analysis.problem import ProblemOptions
 from sound.project import schema
 from sound.project.project import Project, load_project, with_optimiser
@@ -56,10 +56,10 @@ def test_what_a_project_leaves_out_takes_the_defaults_of_the_schema(folder):
 
 def test_defaults_of_the_solid_are_those_of_the_solver():
     defaults = {field.name: field.default for field in dataclasses.fields(ProblemOptions)}
-    for key in ("unit", "fill", "pieces", "poisson", "density", "forest"):
+    for key in ("unit", "fill", "components", "poisson", "density", "forest"):
         assert SCHEMA["properties"][key]["default"] == defaults[key]
     assert SCHEMA["properties"]["fill"]["enum"] == list(FILLS)
-    assert SCHEMA["properties"]["pieces"]["enum"] == list(PIECES)
+    assert SCHEMA["properties"]["components"]["enum"] == list(COMPONENTS)
 
 
 def test_everything_that_is_written_is_read(folder):

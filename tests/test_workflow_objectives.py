@@ -25,8 +25,8 @@ from workflow.study.tables import BUILDERS
 
 STUDY = {
     "models": {
-        "box": {"title": "", "mesh": "builtin:box", "resolutions": [8, 16], "pieces": "error"},
-        "bust": {"title": "", "mesh": "bust.obj", "resolutions": [24], "pieces": "error"},
+        "box": {"title": "", "mesh": "builtin:box", "resolutions": [8, 16], "components": "error"},
+        "bust": {"title": "", "mesh": "bust.obj", "resolutions": [24], "components": "error"},
     },
     "materials": ["uniform", "noise"],
     "modes": 70,

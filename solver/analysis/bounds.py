@@ -47,7 +47,7 @@ def require_memory(model: ElasticModel | None, options: SolverOptions, comm: MPI
 
     def check() -> None:
         n_dofs = cast(ElasticModel, model).n_dofs
-        vectors = min(max(options.modes, options.keep or 0), n_dofs)
+        vectors = min(max(options.modes, options.retained_modes or 0), n_dofs)
         needed = 8 * vectors * (FEWEST_BLOCKS * n_dofs * share + FEWEST_SQUARES * vectors)
         free = available_memory()
         if free is not None and needed > free:

@@ -23,7 +23,7 @@ from solver.correction.correct import EIGENVALUE_TOLERANCE, correct
 from solver.distribution.collective import bcast_from_root, compute_on_root
 from solver.distribution.local_mesh import LocalMesh, distribute, scatter_moduli
 from solver.hcms.synthesis import Synthesis, make_subdomains, synthesize
-from solver.linear import InnerSolver, Inverse
+from solver.linear import LinearSolver, Inverse
 from solver.reference.truth import (
     RESIDUAL_TOLERANCE,
     SPARE_MODES,
@@ -151,7 +151,7 @@ class ModalSolver:
             self.local_mesh = distribute(model, options.subdomains, options.seed, comm)
         with phases("analysis"):
             self._layout = Layout.of_local_mesh(self.local_mesh, comm)
-            self._inner = InnerSolver(options.inner, self._layout)
+            self._linear = LinearSolver(options.linear_solver, self._layout)
             self._keep = self._modes_to_keep()
             if options.method == "hcms":
                 self._subdomains = make_subdomains(self.local_mesh, options.interface, comm)
@@ -244,7 +244,7 @@ class ModalSolver:
 
     def inverse(self, modes: Modes, shift: float) -> Inverse:
         """(K - shift M)^-1 of the material that `modes` belong to, by the correction's solver."""
-        return self._inner.inverse(modes.system, shift)
+        return self._linear.inverse(modes.system, shift)
 
     @property
     def _exact(self) -> bool:
@@ -255,23 +255,23 @@ class ModalSolver:
 
     def _modes_to_keep(self) -> int:
         options, n_dofs = self.options, self.local_mesh.n_dofs
-        together = options.acceleration == "lanczos" and self._inner.indefinite
+        together = options.acceleration == "lanczos" and self._linear.indefinite
         together = together and options.corrections > 0 and options.tolerance != 0.0
         parts = self.local_mesh.decomposition.tree.parts
-        keep = options.keep
+        keep = options.retained_modes
         if keep is None:
             keep = default_keep(options.modes, parts, together)
         least = options.modes + (FEWEST_SPARE if options.corrections else 0)
         if options.method == "hcms" and keep < min(least, n_dofs):
             raise UserError(
-                f"--keep {keep} is too few for {options.modes} modes; expected at least {least}, "
+                f"--retained-modes {keep} is too few for {options.modes} modes; expected at least {least}, "
                 "and half more for fast convergence"
             )
         return keep
 
     def _general_solver(self, system: System, phases: Phases, evidence: dict[str, Any]) -> _Found:
         options = self.options
-        proving = options.prove is not False
+        proving = options.check_inertia is not False
         with phases("eigensolver"):
             truth = solve_truth(
                 system,
@@ -344,13 +344,13 @@ class ModalSolver:
                 return self._uncorrected(synthesis)
             values, start = elastic_part(system, synthesis)
         wanted = options.modes - RIGID_MODES
-        spare = SPARE_MODES if options.prove else 0
+        spare = SPARE_MODES if options.check_inertia else 0
         with phases("correction"):
             result = correct(
                 system,
                 start,
                 wanted + spare,
-                self._inner,
+                self._linear,
                 values,
                 EIGENVALUE_TOLERANCE if options.tolerance is None else options.tolerance,
                 options.corrections,
@@ -360,7 +360,7 @@ class ModalSolver:
             )
             rigid_values, rigid = rigid_pairs(system)
         evidence |= {
-            "inner": self._inner.method,
+            "linear_solver": self._linear.method,
             "corrections": result.steps,
             "right_hand_sides": result.solves,
             "eigenvalue_error_estimate": float(result.errors[:wanted].max()),
@@ -371,7 +371,7 @@ class ModalSolver:
             options.modes,
             result.steps,
         )
-        if options.prove and can_count():
+        if options.check_inertia and can_count():
             found = self._prove(system, found, phases, evidence)
             evidence |= {"further_searches": found.searches, "modes_added": found.added}
         return _Found(*found.lowest(), result.guard, result.inverse)
@@ -380,7 +380,7 @@ class ModalSolver:
         count = self.options.modes
         if len(synthesis.values) < count:
             raise UserError(
-                f"HCMS kept {len(synthesis.values)} modes, {count} are wanted; raise --keep or "
+                f"HCMS kept {len(synthesis.values)} modes, {count} are wanted; raise --retained-modes or "
                 "lower --subdomains"
             )
         return _Found(synthesis.values[:count], np.ascontiguousarray(synthesis.vectors[:, :count]))

@@ -33,8 +33,8 @@ def tolerance(text: str) -> float:
 class SolverOptions:
     """What to compute and how; the defaults suit a model of some ten thousand unknowns.
 
-    The interface treatments are told in `solver.hcms.condense`, the inner solvers in
-    `solver.linear.InnerSolver`, the accelerations in `solver.correction.correct`.
+    The interface treatments are told in `solver.hcms.condense`, the linear solvers in
+    `solver.linear.LinearSolver`, the accelerations in `solver.correction.correct`.
     """
 
     method: str = option(
@@ -55,7 +55,7 @@ class SolverOptions:
         "largest number of correction steps; 0 is plain HCMS",
         type=number_of_steps,
     )
-    keep: int | None = option(
+    retained_modes: int | None = option(
         None,
         "modes kept at the root of the merge tree (default: some more than --modes)",
         type=number_of_modes,
@@ -78,14 +78,14 @@ class SolverOptions:
         "of random materials, the partition, and the vectors that slepc and arpack start from",
         type=whole_number(0),
     )
-    prove: bool | None = option(
+    check_inertia: bool | None = option(
         None,
         "count the eigenvalues by inertia, and find those that are missing (default: for slepc "
         "and arpack)",
     )
-    inner: str = option(
+    linear_solver: str = option(
         "auto",
-        "inner solver of the corrections; auto is the fastest direct one",
+        "linear solver of the corrections; auto is the fastest direct one",
         choices=linear.METHODS,
     )
     acceleration: str = option(

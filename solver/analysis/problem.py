@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from carillon.arguments import whole_number
 from carillon.fem import geometry, materials
 from carillon.fem.element import DEFAULT_POISSON
-from carillon.fem.geometry import FILLS, PIECES, HexMesh, hexmesh_from_voxels, voxelize
+from carillon.fem.geometry import FILLS, COMPONENTS, HexMesh, hexmesh_from_voxels, voxelize
 from carillon.fem.materials import young_modulus
 from carillon.fem.model import DEFAULT_DENSITY, ElasticModel
 from carillon.limits import require_constants
@@ -46,7 +46,7 @@ class ProblemOptions:
     )
     unit: float = option(1.0, "metres per unit of the mesh", type=float)
     fill: str = option("winding", "which voxels are inside", choices=sorted(FILLS))
-    pieces: str = option("error", "if the voxels fall apart", choices=PIECES)
+    components: str = option("error", "if the voxels fall apart", choices=COMPONENTS)
     poisson: float = option(DEFAULT_POISSON, "Poisson's ratio", type=float)
     density: float = option(DEFAULT_DENSITY, "mass density [kg/m^3]", type=float)
     lumped: bool = option(False, "lump the mass")
@@ -97,7 +97,7 @@ def build_problem(options: ProblemOptions) -> Problem:
     begin = time.perf_counter()
     surface = geometry.load_surface(options.mesh, options.unit)
     name = geometry.surface_name(options.mesh)
-    voxels = voxelize(surface, options.resolution, options.fill, options.pieces, name)
+    voxels = voxelize(surface, options.resolution, options.fill, options.components, name)
     fine = hexmesh_from_voxels(voxels)
     meshed = time.perf_counter()
     label = f"mesh '{name}', resolution {options.resolution}"

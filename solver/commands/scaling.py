@@ -73,7 +73,7 @@ def _repeated(arguments: argparse.Namespace) -> list[str]:
     fields = [field.name for field in dataclasses.fields(ProblemOptions)]
     names = [name for name in fields if name not in ("mesh", "resolution")]
     words: list[str] = []
-    for name in (*names, "modes", "tolerance", "inner"):
+    for name in (*names, "modes", "tolerance", "linear_solver"):
         value = getattr(arguments, name)
         if value is True:
             words.append(f"--{name}")

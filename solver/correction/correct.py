@@ -13,7 +13,7 @@ from solver.assembly.system import System
 from solver.correction.enrichment import Ritz, Step, enrich, relax
 from solver.correction.lanczos import HIGHEST_SHIFT, ZERO_FRACTION, lanczos
 from solver.distribution.collective import bcast_from_root
-from solver.linear import Approximate, InnerSolver, Inverse
+from solver.linear import Approximate, LinearSolver, Inverse
 from solver.subspace.rayleigh_ritz import rayleigh_ritz, safe_shift
 from solver.subspace.spectrum import WEYL_EXPONENT
 
@@ -88,7 +88,7 @@ def correct(
     system: System,
     start: Array,
     wanted: int,
-    inner: InnerSolver,
+    linear: LinearSolver,
     values: Array | None = None,
     tolerance: float = EIGENVALUE_TOLERANCE,
     max_steps: int = 30,
@@ -105,7 +105,7 @@ def correct(
     the span of X - w Z with the over-relaxation w of Bathe & Ramaswamy (1980), as in the paper.
     Accurate modes are locked.  With `lanczos` the first step is a whole block Lanczos iteration
     from all modes together, see `solver.correction.lanczos`; what it leaves undone, and any start
-    that is nearly good enough, is for `krylov`, as everything is without an exact inner solver.
+    that is nearly good enough, is for `krylov`, as everything is without an exact linear solver.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def correct(
         (local, q) approximate modes, q > wanted for a margin.
     wanted
         Number of elastic modes to correct.
-    inner
+    linear
         Solver of the linear systems.
     values
         (q,) Ritz values of `start`, if its columns are mass-orthonormal Ritz vectors orthogonal to
@@ -160,7 +160,7 @@ def correct(
         found = np.ascontiguousarray(start[:, :wanted])
         return Correction(values[:wanted], found, exact, start[:, wanted:])
     ritz = Ritz(system, values, start)
-    iteration = _Iteration(system, inner, ritz, wanted, acceleration, similar)
+    iteration = _Iteration(system, linear, ritz, wanted, acceleration, similar)
     try:
         result = iteration.run(tolerance, max_steps, rough, report, observe)
         result.inverse = iteration.lasting(tolerance)
@@ -180,18 +180,18 @@ class _Iteration:
     def __init__(
         self,
         system: System,
-        inner: InnerSolver,
+        linear: LinearSolver,
         ritz: Ritz,
         wanted: int,
         acceleration: str,
         similar: Inverse | None,
     ) -> None:
         self.system = system
-        self.inner = inner
+        self.linear = linear
         self.ritz = ritz
         self.wanted = wanted
-        self.inside = acceleration != "relaxation" and inner.indefinite
-        self.lanczos = acceleration == "lanczos" and inner.indefinite
+        self.inside = acceleration != "relaxation" and linear.indefinite
+        self.lanczos = acceleration == "lanczos" and linear.indefinite
         self.share = SHIFT_FRACTION
         self.similar = similar
         self.made: Inverse | None = None
@@ -308,7 +308,7 @@ class _Iteration:
         if self.made is not None and self.inside and self._too_high(self.made):
             self.destroy()
         if self.made is None:
-            self.made = self.inner.inverse(self.system, self._shift())
+            self.made = self.linear.inverse(self.system, self._shift())
         return self.made
 
     def _too_high(self, inverse: Inverse) -> bool:
@@ -390,8 +390,8 @@ class _Iteration:
         if len(recent) > STAGNATION and recent[-1] > PROGRESS * max(recent[:-1]):
             raise ConvergenceError(
                 f"error correction stagnates at an eigenvalue error of {min(self.history):.1e} "
-                f"after {step} steps, {tolerance:.1e} was asked for; use another inner solver "
-                "(--inner) or a looser tolerance"
+                f"after {step} steps, {tolerance:.1e} was asked for; use another linear solver "
+                "(--linear-solver) or a looser tolerance"
             )
 
 

@@ -19,7 +19,7 @@ LARGEST_FRONTS = 120_000
 
 
 class Inverse(Protocol):
-    """What the error correction needs of an inner solver.
+    """What the error correction needs of a linear solver.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Approximate:
         """Leave it to its owner."""
 
 
-class InnerSolver:
+class LinearSolver:
     """Makes inverses of one mesh for any material and shift.
 
     What depends on the mesh alone is computed once, here.
@@ -83,14 +83,14 @@ class InnerSolver:
 
     def __init__(self, method: str, layout: Layout) -> None:
         if method not in METHODS:
-            raise UserError(f"inner solver {method!r}, expected one of {', '.join(METHODS)}")
+            raise UserError(f"linear solver {method!r}, expected one of {', '.join(METHODS)}")
         nodes = layout.local_mesh.n_dofs // 3
         if method == "auto":
             alone = layout.comm.size == 1 and nodes <= LARGEST_FRONTS
             method = "multifrontal" if alone else "mumps"
         if method == "multifrontal" and layout.comm.size > 1:
             raise UserError(
-                f"the inner solver multifrontal runs on one rank, not on {layout.comm.size}; "
+                f"the linear solver multifrontal runs on one rank, not on {layout.comm.size}; "
                 "use mumps"
             )
         self.method = method

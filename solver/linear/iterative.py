@@ -117,7 +117,7 @@ class IterativeInverse:
         if shift >= 0.0:
             raise ValueError("a free body has a singular stiffness; the shift must be negative")
         if method not in METHODS:
-            raise ValueError(f"'{method}' is none of the inner solvers {', '.join(METHODS)}")
+            raise ValueError(f"'{method}' is none of the linear solvers {', '.join(METHODS)}")
         self.shift = shift
         self.iterations = 0
         self.right_hand_sides = 0
@@ -246,7 +246,7 @@ class IterativeInverse:
             f"{self._method} stopped at a relative residual of {worst:.1e} after {steps:,} "
             f"iterations, {self._tolerance:.1e} was asked for ({(~(norms <= target)).sum()} of "
             f"{len(norms)} right-hand sides left); take {' or '.join(others)} or a sparse "
-            "factorisation as inner solver"
+            "factorisation as linear solver"
         )
 
     def destroy(self) -> None:

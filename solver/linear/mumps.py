@@ -49,7 +49,7 @@ class MumpsInverse:
         except PETSc.Error as error:
             raise ConvergenceError(
                 f"the sparse factorisation of {system.n_dofs:,} unknowns failed ({error}); with "
-                "too little memory use more ranks on more machines, or --inner amg-cg"
+                "too little memory use more ranks on more machines, or --linear-solver amg-cg"
             ) from None
         self._factor = self._pc.getFactorMatrix()
 

@@ -13,7 +13,7 @@ from carillon.errors import LocalUserError, UserError
 OPTIONS_PREFIX = "carillon_"
 """What the names of PETSc's options for this program begin with."""
 INNER_PREFIX, MULTIGRID_PREFIX = f"{OPTIONS_PREFIX}inner_", f"{OPTIONS_PREFIX}amg_"
-"""The same for inner solvers of the correction."""
+"""The same for linear solvers of the correction."""
 OUT_OF_MEMORY, OTHER_LIBRARY = 55, 76
 """PETSc's codes of errors that one rank may have alone; all ranks dislike options together."""
 _ASKED_LATE = ("view", "monitor", "reason")

@@ -22,7 +22,7 @@ from solver.distribution.local_mesh import LocalMesh, distribute
 from solver.files.modes_file import read_modes
 from solver.hcms.condense import INTERFACES
 from solver.hcms.synthesis import synthesize
-from solver.linear import InnerSolver
+from solver.linear import LinearSolver
 from solver.studies.comparison import eigenvalue_errors
 
 Array = NDArray[np.float64]
@@ -71,13 +71,13 @@ def correction_history(
     local_mesh = distribute(model, None, seed, comm)
     layout = Layout.of_local_mesh(local_mesh, comm)
     system = assemble(local_mesh, comm, layout)
-    inner = InnerSolver("auto", layout)
+    inner = LinearSolver("auto", layout)
     histories = []
     keep = default_keep(modes, local_mesh.decomposition.tree.parts)
     for start in track(STARTS, "starts", visible=comm.rank == 0):
         block = _start_block(start, local_mesh, keep, seed, comm)
         for acceleration in STEPWISE:
-            values = _correct(system, inner, block, modes - RIGID_MODES, steps, acceleration)
+            values = _correct(system, linear, block, modes - RIGID_MODES, steps, acceleration)
             histories.append(
                 {
                     "start": start,
@@ -119,7 +119,7 @@ def _read_exact(model: ElasticModel, modes: int, truth: str | Path) -> Array:
 
 def _correct(
     system: System,
-    inner: InnerSolver,
+    linear: LinearSolver,
     block: Array,
     wanted: int,
     steps: int,
@@ -131,7 +131,7 @@ def _correct(
         system,
         block,
         wanted,
-        inner,
+        linear,
         tolerance=0.0,
         max_steps=steps,
         acceleration=acceleration,

@@ -117,7 +117,7 @@ for key, values in {
     "modes": ("11", "0", "1.5", str(2**64), "true"),
     "strike": ("[0, 0]", "[.nan, 0, 0]", "[.inf, 0, 0]", "[a, b, c]", "0"),
     "fill": ("best", "null", "1"),
-    "pieces": ("all", "[]"),
+    "components": ("all", "[]"),
     "title": ("5", "[a]"),
 }.items():
     for value in values:

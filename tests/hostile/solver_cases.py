@@ -62,7 +62,7 @@ each(
     ["-1", "1.5", str(2**63), str(10**30)],
     "--corrections",
 )
-each("keep", f"{MODES} --keep VALUE", ["0", "-1", "nan", str(2**63)], "--keep")
+each("keep", f"{MODES} --retained-modes VALUE", ["0", "-1", "nan", str(2**63)], "--retained-modes")
 each("subdomains", f"{MODES} --subdomains VALUE", ["0", "-1", "nan", str(2**63)], "--subdomains")
 each(
     "ranks",
@@ -124,7 +124,7 @@ for option, values in {
 
 # Choices ------------------------------------------------------------------------------------------
 
-for option in ("method", "coarsen", "objective", "fill", "pieces", "interface", "inner"):
+for option in ("method", "coarsen", "objective", "fill", "components", "interface", "linear_solver"):
     hostile(f"no such {option}", f"{MODES} --{option} best", option, "best")
 hostile("no such acceleration", f"{MODES} --acceleration ''", "acceleration")
 hostile("no such objective to rate", "objectives builtin:box --resolution 4 --objectives a,b", "a")

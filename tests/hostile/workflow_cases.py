@@ -180,7 +180,7 @@ for option, values in {
     "mass-damping": ("nan", "-1", "1e300"),
     "stiffness-damping": ("nan", "-1"),
     "fill": ("best",),
-    "pieces": ("all",),
+    "components": ("all",),
     "material": ("steel", "", "ZOO/complex.npy", "ZOO/nan.npy", "ZOO/claims.npy"),
     "forest": ("nowhere.h5", "ZOO/modes.h5", ""),
     "tolerances": (

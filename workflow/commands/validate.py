@@ -21,7 +21,7 @@ from carillon.arguments import (
     whole_number,
 )
 from carillon.errors import UserError
-from carillon.fem.geometry import FILLS, PIECES, surface_name
+from carillon.fem.geometry import FILLS, COMPONENTS, surface_name
 from carillon.fem.materials import NAMES as MATERIALS
 from carillon.fem.model import DEFAULT_DENSITY
 from carillon.files import atomic_path
@@ -68,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--fill", choices=sorted(FILLS), default="winding", help="voxel filling")
     parser.add_argument(
-        "--pieces", choices=PIECES, default="error", help="if the voxels fall apart"
+        "--components", choices=COMPONENTS, default="error", help="if the voxels fall apart"
     )
     parser.add_argument(
         "--density", type=positive_number, default=DEFAULT_DENSITY, help="kg/m^3 (default 1000)"
@@ -150,7 +150,7 @@ def configuration(arguments: argparse.Namespace) -> dict[str, Any]:
                 "resolution",
                 "unit",
                 "fill",
-                "pieces",
+                "components",
                 "density",
                 "modes",
                 "seed",
@@ -177,7 +177,7 @@ def configuration(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def _checked_size(arguments: argparse.Namespace) -> str:
     """The size of the solid, made once to tell all that is wrong with it before anything runs."""
-    names = ("mesh", "resolution", "material", "unit", "fill", "pieces", "poisson", "density")
+    names = ("mesh", "resolution", "material", "unit", "fill", "components", "poisson", "density")
     given = {name: getattr(arguments, name) for name in names}
     load_forest(arguments.forest, arguments.poisson)
     solid = build_problem(ProblemOptions(**given, seed=arguments.seed))

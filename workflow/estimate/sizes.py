@@ -35,7 +35,7 @@ class Solid:
     mesh: str
     resolution: int
     fill: str = "winding"
-    pieces: str = "error"
+    components: str = "error"
 
 
 Sizes = Callable[[Solid], Size]
@@ -60,6 +60,6 @@ def size_of(solid: Solid) -> Size:
         basis = f"{counted.basis} at resolution {LARGEST_COUNTED}, times {times:,.1f}"
         return Size(round(times * counted.fine), round(times * counted.coarse), basis)
     surface = load_surface(solid.mesh)
-    voxels = voxelize(surface, solid.resolution, solid.fill, solid.pieces, solid.mesh)
+    voxels = voxelize(surface, solid.resolution, solid.fill, solid.components, solid.mesh)
     mesh = hexmesh_from_voxels(voxels)
     return Size(mesh.n_dofs, 3 * blocks_from_mesh(mesh).coarse.n_nodes, "counted on its voxels")

@@ -37,14 +37,14 @@ class SolverStages:
         model = config["models"][name]
         mesh = settings.mesh_of(config, name)
         chosen = resolution or model["resolution"]
-        return self.sizes(Solid(mesh, chosen, model["fill"], model["pieces"]))
+        return self.sizes(Solid(mesh, chosen, model["fill"], model["components"]))
 
     def shape_size(self, name: str) -> Size:
         """Unknowns of a solid of the figures, also of one whose mesh is absent."""
         config = self.run.config
         shape = config["figures"]["models"][name]
         mesh = settings.figured_mesh(config, name)
-        return self.sizes(Solid(mesh, shape["resolution"], pieces=shape["pieces"]))
+        return self.sizes(Solid(mesh, shape["resolution"], components=shape["components"]))
 
     @property
     def models(self) -> dict[str, Size]:

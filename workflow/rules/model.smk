@@ -13,7 +13,7 @@ def model_arguments(wildcards, resolution=None):
         "resolution": resolution or model["resolution"],
         "material": settings.material_of(config, wildcards.model),
         "poisson": config["poisson"],
-        **{key: model[key] for key in ("unit", "density", "seed", "fill", "pieces")},
+        **{key: model[key] for key in ("unit", "density", "seed", "fill", "components")},
     }
     return [settings.mesh_of(config, wildcards.model), *options(how)]
 
@@ -42,7 +42,7 @@ def variant_arguments(wildcards, input):
 def hcms_arguments(corrected):
     """Parameters of component mode synthesis and its correction."""
     solver = config["solver"]
-    how = {key: solver[key] for key in ("interface", "keep", "subdomains")}
+    how = {key: solver[key] for key in ("interface", "retained_modes", "subdomains")}
     if corrected:
         how |= {"tol": solver["tolerance"], "corrections": solver["corrections"]}
     else:

@@ -19,7 +19,7 @@ def shape_mesh(wildcards):
 def shape_arguments(wildcards):
     """What the solid is: mesh, resolution, material."""
     model = config["figures"]["models"][wildcards.shape]
-    how = {key: model[key] for key in ("resolution", "material", "pieces")}
+    how = {key: model[key] for key in ("resolution", "material", "components")}
     return [
         settings.figured_mesh(config, wildcards.shape),
         *options(how | {"poisson": config["poisson"]}),

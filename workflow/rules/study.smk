@@ -30,6 +30,6 @@ def case_arguments(wildcards):
         "resolution": wildcards.resolution,
         "material": wildcards.material,
         "poisson": config["poisson"],
-        "pieces": model["pieces"],
+        "components": model["components"],
     }
     return [settings.studied_mesh(config, wildcards.solid), *options(how)]

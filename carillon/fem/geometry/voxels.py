@@ -15,7 +15,7 @@ from carillon.fem.geometry.topology import pieces as label_pieces
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
     import trimesh
 
-PIECES = ("error", "largest")
+COMPONENTS = ("error", "largest")
 
 #: Most voxels of a bounding grid; filling takes about 150 bytes for each of them.
 MAX_GRID = 16_000_000
@@ -74,7 +74,7 @@ def voxelize(
     surface: trimesh.Trimesh,
     resolution: int,
     fill: str = "winding",
-    pieces: str = "error",
+    components: str = "error",
     name: str = "mesh",
 ) -> VoxelModel:
     """Fill the inside of a surface with cubes that hang together through their faces.
@@ -109,8 +109,8 @@ def voxelize(
     resolution = _checked_resolution(surface, resolution, name)
     if fill not in FILLS:
         raise UserError(f"fill {fill!r} is unknown, expected one of {', '.join(FILLS)}")
-    if pieces not in PIECES:
-        raise UserError(f"pieces {pieces!r} is unknown, expected one of {', '.join(PIECES)}")
+    if pieces not in COMPONENTS:
+        raise UserError(f"pieces {pieces!r} is unknown, expected one of {', '.join(COMPONENTS)}")
     model = _filled_model(surface, resolution, fill, name)
     if model.n_cells == 0:
         raise UserError(
@@ -171,7 +171,7 @@ def _pieces_message(
     hint = f" (at {better} it is one piece)" if better else ""
     return (
         f"mesh {model.name!r} at resolution {model.resolution} falls into {len(sizes):,} pieces "
-        f"({listed} voxels); raise --resolution{hint} or pass --pieces largest to keep the largest"
+        f"({listed} voxels); raise --resolution{hint} or pass --components largest to keep the largest"
     )
 
 

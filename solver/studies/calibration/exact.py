@@ -58,7 +58,7 @@ def _case(name: str, mesh: HexMesh, young: Array) -> Case | None:
 
 
 def _object(name: str, resolution: int, material: str) -> Case | None:
-    voxels = voxelize(load_surface(f"builtin:{name}"), resolution, pieces="largest", name=name)
+    voxels = voxelize(load_surface(f"builtin:{name}"), resolution, components="largest", name=name)
     mesh = hexmesh_from_voxels(voxels)
     return _case(f"{name}:{material}", mesh, young_modulus(material, mesh))
 

@@ -1,4 +1,4 @@
-"""A communicator that counts what goes over it, and an inner solver that is timed."""
+"""A communicator that counts what goes over it, and a linear solver that is timed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from solver.assembly.system import System
 from solver.hcms.counts import Tally
-from solver.linear import InnerSolver, Inverse
+from solver.linear import LinearSolver, Inverse
 
 Array = NDArray[np.float64]
 
@@ -89,8 +89,8 @@ def _array_bytes(value: Any) -> int:
     return int(getattr(value, "nbytes", 0))
 
 
-class TimedInner(InnerSolver):
-    """An inner solver whose factorisations and solves are tallied.
+class TimedLinearSolver(LinearSolver):
+    """An linear solver whose factorisations and solves are tallied.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class TimedInner(InnerSolver):
     solving: Tally
 
     @classmethod
-    def of(cls, inner: InnerSolver) -> TimedInner:
+    def of(cls, linear: LinearSolver) -> TimedLinearSolver:
         """Timed stand-in for `inner`, with the same plan."""
         timed = cls.__new__(cls)
         timed.__dict__.update(inner.__dict__)

@@ -22,8 +22,8 @@ from solver.distribution.collective import bcast_from_root
 from solver.distribution.local_mesh import LocalMesh, distribute
 from solver.hcms.counts import Counts, Tally
 from solver.hcms.synthesis import make_subdomains, synthesize
-from solver.linear import InnerSolver
-from solver.studies.scaling.counting import CountingComm, TimedInner
+from solver.linear import LinearSolver
+from solver.studies.scaling.counting import CountingComm, TimedLinearSolver
 from solver.studies.scaling.work import ASSEMBLY_FLOPS, dense_flops, elimination
 
 Phases = dict[str, dict[str, list[float]]]
@@ -77,7 +77,7 @@ def measure(
         "corrections": run.result.steps,
         "blocks": run.result.blocks,
         "right_hand_sides": run.result.solves,
-        "inner": run.inner.method,
+        "linear_solver": run.linear.method,
         "phases": run.phases(model),
         "peak_memory_bytes": _everyones(comm, [_peak_memory()])[:, 0].tolist(),
         "link": _measure_link(comm),
@@ -97,7 +97,7 @@ class _Run:
             self.keep = default_keep(options.modes, parts, together=True)
             layout = Layout.of_local_mesh(self.local_mesh, self.comm)
             subdomains = make_subdomains(self.local_mesh, options.interface, self.comm)
-            self.inner = TimedInner.of(InnerSolver(options.inner, layout))
+            self.linear = TimedLinearSolver.of(LinearSolver(options.linear_solver, layout))
         begin = self._together()
         with self._phase() as self.assembly:
             system: System = assemble(self.local_mesh, self.comm, layout)
@@ -118,7 +118,7 @@ class _Run:
                 system,
                 start,
                 wanted,
-                self.inner,
+                self.linear,
                 values,
                 tolerance=cast(float, options.tolerance),
                 max_steps=options.corrections,
@@ -137,7 +137,7 @@ class _Run:
 
     def phases(self, model: ElasticModel | None) -> Phases:
         """Every phase's quantities, one a rank; collective."""
-        factor, solving = self.inner.factor, self.inner.solving
+        factor, solving = self.linear.factor, self.linear.solving
         dense = self.correction
         dense.seconds -= factor.seconds + solving.seconds
         self._count_flops(model)
@@ -165,8 +165,8 @@ class _Run:
             self.local_mesh.n_dofs, self.result.blocks, self.result.solves, self.width
         )
         self.assembly.flops = ASSEMBLY_FLOPS * len(self.local_mesh.cells)
-        self.inner.factor.flops = work.flops / ranks
-        self.inner.solving.flops = work.solve_flops(self.result.solves) / ranks
+        self.linear.factor.flops = work.flops / ranks
+        self.linear.solving.flops = work.solve_flops(self.result.solves) / ranks
         own = 3 * (self.local_mesh.stop - self.local_mesh.start) / self.local_mesh.n_dofs
         self.correction.flops = own * shared + (alone if self.comm.rank == 0 else 0.0)
 

@@ -55,9 +55,9 @@ class ScalingOptions:
     tolerance: float = option(
         INTERACTIVE_TOLERANCE, "relative eigenvalue error to correct to", type=positive_tolerance
     )
-    inner: str = option(
+    linear_solver: str = option(
         "mumps",
-        "inner solver of the correction, the same on any number of ranks",
+        "linear solver of the correction, the same on any number of ranks",
         choices=linear.METHODS,
     )
     latency: float | None = option(
