@@ -26,6 +26,12 @@ RUN = ("sh", "python", "yaml")
 PROSE = ("", "text", "markdown", "{toctree}", "{include}", "{eval-rst}")
 """Those of blocks that are read."""
 
+PROGRAMS = {
+    ".venv/bin/python": [sys.executable],
+    ".venv/bin/carillon": [sys.executable, "-m", "carillon"],
+}
+"""Programs of the environment, and how the tests call them."""
+
 _BLOCK = re.compile(
     r"(?P<spared><!-- not run: [^\n]+ -->\n)?^(?P<fence>`{3,})(?P<language>\S*)[^\n]*\n"
     r"(?P<text>.*?)^(?P=fence)$",
@@ -131,8 +137,7 @@ class Reader:
     def _type(self, line: str) -> str:
         words = shlex.split(line, comments=True)
         if words[0] != ".venv/bin/snakemake":
-            python = [sys.executable if word == ".venv/bin/python" else word for word in words]
-            return self._once(line, python)
+            return self._once(line, [each for word in words for each in PROGRAMS.get(word, [word])])
         # The rules themselves run in the tests of the workflow.
         # The last --config counts, so that what the line says goes into it too.
         said = words[words.index("--config") + 1 :] if "--config" in words else []

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from carillon.__main__ import ROOMS, commands
+from carillon import ROOMS
+from carillon.__main__ import commands
 from tests.documentation import CHECKOUT, DOCS, PAGES, PROSE, RUN, blocks, page_before, prose
 
 EACH = pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(CHECKOUT)))
@@ -104,7 +105,8 @@ def test_every_command_has_its_help_on_a_page(monkeypatch):
     monkeypatch.syspath_prepend(str(DOCS / "extensions"))
     help_of_room = importlib.import_module("command_help").of_room
     text = "\n".join(
-        (DOCS / "reference" / "commands" / f"{page}.md").read_text() for page in ("index", *ROOMS)
+        (DOCS / "reference" / "commands" / f"{page}.md").read_text()
+        for page in ("index", *ROOMS[1:])
     )
     rooms = re.findall(r"^<!-- made here: commands (\w+) -->$", text, re.MULTILINE)
     headings = re.findall(r"^## `carillon (\S+)`$", "\n".join(map(help_of_room, rooms)), re.M)

@@ -24,8 +24,8 @@ RANKS = {
     "no mesh": "solver modes nowhere.obj --resolution 4 --out o.h5",
     "complex moduli": "solver modes builtin:box --resolution 4 --material ZOO/complex.npy "
     "--out o.h5",
-    "a broken start": "solver modes builtin:box --resolution 4 --modes 12 --start ZOO/modes-cut.h5 "
-    "--out o.h5",
+    "broken initial modes": "solver modes builtin:box --resolution 4 --modes 12 "
+    "--initial-modes ZOO/modes-cut.h5 --out o.h5",
     "damaged shards": "forests train ZOO/shard-flipped.h5 --out o.h5",
     "no such split": "dataset_gen generate --samples 10 --shard 3 --shards 2 --out o.h5",
 }

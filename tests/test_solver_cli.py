@@ -123,7 +123,10 @@ def test_material_array_of_the_right_length_is_used(tmp_path, run_cli, n_voxels)
         ([*BAR, "--material", "steel"], "material 'steel'"),
         ([*BAR, "--modes", "100000"], "100,000 modes asked for"),
         ([*BAR, "--modes", "6"], "6 modes asked for"),
-        ([*BAR, "--modes", "30", "--retained-modes", "30"], "--retained-modes 30 is too few for 30 modes"),
+        (
+            [*BAR, "--modes", "30", "--retained-modes", "30"],
+            "--retained-modes 30 is too few for 30 modes",
+        ),
         ([*BAR, "--seed", "-1"], "--seed"),
         ([*BAR, "--tol", "-1"], "--tol"),
         ([*BAR, "--linear-solver", "guess"], "--linear-solver"),

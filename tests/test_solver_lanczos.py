@@ -121,7 +121,7 @@ def test_warm_start_takes_the_inverse_of_the_material_before():
     prepared = ModalSolver(model, SolverOptions(modes=40, tolerance=1e-3), COMM)
     first = prepared.solve()
     young = model.young * (1.0 + 0.02 * np.cos(np.arange(len(model.young))))[:, None]
-    warm = prepared.solve(young, start=first)
+    warm = prepared.solve(young, initial_modes=first)
     exact = solids.dense_eigenvalues(model.with_young(young))[6:40]
     error = np.abs(warm.values[6:] / exact - 1.0)
     assert error.max() <= 1e-3
@@ -129,7 +129,7 @@ def test_warm_start_takes_the_inverse_of_the_material_before():
     # Where one step was enough, nothing was factorised.
     assert warm.inverse is first.inverse or warm.evidence["corrections"] > 1
     other = ModalSolver(model, SolverOptions(modes=40, tolerance=1e-3), COMM)
-    assert other.solve(young, start=first).inverse is not first.inverse
+    assert other.solve(young, initial_modes=first).inverse is not first.inverse
 
 
 def test_a_contrast_of_a_million_and_nearly_void_elements_are_solved():

@@ -35,7 +35,7 @@ def test_warm_start_reaches_the_same_modes_with_fewer_solves():
     prepared = ModalSolver(model, SolverOptions(modes=40, tolerance=1e-6), COMM)
     first = prepared.solve()
     young = model.young * (1.0 + 0.02 * np.sin(np.arange(len(model.young))))[:, None]
-    cold, warm = prepared.solve(young), prepared.solve(young, start=first)
+    cold, warm = prepared.solve(young), prepared.solve(young, initial_modes=first)
     exact = solids.dense_eigenvalues(model.with_young(young))[6:40]
     for found in (cold, warm):
         assert np.abs(found.values[6:] / exact - 1.0).max() < 1e-6
@@ -94,7 +94,7 @@ def test_command_starts_from_a_file_on_any_number_of_ranks(ranks, tmp_path, run_
     run_cli("solver", "modes", *BAR, "--material", "uniform", *MODES, "--out", before, check=True)
     smooth = (*BAR, "--material", "smooth", *MODES)
     run_cli("solver", "modes", *smooth, "--method", "slepc", "--out", truth, check=True)
-    options = ("--start", before, "--out", after, "--tol", "1e-8")
+    options = ("--initial-modes", before, "--out", after, "--tolerance", "1e-8")
     mpiexec(ranks, "solver", "modes", *smooth, *options, check=True)
     assert compare_files(after, truth).eigenvalue_relative_error["max"] < 1e-8
 
@@ -107,7 +107,7 @@ def test_unsuitable_start_is_refused(tmp_path, run_cli):
     )
     for start, sentence in ((few, "holds 10 modes, 30 are wanted"), (other, "another mesh")):
         out = tmp_path / "x.h5"
-        done = run_cli("solver", "modes", *BAR, *MODES, "--start", start, "--out", out)
+        done = run_cli("solver", "modes", *BAR, *MODES, "--initial-modes", start, "--out", out)
         assert done.returncode == 2
         assert sentence in done.stderr
         assert not out.exists()

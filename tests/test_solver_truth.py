@@ -159,7 +159,9 @@ def test_corrected_modes_that_lack_one_are_completed(monkeypatch):
         return replace(result, values=values, vectors=vectors)
 
     monkeypatch.setattr(analysis, "correct", losing)
-    result = modal_analysis(model, SolverOptions(modes=40, check_inertia=True, tolerance=1e-10), COMM)
+    result = modal_analysis(
+        model, SolverOptions(modes=40, check_inertia=True, tolerance=1e-10), COMM
+    )
     assert np.abs(result.values[6:] / exact[6:] - 1.0).max() < 1e-9
     assert result.evidence["modes_added"] == 1
 

@@ -12,7 +12,7 @@ import yaml
 from jsonschema import Draft202012Validator
 
 from carillon.errors import UserError
-from carillon.fem.geometry import FILLS, COMPONENTS
+from carillon.fem.geometry import COMPONENTS, FILLS
 from solver.analysis.problem import ProblemOptions
 from sound.project import schema
 from sound.project.project import Project, load_project, with_optimiser

@@ -7,7 +7,8 @@ import os
 from collections.abc import Iterator
 from importlib import import_module
 
-from carillon.__main__ import LONGER, ROOMS, commands
+from carillon import ROOMS
+from carillon.__main__ import LONGER, commands
 from carillon.arguments import Parser
 from carillon.commands import Command
 
@@ -23,12 +24,12 @@ def of_room(room: str) -> str:
 def _listed(room: str) -> Iterator[tuple[str, str | None, Command]]:
     """Commands of a room: name, name in the room, and what it is."""
     everything = commands()
-    if room in ROOMS:
+    if room in ROOMS[1:]:
         for own in import_module(f"{room}.commands").COMMANDS:
             name = LONGER.get(room, {}).get(own, own)
             yield name, own, everything.pop(name)
         return
-    in_rooms = {name for each in ROOMS for name, _, _ in _listed(each)}
+    in_rooms = {name for each in ROOMS[1:] for name, _, _ in _listed(each)}
     yield from ((name, None, everything[name]) for name in everything if name not in in_rooms)
 
 

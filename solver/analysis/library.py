@@ -16,8 +16,8 @@ from carillon.fem.model import ElasticModel, fine_model
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
 from solver.distribution.collective import compute_on_root
+from solver.files.initial_modes import scatter_rows
 from solver.files.modes_file import frequencies
-from solver.files.start import scatter_rows
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ def solve(
     model: HexMesh | ElasticModel | None,
     material: str | Array | None = None,
     modes: int = 256,
-    start: Solution | Array | None = None,
+    initial_modes: Solution | Array | None = None,
     comm: MPI.Comm = MPI.COMM_WORLD,
     **options: Any,
 ) -> Solution:
@@ -68,12 +68,12 @@ def solve(
         of a material (`carillon.fem.materials.NAMES`).  None keeps that of the model.
     modes
         Number of modes, rigid ones included.
-    start
+    initial_modes
         Modes of a similar material on the same mesh, which are corrected.
     comm
         Ranks that share the work.
     options
-        Other fields of `SolverOptions`: `method`, `tolerance`, `inner` and so on.
+        Other fields of `SolverOptions`: `method`, `tolerance`, `linear_solver` and so on.
 
     Raises
     ------
@@ -90,28 +90,28 @@ def solve(
     --------
     >>> from carillon.fem.geometry import builtin_surface, hexmesh_from_voxels, voxelize
     >>> mesh = hexmesh_from_voxels(voxelize(builtin_surface("bar"), 12))
-    >>> found = solve(mesh, "uniform", modes=10, method="slepc")
-    >>> len(found.frequencies), found.modes.shape == (mesh.n_dofs, 10)
+    >>> solution = solve(mesh, "uniform", modes=10, method="slepc")
+    >>> len(solution.frequencies), solution.modes.shape == (mesh.n_dofs, 10)
     (10, True)
-    >>> again = solve(mesh, 1.1 * np.full(mesh.n_cells, 1e9), modes=10, start=found)
-    >>> bool(abs(again.frequencies[9] / found.frequencies[9] - 1.1**0.5) < 1e-6)
+    >>> again = solve(mesh, 1.1 * np.full(mesh.n_cells, 1e9), modes=10, initial_modes=solution)
+    >>> bool(abs(again.frequencies[9] / solution.frequencies[9] - 1.1**0.5) < 1e-6)
     True
     """
     solid = compute_on_root(comm, lambda: _with_material(model, material))
     solver = ModalSolver(solid, SolverOptions(modes=modes, **options), comm)
-    whole = start.modes if isinstance(start, Solution) else start
+    whole = initial_modes.modes if isinstance(initial_modes, Solution) else initial_modes
     count = comm.bcast(None if whole is None else whole.shape[1])
     rows = None
     if count is not None:
         rows = scatter_rows([] if whole is None else [whole], count, solver.local_mesh, comm)
-    found = solver.solve(start=rows)
+    result = solver.solve(initial_modes=rows)
     return Solution(
-        found.values,
-        frequencies(found.values),
-        found.system.gather(found.vectors),
-        found.residuals,
-        found.evidence,
-        {**solver.seconds, **found.seconds},
+        result.values,
+        frequencies(result.values),
+        result.system.gather(result.vectors),
+        result.residuals,
+        result.evidence,
+        {**solver.seconds, **result.seconds},
     )
 
 

@@ -23,7 +23,7 @@ from solver.correction.correct import EIGENVALUE_TOLERANCE, correct
 from solver.distribution.collective import bcast_from_root, compute_on_root
 from solver.distribution.local_mesh import LocalMesh, distribute, scatter_moduli
 from solver.hcms.synthesis import Synthesis, make_subdomains, synthesize
-from solver.linear import LinearSolver, Inverse
+from solver.linear import Inverse, LinearSolver
 from solver.reference.truth import (
     RESIDUAL_TOLERANCE,
     SPARE_MODES,
@@ -87,7 +87,7 @@ class Modes:
 
 
 @dataclass
-class _Found:
+class _Solution:
     """Eigenpairs, and what a warm start makes use of, see `Modes`."""
 
     values: Array
@@ -129,7 +129,7 @@ class ModalSolver:
 
         solver = ModalSolver(model, SolverOptions(modes=60, tolerance=1e-2))
         modes = solver.solve()
-        modes = solver.solve(young, start=modes)
+        modes = solver.solve(young, initial_modes=modes)
     """
 
     def __init__(
@@ -157,7 +157,9 @@ class ModalSolver:
                 self._subdomains = make_subdomains(self.local_mesh, options.interface, comm)
         self.seconds = phases.seconds
 
-    def solve(self, young: Array | None = None, start: Modes | Array | None = None) -> Modes:
+    def solve(
+        self, young: Array | None = None, initial_modes: Modes | Array | None = None
+    ) -> Modes:
         """Compute the lowest modes.
 
         All ranks call it and get the same values.
@@ -167,7 +169,7 @@ class ModalSolver:
         young
             Young's modulus [Pa], (m,) of the cells or (m, 8) at their quadrature points, on rank
             0; that of the model if not given.
-        start
+        initial_modes
             Modes of a similar material on the same mesh, or this rank's rows (local, k) of such:
             they are corrected instead of those of HCMS.
 
@@ -179,9 +181,11 @@ class ModalSolver:
             If a tolerance was missed, the modes are not orthonormal, or the body does not have six
             zero-frequency modes.
         """
-        return self._solve(young, start, require_moduli)
+        return self._solve(young, initial_modes, require_moduli)
 
-    def solve_coarse(self, moduli: Array | None, start: Modes | Array | None = None) -> Modes:
+    def solve_coarse(
+        self, moduli: Array | None, initial_modes: Modes | Array | None = None
+    ) -> Modes:
         """The same with the moduli (m, 8) [Pa] that a coarsening made, on rank 0.
 
         They may lie beyond the limits of those that users give.
@@ -193,12 +197,12 @@ class ModalSolver:
         ConvergenceError
             See `solve`.
         """
-        return self._solve(moduli, start, require_coarse_moduli)
+        return self._solve(moduli, initial_modes, require_coarse_moduli)
 
     def _solve(
         self,
         young: Array | None,
-        start: Modes | Array | None,
+        initial_modes: Modes | Array | None,
         require: Callable[[Array, int], Array],
     ) -> Modes:
         phases = Phases(self.comm, self._verbose)
@@ -218,10 +222,10 @@ class ModalSolver:
             "n_dofs": local_mesh.n_dofs,
         }
         if self.options.method == "hcms":
-            found = self._hcms(local_mesh, system, start, phases, evidence)
+            solution = self._hcms(local_mesh, system, initial_modes, phases, evidence)
         else:
-            found = self._general_solver(system, phases, evidence)
-        values, vectors = found.values, found.vectors
+            solution = self._general_solver(system, phases, evidence)
+        values, vectors = solution.values, solution.vectors
         with phases("verification"):
             residuals, orthogonality = verify(system, values, vectors)
         evidence["orthogonality"] = orthogonality
@@ -238,8 +242,8 @@ class ModalSolver:
             system,
             evidence,
             phases.seconds,
-            found.guard,
-            found.inverse,
+            solution.guard,
+            solution.inverse,
         )
 
     def inverse(self, modes: Modes, shift: float) -> Inverse:
@@ -248,7 +252,7 @@ class ModalSolver:
 
     @property
     def _exact(self) -> bool:
-        """Whether eigenpairs are wanted, not just approximations of them."""
+        """Whether eigenpairs are asked for, not just approximations of them."""
         options = self.options
         corrected = options.corrections > 0 and options.tolerance != 0.0
         return options.method != "hcms" or corrected
@@ -264,12 +268,14 @@ class ModalSolver:
         least = options.modes + (FEWEST_SPARE if options.corrections else 0)
         if options.method == "hcms" and keep < min(least, n_dofs):
             raise UserError(
-                f"--retained-modes {keep} is too few for {options.modes} modes; expected at least {least}, "
-                "and half more for fast convergence"
+                f"--retained-modes {keep} is too few for {options.modes} modes; "
+                f"expected at least {least}, and half more for fast convergence"
             )
         return keep
 
-    def _general_solver(self, system: System, phases: Phases, evidence: dict[str, Any]) -> _Found:
+    def _general_solver(
+        self, system: System, phases: Phases, evidence: dict[str, Any]
+    ) -> _Solution:
         options = self.options
         proving = options.check_inertia is not False
         with phases("eigensolver"):
@@ -288,7 +294,7 @@ class ModalSolver:
             "further_searches": truth.searches,
             "modes_added": truth.added,
         }
-        return _Found(*truth.lowest())
+        return _Solution(*truth.lowest())
 
     def _prove(
         self, system: System, truth: Truth, phases: Phases, evidence: dict[str, Any]
@@ -317,17 +323,19 @@ class ModalSolver:
         self,
         local_mesh: LocalMesh,
         system: System,
-        start: Modes | Array | None,
+        initial_modes: Modes | Array | None,
         phases: Phases,
         evidence: dict[str, Any],
-    ) -> _Found:
+    ) -> _Solution:
         options = self.options
         values: Array | None = None
         similar: Inverse | None = None
-        if isinstance(start, Modes):
-            if start.system.rows.pattern is self._layout.pattern:
-                similar = start.inverse
-            start = start.start()
+        if isinstance(initial_modes, Modes):
+            if initial_modes.system.rows.pattern is self._layout.pattern:
+                similar = initial_modes.inverse
+            start: Array | None = initial_modes.start()
+        else:
+            start = initial_modes
         if start is None:
             with phases("hcms"):
                 synthesis = synthesize(
@@ -343,13 +351,13 @@ class ModalSolver:
             if options.corrections == 0:
                 return self._uncorrected(synthesis)
             values, start = elastic_part(system, synthesis)
-        wanted = options.modes - RIGID_MODES
+        requested = options.modes - RIGID_MODES
         spare = SPARE_MODES if options.check_inertia else 0
         with phases("correction"):
             result = correct(
                 system,
                 start,
-                wanted + spare,
+                requested + spare,
                 self._linear,
                 values,
                 EIGENVALUE_TOLERANCE if options.tolerance is None else options.tolerance,
@@ -363,27 +371,29 @@ class ModalSolver:
             "linear_solver": self._linear.method,
             "corrections": result.steps,
             "right_hand_sides": result.solves,
-            "eigenvalue_error_estimate": float(result.errors[:wanted].max()),
+            "eigenvalue_error_estimate": float(result.errors[:requested].max()),
         }
-        found = Truth(
+        truth = Truth(
             np.concatenate([rigid_values, result.values]),
             np.concatenate([rigid, result.vectors], axis=1),
             options.modes,
             result.steps,
         )
         if options.check_inertia and can_count():
-            found = self._prove(system, found, phases, evidence)
-            evidence |= {"further_searches": found.searches, "modes_added": found.added}
-        return _Found(*found.lowest(), result.guard, result.inverse)
+            truth = self._prove(system, truth, phases, evidence)
+            evidence |= {"further_searches": truth.searches, "modes_added": truth.added}
+        return _Solution(*truth.lowest(), result.guard, result.inverse)
 
-    def _uncorrected(self, synthesis: Synthesis) -> _Found:
+    def _uncorrected(self, synthesis: Synthesis) -> _Solution:
         count = self.options.modes
         if len(synthesis.values) < count:
             raise UserError(
-                f"HCMS kept {len(synthesis.values)} modes, {count} are wanted; raise --retained-modes or "
-                "lower --subdomains"
+                f"HCMS kept {len(synthesis.values)} modes, {count} are asked for; raise "
+                "--retained-modes or lower --subdomains"
             )
-        return _Found(synthesis.values[:count], np.ascontiguousarray(synthesis.vectors[:, :count]))
+        return _Solution(
+            synthesis.values[:count], np.ascontiguousarray(synthesis.vectors[:, :count])
+        )
 
 
 def modal_analysis(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from carillon.arguments import whole_number
 from carillon.fem import geometry, materials
 from carillon.fem.element import DEFAULT_POISSON
-from carillon.fem.geometry import FILLS, COMPONENTS, HexMesh, hexmesh_from_voxels, voxelize
+from carillon.fem.geometry import COMPONENTS, FILLS, HexMesh, hexmesh_from_voxels, voxelize
 from carillon.fem.materials import young_modulus
 from carillon.fem.model import DEFAULT_DENSITY, ElasticModel
 from carillon.limits import require_constants

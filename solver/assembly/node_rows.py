@@ -94,9 +94,9 @@ class Halo:
             for rank in range(comm.size)
             if bounds[rank] < bounds[rank + 1]
         ]
-        wanted = [pattern.ghosts[bounds[rank] : bounds[rank + 1]] for rank in range(comm.size)]
+        needed = [pattern.ghosts[bounds[rank] : bounds[rank + 1]] for rank in range(comm.size)]
         self._ghosts = len(pattern.ghosts)
-        asked = comm.alltoall(wanted) if comm.size > 1 else [wanted[0]]
+        asked = comm.alltoall(needed) if comm.size > 1 else [needed[0]]
         self._sent = [(rank, rows - pattern.start) for rank, rows in enumerate(asked) if len(rows)]
 
     @property

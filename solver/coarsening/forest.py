@@ -87,14 +87,14 @@ def forest_or_reason(
         return None, f"without ddfem: {error}"
 
 
-def _mismatch(path: str | Path | None, trained: float, wanted: float) -> str:
+def _mismatch(path: str | Path | None, trained: float, expected: float) -> str:
     if path is None:
         return (
-            f"the default forests are for Poisson's ratio {trained:g}, the model has {wanted:g}; "
-            f"train others (python -m dataset_gen generate --poisson {wanted:g}, then python -m "
+            f"the default forests are for Poisson's ratio {trained:g}, the model has {expected:g}; "
+            f"train others (python -m dataset_gen generate --poisson {expected:g}, then python -m "
             "forests train) and name them with --forest"
         )
     return (
-        f"{path}: trained for Poisson's ratio {trained:g}, the model has {wanted:g}; train forests "
-        "for it or pass --poisson"
+        f"{path}: trained for Poisson's ratio {trained:g}, the model has {expected:g}; train "
+        "forests for it or pass --poisson"
     )

@@ -28,16 +28,16 @@ def run(arguments: argparse.Namespace) -> None:
     """Audit and print."""
     with on_ranks():
         require_outputs(arguments)
-        audits = {name: found.as_dict() for name, found in audit_files(arguments.files).items()}
+        audits = {name: audit.as_dict() for name, audit in audit_files(arguments.files).items()}
     content = {"spectra": audits, "provenance": record(parameters(arguments))}
     write_json(arguments, content)
     if arguments.json:
         print(json.dumps(content, indent=2))
         return
-    for name, found in audits.items():
+    for name, audit in audits.items():
         print(
-            f"{name}: {found['modes']} modes of {found['unknowns']:,} unknowns, "
-            f"{found['rigid_modes']} rigid; largest residual {found['residual_max']:.1e}, "
-            f"orthogonal to {found['orthogonality']:.1e}; {found['expected']} below "
-            f"{found['counted_below']:.6g} rad^2/s^2, counted {found['counted']}"
+            f"{name}: {audit['modes']} modes of {audit['unknowns']:,} unknowns, "
+            f"{audit['rigid_modes']} rigid; largest residual {audit['residual_max']:.1e}, "
+            f"orthogonal to {audit['orthogonality']:.1e}; {audit['expected']} below "
+            f"{audit['counted_below']:.6g} rad^2/s^2, counted {audit['counted']}"
         )

@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> None:
             cases, arguments.seed, arguments.solids, objects=not arguments.random_only
         )
         start = Constants.neutral()
-        found = calibrate_in_turn(
+        calibration = calibrate_in_turn(
             paths, start, DEFAULT_POISSON, arguments.workers, arguments.steps, report=log_step
         )
         source = record(
@@ -62,12 +62,12 @@ def run(arguments: argparse.Namespace) -> None:
             "command"
         ]  # It names folders of this machine, and the file goes into the package.
         content = {
-            **found.constants.as_json(),
+            **calibration.constants.as_json(),
             "provenance": {
                 **source,
-                "settled": found.settled,
+                "settled": calibration.settled,
                 "rms_before": rms_by_material(paths, start, arguments.workers),
-                "rms_after": rms_by_material(paths, found.constants, arguments.workers),
+                "rms_after": rms_by_material(paths, calibration.constants, arguments.workers),
             },
         }
     with atomic_path(arguments.out) as temporary:

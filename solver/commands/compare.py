@@ -26,25 +26,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Compare and print."""
     with on_ranks() as comm:
-        found = bcast_from_root(
+        comparison = bcast_from_root(
             comm, lambda: compare_files(arguments.candidate, arguments.truth).as_dict()
         )
         if comm.rank:
             return
     if arguments.json:
-        found["provenance"] = record(parameters(arguments))
-        print(json.dumps(found, indent=2))
+        comparison["provenance"] = record(parameters(arguments))
+        print(json.dumps(comparison, indent=2))
         return
-    error = found["eigenvalue_relative_error"]
-    print(f"modes compared            {found['modes_compared']} (elastic)")
+    error = comparison["eigenvalue_relative_error"]
+    print(f"modes compared            {comparison['modes_compared']} (elastic)")
     print(
         f"eigenvalue error          median {error['median']:.2e}, 90 % below {error['p90']:.2e}, "
         f"max {error['max']:.2e}"
     )
-    print(f"frequency error, rms      {found['frequency_rms_relative_error']:.2e}")
+    print(f"frequency error, rms      {comparison['frequency_rms_relative_error']:.2e}")
     print(
-        f"frequency error, 7..60    rms {found['frequency_rms_relative_error_7_60']:.2e}, "
-        f"max {found['frequency_max_relative_error_7_60']:.2e}"
+        f"frequency error, 7..60    rms {comparison['frequency_rms_relative_error_7_60']:.2e}, "
+        f"max {comparison['frequency_max_relative_error_7_60']:.2e}"
     )
-    print(f"largest subspace angle    {found['subspace_angle_max']:.2e} rad")
-    print(f"largest residual          {found['residual_max']:.2e}")
+    print(f"largest subspace angle    {comparison['subspace_angle_max']:.2e} rad")
+    print(f"largest residual          {comparison['residual_max']:.2e}")

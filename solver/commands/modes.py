@@ -22,8 +22,8 @@ from solver.analysis.options import SolverOptions
 from solver.analysis.problem import Problem, ProblemOptions, build_problem
 from solver.commands.running import add_solid, on_ranks, parameters, require_outputs
 from solver.distribution.collective import compute_on_root
+from solver.files.initial_modes import modes_from_file
 from solver.files.modes_file import frequencies, write_modes
-from solver.files.start import start_from_file
 from solver.linear import petsc_options
 
 EXAMPLES = """examples:
@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_options(parser, SolverOptions, leave_out=("seed",))
     parser.add_argument("--out", required=True, help="modes file to write (HDF5)")
     parser.add_argument(
-        "--start", metavar="MODES", help="modes file of a similar material to start from"
+        "--initial-modes", metavar="MODES", help="modes file of a similar material to start from"
     )
     parser.add_argument(
         "--petsc",
@@ -59,12 +59,12 @@ def run(arguments: argparse.Namespace) -> None:
         model = None if problem is None else problem.model
         petsc_options.insert_options(arguments.petsc, options.method)
         prepared = ModalSolver(model, options, comm, verbose=sys.stderr.isatty())
-        start = None
-        if arguments.start is not None:
-            start = start_from_file(
-                arguments.start, model, options.modes, prepared.local_mesh, comm
+        initial_modes = None
+        if arguments.initial_modes is not None:
+            initial_modes = modes_from_file(
+                arguments.initial_modes, model, options.modes, prepared.local_mesh, comm
             )
-        result = prepared.solve(start=start)
+        result = prepared.solve(initial_modes=initial_modes)
         result.seconds = {**prepared.seconds, **result.seconds}
         attributes = {} if problem is None else _attributes(arguments, problem, result)
 

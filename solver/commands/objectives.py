@@ -41,15 +41,15 @@ def run(arguments: argparse.Namespace) -> None:
     with on_ranks() as comm:
         require_outputs(arguments, comm)
         described = collect(ProblemOptions, arguments)
-        found = rate_objectives(described, arguments.modes, arguments.objectives, comm)
-        found["provenance"] = record(parameters(arguments))
-        write_json(arguments, found, comm)
+        ratings = rate_objectives(described, arguments.modes, arguments.objectives, comm)
+        ratings["provenance"] = record(parameters(arguments))
+        write_json(arguments, ratings, comm)
         if comm.rank:
             return
     if arguments.json:
-        print(json.dumps(found, indent=2))
+        print(json.dumps(ratings, indent=2))
     else:
-        _print_errors(found)
+        _print_errors(ratings)
 
 
 def _objective_names(text: str) -> list[str]:
@@ -63,18 +63,18 @@ def _objective_names(text: str) -> list[str]:
     return names
 
 
-def _print_errors(found: dict[str, Any]) -> None:
+def _print_errors(ratings: dict[str, Any]) -> None:
     print(
-        f"{found['n_dofs']:,} unknowns coarsened to {found['coarse_n_dofs']:,}; frequency errors "
-        "against SLEPc on the fine mesh"
+        f"{ratings['n_dofs']:,} unknowns coarsened to {ratings['coarse_n_dofs']:,}; frequency "
+        "errors against SLEPc on the fine mesh"
     )
-    last = {part: max(row[part]["last"] for row in found["rows"]) for part in ("audible", "all")}
+    last = {part: max(row[part]["last"] for row in ratings["rows"]) for part in ("audible", "all")}
     parts = ["audible", "all"] if last["all"] > last["audible"] else ["all"]
     spans = [f"modes 7 to {last[part]}" for part in parts]
     heads = "     rms     mean    worst  mode" * len(parts)
     print(f"{'':<14s}" + "".join(f"{span:>32s}" for span in spans))
     print(f"{'':<14s}{heads}      fit    modes")
-    for row in found["rows"]:
+    for row in ratings["rows"]:
         errors = "".join(_errors(row[part]) for part in parts)
         seconds = "".join(f"{row[f'{step}_seconds']:7.2f} s" for step in ("fit", "solve"))
         print(f"{row['coarsening']:<14s}{errors}{seconds}")

@@ -36,9 +36,9 @@ def run(arguments: argparse.Namespace) -> None:
                 f"files called {names}: expected names that differ from each other and from "
                 f"{TRUTH!r}; rename one"
             )
-        found = respond(arguments.truth, candidates, collect(StrikeOptions, arguments))
-        write_response(arguments.out, found, parameters(arguments))
-    for name, response in found.responses.items():
+        study = respond(arguments.truth, candidates, collect(StrikeOptions, arguments))
+        write_response(arguments.out, study, parameters(arguments))
+    for name, response in study.responses.items():
         print(
             f"{name}: differs from {arguments.truth} by {response.difference:.2e} in displacement, "
             f"{response.distance_decibels:.2g} dB in sound"

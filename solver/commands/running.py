@@ -19,7 +19,7 @@ from solver.analysis.problem import ProblemOptions
 from solver.distribution.collective import bcast_from_root
 from solver.linear import petsc_options
 
-INPUTS = ("mesh", "material", "forest", "truth", "start", "files", "candidates")
+INPUTS = ("mesh", "material", "forest", "truth", "initial_modes", "files", "candidates")
 """Arguments that name files which a command reads."""
 HIDDEN = ("out", "json")
 """Arguments on which a result does not depend."""

@@ -40,20 +40,22 @@ def run(arguments: argparse.Namespace) -> None:
     with on_ranks() as comm:
         require_outputs(arguments, comm)
         if arguments.here or comm.size > 1:
-            found, lines = _measured_here(arguments, comm)
+            result, lines = _measured_here(arguments, comm)
         else:
             options = collect(ScalingOptions, arguments)
-            found = scaling_study(collect(ProblemOptions, arguments), options, _repeated(arguments))
-            lines = study_lines(found)
-            found["provenance"] = measured(parameters(arguments), options.ranks, threads=1)
-        write_json(arguments, found, comm)
+            result = scaling_study(
+                collect(ProblemOptions, arguments), options, _repeated(arguments)
+            )
+            lines = study_lines(result)
+            result["provenance"] = measured(parameters(arguments), options.ranks, threads=1)
+        write_json(arguments, result, comm)
         if comm.rank:
             return
-    if arguments.plot is not None and "strong" in found:
+    if arguments.plot is not None and "strong" in result:
         from solver.studies.scaling.plot import save_plot
 
-        save_plot(found, arguments.plot)
-    print(json.dumps(found, indent=2) if arguments.json else "\n".join(lines))
+        save_plot(result, arguments.plot)
+    print(json.dumps(result, indent=2) if arguments.json else "\n".join(lines))
 
 
 def _measured_here(
@@ -63,9 +65,9 @@ def _measured_here(
     described = collect(ProblemOptions, arguments)
     problem = compute_on_root(comm, lambda: build_problem(described))
     model = None if problem is None else problem.model
-    found = measure(model, collect(SolverOptions, arguments), comm)
-    found["provenance"] = measured(parameters(arguments), comm.size)
-    return found, [f"{comm.size} ranks: {found['seconds']:.2f} s"]
+    result = measure(model, collect(SolverOptions, arguments), comm)
+    result["provenance"] = measured(parameters(arguments), comm.size)
+    return result, [f"{comm.size} ranks: {result['seconds']:.2f} s"]
 
 
 def _repeated(arguments: argparse.Namespace) -> list[str]:

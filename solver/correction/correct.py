@@ -13,7 +13,7 @@ from solver.assembly.system import System
 from solver.correction.enrichment import Ritz, Step, enrich, relax
 from solver.correction.lanczos import HIGHEST_SHIFT, ZERO_FRACTION, lanczos
 from solver.distribution.collective import bcast_from_root
-from solver.linear import Approximate, LinearSolver, Inverse
+from solver.linear import Approximate, Inverse, LinearSolver
 from solver.subspace.rayleigh_ritz import rayleigh_ritz, safe_shift
 from solver.subspace.spectrum import WEYL_EXPONENT
 
@@ -87,7 +87,7 @@ class Correction:
 def correct(
     system: System,
     start: Array,
-    wanted: int,
+    requested: int,
     linear: LinearSolver,
     values: Array | None = None,
     tolerance: float = EIGENVALUE_TOLERANCE,
@@ -97,7 +97,7 @@ def correct(
     observe: Callable[[int, Array], None] | None = None,
     similar: Inverse | None = None,
 ) -> Correction:
-    """Improve the `wanted` lowest elastic modes from the block `start` until they are accurate.
+    """Improve the `requested` lowest elastic modes from the block `start` until they are accurate.
 
     A step solves (K - mu M) Z = K X - X Theta M for every mode that is not yet accurate.  With
     `krylov` the Rayleigh-Ritz method then runs in the span of X and Z together, which holds what
@@ -110,8 +110,8 @@ def correct(
     Parameters
     ----------
     start
-        (local, q) approximate modes, q > wanted for a margin.
-    wanted
+        (local, q) approximate modes, q > requested for a margin.
+    requested
         Number of elastic modes to correct.
     linear
         Solver of the linear systems.
@@ -148,19 +148,19 @@ def correct(
     rough = values is not None
     if values is None:
         values, start = rayleigh_ritz(system, start)
-    if len(values) < wanted:
+    if len(values) < requested:
         raise ConvergenceError(
-            f"the start block spans {len(values)} elastic modes, {wanted} are wanted; keep more"
+            f"the start block spans {len(values)} elastic modes, {requested} are wanted; keep more"
         )
     if observe is not None:
-        observe(0, values[:wanted])
+        observe(0, values[:requested])
     if len(values) == system.n_dofs - system.rigid.shape[1]:
         # The subspace is the whole space, where Ritz pairs are eigenpairs.
-        exact = np.full(wanted, np.finfo(float).eps)
-        found = np.ascontiguousarray(start[:, :wanted])
-        return Correction(values[:wanted], found, exact, start[:, wanted:])
+        exact = np.full(requested, np.finfo(float).eps)
+        vectors = np.ascontiguousarray(start[:, :requested])
+        return Correction(values[:requested], vectors, exact, start[:, requested:])
     ritz = Ritz(system, values, start)
-    iteration = _Iteration(system, linear, ritz, wanted, acceleration, similar)
+    iteration = _Iteration(system, linear, ritz, requested, acceleration, similar)
     try:
         result = iteration.run(tolerance, max_steps, rough, report, observe)
         result.inverse = iteration.lasting(tolerance)
@@ -169,9 +169,9 @@ def correct(
     return result
 
 
-def default_guard(wanted: int) -> int:
+def default_guard(requested: int) -> int:
     """Extra vectors that the iteration carries; the more, the faster the last modes converge."""
-    return max(FEWEST_GUARDS, int(GUARD_FRACTION * wanted))
+    return max(FEWEST_GUARDS, int(GUARD_FRACTION * requested))
 
 
 class _Iteration:
@@ -182,22 +182,22 @@ class _Iteration:
         system: System,
         linear: LinearSolver,
         ritz: Ritz,
-        wanted: int,
+        requested: int,
         acceleration: str,
         similar: Inverse | None,
     ) -> None:
         self.system = system
         self.linear = linear
         self.ritz = ritz
-        self.wanted = wanted
+        self.requested = requested
         self.inside = acceleration != "relaxation" and linear.indefinite
         self.lanczos = acceleration == "lanczos" and linear.indefinite
         self.share = SHIFT_FRACTION
         self.similar = similar
         self.made: Inverse | None = None
-        guard = default_guard(wanted)
-        self.width = wanted + guard
-        self.reach = self.improved = wanted + int(IMPROVED_GUARDS * guard)
+        guard = default_guard(requested)
+        self.width = requested + guard
+        self.reach = self.improved = requested + int(IMPROVED_GUARDS * guard)
         self.step: Step = enrich
         if acceleration == "relaxation":
             self.width = self.improved = len(ritz.values)
@@ -245,18 +245,18 @@ class _Iteration:
             step += 1
             self._require_independent(step)
             if observe is not None:
-                observe(step, np.sort(self.ritz.values)[: self.wanted])
+                observe(step, np.sort(self.ritz.values)[: self.requested])
         if tolerance > 0.0 and not accurate:
             raise ConvergenceError(
                 f"error correction reached an eigenvalue error of {worst:.1e} after {step} steps, "
                 f"{tolerance:.1e} was asked for; allow more steps or keep more modes"
             )
-        values, vectors, found = self.ritz.lowest(len(self.ritz.values))
+        values, vectors, errors = self.ritz.lowest(len(self.ritz.values))
         return Correction(
-            values[: self.wanted],
-            np.ascontiguousarray(vectors[:, : self.wanted]),
-            found[: self.wanted],
-            vectors[:, self.wanted :],
+            values[: self.requested],
+            np.ascontiguousarray(vectors[:, : self.requested]),
+            errors[: self.requested],
+            vectors[:, self.requested :],
             step,
             self.solves,
             self.blocks,
@@ -270,18 +270,21 @@ class _Iteration:
         for run in range(LANCZOS_RUNS):
             self.inside = run < LANCZOS_RUNS - 1
             inverse, ritz = self._inverse(1), self.ritz
-            found = lanczos(
-                self.system, inverse, ritz.values, ritz.vectors, self.wanted, width, tolerance
+            result = lanczos(
+                self.system, inverse, ritz.values, ritz.vectors, self.requested, width, tolerance
             )
-            self.solves += found.solves
-            self.blocks += found.blocks
-            if found.resonant:
+            self.solves += result.solves
+            self.blocks += result.blocks
+            if result.resonant:
                 self.destroy()
                 self.share *= OFF_RESONANCE
                 continue
-            bounds = (1.0 + tolerance) * ritz.values[: self.wanted]
-            missed = len(found.values) < self.wanted or (found.values[: self.wanted] > bounds).any()
-            self.ritz = Ritz(self.system, found.values, found.vectors)
+            bounds = (1.0 + tolerance) * ritz.values[: self.requested]
+            missed = (
+                len(result.values) < self.requested
+                or (result.values[: self.requested] > bounds).any()
+            )
+            self.ritz = Ritz(self.system, result.values, result.vectors)
             self._require_independent(1)
             if not self._too_high(inverse):
                 if missed:
@@ -291,13 +294,13 @@ class _Iteration:
             self.destroy()
         self.inside = True
         if observe is not None:
-            observe(1, self.ritz.values[: self.wanted])
+            observe(1, self.ritz.values[: self.requested])
 
     def _require_independent(self, step: int) -> None:
-        if len(self.ritz.values) < self.wanted:
+        if len(self.ritz.values) < self.requested:
             raise ConvergenceError(
                 f"the iterated vectors collapsed to {len(self.ritz.values)} independent ones "
-                f"after {step} steps, {self.wanted} modes are wanted; keep more"
+                f"after {step} steps, {self.requested} modes are wanted; keep more"
             )
 
     def _inverse(self, step: int) -> Inverse:
@@ -328,7 +331,7 @@ class _Iteration:
 
     def _last(self) -> float:
         """Ritz value of the last wanted mode, the same on all ranks."""
-        return float(np.sort(self.ritz.values)[self.wanted - 1])
+        return float(np.sort(self.ritz.values)[self.requested - 1])
 
     def _shift(self) -> float:
         if not self.inside:
@@ -350,9 +353,9 @@ class _Iteration:
         residual = ritz.residual(candidates)
         estimate = self._estimate(candidates, residual)
         ritz.errors[candidates] = bcast_from_root(self.system.comm, lambda: estimate)
-        errors = ritz.errors[np.argsort(ritz.values, kind="stable")[: self.wanted]]
+        errors = ritz.errors[np.argsort(ritz.values, kind="stable")[: self.requested]]
         limit = tolerance if _typical(errors) <= TYPICAL * tolerance else TYPICAL * tolerance
-        inside = candidates[: max(0, self.wanted - ritz.locked)]
+        inside = candidates[: max(0, self.requested - ritz.locked)]
         accurate = inside[ritz.errors[inside] <= limit]
         chosen = ~np.isin(candidates, accurate)
         ritz.lock(accurate)
@@ -377,13 +380,13 @@ class _Iteration:
         """
         values = np.sort(self.ritz.values)
         if self.step is relax:
-            return float(values[(3 * self.wanted + len(values)) // 4])
+            return float(values[(3 * self.requested + len(values)) // 4])
         number = min(self.reach, len(values))
-        found = float(values[number - 1])
+        value = float(values[number - 1])
         if self.blocks == 0 and self.similar is not None:
-            grown = (number / self.wanted) ** WEYL_EXPONENT
-            return min(found, grown * float(values[self.wanted - 1]))
-        return found
+            grown = (number / self.requested) ** WEYL_EXPONENT
+            return min(value, grown * float(values[self.requested - 1]))
+        return value
 
     def _require_progress(self, step: int, tolerance: float) -> None:
         recent = self.history[-STAGNATION - 1 :]

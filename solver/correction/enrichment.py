@@ -253,8 +253,8 @@ def relax(
     iterated[:, position] -= corrections * weight
     locked = ritz.locked_numbers
     iterated -= ritz.vectors[:, locked] @ system.inner(ritz.mass_vectors[:, locked], iterated)
-    found, vectors = rayleigh_ritz(system, iterated, max(0, width - ritz.locked))
-    ritz.replace_active(found, vectors)
+    values, vectors = rayleigh_ritz(system, iterated, max(0, width - ritz.locked))
+    ritz.replace_active(values, vectors)
 
 
 def _symmetric(matrix: Array) -> Array:

@@ -78,7 +78,7 @@ def lanczos(
     inverse: Inverse,
     values: Array,
     start: Array,
-    wanted: int,
+    requested: int,
     width: int,
     tolerance: float,
 ) -> Lanczos:
@@ -89,8 +89,8 @@ def lanczos(
     inverse
         Exact, with the shift mu between zero and the last wanted eigenvalue.
     values, start
-        (q,) and (local, q) Ritz pairs, orthogonal to the rigid motions, q >= wanted.
-    wanted
+        (q,) and (local, q) Ritz pairs, orthogonal to the rigid motions, q >= requested.
+    requested
         Number of modes to become accurate.
     width
         Number of modes to return, as far as there are so many.
@@ -103,9 +103,9 @@ def lanczos(
     loses orthogonality within three steps.  The stiffness projected on the Ritz vectors of the
     operator follows from that of the last block, so the Ritz values of K itself cost little more.
     """
-    mixed = wanted if tolerance > ROUGH else min(len(values), int(MIXED * wanted))
-    columns = min(_columns(wanted), wanted)
-    longest = min(LONGEST * (wanted + columns), system.n_dofs)
+    mixed = requested if tolerance > ROUGH else min(len(values), int(MIXED * requested))
+    columns = min(_columns(requested), requested)
+    longest = min(LONGEST * (requested + columns), system.n_dofs)
     modes = start[:, :mixed]
     begin = _mixed(values[:mixed], modes, _signs(system, modes), inverse.shift, columns)
     basis = _Basis(system, inverse, begin, longest + begin.shape[1])
@@ -116,17 +116,17 @@ def lanczos(
             return Lanczos(values, start, basis.size, basis.blocks, resonant=True)
         if basis.size < looks.next:
             continue
-        error, last = basis.outlook(wanted)
+        error, last = basis.outlook(requested)
         # Beyond most wanted modes the shift would take long to find the first ones.
         if inverse.shift > HIGHEST_SHIFT * last or looks.accurate(basis.size, error):
             break
-    found, vectors = basis.ritz_pairs(width)
-    return Lanczos(found, vectors, basis.size, basis.blocks)
+    ritz_values, vectors = basis.ritz_pairs(width)
+    return Lanczos(ritz_values, vectors, basis.size, basis.blocks)
 
 
-def _columns(wanted: int) -> int:
+def _columns(requested: int) -> int:
     """Width of a block: few modes in each column, and whole vector registers."""
-    narrow = max(-(-wanted // MIXED_IN_COLUMN), FEWEST_COLUMNS)
+    narrow = max(-(-requested // MIXED_IN_COLUMN), FEWEST_COLUMNS)
     return min(-(-narrow // 8) * 8, COLUMNS)
 
 
@@ -234,26 +234,26 @@ class _Basis:
             self._mass_remainder = system.times_mass(self.remainder)
             self._coupling = system.inner(self._mass_remainder, block)
 
-    def outlook(self, wanted: int) -> tuple[float, float]:
-        """Estimated relative error of the worst of the `wanted` lowest eigenvalues, and the last.
+    def outlook(self, requested: int) -> tuple[float, float]:
+        """Estimated relative error of the worst of the lowest eigenvalues, and the last.
 
         Both are infinite as long as there are too few.
         """
         inverted, _, residual = self._operator_pairs()
         mu = self._inverse.shift
         order, values = _lowest(inverted, mu, len(inverted))
-        if len(order) <= wanted:
+        if len(order) <= requested:
             return np.inf, np.inf
         inverted = inverted[order]
         square = np.einsum("ij,ij->j", residual[:, order], residual[:, order])
         unresolved = np.flatnonzero(square > RESOLVED * inverted**2)
         # What is not resolved yet lies beyond the first such value.
-        first = min([*unresolved[unresolved >= wanted], len(order) - 1])
-        distance = np.abs(inverted - inverted[first])[:wanted]
-        values = values[:wanted]
+        first = min([*unresolved[unresolved >= requested], len(order) - 1])
+        distance = np.abs(inverted - inverted[first])[:requested]
+        values = values[:requested]
         size = np.maximum(values, ZERO_FRACTION * values[-1])
-        error = square[:wanted] / distance * (values - mu) ** 2 / size
-        return float(error.max()) / PESSIMISM, float(values[wanted - 1])
+        error = square[:requested] / distance * (values - mu) ** 2 / size
+        return float(error.max()) / PESSIMISM, float(values[requested - 1])
 
     def _operator_pairs(self) -> tuple[Array, Array, Array]:
         """Ritz values and coefficients of the operator, and those of the residuals in `remainder`.
@@ -294,9 +294,9 @@ class _Basis:
             return values[:size] + mu, vectors[:, order] @ weights[:size], weights[size:]
 
         values, weights, of_last = bcast_from_root(system.comm, project)
-        found = self._vectors[:, self._rigid : self._rigid + self.size] @ weights
-        found += block @ of_last
-        return values, found
+        vectors = self._vectors[:, self._rigid : self._rigid + self.size] @ weights
+        vectors += block @ of_last
+        return values, vectors
 
 
 def _signs(system: System, modes: Array) -> Array:

@@ -140,9 +140,9 @@ def _closest_neighbours(
     pair, votes = np.unique(seen * parts + other, return_counts=True)
     voter, candidate = np.divmod(pair, parts)
     order = np.lexsort([candidate, -votes, voter])
-    found, first = np.unique(voter[order], return_index=True)
+    voters, first = np.unique(voter[order], return_index=True)
     closest = np.full(pieces, -1, dtype=np.int64)
-    closest[found] = candidate[order][first]
+    closest[voters] = candidate[order][first]
     return closest
 
 

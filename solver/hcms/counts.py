@@ -110,12 +110,12 @@ class Counts:
         Times are the slowest rank's; `busy` [s] is the longest that a rank did not wait.
         """
         summary = {}
-        for phase, found in self.per_rank(comm).items():
+        for phase, tallies in self.per_rank(comm).items():
             summary[phase] = {
-                **{name: float(found[name].sum()) for name in ("messages", "bytes", "flops")},
-                **{f"{name}_max": float(found[name].max()) for name in ("bytes", "flops")},
-                "seconds": float(found["seconds"].max()),
-                "busy": float((found["seconds"] - found["waiting"]).max()),
+                **{name: float(tallies[name].sum()) for name in ("messages", "bytes", "flops")},
+                **{f"{name}_max": float(tallies[name].max()) for name in ("bytes", "flops")},
+                "seconds": float(tallies["seconds"].max()),
+                "busy": float((tallies["seconds"] - tallies["waiting"]).max()),
             }
         return summary
 

@@ -167,9 +167,9 @@ def _planes_around(
     """Integer coordinates (nodes, 3) of all corners, from those of the corners inside."""
     corner = inside.argmax(axis=1)
     origin = planes[numbers[np.arange(len(numbers)), corner] - first] - _CORNERS[corner]
-    found = np.empty((nodes, 3), dtype=np.int64)
-    found[numbers] = origin[:, None, :] + _CORNERS
-    return found
+    corners = np.empty((nodes, 3), dtype=np.int64)
+    corners[numbers] = origin[:, None, :] + _CORNERS
+    return corners
 
 
 def _ratio_of_diagonals(rows: NodeRows) -> float:

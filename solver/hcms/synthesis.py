@@ -83,14 +83,14 @@ def make_subdomains(local_mesh: LocalMesh, treatment: str, comm: MPI.Comm) -> di
     """Geometry of this rank's subdomains, by number; `treatment` is that of the interfaces."""
     planes = local_mesh.planes()
     ranges = local_mesh.decomposition.row_ranges()
-    found = {}
+    subdomains = {}
     for part, cells in local_mesh.cells_by_subdomain(
         local_mesh.decomposition.subdomains_of(comm.rank)
     ).items():
         start, stop = ranges[part]
         own = planes[start - local_mesh.start : stop - local_mesh.start]
-        found[part] = Subdomain(local_mesh.cells.corners[cells], start, stop, own, treatment)
-    return found
+        subdomains[part] = Subdomain(local_mesh.cells.corners[cells], start, stop, own, treatment)
+    return subdomains
 
 
 def synthesize(
@@ -179,7 +179,7 @@ class _Climb:
 
         def solve(part: int) -> tuple[Array, Array]:
             elements = self.local_mesh.cells.take(cells_of[part]).elements
-            return subdomains[part].modes(elements, self._wanted(part), self._cutoff(part), steps)
+            return subdomains[part].modes(elements, self._count(part), self._cutoff(part), steps)
 
         # The largest first, so that no thread is left with one at the end.
         order = sorted(subdomains, key=lambda part: self.ranges[part][0] - self.ranges[part][1])
@@ -222,8 +222,8 @@ class _Climb:
             projected_right = arrays.pop()
             right = group_from_arrays(arrays, *self.ranges[step.right], left.cells)
         reduced = reduced_pencil(left, right, between, (projected, projected_right), tally)
-        wanted, cutoff = self._wanted(step.group), self._cutoff(step.group)
-        values, Q = lowest_pairs(reduced, wanted, tally, cutoff)
+        count, cutoff = self._count(step.group), self._cutoff(step.group)
+        values, Q = lowest_pairs(reduced, count, tally, cutoff)
         self.groups[step.group] = join(left, right, values, Q, tally)
         split = len(left.values)
         self.coefficients[step.group] = Q[:split], Q[split:]
@@ -239,7 +239,7 @@ class _Climb:
         _, stop = self.ranges[step.right]
         return interface(cells, start, middle, stop, self.treatment)
 
-    def _wanted(self, group: int) -> int:
+    def _count(self, group: int) -> int:
         start, stop = self.ranges[group]
         return modes_to_keep((stop - start) / self.ranges[-1][1], self.keep)
 

@@ -47,11 +47,11 @@ class Fronts:
 
     def children(self) -> list[list[int]]:
         """Children of each front, in order."""
-        found: list[list[int]] = [[] for _ in range(len(self))]
+        children: list[list[int]] = [[] for _ in range(len(self))]
         for front, parent in enumerate(self.parent):
             if parent >= 0:
-                found[parent].append(front)
-        return found
+                children[parent].append(front)
+        return children
 
     def solve_flops(self) -> int:
         """Floating-point operations of a solve with one right-hand side."""
@@ -132,8 +132,8 @@ def _boundaries(
         stop = first[front + 1]
         rows = order[first[front] : stop]
         touched = [neighbours[indptr[row] : indptr[row + 1]] for row in rows]
-        found = np.unique(np.concatenate([none, *touched, *inherited[front]]))
-        outside = found[np.searchsorted(found, stop) :]
+        reached = np.unique(np.concatenate([none, *touched, *inherited[front]]))
+        outside = reached[np.searchsorted(reached, stop) :]
         boundary.append(outside)
         inherited[front].clear()
         if above >= 0:

@@ -179,7 +179,7 @@ class IterativeInverse:
         """Conjugate gradients from zero (Hestenes & Stiefel 1952) until |residual| <= target."""
         products = self._operators.column_products
         residual = residual.copy()
-        found = np.empty_like(residual)
+        finished = np.empty_like(residual)
         solution = np.zeros_like(residual)
         progress = _Progress(self._norms(residual))
         active = np.arange(residual.shape[1])
@@ -197,10 +197,10 @@ class IterativeInverse:
                 break
             left = norms > target[active]
             if not left.all():
-                found[:, active[~left]] = solution[:, ~left]
+                finished[:, active[~left]] = solution[:, ~left]
                 active = active[left]
                 if not len(active):
-                    return found
+                    return finished
                 solution, residual, direction = (
                     np.ascontiguousarray(each[:, left]) for each in (solution, residual, direction)
                 )

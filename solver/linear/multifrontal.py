@@ -321,8 +321,8 @@ def _require_memory(plan: Plan) -> None:
     if available is not None and plan.bytes > available:
         raise LocalConvergenceError(
             f"the sparse factorisation of {3 * len(plan.position):,} unknowns takes about "
-            f"{plan.bytes / 1e9:.1f} GB, {available / 1e9:.1f} GB are free; use --linear-solver amg-cg, or "
-            "mumps on more ranks of more machines"
+            f"{plan.bytes / 1e9:.1f} GB, {available / 1e9:.1f} GB are free; use --linear-solver "
+            "amg-cg, or mumps on more ranks of more machines"
         )
 
 

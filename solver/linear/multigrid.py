@@ -222,18 +222,18 @@ def _largest_eigenvalue(rows: BlockRows, scale: Array, comm: MPI.Comm) -> float:
     vector *= root > 0.0
     before = np.zeros_like(vector)
     diagonal: list[float] = []
-    beside = [np.sqrt(product(vector, vector))]
+    off_diagonal = [np.sqrt(product(vector, vector))]
     for _ in range(LANCZOS_STEPS):
-        vector /= root.dtype.type(beside[-1])
+        vector /= root.dtype.type(off_diagonal[-1])
         image = root * rows.times(root * vector)
         diagonal.append(product(vector, image))
         image -= root.dtype.type(diagonal[-1]) * vector
-        image -= root.dtype.type(beside[-1] if len(diagonal) > 1 else 0.0) * before
+        image -= root.dtype.type(off_diagonal[-1] if len(diagonal) > 1 else 0.0) * before
         before, vector = vector, image
-        beside.append(np.sqrt(product(vector, vector)))
-        if beside[-1] <= EXHAUSTED * diagonal[0]:
+        off_diagonal.append(np.sqrt(product(vector, vector)))
+        if off_diagonal[-1] <= EXHAUSTED * diagonal[0]:
             break
-    return float(la.eigvalsh_tridiagonal(diagonal, beside[1 : len(diagonal)])[-1])
+    return float(la.eigvalsh_tridiagonal(diagonal, off_diagonal[1 : len(diagonal)])[-1])
 
 
 @numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")

@@ -37,10 +37,10 @@ def insert_options(text: str | None, method: str = "slepc") -> None:
     prefixes = (INNER_PREFIX, MULTIGRID_PREFIX) if hcms else (OPTIONS_PREFIX,)
     strangers = [name for name in _names(text) if not name.startswith(prefixes)]
     if strangers or not text.strip().startswith(f"-{OPTIONS_PREFIX}"):
-        found = f"-{strangers[0]}" if strangers else text
+        option = f"-{strangers[0]}" if strangers else text
         example = f"{INNER_PREFIX}mat_mumps_icntl_14" if hcms else f"{OPTIONS_PREFIX}eps_ncv"
         raise UserError(
-            f"PETSc option {found!r}: expected names with the prefix -{prefixes[0]}, like "
+            f"PETSc option {option!r}: expected names with the prefix -{prefixes[0]}, like "
             f"-{example}, for --method {method}"
         )
     PETSc.Options().insertString(text)

@@ -62,7 +62,7 @@ def smallest_eigenpairs(
 
     Returns
     -------
-    values (found,) ascending, vectors (local, found), outer iterations; `found` may be smaller than
+    values (k,) ascending, vectors (local, k), outer iterations; k may be smaller than
     `count`, which is for the caller to judge.  The vectors are M-orthonormal but for copies of a
     multiple eigenvalue, which are so to the tolerance.
 
@@ -107,9 +107,9 @@ def smallest_eigenpairs(
             solver.setUp()
             require_known_options()
         solver.solve()
-        values, found = _collect(system, solver, min(solver.getConverged(), asked))
-        values, found = _outside(system, known, values, found)
-        return values[:count], found[:, :count], int(solver.getIterationNumber())
+        values, modes = _collect(system, solver, min(solver.getConverged(), asked))
+        values, modes = _outside(system, known, values, modes)
+        return values[:count], modes[:, :count], int(solver.getIterationNumber())
     finally:
         for used in (solver, *vectors):
             used.destroy()

@@ -97,8 +97,8 @@ def solve_truth(
         If too few pairs converge.
     """
     truth = Truth(*rigid_pairs(system), modes, 0)
-    wanted = min(modes + spare, system.n_dofs) - RIGID_MODES
-    truth = _with_lowest(system, truth, wanted, start_vector(system, seed), tolerance, method)
+    requested = min(modes + spare, system.n_dofs) - RIGID_MODES
+    truth = _with_lowest(system, truth, requested, start_vector(system, seed), tolerance, method)
     few = modes - len(truth.values)
     if few > 0:
         truth = _search_on(system, truth, np.inf, few, tolerance, seed)
@@ -178,16 +178,16 @@ def _search_on(
 ) -> Truth:
     """`truth` with up to `missing` more eigenpairs below a value; with all there are, if None."""
     end = 1 if missing is None else FRUITLESS_SEARCHES
-    added = found = fruitless = 0
+    added = latest = fruitless = 0
     while (missing is None or added < missing) and fruitless < end:
-        count = max(1, 2 * found) if missing is None else missing - added
+        count = max(1, 2 * latest) if missing is None else missing - added
         start = start_vector(system, seed, truth.searches + 1)
         before = len(truth.values)
         truth = _with_lowest(system, truth, count, start, tolerance, below=below)
-        found = len(truth.values) - before
-        truth = replace(truth, searches=truth.searches + 1, added=truth.added + found)
-        added += found
-        fruitless = 0 if found else fruitless + 1
+        latest = len(truth.values) - before
+        truth = replace(truth, searches=truth.searches + 1, added=truth.added + latest)
+        added += latest
+        fruitless = 0 if latest else fruitless + 1
     return truth
 
 

@@ -78,8 +78,8 @@ def choose_contacts(
     return [Contact(points[index], -outward[index]) for index in (first, second, third)]
 
 
-def surface_node(mesh: HexMesh, wanted: Array, what: str) -> int:
-    """Number, among the nodes on the surface, of that nearest to the point `wanted` (3,) [m].
+def surface_node(mesh: HexMesh, point: Array, what: str) -> int:
+    """Number, among the nodes on the surface, of that nearest to `point` (3,) [m].
 
     Raises
     ------
@@ -87,9 +87,9 @@ def surface_node(mesh: HexMesh, wanted: Array, what: str) -> int:
         If the point, which the message calls `what`, is away from the surface.
     """
     points = mesh.nodes[np.unique(surface_quads(mesh))]
-    distance, index = cKDTree(points).query(wanted)
+    distance, index = cKDTree(points).query(point)
     if distance > REACH * mesh.edge:
-        shown = [", ".join(f"{x:.4g}" for x in point) for point in (wanted, points[index])]
+        shown = [", ".join(f"{x:.4g}" for x in each) for each in (point, points[index])]
         raise UserError(
             f"{what}: the point ({shown[0]}) m is {distance:.3g} m from the surface of the voxels, "
             f"expected at most {REACH:g} cells of {mesh.edge:.3g} m; the nearest one is "

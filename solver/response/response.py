@@ -177,6 +177,6 @@ def spectral_distance(sound: Array, truth: Array) -> float:
     return float(np.sqrt(np.mean((levels[0] - levels[1])[heard] ** 2)))
 
 
-def relative_difference(found: Array, truth: Array) -> float:
+def relative_difference(response: Array, truth: Array) -> float:
     """|found - truth| / |truth| in the 2-norm over all entries."""
-    return float(np.linalg.norm(found - truth) / np.linalg.norm(truth))
+    return float(np.linalg.norm(response - truth) / np.linalg.norm(truth))

@@ -78,10 +78,10 @@ def audit_files(paths: Iterable[str | Path]) -> dict[str, Audit]:
     UserError
         If a file is unusable, or its audit leaves the range of numbers.
     """
-    found = list(dict.fromkeys(map(str, paths)))
-    stems = [Path(path).stem for path in found]
-    labels = stems if len(set(stems)) == len(stems) else found
-    return {label: _audited(path) for label, path in zip(labels, found, strict=True)}
+    names = list(dict.fromkeys(map(str, paths)))
+    stems = [Path(path).stem for path in names]
+    labels = stems if len(set(stems)) == len(stems) else names
+    return {label: _audited(path) for label, path in zip(labels, names, strict=True)}
 
 
 def _audited(path: str) -> Audit:

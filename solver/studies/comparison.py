@@ -168,8 +168,8 @@ def subspace_angles(modes: Array, truth: Array, M: sp.csr_matrix, groups: list[s
     """
     angles = np.empty(len(groups))
     for index, group in enumerate(groups):
-        inside, wanted = modes[:, group], truth[:, group]
-        outside = wanted - inside @ (inside.T @ (M @ wanted))
+        inside, exact = modes[:, group], truth[:, group]
+        outside = exact - inside @ (inside.T @ (M @ exact))
         square = np.linalg.eigvalsh(outside.T @ (M @ outside))[-1]
         angles[index] = np.arcsin(min(1.0, np.sqrt(max(square, 0.0))))
     return angles

@@ -71,7 +71,7 @@ def correction_history(
     local_mesh = distribute(model, None, seed, comm)
     layout = Layout.of_local_mesh(local_mesh, comm)
     system = assemble(local_mesh, comm, layout)
-    inner = LinearSolver("auto", layout)
+    linear = LinearSolver("auto", layout)
     histories = []
     keep = default_keep(modes, local_mesh.decomposition.tree.parts)
     for start in track(STARTS, "starts", visible=comm.rank == 0):
@@ -108,10 +108,10 @@ def _exact(
 
 def _read_exact(model: ElasticModel, modes: int, truth: str | Path) -> Array:
     file = read_modes(truth, with_modes=False)
-    found, unknowns = len(file.eigenvalues), file.mesh.n_dofs
-    if found < modes or unknowns != model.n_dofs:
+    available, unknowns = len(file.eigenvalues), file.mesh.n_dofs
+    if available < modes or unknowns != model.n_dofs:
         raise UserError(
-            f"{truth}: {found:,} modes of {unknowns:,} unknowns, expected {modes:,} or more of "
+            f"{truth}: {available:,} modes of {unknowns:,} unknowns, expected {modes:,} or more of "
             f"{model.n_dofs:,}"
         )
     return file.eigenvalues[:modes]
@@ -121,7 +121,7 @@ def _correct(
     system: System,
     linear: LinearSolver,
     block: Array,
-    wanted: int,
+    requested: int,
     steps: int,
     acceleration: str,
 ) -> list[Array]:
@@ -130,7 +130,7 @@ def _correct(
     correct(
         system,
         block,
-        wanted,
+        requested,
         linear,
         tolerance=0.0,
         max_steps=steps,

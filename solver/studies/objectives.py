@@ -180,16 +180,16 @@ def _row(name: str, solid: _Solid | None, exact: Array, comm: MPI.Comm) -> dict[
         result = _solve(model, modes, comm)
     except ConvergenceError as error:
         raise ConvergenceError(f"{name}: {error}") from None
-    found = frequencies(result.values)
-    errors = found[RIGID_MODES:] / exact[RIGID_MODES : len(found)] - 1.0
+    hertz = frequencies(result.values)
+    errors = hertz[RIGID_MODES:] / exact[RIGID_MODES : len(hertz)] - 1.0
     return {
         "coarsening": name,
         "audible": asdict(frequency_errors(errors, AUDIBLE_LAST)),
-        "all": asdict(frequency_errors(errors, len(found))),
+        "all": asdict(frequency_errors(errors, len(hertz))),
         "converged": converged,
         "fit_seconds": fitted,
         "solve_seconds": solve_seconds(result),
-        "frequencies_hz": found.tolist(),
+        "frequencies_hz": hertz.tolist(),
     }
 
 

@@ -59,10 +59,10 @@ def require_orthonormal(orthogonality: float) -> None:
         )
 
 
-def require_six_rigid(found: int) -> None:
-    """Raise ConvergenceError unless `found` is the number of a connected free body's."""
-    if found != RIGID_MODES:
+def require_six_rigid(count: int) -> None:
+    """Raise ConvergenceError unless `count` is the number of a connected free body's."""
+    if count != RIGID_MODES:
         raise ConvergenceError(
-            f"{found} zero-frequency modes found, a connected free body has {RIGID_MODES}; part of "
+            f"{count} zero-frequency modes found, a connected free body has {RIGID_MODES}; part of "
             "the model hangs on a hinge or has almost no stiffness"
         )

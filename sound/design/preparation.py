@@ -67,7 +67,9 @@ def prepare(project: Project, targets: Targets | None = None) -> Prepared:
     strikes = project.strikes(surface)
     objective = Objective(targets_of(project) if targets is None else targets, project.weights)
     name = surface_name(solid.mesh)
-    mesh = hexmesh_from_voxels(voxelize(surface, solid.resolution, solid.fill, solid.components, name))
+    mesh = hexmesh_from_voxels(
+        voxelize(surface, solid.resolution, solid.fill, solid.components, name)
+    )
     material = ReducedMaterial.of_mesh(
         mesh, project.material.dimensions, project.material.young, project.material.law
     )

@@ -18,7 +18,17 @@ from sound.surface import struck_surface
 if TYPE_CHECKING:
     import trimesh
 
-_SOLID = ("mesh", "resolution", "unit", "fill", "components", "poisson", "density", "coarsen", "forest")
+_SOLID = (
+    "mesh",
+    "resolution",
+    "unit",
+    "fill",
+    "components",
+    "poisson",
+    "density",
+    "coarsen",
+    "forest",
+)
 LEAST_WEIGHT = 1e-12
 """Of frequencies or of amplitudes: what is smaller leaves a search with nothing to lower."""
 

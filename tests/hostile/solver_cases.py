@@ -124,7 +124,15 @@ for option, values in {
 
 # Choices ------------------------------------------------------------------------------------------
 
-for option in ("method", "coarsen", "objective", "fill", "components", "interface", "linear_solver"):
+for option in (
+    "method",
+    "coarsen",
+    "objective",
+    "fill",
+    "components",
+    "interface",
+    "linear_solver",
+):
     hostile(f"no such {option}", f"{MODES} --{option} best", option, "best")
 hostile("no such acceleration", f"{MODES} --acceleration ''", "acceleration")
 hostile("no such objective to rate", "objectives builtin:box --resolution 4 --objectives a,b", "a")
@@ -264,7 +272,7 @@ hostile(
 )
 hostile(
     "out that is the start",
-    f"{BOX} --start modes.h5 --out ./modes.h5",
+    f"{BOX} --initial-modes modes.h5 --out ./modes.h5",
     files={"modes.h5": Copy("modes.h5")},
 )
 hostile(
@@ -370,7 +378,7 @@ hostile("contact of an hour", "respond ZOO/modes.h5 --out out.h5 --contact 1e300
 hostile("periods without end", "respond ZOO/modes.h5 --out out.h5 --periods 1e300", "periods")
 each(
     "start from",
-    f"{MODES} --start VALUE",
+    f"{MODES} --initial-modes VALUE",
     [
         "ZOO/modes-nan.h5",
         "ZOO/modes-cut.h5",
@@ -464,7 +472,8 @@ control(
 )
 control(
     "a start",
-    f"modes builtin:box --resolution 4 --modes 10 --material random --start ZOO/modes.h5 {OUT}",
+    f"modes builtin:box --resolution 4 --modes 10 --material random "
+    f"--initial-modes ZOO/modes.h5 {OUT}",
     "out.h5",
 )
 control("PETSc options", [*MODES.split(), "--petsc", "-carillon_eps_ncv 40"], "out.h5")

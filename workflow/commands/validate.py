@@ -21,7 +21,7 @@ from carillon.arguments import (
     whole_number,
 )
 from carillon.errors import UserError
-from carillon.fem.geometry import FILLS, COMPONENTS, surface_name
+from carillon.fem.geometry import COMPONENTS, FILLS, surface_name
 from carillon.fem.materials import NAMES as MATERIALS
 from carillon.fem.model import DEFAULT_DENSITY
 from carillon.files import atomic_path

@@ -10,7 +10,7 @@ from carillon.fem.geometry.hexmesh import (
     hexmesh_from_grid,
     hexmesh_from_voxels,
 )
-from carillon.fem.geometry.voxels import FILLS, COMPONENTS, VoxelModel, voxelize
+from carillon.fem.geometry.voxels import COMPONENTS, FILLS, VoxelModel, voxelize
 
 if TYPE_CHECKING:
     from carillon.fem.geometry.builtin import BUILTINS, builtin_surface

@@ -84,8 +84,8 @@ def voxelize(
     surface : triangles in metres; holes and overlapping shells are allowed.
     resolution : voxels along the longest side of the bounding box, at least 2.
     fill : how voxels are chosen, a key of `FILLS`; see `carillon.fem.geometry.fill`.
-    pieces : ``"error"`` rejects a model of several face-connected pieces, ``"largest"`` keeps the
-        largest. Cubes that share but an edge or a corner would be joined by a hinge, which adds
+    components : ``"error"`` rejects a model of several face-connected pieces, ``"largest"`` keeps
+        the largest. Cubes that share but an edge or a corner would be joined by a hinge, which adds
         zero-frequency modes that the object does not have.
     name : name of the model.
 
@@ -109,8 +109,10 @@ def voxelize(
     resolution = _checked_resolution(surface, resolution, name)
     if fill not in FILLS:
         raise UserError(f"fill {fill!r} is unknown, expected one of {', '.join(FILLS)}")
-    if pieces not in COMPONENTS:
-        raise UserError(f"pieces {pieces!r} is unknown, expected one of {', '.join(COMPONENTS)}")
+    if components not in COMPONENTS:
+        raise UserError(
+            f"components {components!r} is unknown, expected one of {', '.join(COMPONENTS)}"
+        )
     model = _filled_model(surface, resolution, fill, name)
     if model.n_cells == 0:
         raise UserError(
@@ -119,7 +121,7 @@ def voxelize(
             f"the mesh"
         )
     labels, sizes = label_pieces(model.filled)
-    if len(sizes) > 1 and pieces == "error":
+    if len(sizes) > 1 and components == "error":
         raise UserError(_pieces_message(surface, model, fill, sizes))
     return replace(model, filled=labels == 1)
 
@@ -171,7 +173,8 @@ def _pieces_message(
     hint = f" (at {better} it is one piece)" if better else ""
     return (
         f"mesh {model.name!r} at resolution {model.resolution} falls into {len(sizes):,} pieces "
-        f"({listed} voxels); raise --resolution{hint} or pass --components largest to keep the largest"
+        f"({listed} voxels); raise --resolution{hint} or pass "
+        "--components largest to keep the largest"
     )
 
 

@@ -125,13 +125,13 @@ def smallest_without_factor(
     solver.setDimensions(modes - RIGID_MODES)
     solver.setTolerances(tolerance, MOST_RESTARTS)
     solver.solve()
-    found = solver.getConverged()
-    elastic = np.sort([solver.getEigenvalue(index).real for index in range(found)])
+    converged = solver.getConverged()
+    elastic = np.sort([solver.getEigenvalue(index).real for index in range(converged)])
     for used in (solver, operator, system):
         used.destroy()
-    if RIGID_MODES + found < modes:
+    if RIGID_MODES + converged < modes:
         raise ConvergenceError(
-            f"ARPACK in regular mode converged {RIGID_MODES + found} of {modes} modes in "
+            f"ARPACK in regular mode converged {RIGID_MODES + converged} of {modes} modes in "
             f"{MOST_RESTARTS} restarts"
         )
     return np.concatenate([rigid_values, elastic])[:modes]

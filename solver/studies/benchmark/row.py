@@ -92,8 +92,8 @@ class BenchmarkOptions:
     @property
     def left_out(self) -> tuple[str, ...]:
         """Methods that the options leave out."""
-        wanted = {"arpack": self.arpack, "arpack_regular": self.arpack_regular}
-        return tuple(name for name, runs in wanted.items() if not runs)
+        choices = {"arpack": self.arpack, "arpack_regular": self.arpack_regular}
+        return tuple(name for name, runs in choices.items() if not runs)
 
     def rounds(self, method: str) -> int:
         """Runs of a method."""
@@ -147,11 +147,11 @@ def benchmark_row(
             {**configuration.as_dict(), "seconds": seconds}
             for configuration, seconds in tried.items()
         ],
-        "runs": {name: len(found) for name, found in runs.items()},
+        "runs": {name: len(results) for name, results in runs.items()},
         "failed": failed,
-        "missed": {name: most for name, found in runs.items() if (most := _missed(found))},
+        "missed": {name: most for name, results in runs.items() if (most := _missed(results))},
         "ranks": comm.size,
-        "threads": max((int(found["num_threads"]) for found in loaded_blas()), default=1),
+        "threads": max((int(library["num_threads"]) for library in loaded_blas()), default=1),
         "blas": blas_name(),
         "problem": {name: text for name, text in PROBLEMS.items() if name not in left_out},
         "meaning": MEANING,
@@ -269,8 +269,10 @@ def _describe(options: ProblemOptions, solid: Solid) -> dict[str, Any]:
 
 def _times(runs: Runs, before: dict[str, float]) -> dict[str, Any]:
     """Medians, spreads and ratios; `before` is what the mesh alone needed."""
-    seconds = {name: median([run.seconds for run in found]) for name, found in runs.items()}
-    planned = {name: median([run.before for run in found]) or 0.0 for name, found in runs.items()}
+    seconds = {name: median([run.seconds for run in results]) for name, results in runs.items()}
+    planned = {
+        name: median([run.before for run in results]) or 0.0 for name, results in runs.items()
+    }
     parts = {
         **before,
         "fine_solver": planned.get("hcms_ec", 0.0),
@@ -284,9 +286,11 @@ def _times(runs: Runs, before: dict[str, float]) -> dict[str, Any]:
             "precompute": sum(parts.values()),
             **{name: seconds.get(name) for name in names},
         },
-        "spread": {name: spread([run.seconds for run in found]) for name, found in runs.items()},
+        "spread": {
+            name: spread([run.seconds for run in results]) for name, results in runs.items()
+        },
         "precompute_parts": parts,
-        "phases": {name: found[-1].phases for name, found in runs.items()},
+        "phases": {name: results[-1].phases for name, results in runs.items()},
         "speedup": speedups(seconds),
         "speedup_with_precompute": speedups(seconds, planned),
     }

@@ -42,8 +42,8 @@ def spectrum_error(values: Array, exact: Array) -> dict[str, float]:
 
 def tone_error(values: Array, exact: Array) -> dict[str, float]:
     """Relative errors of the frequencies, matched by index: of modes 7 to 60, and of all."""
-    found, true = _elastic(values, exact)
-    errors = frequencies(found) / frequencies(true) - 1.0
+    computed, true = _elastic(values, exact)
+    errors = frequencies(computed) / frequencies(true) - 1.0
     audible = frequency_errors(errors, AUDIBLE_LAST)
     everything = frequency_errors(errors, RIGID_MODES + len(errors))
     return {
@@ -75,9 +75,9 @@ def speedups(
         if own is None:
             continue
         own += (added or {}).get(method, 0.0)
-        found = {base: time / own for base in bases if (time := seconds.get(base)) is not None}
-        if found:
-            ratios[method] = found
+        over = {base: time / own for base in bases if (time := seconds.get(base)) is not None}
+        if over:
+            ratios[method] = over
     return ratios
 
 

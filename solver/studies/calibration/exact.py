@@ -79,9 +79,9 @@ def make_cases(folder: Path, seed: int, count: int, objects: bool = True) -> lis
         If a file cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    wanted = len(BUILTINS) * len(OBJECT_RESOLUTIONS) * len(NAMES) if objects else 0
+    expected = len(BUILTINS) * len(OBJECT_RESOLUTIONS) * len(NAMES) if objects else 0
     with_progress = track(
-        _made(folder, seed, count, objects), "exact spectra", total=wanted + count, unit="solid"
+        _made(folder, seed, count, objects), "exact spectra", total=expected + count, unit="solid"
     )
     paths = [path for path in with_progress if path is not None]
     logger.info(f"{len(paths)} solids with exact spectra in {folder}")
@@ -93,13 +93,13 @@ def _made(folder: Path, seed: int, count: int, objects: bool) -> Iterator[Path |
         for name, resolution, material in product(BUILTINS, OBJECT_RESOLUTIONS, NAMES):
             path = folder / f"{name}-{resolution}-{material}.h5"
             yield _kept(path, partial(_object, name, resolution, material))
-    number = found = 0
-    while found < count:
+    number = done = 0
+    while done < count:
         path = folder / f"seed-{seed}-solid-{number:04d}.h5"
         made = _kept(path, partial(_random, seed, number))
         number += 1
         if made is not None:
-            found += 1
+            done += 1
             yield made
 
 

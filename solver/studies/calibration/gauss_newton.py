@@ -175,10 +175,10 @@ def calibrate_in_turn(
 def rms_by_material(paths: Sequence[Path], constants: Constants, workers: int) -> dict[str, float]:
     """Root mean square of the relative frequency errors of the cases of each material."""
     pool = Parallel(n_jobs=workers)
-    found = pool(delayed(_squares)(path, constants.vector) for path in paths)
-    materials = sorted({material for material, _ in found})
+    squares = pool(delayed(_squares)(path, constants.vector) for path in paths)
+    materials = sorted({material for material, _ in squares})
     return {
-        material: float(np.sqrt(np.mean([s for name, s in found if name == material])))
+        material: float(np.sqrt(np.mean([s for name, s in squares if name == material])))
         for material in materials
     }
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from solver.assembly.system import System
 from solver.hcms.counts import Tally
-from solver.linear import LinearSolver, Inverse
+from solver.linear import Inverse, LinearSolver
 
 Array = NDArray[np.float64]
 
@@ -103,9 +103,9 @@ class TimedLinearSolver(LinearSolver):
 
     @classmethod
     def of(cls, linear: LinearSolver) -> TimedLinearSolver:
-        """Timed stand-in for `inner`, with the same plan."""
+        """Timed stand-in for `linear`, with the same plan."""
         timed = cls.__new__(cls)
-        timed.__dict__.update(inner.__dict__)
+        timed.__dict__.update(linear.__dict__)
         timed.factor, timed.solving = Tally(), Tally()
         return timed
 

@@ -60,7 +60,7 @@ def measure_each(
     launcher = shutil.which(LAUNCHER)
     if launcher is None:
         raise UserError(f"no {LAUNCHER} on PATH; install MPI, or start the ranks by hand")
-    found: list[dict[str, Any]] = []
+    results: list[dict[str, Any]] = []
     failed: dict[int, str] = {}
     with tempfile.TemporaryDirectory() as folder:
         for ranks, given in track(arguments.items(), "ranks", total=len(arguments)):
@@ -69,15 +69,15 @@ def measure_each(
             command += ["scaling", *given, "--here", "--out", str(out)]
             failure = _run(command, {**_ALLOWED, **os.environ, "OMP_NUM_THREADS": "1"})
             if failure is None:
-                found.append(json.loads(out.read_text()))
-                logger.info(f"{ranks} ranks: {found[-1]['seconds']:.2f} s")
+                results.append(json.loads(out.read_text()))
+                logger.info(f"{ranks} ranks: {results[-1]['seconds']:.2f} s")
             else:
                 failed[ranks] = failure
                 logger.warning(f"the run on {ranks} ranks failed: {failure}")
-    if not found:
+    if not results:
         ranks, failure = next(iter(failed.items()))
         raise UserError(f"the run on {ranks} ranks failed: {failure}")
-    return found, failed
+    return results, failed
 
 
 def require_ranks(ranks: int, environment: Mapping[str, str] = os.environ) -> None:

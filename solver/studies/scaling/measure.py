@@ -89,8 +89,8 @@ class _Run:
 
     def __init__(self, model: ElasticModel | None, options: SolverOptions, comm: MPI.Comm) -> None:
         self.comm = CountingComm.of(comm)
-        wanted = options.modes - RIGID_MODES
-        self.width = wanted + default_guard(wanted)
+        requested = options.modes - RIGID_MODES
+        self.width = requested + default_guard(requested)
         with self._phase() as self.partition:
             self.local_mesh: LocalMesh = distribute(model, None, options.seed, self.comm)
             parts = self.local_mesh.decomposition.tree.parts
@@ -117,7 +117,7 @@ class _Run:
             self.result: Correction = correct(
                 system,
                 start,
-                wanted,
+                requested,
                 self.linear,
                 values,
                 tolerance=cast(float, options.tolerance),
@@ -191,8 +191,8 @@ def _measure_link(comm: MPI.Comm) -> dict[str, float] | None:
     small, large = (_ping(comm, size) for size in PING_SIZES)
     comm.barrier()
     per_byte = max(large - small, 1e-12) / (PING_SIZES[1] - PING_SIZES[0])
-    found: dict[str, float] = comm.bcast({"latency": small, "bandwidth": 1.0 / per_byte})
-    return found
+    measured: dict[str, float] = comm.bcast({"latency": small, "bandwidth": 1.0 / per_byte})
+    return measured
 
 
 def _ping(comm: MPI.Comm, size: int) -> float:

@@ -103,10 +103,10 @@ def fit_machine(
     flops = dict.fromkeys(MODELLED, 0.0)
     seconds = dict.fromkeys(MODELLED, 0.0)
     for run in fair:
-        for phase, found in run["phases"].items():
+        for phase, tallies in run["phases"].items():
             if kind(phase) in flops:
-                flops[kind(phase)] += sum(found["flops"])
-                seconds[kind(phase)] += sum(found["seconds"]) - sum(found["waiting"])
+                flops[kind(phase)] += sum(tallies["flops"])
+                seconds[kind(phase)] += sum(tallies["seconds"]) - sum(tallies["waiting"])
     rates = {name: flops[name] / seconds[name] for name in MODELLED if flops[name] > 0.0}
     links = [run["link"] for run in fair if run["link"] is not None]
     machine = Machine({**dict.fromkeys(MODELLED, np.inf), **rates})

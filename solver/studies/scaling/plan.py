@@ -82,13 +82,13 @@ def _modes(sizes: TreeSizes, keep: int) -> list[int]:
     """Modes that every group keeps."""
     modes: list[int] = []
     for group, nodes in enumerate(sizes.nodes):
-        wanted = modes_to_keep(nodes / sizes.nodes[-1], keep)
+        requested = modes_to_keep(nodes / sizes.nodes[-1], keep)
         if group < sizes.tree.parts:
             available = int(3 * nodes)
         else:
             step = sizes.tree.merges[group - sizes.tree.parts]
             available = modes[step.left] + modes[step.right]
-        modes.append(min(wanted, available))
+        modes.append(min(requested, available))
     return modes
 
 

@@ -74,7 +74,7 @@ def _draw(axis: Any, part: dict[str, Any]) -> None:
             label=name,
         )
     for run in part["runs"]:
-        slowest = {phase: max(found["seconds"]) for phase, found in run["phases"].items()}
+        slowest = {phase: max(tallies["seconds"]) for phase, tallies in run["phases"].items()}
         _dot(axis, run, run["seconds"], INK)
         for name, colour in COLOURS.items():
             _dot(axis, run, _of_kind(slowest, name), colour)

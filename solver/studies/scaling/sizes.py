@@ -162,6 +162,6 @@ def _pairs(corners: Corners, first: NDArray[np.bool_], second: NDArray[np.bool_]
     """Distinct pairs of a `first` and a `second` corner of the same cell."""
     if not len(corners):
         return 0
-    wanted = first[:, :, None] & second[:, None, :]
+    across = first[:, :, None] & second[:, None, :]
     pair = corners[:, :, None] * (1 + corners.max()) + corners[:, None, :]
-    return len(np.unique(pair[wanted]))
+    return len(np.unique(pair[across]))

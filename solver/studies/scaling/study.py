@@ -146,11 +146,11 @@ def study_lines(result: Result) -> list[str]:
         modelled = {row["ranks"]: row["total"] for row in part["model"]["rows"]}
         for run in part["runs"]:
             model = modelled.get(run["ranks"])
-            beside = "" if model is None else f"   model {model:8.2f} s"
+            by_model = "" if model is None else f"   model {model:8.2f} s"
             note = f"   oversubscribed: {run['cores']} cores" if run["oversubscribed"] else ""
             lines.append(
                 f"{run['ranks']:6d} ranks {run['n_dofs']:>10,d} unknowns "
-                f"{run['seconds']:8.2f} s{beside}{note}"
+                f"{run['seconds']:8.2f} s{by_model}{note}"
             )
         measured = {run["ranks"] for run in part["runs"]}
         lines += [f"{ranks:6} ranks failed: {reason}" for ranks, reason in part["failed"].items()]

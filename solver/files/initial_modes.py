@@ -26,7 +26,7 @@ COLUMNS = 16
 _ROWS = 13
 
 
-def start_from_file(
+def modes_from_file(
     path: str | Path, model: ElasticModel | None, modes: int, local_mesh: LocalMesh, comm: MPI.Comm
 ) -> Array:
     """This rank's rows (local unknowns, k) of the modes in a file.
