@@ -20,7 +20,7 @@ from dataset_gen.objectives.calibration import (
     parse,
 )
 from solver.studies.calibration.cases import read_case
-from solver.studies.calibration.constants import LUMPED, Constants, filled_places
+from solver.studies.calibration.constants import LUMPED, CalibrationConstants, filled_places
 from solver.studies.calibration.exact import make_cases
 from solver.studies.calibration.gauss_newton import bounds, calibrate, calibrate_in_turn
 from solver.studies.calibration.solids import CELLS, random_solid
@@ -65,8 +65,8 @@ def test_blocks_of_one_material_get_the_factors():
 
 
 def test_a_vector_of_constants_survives_its_file():
-    constants = Constants.of(default_calibration())
-    again = Constants.of(parse(json.loads(json.dumps(constants.as_json()))))
+    constants = CalibrationConstants.of(default_calibration())
+    again = CalibrationConstants.of(parse(json.loads(json.dumps(constants.as_json()))))
     np.testing.assert_allclose(again.vector, constants.vector, atol=1e-3)
 
 
@@ -112,12 +112,13 @@ def test_cases_are_kept_and_read_back(paths):
 def test_derivatives_of_frequencies_agree_with_differences(paths):
     """Every constant in a random direction; multiple frequencies would not be differentiable."""
     case = read_case(paths[1])
-    constants = Constants.neutral()
+    constants = CalibrationConstants.neutral()
     errors, columns = case.linearised(constants)
     direction = np.random.default_rng(1).standard_normal(len(constants.vector))
     step = 1e-5
     ahead, behind = (
-        case.errors(Constants(constants.vector + sign * step * direction)) for sign in (1, -1)
+        case.errors(CalibrationConstants(constants.vector + sign * step * direction))
+        for sign in (1, -1)
     )
     difference = (ahead - behind) / (2.0 * step)
     np.testing.assert_allclose(
@@ -127,7 +128,7 @@ def test_derivatives_of_frequencies_agree_with_differences(paths):
 
 
 def test_the_search_lowers_the_errors_within_bounds_for_any_number_of_workers(paths):
-    start = Constants.neutral()
+    start = CalibrationConstants.neutral()
     one = calibrate(paths, start, 0.25, workers=1, steps=2)
     two = calibrate(paths, start, 0.25, workers=2, steps=2)
     assert np.array_equal(one.constants.vector, two.constants.vector)
@@ -139,7 +140,7 @@ def test_the_search_lowers_the_errors_within_bounds_for_any_number_of_workers(pa
 
 
 def test_filled_blocks_are_left_to_solids_without_voids(paths):
-    start = Constants.neutral()
+    start = CalibrationConstants.neutral()
     hollow = [path for path in paths if not read_case(path).filled.all()]
     found = calibrate_in_turn(hollow, start, 0.25, steps=1).constants.vector
     kept = filled_places()

@@ -15,8 +15,8 @@ from solver.hcms.counts import Tally
 from solver.studies.scaling import launch
 from solver.studies.scaling.model import (
     ASSUMED_BANDWIDTH,
-    Correction,
-    Machine,
+    CorrectionWork,
+    MachineRates,
     fit_machine,
     kind,
     predict,
@@ -87,7 +87,7 @@ def test_more_ranks_have_less_to_do_each_and_more_to_say():
     decomposition, order = decompose(mesh, 8, 0, 1)
     sizes = sizes_of_mesh(mesh, decomposition, order)
     work = elimination(mesh)
-    correction = Correction(blocks=2, solves=100, width=70)
+    correction = CorrectionWork(blocks=2, solves=100, width=70)
     alone, many = (work_of_busiest(sizes, work, 60, correction, ranks) for ranks in (1, 8))
     for phase in ("local", "basis", "factor", "solve"):
         assert many[phase].flops < alone[phase].flops
@@ -118,7 +118,7 @@ def test_rates_are_fitted_to_runs_that_have_their_cores():
 
 
 def test_time_is_that_of_operations_bytes_and_messages():
-    machine = Machine({"merge": 1e9}, latency=1e-3, bandwidth=1e6)
+    machine = MachineRates({"merge": 1e9}, latency=1e-3, bandwidth=1e6)
     seconds = predict(machine, {"merge 3": Tally(messages=10, bytes=2e6, flops=3e9)})
     assert seconds == {"merge 3": pytest.approx(3.0 + 2.0 + 0.01)}
     assert kind("merge 3") == "merge"

@@ -14,7 +14,7 @@ from carillon.fem.element import DEFAULT_POISSON
 from carillon.files import atomic_path
 from carillon.provenance import record
 from solver.commands.running import on_ranks, require_outputs
-from solver.studies.calibration.constants import Constants
+from solver.studies.calibration.constants import CalibrationConstants
 from solver.studies.calibration.exact import make_cases
 from solver.studies.calibration.gauss_newton import calibrate_in_turn, log_step, rms_by_material
 
@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> None:
         paths = make_cases(
             cases, arguments.seed, arguments.solids, objects=not arguments.random_only
         )
-        start = Constants.neutral()
+        start = CalibrationConstants.neutral()
         calibration = calibrate_in_turn(
             paths, start, DEFAULT_POISSON, arguments.workers, arguments.steps, report=log_step
         )

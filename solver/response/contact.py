@@ -36,8 +36,10 @@ class Contact:
 
     Attributes
     ----------
-    position : (3,) [m].
-    inward : (3,) unit vector into the solid.
+    position : (3,) [m]
+        Where it is.
+    inward : (3,)
+        Unit vector into the solid.
     """
 
     position: Array

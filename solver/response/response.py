@@ -51,9 +51,12 @@ class Contacts:
 
     Attributes
     ----------
-    eigenvalues : (k,) [rad^2/s^2], rigid modes left out.
-    motion : (p, 3, k) [kg^-1/2] displacement of the points in each mode.
-    push : (p, k) [kg^-1/2] force on each mode by a unit force along the points' inward normals.
+    eigenvalues : (k,) [rad^2/s^2]
+        Rigid modes left out.
+    motion : (p, 3, k) [kg^-1/2]
+        Displacement of the points in each mode.
+    push : (p, k) [kg^-1/2]
+        Force on each mode by a unit force along the points' inward normals.
     """
 
     eigenvalues: Array

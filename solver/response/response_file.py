@@ -85,12 +85,17 @@ class Response:
 
     Attributes
     ----------
-    displacement : (t, 3) [m] of the observed point after an impulse of 1 N s at the struck one.
-    sound : (s,) at `SAMPLE_RATE_HERTZ`, strikes at all points in turn, each relative to the
-        loudest that the truth's is, see `solver.response.response.contact_sounds`.
-    audible : number of modes that sound.
-    difference : relative 2-norm of the displacement's difference from the truth's.
-    distance_decibels : rms difference of the spectrograms; NaN where the truth is not heard.
+    displacement : (t, 3) [m]
+        Displacement of the observed point after an impulse of 1 N s at the struck one.
+    sound : (s,)
+        Sound pressure at `SAMPLE_RATE_HERTZ`: strikes at all points in turn, each relative to the loudest that the
+        truth's is, see `solver.response.response.contact_sounds`.
+    audible
+        Number of modes that sound.
+    difference
+        Relative 2-norm of the displacement's difference from the truth's.
+    distance_decibels
+        Rms difference of the spectrograms; NaN where the truth is not heard.
     """
 
     displacement: Array
@@ -106,10 +111,14 @@ class ResponseFile:
 
     Attributes
     ----------
-    seconds : (t,) instants of the displacements.
-    contacts : the points, by the names `POINTS`.
-    responses : by name of the spectrum, the first being the truth.
-    attributes, provenance : damping and so on; origin of the numbers.
+    seconds : (t,)
+        Instants of the displacements.
+    contacts
+        The points, by the names `POINTS`.
+    responses
+        By name of the spectrum, the first being the truth.
+    attributes, provenance
+        Damping and so on; origin of the numbers.
     """
 
     seconds: Array

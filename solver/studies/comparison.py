@@ -24,7 +24,7 @@ AUDIBLE_FIRST, AUDIBLE_LAST = 7, 60
 
 
 @dataclass
-class Comparison:
+class SpectrumComparison:
     """Errors of a candidate against the truth; rigid modes are left out.
 
     Attributes
@@ -121,7 +121,7 @@ def eigenvalue_errors(values: Array, exact: Array) -> dict[str, float]:
     }
 
 
-def compare_files(candidate: str | Path, truth: str | Path) -> Comparison:
+def compare_files(candidate: str | Path, truth: str | Path) -> SpectrumComparison:
     """Compare two modes files, of the same mesh or of a mesh and its coarsening.
 
     Raises
@@ -137,7 +137,7 @@ def compare_files(candidate: str | Path, truth: str | Path) -> Comparison:
     shift = a.frequencies[elastic] / b.frequencies[elastic] - 1.0
     audible = frequency_errors(shift, AUDIBLE_LAST)
     angles = _cluster_angles(a, b, count)
-    return Comparison(
+    return SpectrumComparison(
         str(candidate),
         str(truth),
         eigenvalue_errors(values, exact),

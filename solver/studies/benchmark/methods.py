@@ -23,7 +23,7 @@ from solver.studies.benchmark.rivals import (
     smallest_without_factor,
     without_purification,
 )
-from solver.studies.benchmark.solid import Solid
+from solver.studies.benchmark.solid import BenchmarkSolid
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ RIVAL_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
-class Run:
+class MethodRun:
     """One run of a method.
 
     Attributes
@@ -77,7 +77,7 @@ class Methods:
 
     def __init__(
         self,
-        solid: Solid | None,
+        solid: BenchmarkSolid | None,
         modes: int,
         configuration: SlepcConfiguration,
         seed: int = 0,
@@ -92,40 +92,40 @@ class Methods:
         self.brief = brief
         self._warm: tuple[ModalSolver, Modes] | None = None
 
-    def slepc(self, coarsening: str = "none", changed: bool = False) -> Run:
+    def slepc(self, coarsening: str = "none", changed: bool = False) -> MethodRun:
         """SLEPc's Krylov-Schur in shift-and-invert mode."""
         with self.configuration.in_force(self.modes):
             return self._rival("slepc", *self._model(coarsening, changed))
 
-    def arpack(self) -> Run:
+    def arpack(self) -> MethodRun:
         """ARPACK in shift-and-invert mode."""
         with without_purification():
             return self._rival("arpack", *self._model("none"))
 
-    def arpack_regular(self) -> Run:
+    def arpack_regular(self) -> MethodRun:
         """ARPACK without a factorisation, on the fine mesh with a diagonal mass."""
         model = compute_on_root(self.comm, lambda: self._root.lumped())
         begin = self._now()
         values = smallest_without_factor(model, self.modes, RIVAL_TOLERANCE, self.seed, self.comm)
-        return Run(self._now() - begin, values)
+        return MethodRun(self._now() - begin, values)
 
-    def hcms(self) -> Run:
+    def hcms(self) -> MethodRun:
         """Component mode synthesis alone."""
         return self._cold(*self._model("none"), self._options(corrections=0))
 
-    def hcms_ec(self) -> Run:
+    def hcms_ec(self) -> MethodRun:
         """Component mode synthesis and error correction."""
         return self._cold(*self._model("none"), self._options(tolerance=CORRECTED_TOLERANCE))
 
-    def ddfem_hcms_ec_accurate(self) -> Run:
+    def ddfem_hcms_ec_accurate(self) -> MethodRun:
         """The same on the mesh coarsened by forests."""
         return self._cold(*self._model("ddfem"), self._options(tolerance=CORRECTED_TOLERANCE))
 
-    def ddfem_hcms_ec(self) -> Run:
+    def ddfem_hcms_ec(self) -> MethodRun:
         """The same on the mesh coarsened by forests, to the interactive tolerance."""
         return self._cold(*self._model("ddfem"), self._interactive)
 
-    def ddfem_hcms_ec_warm(self) -> Run:
+    def ddfem_hcms_ec_warm(self) -> MethodRun:
         """The same for the changed material, from the modes of the unchanged one."""
         solver, start = self._prepared()
         model, coarsened = self._model("ddfem", changed=True)
@@ -157,7 +157,7 @@ class Methods:
         return options
 
     @property
-    def _root(self) -> Solid:
+    def _root(self) -> BenchmarkSolid:
         assert self.solid is not None
         return self.solid
 
@@ -169,14 +169,16 @@ class Methods:
         model, seconds = made or (None, 0.0)
         return model, self.comm.bcast(seconds)
 
-    def _cold(self, model: ElasticModel | None, coarsened: float, options: SolverOptions) -> Run:
+    def _cold(
+        self, model: ElasticModel | None, coarsened: float, options: SolverOptions
+    ) -> MethodRun:
         begin = self._now()
         solver = ModalSolver(model, options, self.comm)
         prepared = self._now()
         result = solver.solve()
         return replace(self._run(result, prepared, coarsened), before=prepared - begin)
 
-    def _rival(self, method: str, model: ElasticModel | None, coarsened: float) -> Run:
+    def _rival(self, method: str, model: ElasticModel | None, coarsened: float) -> MethodRun:
         """A general eigensolver, which needs nothing of what is prepared of the mesh.
 
         It is given the rigid motions, finds a few modes to spare, and is charged for one search.
@@ -186,7 +188,7 @@ class Methods:
         options = self._options(method=method, tolerance=RIVAL_TOLERANCE)
         return replace(self._cold(model, coarsened, options), before=0.0)
 
-    def _run(self, result: Modes, begin: float, coarsened: float) -> Run:
+    def _run(self, result: Modes, begin: float, coarsened: float) -> MethodRun:
         elapsed = self._now() - begin
         phases = {name: time for name, time in result.seconds.items() if name not in CHECKS}
         checking = sum(result.seconds.values()) - sum(phases.values())
@@ -195,7 +197,7 @@ class Methods:
         if coarsened:
             phases = {"coarsening": coarsened, **phases}
         added = result.evidence.get("modes_added", 0)
-        return Run(coarsened + elapsed - checking, values, phases=phases, added=added)
+        return MethodRun(coarsened + elapsed - checking, values, phases=phases, added=added)
 
     def _now(self) -> float:
         """Time at which all ranks are here."""
@@ -203,7 +205,7 @@ class Methods:
         return time.perf_counter()
 
 
-def named(methods: Methods) -> dict[str, Callable[[], Run]]:
+def named(methods: Methods) -> dict[str, Callable[[], MethodRun]]:
     """The methods of the table by name, in its order."""
     return {
         "arpack": methods.arpack,

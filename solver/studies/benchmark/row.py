@@ -19,7 +19,7 @@ from carillon.runtime import blas_name, loaded_blas
 from solver.analysis.options import number_of_modes
 from solver.analysis.problem import ProblemOptions
 from solver.distribution.collective import bcast_from_root, compute_on_root
-from solver.studies.benchmark.methods import Methods, Run, named
+from solver.studies.benchmark.methods import MethodRun, Methods, named
 from solver.studies.benchmark.rivals import SlepcConfiguration, configurations
 from solver.studies.benchmark.scores import (
     BASES,
@@ -29,12 +29,12 @@ from solver.studies.benchmark.scores import (
     spread,
     tone_error,
 )
-from solver.studies.benchmark.solid import Solid, make_solid
+from solver.studies.benchmark.solid import BenchmarkSolid, make_solid
 from solver.studies.comparison import AUDIBLE_LAST
 
 logger = logging.getLogger(__name__)
 
-Runs = dict[str, list[Run]]
+Runs = dict[str, list[MethodRun]]
 
 SLOW = ("arpack", "arpack_regular")
 NEED_FORESTS = ("ddfem", "ddfem_hcms_ec_accurate", "ddfem_hcms_ec", "ddfem_hcms_ec_warm")
@@ -138,7 +138,7 @@ def benchmark_row(
     runs, failed = _alternate(methods, benchmark, left_out)
     spectra = _references(methods, runs, with_forests=not reason)
     row = {
-        **bcast_from_root(comm, lambda: _describe(options, cast(Solid, solid))),
+        **bcast_from_root(comm, lambda: _describe(options, cast(BenchmarkSolid, solid))),
         "modes": benchmark.modes,
         **_times(runs, comm.bcast(None if solid is None else solid.seconds)),
         **_errors(runs, spectra),
@@ -188,7 +188,7 @@ def _few(modes: int) -> int:
     return min(WARM_UP_MODES, modes)
 
 
-def _chosen(methods: Methods, left_out: tuple[str, ...]) -> dict[str, Callable[[], Run]]:
+def _chosen(methods: Methods, left_out: tuple[str, ...]) -> dict[str, Callable[[], MethodRun]]:
     return {name: run for name, run in named(methods).items() if name not in left_out}
 
 
@@ -240,7 +240,7 @@ def _alternate(
     return runs, failed
 
 
-def _references(methods: Methods, runs: Runs, with_forests: bool) -> dict[str, Run]:
+def _references(methods: Methods, runs: Runs, with_forests: bool) -> dict[str, MethodRun]:
     """Spectra by SLEPc that the others are compared with."""
     spectra = {"fine": runs["slepc"][0], "average": methods.slepc("average")}
     if with_forests:
@@ -249,11 +249,11 @@ def _references(methods: Methods, runs: Runs, with_forests: bool) -> dict[str, R
     return spectra
 
 
-def _missed(runs: list[Run]) -> int:
+def _missed(runs: list[MethodRun]) -> int:
     return max((run.added for run in runs), default=0)
 
 
-def _describe(options: ProblemOptions, solid: Solid) -> dict[str, Any]:
+def _describe(options: ProblemOptions, solid: BenchmarkSolid) -> dict[str, Any]:
     return {
         "model": surface_name(options.mesh),
         "mesh": options.mesh,
@@ -296,7 +296,7 @@ def _times(runs: Runs, before: dict[str, float]) -> dict[str, Any]:
     }
 
 
-def _errors(runs: Runs, spectra: dict[str, Run]) -> dict[str, Any]:
+def _errors(runs: Runs, spectra: dict[str, MethodRun]) -> dict[str, Any]:
     same_operator = {
         "arpack": "fine",
         "hcms": "fine",

@@ -61,8 +61,10 @@ def speedups(
 
     Parameters
     ----------
-    seconds : medians by method.
-    added : what is added to a method's own time, such as its precomputation.
+    seconds
+        Medians by method.
+    added
+        What is added to a method's own time, such as its precomputation.
 
     Examples
     --------

@@ -26,7 +26,7 @@ _CHANGE_SEED = 1
 
 
 @dataclass(frozen=True)
-class Solid:
+class BenchmarkSolid:
     """A meshed solid, held by rank 0 alone.
 
     Attributes
@@ -76,7 +76,7 @@ class Solid:
         return replace(self.fine, lumped=True)
 
 
-def make_solid(options: ProblemOptions, modes: int) -> Solid:
+def make_solid(options: ProblemOptions, modes: int) -> BenchmarkSolid:
     """Voxelise the solid and give it both materials.
 
     Raises
@@ -97,7 +97,7 @@ def make_solid(options: ProblemOptions, modes: int) -> Solid:
             f"{modes:,} modes asked for, but the coarsened model has {unknowns:,} unknowns; ask "
             "for fewer or raise --resolution"
         )
-    return Solid(
+    return BenchmarkSolid(
         problem,
         blocks,
         problem.young * _change(problem.fine, options.seed),

@@ -23,7 +23,7 @@ from dataset_gen.objectives import fit, orientations
 from dataset_gen.objectives.calibrated import contrast_logs
 from dataset_gen.objectives.calibration import octant_orbits
 from solver.assembly.sparse import assembled
-from solver.studies.calibration.constants import FILLED, LUMPED, VOID, Constants
+from solver.studies.calibration.constants import FILLED, LUMPED, VOID, CalibrationConstants
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -50,15 +50,19 @@ class Logs(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Case:
+class SpectrumCase:
     """A coarse mesh, the moduli of its blocks, and the frequencies it ought to have.
 
     Attributes
     ----------
-    name : of the shape and of the material, with a colon between.
-    model : coarse model; its moduli are placeholders.
-    blocks : (mc, 8) fine moduli [Pa], 0 where void.
-    exact : (k,) elastic angular frequencies [rad/s] of the fine model.
+    name
+        Of the shape and of the material, with a colon between.
+    model
+        Coarse model; its moduli are placeholders.
+    blocks : (mc, 8)
+        Fine moduli [Pa], 0 where void.
+    exact : (k,)
+        Elastic angular frequencies [rad/s] of the fine model.
     """
 
     name: str
@@ -99,13 +103,13 @@ class Case:
         """What lumping adds to the consistent nodal mass (mc, 8, 8); zero in partly void blocks."""
         return replace(self.model, lumped_share=1.0).nodal_mass() - self.model.nodal_mass()
 
-    def moduli(self, constants: Constants) -> Array:
+    def moduli(self, constants: CalibrationConstants) -> Array:
         """Coarse moduli (mc, 8) [Pa]."""
         vector, logs = constants.vector, self.logs
         exponent = np.where(self.filled, vector[FILLED], vector[VOID])[:, None]
         return np.asarray(np.exp(logs.base + vector[self.orbits] + exponent * logs.slope))
 
-    def modes(self, constants: Constants) -> tuple[Array, Array]:
+    def modes(self, constants: CalibrationConstants) -> tuple[Array, Array]:
         """Elastic eigenvalues (k,) and modes (n, k) of the coarse model, as many as are exact."""
         young, share = self.moduli(constants), constants.lumped_share
         stiffness, mass = assembled(replace(self.model, young=young, lumped_share=share))
@@ -122,14 +126,14 @@ class Case:
         order = np.argsort(values)[RIGID_MODES:]
         return values[order], vectors[:, order]
 
-    def errors(self, constants: Constants) -> Array:
+    def errors(self, constants: CalibrationConstants) -> Array:
         """`log(coarse / exact)` (k,) of the frequencies."""
         return self._logs_of(self.modes(constants)[0])
 
     def _logs_of(self, values: Array) -> Array:
         return np.asarray(0.5 * np.log(np.maximum(values, 1e-6 * self.exact**2) / self.exact**2))
 
-    def linearised(self, constants: Constants) -> tuple[Array, Array]:
+    def linearised(self, constants: CalibrationConstants) -> tuple[Array, Array]:
         """Errors (k,) and their derivatives (k, constants).
 
         `d log omega / d log E_q` is the share of strain energy at the quadrature point, and the
@@ -159,7 +163,7 @@ class Case:
         return shares
 
 
-def write_case(path: Path, case: Case) -> None:
+def write_case(path: Path, case: SpectrumCase) -> None:
     """Write a case atomically."""
     with create_h5(path, KIND, SCHEMA, sealed=True) as file:
         file.attrs["name"] = case.name
@@ -170,7 +174,7 @@ def write_case(path: Path, case: Case) -> None:
             file[name].attrs["units"] = unit
 
 
-def read_case(path: Path) -> Case:
+def read_case(path: Path) -> SpectrumCase:
     """Read a case.
 
     Raises
@@ -183,4 +187,4 @@ def read_case(path: Path) -> Case:
         blocks, exact, name = file["blocks"][()], file["exact"][()], str(file.attrs["name"])
     mesh = hexmesh_from_grid(grid, np.zeros(3), edge)
     fill = np.packbits(blocks > 0.0, axis=1, bitorder="little").ravel()
-    return Case(name, ElasticModel(mesh, np.ones_like(blocks), fill), blocks, exact)
+    return SpectrumCase(name, ElasticModel(mesh, np.ones_like(blocks), fill), blocks, exact)

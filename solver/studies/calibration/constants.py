@@ -18,20 +18,20 @@ FILLED, VOID, LUMPED = -3, -2, -1
 
 
 @dataclass(frozen=True)
-class Constants:
+class CalibrationConstants:
     """Logarithms of the factors, exponents of Galerkin in filled and partly void blocks, share."""
 
     vector: Array
 
     @classmethod
-    def neutral(cls) -> Constants:
+    def neutral(cls) -> CalibrationConstants:
         """Where the search starts: `factored` with a little of Galerkin and of lumped mass."""
         vector = np.zeros(octant_orbits()[1] + 3)
         vector[[FILLED, VOID, LUMPED]] = 0.3, 0.1, 0.2
         return cls(vector)
 
     @classmethod
-    def of(cls, calibration: Calibration) -> Constants:
+    def of(cls, calibration: Calibration) -> CalibrationConstants:
         """The vector of a calibration."""
         numbers, count = octant_orbits()
         vector = np.zeros(count + 3)

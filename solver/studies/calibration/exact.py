@@ -26,7 +26,7 @@ from carillon.progress import track
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.coarsening.model import block_moduli, coarse_model
-from solver.studies.calibration.cases import Case, write_case
+from solver.studies.calibration.cases import SpectrumCase, write_case
 from solver.studies.calibration.solids import random_solid
 
 logger = logging.getLogger(__name__)
@@ -44,7 +44,7 @@ OBJECT_RESOLUTIONS = (20, 27)
 """Voxels along the longest side of the built-in objects, which are cases as well."""
 
 
-def _case(name: str, mesh: HexMesh, young: Array) -> Case | None:
+def _case(name: str, mesh: HexMesh, young: Array) -> SpectrumCase | None:
     """Case of a solid, None if it is too large or too small."""
     blocks = blocks_from_mesh(mesh)
     e = block_moduli(blocks, young)
@@ -54,16 +54,16 @@ def _case(name: str, mesh: HexMesh, young: Array) -> Case | None:
     options = SolverOptions(method="slepc", modes=MODES)
     result = modal_analysis(fine_model(mesh, young), options, MPI.COMM_SELF)
     result.system.destroy()
-    return Case(name, coarse, e, np.sqrt(result.values[RIGID_MODES:]))
+    return SpectrumCase(name, coarse, e, np.sqrt(result.values[RIGID_MODES:]))
 
 
-def _object(name: str, resolution: int, material: str) -> Case | None:
+def _object(name: str, resolution: int, material: str) -> SpectrumCase | None:
     voxels = voxelize(load_surface(f"builtin:{name}"), resolution, components="largest", name=name)
     mesh = hexmesh_from_voxels(voxels)
     return _case(f"{name}:{material}", mesh, young_modulus(material, mesh))
 
 
-def _random(seed: int, number: int) -> Case | None:
+def _random(seed: int, number: int) -> SpectrumCase | None:
     mesh, young, material = random_solid(seed, number)
     return _case(f"random:{material}", mesh, young)
 
@@ -103,7 +103,7 @@ def _made(folder: Path, seed: int, count: int, objects: bool) -> Iterator[Path |
             yield made
 
 
-def _kept(path: Path, make: Callable[[], Case | None]) -> Path | None:
+def _kept(path: Path, make: Callable[[], SpectrumCase | None]) -> Path | None:
     """The file of a case, made if it is not there; None if the case is too large or too small."""
     skipped = path.with_suffix(".skipped")
     if skipped.exists():

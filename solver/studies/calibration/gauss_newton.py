@@ -16,8 +16,8 @@ from carillon.fem.block import least_patterns
 from carillon.serial import serial_blas
 from dataset_gen.objectives.calibration import octant_orbits
 from dataset_gen.objectives.factored import unit_moduli
-from solver.studies.calibration.cases import Case, read_case
-from solver.studies.calibration.constants import Constants, filled_places
+from solver.studies.calibration.cases import SpectrumCase, read_case
+from solver.studies.calibration.constants import CalibrationConstants, filled_places
 
 logger = logging.getLogger(__name__)
 
@@ -44,7 +44,7 @@ SETTLED = 1e-3
 class Progress(NamedTuple):
     """State after a step: constants, rms of the logarithmic errors, whether the search settled."""
 
-    constants: Constants
+    constants: CalibrationConstants
     rms: float
     settled: bool
 
@@ -56,14 +56,14 @@ class _Sum(NamedTuple):
 
 
 @lru_cache(maxsize=1024)
-def _case(path: Path) -> Case:
+def _case(path: Path) -> SpectrumCase:
     return read_case(path)
 
 
 @serial_blas
 def _contribution(path: Path, vector: Array) -> _Sum:
     """Mean squared error of one case and its Gauss-Newton derivatives."""
-    errors, columns = _case(path).linearised(Constants(vector))
+    errors, columns = _case(path).linearised(CalibrationConstants(vector))
     errors = np.clip(errors, -LARGEST_ERROR, LARGEST_ERROR)
     count = len(errors)
     return _Sum(
@@ -84,7 +84,7 @@ def bounds(poisson: float) -> tuple[Array, Array]:
 
 def calibrate(
     paths: Sequence[Path],
-    start: Constants,
+    start: CalibrationConstants,
     poisson: float,
     workers: int = 1,
     steps: int = 8,
@@ -95,13 +95,20 @@ def calibrate(
 
     Parameters
     ----------
-    paths : files of the cases.
-    start : constants to begin with and to be pulled towards.
-    poisson : Poisson's ratio of the cases.
-    workers : processes that share the cases.
-    steps : largest number of steps.
-    free : places of the constants to find, all if not given.
-    report : called after each step with its number.
+    paths
+        Files of the cases.
+    start
+        Constants to begin with and to be pulled towards.
+    poisson
+        Poisson's ratio of the cases.
+    workers
+        Processes that share the cases.
+    steps
+        Largest number of steps.
+    free
+        Places of the constants to find, all if not given.
+    report
+        Called after each step with its number.
     """
     low, high = bounds(poisson)
     if free is not None:
@@ -131,7 +138,7 @@ def calibrate(
         if there.cost < here.cost:
             vector, here, damping = trial, there, damping / 5.0
         settled = bool(here.cost > (1.0 - SETTLED) * before)
-        state = Progress(Constants(vector), float(np.sqrt(here.cost)), settled)
+        state = Progress(CalibrationConstants(vector), float(np.sqrt(here.cost)), settled)
         if report is not None:
             report(number, state)
         if settled:
@@ -153,7 +160,7 @@ def _step(state: _Sum, vector: Array, low: Array, high: Array, damping: float) -
 
 def calibrate_in_turn(
     paths: Sequence[Path],
-    start: Constants,
+    start: CalibrationConstants,
     poisson: float,
     workers: int = 1,
     steps: int = 8,
@@ -172,7 +179,9 @@ def calibrate_in_turn(
     return calibrate(paths, start, poisson, workers, steps, others, report)
 
 
-def rms_by_material(paths: Sequence[Path], constants: Constants, workers: int) -> dict[str, float]:
+def rms_by_material(
+    paths: Sequence[Path], constants: CalibrationConstants, workers: int
+) -> dict[str, float]:
     """Root mean square of the relative frequency errors of the cases of each material."""
     pool = Parallel(n_jobs=workers)
     squares = pool(delayed(_squares)(path, constants.vector) for path in paths)
@@ -185,7 +194,7 @@ def rms_by_material(paths: Sequence[Path], constants: Constants, workers: int) -
 
 def _squares(path: Path, vector: Array) -> tuple[str, float]:
     case = _case(path)
-    errors = np.expm1(case.errors(Constants(vector)))
+    errors = np.expm1(case.errors(CalibrationConstants(vector)))
     return case.name.rsplit(":", 1)[1], float(np.mean(errors**2))
 
 

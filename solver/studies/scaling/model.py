@@ -20,7 +20,7 @@ from solver.hcms.counts import Tally
 from solver.studies.scaling.counting import rounds
 from solver.studies.scaling.plan import planned_counts
 from solver.studies.scaling.sizes import TreeSizes
-from solver.studies.scaling.work import Elimination, dense_flops
+from solver.studies.scaling.work import Factorisation, dense_flops
 
 Array = NDArray[np.float64]
 Busiest = dict[str, Tally]
@@ -52,7 +52,7 @@ WEAK_ASSUMPTIONS = (
 
 
 @dataclass(frozen=True)
-class Machine:
+class MachineRates:
     """What a rank and a link do per second.
 
     Attributes
@@ -92,7 +92,7 @@ def kind(phase: str) -> str:
 
 def fit_machine(
     runs: Sequence[dict[str, Any]], latency: float | None = None, bandwidth: float | None = None
-) -> Machine:
+) -> MachineRates:
     """Rates from measured runs, those on more ranks than cores left out.
 
     A rate is that of all operations of its kind over all time not spent waiting; it is the one for
@@ -109,7 +109,7 @@ def fit_machine(
                 seconds[kind(phase)] += sum(tallies["seconds"]) - sum(tallies["waiting"])
     rates = {name: flops[name] / seconds[name] for name in MODELLED if flops[name] > 0.0}
     links = [run["link"] for run in fair if run["link"] is not None]
-    machine = Machine({**dict.fromkeys(MODELLED, np.inf), **rates})
+    machine = MachineRates({**dict.fromkeys(MODELLED, np.inf), **rates})
     if links:
         machine = replace(
             machine,
@@ -124,7 +124,7 @@ def fit_machine(
 
 
 @dataclass(frozen=True)
-class Correction:
+class CorrectionWork:
     """What the error correction does, as far as it does not depend on the number of ranks.
 
     Attributes
@@ -140,13 +140,13 @@ class Correction:
     width: int
 
     @classmethod
-    def measured(cls, run: dict[str, Any]) -> Correction:
+    def measured(cls, run: dict[str, Any]) -> CorrectionWork:
         """As a run made it."""
         return cls(run["blocks"], run["right_hand_sides"], run["width"])
 
 
 def work_of_busiest(
-    sizes: TreeSizes, elimination: Elimination, keep: int, correction: Correction, ranks: int
+    sizes: TreeSizes, elimination: Factorisation, keep: int, correction: CorrectionWork, ranks: int
 ) -> Busiest:
     """Work of the busiest rank in every phase on so many ranks, counted without doing it."""
     parts = sizes.tree.parts
@@ -194,6 +194,6 @@ def _surface(sizes: TreeSizes, owner: NDArray[np.integer], ranks: int) -> float:
     return float((boundary / np.cbrt(count)).clip(max=nodes).max())
 
 
-def predict(machine: Machine, work: Busiest) -> dict[str, float]:
+def predict(machine: MachineRates, work: Busiest) -> dict[str, float]:
     """Modelled seconds of every phase."""
     return {phase: machine.seconds(phase, tally) for phase, tally in work.items()}

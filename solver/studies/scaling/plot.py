@@ -42,8 +42,10 @@ def scaling_figure(result: dict[str, Any], settings: Mapping[str, Any] | None = 
 
     Parameters
     ----------
-    result : output of `solver scaling`.
-    settings : matplotlib's, to be drawn with.
+    result
+        Output of `solver scaling`.
+    settings
+        Matplotlib's, to be drawn with.
     """
     from matplotlib import pyplot as plt  # slow to import, and only needed here
 

@@ -20,14 +20,14 @@ from solver.studies.scaling.launch import MOST_RANKS, measure_each, require_rank
 from solver.studies.scaling.model import (
     ASSUMPTIONS,
     WEAK_ASSUMPTIONS,
-    Correction,
-    Machine,
+    CorrectionWork,
+    MachineRates,
     fit_machine,
     predict,
     work_of_busiest,
 )
 from solver.studies.scaling.sizes import TreeSizes, sizes_of_box, sizes_of_mesh
-from solver.studies.scaling.work import Elimination, elimination
+from solver.studies.scaling.work import Factorisation, elimination
 
 PREDICTED = tuple(1 << power for power in range(11))
 """Numbers of ranks that the model is asked for: 1 to 1024."""
@@ -165,12 +165,12 @@ def study_lines(result: Result) -> list[str]:
 def _strong(
     model: ElasticModel,
     seed: int,
-    machine: Machine,
-    work: Elimination,
+    machine: MachineRates,
+    work: Factorisation,
     runs: list[Result],
     scaling: ScalingOptions,
 ) -> list[Result]:
-    correction = Correction.measured(runs[0])
+    correction = CorrectionWork.measured(runs[0])
     rows = []
     sizes: TreeSizes | None = None
     most = model.mesh.n_cells // FEWEST_CELLS
@@ -184,8 +184,10 @@ def _strong(
     return rows
 
 
-def _weak(machine: Machine, work: Elimination, alone: Result, runs: list[Result]) -> list[Result]:
-    correction = Correction.measured(runs[0])
+def _weak(
+    machine: MachineRates, work: Factorisation, alone: Result, runs: list[Result]
+) -> list[Result]:
+    correction = CorrectionWork.measured(runs[0])
     unknowns = runs[0]["n_dofs"] / runs[0]["ranks"]
     parts = 1 << max(0, round(np.log2(runs[0]["subdomains"] / runs[0]["ranks"])))
     rows = []

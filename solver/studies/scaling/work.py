@@ -18,7 +18,7 @@ LOOKS = 3
 
 
 @dataclass(frozen=True)
-class Elimination:
+class Factorisation:
     """A sparse Cholesky factorisation by nested dissection.
 
     Attributes
@@ -35,9 +35,9 @@ class Elimination:
     entries: float
     boundary: tuple[float, ...]
 
-    def grown(self, factor: float) -> Elimination:
+    def grown(self, factor: float) -> Factorisation:
         """That of a compact solid `factor` times as large."""
-        return Elimination(
+        return Factorisation(
             self.flops * factor**2,
             self.entries * factor ** (4.0 / 3.0),
             tuple(size * factor ** (2.0 / 3.0) for size in self.boundary),
@@ -56,7 +56,7 @@ class Elimination:
         return sum(16.0 * size * columns for size in self.boundary[1 : levels + 1])
 
 
-def elimination(mesh: HexMesh) -> Elimination:
+def elimination(mesh: HexMesh) -> Factorisation:
     """Symbolic factorisation of the stiffness of a mesh."""
     pattern = Pattern.of_cells(mesh.cells.astype(np.int64), 0, mesh.n_nodes)
     fronts = dissect(mesh.node_grid.astype(np.int64), pattern.indptr, pattern.columns)
@@ -68,7 +68,7 @@ def elimination(mesh: HexMesh) -> Elimination:
         if fronts.parent[front] >= 0:
             depth[front] = depth[fronts.parent[front]] + 1
     boundary = tuple(float(outside[depth == level].max()) for level in range(int(depth.max()) + 1))
-    return Elimination(
+    return Factorisation(
         float(flops.sum()), float((0.5 * own * (own + 1.0) + own * outside).sum()), boundary
     )
 
