@@ -60,32 +60,46 @@ def dense_eigenvalues(model: ElasticModel) -> np.ndarray:
 
 
 def parallelepiped_eigenvalues(
-    sides: tuple[float, float, float], young: float, poisson: float, density: float, degree: int = 9
+    sides: tuple[float, float, float],
+    young: float,
+    poisson: float,
+    density: float,
+    degree: int = 9,
+    profile: Callable[[np.ndarray], np.ndarray] = np.ones_like,
 ) -> np.ndarray:
-    """Eigenvalues of the free homogeneous parallelepiped by Rayleigh-Ritz with polynomials.
+    """Eigenvalues of the free parallelepiped by Rayleigh-Ritz with polynomials.
 
     Independent of the finite elements: one global space of Legendre polynomials, exact Gauss
-    quadrature (Visscher et al. 1991 use powers in the same way).
+    quadrature (Visscher et al. 1991 use powers in the same way).  Young's modulus is `young` times
+    `profile`, a polynomial in the first coordinate, which runs from -1 to 1, of degree 8 at most.
     """
-    points, weights = legendre.leggauss(degree + 1)
+    points, weights = legendre.leggauss(degree + 5)
     values = legendre.legvander(points, degree)
     slopes = np.stack(
         [legendre.legval(points, legendre.legder(row)) for row in np.eye(degree + 1)], axis=1
     )
-    mass = values.T @ (weights[:, None] * values)
-    stiff = slopes.T @ (weights[:, None] * slopes)
-    mixed = values.T @ (weights[:, None] * slopes)
+
+    def tables(weights: np.ndarray) -> dict[tuple[int, int], np.ndarray]:
+        """Integrals of products of the polynomials and their derivatives, by their orders."""
+        both = (values, slopes)
+        return {
+            (i, j): both[i].T @ (weights[:, None] * both[j]) for i in range(2) for j in range(2)
+        }
+
+    plain, along = tables(weights), tables(weights * profile(points))
     indices = np.array(
         [index for index in product(range(degree + 1), repeat=3) if sum(index) <= degree]
     )
     elasticity = young * elasticity_matrix(poisson)
     half = 0.5 * np.array(sides)
 
-    def integral(a: int, b: int) -> np.ndarray:
-        """Integral of (d_a phi_m) (d_b phi_n), with a or b = 3 for no derivative."""
+    def integral(a: int, b: int, first: dict[tuple[int, int], np.ndarray]) -> np.ndarray:
+        """Integral of (d_a phi_m) (d_b phi_n), with a or b = 3 for no derivative.
+
+        `first` has the integrals along the first axis.
+        """
         result = np.full((len(indices), len(indices)), half.prod())
-        for axis in range(3):
-            table = {(0, 0): mass, (1, 1): stiff, (0, 1): mixed, (1, 0): mixed.T}
+        for axis, table in enumerate((first, plain, plain)):
             factor = table[(int(a == axis), int(b == axis))]
             scale = half[axis] ** -(int(a == axis) + int(b == axis))
             result *= scale * factor[np.ix_(indices[:, axis], indices[:, axis])]
@@ -95,9 +109,9 @@ def parallelepiped_eigenvalues(
     size = len(indices)
     K = np.zeros((3, size, 3, size))
     M = np.zeros((3, size, 3, size))
-    gradients = {(a, b): integral(a, b) for a in range(3) for b in range(3)}
+    gradients = {(a, b): integral(a, b, along) for a in range(3) for b in range(3)}
     for i in range(3):
-        M[i, :, i, :] = density * integral(3, 3)
+        M[i, :, i, :] = density * integral(3, 3, plain)
         for j in range(3):
             K[i, :, j, :] += lame * gradients[i, j] + shear * gradients[j, i]
         for k in range(3):

@@ -12,7 +12,7 @@ import solver.reference.truth as truth
 from carillon.errors import ConvergenceError
 from solver.analysis.problem import ProblemOptions
 from solver.studies.benchmark import BenchmarkOptions, benchmark_row, row_lines
-from solver.studies.benchmark.methods import Methods, Run
+from solver.studies.benchmark.methods import MethodRun, Methods
 from solver.studies.benchmark.rivals import (
     SlepcConfiguration,
     configurations,
@@ -111,7 +111,7 @@ def test_methods_alternate():
     class Noted(Methods):
         def __getattribute__(self, name):
             if name in (*TIMED, "arpack_regular"):
-                return lambda *_: order.append(name) or Run(1.0, np.empty(0))
+                return lambda *_: order.append(name) or MethodRun(1.0, np.empty(0))
             return super().__getattribute__(name)
 
     noted = Noted(None, MODES, SlepcConfiguration.default(1))

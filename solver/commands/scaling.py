@@ -76,9 +76,9 @@ def _repeated(arguments: argparse.Namespace) -> list[str]:
     names = [name for name in fields if name not in ("mesh", "resolution")]
     words: list[str] = []
     for name in (*names, "modes", "tolerance", "linear_solver"):
-        value = getattr(arguments, name)
+        value, flag = getattr(arguments, name), f"--{name.replace('_', '-')}"
         if value is True:
-            words.append(f"--{name}")
+            words.append(flag)
         elif value is not None and value is not False:
-            words += [f"--{name}", str(value)]
+            words += [flag, str(value)]
     return words

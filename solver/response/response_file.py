@@ -88,8 +88,8 @@ class Response:
     displacement : (t, 3) [m]
         Displacement of the observed point after an impulse of 1 N s at the struck one.
     sound : (s,)
-        Sound pressure at `SAMPLE_RATE_HERTZ`: strikes at all points in turn, each relative to the loudest that the
-        truth's is, see `solver.response.response.contact_sounds`.
+        Sound pressure at `SAMPLE_RATE_HERTZ`: strikes at all points in turn, each relative to the
+        loudest that the truth has, see `solver.response.response.contact_sounds`.
     audible
         Number of modes that sound.
     difference
