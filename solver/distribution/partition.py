@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.cluster.vq import kmeans2
 from scipy.sparse.csgraph import connected_components
 
 from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
 from carillon.fem.laplacian import laplacian_modes
-from solver.distribution.clustering import k_means
 
 EMBEDDING_MODES = 12
 """Laplacian eigenvectors that span the clustering space, the constant left out."""
@@ -18,6 +20,10 @@ SUBDOMAIN_DOFS = 1800
 """Aimed unknowns of a subdomain."""
 FEWEST_SUBDOMAINS = 4
 """Subdomains of the smallest models, so that a few ranks can share them."""
+FEW_CLUSTERS = 16
+"""Subdomains up to which SciPy finds them."""
+ITERATIONS = 40
+"""Of SciPy's k-means; twice as many lower the sum of squares by less than a thousandth."""
 FEWEST_HOLDING = 3
 """Corners of one cell that a subdomain needs there for the cell to hold them together."""
 MOST_ROUNDS = 10
@@ -41,7 +47,24 @@ def partition_cells(mesh: HexMesh, parts: int, seed: int = 0) -> NDArray[np.int3
     values, vectors = laplacian_modes(mesh, EMBEDDING_MODES + 1)
     # Commute-time weights: distances in the embedding follow distances along the solid.
     embedding = vectors[:, 1:] / np.sqrt(np.maximum(values[1:], 1e-12))
-    return _without_gaps(k_means(embedding, parts, np.random.default_rng(seed)))
+    return _without_gaps(_clusters(embedding, parts, seed))
+
+
+def _clusters(points: NDArray[np.float64], count: int, seed: int) -> NDArray[np.integer]:
+    """Cluster (n,) of each point (n, d) by k-means++ (Arthur & Vassilvitskii 2007).
+
+    SciPy's where they are few: to load scikit-learn takes longer than to solve a small model.
+    scikit-learn's where they are many, since SciPy's seeding takes time like their square.
+    """
+    if count <= FEW_CLUSTERS:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # an empty cluster does no harm
+            rng = np.random.default_rng(seed)
+            return np.asarray(kmeans2(points, count, ITERATIONS, minit="++", rng=rng)[1])
+    from sklearn.cluster import KMeans
+
+    kmeans = KMeans(count, init="k-means++", n_init=1, random_state=seed % 2**32)
+    return np.asarray(kmeans.fit_predict(points))
 
 
 def partition_nodes(mesh: HexMesh, cell_part: NDArray[np.int32]) -> NDArray[np.int32]:
