@@ -90,7 +90,7 @@ def _array_bytes(value: Any) -> int:
 
 
 class TimedLinearSolver(LinearSolver):
-    """An linear solver whose factorisations and solves are tallied.
+    """A linear solver whose factorisations and solves are tallied.
 
     Attributes
     ----------
