@@ -168,7 +168,7 @@ def _nearest_vertex(surface: trimesh.Trimesh, name: str, at: Array) -> int:
     away = np.linalg.norm(vertices[used] - at, axis=1)
     nearest, side = int(used[np.argmin(away)]), longest_side(surface)
     to_surface = float(np.sqrt(igl.point_mesh_squared_distance(at[None], vertices, faces)[0][0]))
-    found = f"target {name!r}: the point ({_numbers(at)}) m is {{:.3g}} m from {{}}"
+    place = f"target {name!r}: the point ({_numbers(at)}) m is {{:.3g}} m from {{}}"
     hint = f"; the nearest vertex is {nearest} at ({_numbers(vertices[nearest])}) m"
     for distance, share, what in (
         (to_surface, OFF_SURFACE, "the surface"),
@@ -176,7 +176,7 @@ def _nearest_vertex(surface: trimesh.Trimesh, name: str, at: Array) -> int:
     ):
         if distance > share * side:
             raise UserError(
-                f"{found.format(distance, what)}, expected at most {share:.0%} of its longest "
+                f"{place.format(distance, what)}, expected at most {share:.0%} of its longest "
                 f"side, {share * side:.3g} m{hint}"
             )
     return nearest

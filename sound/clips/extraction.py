@@ -108,8 +108,8 @@ def extract(
     >>> clip = damped_sinusoids(
     ...     np.array([440.0]), np.array([8.0]), np.array([0.5]), np.zeros(1), rate=8000, count=8000
     ... )
-    >>> found = extract(clip, 8000)
-    >>> found.frequencies.round(3).tolist(), found.dampings.round(3).tolist()
+    >>> sound = extract(clip, 8000)
+    >>> sound.frequencies.round(3).tolist(), sound.dampings.round(3).tolist()
     ([440.0], [8.0])
     """
     clip = np.asarray(samples, dtype=float)
@@ -125,9 +125,9 @@ def extract(
     scale = float(np.abs(clip).max())
     searched = clip[: round(LONGEST_SECONDS * rate)] / scale
     with single_threaded_blas():  # many small matrices
-        found = _found(searched, rate, visible)
-    _require_modes(found, len(searched), rate)
-    kept = found.chosen(_is_mode(found, len(searched)))
+        fit = _fitted(searched, rate, visible)
+    _require_modes(fit, len(searched), rate)
+    kept = fit.chosen(_is_mode(fit, len(searched)))
     return _as_sound(kept, clip, strike, rate, scale, modes)
 
 
@@ -167,7 +167,7 @@ def _steady(hertz: float, seconds: float) -> str:
     )
 
 
-def _found(clip: Array, rate: int, visible: bool) -> Fit:
+def _fitted(clip: Array, rate: int, visible: bool) -> Fit:
     """All damped sinusoids that stand out of a clip."""
     fit = settled(np.zeros(0, complex), clip, 0)
     first = 0.5 * BAND_SAMPLES / min(1.0, len(clip) / rate)

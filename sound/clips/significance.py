@@ -68,8 +68,8 @@ def _pruned(exponents: Complex, clip: Array) -> Fit:
         rest = clip - superposed(exponents, coefficients, len(clip))
         level = _level(exponents, rest)
         prominence = _gain(exponents, coefficients, len(clip)) / level
-        beside = np.pad(prominence, 1, constant_values=np.inf)
-        least = (prominence <= beside[:-2]) & (prominence <= beside[2:])
+        padded = np.pad(prominence, 1, constant_values=np.inf)
+        least = (prominence <= padded[:-2]) & (prominence <= padded[2:])
         weak = least & (prominence < PROMINENCE)
         if not weak.any():
             return Fit(exponents, coefficients, prominence, level)

@@ -29,16 +29,16 @@ def run(arguments: argparse.Namespace) -> int:
 
     given = {key: getattr(arguments, key) for key in ("seconds", "evaluations", "workers")}
     project = with_optimiser(load_project(arguments.project), **given)
-    found = benchmark(prepare(project), arguments.runs, lambda what: say(f"measuring: {what}"))
+    results = benchmark(prepare(project), arguments.runs, lambda what: say(f"measuring: {what}"))
     if arguments.json:
-        print(json.dumps({**found, "provenance": measured(project.as_dict())}))
+        print(json.dumps({**results, "provenance": measured(project.as_dict())}))
         return 0
-    print(_table(found))
+    print(_table(results))
     return 0
 
 
-def _table(found: dict[str, Any]) -> str:
-    times = found["evaluation"]
+def _table(results: dict[str, Any]) -> str:
+    times = results["evaluation"]
     lines = [
         f"evaluation of {times['n_dofs']:,} unknowns, {times['modes']} modes, "
         f"{times['coordinates']} coordinates, one thread, median of {times['runs']}:",
@@ -48,7 +48,7 @@ def _table(found: dict[str, Any]) -> str:
         f"{'method':8} {'cost':>19} {'fall':>7} {'90 % after':>11} {'evaluations':>12} "
         f"{'a minute':>9} {'seconds':>8}",
     ]
-    for row in found["rows"]:
+    for row in results["rows"]:
         after = row["seconds_to_90_percent"]
         lines.append(
             f"{row['method']:8} {row['cost_start']:8.4g} -> {row['cost_end']:7.4g} "

@@ -28,7 +28,7 @@ ENDINGS = (".h5", ".hdf5")
 """Of designs."""
 GIVEN = ("seconds", "evaluations", "method", "workers")
 """Arguments that take the place of what a project says."""
-SLOW = ("trimesh", "sound.design.designing")
+SLOW = ("trimesh", "sound.design.optimise")
 """Modules that take seconds to load, which `--help` does without."""
 SHOWN_EVERY = 1.0
 """Seconds between two progress lines on a terminal."""
@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _search(arguments: argparse.Namespace) -> int:
     """Search, writing the design every half minute and at the end."""
-    from sound.design.designing import design
+    from sound.design.optimise import optimise
     from sound.design.preparation import prepare, require_same_voxels
     from sound.outputs import require_output
     from sound.project.design_file import read_design, write_design
@@ -79,21 +79,21 @@ def _search(arguments: argparse.Namespace) -> int:
         former = read_design(arguments.start)
     elif out.exists() and not arguments.restart:
         former = read_design(out)
-    prepared = prepare(project)
+    problem = prepare(project)
     if former is not None:
-        require_same_voxels(prepared, former)
+        require_same_voxels(problem, former)
         so_far = former.history["evaluations"][-1:].sum()
         say(f"{arguments.start or out}: going on after {so_far:,.0f} evaluations")
-    found = design(
-        prepared, former, keep=lambda each: write_design(out, each), watch=_Progress().show
+    result = optimise(
+        problem, former, keep=lambda each: write_design(out, each), watch=_SearchProgress().show
     )
-    write_design(out, found)
-    summary = summarise(found)
-    print(json.dumps(summary) if arguments.json else _sentences(out, found, summary))
+    write_design(out, result)
+    summary = summarise(result)
+    print(json.dumps(summary) if arguments.json else _sentences(out, result, summary))
     return 0
 
 
-class _Progress:
+class _SearchProgress:
     """A line with cost and time: in place on a terminal, one a minute in a log."""
 
     def __init__(self) -> None:
@@ -106,8 +106,8 @@ class _Progress:
         if now < self._due:
             return
         self._due = now + (SHOWN_EVERY if self._terminal else LINE_SECONDS)
-        moment, first = search.history[-1], search.history[0]
-        cost = moment.cost
+        entry, first = search.history[-1], search.history[0]
+        cost = entry.cost
         text = (
             f"{search.own_seconds:6.1f} s  {search.own_evaluations:5,} evaluations  "
             f"cost {cost.total:9.4g} ({fall(first.cost.total, cost.total):.1%} less)  "
@@ -116,10 +116,10 @@ class _Progress:
         say(text, end="\r" if self._terminal else "\n")
 
 
-def summarise(found: Design) -> dict[str, Any]:
+def summarise(design: Design) -> dict[str, Any]:
     """The outcome as plain values."""
-    evidence = found.evidence
-    off = np.abs(found.frequencies / found.targets.frequencies - 1.0)
+    evidence = design.evidence
+    off = np.abs(design.frequencies / design.targets.frequencies - 1.0)
     return {
         "cost_start": evidence["cost_start"],
         "cost": evidence["cost"],
@@ -131,17 +131,17 @@ def summarise(found: Design) -> dict[str, Any]:
         "evaluations_per_minute": evidence["evaluations_per_minute"],
         "workers": evidence["workers"],
         "method": evidence["method"],
-        "modes": len(found.frequencies),
-        "targets": [strike.name for strike in found.strikes],
+        "modes": len(design.frequencies),
+        "targets": [strike.name for strike in design.strikes],
         "frequency_error_median": float(np.median(off)),
         "frequency_error_max": float(off.max()),
-        "young_min_pa": float(found.young.min()),
-        "young_max_pa": float(found.young.max()),
+        "young_min_pa": float(design.young.min()),
+        "young_max_pa": float(design.young.max()),
         "residual_max": evidence["residual_max"],
     }
 
 
-def _sentences(out: Path, found: Design, summary: dict[str, Any]) -> str:
+def _sentences(out: Path, design: Design, summary: dict[str, Any]) -> str:
     return "\n".join(
         [
             f"cost {summary['cost_start']:.4g} -> {summary['cost']:.4g} ({summary['fall']:.1%} "
@@ -150,7 +150,7 @@ def _sentences(out: Path, found: Design, summary: dict[str, Any]) -> str:
             f"frequencies of {summary['modes']} modes: median error "
             f"{summary['frequency_error_median']:.2%}, worst {summary['frequency_error_max']:.2%}; "
             f"residuals of the modes up to {summary['residual_max']:.1e}",
-            f"Young's modulus {found.young.min() / 1e9:.3g} to {found.young.max() / 1e9:.3g} GPa",
+            f"Young's modulus {design.young.min() / 1e9:.3g} to {design.young.max() / 1e9:.3g} GPa",
             f"design: {out}",
         ]
     )

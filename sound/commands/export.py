@@ -35,21 +35,21 @@ def run(arguments: argparse.Namespace) -> int:
     from sound.outputs import require_output
     from sound.project.design_file import read_design
 
-    wanted = _format(arguments.out, arguments.format)
+    kind = _format(arguments.out, arguments.format)
     require_output(arguments.out, [Path(arguments.out).suffix.lower()], [arguments.design])
     design = read_design(arguments.design)
-    if wanted == "h5":
+    if kind == "h5":
         from sound.export.embedded import write_embedded  # Loaded if needed: some take long.
 
         write_embedded(arguments.out, design, {"design": arguments.design})
-    elif wanted == "dsp":
+    elif kind == "dsp":
         from sound.export.faust import write_faust
 
         write_faust(arguments.out, design, arguments.points)
     else:
         from sound.export.gltf import write_gltf
 
-        write_gltf(arguments.out, design, binary=wanted == "glb")
+        write_gltf(arguments.out, design, binary=kind == "glb")
     print(
         f"{arguments.out}: {len(design.frequencies)} modes, {design.frequencies[0]:.4g} to "
         f"{design.frequencies[-1]:.4g} Hz, {Path(arguments.out).stat().st_size:,} bytes"
@@ -59,12 +59,14 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _format(out: str, named: str | None) -> str:
     """What is written: as named, or as the ending tells; the two must not contradict each other."""
-    told = Path(out).suffix.lstrip(".").lower()
-    if named is not None and told in FORMATS and told != named:
-        raise UserError(f"--out {out}: ends in .{told}, but --format is {named}; leave one of them")
-    if named is None and told not in FORMATS:
+    ending = Path(out).suffix.lstrip(".").lower()
+    if named is not None and ending in FORMATS and ending != named:
+        raise UserError(
+            f"--out {out}: ends in .{ending}, but --format is {named}; leave one of them"
+        )
+    if named is None and ending not in FORMATS:
         raise UserError(
             f"--out {out}: the ending tells no format, expected one of .{', .'.join(FORMATS)}; or "
             "name it by --format"
         )
-    return named or told
+    return named or ending

@@ -128,8 +128,8 @@ def run(arguments: argparse.Namespace) -> int:
         gain = PEAK / peak
         sound, peak = gain * sound, PEAK
     write_wav(arguments.out, sound, arguments.rate)
-    found = _summary(arguments, scene, gain, peak)
-    print(json.dumps(found) if arguments.json else _sentence(found))
+    summary = _summary(arguments, scene, gain, peak)
+    print(json.dumps(summary) if arguments.json else _sentence(summary))
     if peak > 1.0:
         print(f"sound: {peak:.2f} of full scale; lower --strength for players", file=sys.stderr)
     return 0
@@ -236,10 +236,10 @@ def _summary(
     }
 
 
-def _sentence(found: dict[str, Any]) -> str:
-    hertz = found["frequencies_hz"]
+def _sentence(summary: dict[str, Any]) -> str:
+    hertz = summary["frequencies_hz"]
     span = f", {min(hertz):.4g} to {max(hertz):.4g} Hz" if hertz else ""
-    text = f"{found['out']}: {len(hertz)} modes{span}, peak {found['peak']:.3g} of full scale"
-    if found["modes_left_out"]:
-        text += f"; {found['modes_left_out']} above half the sampling rate are left out"
+    text = f"{summary['out']}: {len(hertz)} modes{span}, peak {summary['peak']:.3g} of full scale"
+    if summary["modes_left_out"]:
+        text += f"; {summary['modes_left_out']} above half the sampling rate are left out"
     return text

@@ -53,7 +53,7 @@ class Sensitivity:
 
 
 @dataclass(frozen=True)
-class Cost:
+class DesignCost:
     """Value of Eq. (4) and its parts, each without its weight."""
 
     total: float
@@ -77,8 +77,8 @@ class Objective:
         self.targets = targets
         self.weights = weights
         self._bark = bark(targets.frequencies)
-        wanted = _average(targets.frequencies, targets.amplitudes**2)
-        self._wanted = np.sqrt(wanted / np.maximum(wanted.max(axis=1, keepdims=True), TINY))
+        energies = _average(targets.frequencies, targets.amplitudes**2)
+        self._target = np.sqrt(energies / np.maximum(energies.max(axis=1, keepdims=True), TINY))
 
     def frequency_residual(self, eigenvalues: Array) -> Array:
         """Bark differences (N - 1,) of the second mode to the last (Eq. 1)."""
@@ -86,9 +86,9 @@ class Objective:
 
     def amplitude_residual(self, eigenvalues: Array, pushed: Array) -> Array:
         """Differences (T, N - 1) of the balances, of the second mode to the last (Eq. 2)."""
-        return np.asarray(self._balance(eigenvalues, pushed) - self._wanted)[:, 1:]
+        return np.asarray(self._balance(eigenvalues, pushed) - self._target)[:, 1:]
 
-    def cost(self, eigenvalues: Array, pushed: Array, regulariser: float) -> Cost:
+    def cost(self, eigenvalues: Array, pushed: Array, regulariser: float) -> DesignCost:
         """Eq. (4).
 
         Parameters
@@ -104,7 +104,7 @@ class Objective:
         amplitude = 0.5 * float(np.sum(self.amplitude_residual(eigenvalues, pushed) ** 2))
         w = self.weights
         total = w.frequency * frequency + w.amplitude * amplitude + w.regulariser * regulariser
-        return Cost(total, frequency, amplitude, regulariser)
+        return DesignCost(total, frequency, amplitude, regulariser)
 
     def frequency_jacobian(self, eigenvalues: Array, sensitivity: Sensitivity) -> Array:
         """Derivatives (N - 1, m) of `frequency_residual`."""

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Prepared:
+class DesignProblem:
     """What a search needs: the surface, the setting and the project they follow from."""
 
     project: Project
@@ -49,7 +49,7 @@ def targets_of(project: Project) -> Targets:
     return share_frequencies([target.name for target in project.targets], sounds, project.modes)
 
 
-def prepare(project: Project, targets: Targets | None = None) -> Prepared:
+def prepare(project: Project, targets: Targets | None = None) -> DesignProblem:
     """Mesh, material and objective of a project.
 
     Parameters
@@ -72,10 +72,10 @@ def prepare(project: Project, targets: Targets | None = None) -> Prepared:
         mesh, project.material.dimensions, project.material.young, project.material.law
     )
     setting = Setting(mesh, solid, material, strikes, objective)
-    return Prepared(project, np.asarray(surface.vertices), np.asarray(surface.faces), setting)
+    return DesignProblem(project, np.asarray(surface.vertices), np.asarray(surface.faces), setting)
 
 
-def require_same_voxels(prepared: Prepared, former: Design) -> None:
+def require_same_voxels(problem: DesignProblem, former: Design) -> None:
     """Check that a project can go on from a former design.
 
     Raises
@@ -83,7 +83,7 @@ def require_same_voxels(prepared: Prepared, former: Design) -> None:
     UserError
         If the former design is of other voxels.
     """
-    mesh = prepared.setting.mesh
+    mesh = problem.setting.mesh
     if not np.array_equal(former.fine_grid, mesh.grid):
         raise UserError(
             f"the design to go on from has {len(former.fine_grid):,} voxels, the project another "
@@ -91,7 +91,7 @@ def require_same_voxels(prepared: Prepared, former: Design) -> None:
         )
 
 
-def coordinates_of(prepared: Prepared, former: Design) -> Array:
+def coordinates_of(problem: DesignProblem, former: Design) -> Array:
     """Coordinates (m,) whose material is that of a former design, as near as may be.
 
     Raises
@@ -99,9 +99,9 @@ def coordinates_of(prepared: Prepared, former: Design) -> Array:
     UserError
         If the former design is of other voxels.
     """
-    require_same_voxels(prepared, former)
-    material = prepared.setting.material
-    same = former.settings.get("material") == prepared.project.as_dict()["material"]
+    require_same_voxels(problem, former)
+    material = problem.setting.material
+    same = former.settings.get("material") == problem.project.as_dict()["material"]
     if same and len(former.coordinates) == material.dimensions:
         return former.coordinates
     return material.coordinates(former.young)

@@ -65,11 +65,11 @@ def projected_stiffness(
     count, points = vectors.shape[1], others.shape[1]
     pairs = count * (count + 1) // 2
     total = np.zeros((slopes.shape[1], pairs + points * count))
-    beside = np.ascontiguousarray(others.reshape(len(vectors), -1))
+    columns = np.ascontiguousarray(others.reshape(len(vectors), -1))
     for first in range(0, len(corners), CELLS_AT_ONCE):
         cells = corners[first : first + CELLS_AT_ONCE]
         energies = np.empty((8 * len(cells), total.shape[1]))
-        _pair_energies(cells, strains, vectors, beside, energies)
+        _pair_energies(cells, strains, vectors, columns, energies)
         total += slopes[8 * first : 8 * (first + len(cells))].T @ energies
     upper = np.triu_indices(count)
     inside = np.empty((len(total), count, count))
@@ -143,15 +143,15 @@ def _pair_energies(corners, strains, vectors, others, energies):  # type: ignore
     count = vectors.shape[1]
     points = others.shape[1] // count
     local = np.empty((24, count))
-    beside = np.empty((24, others.shape[1]))
+    local_others = np.empty((24, others.shape[1]))
     for cell in range(len(corners)):
         for a in range(8):
             node = corners[cell, a]
             local[3 * a : 3 * a + 3] = vectors[3 * node : 3 * node + 3]
-            beside[3 * a : 3 * a + 3] = others[3 * node : 3 * node + 3]
+            local_others[3 * a : 3 * a + 3] = others[3 * node : 3 * node + 3]
         for q in range(8):
             strain = strains[q] @ local
-            strain_beside = strains[q] @ beside
+            strain_others = strains[q] @ local_others
             row = energies[8 * cell + q]
             pair = 0
             for i in range(count):
@@ -165,5 +165,5 @@ def _pair_energies(corners, strains, vectors, others, energies):  # type: ignore
                 for i in range(count):
                     value = 0.0
                     for s in range(6):
-                        value += strain[s, i] * strain_beside[s, p * count + i]
+                        value += strain[s, i] * strain_others[s, p * count + i]
                     row[pair + p * count + i] = value

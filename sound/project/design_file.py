@@ -200,10 +200,10 @@ def _fault(design: Design) -> str:
         ("surface faces", design.surface_faces, (None, 3)),
     ]
     for name, data, shape in expected:
-        found = (len(data),) if isinstance(data, (list, tuple)) else data.shape
-        if not _matches(found, shape):
-            wanted = str(shape).replace("None", "any")
-            return f"holds {name} of shape {found}, expected {wanted}"
+        own = (len(data),) if isinstance(data, (list, tuple)) else data.shape
+        if not _matches(own, shape):
+            any_shape = str(shape).replace("None", "any")
+            return f"holds {name} of shape {own}, expected {any_shape}"
     numbers = [(name, data) for name, data, _ in expected if isinstance(data, np.ndarray)]
     for name, data in [*numbers, ("frequencies", targets.frequencies), ("moduli", design.young)]:
         if data.dtype.kind not in "fiu" or not np.isfinite(data).all():
@@ -216,8 +216,8 @@ def _fault(design: Design) -> str:
     return ""
 
 
-def _matches(found: tuple[int, ...], shape: tuple[int | None, ...]) -> bool:
-    return len(found) == len(shape) and all(b in (a, None) for a, b in zip(found, shape))
+def _matches(own: tuple[int, ...], expected: tuple[int | None, ...]) -> bool:
+    return len(own) == len(expected) and all(b in (a, None) for a, b in zip(own, expected))
 
 
 def _put_strikes(group: h5py.Group, strikes: Sequence[Strike]) -> None:

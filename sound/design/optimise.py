@@ -11,13 +11,13 @@ from sound.design.interrupts import interruptible
 from sound.design.optimisers import OPTIMISERS
 from sound.design.outcome import Outcome, require_modes
 from sound.design.pool import Pool, Task
-from sound.design.preparation import Prepared, coordinates_of
+from sound.design.preparation import DesignProblem, coordinates_of
 from sound.design.search import BudgetSpentError, Search
 from sound.project.design_file import HISTORY_TYPE, Design
 
 
-def design(
-    prepared: Prepared,
+def optimise(
+    problem: DesignProblem,
     former: Design | None = None,
     keep: Callable[[Design], None] | None = None,
     keep_every: float = 30.0,
@@ -29,7 +29,7 @@ def design(
 
     Parameters
     ----------
-    prepared
+    problem
         Of the project.
     former
         Design to go on from, of the same mesh; its targets may be others.
@@ -43,16 +43,16 @@ def design(
     UserError
         See `coordinates_of`; or if the material to start from has no modes.
     """
-    project, setting = prepared.project, prepared.setting
+    project, setting = problem.project, problem.setting
     z = np.zeros(setting.material.dimensions)
     before = (0.0, 0)
     rows = np.empty(0, HISTORY_TYPE)
     if former is not None:
-        z = coordinates_of(prepared, former)
+        z = coordinates_of(problem, former)
         rows = former.history
     if len(rows):
         before = (float(rows["seconds"][-1]), int(rows["evaluations"][-1]))
-    outcome = Outcome(prepared, rows)
+    outcome = Outcome(problem, rows)
     budget = project.optimiser
     kept = time.monotonic()
 
@@ -68,7 +68,7 @@ def design(
             return interrupted()
 
         search = Search(
-            lambda: Pool(setting, prepared.workers),
+            lambda: Pool(setting, problem.workers),
             budget.seconds,
             budget.evaluations,
             look,
