@@ -180,9 +180,10 @@ def test_design_of_other_voxels_is_refused(problem, found):
         optimise(problem, former=other)
 
 
-def test_designs_are_kept_on_the_way(problem):
+def test_designs_are_kept_on_the_way(problem, monkeypatch):
+    monkeypatch.setattr("sound.design.optimise.KEEP_SECONDS", 0.0)
     kept = []
-    optimise(with_options(problem, evaluations=60), keep=kept.append, keep_every=0.0)
+    optimise(with_options(problem, evaluations=60), keep=kept.append)
     costs = [each.evidence["cost"] for each in kept]
     assert len(kept) > 1 and costs[-1] < costs[0]
 

@@ -77,11 +77,10 @@ class ModalSound:
         """Energy (n,) of each mode, its squared samples summed over all time."""
         return np.asarray(self.amplitudes**2 * self.rate / (4.0 * self.dampings))
 
-    def modal_part(self, count: int | None = None) -> Array:
-        """Samples (count,) of the modes alone; as many as the residual has unless told."""
-        count = len(self.residual) if count is None else count
+    def modal_part(self) -> Array:
+        """Samples (s,) of the modes alone, as many as the residual has."""
         values = (self.frequencies, self.dampings, self.amplitudes, self.phases)
-        return damped_sinusoids(*values, self.rate, count)
+        return damped_sinusoids(*values, self.rate, len(self.residual))
 
 
 def extract(

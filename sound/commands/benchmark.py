@@ -4,21 +4,29 @@ from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import asdict, dataclass
 from typing import Any
 
-from carillon.arguments import number_of_workers, positive_number, whole_number
+from carillon.arguments import whole_number
 from carillon.measurement import measured
+from carillon.options import REQUIRED, add_options, collect, option
 from carillon.progress import say
+from sound.commands.search_options import SearchOptions
+
+
+@dataclass(frozen=True)
+class BenchmarkOptions:
+    """What is measured."""
+
+    project: str = option(REQUIRED, "project file (YAML)")
+    runs: int = option(7, "timed evaluations", type=whole_number(1, 1000))
+    json: bool = option(False, "print everything as JSON")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    parser.add_argument("project", help="project file (YAML)")
-    parser.add_argument("--seconds", type=positive_number, help="of each, not the project's")
-    parser.add_argument("--evaluations", type=whole_number(1), help="of each at most")
-    parser.add_argument("--workers", type=number_of_workers, help="processes, not the project's")
-    parser.add_argument("--runs", type=whole_number(1, 1000), default=7, help="timed evaluations")
-    parser.add_argument("--json", action="store_true", help="print everything as JSON")
+    add_options(parser, BenchmarkOptions, positional=("project",))
+    add_options(parser, SearchOptions, leave_out=("method",))
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -27,10 +35,11 @@ def run(arguments: argparse.Namespace) -> int:
     from sound.design.preparation import prepare
     from sound.project.project import load_project, with_optimiser
 
-    given = {key: getattr(arguments, key) for key in ("seconds", "evaluations", "workers")}
-    project = with_optimiser(load_project(arguments.project), **given)
-    results = benchmark(prepare(project), arguments.runs, lambda what: say(f"measuring: {what}"))
-    if arguments.json:
+    options = collect(BenchmarkOptions, arguments)
+    settings = asdict(collect(SearchOptions, arguments))
+    project = with_optimiser(load_project(options.project), **settings)
+    results = benchmark(prepare(project), options.runs, lambda what: say(f"measuring: {what}"))
+    if options.json:
         print(json.dumps({**results, "provenance": measured(project.as_dict())}))
         return 0
     print(_table(results))

@@ -6,17 +6,18 @@ import argparse
 import json
 import sys
 import time
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from carillon.arguments import number_of_workers, positive_number, whole_number
 from carillon.errors import UserError
 from carillon.locks import locked
+from carillon.options import REQUIRED, add_options, collect, option
 from carillon.progress import LINE_SECONDS, say
+from sound.commands.search_options import SearchOptions
 from sound.design.interrupts import ended_by_interrupts
 from sound.design.objective import fall
 
@@ -26,27 +27,29 @@ if TYPE_CHECKING:
 
 ENDINGS = (".h5", ".hdf5")
 """Of designs."""
-GIVEN = ("seconds", "evaluations", "method", "workers")
-"""Arguments that take the place of what a project says."""
 SLOW = ("trimesh", "sound.design.optimise")
 """Modules that take seconds to load, which `--help` does without."""
 SHOWN_EVERY = 1.0
 """Seconds between two progress lines on a terminal."""
 
 
+@dataclass(frozen=True)
+class DesignOptions:
+    """What is designed, and where it is written."""
+
+    project: str = option(REQUIRED, "project file (YAML)")
+    out: str = option(REQUIRED, "file to write (.h5); goes on if it exists")
+    initial_design: str | None = option(
+        None, "design of the same mesh to go on from, its targets aside", metavar="DESIGN"
+    )
+    restart: bool = option(False, "begin anew, even if --out exists")
+    json: bool = option(False, "print the outcome as JSON")
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    parser.add_argument("project", help="project file (YAML)")
-    parser.add_argument("--out", required=True, help="file to write (.h5); goes on if it exists")
-    parser.add_argument("--start", help="design of the same mesh to go on from, its targets aside")
-    parser.add_argument("--restart", action="store_true", help="begin anew, even if --out exists")
-    parser.add_argument("--seconds", type=positive_number, help="wall time, not the project's")
-    parser.add_argument(
-        "--evaluations", type=whole_number(1), help="modal analyses at most, not the project's"
-    )
-    parser.add_argument("--method", choices=("hybrid", "cma", "bfgs"), help="not the project's")
-    parser.add_argument("--workers", type=number_of_workers, help="processes, not the project's")
-    parser.add_argument("--json", action="store_true", help="print the outcome as JSON")
+    add_options(parser, DesignOptions, positional=("project",))
+    add_options(parser, SearchOptions)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -54,11 +57,12 @@ def run(arguments: argparse.Namespace) -> int:
     with ended_by_interrupts():
         for module in SLOW:
             import_module(module)
-    with locked(arguments.out):
-        return _search(arguments)
+    options = collect(DesignOptions, arguments)
+    with locked(options.out):
+        return _search(options, collect(SearchOptions, arguments))
 
 
-def _search(arguments: argparse.Namespace) -> int:
+def _search(options: DesignOptions, settings: SearchOptions) -> int:
     """Search, writing the design every half minute and at the end."""
     from sound.design.optimise import optimise
     from sound.design.preparation import prepare, require_same_voxels
@@ -67,29 +71,28 @@ def _search(arguments: argparse.Namespace) -> int:
     from sound.project.project import load_project, with_optimiser
 
     _require_one_rank()
-    project = load_project(arguments.project)
-    inputs = filter(None, [arguments.project, project.solid.mesh, project.solid.forest])
-    out = require_output(arguments.out, ENDINGS, inputs)
-    if arguments.evaluations is not None and arguments.seconds is None:
+    project = load_project(options.project)
+    inputs = filter(None, [options.project, project.solid.mesh, project.solid.forest])
+    out = require_output(options.out, ENDINGS, inputs)
+    if settings.evaluations is not None and settings.seconds is None:
         project = replace(project, optimiser=replace(project.optimiser, seconds=None))
-    given = {key: getattr(arguments, key) for key in GIVEN}
-    project = with_optimiser(project, **given)
+    project = with_optimiser(project, **asdict(settings))
     former = None
-    if arguments.start is not None:
-        former = read_design(arguments.start)
-    elif out.exists() and not arguments.restart:
+    if options.initial_design is not None:
+        former = read_design(options.initial_design)
+    elif out.exists() and not options.restart:
         former = read_design(out)
     problem = prepare(project)
     if former is not None:
         require_same_voxels(problem, former)
         so_far = former.history["evaluations"][-1:].sum()
-        say(f"{arguments.start or out}: going on after {so_far:,.0f} evaluations")
+        say(f"{options.initial_design or out}: going on after {so_far:,.0f} evaluations")
     result = optimise(
         problem, former, keep=lambda each: write_design(out, each), watch=_SearchProgress().show
     )
     write_design(out, result)
     summary = summarise(result)
-    print(json.dumps(summary) if arguments.json else _sentences(out, result, summary))
+    print(json.dumps(summary) if options.json else _sentences(out, result, summary))
     return 0
 
 

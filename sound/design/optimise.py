@@ -15,12 +15,14 @@ from sound.design.preparation import DesignProblem, coordinates_of
 from sound.design.search import BudgetSpentError, Search
 from sound.project.design_file import HISTORY_TYPE, Design
 
+KEEP_SECONDS = 30.0
+"""Time between two designs that are kept while a search goes on [s]."""
+
 
 def optimise(
     problem: DesignProblem,
     former: Design | None = None,
     keep: Callable[[Design], None] | None = None,
-    keep_every: float = 30.0,
     watch: Callable[[Search], None] | None = None,
 ) -> Design:
     """Search for a material until the project's budget is spent, or somebody interrupts.
@@ -34,7 +36,7 @@ def optimise(
     former
         Design to go on from, of the same mesh; its targets may be others.
     keep
-        Called with the design so far every `keep_every` seconds of the search.
+        Called with the design so far every `KEEP_SECONDS` of the search.
     watch
         Called after every round of evaluations.
 
@@ -62,7 +64,7 @@ def optimise(
             nonlocal kept
             if watch is not None:
                 watch(search)
-            if keep is not None and time.monotonic() - kept >= keep_every and search.best:
+            if keep is not None and time.monotonic() - kept >= KEEP_SECONDS and search.best:
                 keep(outcome.of(search))
                 kept = time.monotonic()
             return interrupted()

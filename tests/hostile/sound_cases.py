@@ -271,7 +271,7 @@ for damage in ("cut", "flipped", "unsealed", "nan", "kind", "missing", "claims",
 hostile("design goes on from modes", RUN, "d.h5", files={"d.h5": Copy("modes.h5")})
 each(
     "design starts from",
-    f"{RUN} --start VALUE",
+    f"{RUN} --initial-design VALUE",
     [
         "ZOO/modes.h5",
         "ZOO/design-cut.h5",
