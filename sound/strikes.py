@@ -37,14 +37,14 @@ class Strike:
 
     Attributes
     ----------
-    name
+    name : str
         Of the target whose clip is to sound there.
-    vertex
+    vertex : int
         Number of the surface's vertex.
-    position
-        (3,) [m].
-    inward
-        (3,) unit vector into the solid.
+    position : (3,) [m]
+        Of that vertex.
+    inward : (3,)
+        Unit vector into the solid.
     """
 
     name: str
@@ -74,11 +74,11 @@ def locate(
     ----------
     surface
         Triangles in metres; vertices may be repeated, and triangles may face either way.
-    name
+    name : str
         Of the target, for messages.
-    at
-        Position (3,) [m], whose nearest vertex is struck.
-    vertex
+    at : (3,) [m] or None
+        Position, whose nearest vertex is struck.
+    vertex : int or None
         Number of the vertex; give this or `at`.
 
     Raises

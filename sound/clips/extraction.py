@@ -55,13 +55,20 @@ class ModalSound:
 
     Attributes
     ----------
-    frequencies : (n,) [Hz], ascending.
-    dampings : (n,) [1/s].
-    amplitudes : (n,) at the strike, in units of the samples.
-    phases : (n,) [rad].
-    residual : (s,) the clip from the strike on minus all modes found, those not asked for included.
-    rate : samples per second [Hz].
-    evidence : how the modes were found and how sure they are; plain values.
+    frequencies : (n,) [Hz]
+        Ascending.
+    dampings : (n,) [1/s]
+        d.
+    amplitudes : (n,)
+        At the strike, in units of the samples.
+    phases : (n,) [rad]
+        theta.
+    residual : (s,)
+        The clip from the strike on minus all modes found, those not asked for included.
+    rate : int [Hz]
+        Samples per second.
+    evidence : dict
+        How the modes were found and how sure they are; plain values.
     """
 
     frequencies: Array
@@ -90,10 +97,14 @@ def extract(
 
     Parameters
     ----------
-    samples : (s,) of one channel.
-    rate : samples per second [Hz].
-    modes : number of modes to keep, those with most energy; all that are found if None.
-    visible : show progress.
+    samples : (s,)
+        Of one channel.
+    rate : int [Hz]
+        Samples per second.
+    modes : int or None
+        Number of modes to keep, those with most energy; all that are found if None.
+    visible : bool
+        Whether progress is shown.
 
     Raises
     ------

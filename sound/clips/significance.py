@@ -27,9 +27,12 @@ class Fit:
 
     Attributes
     ----------
-    exponents, coefficients : (k,) in order of frequency.
-    prominence : (k,) energy that the fit would lose without each, over the level.
-    level : (k,) variance of white noise as strong as the noise under each.
+    exponents, coefficients : (k,) complex
+        In order of frequency.
+    prominence : (k,)
+        Energy that the fit would lose without each, over the level.
+    level : (k,)
+        Variance of white noise as strong as the noise under each.
     """
 
     exponents: Complex

@@ -31,17 +31,17 @@ class EvaluationTimes:
 
     Attributes
     ----------
-    cold_seconds
+    cold_seconds : float [s]
         From nothing.
-    warm_seconds
+    warm_seconds : float [s]
         From the modes of a material that differs by `CHANGE`.
-    gradient_seconds
+    gradient_seconds : float [s]
         The same, with derivatives of all frequencies and amplitudes.
-    analysis_seconds
+    analysis_seconds : float [s]
         Of the warm one, the modal analysis; the rest is coarsening.
-    runs
+    runs : int
         Measured after one that warms up.
-    n_dofs, modes, coordinates
+    n_dofs, modes, coordinates : int
         Size of what was evaluated.
     """
 

@@ -67,10 +67,10 @@ class Squares:
 
     Attributes
     ----------
-    residual
-        (r,) weighted.
-    jacobian
-        (r, m).
+    residual : (r,)
+        Weighted.
+    jacobian : (r, m)
+        Its derivatives.
     """
 
     residual: Array
@@ -93,9 +93,9 @@ class DescentLimits:
 
     Attributes
     ----------
-    deadline
-        Monotonic clock [s] from which no material is looked at.
-    evaluations
+    deadline : float [s]
+        Monotonic clock from which no material is looked at.
+    evaluations : float
         Materials that are looked at, at most; that of the start always is.
     """
 

@@ -42,10 +42,10 @@ class Sensitivity:
 
     Attributes
     ----------
-    stiffness
-        (m, N, N) u_i^T (dK/dz) u_j of the elastic modes [rad^2/s^2].
-    outside
-        (m, T, N) part of the derivative of each pushed mode that lies outside the computed modes.
+    stiffness : (m, N, N) [rad^2/s^2]
+        u_i^T (dK/dz) u_j of the elastic modes.
+    outside : (m, T, N)
+        Part of the derivative of each pushed mode that lies outside the computed modes.
     """
 
     stiffness: Array
@@ -93,11 +93,11 @@ class Objective:
 
         Parameters
         ----------
-        eigenvalues
-            (N,) of the elastic modes [rad^2/s^2], ascending.
-        pushed
-            (T, N) u_k^T f of a unit impulse f along the inward normals [kg^-1/2 N s].
-        regulariser
+        eigenvalues : (N,) [rad^2/s^2]
+            Of the elastic modes, ascending.
+        pushed : (T, N) [kg^-1/2 N s]
+            u_k^T f of a unit impulse f along the inward normals.
+        regulariser : float
             R.
         """
         frequency = 0.5 * float(np.sum(self.frequency_residual(eigenvalues) ** 2))

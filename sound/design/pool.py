@@ -67,11 +67,11 @@ class Task:
 
     Attributes
     ----------
-    z
-        (m,) coordinates.
-    start
+    z : (m,)
+        Coordinates.
+    start : (3 n, k) or None
         Rows of modes to begin from.
-    gradient
+    gradient : bool
         Whether the gradient of the cost is asked for.
     options, steps, damping, limits
         Of a descent, see `descend`; an evaluation alone if there are no options.
@@ -92,15 +92,17 @@ class Trial:
 
     Attributes
     ----------
-    z, cost
-        The material and its cost, `FAILED` if there are no modes to be had.
-    evaluations
+    z : (m,)
+        Coordinates of the material.
+    cost
+        Its cost, `FAILED` if there are no modes to be had.
+    evaluations : int
         Materials looked at.
-    gradient
-        (m,) of the cost, if it was asked for.
+    gradient : (m,) or None
+        Of the cost, if it was asked for.
     descent
         How a descent went; its modes stay behind.
-    start
+    start : (3 n, k) or None
         Modes for others to begin from, of a descent or with the gradient.
     """
 

@@ -40,12 +40,14 @@ class Search:
     ----------
     make_pool
         Makes the processes that run them; their start counts as time of the search.
-    seconds, evaluations
-        Budget; None sets no limit.  Descents that run side by side get equal shares of the
-        evaluations that are left, so that what they find does not depend on which one comes first.
+    seconds : float or None [s]
+        Budget; None sets no limit.
+    evaluations : int or None
+        The same.  Descents that run side by side get equal shares of the evaluations that are left,
+        so that what they find does not depend on which one comes first.
     watch
         Called after every round of tasks; ends the search by returning True.
-    before
+    before : (float [s], int)
         Seconds and evaluations of former searches that this one goes on from.
 
     Attributes

@@ -47,20 +47,23 @@ def projected_stiffness(
 
     Parameters
     ----------
-    corners
-        (c, 8) nodes of the elements.
-    strains
-        (8, 6, 24) strain factors, the edge of an element included.
-    vectors
-        (3 n, N) modes u.
-    others
-        (3 n, T, N) vectors x, T of each mode.
-    slopes
-        (8 c, m) derivatives of the moduli at the quadrature points.
+    corners : (c, 8)
+        Nodes of the elements.
+    strains : (8, 6, 24)
+        Strain factors, the edge of an element included.
+    vectors : (3 n, N)
+        Modes u.
+    others : (3 n, T, N)
+        Vectors x, T of each mode.
+    slopes : (8 c, m)
+        Derivatives of the moduli at the quadrature points.
 
     Returns
     -------
-    (m, N, N) and (m, T, N).
+    inside : (m, N, N)
+        u_i^T (dK/dz) u_j.
+    beyond : (m, T, N)
+        u_i^T (dK/dz) x_i.
     """
     count, points = vectors.shape[1], others.shape[1]
     pairs = count * (count + 1) // 2
@@ -88,12 +91,18 @@ def outside_response(
 
     Parameters
     ----------
+    modes
+        Of the analysis.
     inverse
         (K - mu M)^-1 with mu between the eigenvalues, not close to one.
-    elastic, values
-        (3 n, N) and (N,) the computed modes but for the rigid ones.
-    pushes
-        (3 n, T) forces f.
+    elastic : (3 n, N)
+        The computed modes but for the rigid ones.
+    values : (N,) [rad^2/s^2]
+        Their eigenvalues.
+    pushes : (3 n, T)
+        Forces f.
+    blocks : int
+        Of the Krylov space.
     """
     system = modes.system
     known = np.concatenate([system.rigid, elastic], axis=1)

@@ -42,12 +42,12 @@ class Evaluation:
 
     Attributes
     ----------
-    z
-        (m,) material coordinates.
-    eigenvalues
-        (N,) of the elastic modes [rad^2/s^2], ascending.
-    pushed
-        (T, N) u_k^T f of a unit impulse f along the inward normal at each point [kg^-1/2 N s].
+    z : (m,)
+        Material coordinates.
+    eigenvalues : (N,) [rad^2/s^2]
+        Of the elastic modes, ascending.
+    pushed : (T, N) [kg^-1/2 N s]
+        u_k^T f of a unit impulse f along the inward normal at each point.
     modes
         All of the analysis, to start the next one from.
     sensitivity
