@@ -137,6 +137,26 @@ def inward_normals(surface: trimesh.Trimesh, positions: Array) -> Array:
     return np.asarray(np.where((behind > ahead + CLEAR)[:, None], -inward, inward))
 
 
+def spread(candidates: Array, taken: Array, count: int) -> list[int]:
+    """Numbers of points, each one the farthest from all before.
+
+    Parameters
+    ----------
+    candidates : (c, 3) [m]
+        Points to choose from.
+    taken : (t, 3) [m]
+        Points to keep away from, too.
+    count : int
+        How many to choose; fewer are if there are not so many places.
+    """
+    away = np.min([np.linalg.norm(candidates - point, axis=1) for point in taken], axis=0)
+    chosen: list[int] = []
+    while len(chosen) < count and away.any():
+        chosen.append(int(np.argmax(away)))
+        away = np.minimum(away, np.linalg.norm(candidates - candidates[chosen[-1]], axis=1))
+    return chosen
+
+
 def _vertex(surface: trimesh.Trimesh, place: Place) -> int:
     if (place.at is None) == (place.vertex is None):
         raise UserError(f"target {place.name!r}: expected either a position or a vertex")

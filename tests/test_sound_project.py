@@ -14,6 +14,10 @@ from jsonschema import Draft202012Validator
 from carillon.errors import UserError
 from carillon.fem.geometry import FILLS, PIECES
 from solver.analysis.problem import ProblemOptions
+from solver.coarsening.choice import METHODS as COARSENINGS
+from sound.commands.search_options import SearchOptions
+from sound.design.material import LAWS
+from sound.design.optimisers import OPTIMISERS
 from sound.project import schema
 from sound.project.project import Project, load_project, with_optimiser
 
@@ -60,6 +64,16 @@ def test_defaults_of_the_solid_are_those_of_the_solver():
         assert SCHEMA["properties"][key]["default"] == defaults[key]
     assert SCHEMA["properties"]["fill"]["enum"] == list(FILLS)
     assert SCHEMA["properties"]["pieces"]["enum"] == list(PIECES)
+
+
+def test_choices_of_the_schema_are_those_of_the_code():
+    material, optimiser = (SCHEMA["properties"][key] for key in ("material", "optimiser"))
+    assert material["properties"]["law"]["enum"] == list(LAWS)
+    methods = optimiser["properties"]["method"]["enum"]
+    assert methods == list(OPTIMISERS)
+    choices = {each.name: each.metadata["choices"] for each in dataclasses.fields(SearchOptions)}
+    assert methods == list(choices["method"])
+    assert set(SCHEMA["properties"]["coarsen"]["enum"]) < set(COARSENINGS)
 
 
 def test_everything_that_is_written_is_read(folder):
