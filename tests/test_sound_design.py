@@ -40,7 +40,7 @@ def problem(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def found(problem):
+def designed(problem):
     return optimise(problem)
 
 
@@ -58,22 +58,22 @@ def with_targets(problem, targets):
     return replace(problem, setting=replace(problem.setting, strikes=strikes, objective=objective))
 
 
-def test_hybrid_finds_a_material_that_sounds_alike(found):
-    assert found.evidence["cost"] < 0.02 * found.evidence["cost_start"]
-    targets = found.targets
-    np.testing.assert_allclose(found.frequencies[0], targets.frequencies[0], rtol=1e-6)
-    np.testing.assert_allclose(found.frequencies, targets.frequencies, rtol=0.03)
-    assert (np.diff(found.history["cost"]) <= 0.0).all()
-    assert (np.diff(found.history["evaluations"]) >= 0).all()
-    assert found.evidence["residual_max"] < 1e-3
-    assert found.young.min() > 0.0
+def test_hybrid_finds_a_material_that_sounds_alike(designed):
+    assert designed.evidence["cost"] < 0.02 * designed.evidence["cost_start"]
+    targets = designed.targets
+    np.testing.assert_allclose(designed.frequencies[0], targets.frequencies[0], rtol=1e-6)
+    np.testing.assert_allclose(designed.frequencies, targets.frequencies, rtol=0.03)
+    assert (np.diff(designed.history["cost"]) <= 0.0).all()
+    assert (np.diff(designed.history["evaluations"]) >= 0).all()
+    assert designed.evidence["residual_max"] < 1e-3
+    assert designed.young.min() > 0.0
 
 
-def test_written_modes_are_those_of_the_written_model(found, tmp_path):
+def test_written_modes_are_those_of_the_written_model(designed, tmp_path):
     """An independent solver finds the same frequencies from what the file says."""
     from solver import solve
 
-    write_design(tmp_path / "design.h5", found)
+    write_design(tmp_path / "design.h5", designed)
     read = read_design(tmp_path / "design.h5")
     truth = solve(read.model, modes=6 + len(read.frequencies), method="slepc")
     np.testing.assert_allclose(truth.frequencies[6:], read.frequencies, rtol=1e-6)
@@ -81,8 +81,8 @@ def test_written_modes_are_those_of_the_written_model(found, tmp_path):
 
 @pytest.mark.parametrize("method", sorted(set(OPTIMISERS) - {"hybrid"}))
 def test_parts_of_the_hybrid_improve_by_themselves(problem, method):
-    found = optimise(with_options(problem, method=method, evaluations=60))
-    assert found.evidence["cost"] < 0.7 * found.evidence["cost_start"]
+    design = optimise(with_options(problem, method=method, evaluations=60))
+    assert design.evidence["cost"] < 0.7 * design.evidence["cost_start"]
 
 
 def test_result_does_not_depend_on_the_number_of_workers(problem):
@@ -104,10 +104,10 @@ def test_no_more_evaluations_are_made_than_asked_for(problem, monkeypatch, metho
         return evaluate(simulation, *arguments, **options)
 
     monkeypatch.setattr(Simulation, "evaluate", counted)
-    found = optimise(with_options(problem, method=method, evaluations=most))
-    assert len(looked_at) == found.evidence["evaluations"] == found.history["evaluations"][-1]
+    design = optimise(with_options(problem, method=method, evaluations=most))
+    assert len(looked_at) == design.evidence["evaluations"] == design.history["evaluations"][-1]
     assert most - 1 <= len(looked_at) <= most
-    assert found.evidence["cost"] <= found.evidence["cost_start"]
+    assert design.evidence["cost"] <= design.evidence["cost_start"]
 
 
 def test_a_worse_material_than_that_of_the_start_is_not_saved(problem):
@@ -144,21 +144,21 @@ def test_a_start_without_modes_is_refused_at_once(problem, monkeypatch):
 def test_a_part_of_the_cost_may_weigh_nothing(problem, weights):
     objective = Objective(problem.setting.objective.targets, Weights(*weights))
     setting = replace(problem.setting, objective=objective)
-    found = optimise(with_options(replace(problem, setting=setting), evaluations=30))
-    assert found.evidence["cost"] < found.evidence["cost_start"]
+    design = optimise(with_options(replace(problem, setting=setting), evaluations=30))
+    assert design.evidence["cost"] < design.evidence["cost_start"]
 
 
-def test_a_design_without_a_history_can_be_gone_on_from(problem, found):
-    bare = replace(found, history=found.history[:0])
+def test_a_design_without_a_history_can_be_gone_on_from(problem, designed):
+    bare = replace(designed, history=designed.history[:0])
     again = optimise(with_options(problem, evaluations=1), former=bare)
     assert again.history["evaluations"].tolist() == [1.0, 1.0]
 
 
-def test_a_design_goes_on_from_where_it_was(problem, found):
-    again = optimise(with_options(problem, evaluations=30), former=found)
+def test_a_design_goes_on_from_where_it_was(problem, designed):
+    again = optimise(with_options(problem, evaluations=30), former=designed)
     # Analyses of one material from different modes agree to their tolerance.
-    assert again.evidence["cost"] <= found.evidence["cost"] * (1 + 1e-6)
-    assert again.history["evaluations"][-1] > found.history["evaluations"][-1]
+    assert again.evidence["cost"] <= designed.evidence["cost"] * (1 + 1e-6)
+    assert again.history["evaluations"][-1] > designed.history["evaluations"][-1]
     assert (np.diff(again.history["seconds"]) >= 0.0).all()
 
 
@@ -174,8 +174,8 @@ def test_a_target_can_be_added(problem):
     assert both.evidence["cost"] < both.evidence["cost_start"]
 
 
-def test_design_of_other_voxels_is_refused(problem, found):
-    other = replace(found, fine_grid=found.fine_grid[:-1])
+def test_design_of_other_voxels_is_refused(problem, designed):
+    other = replace(designed, fine_grid=designed.fine_grid[:-1])
     with pytest.raises(UserError, match="begin a new design"):
         optimise(problem, former=other)
 
@@ -192,17 +192,17 @@ def test_cost_vanishes_at_the_targets_and_knows_no_scale_nor_sign(problem):
     simulation = problem.setting.simulation()
     objective = problem.setting.objective
     z = 0.1 * np.random.default_rng(3).standard_normal(simulation.material.dimensions)
-    found = simulation.evaluate(z)
+    evaluation = simulation.evaluate(z)
     targets = replace(
         objective.targets,
-        frequencies=np.sqrt(found.eigenvalues) / 7.0,
-        amplitudes=5.0 * np.abs(found.pushed),
+        frequencies=np.sqrt(evaluation.eigenvalues) / 7.0,
+        amplitudes=5.0 * np.abs(evaluation.pushed),
     )
     same = Objective(targets, Weights(1.0, 10.0, 0.0))
-    assert same.cost(found.eigenvalues, found.pushed, 0.0).total < 1e-20
-    cost = objective.cost(found.eigenvalues, found.pushed, 0.0)
-    signs = np.where(np.arange(len(found.eigenvalues)) % 2, 1.0, -1.0)
-    other = objective.cost(3.0 * found.eigenvalues, 2.0 * signs * found.pushed, 0.0)
+    assert same.cost(evaluation.eigenvalues, evaluation.pushed, 0.0).total < 1e-20
+    cost = objective.cost(evaluation.eigenvalues, evaluation.pushed, 0.0)
+    signs = np.where(np.arange(len(evaluation.eigenvalues)) % 2, 1.0, -1.0)
+    other = objective.cost(3.0 * evaluation.eigenvalues, 2.0 * signs * evaluation.pushed, 0.0)
     assert other.total == pytest.approx(cost.total, rel=1e-12)
 
 
@@ -274,9 +274,9 @@ def test_somebody_who_interrupts_gets_the_best_so_far(problem):
         if len(rounds) == 2:
             os.kill(os.getpid(), signal.SIGTERM)
 
-    found = optimise(with_options(problem, evaluations=10**6), watch=interrupt)
+    design = optimise(with_options(problem, evaluations=10**6), watch=interrupt)
     assert len(rounds) == 2
-    assert found.evidence["cost"] < found.evidence["cost_start"]
+    assert design.evidence["cost"] < design.evidence["cost_start"]
 
 
 def test_more_modes_than_the_clips_have(folder):

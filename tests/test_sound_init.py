@@ -49,10 +49,10 @@ def without_marks(text: str) -> str:
 def test_what_is_not_asked_for_has_its_default(here):
     described = yaml.safe_load(written(here / "bar.yaml", "--clips", "metal.wav"))
     defaults = with_defaults({key: described[key] for key in ("mesh", "targets")}, SCHEMA)
-    found = load_project(here / "bar.yaml").as_dict()
+    filled = load_project(here / "bar.yaml").as_dict()
     for key in SCHEMA["properties"]:
         if key not in ("mesh", "targets", "modes"):
-            assert found[key] == defaults[key], key
+            assert filled[key] == defaults[key], key
 
 
 def test_every_key_is_there_with_its_default_and_its_meaning(here):

@@ -32,9 +32,9 @@ class TargetEntry:
 
     name: str
     clip: str
-    at: tuple[float, float, float] | None = None
-    vertex: int | None = None
-    modes: int | None = None
+    at: tuple[float, float, float] | None
+    vertex: int | None
+    modes: int | None
 
 
 @dataclass(frozen=True)
