@@ -58,8 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     from sound.project.template import project_text
 
     options = collect(InitOptions, arguments)
-    path = _file_of(options.path or ".")
-    require_output(path, ENDINGS)
+    path = require_output(_file_of(options.path or "."), ENDINGS)
     values = _values(options, path.parent)
     text = project_text(values)
     described = parse_yaml(text)
@@ -72,9 +71,9 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _file_of(path: str) -> Path:
+def _file_of(path: str) -> str:
     """The file to write, which is not there yet."""
-    file = Path(path, DEFAULT_NAME) if os.path.isdir(path) else Path(path)
+    file = os.path.join(path, DEFAULT_NAME) if os.path.isdir(path) else path
     if os.path.lexists(file):
         raise UserError(f"{file}: is there already; name another file, or remove it first")
     return file
