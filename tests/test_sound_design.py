@@ -150,12 +150,12 @@ def test_a_part_of_the_cost_may_weigh_nothing(problem, weights):
 
 def test_a_design_without_a_history_can_be_gone_on_from(problem, designed):
     bare = replace(designed, history=designed.history[:0])
-    again = optimise(with_options(problem, evaluations=1), former=bare)
+    again = optimise(with_options(problem, evaluations=1), initial=bare)
     assert again.history["evaluations"].tolist() == [1.0, 1.0]
 
 
 def test_a_design_goes_on_from_where_it_was(problem, designed):
-    again = optimise(with_options(problem, evaluations=30), former=designed)
+    again = optimise(with_options(problem, evaluations=30), initial=designed)
     # Analyses of one material from different modes agree to their tolerance.
     assert again.evidence["cost"] <= designed.evidence["cost"] * (1 + 1e-6)
     assert again.history["evaluations"][-1] > designed.history["evaluations"][-1]
@@ -166,7 +166,7 @@ def test_a_target_can_be_added(problem):
     made = problem.project
     one = with_targets(problem, small_project.targets(made, names=("end",)))
     first = optimise(with_options(one, evaluations=60))
-    both = optimise(with_options(problem, evaluations=60), former=first)
+    both = optimise(with_options(problem, evaluations=60), initial=first)
     assert len(first.strikes) == 1 and len(both.strikes) == 2
     alone = optimise(with_options(problem, evaluations=1, method="cma"))
     # The material of the first search is a better start than the uniform one.
@@ -177,7 +177,7 @@ def test_a_target_can_be_added(problem):
 def test_design_of_other_voxels_is_refused(problem, designed):
     other = replace(designed, fine_grid=designed.fine_grid[:-1])
     with pytest.raises(UserError, match="begin a new design"):
-        optimise(problem, former=other)
+        optimise(problem, initial=other)
 
 
 def test_designs_are_kept_on_the_way(problem, monkeypatch):

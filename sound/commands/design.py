@@ -77,18 +77,18 @@ def _search(options: DesignOptions, settings: SearchOptions) -> int:
     if settings.evaluations is not None and settings.seconds is None:
         project = replace(project, optimiser=replace(project.optimiser, seconds=None))
     project = with_optimiser(project, **asdict(settings))
-    former = None
+    initial = None
     if options.initial_design is not None:
-        former = read_design(options.initial_design)
+        initial = read_design(options.initial_design)
     elif out.exists() and not options.restart:
-        former = read_design(out)
+        initial = read_design(out)
     problem = prepare(project)
-    if former is not None:
-        require_same_voxels(problem, former)
-        so_far = former.history["evaluations"][-1:].sum()
+    if initial is not None:
+        require_same_voxels(problem, initial)
+        so_far = initial.history["evaluations"][-1:].sum()
         say(f"{options.initial_design or out}: going on after {so_far:,.0f} evaluations")
     result = optimise(
-        problem, former, keep=lambda each: write_design(out, each), watch=_SearchProgress().show
+        problem, initial, keep=lambda each: write_design(out, each), watch=_SearchProgress().show
     )
     write_design(out, result)
     summary = summarise(result)

@@ -21,7 +21,7 @@ KEEP_SECONDS = 30.0
 
 def optimise(
     problem: DesignProblem,
-    former: Design | None = None,
+    initial: Design | None = None,
     keep: Callable[[Design], None] | None = None,
     watch: Callable[[Search], None] | None = None,
 ) -> Design:
@@ -33,7 +33,7 @@ def optimise(
     ----------
     problem
         Of the project.
-    former
+    initial
         Design to go on from, of the same mesh; its targets may be others.
     keep
         Called with the design so far every `KEEP_SECONDS` of the search.
@@ -49,9 +49,9 @@ def optimise(
     z = np.zeros(setting.material.dimensions)
     before = (0.0, 0)
     rows = np.empty(0, HISTORY_TYPE)
-    if former is not None:
-        z = coordinates_of(problem, former)
-        rows = former.history
+    if initial is not None:
+        z = coordinates_of(problem, initial)
+        rows = initial.history
     if len(rows):
         before = (float(rows["seconds"][-1]), int(rows["evaluations"][-1]))
     outcome = Outcome(problem, rows)

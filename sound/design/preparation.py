@@ -75,33 +75,33 @@ def prepare(project: Project, targets: Targets | None = None) -> DesignProblem:
     return DesignProblem(project, np.asarray(surface.vertices), np.asarray(surface.faces), setting)
 
 
-def require_same_voxels(problem: DesignProblem, former: Design) -> None:
-    """Check that a project can go on from a former design.
+def require_same_voxels(problem: DesignProblem, initial: Design) -> None:
+    """Check that a project can go on from an initial design.
 
     Raises
     ------
     UserError
-        If the former design is of other voxels.
+        If the initial design is of other voxels.
     """
     mesh = problem.setting.mesh
-    if not np.array_equal(former.fine_grid, mesh.grid):
+    if not np.array_equal(initial.fine_grid, mesh.grid):
         raise UserError(
-            f"the design to go on from has {len(former.fine_grid):,} voxels, the project another "
+            f"the design to go on from has {len(initial.fine_grid):,} voxels, the project another "
             f"mesh of {mesh.n_cells:,}; begin a new design under another name"
         )
 
 
-def coordinates_of(problem: DesignProblem, former: Design) -> Array:
-    """Coordinates (m,) whose material is that of a former design, as near as may be.
+def coordinates_of(problem: DesignProblem, initial: Design) -> Array:
+    """Coordinates (m,) whose material is that of an initial design, as near as may be.
 
     Raises
     ------
     UserError
-        If the former design is of other voxels.
+        If the initial design is of other voxels.
     """
-    require_same_voxels(problem, former)
+    require_same_voxels(problem, initial)
     material = problem.setting.material
-    same = former.settings.get("material") == problem.project.as_dict()["material"]
-    if same and len(former.coordinates) == material.dimensions:
-        return former.coordinates
-    return material.coordinates(former.young)
+    same = initial.settings.get("material") == problem.project.as_dict()["material"]
+    if same and len(initial.coordinates) == material.dimensions:
+        return initial.coordinates
+    return material.coordinates(initial.young)
