@@ -63,7 +63,7 @@ onstart:
 
 
 onerror:
-    room.tell_if_full(RESULTS)
+    room.check_disk(RESULTS)
 
 
 rule all:

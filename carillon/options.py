@@ -53,7 +53,7 @@ def option(
 
 
 def add_options(
-    parser: argparse.ArgumentParser,
+    parser: argparse._ActionsContainer,
     options: type,
     leave_out: Sequence[str] = (),
     positional: Sequence[str] = (),
@@ -62,6 +62,8 @@ def add_options(
 
     Parameters
     ----------
+    parser
+        The command line, or a group of it.
     options
         A dataclass with fields made by `option`; others are left alone.
     leave_out
@@ -80,7 +82,9 @@ def collect(options: type[T], arguments: argparse.Namespace) -> T:
     return options(**{name: value for name, value in vars(arguments).items() if name in names})
 
 
-def _add(parser: argparse.ArgumentParser, field: dataclasses.Field[Any], positional: bool) -> None:
+def _add(
+    parser: argparse._ActionsContainer, field: dataclasses.Field[Any], positional: bool
+) -> None:
     default = field.default
     told = {key: value for key, value in field.metadata.items() if value is not None}
     if positional:

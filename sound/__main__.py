@@ -1,4 +1,4 @@
-"""Command line: `python -m sound extract | clip | design | render | export | benchmark`."""
+"""Command line: `python -m sound extract | clip | init | design | render | export | benchmark`."""
 
 from __future__ import annotations
 

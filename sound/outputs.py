@@ -26,10 +26,10 @@ def require_output(
     UserError
         If the name has another ending or is an input's, or no file can be written there.
     """
-    path = Path(path)
-    if path.suffix.lower() not in endings:
+    suffix = Path(path).suffix
+    if suffix.lower() not in endings:
         raise UserError(
-            f"{path}: ends in {path.suffix or 'nothing'}, expected a name that ends in "
+            f"{path}: ends in {suffix or 'nothing'}, expected a name that ends in "
             f"{' or '.join(endings)}, since that is what is written"
         )
     return require_writable(path, inputs)

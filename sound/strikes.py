@@ -37,14 +37,14 @@ class Strike:
 
     Attributes
     ----------
-    name
+    name : str
         Of the target whose clip is to sound there.
-    vertex
+    vertex : int
         Number of the surface's vertex.
-    position
-        (3,) [m].
-    inward
-        (3,) unit vector into the solid.
+    position : (3,) [m]
+        Of that vertex.
+    inward : (3,)
+        Unit vector into the solid.
     """
 
     name: str
@@ -74,11 +74,11 @@ def locate(
     ----------
     surface
         Triangles in metres; vertices may be repeated, and triangles may face either way.
-    name
+    name : str
         Of the target, for messages.
-    at
-        Position (3,) [m], whose nearest vertex is struck.
-    vertex
+    at : (3,) [m] or None
+        Position, whose nearest vertex is struck.
+    vertex : int or None
         Number of the vertex; give this or `at`.
 
     Raises
@@ -137,6 +137,26 @@ def inward_normals(surface: trimesh.Trimesh, positions: Array) -> Array:
     return np.asarray(np.where((behind > ahead + CLEAR)[:, None], -inward, inward))
 
 
+def spread(candidates: Array, taken: Array, count: int) -> list[int]:
+    """Numbers of points, each one the farthest from all before.
+
+    Parameters
+    ----------
+    candidates : (c, 3) [m]
+        Points to choose from.
+    taken : (t, 3) [m]
+        Points to keep away from, too.
+    count : int
+        How many to choose; fewer are if there are not so many places.
+    """
+    away = np.min([np.linalg.norm(candidates - point, axis=1) for point in taken], axis=0)
+    chosen: list[int] = []
+    while len(chosen) < count and away.any():
+        chosen.append(int(np.argmax(away)))
+        away = np.minimum(away, np.linalg.norm(candidates - candidates[chosen[-1]], axis=1))
+    return chosen
+
+
 def _vertex(surface: trimesh.Trimesh, place: Place) -> int:
     if (place.at is None) == (place.vertex is None):
         raise UserError(f"target {place.name!r}: expected either a position or a vertex")
@@ -168,7 +188,7 @@ def _nearest_vertex(surface: trimesh.Trimesh, name: str, at: Array) -> int:
     away = np.linalg.norm(vertices[used] - at, axis=1)
     nearest, side = int(used[np.argmin(away)]), longest_side(surface)
     to_surface = float(np.sqrt(igl.point_mesh_squared_distance(at[None], vertices, faces)[0][0]))
-    found = f"target {name!r}: the point ({_numbers(at)}) m is {{:.3g}} m from {{}}"
+    place = f"target {name!r}: the point ({_numbers(at)}) m is {{:.3g}} m from {{}}"
     hint = f"; the nearest vertex is {nearest} at ({_numbers(vertices[nearest])}) m"
     for distance, share, what in (
         (to_surface, OFF_SURFACE, "the surface"),
@@ -176,7 +196,7 @@ def _nearest_vertex(surface: trimesh.Trimesh, name: str, at: Array) -> int:
     ):
         if distance > share * side:
             raise UserError(
-                f"{found.format(distance, what)}, expected at most {share:.0%} of its longest "
+                f"{place.format(distance, what)}, expected at most {share:.0%} of its longest "
                 f"side, {share * side:.3g} m{hint}"
             )
     return nearest

@@ -15,7 +15,7 @@ from forests.training.dataset import dataset_of
 from forests.training.train import Training, train
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
-from sound.design.designing import design
+from sound.design.optimise import optimise
 from sound.design.preparation import prepare
 from tests import small_project, solids
 
@@ -28,11 +28,11 @@ def results(folder: Path) -> dict[str, np.ndarray]:
     model = train(dataset_of([shard]), Training(trees=1, max_leaves=60), progress=False)
     project = small_project.project(folder, evaluations=15)
     small_project.write_clips(folder, np.linspace(400.0, 3000.0, project.modes))
-    found = design(prepare(project))
+    design = optimise(prepare(project))
     made = {f"forests/{name}": values for name, values in vars(model.forests).items()}
     made |= {"shard/fine": shard.fine, "shard/coarse": shard.coarse}
-    made |= {"design/coordinates": found.coordinates, "design/young": found.young}
-    made |= {"design/modes": found.modes, "design/cost": found.history["cost"]}
+    made |= {"design/coordinates": design.coordinates, "design/young": design.young}
+    made |= {"design/modes": design.modes, "design/cost": design.history["cost"]}
     # Large enough that BLAS shares its work among threads.
     box = solids.random_box(16, 8, 6)
     methods = {

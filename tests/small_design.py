@@ -28,17 +28,17 @@ def small_design() -> Design:
     random = np.random.default_rng(7)
     young = 2e8 * 10.0 ** random.uniform(-0.5, 0.5, fine.n_cells)
     model = build_model(fine, young, make_coarsening("average"))
-    found = solve(model, modes=RIGID_MODES + N_MODES, method="slepc")
-    assert found.modes is not None
+    result = solve(model, modes=RIGID_MODES + N_MODES, method="slepc")
+    assert result.modes is not None
     surface = box_surface()
     return Design(
         [_strike("corner", surface, np.array(SIDES)), _strike("side", surface, np.zeros(3))],
-        _targets(random, found.frequencies[RIGID_MODES:]),
+        _targets(random, result.frequencies[RIGID_MODES:]),
         random.normal(size=5),
         young,
         model,
-        found.eigenvalues,
-        found.modes,
+        result.eigenvalues,
+        result.modes,
         np.array(surface.vertices),
         np.array(surface.faces),
         fine.grid,

@@ -73,14 +73,14 @@ def targets(made, seed=0, names=("end", "side")):
     moduli = np.exp(
         0.3 * smooth_fields(setting.mesh.grid) @ np.random.default_rng(seed).normal(size=9)
     )
-    found = setting.simulation().evaluate(setting.material.coordinates(moduli))
-    frequencies = np.sqrt(found.eigenvalues) / (2.0 * np.pi)
+    evaluation = setting.simulation().evaluate(setting.material.coordinates(moduli))
+    frequencies = np.sqrt(evaluation.eigenvalues) / (2.0 * np.pi)
     chosen = [("end", "side").index(name) for name in names]
     return replace(
         empty,
         names=tuple(names),
         frequencies=0.5 * frequencies,
-        amplitudes=np.abs(found.pushed)[chosen],
+        amplitudes=np.abs(evaluation.pushed)[chosen],
         residuals=empty.residuals[: len(names)],
         rates=empty.rates[: len(names)],
     )

@@ -19,13 +19,13 @@ import yaml
 
 from carillon.errors import ConvergenceError, UserError
 from sound.design import pool
-from sound.design.designing import design
-from sound.design.objective import Cost, Objective
+from sound.design.objective import DesignCost, Objective
+from sound.design.optimise import optimise
 from sound.design.optimisers import OPTIMISERS
 from sound.design.outcome import Outcome
 from sound.design.pool import Pool, Task, Trial
 from sound.design.preparation import prepare, targets_of
-from sound.design.search import Moment
+from sound.design.search import HistoryEntry
 from sound.design.simulation import Simulation
 from sound.project.design_file import HISTORY_TYPE, read_design, write_design
 from sound.project.project import Weights, project_of
@@ -34,61 +34,59 @@ from tests.patience import HANG_SECONDS, words_of
 
 
 @pytest.fixture(scope="module")
-def prepared(tmp_path_factory):
+def problem(tmp_path_factory):
     made = small_project.project(tmp_path_factory.mktemp("project"))
     return prepare(made, small_project.targets(made))
 
 
 @pytest.fixture(scope="module")
-def found(prepared):
-    return design(prepared)
+def designed(problem):
+    return optimise(problem)
 
 
-def with_options(prepared, **changes):
-    project = prepared.project
+def with_options(problem, **changes):
+    project = problem.project
     return replace(
-        prepared, project=replace(project, optimiser=replace(project.optimiser, **changes))
+        problem, project=replace(project, optimiser=replace(project.optimiser, **changes))
     )
 
 
-def with_targets(prepared, targets):
+def with_targets(problem, targets):
     names = set(targets.names)
-    strikes = [strike for strike in prepared.setting.strikes if strike.name in names]
-    objective = Objective(targets, prepared.project.weights)
-    return replace(
-        prepared, setting=replace(prepared.setting, strikes=strikes, objective=objective)
-    )
+    strikes = [strike for strike in problem.setting.strikes if strike.name in names]
+    objective = Objective(targets, problem.project.weights)
+    return replace(problem, setting=replace(problem.setting, strikes=strikes, objective=objective))
 
 
-def test_hybrid_finds_a_material_that_sounds_alike(found):
-    assert found.evidence["cost"] < 0.02 * found.evidence["cost_start"]
-    targets = found.targets
-    np.testing.assert_allclose(found.frequencies[0], targets.frequencies[0], rtol=1e-6)
-    np.testing.assert_allclose(found.frequencies, targets.frequencies, rtol=0.03)
-    assert (np.diff(found.history["cost"]) <= 0.0).all()
-    assert (np.diff(found.history["evaluations"]) >= 0).all()
-    assert found.evidence["residual_max"] < 1e-3
-    assert found.young.min() > 0.0
+def test_hybrid_finds_a_material_that_sounds_alike(designed):
+    assert designed.evidence["cost"] < 0.02 * designed.evidence["cost_start"]
+    targets = designed.targets
+    np.testing.assert_allclose(designed.frequencies[0], targets.frequencies[0], rtol=1e-6)
+    np.testing.assert_allclose(designed.frequencies, targets.frequencies, rtol=0.03)
+    assert (np.diff(designed.history["cost"]) <= 0.0).all()
+    assert (np.diff(designed.history["evaluations"]) >= 0).all()
+    assert designed.evidence["residual_max"] < 1e-3
+    assert designed.young.min() > 0.0
 
 
-def test_written_modes_are_those_of_the_written_model(found, tmp_path):
+def test_written_modes_are_those_of_the_written_model(designed, tmp_path):
     """An independent solver finds the same frequencies from what the file says."""
     from solver import solve
 
-    write_design(tmp_path / "design.h5", found)
+    write_design(tmp_path / "design.h5", designed)
     read = read_design(tmp_path / "design.h5")
     truth = solve(read.model, modes=6 + len(read.frequencies), method="slepc")
     np.testing.assert_allclose(truth.frequencies[6:], read.frequencies, rtol=1e-6)
 
 
 @pytest.mark.parametrize("method", sorted(set(OPTIMISERS) - {"hybrid"}))
-def test_parts_of_the_hybrid_improve_by_themselves(prepared, method):
-    found = design(with_options(prepared, method=method, evaluations=60))
-    assert found.evidence["cost"] < 0.7 * found.evidence["cost_start"]
+def test_parts_of_the_hybrid_improve_by_themselves(problem, method):
+    design = optimise(with_options(problem, method=method, evaluations=60))
+    assert design.evidence["cost"] < 0.7 * design.evidence["cost_start"]
 
 
-def test_result_does_not_depend_on_the_number_of_workers(prepared):
-    one, two = (design(with_options(prepared, evaluations=60, workers=n)) for n in (1, 2))
+def test_result_does_not_depend_on_the_number_of_workers(problem):
+    one, two = (optimise(with_options(problem, evaluations=60, workers=n)) for n in (1, 2))
     np.testing.assert_array_equal(one.coordinates, two.coordinates)
     np.testing.assert_array_equal(one.modes, two.modes)
     assert one.evidence["cost"] == two.evidence["cost"]
@@ -96,7 +94,7 @@ def test_result_does_not_depend_on_the_number_of_workers(prepared):
 
 @pytest.mark.parametrize("method", sorted(OPTIMISERS))
 @pytest.mark.parametrize("most", [1, 2, 3, 12])
-def test_no_more_evaluations_are_made_than_asked_for(prepared, monkeypatch, method, most):
+def test_no_more_evaluations_are_made_than_asked_for(problem, monkeypatch, method, most):
     looked_at = []
     evaluate = Simulation.evaluate
 
@@ -106,28 +104,26 @@ def test_no_more_evaluations_are_made_than_asked_for(prepared, monkeypatch, meth
         return evaluate(simulation, *arguments, **options)
 
     monkeypatch.setattr(Simulation, "evaluate", counted)
-    found = design(with_options(prepared, method=method, evaluations=most))
-    assert len(looked_at) == found.evidence["evaluations"] == found.history["evaluations"][-1]
+    design = optimise(with_options(problem, method=method, evaluations=most))
+    assert len(looked_at) == design.evidence["evaluations"] == design.history["evaluations"][-1]
     assert most - 1 <= len(looked_at) <= most
-    assert found.evidence["cost"] <= found.evidence["cost_start"]
+    assert design.evidence["cost"] <= design.evidence["cost_start"]
 
 
-def test_a_worse_material_than_that_of_the_start_is_not_saved(prepared):
+def test_a_worse_material_than_that_of_the_start_is_not_saved(problem):
     """Though the coarse analyses of a search may take it for a better one."""
-    start = np.zeros(prepared.setting.material.dimensions)
+    start = np.zeros(problem.setting.material.dimensions)
     worse = start.copy()
     worse[0] = 1.0
     search = SimpleNamespace(
-        start=Trial(start, Cost(9.0, 9.0, 0.0, 0.0), 1),
-        best=Trial(worse, Cost(8.0, 8.0, 0.0, 0.0), 1),
-        history=[Moment(1.0, 2, Cost(8.0, 8.0, 0.0, 0.0))],
+        start=Trial(start, DesignCost(9.0, 9.0, 0.0, 0.0), 1),
+        best=Trial(worse, DesignCost(8.0, 8.0, 0.0, 0.0), 1),
+        history=[HistoryEntry(1.0, 2, DesignCost(8.0, 8.0, 0.0, 0.0))],
         own_seconds=1.0,
         own_evaluations=2,
     )
     costs = [
-        Outcome(prepared, np.empty(0, HISTORY_TYPE)).of(
-            SimpleNamespace(**{**vars(search), **other})
-        )
+        Outcome(problem, np.empty(0, HISTORY_TYPE)).of(SimpleNamespace(**{**vars(search), **other}))
         for other in ({}, {"best": search.start}, {"start": search.best})
     ]
     assert [each.evidence["cost"] for each in costs[:2]] == [costs[1].evidence["cost_start"]] * 2
@@ -135,82 +131,83 @@ def test_a_worse_material_than_that_of_the_start_is_not_saved(prepared):
     np.testing.assert_array_equal(costs[0].coordinates, start)
 
 
-def test_a_start_without_modes_is_refused_at_once(prepared, monkeypatch):
+def test_a_start_without_modes_is_refused_at_once(problem, monkeypatch):
     def fail(*_, **__):
         raise ConvergenceError("no modes")
 
     monkeypatch.setattr(Simulation, "evaluate", fail)
     with pytest.raises(UserError, match="to start from has no modes"):
-        design(with_options(prepared, evaluations=None))
+        optimise(with_options(problem, evaluations=None))
 
 
 @pytest.mark.parametrize("weights", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
-def test_a_part_of_the_cost_may_weigh_nothing(prepared, weights):
-    objective = Objective(prepared.setting.objective.targets, Weights(*weights))
-    setting = replace(prepared.setting, objective=objective)
-    found = design(with_options(replace(prepared, setting=setting), evaluations=30))
-    assert found.evidence["cost"] < found.evidence["cost_start"]
+def test_a_part_of_the_cost_may_weigh_nothing(problem, weights):
+    objective = Objective(problem.setting.objective.targets, Weights(*weights))
+    setting = replace(problem.setting, objective=objective)
+    design = optimise(with_options(replace(problem, setting=setting), evaluations=30))
+    assert design.evidence["cost"] < design.evidence["cost_start"]
 
 
-def test_a_design_without_a_history_can_be_gone_on_from(prepared, found):
-    bare = replace(found, history=found.history[:0])
-    again = design(with_options(prepared, evaluations=1), former=bare)
+def test_a_design_without_a_history_can_be_gone_on_from(problem, designed):
+    bare = replace(designed, history=designed.history[:0])
+    again = optimise(with_options(problem, evaluations=1), initial=bare)
     assert again.history["evaluations"].tolist() == [1.0, 1.0]
 
 
-def test_a_design_goes_on_from_where_it_was(prepared, found):
-    again = design(with_options(prepared, evaluations=30), former=found)
+def test_a_design_goes_on_from_where_it_was(problem, designed):
+    again = optimise(with_options(problem, evaluations=30), initial=designed)
     # Analyses of one material from different modes agree to their tolerance.
-    assert again.evidence["cost"] <= found.evidence["cost"] * (1 + 1e-6)
-    assert again.history["evaluations"][-1] > found.history["evaluations"][-1]
+    assert again.evidence["cost"] <= designed.evidence["cost"] * (1 + 1e-6)
+    assert again.history["evaluations"][-1] > designed.history["evaluations"][-1]
     assert (np.diff(again.history["seconds"]) >= 0.0).all()
 
 
-def test_a_target_can_be_added(prepared):
-    made = prepared.project
-    one = with_targets(prepared, small_project.targets(made, names=("end",)))
-    first = design(with_options(one, evaluations=60))
-    both = design(with_options(prepared, evaluations=60), former=first)
+def test_a_target_can_be_added(problem):
+    made = problem.project
+    one = with_targets(problem, small_project.targets(made, names=("end",)))
+    first = optimise(with_options(one, evaluations=60))
+    both = optimise(with_options(problem, evaluations=60), initial=first)
     assert len(first.strikes) == 1 and len(both.strikes) == 2
-    alone = design(with_options(prepared, evaluations=1, method="cma"))
+    alone = optimise(with_options(problem, evaluations=1, method="cma"))
     # The material of the first search is a better start than the uniform one.
     assert both.evidence["cost_start"] < alone.evidence["cost_start"]
     assert both.evidence["cost"] < both.evidence["cost_start"]
 
 
-def test_design_of_other_voxels_is_refused(prepared, found):
-    other = replace(found, fine_grid=found.fine_grid[:-1])
+def test_design_of_other_voxels_is_refused(problem, designed):
+    other = replace(designed, fine_grid=designed.fine_grid[:-1])
     with pytest.raises(UserError, match="begin a new design"):
-        design(prepared, former=other)
+        optimise(problem, initial=other)
 
 
-def test_designs_are_kept_on_the_way(prepared):
+def test_designs_are_kept_on_the_way(problem, monkeypatch):
+    monkeypatch.setattr("sound.design.optimise.KEEP_SECONDS", 0.0)
     kept = []
-    design(with_options(prepared, evaluations=60), keep=kept.append, keep_every=0.0)
+    optimise(with_options(problem, evaluations=60), keep=kept.append)
     costs = [each.evidence["cost"] for each in kept]
     assert len(kept) > 1 and costs[-1] < costs[0]
 
 
-def test_cost_vanishes_at_the_targets_and_knows_no_scale_nor_sign(prepared):
-    simulation = prepared.setting.simulation()
-    objective = prepared.setting.objective
+def test_cost_vanishes_at_the_targets_and_knows_no_scale_nor_sign(problem):
+    simulation = problem.setting.simulation()
+    objective = problem.setting.objective
     z = 0.1 * np.random.default_rng(3).standard_normal(simulation.material.dimensions)
-    found = simulation.evaluate(z)
+    evaluation = simulation.evaluate(z)
     targets = replace(
         objective.targets,
-        frequencies=np.sqrt(found.eigenvalues) / 7.0,
-        amplitudes=5.0 * np.abs(found.pushed),
+        frequencies=np.sqrt(evaluation.eigenvalues) / 7.0,
+        amplitudes=5.0 * np.abs(evaluation.pushed),
     )
     same = Objective(targets, Weights(1.0, 10.0, 0.0))
-    assert same.cost(found.eigenvalues, found.pushed, 0.0).total < 1e-20
-    cost = objective.cost(found.eigenvalues, found.pushed, 0.0)
-    signs = np.where(np.arange(len(found.eigenvalues)) % 2, 1.0, -1.0)
-    other = objective.cost(3.0 * found.eigenvalues, 2.0 * signs * found.pushed, 0.0)
+    assert same.cost(evaluation.eigenvalues, evaluation.pushed, 0.0).total < 1e-20
+    cost = objective.cost(evaluation.eigenvalues, evaluation.pushed, 0.0)
+    signs = np.where(np.arange(len(evaluation.eigenvalues)) % 2, 1.0, -1.0)
+    other = objective.cost(3.0 * evaluation.eigenvalues, 2.0 * signs * evaluation.pushed, 0.0)
     assert other.total == pytest.approx(cost.total, rel=1e-12)
 
 
-def test_mixed_modes_of_a_cluster_cost_the_same(prepared):
-    objective = prepared.setting.objective
+def test_mixed_modes_of_a_cluster_cost_the_same(problem):
+    objective = problem.setting.objective
     random = np.random.default_rng(0)
     values = np.array([1.0, 2.0, 2.0, 3.0, 5.0, 6.0]) * 1e6
     pushed = random.standard_normal((2, 6))
@@ -221,9 +218,9 @@ def test_mixed_modes_of_a_cluster_cost_the_same(prepared):
     assert costs[0] == pytest.approx(costs[1], rel=1e-12)
 
 
-def test_a_worker_that_dies_is_told(prepared):
-    processes = Pool(prepared.setting, 2)
-    z = np.zeros(prepared.setting.material.dimensions)
+def test_a_worker_that_dies_is_told(problem):
+    processes = Pool(problem.setting, 2)
+    z = np.zeros(problem.setting.material.dimensions)
     try:
         processes.run([Task(z)] * 2)
         process = next(iter(processes._executor._processes.values()))
@@ -269,7 +266,7 @@ def test_command_from_clips_to_file_and_on(folder):
     assert read_design(folder / "design.h5").history["evaluations"][-1] > before
 
 
-def test_somebody_who_interrupts_gets_the_best_so_far(prepared):
+def test_somebody_who_interrupts_gets_the_best_so_far(problem):
     rounds = []
 
     def interrupt(search):
@@ -277,9 +274,9 @@ def test_somebody_who_interrupts_gets_the_best_so_far(prepared):
         if len(rounds) == 2:
             os.kill(os.getpid(), signal.SIGTERM)
 
-    found = design(with_options(prepared, evaluations=10**6), watch=interrupt)
+    design = optimise(with_options(problem, evaluations=10**6), watch=interrupt)
     assert len(rounds) == 2
-    assert found.evidence["cost"] < found.evidence["cost_start"]
+    assert design.evidence["cost"] < design.evidence["cost_start"]
 
 
 def test_more_modes_than_the_clips_have(folder):

@@ -21,25 +21,25 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "design.h5"
 
 
-def assert_same(found: object, expected: object) -> None:
+def assert_same(actual: object, expected: object) -> None:
     if isinstance(expected, dict):
-        assert found.keys() == expected.keys()
+        assert actual.keys() == expected.keys()
         for key in expected:
-            assert_same(found[key], expected[key])
+            assert_same(actual[key], expected[key])
     elif isinstance(expected, (list, tuple)):
-        assert len(found) == len(expected)
-        for a, b in zip(found, expected):
+        assert len(actual) == len(expected)
+        for a, b in zip(actual, expected):
             assert_same(a, b)
     else:
-        np.testing.assert_array_equal(found, expected)
+        np.testing.assert_array_equal(actual, expected)
 
 
 def test_a_design_comes_back(path: Path) -> None:
-    found = asdict(read_design(path))
-    assert found.pop("provenance")["commit"]
+    read = asdict(read_design(path))
+    assert read.pop("provenance")["commit"]
     expected = asdict(small_design())
     del expected["provenance"]
-    assert_same(found, expected)
+    assert_same(read, expected)
 
 
 def test_empty_residuals_and_history_come_back(tmp_path: Path) -> None:
@@ -47,9 +47,9 @@ def test_empty_residuals_and_history_come_back(tmp_path: Path) -> None:
     targets = replace(design.targets, residuals=(np.zeros(0), np.zeros(0)))
     empty = replace(design, targets=targets, history=design.history[:0])
     write_design(tmp_path / "design.h5", empty)
-    found = read_design(tmp_path / "design.h5")
-    assert [len(part) for part in found.targets.residuals] == [0, 0]
-    assert len(found.history) == 0
+    designed = read_design(tmp_path / "design.h5")
+    assert [len(part) for part in designed.targets.residuals] == [0, 0]
+    assert len(designed.history) == 0
 
 
 def test_every_dataset_says_its_unit_and_what_it_is(path: Path) -> None:

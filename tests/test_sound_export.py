@@ -96,9 +96,9 @@ def target_amplitudes() -> np.ndarray:
 def test_the_solver_reads_and_audits_the_embedded_mesh(folder: Path) -> None:
     file = read_modes(folder / "pan.h5")
     np.testing.assert_array_equal(file.modes, small_design().modes)
-    found = audit(file)
-    assert found.rigid_modes == 6 and found.counted == found.expected
-    assert found.residual_max < 1e-9 and found.orthogonality < 1e-9
+    row = audit(file)
+    assert row.rigid_modes == 6 and row.counted == row.expected
+    assert row.residual_max < 1e-9 and row.orthogonality < 1e-9
     compared = compare_files(folder / "pan.h5", folder / "pan.h5")
     assert compared.modes_compared == N_MODES and compared.subspace_angle_max < 1e-7
 
@@ -108,13 +108,13 @@ def test_the_embedding_carries_modes_to_the_surface(folder: Path) -> None:
     modes = design.modes.reshape(design.model.mesh.n_nodes, 3, -1)
     with h5py.File(folder / "pan.h5") as file:
         cells = file["cells"][()][file["surface/cell"][()]]
-        found = np.einsum("vc,vcik->vik", file["surface/weights"][()], modes[cells])
+        motion = np.einsum("vc,vcik->vik", file["surface/weights"][()], modes[cells])
         np.testing.assert_array_equal(file["surface/vertices"], design.surface_vertices)
         np.testing.assert_array_equal(file["dampings"], design.targets.dampings)
         assert "kg" in file.attrs["normalisation"]
     values = interpolation(design.model.mesh, design.surface_vertices)
-    expected = (values @ modes.reshape(len(modes), -1)).reshape(found.shape)
-    np.testing.assert_allclose(found, expected, atol=1e-12)
+    expected = (values @ modes.reshape(len(modes), -1)).reshape(motion.shape)
+    np.testing.assert_allclose(motion, expected, atol=1e-12)
 
 
 def read_gltf(path: Path) -> tuple[dict[str, Any], bytes]:
@@ -131,11 +131,11 @@ def read_gltf(path: Path) -> tuple[dict[str, Any], bytes]:
 
 
 def accessor(document: dict[str, Any], data: bytes, number: int) -> np.ndarray:
-    wanted = document["accessors"][number]
-    view = document["bufferViews"][wanted["bufferView"]]
-    kind = "<u4" if wanted["componentType"] == UNSIGNED_INT else "<f4"
-    width = {"SCALAR": 1, "VEC3": 3}[wanted["type"]]
-    count = wanted["count"] * width
+    entry = document["accessors"][number]
+    view = document["bufferViews"][entry["bufferView"]]
+    kind = "<u4" if entry["componentType"] == UNSIGNED_INT else "<f4"
+    width = {"SCALAR": 1, "VEC3": 3}[entry["type"]]
+    count = entry["count"] * width
     assert view["byteOffset"] % 4 == 0 and view["byteLength"] == 4 * count
     return np.frombuffer(data, kind, count, view["byteOffset"]).reshape(-1, width)
 
@@ -178,13 +178,15 @@ def test_the_loudest_modes_come_first(folder: Path) -> None:
 
 def test_mass_properties_of_a_box() -> None:
     a, b, c = SIDES
-    found = mass_properties(fine_model(box_mesh(6, 4, 2, 0.04), np.full(48, 1e9), density=500.0))
+    properties = mass_properties(
+        fine_model(box_mesh(6, 4, 2, 0.04), np.full(48, 1e9), density=500.0)
+    )
     mass = 500.0 * a * b * c
-    assert found.mass == pytest.approx(mass)
-    np.testing.assert_allclose(found.centre, np.array(SIDES) / 2)
+    assert properties.mass == pytest.approx(mass)
+    np.testing.assert_allclose(properties.centre, np.array(SIDES) / 2)
     moments = mass / 12.0 * np.array([b**2 + c**2, a**2 + c**2, a**2 + b**2])
-    np.testing.assert_allclose(found.moments, np.sort(moments))
-    assert np.linalg.det(found.axes) == pytest.approx(1.0)
+    np.testing.assert_allclose(properties.moments, np.sort(moments))
+    assert np.linalg.det(properties.axes) == pytest.approx(1.0)
 
 
 def test_partly_filled_coarse_cells_weigh_what_their_fine_ones_do() -> None:
@@ -222,8 +224,8 @@ def test_faust_plays_what_we_render(player: Path, position: int) -> None:
     design = small_design()
     bank = Bank(design.frequencies, design.targets.dampings, RATE)
     expected = ring(bank, [(0.0, 2.0 * target_amplitudes()[position])], 22_050)
-    found = played(player, position, 2.0, 0.0)
-    np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
+    samples = played(player, position, 2.0, 0.0)
+    np.testing.assert_allclose(samples, expected, atol=1e-6 * np.abs(expected).max())
 
 
 def test_a_force_that_takes_time_has_the_same_impulse_in_faust(player: Path) -> None:

@@ -56,11 +56,11 @@ def single(frequency: float, damping: float, seconds: float, rate: int = RATE) -
     )
 
 
-def assert_same(found: ModalSound, true: ModalSound) -> None:
-    assert len(found.frequencies) == len(true.frequencies)
-    np.testing.assert_allclose(found.frequencies, true.frequencies, rtol=FREQUENCY_TOLERANCE)
-    np.testing.assert_allclose(found.dampings, true.dampings, rtol=DAMPING_TOLERANCE)
-    np.testing.assert_allclose(found.amplitudes, true.amplitudes, rtol=0.1)
+def assert_same(actual: ModalSound, true: ModalSound) -> None:
+    assert len(actual.frequencies) == len(true.frequencies)
+    np.testing.assert_allclose(actual.frequencies, true.frequencies, rtol=FREQUENCY_TOLERANCE)
+    np.testing.assert_allclose(actual.dampings, true.dampings, rtol=DAMPING_TOLERANCE)
+    np.testing.assert_allclose(actual.amplitudes, true.amplitudes, rtol=0.1)
 
 
 @pytest.mark.parametrize(
@@ -75,10 +75,10 @@ def assert_same(found: ModalSound, true: ModalSound) -> None:
 )
 def test_parameters_come_back_at_20_decibels(rate, count, seconds, highest):
     true = modes(count, highest, seed=count)
-    found = extract(sampled(true, rate, seconds), rate)
-    assert_same(found, true)
-    assert found.evidence["order"] == count
-    assert found.evidence["explained"] == pytest.approx(1.0 / 1.01, abs=2e-3)
+    sound = extract(sampled(true, rate, seconds), rate)
+    assert_same(sound, true)
+    assert sound.evidence["order"] == count
+    assert sound.evidence["explained"] == pytest.approx(1.0 / 1.01, abs=2e-3)
 
 
 def test_parameters_come_back_from_a_stereo_file_with_silence_before_the_strike(tmp_path):
@@ -89,20 +89,20 @@ def test_parameters_come_back_from_a_stereo_file_with_silence_before_the_strike(
     clip += 1e-4 * random.standard_normal(len(clip))
     path = tmp_path / "clip.wav"
     soundfile.write(path, np.stack([1.2 * clip, 0.8 * clip], axis=1), RATE, subtype="PCM_24")
-    found = extract(*read_wav(path))
-    assert found.evidence["strike_seconds"] == pytest.approx(strike / RATE, abs=1e-3)
-    np.testing.assert_allclose(found.frequencies, true.frequencies, rtol=FREQUENCY_TOLERANCE)
-    np.testing.assert_allclose(found.dampings, true.dampings, rtol=DAMPING_TOLERANCE)
-    np.testing.assert_allclose(found.amplitudes, 0.1 * true.amplitudes, rtol=0.1)
+    sound = extract(*read_wav(path))
+    assert sound.evidence["strike_seconds"] == pytest.approx(strike / RATE, abs=1e-3)
+    np.testing.assert_allclose(sound.frequencies, true.frequencies, rtol=FREQUENCY_TOLERANCE)
+    np.testing.assert_allclose(sound.dampings, true.dampings, rtol=DAMPING_TOLERANCE)
+    np.testing.assert_allclose(sound.amplitudes, 0.1 * true.amplitudes, rtol=0.1)
 
 
 def test_errors_are_those_that_the_noise_allows():
     true = modes(12, 3500.0, seed=3)
     scores = []
     for decibels in (15.0, 30.0, 45.0):
-        found = extract(sampled(true, RATE, 1.0, decibels), RATE)
-        deviations = np.array(found.evidence["damping_deviations_per_second"])
-        scores.append((found.dampings - true.dampings) / deviations)
+        sound = extract(sampled(true, RATE, 1.0, decibels), RATE)
+        deviations = np.array(sound.evidence["damping_deviations_per_second"])
+        scores.append((sound.dampings - true.dampings) / deviations)
     # Of 36 standard normal numbers the largest is about 2.4, their root mean square 1 +- 0.12.
     assert np.abs(scores).max() < 5.0
     assert 0.6 < np.sqrt(np.mean(np.square(scores))) < 1.6
@@ -120,10 +120,10 @@ def test_two_modes_a_bandwidth_apart_are_told_apart(damping):
         0,
         {},
     )
-    found = extract(sampled(true, RATE, 1.5), RATE)
-    assert len(found.frequencies) == 2
-    np.testing.assert_allclose(found.frequencies, true.frequencies, rtol=FREQUENCY_TOLERANCE)
-    np.testing.assert_allclose(found.dampings, true.dampings, rtol=DAMPING_TOLERANCE)
+    sound = extract(sampled(true, RATE, 1.5), RATE)
+    assert len(sound.frequencies) == 2
+    np.testing.assert_allclose(sound.frequencies, true.frequencies, rtol=FREQUENCY_TOLERANCE)
+    np.testing.assert_allclose(sound.dampings, true.dampings, rtol=DAMPING_TOLERANCE)
 
 
 def test_peaks_of_a_zero_padded_spectrum_agree():
@@ -131,22 +131,22 @@ def test_peaks_of_a_zero_padded_spectrum_agree():
     from scipy.signal.windows import hann
 
     clip = sampled(modes(10, 3500.0, seed=5, lowest=150.0), RATE, 1.0, 40.0)
-    found = extract(clip, RATE)
+    sound = extract(clip, RATE)
     size = 1 << 18
     spectrum = np.abs(np.fft.rfft(clip * hann(len(clip)), size))
     width = 30 * size // RATE
     peaks = find_peaks(spectrum, height=0.002 * spectrum.max(), distance=width)[0] * RATE / size
-    highest = peaks[np.abs(peaks[:, None] - found.frequencies).argmin(axis=0)]
-    np.testing.assert_allclose(highest, found.frequencies, atol=0.5)
-    strong = found.energies > 0.02 * found.energies.max()
-    np.testing.assert_allclose(highest[strong], found.frequencies[strong], atol=0.2)
+    highest = peaks[np.abs(peaks[:, None] - sound.frequencies).argmin(axis=0)]
+    np.testing.assert_allclose(highest, sound.frequencies, atol=0.5)
+    strong = sound.energies > 0.02 * sound.energies.max()
+    np.testing.assert_allclose(highest[strong], sound.frequencies[strong], atol=0.2)
 
 
 def test_modes_and_residual_add_up_to_the_clip():
     clip = sampled(modes(6, 3000.0, seed=6), RATE, 0.5)
-    found = extract(clip, RATE)
-    start = len(clip) - len(found.residual)
-    np.testing.assert_allclose(found.modal_part() + found.residual, clip[start:], atol=1e-10)
+    sound = extract(clip, RATE)
+    start = len(clip) - len(sound.residual)
+    np.testing.assert_allclose(sound.modal_part() + sound.residual, clip[start:], atol=1e-10)
 
 
 def test_strongest_modes_are_kept_and_the_residual_is_without_the_others_too():
@@ -168,10 +168,10 @@ def test_loudness_does_not_matter():
 def test_the_noise_of_a_blow_is_no_mode():
     true = synthesised("metal", 700.0, 1.0, 16_000, seed=1)
     knock = 20.0 * true.residual  # 8 dB below the sum of all partials
-    found = extract(true.modal_part() + knock, 16_000)
-    apart = np.abs(found.frequencies[:, None] / true.frequencies - 1.0).min(axis=1)
+    sound = extract(true.modal_part() + knock, 16_000)
+    apart = np.abs(sound.frequencies[:, None] / true.frequencies - 1.0).min(axis=1)
     assert (apart < FREQUENCY_TOLERANCE).all()
-    left = np.sum((found.residual - knock[-len(found.residual) :]) ** 2)
+    left = np.sum((sound.residual - knock[-len(sound.residual) :]) ** 2)
     assert left < 0.2 * np.sum(knock**2)
 
 
@@ -221,9 +221,9 @@ def test_esprit_finds_exponents_and_their_number():
     exponents = np.array([-0.01 + 0.3j, -0.02 + 0.32j, -0.002 - 1.0j])
     signal = np.exp(np.outer(np.arange(200), exponents)).sum(axis=1)
     signal += 1e-6 * (noise(400).reshape(2, 200) * [[1.0], [1.0j]]).sum(axis=0)
-    found = esprit(signal)
-    assert len(found) == 3
-    np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(exponents), atol=1e-6)
+    estimated = esprit(signal)
+    assert len(estimated) == 3
+    np.testing.assert_allclose(np.sort_complex(estimated), np.sort_complex(exponents), atol=1e-6)
 
 
 def test_normal_matrix_is_that_of_the_columns():
@@ -246,9 +246,9 @@ def test_least_squares_refines_exponents():
     true = modes(4, 3000.0, seed=10)
     clip = sampled(true, RATE, 0.5, 200.0)
     start = exponents_of(1.0005 * true.frequencies, 1.2 * true.dampings, RATE)
-    found = refined(start, fitted_coefficients(start, clip), clip, 30)[0]
+    exponents = refined(start, fitted_coefficients(start, clip), clip, 30)[0]
     exact = exponents_of(true.frequencies, true.dampings, RATE)
-    np.testing.assert_allclose(found, exact, rtol=1e-8)
+    np.testing.assert_allclose(exponents, exact, rtol=1e-8)
 
 
 def test_a_clean_steady_tone_is_refused_at_once():
@@ -264,6 +264,6 @@ def test_modes_of_a_clean_clip_are_found_once():
     waves = np.exp(-np.outer([6.0, 6.6, 6.6, 9.5, 15.1], seconds))
     waves *= np.sin(2.0 * np.pi * np.outer(frequencies, seconds))
     clip = np.array([0.4, 0.1, 2e-3, 0.02, 0.1]) @ waves
-    found = extract(clip.astype(np.float32), 44_100)
-    assert len(found.frequencies) == len(frequencies)
-    np.testing.assert_allclose(found.frequencies, frequencies, rtol=1e-6)
+    sound = extract(clip.astype(np.float32), 44_100)
+    assert len(sound.frequencies) == len(frequencies)
+    np.testing.assert_allclose(sound.frequencies, frequencies, rtol=1e-6)

@@ -52,14 +52,14 @@ def random_objective(seed=0):
 
 def gradients(simulation, objective, z):
     """Gradients (m,) of E_f and E_a by formula, and what was evaluated."""
-    found = simulation.evaluate(z, derivatives=True)
-    values, pushed, sensitivity = found.eigenvalues, found.pushed, found.sensitivity
+    evaluation = simulation.evaluate(z, derivatives=True)
+    values, pushed, sensitivity = evaluation.eigenvalues, evaluation.pushed, evaluation.sensitivity
     frequency = objective.frequency_jacobian(values, sensitivity)
     amplitude = objective.amplitude_jacobian(values, pushed, sensitivity)
     return (
         frequency.T @ objective.frequency_residual(values),
         np.einsum("tnm,tn->m", amplitude, objective.amplitude_residual(values, pushed)),
-        found,
+        evaluation,
     )
 
 
@@ -92,8 +92,8 @@ def differences(simulation, objective, z, step):
     return np.array(rows).T
 
 
-def relative(found, expected):
-    return np.linalg.norm(found - expected) / np.linalg.norm(expected)
+def relative(actual, expected):
+    return np.linalg.norm(actual - expected) / np.linalg.norm(expected)
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -114,8 +114,8 @@ def test_gradient_with_clustered_modes(coarsen):
     shape = (6, 6, 6)
     solid, objective = simulation(shape, coarsen, "linear"), random_objective()
     z = 0.01 * np.random.default_rng(0).standard_normal(SIZE)
-    frequency, amplitude, found = gradients(solid, objective, z)
-    gaps = np.diff(found.eigenvalues) / found.eigenvalues[1:]
+    frequency, amplitude, evaluation = gradients(solid, objective, z)
+    gaps = np.diff(evaluation.eigenvalues) / evaluation.eigenvalues[1:]
     assert np.sum(gaps < 5e-3) >= 3 and gaps.min() < 1e-4
     by_frequency, by_amplitude = differences(solid, objective, z, 1e-6)
     assert relative(frequency, by_frequency) < 1e-4
@@ -126,8 +126,8 @@ def test_gradient_at_repeated_modes():
     """A square prism has exact pairs, whose amplitudes one by one have no derivatives."""
     shape = (8, 8, 4)
     solid, objective = simulation(shape, "none", "linear"), random_objective()
-    frequency, amplitude, found = gradients(solid, objective, np.zeros(SIZE))
-    gaps = np.diff(found.eigenvalues) / found.eigenvalues[1:]
+    frequency, amplitude, evaluation = gradients(solid, objective, np.zeros(SIZE))
+    gaps = np.diff(evaluation.eigenvalues) / evaluation.eigenvalues[1:]
     assert gaps.min() < 1e-9
     # Modes of a pair change places on the way from one end to the other, which adds errors of first
     # and second order in the step: both are extrapolated away.
@@ -144,10 +144,10 @@ def test_modes_beyond_those_computed_matter():
     shape = (8, 6, 4)
     solid, objective = simulation(shape, "none", "linear"), random_objective()
     z = 0.2 * np.random.default_rng(0).standard_normal(SIZE)
-    _, amplitude, found = gradients(solid, objective, z)
-    values, pushed = found.eigenvalues, found.pushed
-    found.sensitivity.outside[:] = 0.0
-    rows = objective.amplitude_jacobian(values, pushed, found.sensitivity)
+    _, amplitude, evaluation = gradients(solid, objective, z)
+    values, pushed = evaluation.eigenvalues, evaluation.pushed
+    evaluation.sensitivity.outside[:] = 0.0
+    rows = objective.amplitude_jacobian(values, pushed, evaluation.sensitivity)
     without = np.einsum("tnm,tn->m", rows, objective.amplitude_residual(values, pushed))
     assert relative(without, amplitude) > 1e-2
 

@@ -14,6 +14,10 @@ from jsonschema import Draft202012Validator
 from carillon.errors import UserError
 from carillon.fem.geometry import COMPONENTS, FILLS
 from solver.analysis.problem import ProblemOptions
+from solver.coarsening.choice import METHODS as COARSENINGS
+from sound.commands.search_options import SearchOptions
+from sound.design.material import LAWS
+from sound.design.optimisers import OPTIMISERS
 from sound.project import schema
 from sound.project.project import Project, load_project, with_optimiser
 
@@ -46,12 +50,12 @@ def test_the_schema_is_one_and_describes_every_key():
 
 
 def test_what_a_project_leaves_out_takes_the_defaults_of_the_schema(folder):
-    found = load(folder).as_dict()
+    described = load(folder).as_dict()
     for key, part in SCHEMA["properties"].items():
         for inner, each in part.get("properties", {}).items():
-            assert found[key][inner] == each["default"]
+            assert described[key][inner] == each["default"]
         if "default" in part and "properties" not in part:
-            assert found[key] == part["default"]
+            assert described[key] == part["default"]
 
 
 def test_defaults_of_the_solid_are_those_of_the_solver():
@@ -62,12 +66,22 @@ def test_defaults_of_the_solid_are_those_of_the_solver():
     assert SCHEMA["properties"]["components"]["enum"] == list(COMPONENTS)
 
 
+def test_choices_of_the_schema_are_those_of_the_code():
+    material, optimiser = (SCHEMA["properties"][key] for key in ("material", "optimiser"))
+    assert material["properties"]["law"]["enum"] == list(LAWS)
+    methods = optimiser["properties"]["method"]["enum"]
+    assert methods == list(OPTIMISERS)
+    choices = {each.name: each.metadata["choices"] for each in dataclasses.fields(SearchOptions)}
+    assert methods == list(choices["method"])
+    assert set(SCHEMA["properties"]["coarsen"]["enum"]) < set(COARSENINGS)
+
+
 def test_everything_that_is_written_is_read(folder):
     targets = [
         {"name": "rim", "at": [0.088, 0, 0], "clip": "rim.wav", "modes": 20},
         {"name": "top", "vertex": 7, "clip": "top.wav"},
     ]
-    found = load(
+    project = load(
         folder,
         resolution=16,
         coarsen="none",
@@ -76,36 +90,36 @@ def test_everything_that_is_written_is_read(folder):
         material={"law": "exponential"},
         optimiser={"method": "cma", "seconds": None, "evaluations": 40},
     )
-    assert found.solid == ProblemOptions("builtin:bell", 16)
-    assert found.modes == 12
-    assert [target.name for target in found.targets] == ["rim", "top"]
-    assert found.targets[0].at == (0.088, 0, 0) and found.targets[0].modes == 20
-    assert found.targets[1].vertex == 7 and found.targets[1].modes is None
-    assert found.material.law == "exponential" and found.material.young == 1e9
-    assert found.optimiser.method == "cma" and found.optimiser.seconds is None
+    assert project.solid == ProblemOptions("builtin:bell", 16)
+    assert project.modes == 12
+    assert [target.name for target in project.targets] == ["rim", "top"]
+    assert project.targets[0].at == (0.088, 0, 0) and project.targets[0].modes == 20
+    assert project.targets[1].vertex == 7 and project.targets[1].modes is None
+    assert project.material.law == "exponential" and project.material.young == 1e9
+    assert project.optimiser.method == "cma" and project.optimiser.seconds is None
 
 
 def test_paths_are_relative_to_the_project(folder, monkeypatch):
     monkeypatch.chdir("/")
-    found = load(folder, mesh="models/jug.obj", forest="forests.h5")
-    assert found.solid.mesh == str(folder / "models/jug.obj")
-    assert found.solid.forest == str(folder / "forests.h5")
-    assert found.targets[0].clip == str(folder / "rim.wav")
+    project = load(folder, mesh="models/jug.obj", forest="forests.h5")
+    assert project.solid.mesh == str(folder / "models/jug.obj")
+    assert project.solid.forest == str(folder / "forests.h5")
+    assert project.targets[0].clip == str(folder / "rim.wav")
 
 
 def test_a_project_as_a_dictionary_is_the_same_project_anywhere(folder, tmp_path):
-    found = load(folder, mesh="jug.obj", targets=[LEAST["targets"][0] | {"modes": 4}])
+    project = load(folder, mesh="jug.obj", targets=[LEAST["targets"][0] | {"modes": 4}])
     other = tmp_path / "elsewhere"
     other.mkdir()
-    assert load_project(write(other, found.as_dict())) == found
+    assert load_project(write(other, project.as_dict())) == project
 
 
 @pytest.mark.parametrize("number", ["1e9", "1.0e9", "1.0e+9", "1000000000"])
 def test_numbers_may_be_written_as_people_do(folder, number):
     text = yaml.safe_dump(LEAST) + f"material: {{young: {number}}}\nmodes: 12.0\n"
-    found = load_project(write(folder, text))
-    assert found.material.young == 1e9
-    assert found.modes == 12 and isinstance(found.modes, int)
+    project = load_project(write(folder, text))
+    assert project.material.young == 1e9
+    assert project.modes == 12 and isinstance(project.modes, int)
 
 
 def test_points_are_struck_in_the_unit_of_the_mesh(folder):
@@ -113,8 +127,8 @@ def test_points_are_struck_in_the_unit_of_the_mesh(folder):
         {"name": "rim", "at": [0.088, 0.0, 0.0], "clip": "rim.wav"},
         {"name": "top", "vertex": 7, "clip": "top.wav"},
     ]
-    found = load(folder, unit=2.0, targets=places)
-    rim, top = found.strikes(found.surface())
+    project = load(folder, unit=2.0, targets=places)
+    rim, top = project.strikes(project.surface())
     assert rim.name == "rim" and top.vertex == 7
     assert np.linalg.norm(rim.position - (0.176, 0.0, 0.0)) < 0.02
 

@@ -51,8 +51,8 @@ def measured_partial(sound: np.ndarray, near: float, rate: int) -> tuple[float, 
     whole = np.log(spectra[0])
     index = int(np.argmax(np.where(inside, spectra[0], 0.0)))
     a, b, c = whole[index - 1 : index + 2]
-    found = hertz[index] + 0.5 * (a - c) / (a - 2 * b + c) * (hertz[1] - hertz[0])
-    return found, (peaks[0] - peaks[1]) * rate / half
+    frequency = hertz[index] + 0.5 * (a - c) / (a - 2 * b + c) * (hertz[1] - hertz[0])
+    return frequency, (peaks[0] - peaks[1]) * rate / half
 
 
 def design_solid() -> tuple[SoundingSolid, Listening]:
@@ -96,8 +96,8 @@ def test_amplitude_is_the_push_on_each_mode() -> None:
         design.model.mesh.n_nodes, -1
     )
     pushed = motion.reshape(3, N_MODES).T @ (2.5 * strike.inward)
-    found = solid.amplitudes(strike.position[None], 2.5 * strike.inward[None])[0]
-    np.testing.assert_allclose(found, np.abs(pushed), rtol=1e-12)
+    amplitudes = solid.amplitudes(strike.position[None], 2.5 * strike.inward[None])[0]
+    np.testing.assert_allclose(amplitudes, np.abs(pushed), rtol=1e-12)
 
 
 def test_signs_of_modes_do_not_matter() -> None:
@@ -125,9 +125,9 @@ def test_mixing_a_cluster_does_not_matter() -> None:
 def test_target_points_sound_as_loud_as_their_clips() -> None:
     design = small_design()
     solid, listening = design_solid()
-    for strike, wanted in zip(design.strikes, design.targets.amplitudes):
-        found = solid.amplitudes(strike.position[None], strike.inward[None])[0]
-        assert listening.gain(strike.position) * found.max() == pytest.approx(wanted.max())
+    for strike, target in zip(design.strikes, design.targets.amplitudes):
+        amplitudes = solid.amplitudes(strike.position[None], strike.inward[None])[0]
+        assert listening.gain(strike.position) * amplitudes.max() == pytest.approx(target.max())
 
 
 def test_weights_are_one_at_a_struck_point_and_blend_between() -> None:
@@ -157,10 +157,12 @@ def test_residual_follows_the_impulse_and_the_rate() -> None:
 def test_resampling_keeps_a_tone() -> None:
     t = np.arange(4000) / 8000
     tone = np.sin(2 * np.pi * 440.0 * t)
-    found = resampled(tone, 8000, 44_100)
-    u = np.arange(len(found)) / 44_100
+    resampled_tone = resampled(tone, 8000, 44_100)
+    u = np.arange(len(resampled_tone)) / 44_100
     middle = (u > 0.05) & (u < 0.45)
-    np.testing.assert_allclose(found[middle], np.sin(2 * np.pi * 440.0 * u[middle]), atol=5e-3)
+    np.testing.assert_allclose(
+        resampled_tone[middle], np.sin(2 * np.pi * 440.0 * u[middle]), atol=5e-3
+    )
 
 
 def test_a_melody_is_the_sum_of_its_strikes() -> None:
@@ -199,18 +201,18 @@ def test_partials_of_a_rendered_file_are_the_modes(
     out = tmp_path / "hit.wav"
     words = ["render", tmp_path / "design.h5", "--target", "corner", "--no-residual", "--json"]
     assert run([*words, "--seconds", 0.4, "--out", out]) == 0
-    told = json.loads(capsys.readouterr().out)
-    np.testing.assert_allclose(told["frequencies_hz"], design.frequencies)
+    printed = json.loads(capsys.readouterr().out)
+    np.testing.assert_allclose(printed["frequencies_hz"], design.frequencies)
     sound, rate = soundfile.read(out)
     assert rate == RATE and len(sound) == round(0.4 * RATE)
-    loud = np.array(told["amplitudes"]) > 0.05 * max(told["amplitudes"])
+    loud = np.array(printed["amplitudes"]) > 0.05 * max(printed["amplitudes"])
     gaps = np.diff(design.frequencies, prepend=0.0, append=np.inf)
     resolved = loud & (np.minimum(gaps[:-1], gaps[1:]) > 20.0)
     assert resolved.sum() >= 4
     for k in np.flatnonzero(resolved):
         frequency, damping = design.frequencies[k], design.targets.dampings[k]
-        found, decay = measured_partial(sound, frequency, rate)
-        assert found == pytest.approx(frequency, rel=5e-4)
+        measured, decay = measured_partial(sound, frequency, rate)
+        assert measured == pytest.approx(frequency, rel=5e-4)
         assert decay == pytest.approx(damping, rel=0.02)
     spectrum = np.abs(np.fft.rfft(np.hanning(len(sound)) * sound))
     assert len(find_peaks(spectrum, height=0.02 * spectrum.max(), distance=20)[0]) <= N_MODES
@@ -218,30 +220,32 @@ def test_partials_of_a_rendered_file_are_the_modes(
 
 def test_the_solver_s_modes_can_be_heard(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     model = uniform_box(6, 4, 2, 0.04)
-    found = solve(model, modes=RIGID_MODES + N_MODES, method="slepc")
+    result = solve(model, modes=RIGID_MODES + N_MODES, method="slepc")
     path, out = tmp_path / "modes.h5", tmp_path / "hit.wav"
-    write_modes(path, model, found.eigenvalues, [found.modes], found.residuals, {}, {})
+    write_modes(path, model, result.eigenvalues, [result.modes], result.residuals, {}, {})
     words = ["render", path, "--at", 0, 0, 0, "--damping", 5, 2e-7, "--json", "--out", out]
     assert run(words) == 0
-    told = json.loads(capsys.readouterr().out)
-    decay = Damping(5.0, 2e-7).decay_per_second(found.eigenvalues[RIGID_MODES:])
-    np.testing.assert_allclose(told["dampings_per_second"], decay)
-    np.testing.assert_allclose(told["frequencies_hz"], found.frequencies[RIGID_MODES:], rtol=1e-4)
+    printed = json.loads(capsys.readouterr().out)
+    decay = Damping(5.0, 2e-7).decay_per_second(result.eigenvalues[RIGID_MODES:])
+    np.testing.assert_allclose(printed["dampings_per_second"], decay)
+    np.testing.assert_allclose(
+        printed["frequencies_hz"], result.frequencies[RIGID_MODES:], rtol=1e-4
+    )
     assert np.abs(soundfile.read(out)[0]).max() == pytest.approx(PEAK)
     write_design(tmp_path / "design.h5", small_design())
     like = ["--like", tmp_path / "design.h5", "--target", "side", "--json"]
     assert run(["render", path, *like, "--out", out]) == 0
-    told = json.loads(capsys.readouterr().out)
-    np.testing.assert_allclose(told["dampings_per_second"], small_design().targets.dampings)
-    assert max(told["amplitudes"]) == pytest.approx(small_design().targets.amplitudes[1].max())
+    printed = json.loads(capsys.readouterr().out)
+    np.testing.assert_allclose(printed["dampings_per_second"], small_design().targets.dampings)
+    assert max(printed["amplitudes"]) == pytest.approx(small_design().targets.amplitudes[1].max())
 
 
 def test_modes_too_damped_to_oscillate_are_left_out(tmp_path: Path) -> None:
     model = uniform_box(4, 3, 2, 0.05)
-    found = solve(model, modes=RIGID_MODES + 4, method="slepc")
+    result = solve(model, modes=RIGID_MODES + 4, method="slepc")
     path = tmp_path / "modes.h5"
-    write_modes(path, model, found.eigenvalues, [found.modes], found.residuals, {}, {})
-    critical = 2.0 * np.sqrt(found.eigenvalues[RIGID_MODES + 1])
+    write_modes(path, model, result.eigenvalues, [result.modes], result.residuals, {}, {})
+    critical = 2.0 * np.sqrt(result.eigenvalues[RIGID_MODES + 1])
     assert len(SoundingSolid.of_modes(read_modes(path), Damping(0.9 * critical)).frequencies) <= 4
     with pytest.raises(UserError, match="none is elastic"):
         SoundingSolid.of_modes(read_modes(path), Damping(1e3 * critical))

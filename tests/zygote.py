@@ -50,7 +50,7 @@ _ALONE = {
     "OMPI_MCA_osc": "^ucx,rdma",
 }
 _LATER = (
-    *("sound.design.designing", "sound.export.faust", "sound.export.gltf", "sound.export.embedded"),
+    *("sound.design.optimise", "sound.export.faust", "sound.export.gltf", "sound.export.embedded"),
     *("sound.rendering.render", "sound.project.project", "sound.project.design_file"),
     *("solver.studies.calibration.gauss_newton", "solver.studies.scaling.plot"),
     *("snakemake.utils", "soundfile", "igl", "scipy.signal", "scipy.optimize", "trimesh"),

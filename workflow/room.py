@@ -53,7 +53,7 @@ def require_place(folder: Path, what: str) -> None:
         ) from None
 
 
-def tell_if_full(folder: Path) -> None:
+def check_disk(folder: Path) -> None:
     """Say in a sentence that no megabyte can be written to `folder`, if that is so."""
     try:
         with tempfile.TemporaryFile(dir=folder) as file:

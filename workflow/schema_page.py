@@ -35,7 +35,7 @@ _PROJECT = """# Project of a sound design
 <!-- Made by python -m workflow.schema_page project > docs/project.md; do not edit. -->
 
 {description}. `python -m sound design PROJECT.yaml --out design.h5` reads it; mistakes are answered
-in one sentence. The least that a project says:
+in one sentence. `python -m sound init` writes one with all keys in it. The least that one says:
 
 ```yaml
 mesh: builtin:frying-pan

@@ -20,9 +20,12 @@ class Band:
 
     Attributes
     ----------
-    centre, width : [Hz]; sinusoids within half a width of the centre are what it is for.
-    rate : sampling rate [Hz], at least twice the width.
-    signal : (n,) complex, shifted by the centre.
+    centre, width : float [Hz]
+        Sinusoids within half a width of the centre are what it is for.
+    rate : float [Hz]
+        Sampling rate, at least twice the width.
+    signal : (n,) complex
+        Shifted by the centre.
     """
 
     centre: float

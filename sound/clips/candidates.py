@@ -39,10 +39,10 @@ def candidates(rest: Array, rate: int, width: float, label: str, visible: bool) 
     would hide what its end leaves in all bands, would take minutes otherwise.
     """
     count = int(0.5 * rate / width) + 1
-    parts = bands(rest, rate, width, BAND_SAMPLES)
-    found = [_band_exponents(band, rate) for band in track(parts, label, count, visible=visible)]
-    exponents = np.concatenate([each for each, _ in found])
-    energies = np.concatenate([energies for _, energies in found])
+    parts = track(bands(rest, rate, width, BAND_SAMPLES), label, count, visible=visible)
+    of_bands = [_band_exponents(band, rate) for band in parts]
+    exponents = np.concatenate([each for each, _ in of_bands])
+    energies = np.concatenate([energies for _, energies in of_bands])
     return exponents[np.sort(np.argsort(-energies, kind="stable")[:MOST])]
 
 

@@ -34,7 +34,18 @@ def damped_sinusoids(
 
     Parameters
     ----------
-    frequencies, dampings, amplitudes, phases : (k,) [Hz], [1/s], any unit, [rad].
+    frequencies : (k,) [Hz]
+        f.
+    dampings : (k,) [1/s]
+        d.
+    amplitudes : (k,)
+        a, in any unit.
+    phases : (k,) [rad]
+        theta.
+    rate : int [Hz]
+        Samples per second.
+    count : int
+        Number of samples.
 
     Examples
     --------
@@ -118,9 +129,12 @@ def solved(matrix: Array, right: Complex, damping: float = 1e-13) -> Complex:
 
     Parameters
     ----------
-    matrix : see `normal_matrix`.
-    right : A^T r for a signal r.
-    damping : share of the diagonal that is added to it.
+    matrix : (2 n, 2 n)
+        See `normal_matrix`.
+    right : (n,) complex
+        A^T r for a signal r.
+    damping : float
+        Share of the diagonal that is added to it.
     """
     values = inverse(matrix, damping) @ np.concatenate([right.real, -right.imag])
     half = len(right)

@@ -13,14 +13,14 @@ MOST = 40
 _ESTER_FRACTION = 0.02
 
 
-def esprit(signal: Complex, most: int = MOST) -> Complex:
+def esprit(signal: Complex) -> Complex:
     """Exponents (p,) per sample of the damped sinusoids in `signal` (n,).
 
     The leading left singular vectors of the signal's Hankel matrix span what exp(lambda_k n) span,
     so that shifting them by a sample multiplies them by a matrix with eigenvalues exp(lambda_k)
     (Roy and Kailath 1989), which is found by total least squares.
     """
-    vectors = _subspace(signal, most)
+    vectors = _subspace(signal)
     order = ester(vectors)
     poles = la.eigvals(_rotation(vectors[:, :order]))
     return np.log(poles[np.abs(poles) > 0.0])
@@ -41,10 +41,10 @@ def ester(vectors: Complex) -> int:
     return int(orders[criterion >= _ESTER_FRACTION * criterion.max()][-1])
 
 
-def _subspace(signal: Complex, most: int) -> Complex:
+def _subspace(signal: Complex) -> Complex:
     rows = len(signal) // 3
     hankel = np.lib.stride_tricks.sliding_window_view(signal, len(signal) - rows + 1)
-    most = min(most, rows - 2)
+    most = min(MOST, rows - 2)
     covariance = hankel @ hankel.conj().T
     vectors = la.eigh(covariance, subset_by_index=(rows - most, rows - 1))[1]
     return np.asarray(vectors[:, ::-1])

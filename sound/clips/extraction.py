@@ -55,13 +55,20 @@ class ModalSound:
 
     Attributes
     ----------
-    frequencies : (n,) [Hz], ascending.
-    dampings : (n,) [1/s].
-    amplitudes : (n,) at the strike, in units of the samples.
-    phases : (n,) [rad].
-    residual : (s,) the clip from the strike on minus all modes found, those not asked for included.
-    rate : samples per second [Hz].
-    evidence : how the modes were found and how sure they are; plain values.
+    frequencies : (n,) [Hz]
+        Ascending.
+    dampings : (n,) [1/s]
+        d.
+    amplitudes : (n,)
+        At the strike, in units of the samples.
+    phases : (n,) [rad]
+        theta.
+    residual : (s,)
+        The clip from the strike on minus all modes found, those not asked for included.
+    rate : int [Hz]
+        Samples per second.
+    evidence : dict
+        How the modes were found and how sure they are; plain values.
     """
 
     frequencies: Array
@@ -77,11 +84,10 @@ class ModalSound:
         """Energy (n,) of each mode, its squared samples summed over all time."""
         return np.asarray(self.amplitudes**2 * self.rate / (4.0 * self.dampings))
 
-    def modal_part(self, count: int | None = None) -> Array:
-        """Samples (count,) of the modes alone; as many as the residual has unless told."""
-        count = len(self.residual) if count is None else count
+    def modal_part(self) -> Array:
+        """Samples (s,) of the modes alone, as many as the residual has."""
         values = (self.frequencies, self.dampings, self.amplitudes, self.phases)
-        return damped_sinusoids(*values, self.rate, count)
+        return damped_sinusoids(*values, self.rate, len(self.residual))
 
 
 def extract(
@@ -91,10 +97,14 @@ def extract(
 
     Parameters
     ----------
-    samples : (s,) of one channel.
-    rate : samples per second [Hz].
-    modes : number of modes to keep, those with most energy; all that are found if None.
-    visible : show progress.
+    samples : (s,)
+        Of one channel.
+    rate : int [Hz]
+        Samples per second.
+    modes : int or None
+        Number of modes to keep, those with most energy; all that are found if None.
+    visible : bool
+        Whether progress is shown.
 
     Raises
     ------
@@ -108,8 +118,8 @@ def extract(
     >>> clip = damped_sinusoids(
     ...     np.array([440.0]), np.array([8.0]), np.array([0.5]), np.zeros(1), rate=8000, count=8000
     ... )
-    >>> found = extract(clip, 8000)
-    >>> found.frequencies.round(3).tolist(), found.dampings.round(3).tolist()
+    >>> sound = extract(clip, 8000)
+    >>> sound.frequencies.round(3).tolist(), sound.dampings.round(3).tolist()
     ([440.0], [8.0])
     """
     clip = np.asarray(samples, dtype=float)
@@ -125,9 +135,9 @@ def extract(
     scale = float(np.abs(clip).max())
     searched = clip[: round(LONGEST_SECONDS * rate)] / scale
     with single_threaded_blas():  # many small matrices
-        found = _found(searched, rate, visible)
-    _require_modes(found, len(searched), rate)
-    kept = found.chosen(_is_mode(found, len(searched)))
+        fit = _fitted(searched, rate, visible)
+    _require_modes(fit, len(searched), rate)
+    kept = fit.chosen(_is_mode(fit, len(searched)))
     return _as_sound(kept, clip, strike, rate, scale, modes)
 
 
@@ -167,7 +177,7 @@ def _steady(hertz: float, seconds: float) -> str:
     )
 
 
-def _found(clip: Array, rate: int, visible: bool) -> Fit:
+def _fitted(clip: Array, rate: int, visible: bool) -> Fit:
     """All damped sinusoids that stand out of a clip."""
     fit = settled(np.zeros(0, complex), clip, 0)
     first = 0.5 * BAND_SAMPLES / min(1.0, len(clip) / rate)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from carillon.errors import UserError
@@ -16,3 +17,10 @@ def extract_file(path: str | Path, modes: int | None = None, visible: bool = Fal
         return extract(samples, rate, modes, visible)
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
+
+
+def clip_names(clips: Sequence[str | Path]) -> list[str]:
+    """Names of the clips without folder and ending, or numbers where those are not unique."""
+    names = [Path(clip).stem for clip in clips]
+    unique = len(set(names)) == len(names)
+    return names if unique else [f"clip {number + 1}" for number in range(len(names))]

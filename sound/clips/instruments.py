@@ -48,13 +48,19 @@ class Instrument:
 
     Attributes
     ----------
-    pitch : frequency [Hz] of the lowest partial unless told otherwise.
-    partials : function of (pitch, highest frequency, random numbers) that gives frequencies (n,)
-        [Hz] and relative amplitudes (n,).
-    damping : 1/s at frequency 0.
-    loss : loss factor of the material, which adds pi f `loss` to the damping of frequency f.
-    knock : peak of the noise of the blow, relative to the sum of the partials' amplitudes.
-    knock_damping : 1/s at which that noise dies away.
+    pitch : float [Hz]
+        Frequency of the lowest partial unless another is asked for.
+    partials
+        Function of (pitch, highest frequency, random numbers) that gives frequencies (n,) [Hz] and
+        relative amplitudes (n,).
+    damping : float [1/s]
+        At frequency 0.
+    loss : float
+        Loss factor of the material, which adds pi f `loss` to the damping of frequency f.
+    knock : float
+        Peak of the noise of the blow, relative to the sum of the partials' amplitudes.
+    knock_damping : float [1/s]
+        Damping of that noise.
     """
 
     pitch: float
@@ -94,9 +100,16 @@ def synthesised(
 
     Parameters
     ----------
-    instrument : one of `INSTRUMENTS`.
-    pitch : frequency of the lowest partial [Hz]; the instrument's own if None.
-    seed : of imperfections, of where it is struck, and of the noise.
+    instrument : str
+        One of `INSTRUMENTS`.
+    pitch : float or None [Hz]
+        Frequency of the lowest partial; the instrument's own if None.
+    seconds : float [s]
+        Length.
+    rate : int [Hz]
+        Samples per second.
+    seed : int
+        Of imperfections, of where it is struck, and of the noise.
 
     Raises
     ------

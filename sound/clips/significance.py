@@ -27,9 +27,12 @@ class Fit:
 
     Attributes
     ----------
-    exponents, coefficients : (k,) in order of frequency.
-    prominence : (k,) energy that the fit would lose without each, over the level.
-    level : (k,) variance of white noise as strong as the noise under each.
+    exponents, coefficients : (k,) complex
+        In order of frequency.
+    prominence : (k,)
+        Energy that the fit would lose without each, over the level.
+    level : (k,)
+        Variance of white noise as strong as the noise under each.
     """
 
     exponents: Complex
@@ -68,8 +71,8 @@ def _pruned(exponents: Complex, clip: Array) -> Fit:
         rest = clip - superposed(exponents, coefficients, len(clip))
         level = _level(exponents, rest)
         prominence = _gain(exponents, coefficients, len(clip)) / level
-        beside = np.pad(prominence, 1, constant_values=np.inf)
-        least = (prominence <= beside[:-2]) & (prominence <= beside[2:])
+        padded = np.pad(prominence, 1, constant_values=np.inf)
+        least = (prominence <= padded[:-2]) & (prominence <= padded[2:])
         weak = least & (prominence < PROMINENCE)
         if not weak.any():
             return Fit(exponents, coefficients, prominence, level)

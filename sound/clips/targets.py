@@ -25,12 +25,18 @@ class Targets:
 
     Attributes
     ----------
-    names : T names of the points.
-    frequencies : (N,) [Hz], ascending, shared by all points.
-    dampings : (N,) [1/s].
-    amplitudes : (T, N) at the strike, 0 where the clip of that point has no such mode.
-    residuals : T arrays of samples, what is left of each clip without its modes.
-    rates : T sampling rates of the residuals [Hz].
+    names : T texts
+        Names of the points.
+    frequencies : (N,) [Hz]
+        Ascending, shared by all points.
+    dampings : (N,) [1/s]
+        Shared by all points, too.
+    amplitudes : (T, N)
+        At the strike, 0 where the clip of that point has no such mode.
+    residuals : T arrays (s,)
+        Samples, what is left of each clip without its modes.
+    rates : T integers [Hz]
+        Sampling rates of the residuals.
     """
 
     names: tuple[str, ...]

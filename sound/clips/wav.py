@@ -31,7 +31,6 @@ ENDINGS = (".wav",)
 """Of sound files that are written."""
 PEAK = 0.89
 """Largest magnitude of a normalised sound: 1 dB below full scale."""
-_SUBTYPES = {"float": "FLOAT", "16 bit": "PCM_16"}
 
 
 def read_wav(path: str | Path) -> tuple[Array, int]:
@@ -52,15 +51,17 @@ def read_wav(path: str | Path) -> tuple[Array, int]:
         raise UserError(f"{path}: {error}") from None
 
 
-def write_wav(
-    path: str | Path, samples: Array, rate: int, sample_format: str = "float", peak: bool = False
-) -> None:
-    """Write one channel (s,) as WAV, atomically.
+def write_wav(path: str | Path, samples: Array, rate: int, peak: bool = False) -> None:
+    """Write one channel (s,) as WAV of 32-bit floats, atomically.
 
     Parameters
     ----------
-    sample_format : "float" (32 bit) or "16 bit".
-    peak : scale to the largest magnitude `PEAK`.
+    samples : (s,)
+        Full scale is 1.
+    rate : int [Hz]
+        Samples per second.
+    peak : bool
+        Whether the largest magnitude becomes `PEAK`.
 
     Raises
     ------
@@ -77,18 +78,13 @@ def write_wav(
         raise UserError(f"{path}: not written, the sound has samples that are not finite numbers")
     if peak and largest > 0.0:
         samples, largest = samples * (PEAK / largest), PEAK
-    if sample_format == "16 bit" and largest > 1.0:
-        raise UserError(
-            f"{path}: not written, the sound reaches {largest:.3g} and 16 bits hold up to 1; "
-            "normalise it or write floats"
-        )
     if largest > np.finfo(np.float32).max:
         raise UserError(
             f"{path}: not written, the sound reaches {largest:.3g}, more than its samples hold"
         )
     # By way of memory, since the library does not say why it could not write to a disk.
     content = io.BytesIO()
-    soundfile.write(content, samples, rate, format="WAV", subtype=_SUBTYPES[sample_format])
+    soundfile.write(content, samples, rate, format="WAV", subtype="FLOAT")
     with atomic_path(path) as temporary:
         temporary.write_bytes(content.getbuffer())
 

@@ -7,6 +7,7 @@ COMMANDS = {
         "sound.commands.extract", "modes of a sound clip: frequency, damping, amplitude"
     ),
     "clip": Command("sound.commands.clip", "synthesise a clip of a struck metal, wood or string"),
+    "init": Command("sound.commands.init", "a project file to begin with, all keys in it"),
     "design": Command(
         "sound.commands.design", "optimise the material until struck points sound as clips"
     ),

@@ -4,21 +4,29 @@ from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import asdict, dataclass
 from typing import Any
 
-from carillon.arguments import number_of_workers, positive_number, whole_number
+from carillon.arguments import whole_number
 from carillon.measurement import measured
+from carillon.options import REQUIRED, add_options, collect, option
 from carillon.progress import say
+from sound.commands.search_options import SearchOptions
+
+
+@dataclass(frozen=True)
+class BenchmarkOptions:
+    """What is measured."""
+
+    project: str = option(REQUIRED, "project file (YAML)")
+    runs: int = option(7, "timed evaluations", type=whole_number(1, 1000))
+    json: bool = option(False, "print everything as JSON")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    parser.add_argument("project", help="project file (YAML)")
-    parser.add_argument("--seconds", type=positive_number, help="of each, not the project's")
-    parser.add_argument("--evaluations", type=whole_number(1), help="of each at most")
-    parser.add_argument("--workers", type=number_of_workers, help="processes, not the project's")
-    parser.add_argument("--runs", type=whole_number(1, 1000), default=7, help="timed evaluations")
-    parser.add_argument("--json", action="store_true", help="print everything as JSON")
+    add_options(parser, BenchmarkOptions, positional=("project",))
+    add_options(parser, SearchOptions, leave_out=("method",))
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -27,18 +35,19 @@ def run(arguments: argparse.Namespace) -> int:
     from sound.design.preparation import prepare
     from sound.project.project import load_project, with_optimiser
 
-    given = {key: getattr(arguments, key) for key in ("seconds", "evaluations", "workers")}
-    project = with_optimiser(load_project(arguments.project), **given)
-    found = benchmark(prepare(project), arguments.runs, lambda what: say(f"measuring: {what}"))
-    if arguments.json:
-        print(json.dumps({**found, "provenance": measured(project.as_dict())}))
+    options = collect(BenchmarkOptions, arguments)
+    settings = asdict(collect(SearchOptions, arguments))
+    project = with_optimiser(load_project(options.project), **settings)
+    results = benchmark(prepare(project), options.runs, lambda what: say(f"measuring: {what}"))
+    if options.json:
+        print(json.dumps({**results, "provenance": measured(project.as_dict())}))
         return 0
-    print(_table(found))
+    print(_table(results))
     return 0
 
 
-def _table(found: dict[str, Any]) -> str:
-    times = found["evaluation"]
+def _table(results: dict[str, Any]) -> str:
+    times = results["evaluation"]
     lines = [
         f"evaluation of {times['n_dofs']:,} unknowns, {times['modes']} modes, "
         f"{times['coordinates']} coordinates, one thread, median of {times['runs']}:",
@@ -48,7 +57,7 @@ def _table(found: dict[str, Any]) -> str:
         f"{'method':8} {'cost':>19} {'fall':>7} {'90 % after':>11} {'evaluations':>12} "
         f"{'a minute':>9} {'seconds':>8}",
     ]
-    for row in found["rows"]:
+    for row in results["rows"]:
         after = row["seconds_to_90_percent"]
         lines.append(
             f"{row['method']:8} {row['cost_start']:8.4g} -> {row['cost_end']:7.4g} "

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import dataclass
 
 from carillon.arguments import positive_number, whole_number
 from carillon.errors import UserError
+from carillon.options import REQUIRED, add_options, collect, option
 from sound.bounds import sample_rate
 
 NAMES = ("metal", "wood", "piano")
@@ -14,42 +16,53 @@ LONGEST_SECONDS = 60.0
 """Length of a clip that is long enough for every strike to die away."""
 
 
+@dataclass(frozen=True)
+class PitchOptions:
+    """How high a clip sounds, by one of the two; the instrument's own pitch if by none."""
+
+    note: str | None = option(None, "lowest partial as a note, such as C4 or F#3")
+    pitch: float | None = option(None, "lowest partial [Hz]", type=positive_number)
+
+
+@dataclass(frozen=True)
+class ClipOptions:
+    """A clip to synthesise."""
+
+    instrument: str = option(
+        REQUIRED, "what is struck", choices=NAMES, metavar=f"{{{','.join(NAMES)}}}"
+    )
+    out: str = option(REQUIRED, "sound file to write", metavar="FILE.wav")
+    seconds: float = option(2.0, "length", type=positive_number)
+    rate: int = option(44_100, "samples per second", type=sample_rate)
+    seed: int = option(0, "of imperfections and noise", type=whole_number(0))
+    json: bool = option(False, "print the partials as JSON")
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's arguments."""
-    parser.add_argument("instrument", choices=NAMES, help="what is struck")
-    pitch = parser.add_mutually_exclusive_group()
-    pitch.add_argument("--note", help="lowest partial as a note, such as C4 or F#3")
-    pitch.add_argument("--pitch", type=positive_number, help="lowest partial [Hz]")
-    parser.add_argument("--seconds", type=positive_number, default=2.0, help="length (default 2)")
-    parser.add_argument(
-        "--rate", type=sample_rate, default=44_100, help="samples per second (default 44100)"
-    )
-    parser.add_argument(
-        "--seed", type=whole_number(0), default=0, help="of imperfections and noise (default 0)"
-    )
-    parser.add_argument("--json", action="store_true", help="print the partials as JSON")
-    parser.add_argument("--out", metavar="FILE.wav", required=True, help="sound file to write")
+    """Describe the command line."""
+    add_options(parser.add_mutually_exclusive_group(), PitchOptions)
+    add_options(parser, ClipOptions, positional=("instrument",))
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the command."""
+    """Synthesise and write."""
     from sound.clips.extraction import SHORTEST_SAMPLES
     from sound.clips.instruments import note_hertz, synthesised
     from sound.clips.wav import ENDINGS, PEAK, write_wav
     from sound.outputs import require_output
 
-    require_output(arguments.out, ENDINGS)
-    shortest = SHORTEST_SAMPLES / arguments.rate
-    if not shortest <= arguments.seconds <= LONGEST_SECONDS:
+    options, pitches = collect(ClipOptions, arguments), collect(PitchOptions, arguments)
+    require_output(options.out, ENDINGS)
+    shortest = SHORTEST_SAMPLES / options.rate
+    if not shortest <= options.seconds <= LONGEST_SECONDS:
         raise UserError(
-            f"--seconds {arguments.seconds:g}: expected {shortest:.3g} to {LONGEST_SECONDS:g}"
+            f"--seconds {options.seconds:g}: expected {shortest:.3g} to {LONGEST_SECONDS:g}"
         )
-    pitch = arguments.pitch if arguments.note is None else note_hertz(arguments.note)
-    options = (arguments.seconds, arguments.rate, arguments.seed)
-    sound = synthesised(arguments.instrument, pitch, *options)
+    pitch = pitches.pitch if pitches.note is None else note_hertz(pitches.note)
+    sound = synthesised(options.instrument, pitch, options.seconds, options.rate, options.seed)
     samples = sound.modal_part() + sound.residual
-    write_wav(arguments.out, samples, sound.rate, peak=True)
-    if arguments.json:
+    write_wav(options.out, samples, sound.rate, peak=True)
+    if options.json:
         scale = PEAK / abs(samples).max()
         content = {
             **sound.evidence,
@@ -61,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     low, high = sound.frequencies[[0, -1]]
     print(
-        f"{arguments.out}: {arguments.seconds:g} s of struck {arguments.instrument}, "
+        f"{options.out}: {options.seconds:g} s of struck {options.instrument}, "
         f"{len(sound.frequencies)} partials from {low:.2f} to {high:.2f} Hz"
     )
     return 0

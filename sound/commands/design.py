@@ -6,17 +6,18 @@ import argparse
 import json
 import sys
 import time
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from carillon.arguments import number_of_workers, positive_number, whole_number
 from carillon.errors import UserError
 from carillon.locks import locked
+from carillon.options import REQUIRED, add_options, collect, option
 from carillon.progress import LINE_SECONDS, say
+from sound.commands.search_options import SearchOptions
 from sound.design.interrupts import ended_by_interrupts
 from sound.design.objective import fall
 
@@ -26,27 +27,29 @@ if TYPE_CHECKING:
 
 ENDINGS = (".h5", ".hdf5")
 """Of designs."""
-GIVEN = ("seconds", "evaluations", "method", "workers")
-"""Arguments that take the place of what a project says."""
-SLOW = ("trimesh", "sound.design.designing")
+SLOW = ("trimesh", "sound.design.optimise")
 """Modules that take seconds to load, which `--help` does without."""
 SHOWN_EVERY = 1.0
 """Seconds between two progress lines on a terminal."""
 
 
+@dataclass(frozen=True)
+class DesignOptions:
+    """What is designed, and where it is written."""
+
+    project: str = option(REQUIRED, "project file (YAML)")
+    out: str = option(REQUIRED, "file to write (.h5); goes on if it exists")
+    initial_design: str | None = option(
+        None, "design of the same mesh to go on from, its targets aside", metavar="DESIGN"
+    )
+    restart: bool = option(False, "begin anew, even if --out exists")
+    json: bool = option(False, "print the outcome as JSON")
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    parser.add_argument("project", help="project file (YAML)")
-    parser.add_argument("--out", required=True, help="file to write (.h5); goes on if it exists")
-    parser.add_argument("--start", help="design of the same mesh to go on from, its targets aside")
-    parser.add_argument("--restart", action="store_true", help="begin anew, even if --out exists")
-    parser.add_argument("--seconds", type=positive_number, help="wall time, not the project's")
-    parser.add_argument(
-        "--evaluations", type=whole_number(1), help="modal analyses at most, not the project's"
-    )
-    parser.add_argument("--method", choices=("hybrid", "cma", "bfgs"), help="not the project's")
-    parser.add_argument("--workers", type=number_of_workers, help="processes, not the project's")
-    parser.add_argument("--json", action="store_true", help="print the outcome as JSON")
+    add_options(parser, DesignOptions, positional=("project",))
+    add_options(parser, SearchOptions)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -54,46 +57,46 @@ def run(arguments: argparse.Namespace) -> int:
     with ended_by_interrupts():
         for module in SLOW:
             import_module(module)
-    with locked(arguments.out):
-        return _search(arguments)
+    options = collect(DesignOptions, arguments)
+    with locked(options.out):
+        return _search(options, collect(SearchOptions, arguments))
 
 
-def _search(arguments: argparse.Namespace) -> int:
+def _search(options: DesignOptions, settings: SearchOptions) -> int:
     """Search, writing the design every half minute and at the end."""
-    from sound.design.designing import design
+    from sound.design.optimise import optimise
     from sound.design.preparation import prepare, require_same_voxels
     from sound.outputs import require_output
     from sound.project.design_file import read_design, write_design
     from sound.project.project import load_project, with_optimiser
 
     _require_one_rank()
-    project = load_project(arguments.project)
-    inputs = filter(None, [arguments.project, project.solid.mesh, project.solid.forest])
-    out = require_output(arguments.out, ENDINGS, inputs)
-    if arguments.evaluations is not None and arguments.seconds is None:
+    project = load_project(options.project)
+    inputs = filter(None, [options.project, project.solid.mesh, project.solid.forest])
+    out = require_output(options.out, ENDINGS, inputs)
+    if settings.evaluations is not None and settings.seconds is None:
         project = replace(project, optimiser=replace(project.optimiser, seconds=None))
-    given = {key: getattr(arguments, key) for key in GIVEN}
-    project = with_optimiser(project, **given)
-    former = None
-    if arguments.start is not None:
-        former = read_design(arguments.start)
-    elif out.exists() and not arguments.restart:
-        former = read_design(out)
-    prepared = prepare(project)
-    if former is not None:
-        require_same_voxels(prepared, former)
-        so_far = former.history["evaluations"][-1:].sum()
-        say(f"{arguments.start or out}: going on after {so_far:,.0f} evaluations")
-    found = design(
-        prepared, former, keep=lambda each: write_design(out, each), watch=_Progress().show
+    project = with_optimiser(project, **asdict(settings))
+    initial = None
+    if options.initial_design is not None:
+        initial = read_design(options.initial_design)
+    elif out.exists() and not options.restart:
+        initial = read_design(out)
+    problem = prepare(project)
+    if initial is not None:
+        require_same_voxels(problem, initial)
+        so_far = initial.history["evaluations"][-1:].sum()
+        say(f"{options.initial_design or out}: going on after {so_far:,.0f} evaluations")
+    result = optimise(
+        problem, initial, keep=lambda each: write_design(out, each), watch=_SearchProgress().show
     )
-    write_design(out, found)
-    summary = summarise(found)
-    print(json.dumps(summary) if arguments.json else _sentences(out, found, summary))
+    write_design(out, result)
+    summary = summarise(result)
+    print(json.dumps(summary) if options.json else _sentences(out, result, summary))
     return 0
 
 
-class _Progress:
+class _SearchProgress:
     """A line with cost and time: in place on a terminal, one a minute in a log."""
 
     def __init__(self) -> None:
@@ -106,8 +109,8 @@ class _Progress:
         if now < self._due:
             return
         self._due = now + (SHOWN_EVERY if self._terminal else LINE_SECONDS)
-        moment, first = search.history[-1], search.history[0]
-        cost = moment.cost
+        entry, first = search.history[-1], search.history[0]
+        cost = entry.cost
         text = (
             f"{search.own_seconds:6.1f} s  {search.own_evaluations:5,} evaluations  "
             f"cost {cost.total:9.4g} ({fall(first.cost.total, cost.total):.1%} less)  "
@@ -116,10 +119,10 @@ class _Progress:
         say(text, end="\r" if self._terminal else "\n")
 
 
-def summarise(found: Design) -> dict[str, Any]:
+def summarise(design: Design) -> dict[str, Any]:
     """The outcome as plain values."""
-    evidence = found.evidence
-    off = np.abs(found.frequencies / found.targets.frequencies - 1.0)
+    evidence = design.evidence
+    off = np.abs(design.frequencies / design.targets.frequencies - 1.0)
     return {
         "cost_start": evidence["cost_start"],
         "cost": evidence["cost"],
@@ -131,17 +134,17 @@ def summarise(found: Design) -> dict[str, Any]:
         "evaluations_per_minute": evidence["evaluations_per_minute"],
         "workers": evidence["workers"],
         "method": evidence["method"],
-        "modes": len(found.frequencies),
-        "targets": [strike.name for strike in found.strikes],
+        "modes": len(design.frequencies),
+        "targets": [strike.name for strike in design.strikes],
         "frequency_error_median": float(np.median(off)),
         "frequency_error_max": float(off.max()),
-        "young_min_pa": float(found.young.min()),
-        "young_max_pa": float(found.young.max()),
+        "young_min_pa": float(design.young.min()),
+        "young_max_pa": float(design.young.max()),
         "residual_max": evidence["residual_max"],
     }
 
 
-def _sentences(out: Path, found: Design, summary: dict[str, Any]) -> str:
+def _sentences(out: Path, design: Design, summary: dict[str, Any]) -> str:
     return "\n".join(
         [
             f"cost {summary['cost_start']:.4g} -> {summary['cost']:.4g} ({summary['fall']:.1%} "
@@ -150,7 +153,7 @@ def _sentences(out: Path, found: Design, summary: dict[str, Any]) -> str:
             f"frequencies of {summary['modes']} modes: median error "
             f"{summary['frequency_error_median']:.2%}, worst {summary['frequency_error_max']:.2%}; "
             f"residuals of the modes up to {summary['residual_max']:.1e}",
-            f"Young's modulus {found.young.min() / 1e9:.3g} to {found.young.max() / 1e9:.3g} GPa",
+            f"Young's modulus {design.young.min() / 1e9:.3g} to {design.young.max() / 1e9:.3g} GPa",
             f"design: {out}",
         ]
     )

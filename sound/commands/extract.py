@@ -5,65 +5,67 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from pathlib import Path
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from carillon.arguments import whole_number
 from carillon.errors import UserError
+from carillon.options import REQUIRED, add_options, collect, option
 
 if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     from sound.clips.extraction import ModalSound
     from sound.clips.targets import Targets
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's arguments."""
-    parser.add_argument("clips", nargs="+", metavar="CLIP.wav", help="a strike each")
-    parser.add_argument(
-        "--modes",
+@dataclass(frozen=True)
+class ExtractOptions:
+    """Clips whose modes are extracted, and what is written of them."""
+
+    clips: list[str] = option(REQUIRED, "a strike each", nargs="+", metavar="CLIP.wav")
+    modes: int | None = option(
+        None,
+        "modes to keep, shared by all clips, those that carry most (default: all)",
         type=whole_number(1),
-        help="modes to keep, shared by all clips, those that carry most (default: all)",
     )
-    parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
-    parser.add_argument("--out", metavar="FILE.json", help="write the same JSON to a file, too")
-    parser.add_argument(
-        "--residual", metavar="FILE.wav", help="write what is left of one clip without its modes"
+    json: bool = option(False, "print JSON instead of tables")
+    out: str | None = option(None, "write the same JSON to a file, too", metavar="FILE.json")
+    residual: str | None = option(
+        None, "write what is left of one clip without its modes", metavar="FILE.wav"
     )
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command line."""
+    add_options(parser, ExtractOptions, positional=("clips",))
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the command."""
+    """Extract, write and print."""
     from carillon.files import atomic_path
-    from sound.clips.files import extract_file
+    from sound.clips.files import clip_names, extract_file
     from sound.clips.targets import share_frequencies
     from sound.clips.wav import ENDINGS, write_wav
     from sound.outputs import require_output
 
-    if arguments.residual is not None and len(arguments.clips) > 1:
+    options = collect(ExtractOptions, arguments)
+    if options.residual is not None and len(options.clips) > 1:
         raise UserError(
-            f"--residual writes what is left of one clip, {len(arguments.clips)} were given"
+            f"--residual writes what is left of one clip, {len(options.clips)} were given"
         )
-    if arguments.out is not None:
-        require_output(arguments.out, (".json",), arguments.clips)
-    if arguments.residual is not None:
-        require_output(arguments.residual, ENDINGS, arguments.clips)
-    sounds = [extract_file(clip, visible=sys.stderr.isatty()) for clip in arguments.clips]
-    targets = share_frequencies(_names(arguments.clips), sounds, arguments.modes)
-    if arguments.residual is not None:
-        write_wav(arguments.residual, sounds[0].residual, sounds[0].rate)
-    content = _content(arguments.clips, sounds, targets)
-    if arguments.out is not None:
-        with atomic_path(arguments.out) as temporary:
+    if options.out is not None:
+        require_output(options.out, (".json",), options.clips)
+    if options.residual is not None:
+        require_output(options.residual, ENDINGS, options.clips)
+    sounds = [extract_file(clip, visible=sys.stderr.isatty()) for clip in options.clips]
+    targets = share_frequencies(clip_names(options.clips), sounds, options.modes)
+    if options.residual is not None:
+        write_wav(options.residual, sounds[0].residual, sounds[0].rate)
+    content = _content(options.clips, sounds, targets)
+    if options.out is not None:
+        with atomic_path(options.out) as temporary:
             temporary.write_text(json.dumps(content, indent=2) + "\n")
-    print(json.dumps(content, indent=2) if arguments.json else "\n".join(_lines(content)))
+    print(json.dumps(content, indent=2) if options.json else "\n".join(_lines(content)))
     return 0
-
-
-def _names(clips: list[str]) -> list[str]:
-    """Names of the clips without folder and ending, or numbers where those are not unique."""
-    names = [Path(clip).stem for clip in clips]
-    unique = len(set(names)) == len(names)
-    return names if unique else [f"clip {number + 1}" for number in range(len(names))]
 
 
 def _content(clips: list[str], sounds: list[ModalSound], targets: Targets) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from carillon.arguments import number_between, positive_number, whole_number
 from carillon.errors import UserError
+from carillon.options import REQUIRED, add_options, collect, option
 from sound.bounds import require_length, sample_rate
 
 if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
@@ -31,6 +32,69 @@ LEAST_IMPULSE, LARGEST_IMPULSE = 1e-6, 1e6
 """What somebody may strike with [N s]."""
 
 
+@dataclass(frozen=True)
+class PointOptions:
+    """Where a solid is struck, by one of the three."""
+
+    target: str | None = option(None, "strike where a target was assigned", metavar="NAME")
+    vertex: int | None = option(None, "strike a vertex of the surface", type=whole_number(0))
+    at: list[float] | None = option(
+        None,
+        "strike the surface near a point [m]",
+        type=number_between(-1e9, 1e9, "m"),
+        nargs=3,
+        metavar=("X", "Y", "Z"),
+    )
+
+
+@dataclass(frozen=True)
+class ImpulseOptions:
+    """How a solid is struck, by one of the two."""
+
+    impulse: list[float] | None = option(
+        None,
+        "impulse [N s]",
+        type=number_between(-LARGEST_IMPULSE, LARGEST_IMPULSE, "N s"),
+        nargs=3,
+        metavar=("FX", "FY", "FZ"),
+    )
+    strength: float = option(
+        1.0,
+        "impulse along the inward normal [N s] (default 1, which sounds as loud as the clip)",
+        type=number_between(LEAST_IMPULSE, LARGEST_IMPULSE, "N s"),
+    )
+
+
+@dataclass(frozen=True)
+class RenderOptions:
+    """What sounds, and the sound that is written."""
+
+    file: str = option(REQUIRED, "design.h5, or modes.h5 of the solver")
+    out: str = option(REQUIRED, "file to write (WAV)")
+    seconds: float | None = option(None, "length (default: until it decays)", type=positive_number)
+    rate: int = option(44_100, "samples per second", type=sample_rate)
+    contact_seconds: float = option(
+        0.0,
+        "duration of the force, half a sine (default 0: an impulse)",
+        type=number_between(0.0, LONGEST_CONTACT, "s"),
+    )
+    no_residual: bool = option(False, "modes only, without the rest of the clips")
+    like: str | None = option(
+        None,
+        "for modes.h5 of a designed object: dampings, points, loudness, residuals of a design",
+        metavar="DESIGN",
+    )
+    damping: list[float] | None = option(
+        None,
+        "for modes.h5: Rayleigh damping, coefficients of mass [1/s] and stiffness [s] "
+        "(default 30 1e-6)",
+        type=number_between(0.0, 1e9),
+        nargs=2,
+        metavar=("ALPHA", "BETA"),
+    )
+    json: bool = option(False, "print what sounds as JSON")
+
+
 @dataclass
 class _Scene:
     """What is struck, where and how: the solid, its loudness, a point and an impulse there."""
@@ -42,60 +106,10 @@ class _Scene:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's arguments."""
-    parser.add_argument("file", metavar="FILE", help="design.h5, or modes.h5 of the solver")
-    point = parser.add_mutually_exclusive_group(required=True)
-    point.add_argument("--target", metavar="NAME", help="strike where a target was assigned")
-    point.add_argument("--vertex", type=whole_number(0), help="strike a vertex of the surface")
-    point.add_argument(
-        "--at",
-        type=number_between(-1e9, 1e9, "m"),
-        nargs=3,
-        metavar=("X", "Y", "Z"),
-        help="strike the surface near a point [m]",
-    )
-    impulse = parser.add_mutually_exclusive_group()
-    impulse.add_argument(
-        "--impulse",
-        type=number_between(-LARGEST_IMPULSE, LARGEST_IMPULSE, "N s"),
-        nargs=3,
-        metavar=("FX", "FY", "FZ"),
-        help="impulse [N s]",
-    )
-    impulse.add_argument(
-        "--strength",
-        type=number_between(LEAST_IMPULSE, LARGEST_IMPULSE, "N s"),
-        default=1.0,
-        help="impulse along the inward normal [N s] (default 1, which sounds as loud as the clip)",
-    )
-    parser.add_argument("--seconds", type=positive_number, help="length (default: until it decays)")
-    parser.add_argument(
-        "--rate", type=sample_rate, default=44_100, help="samples per second (default 44100)"
-    )
-    parser.add_argument(
-        "--contact-seconds",
-        type=number_between(0.0, LONGEST_CONTACT, "s"),
-        default=0.0,
-        help="duration of the force, half a sine (default 0: an impulse)",
-    )
-    parser.add_argument(
-        "--no-residual", action="store_true", help="modes only, without the rest of the clips"
-    )
-    parser.add_argument(
-        "--like",
-        metavar="DESIGN",
-        help="for modes.h5 of a designed object: dampings, points, loudness, residuals of a design",
-    )
-    parser.add_argument(
-        "--damping",
-        type=number_between(0.0, 1e9),
-        nargs=2,
-        metavar=("ALPHA", "BETA"),
-        help="for modes.h5: Rayleigh damping, coefficients of mass [1/s] and stiffness [s] "
-        "(default 30 1e-6)",
-    )
-    parser.add_argument("--out", required=True, help="file to write (WAV)")
-    parser.add_argument("--json", action="store_true", help="print what sounds as JSON")
+    """Describe the command line."""
+    add_options(parser.add_mutually_exclusive_group(required=True), PointOptions)
+    add_options(parser.add_mutually_exclusive_group(), ImpulseOptions)
+    add_options(parser, RenderOptions, positional=("file",))
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -106,42 +120,43 @@ def run(arguments: argparse.Namespace) -> int:
     from sound.outputs import require_output
     from sound.rendering.render import Hit, render, ringing_seconds
 
-    require_output(arguments.out, ENDINGS, [arguments.file, arguments.like or arguments.file])
-    if arguments.seconds is not None and arguments.seconds > LONGEST_SECONDS:
-        raise UserError(f"--seconds {arguments.seconds:g}: expected at most {LONGEST_SECONDS:g}")
-    if arguments.seconds is not None:
-        require_length(arguments.seconds, arguments.rate)
-    scene = _scene(arguments)
+    options = collect(RenderOptions, arguments)
+    require_output(options.out, ENDINGS, [options.file, options.like or options.file])
+    if options.seconds is not None and options.seconds > LONGEST_SECONDS:
+        raise UserError(f"--seconds {options.seconds:g}: expected at most {LONGEST_SECONDS:g}")
+    if options.seconds is not None:
+        require_length(options.seconds, options.rate)
+    scene = _scene(options, collect(PointOptions, arguments), collect(ImpulseOptions, arguments))
     hit = Hit(0.0, scene.position, scene.impulse)
     sound = render(
         scene.solid,
         [hit],
-        arguments.seconds or ringing_seconds(scene.solid),
-        arguments.rate,
-        arguments.contact_seconds,
+        options.seconds or ringing_seconds(scene.solid),
+        options.rate,
+        options.contact_seconds,
         scene.listening,
-        not arguments.no_residual,
+        not options.no_residual,
     )
     gain = 1.0 if scene.listening is None else scene.listening.gain(scene.position)
     peak = float(np.abs(sound).max(initial=0.0))
     if scene.listening is None and peak > 0.0:
         gain = PEAK / peak
         sound, peak = gain * sound, PEAK
-    write_wav(arguments.out, sound, arguments.rate)
-    found = _summary(arguments, scene, gain, peak)
-    print(json.dumps(found) if arguments.json else _sentence(found))
+    write_wav(options.out, sound, options.rate)
+    summary = _summary(options, scene, gain, peak)
+    print(json.dumps(summary) if options.json else _sentence(summary))
     if peak > 1.0:
         print(f"sound: {peak:.2f} of full scale; lower --strength for players", file=sys.stderr)
     return 0
 
 
-def _scene(arguments: argparse.Namespace) -> _Scene:
+def _scene(options: RenderOptions, point: PointOptions, strike: ImpulseOptions) -> _Scene:
     import numpy as np
 
-    position, inward, solid, listening = _point_of_solid(arguments)
-    if arguments.impulse is None:
-        return _Scene(solid, listening, position, arguments.strength * inward)
-    impulse = np.array(arguments.impulse)
+    position, inward, solid, listening = _point_of_solid(options, point)
+    if strike.impulse is None:
+        return _Scene(solid, listening, position, strike.strength * inward)
+    impulse = np.array(strike.impulse)
     strength = float(np.linalg.norm(impulse))
     if strength < LEAST_IMPULSE:
         raise UserError(
@@ -152,7 +167,7 @@ def _scene(arguments: argparse.Namespace) -> _Scene:
 
 
 def _point_of_solid(
-    arguments: argparse.Namespace,
+    options: RenderOptions, point: PointOptions
 ) -> tuple[Array, Array, SoundingSolid, Listening | None]:
     """Struck point, inward normal there, the solid, and how its clips are heard if it has some."""
     from carillon.files import kind_of
@@ -162,69 +177,67 @@ def _point_of_solid(
     from sound.rendering.listening import Listening
     from sound.rendering.solid import SoundingSolid
 
-    has_modes = kind_of(arguments.file, "a Carillon design or modes file (HDF5)")[0] == "modes"
-    if not has_modes and (arguments.damping or arguments.like):
+    has_modes = kind_of(options.file, "a Carillon design or modes file (HDF5)")[0] == "modes"
+    if not has_modes and (options.damping or options.like):
         raise UserError("--damping and --like go with modes.h5; a design has dampings of its own")
-    if arguments.damping and arguments.like:
+    if options.damping and options.like:
         raise UserError("--damping and --like exclude each other; a design tells all dampings")
-    if has_modes and not arguments.like:
-        file = read_modes(arguments.file)
-        damping = Damping(*arguments.damping) if arguments.damping else Damping()
-        return *_voxel_point(arguments, file.mesh), SoundingSolid.of_modes(file, damping), None
-    design = read_design(arguments.like or arguments.file)
+    if has_modes and not options.like:
+        file = read_modes(options.file)
+        damping = Damping(*options.damping) if options.damping else Damping()
+        return *_voxel_point(point, file.mesh), SoundingSolid.of_modes(file, damping), None
+    design = read_design(options.like or options.file)
     if has_modes:
-        solid = SoundingSolid.of_truth(read_modes(arguments.file), design)
+        solid = SoundingSolid.of_truth(read_modes(options.file), design)
     else:
         solid = SoundingSolid.of_design(design)
-    return *_surface_point(arguments, design), solid, Listening.of_design(design, solid)
+    return *_surface_point(point, design), solid, Listening.of_design(design, solid)
 
 
-def _surface_point(arguments: argparse.Namespace, design: Design) -> tuple[Array, Array]:
+def _surface_point(point: PointOptions, design: Design) -> tuple[Array, Array]:
     """Struck point of a design's surface and inward normal there."""
-    if arguments.target is not None:
+    if point.target is not None:
         strikes = {strike.name: strike for strike in design.strikes}
-        if arguments.target not in strikes:
+        if point.target not in strikes:
             raise UserError(
-                f"--target {arguments.target}: the design has no such target, expected one of "
+                f"--target {point.target}: the design has no such target, expected one of "
                 f"{', '.join(strikes)}"
             )
-        strike = strikes[arguments.target]
+        strike = strikes[point.target]
         return strike.position, strike.inward
     import trimesh
 
     from sound.strikes import locate
 
     surface = trimesh.Trimesh(design.surface_vertices, design.surface_faces, process=False)
-    what = "--at" if arguments.vertex is None else "--vertex"
-    strike = locate(surface, what, arguments.at, arguments.vertex)
+    what = "--at" if point.vertex is None else "--vertex"
+    strike = locate(surface, what, point.at, point.vertex)
     return strike.position, strike.inward
 
 
-def _voxel_point(arguments: argparse.Namespace, mesh: Any) -> tuple[Array, Array]:
+def _voxel_point(point: PointOptions, mesh: Any) -> tuple[Array, Array]:
     """Struck point of the voxels' surface and inward normal there."""
     import numpy as np
 
     from solver.response.contact import surface_node, surface_normals
 
-    if arguments.at is None:
+    if point.at is None:
         raise UserError(
             "a modes file knows neither targets nor the vertices of a surface; strike it --at a "
             "point, or name its design by --like"
         )
     nodes, outward = surface_normals(mesh)
-    index = surface_node(mesh, np.array(arguments.at), "--at")
+    index = surface_node(mesh, np.array(point.at), "--at")
     return mesh.nodes[nodes[index]], -outward[index]
 
 
-def _summary(
-    arguments: argparse.Namespace, scene: _Scene, gain: float, peak: float
-) -> dict[str, Any]:
+def _summary(options: RenderOptions, scene: _Scene, gain: float, peak: float) -> dict[str, Any]:
     solid = scene.solid
     amplitudes = gain * solid.amplitudes(scene.position[None], scene.impulse[None])[0]
-    heard = solid.frequencies < arguments.rate / 2.0
+    heard = solid.frequencies < options.rate / 2.0
     return {
-        "out": str(Path(arguments.out)),
-        "rate_hz": arguments.rate,
+        "out": str(Path(options.out)),
+        "rate_hz": options.rate,
         "position_m": scene.position.tolist(),
         "impulse_newton_seconds": scene.impulse.tolist(),
         "gain": gain,
@@ -236,10 +249,10 @@ def _summary(
     }
 
 
-def _sentence(found: dict[str, Any]) -> str:
-    hertz = found["frequencies_hz"]
+def _sentence(summary: dict[str, Any]) -> str:
+    hertz = summary["frequencies_hz"]
     span = f", {min(hertz):.4g} to {max(hertz):.4g} Hz" if hertz else ""
-    text = f"{found['out']}: {len(hertz)} modes{span}, peak {found['peak']:.3g} of full scale"
-    if found["modes_left_out"]:
-        text += f"; {found['modes_left_out']} above half the sampling rate are left out"
+    text = f"{summary['out']}: {len(hertz)} modes{span}, peak {summary['peak']:.3g} of full scale"
+    if summary["modes_left_out"]:
+        text += f"; {summary['modes_left_out']} above half the sampling rate are left out"
     return text

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.threads import one_thread
-from sound.design.designing import design
 from sound.design.objective import fall
+from sound.design.optimise import optimise
 from sound.design.optimisers import OPTIMISERS
-from sound.design.preparation import Prepared
+from sound.design.preparation import DesignProblem
 from sound.design.simulation import Evaluation
 from sound.project.design_file import Design
 
@@ -31,17 +31,17 @@ class EvaluationTimes:
 
     Attributes
     ----------
-    cold_seconds
+    cold_seconds : float [s]
         From nothing.
-    warm_seconds
+    warm_seconds : float [s]
         From the modes of a material that differs by `CHANGE`.
-    gradient_seconds
+    gradient_seconds : float [s]
         The same, with derivatives of all frequencies and amplitudes.
-    analysis_seconds
+    analysis_seconds : float [s]
         Of the warm one, the modal analysis; the rest is coarsening.
-    runs
+    runs : int
         Measured after one that warms up.
-    n_dofs, modes, coordinates
+    n_dofs, modes, coordinates : int
         Size of what was evaluated.
     """
 
@@ -55,10 +55,10 @@ class EvaluationTimes:
     coordinates: int
 
 
-def time_evaluations(prepared: Prepared, runs: int = 7, seed: int = 0) -> EvaluationTimes:
+def time_evaluations(problem: DesignProblem, runs: int = 7, seed: int = 0) -> EvaluationTimes:
     """Median times of evaluations near the uniform material."""
     with one_thread():
-        simulation = prepared.setting.simulation()
+        simulation = problem.setting.simulation()
         size = simulation.material.dimensions
         random = np.random.default_rng(seed)
         moves = random.standard_normal((runs + 1, size))
@@ -81,31 +81,31 @@ def time_evaluations(prepared: Prepared, runs: int = 7, seed: int = 0) -> Evalua
 
 
 def compare_optimisers(
-    prepared: Prepared, report: Callable[[str], None] | None = None
+    problem: DesignProblem, report: Callable[[str], None] | None = None
 ) -> list[dict[str, Any]]:
     """One row for each optimiser, all with the project's budget, seed and workers."""
     rows = []
     for method in OPTIMISERS:
         if report is not None:
             report(method)
-        project = prepared.project
+        project = problem.project
         chosen = replace(project, optimiser=replace(project.optimiser, method=method))
-        rows.append(_row(method, design(replace(prepared, project=chosen))))
+        rows.append(_row(method, optimise(replace(problem, project=chosen))))
     return rows
 
 
 def benchmark(
-    prepared: Prepared, runs: int, report: Callable[[str], None] | None = None
+    problem: DesignProblem, runs: int, report: Callable[[str], None] | None = None
 ) -> dict[str, Any]:
     """Times of evaluations, and the optimisers' rows."""
     if report is not None:
         report("evaluations")
-    times = time_evaluations(prepared, runs, prepared.project.optimiser.seed)
-    return {"evaluation": asdict(times), "rows": compare_optimisers(prepared, report)}
+    times = time_evaluations(problem, runs, problem.project.optimiser.seed)
+    return {"evaluation": asdict(times), "rows": compare_optimisers(problem, report)}
 
 
-def _row(method: str, found: Design) -> dict[str, Any]:
-    evidence, history = found.evidence, found.history
+def _row(method: str, design: Design) -> dict[str, Any]:
+    evidence, history = design.evidence, design.history
     start, end = float(history["cost"][0]), float(history["cost"][-1])
     low = np.flatnonzero(history["cost"] <= 0.1 * start)
     return {

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
 from sound.design.material import ReducedMaterial
-from sound.design.objective import Cost, Objective
+from sound.design.objective import DesignCost, Objective
 from sound.design.simulation import Evaluation, Simulation
 
 Array = NDArray[np.float64]
@@ -30,8 +30,8 @@ TINY, LARGE = 1e-300, 1e12
 
 
 @dataclass(frozen=True)
-class Manner:
-    """How a descent goes.
+class StepOptions:
+    """How the Gauss-Newton steps of a descent go.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class LimitedMemory:
     Attributes
     ----------
     evaluations
-        Gradients that stand for one step of the other manner.
+        Gradients that stand for one Gauss-Newton step.
     """
 
     evaluations: int
@@ -67,10 +67,10 @@ class Squares:
 
     Attributes
     ----------
-    residual
-        (r,) weighted.
-    jacobian
-        (r, m).
+    residual : (r,)
+        Weighted.
+    jacobian : (r, m)
+        Its derivatives.
     """
 
     residual: Array
@@ -88,14 +88,14 @@ class Squares:
 
 
 @dataclass(frozen=True)
-class Limits:
+class DescentLimits:
     """When a descent ends in any case.
 
     Attributes
     ----------
-    deadline
-        Monotonic clock [s] from which no material is looked at.
-    evaluations
+    deadline : float [s]
+        Monotonic clock from which no material is looked at.
+    evaluations : float
         Materials that are looked at, at most; that of the start always is.
     """
 
@@ -107,24 +107,24 @@ class Limits:
         return evaluations >= self.evaluations or time.monotonic() >= self.deadline
 
 
-class Way(NamedTuple):
-    """A cost on the way: when (monotonic clock [s]), after how many evaluations, and what."""
+class CostPoint(NamedTuple):
+    """A cost during a descent: when (monotonic clock [s]), after how many evaluations, and what."""
 
     clock: float
     evaluations: int
-    cost: Cost
+    cost: DesignCost
 
 
 @dataclass
-class Descent:
+class DescentState:
     """How far a descent came.
 
     Attributes
     ----------
-    found
+    last
         The last material, with derivatives; none where it stayed in another process.
-    way
-        Costs from its start on, the last one that of `found`.
+    costs
+        Those from its start on, the one at the end that of `last`.
     evaluations
         Materials looked at.
     damping
@@ -133,45 +133,49 @@ class Descent:
         Whether no step was to be found any more.
     """
 
-    found: Evaluation | None
-    way: list[Way]
+    last: Evaluation | None
+    costs: list[CostPoint]
     evaluations: int
     damping: tuple[float, ...]
     stalled: bool = False
 
     @property
-    def cost(self) -> Cost:
+    def cost(self) -> DesignCost:
         """Cost of the last material."""
-        return self.way[-1].cost
+        return self.costs[-1].cost
 
 
-def cost_of(objective: Objective, material: ReducedMaterial, found: Evaluation) -> Cost:
+def cost_of(objective: Objective, material: ReducedMaterial, evaluation: Evaluation) -> DesignCost:
     """Eq. (4) of a material."""
-    return objective.cost(found.eigenvalues, found.pushed, material.regulariser(found.z))
+    return objective.cost(
+        evaluation.eigenvalues, evaluation.pushed, material.regulariser(evaluation.z)
+    )
 
 
 def squares_of(
     objective: Objective,
     material: ReducedMaterial,
-    found: Evaluation,
+    evaluation: Evaluation,
     frequency: bool = True,
     amplitude: bool = True,
 ) -> Squares:
     """Weighted residuals of a material with derivatives, those of the regulariser included."""
-    weights, sensitivity = objective.weights, found.sensitivity
+    weights, sensitivity = objective.weights, evaluation.sensitivity
     assert sensitivity is not None
     root = np.sqrt(weights.regulariser * material.laplacian)
-    residuals, rows = [root * found.z], [np.diag(root)]
+    residuals, rows = [root * evaluation.z], [np.diag(root)]
     if frequency:
         factor = np.sqrt(weights.frequency)
-        residuals.append(factor * objective.frequency_residual(found.eigenvalues))
-        rows.append(factor * objective.frequency_jacobian(found.eigenvalues, sensitivity))
+        residuals.append(factor * objective.frequency_residual(evaluation.eigenvalues))
+        rows.append(factor * objective.frequency_jacobian(evaluation.eigenvalues, sensitivity))
     if amplitude:
         factor = np.sqrt(weights.amplitude)
-        difference = objective.amplitude_residual(found.eigenvalues, found.pushed)
-        slopes = objective.amplitude_jacobian(found.eigenvalues, found.pushed, sensitivity)
+        difference = objective.amplitude_residual(evaluation.eigenvalues, evaluation.pushed)
+        slopes = objective.amplitude_jacobian(
+            evaluation.eigenvalues, evaluation.pushed, sensitivity
+        )
         residuals.append(factor * difference.ravel())
-        rows.append(factor * slopes.reshape(-1, len(found.z)))
+        rows.append(factor * slopes.reshape(-1, len(evaluation.z)))
     return Squares(np.concatenate(residuals), np.concatenate(rows))
 
 
@@ -180,11 +184,11 @@ def descend(
     objective: Objective,
     z: Array,
     start: Array | None,
-    manner: Manner,
+    options: StepOptions,
     steps: int,
     damping: tuple[float, ...] | None = None,
-    limits: Limits = Limits(),
-) -> Descent:
+    limits: DescentLimits = DescentLimits(),
+) -> DescentState:
     """Up to `steps` steps from z, each of which lowers the whole of Eq. (4).
 
     Parameters
@@ -192,7 +196,7 @@ def descend(
     start
         Modes to begin from, see `Simulation.evaluate`.
     damping
-        Where a former descent in the same manner ended.
+        Where a former descent with the same options ended.
     limits
         That end it earlier.
 
@@ -201,16 +205,16 @@ def descend(
     ConvergenceError
         If z itself has no modes.
     """
-    found = simulation.evaluate(z, start, derivatives=True)
-    way = [Way(time.monotonic(), 1, cost_of(objective, simulation.material, found))]
-    here = Descent(found, way, 1, damping or (manner.damping,) * len(manner.parts))
+    evaluation = simulation.evaluate(z, start, derivatives=True)
+    costs = [CostPoint(time.monotonic(), 1, cost_of(objective, simulation.material, evaluation))]
+    here = DescentState(evaluation, costs, 1, damping or (options.damping,) * len(options.parts))
     idle = 0
     for step in range(steps):
-        taken = _step(simulation, objective, here, manner, step % len(manner.parts), limits)
+        taken = _step(simulation, objective, here, options, step % len(options.parts), limits)
         if limits.reached(here.evaluations):
             break
         idle = 0 if taken else idle + 1
-        here.stalled = idle == len(manner.parts)
+        here.stalled = idle == len(options.parts)
         if here.stalled:
             break
     return here
@@ -222,38 +226,38 @@ def descend_by_gradients(
     z: Array,
     start: Array | None,
     evaluations: int,
-    limits: Limits = Limits(),
-) -> Descent:
+    limits: DescentLimits = DescentLimits(),
+) -> DescentState:
     """Descent by L-BFGS (scipy), with about as many gradients as `evaluations` says.
 
     Parameters and errors are those of `descend`.
     """
     from scipy.optimize import minimize
 
-    found = simulation.evaluate(z, start, derivatives=True)
-    way = [Way(time.monotonic(), 1, cost_of(objective, simulation.material, found))]
-    here = Descent(found, way, 1, ())
+    evaluation = simulation.evaluate(z, start, derivatives=True)
+    costs = [CostPoint(time.monotonic(), 1, cost_of(objective, simulation.material, evaluation))]
+    here = DescentState(evaluation, costs, 1, ())
 
     def value(point: Array) -> tuple[float, Array]:
         if limits.reached(here.evaluations):
             raise _LimitError
         here.evaluations += 1
         try:
-            assert here.found is not None
-            tried = simulation.evaluate(point, here.found.modes, derivatives=True)
+            assert here.last is not None
+            tried = simulation.evaluate(point, here.last.modes, derivatives=True)
         except ConvergenceError:
             return LARGE, np.zeros(len(point))
         cost = cost_of(objective, simulation.material, tried)
         if cost.total < here.cost.total:
-            here.found = tried
-            here.way.append(Way(time.monotonic(), here.evaluations, cost))
+            here.last = tried
+            here.costs.append(CostPoint(time.monotonic(), here.evaluations, cost))
         return cost.total, squares_of(objective, simulation.material, tried).gradient
 
     try:
         minimize(value, z, jac=True, method="L-BFGS-B", options={"maxfun": evaluations})
     except _LimitError:
         return here
-    here.stalled = len(here.way) == 1
+    here.stalled = len(here.costs) == 1
     return here
 
 
@@ -264,23 +268,23 @@ class _LimitError(Exception):
 def _step(
     simulation: Simulation,
     objective: Objective,
-    here: Descent,
-    manner: Manner,
+    here: DescentState,
+    options: StepOptions,
     part: int,
-    limits: Limits,
+    limits: DescentLimits,
 ) -> bool:
     """Take one step, if there is one that lowers the cost."""
-    assert here.found is not None
-    squares = squares_of(objective, simulation.material, here.found, *manner.parts[part])
+    assert here.last is not None
+    squares = squares_of(objective, simulation.material, here.last, *options.parts[part])
     curvature, gradient = squares.curvature, squares.gradient
     damping = here.damping[part]
     while damping <= LARGEST_DAMPING and curvature.any():
         if limits.reached(here.evaluations):
             return False
-        move = _damped(curvature, gradient, damping, manner.longest)
+        move = _damped(curvature, gradient, damping, options.longest)
         here.evaluations += 1
         try:
-            tried = simulation.evaluate(here.found.z + move, here.found.modes)
+            tried = simulation.evaluate(here.last.z + move, here.last.modes)
             cost = cost_of(objective, simulation.material, tried)
         except ConvergenceError:
             cost = None
@@ -291,10 +295,10 @@ def _step(
         if here.cost.total - cost.total > FORETOLD * foretold:
             damping *= SOFTER
         here.damping = _replaced(here.damping, part, damping)
-        here.found = simulation.differentiate(tried)
-        here.way.append(Way(time.monotonic(), here.evaluations, cost))
+        here.last = simulation.differentiate(tried)
+        here.costs.append(CostPoint(time.monotonic(), here.evaluations, cost))
         return True
-    here.damping = _replaced(here.damping, part, manner.damping)
+    here.damping = _replaced(here.damping, part, options.damping)
     return False
 
 

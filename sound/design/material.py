@@ -40,13 +40,13 @@ class ReducedMaterial:
 
     Attributes
     ----------
-    basis
-        (M, m) modes of the Laplacian without the constant, their rms value 1.
-    laplacian
-        (m,) eigenvalues of the Laplacian, the diagonal of Q in Eq. (4).
-    young
-        Modulus Y0 [Pa].
-    law
+    basis : (M, m)
+        Modes of the Laplacian without the constant, their rms value 1.
+    laplacian : (m,)
+        Eigenvalues of the Laplacian, the diagonal of Q in Eq. (4).
+    young : float [Pa]
+        Modulus Y0.
+    law : str
         One of `LAWS`.
     """
 

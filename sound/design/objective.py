@@ -42,10 +42,10 @@ class Sensitivity:
 
     Attributes
     ----------
-    stiffness
-        (m, N, N) u_i^T (dK/dz) u_j of the elastic modes [rad^2/s^2].
-    outside
-        (m, T, N) part of the derivative of each pushed mode that lies outside the computed modes.
+    stiffness : (m, N, N) [rad^2/s^2]
+        u_i^T (dK/dz) u_j of the elastic modes.
+    outside : (m, T, N)
+        Part of the derivative of each pushed mode that lies outside the computed modes.
     """
 
     stiffness: Array
@@ -53,7 +53,7 @@ class Sensitivity:
 
 
 @dataclass(frozen=True)
-class Cost:
+class DesignCost:
     """Value of Eq. (4) and its parts, each without its weight."""
 
     total: float
@@ -77,8 +77,8 @@ class Objective:
         self.targets = targets
         self.weights = weights
         self._bark = bark(targets.frequencies)
-        wanted = _average(targets.frequencies, targets.amplitudes**2)
-        self._wanted = np.sqrt(wanted / np.maximum(wanted.max(axis=1, keepdims=True), TINY))
+        energies = _average(targets.frequencies, targets.amplitudes**2)
+        self._target = np.sqrt(energies / np.maximum(energies.max(axis=1, keepdims=True), TINY))
 
     def frequency_residual(self, eigenvalues: Array) -> Array:
         """Bark differences (N - 1,) of the second mode to the last (Eq. 1)."""
@@ -86,25 +86,25 @@ class Objective:
 
     def amplitude_residual(self, eigenvalues: Array, pushed: Array) -> Array:
         """Differences (T, N - 1) of the balances, of the second mode to the last (Eq. 2)."""
-        return np.asarray(self._balance(eigenvalues, pushed) - self._wanted)[:, 1:]
+        return np.asarray(self._balance(eigenvalues, pushed) - self._target)[:, 1:]
 
-    def cost(self, eigenvalues: Array, pushed: Array, regulariser: float) -> Cost:
+    def cost(self, eigenvalues: Array, pushed: Array, regulariser: float) -> DesignCost:
         """Eq. (4).
 
         Parameters
         ----------
-        eigenvalues
-            (N,) of the elastic modes [rad^2/s^2], ascending.
-        pushed
-            (T, N) u_k^T f of a unit impulse f along the inward normals [kg^-1/2 N s].
-        regulariser
+        eigenvalues : (N,) [rad^2/s^2]
+            Of the elastic modes, ascending.
+        pushed : (T, N) [kg^-1/2 N s]
+            u_k^T f of a unit impulse f along the inward normals.
+        regulariser : float
             R.
         """
         frequency = 0.5 * float(np.sum(self.frequency_residual(eigenvalues) ** 2))
         amplitude = 0.5 * float(np.sum(self.amplitude_residual(eigenvalues, pushed) ** 2))
         w = self.weights
         total = w.frequency * frequency + w.amplitude * amplitude + w.regulariser * regulariser
-        return Cost(total, frequency, amplitude, regulariser)
+        return DesignCost(total, frequency, amplitude, regulariser)
 
     def frequency_jacobian(self, eigenvalues: Array, sensitivity: Sensitivity) -> Array:
         """Derivatives (N - 1, m) of `frequency_residual`."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sound.design.descent import LimitedMemory, Manner
+from sound.design.descent import LimitedMemory, StepOptions
 from sound.design.pool import Task, Trial
 from sound.design.search import Search
 
@@ -17,10 +17,10 @@ Array = NDArray[np.float64]
 ALTERNATING = ((True, False), (False, True), (True, True))
 """E_f, then E_a (section 6), then both: by themselves they undo some of what the other gained."""
 TOGETHER = ((True, True),)
-MANNERS = (
-    Manner(ALTERNATING, damping=1e-2, longest=0.5),
-    Manner(TOGETHER, damping=1e-2, longest=0.5),
-    Manner(ALTERNATING, damping=10.0, longest=0.1),
+DESCENTS = (
+    StepOptions(ALTERNATING, damping=1e-2, longest=0.5),
+    StepOptions(TOGETHER, damping=1e-2, longest=0.5),
+    StepOptions(ALTERNATING, damping=10.0, longest=0.1),
     LimitedMemory(evaluations=2),
 )
 """How the descents go that run side by side: none is the best for all solids."""
@@ -37,10 +37,10 @@ def hybrid(search: Search, z: Array, seed: int, population: int | None) -> None:
     """Appendix 3: quasi-Newton descents to local optima, and offspring to leave them.
 
     Descents run side by side.  One that stalls gives its place to one of the best offspring that
-    the evolution strategy bears around the best material known; what descends from them is told to
-    the strategy, whose covariance learns where better optima lie.
+    the evolution strategy bears around the best material known; what descends from them goes back
+    to the strategy, whose covariance learns where better optima lie.
     """
-    lanes = [Task(z, manner=manner, steps=STEPS) for manner in MANNERS]
+    lanes = [Task(z, options=options, steps=STEPS) for options in DESCENTS]
     strategy: Any = None
     while True:
         trials = search.run(lanes)
@@ -58,7 +58,7 @@ def hybrid(search: Search, z: Array, seed: int, population: int | None) -> None:
         strategy.tell(points, [_rank(trial) for trial in offspring])
         new = [trial for trial in sorted(offspring, key=_rank) if not _is_known(trial, trials)]
         for lane, trial in zip(stalled, new):
-            lanes[lane] = Task(trial.z, best.start, manner=MANNERS[lane], steps=STEPS)
+            lanes[lane] = Task(trial.z, best.start, options=DESCENTS[lane], steps=STEPS)
 
 
 def evolution(search: Search, z: Array, seed: int, population: int | None) -> None:
@@ -105,7 +105,7 @@ def _continued(lane: Task, trial: Trial) -> Task:
 def _is_stalled(trial: Trial) -> bool:
     if trial.descent is None or trial.descent.stalled:
         return True
-    return trial.cost.total > (1.0 - WORTHWHILE) * trial.descent.way[0].cost.total
+    return trial.cost.total > (1.0 - WORTHWHILE) * trial.descent.costs[0].cost.total
 
 
 def _is_known(trial: Trial, others: list[Trial]) -> bool:

@@ -14,10 +14,10 @@ from carillon.errors import ConvergenceError, UserError
 from carillon.threads import one_thread
 from solver.files.modes_file import frequencies
 from sound.design.descent import cost_of
-from sound.design.objective import Cost
+from sound.design.objective import DesignCost
 from sound.design.pool import Trial
-from sound.design.preparation import Prepared
-from sound.design.search import Moment, Search
+from sound.design.preparation import DesignProblem
+from sound.design.search import HistoryEntry, Search
 from sound.design.simulation import Evaluation, Simulation
 from sound.project.design_file import HISTORY_TYPE, Design
 
@@ -29,8 +29,8 @@ FINAL_TOLERANCE = 1e-8
 class _Analysed:
     """A trial's material, analysed to `FINAL_TOLERANCE`, and its cost."""
 
-    found: Evaluation
-    cost: Cost
+    evaluation: Evaluation
+    cost: DesignCost
 
 
 class Outcome:
@@ -39,14 +39,14 @@ class Outcome:
     Analyses of a search are coarse: what is a little better by them may be a little worse.
     """
 
-    def __init__(self, prepared: Prepared, former_rows: NDArray[np.void]) -> None:
-        self._prepared = prepared
+    def __init__(self, problem: DesignProblem, former_rows: NDArray[np.void]) -> None:
+        self._problem = problem
         self._former_rows = former_rows
         self._start: _Analysed | None = None
 
     @cached_property
     def _simulation(self) -> Simulation:
-        return self._prepared.setting.simulation(FINAL_TOLERANCE)
+        return self._problem.setting.simulation(FINAL_TOLERANCE)
 
     def of(self, search: Search) -> Design:
         """The design that a search has found so far.
@@ -67,21 +67,21 @@ class Outcome:
         return self._design(search, chosen, start.cost)
 
     def _analysed(self, trial: Trial) -> _Analysed:
-        setting = self._prepared.setting
+        setting = self._problem.setting
         # As in the search: sums shared among threads round differently.
         with one_thread():
-            found = self._simulation.evaluate(trial.z, trial.start)
-            return _Analysed(found, cost_of(setting.objective, setting.material, found))
+            evaluation = self._simulation.evaluate(trial.z, trial.start)
+            return _Analysed(evaluation, cost_of(setting.objective, setting.material, evaluation))
 
-    def _design(self, search: Search, chosen: _Analysed, cost_start: Cost) -> Design:
-        prepared, setting, simulation = self._prepared, self._prepared.setting, self._simulation
-        found, cost, targets = chosen.found, chosen.cost, setting.objective.targets
-        factor = float((targets.frequencies[0] / frequencies(found.eigenvalues)[0]) ** 2)
-        moduli = setting.material.moduli(found.z)
+    def _design(self, search: Search, chosen: _Analysed, cost_start: DesignCost) -> Design:
+        problem, setting, simulation = self._problem, self._problem.setting, self._simulation
+        evaluation, cost, targets = chosen.evaluation, chosen.cost, setting.objective.targets
+        factor = float((targets.frequencies[0] / frequencies(evaluation.eigenvalues)[0]) ** 2)
+        moduli = setting.material.moduli(evaluation.z)
         seconds, evaluations = search.own_seconds, search.own_evaluations
         evidence: dict[str, Any] = {
-            "method": prepared.project.optimiser.method,
-            "workers": prepared.workers,
+            "method": problem.project.optimiser.method,
+            "workers": problem.workers,
             "cost_start": cost_start.total,
             "cost": cost.total,
             "frequency_cost": cost.frequency,
@@ -90,26 +90,26 @@ class Outcome:
             "evaluations": evaluations,
             "evaluations_per_minute": 60.0 * evaluations / seconds,
             "scale_of_moduli": factor,
-            "residual_max": found.modes.evidence["residual_max"],
-            "orthogonality": found.modes.evidence["orthogonality"],
-            "eigenvalue_error_estimate": found.modes.evidence["eigenvalue_error_estimate"],
+            "residual_max": evaluation.modes.evidence["residual_max"],
+            "orthogonality": evaluation.modes.evidence["orthogonality"],
+            "eigenvalue_error_estimate": evaluation.modes.evidence["eigenvalue_error_estimate"],
             "n_dofs": simulation.model.n_dofs,
         }
         return Design(
             strikes=list(setting.strikes),
             targets=targets,
-            coordinates=found.z,
+            coordinates=evaluation.z,
             young=factor * moduli,
             model=replace(simulation.model, young=factor * simulation.elements.moduli(moduli)),
-            eigenvalues=factor * found.modes.values,
-            modes=simulation.mesh_rows(found.modes.vectors),
-            surface_vertices=prepared.vertices,
-            surface_faces=prepared.faces,
+            eigenvalues=factor * evaluation.modes.values,
+            modes=simulation.mesh_rows(evaluation.modes.vectors),
+            surface_vertices=problem.vertices,
+            surface_faces=problem.faces,
             fine_grid=setting.mesh.grid,
             fine_origin=setting.mesh.origin,
             fine_edge=setting.mesh.edge,
             history=np.concatenate([self._former_rows, history_rows(search.history)]),
-            settings=prepared.project.as_dict(),
+            settings=problem.project.as_dict(),
             evidence=evidence,
         )
 
@@ -124,19 +124,19 @@ def require_modes(search: Search) -> Trial:
     return search.start
 
 
-def history_rows(history: Sequence[Moment]) -> NDArray[np.void]:
-    """Moments as rows of a design's history."""
+def history_rows(history: Sequence[HistoryEntry]) -> NDArray[np.void]:
+    """Entries as rows of a design's history."""
     return np.array(
         [
             (
-                moment.seconds,
-                moment.evaluations,
-                moment.cost.total,
-                moment.cost.frequency,
-                moment.cost.amplitude,
-                moment.cost.regulariser,
+                entry.seconds,
+                entry.evaluations,
+                entry.cost.total,
+                entry.cost.frequency,
+                entry.cost.amplitude,
+                entry.cost.regulariser,
             )
-            for moment in history
+            for entry in history
         ],
         HISTORY_TYPE,
     )

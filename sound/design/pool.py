@@ -25,23 +25,23 @@ from carillon.fem.geometry import HexMesh
 from carillon.threads import one_thread
 from solver.analysis.problem import ProblemOptions
 from sound.design.descent import (
-    Descent,
+    DescentLimits,
+    DescentState,
     LimitedMemory,
-    Limits,
-    Manner,
+    StepOptions,
     cost_of,
     descend,
     descend_by_gradients,
     squares_of,
 )
 from sound.design.material import ReducedMaterial
-from sound.design.objective import Cost, Objective
+from sound.design.objective import DesignCost, Objective
 from sound.design.simulation import TOLERANCE, Simulation
 from sound.strikes import Strike
 
 Array = NDArray[np.float64]
 
-FAILED = Cost(np.inf, np.inf, np.inf, np.inf)
+FAILED = DesignCost(np.inf, np.inf, np.inf, np.inf)
 """Cost of a material whose modes could not be found."""
 
 
@@ -67,23 +67,23 @@ class Task:
 
     Attributes
     ----------
-    z
-        (m,) coordinates.
-    start
+    z : (m,)
+        Coordinates.
+    start : (3 n, k) or None
         Rows of modes to begin from.
-    gradient
-        Whether the gradient of the cost is wanted.
-    manner, steps, damping, limits
-        Of a descent, see `descend`; an evaluation alone if there is no manner.
+    gradient : bool
+        Whether the gradient of the cost is asked for.
+    options, steps, damping, limits
+        Of a descent, see `descend`; an evaluation alone if there are no options.
     """
 
     z: Array
     start: Array | None = None
     gradient: bool = False
-    manner: Manner | LimitedMemory | None = None
+    options: StepOptions | LimitedMemory | None = None
     steps: int = 0
     damping: tuple[float, ...] | None = None
-    limits: Limits = Limits()
+    limits: DescentLimits = DescentLimits()
 
 
 @dataclass(frozen=True)
@@ -92,23 +92,25 @@ class Trial:
 
     Attributes
     ----------
-    z, cost
-        The material and its cost, `FAILED` if there are no modes to be had.
-    evaluations
+    z : (m,)
+        Coordinates of the material.
+    cost
+        Its cost, `FAILED` if there are no modes to be had.
+    evaluations : int
         Materials looked at.
-    gradient
-        (m,) of the cost, if it was wanted.
+    gradient : (m,) or None
+        Of the cost, if it was asked for.
     descent
         How a descent went; its modes stay behind.
-    start
+    start : (3 n, k) or None
         Modes for others to begin from, of a descent or with the gradient.
     """
 
     z: Array
-    cost: Cost
+    cost: DesignCost
     evaluations: int
     gradient: Array | None = None
-    descent: Descent | None = None
+    descent: DescentState | None = None
     start: Array | None = None
 
 
@@ -204,28 +206,28 @@ def _run(task: Task) -> Trial:
     return Trial(task.z, FAILED, 1)
 
 
-def _descent(task: Task, manner: Manner | LimitedMemory) -> Descent:
+def _descent(task: Task, options: StepOptions | LimitedMemory) -> DescentState:
     parts = (_simulation, _objective, task.z, task.start)
-    if isinstance(manner, LimitedMemory):
-        return descend_by_gradients(*parts, task.steps * manner.evaluations, task.limits)
-    return descend(*parts, manner, task.steps, task.damping, task.limits)
+    if isinstance(options, LimitedMemory):
+        return descend_by_gradients(*parts, task.steps * options.evaluations, task.limits)
+    return descend(*parts, options, task.steps, task.damping, task.limits)
 
 
 def _done(task: Task) -> Trial:
-    if task.manner is not None:
-        descent = _descent(task, task.manner)
-        last = descent.found
+    if task.options is not None:
+        descent = _descent(task, task.options)
+        last = descent.last
         assert last is not None
         return Trial(
             last.z,
             descent.cost,
             descent.evaluations,
-            descent=replace(descent, found=None),
+            descent=replace(descent, last=None),
             start=last.modes.start(),
         )
-    found = _simulation.evaluate(task.z, task.start, task.gradient)
-    cost = cost_of(_objective, _simulation.material, found)
+    evaluation = _simulation.evaluate(task.z, task.start, task.gradient)
+    cost = cost_of(_objective, _simulation.material, evaluation)
     if not task.gradient:
         return Trial(task.z, cost, 1)
-    gradient = squares_of(_objective, _simulation.material, found).gradient
-    return Trial(task.z, cost, 1, gradient, start=found.modes.start())
+    gradient = squares_of(_objective, _simulation.material, evaluation).gradient
+    return Trial(task.z, cost, 1, gradient, start=evaluation.modes.start())

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Prepared:
+class DesignProblem:
     """What a search needs: the surface, the setting and the project they follow from."""
 
     project: Project
@@ -49,7 +49,7 @@ def targets_of(project: Project) -> Targets:
     return share_frequencies([target.name for target in project.targets], sounds, project.modes)
 
 
-def prepare(project: Project, targets: Targets | None = None) -> Prepared:
+def prepare(project: Project, targets: Targets | None = None) -> DesignProblem:
     """Mesh, material and objective of a project.
 
     Parameters
@@ -74,36 +74,36 @@ def prepare(project: Project, targets: Targets | None = None) -> Prepared:
         mesh, project.material.dimensions, project.material.young, project.material.law
     )
     setting = Setting(mesh, solid, material, strikes, objective)
-    return Prepared(project, np.asarray(surface.vertices), np.asarray(surface.faces), setting)
+    return DesignProblem(project, np.asarray(surface.vertices), np.asarray(surface.faces), setting)
 
 
-def require_same_voxels(prepared: Prepared, former: Design) -> None:
-    """Check that a project can go on from a former design.
+def require_same_voxels(problem: DesignProblem, initial: Design) -> None:
+    """Check that a project can go on from an initial design.
 
     Raises
     ------
     UserError
-        If the former design is of other voxels.
+        If the initial design is of other voxels.
     """
-    mesh = prepared.setting.mesh
-    if not np.array_equal(former.fine_grid, mesh.grid):
+    mesh = problem.setting.mesh
+    if not np.array_equal(initial.fine_grid, mesh.grid):
         raise UserError(
-            f"the design to go on from has {len(former.fine_grid):,} voxels, the project another "
+            f"the design to go on from has {len(initial.fine_grid):,} voxels, the project another "
             f"mesh of {mesh.n_cells:,}; begin a new design under another name"
         )
 
 
-def coordinates_of(prepared: Prepared, former: Design) -> Array:
-    """Coordinates (m,) whose material is that of a former design, as near as may be.
+def coordinates_of(problem: DesignProblem, initial: Design) -> Array:
+    """Coordinates (m,) whose material is that of an initial design, as near as may be.
 
     Raises
     ------
     UserError
-        If the former design is of other voxels.
+        If the initial design is of other voxels.
     """
-    require_same_voxels(prepared, former)
-    material = prepared.setting.material
-    same = former.settings.get("material") == prepared.project.as_dict()["material"]
-    if same and len(former.coordinates) == material.dimensions:
-        return former.coordinates
-    return material.coordinates(former.young)
+    require_same_voxels(problem, initial)
+    material = problem.setting.material
+    same = initial.settings.get("material") == problem.project.as_dict()["material"]
+    if same and len(initial.coordinates) == material.dimensions:
+        return initial.coordinates
+    return material.coordinates(initial.young)

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sound.design.descent import Limits
-from sound.design.objective import Cost
+from sound.design.descent import DescentLimits
+from sound.design.objective import DesignCost
 from sound.design.pool import Pool, Task, Trial
 
 Array = NDArray[np.float64]
@@ -25,12 +25,12 @@ class BudgetSpentError(Exception):
 
 
 @dataclass(frozen=True)
-class Moment:
+class HistoryEntry:
     """The best cost known after some time [s] and evaluations."""
 
     seconds: float
     evaluations: int
-    cost: Cost
+    cost: DesignCost
 
 
 class Search:
@@ -40,12 +40,14 @@ class Search:
     ----------
     make_pool
         Makes the processes that run them; their start counts as time of the search.
-    seconds, evaluations
-        Budget; None sets no limit.  Descents that run side by side get equal shares of the
-        evaluations that are left, so that what they find does not depend on which one comes first.
+    seconds : float or None [s]
+        Budget; None sets no limit.
+    evaluations : int or None
+        The same.  Descents that run side by side get equal shares of the evaluations that are left,
+        so that what they find does not depend on which one comes first.
     watch
         Called after every round of tasks; ends the search by returning True.
-    before
+    before : (float [s], int)
         Seconds and evaluations of former searches that this one goes on from.
 
     Attributes
@@ -68,7 +70,7 @@ class Search:
     ) -> None:
         self.best: Trial | None = None
         self.start: Trial | None = None
-        self.history: list[Moment] = []
+        self.history: list[HistoryEntry] = []
         self._most = evaluations
         self._watch = watch
         self._before = before
@@ -115,12 +117,12 @@ class Search:
     def _affordable(self, tasks: Sequence[Task]) -> list[Task]:
         """The first tasks that enough evaluations are left for, with their limits."""
         if self._most is None:
-            return [replace(task, limits=Limits(self.deadline)) for task in tasks]
+            return [replace(task, limits=DescentLimits(self.deadline)) for task in tasks]
         left = self._most - self._done
-        needed = 1 if all(task.manner is None for task in tasks) else FEWEST
+        needed = 1 if all(task.options is None for task in tasks) else FEWEST
         count = min(len(tasks), left // needed)
         return [
-            replace(task, limits=Limits(self.deadline, left // count + (k < left % count)))
+            replace(task, limits=DescentLimits(self.deadline, left // count + (k < left % count)))
             for k, task in enumerate(tasks[:count])
         ]
 
@@ -129,9 +131,9 @@ class Search:
         now = time.monotonic()
         costs = []
         for trial in trials:
-            way = [] if trial.descent is None else trial.descent.way
+            points = [] if trial.descent is None else trial.descent.costs
             counted = 0
-            for point in way:
+            for point in points:
                 costs.append((point.clock, point.evaluations - counted, point.cost))
                 counted = point.evaluations
             if trial.evaluations > counted:
@@ -146,6 +148,6 @@ class Search:
                 self._note(clock, cost)
         self._note(now, self.history[-1].cost)
 
-    def _note(self, clock: float, cost: Cost) -> None:
+    def _note(self, clock: float, cost: DesignCost) -> None:
         seconds = self._before[0] + clock - self._begin
-        self.history.append(Moment(seconds, self._before[1] + self._done, cost))
+        self.history.append(HistoryEntry(seconds, self._before[1] + self._done, cost))

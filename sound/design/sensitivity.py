@@ -47,29 +47,32 @@ def projected_stiffness(
 
     Parameters
     ----------
-    corners
-        (c, 8) nodes of the elements.
-    strains
-        (8, 6, 24) strain factors, the edge of an element included.
-    vectors
-        (3 n, N) modes u.
-    others
-        (3 n, T, N) vectors x, T of each mode.
-    slopes
-        (8 c, m) derivatives of the moduli at the quadrature points.
+    corners : (c, 8)
+        Nodes of the elements.
+    strains : (8, 6, 24)
+        Strain factors, the edge of an element included.
+    vectors : (3 n, N)
+        Modes u.
+    others : (3 n, T, N)
+        Vectors x, T of each mode.
+    slopes : (8 c, m)
+        Derivatives of the moduli at the quadrature points.
 
     Returns
     -------
-    (m, N, N) and (m, T, N).
+    inside : (m, N, N)
+        u_i^T (dK/dz) u_j.
+    beyond : (m, T, N)
+        u_i^T (dK/dz) x_i.
     """
     count, points = vectors.shape[1], others.shape[1]
     pairs = count * (count + 1) // 2
     total = np.zeros((slopes.shape[1], pairs + points * count))
-    beside = np.ascontiguousarray(others.reshape(len(vectors), -1))
+    columns = np.ascontiguousarray(others.reshape(len(vectors), -1))
     for first in range(0, len(corners), CELLS_AT_ONCE):
         cells = corners[first : first + CELLS_AT_ONCE]
         energies = np.empty((8 * len(cells), total.shape[1]))
-        _pair_energies(cells, strains, vectors, beside, energies)
+        _pair_energies(cells, strains, vectors, columns, energies)
         total += slopes[8 * first : 8 * (first + len(cells))].T @ energies
     upper = np.triu_indices(count)
     inside = np.empty((len(total), count, count))
@@ -88,12 +91,18 @@ def outside_response(
 
     Parameters
     ----------
+    modes
+        Of the analysis.
     inverse
         (K - mu M)^-1 with mu between the eigenvalues, not close to one.
-    elastic, values
-        (3 n, N) and (N,) the computed modes but for the rigid ones.
-    pushes
-        (3 n, T) forces f.
+    elastic : (3 n, N)
+        The computed modes but for the rigid ones.
+    values : (N,) [rad^2/s^2]
+        Their eigenvalues.
+    pushes : (3 n, T)
+        Forces f.
+    blocks : int
+        Of the Krylov space.
     """
     system = modes.system
     known = np.concatenate([system.rigid, elastic], axis=1)
@@ -143,15 +152,15 @@ def _pair_energies(corners, strains, vectors, others, energies):  # type: ignore
     count = vectors.shape[1]
     points = others.shape[1] // count
     local = np.empty((24, count))
-    beside = np.empty((24, others.shape[1]))
+    local_others = np.empty((24, others.shape[1]))
     for cell in range(len(corners)):
         for a in range(8):
             node = corners[cell, a]
             local[3 * a : 3 * a + 3] = vectors[3 * node : 3 * node + 3]
-            beside[3 * a : 3 * a + 3] = others[3 * node : 3 * node + 3]
+            local_others[3 * a : 3 * a + 3] = others[3 * node : 3 * node + 3]
         for q in range(8):
             strain = strains[q] @ local
-            strain_beside = strains[q] @ beside
+            strain_others = strains[q] @ local_others
             row = energies[8 * cell + q]
             pair = 0
             for i in range(count):
@@ -165,5 +174,5 @@ def _pair_energies(corners, strains, vectors, others, energies):  # type: ignore
                 for i in range(count):
                     value = 0.0
                     for s in range(6):
-                        value += strain[s, i] * strain_beside[s, p * count + i]
+                        value += strain[s, i] * strain_others[s, p * count + i]
                     row[pair + p * count + i] = value

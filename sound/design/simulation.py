@@ -42,12 +42,12 @@ class Evaluation:
 
     Attributes
     ----------
-    z
-        (m,) material coordinates.
-    eigenvalues
-        (N,) of the elastic modes [rad^2/s^2], ascending.
-    pushed
-        (T, N) u_k^T f of a unit impulse f along the inward normal at each point [kg^-1/2 N s].
+    z : (m,)
+        Material coordinates.
+    eigenvalues : (N,) [rad^2/s^2]
+        Of the elastic modes, ascending.
+    pushed : (T, N) [kg^-1/2 N s]
+        u_k^T f of a unit impulse f along the inward normal at each point.
     modes
         All of the analysis, to start the next one from.
     sensitivity
@@ -92,8 +92,8 @@ class Simulation:
         self.material = material
         self.elements = AnalysedElements(mesh, options)
         self.modes = modes
-        wanted = SolverOptions(modes=RIGID_MODES + modes, tolerance=tolerance)
-        self.solver = ModalSolver(self.model, wanted, MPI.COMM_SELF)
+        analysis = SolverOptions(modes=RIGID_MODES + modes, tolerance=tolerance)
+        self.solver = ModalSolver(self.model, analysis, MPI.COMM_SELF)
         # Rows of the analysis are in the order of its partition.
         self._order = degrees_of_freedom(self.solver.local_mesh.nodes)
         self._pushes = pushes(self.model.mesh, strikes)[self._order]
@@ -114,26 +114,26 @@ class Simulation:
         start
             Modes at coordinates not far from there, from which the analysis then begins.
         derivatives
-            Whether their derivatives are wanted.
+            Whether their derivatives are asked for.
         """
         young = self.material.moduli(z)
         modes = self.solver.solve_coarse(self.elements.moduli(young), start)
         elastic = modes.vectors[:, RIGID_MODES:]
-        found = Evaluation(z, modes.values[RIGID_MODES:], self._pushes.T @ elastic, modes)
-        return self.differentiate(found) if derivatives else found
+        evaluation = Evaluation(z, modes.values[RIGID_MODES:], self._pushes.T @ elastic, modes)
+        return self.differentiate(evaluation) if derivatives else evaluation
 
-    def differentiate(self, found: Evaluation) -> Evaluation:
+    def differentiate(self, evaluation: Evaluation) -> Evaluation:
         """The same evaluation with derivatives."""
-        young = self.material.moduli(found.z)
-        elastic = np.ascontiguousarray(found.modes.vectors[:, RIGID_MODES:])
-        return replace(found, sensitivity=self._sensitivity(young, found, elastic))
+        young = self.material.moduli(evaluation.z)
+        elastic = np.ascontiguousarray(evaluation.modes.vectors[:, RIGID_MODES:])
+        return replace(evaluation, sensitivity=self._sensitivity(young, evaluation, elastic))
 
-    def _sensitivity(self, young: Array, found: Evaluation, elastic: Array) -> Sensitivity:
+    def _sensitivity(self, young: Array, evaluation: Evaluation, elastic: Array) -> Sensitivity:
         directions = self.material.slopes(young)[:, None] * self.material.basis
         slopes = self.elements.slopes(young, directions)
-        inverse = self.solver.inverse(found.modes, shift_between(found.eigenvalues))
+        inverse = self.solver.inverse(evaluation.modes, shift_between(evaluation.eigenvalues))
         outside = outside_response(
-            found.modes, inverse, elastic, found.eigenvalues, self._pushes, KRYLOV_BLOCKS
+            evaluation.modes, inverse, elastic, evaluation.eigenvalues, self._pushes, KRYLOV_BLOCKS
         )
         inverse.destroy()
         vectors, others = np.empty_like(elastic), np.empty_like(outside)

@@ -120,7 +120,7 @@ def _struck_points(design: Design, points: int) -> tuple[list[str], Array, Array
     """Names, positions (p, 3) and inward normals (p, 3): the targets', and others spread out."""
     import trimesh
 
-    from sound.strikes import inward_normals
+    from sound.strikes import inward_normals, spread
 
     strikes = design.strikes
     positions = np.array([strike.position for strike in strikes])
@@ -128,24 +128,13 @@ def _struck_points(design: Design, points: int) -> tuple[list[str], Array, Array
     names = [_plain(strike.name) for strike in strikes]
     if points:
         used = np.unique(design.surface_faces)
-        chosen = used[_spread(design.surface_vertices[used], positions, points)]
+        chosen = used[spread(design.surface_vertices[used], positions, points)]
         others = design.surface_vertices[chosen]
         surface = trimesh.Trimesh(design.surface_vertices, design.surface_faces, process=False)
         positions = np.concatenate([positions, others])
         inward = np.concatenate([inward, inward_normals(surface, others)])
         names += [f"vertex {vertex}" for vertex in chosen]
     return names, positions, inward
-
-
-def _spread(candidates: Array, taken: Array, count: int) -> list[int]:
-    """Numbers of `count` candidates, fewer if there are not so many, each one the farthest from
-    those `taken` before."""
-    away = np.min([np.linalg.norm(candidates - point, axis=1) for point in taken], axis=0)
-    chosen: list[int] = []
-    while len(chosen) < count and away.any():
-        chosen.append(int(np.argmax(away)))
-        away = np.minimum(away, np.linalg.norm(candidates - candidates[chosen[-1]], axis=1))
-    return chosen
 
 
 def _plain(name: str) -> str:

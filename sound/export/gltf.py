@@ -170,12 +170,12 @@ def _loudest_first(
 def _mass_properties(design: Design) -> dict[str, Any]:
     from scipy.spatial.transform import Rotation
 
-    found = mass_properties(design.model)
+    properties = mass_properties(design.model)
     return {
-        "mass": found.mass,
-        "centerOfMass": found.centre.tolist(),
-        "inertiaDiagonal": found.moments.tolist(),
-        "inertiaOrientation": Rotation.from_matrix(found.axes).as_quat().tolist(),
+        "mass": properties.mass,
+        "centerOfMass": properties.centre.tolist(),
+        "inertiaDiagonal": properties.moments.tolist(),
+        "inertiaOrientation": Rotation.from_matrix(properties.axes).as_quat().tolist(),
     }
 
 

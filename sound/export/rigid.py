@@ -18,14 +18,14 @@ class MassProperties:
 
     Attributes
     ----------
-    mass
-        [kg].
-    centre
-        (3,) centre of mass [m].
-    moments
-        (3,) principal moments of inertia about it [kg m^2], ascending.
-    axes
-        (3, 3) rotation whose columns are the principal axes.
+    mass : float [kg]
+        Of the whole solid.
+    centre : (3,) [m]
+        Centre of mass.
+    moments : (3,) [kg m^2]
+        Principal moments of inertia about it, ascending.
+    axes : (3, 3)
+        Rotation whose columns are the principal axes.
     """
 
     mass: float

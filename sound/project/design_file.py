@@ -55,28 +55,34 @@ class Design:
         The T struck points.
     targets
         What they shall sound like; its dampings are those of the elastic modes, too (§5).
-    coordinates
-        (m,) z of the reduced material Y = Phi z (§6), dimensionless: of a reference modulus.
-    young
-        (M,) Young's modulus of the fine cells [Pa], scaled so that the first elastic mode sounds
-        at the first target frequency.
+    coordinates : (m,)
+        z of the reduced material Y = Phi z (§6), dimensionless: of a reference modulus.
+    young : (M,) [Pa]
+        Young's modulus of the fine cells, scaled so that the first elastic mode sounds at the first
+        target frequency.
     model
         The coarse solid that was analysed, with its moduli.
-    eigenvalues
-        (6 + N,) [rad^2/s^2], ascending, those of the rigid motions first.
-    modes
-        (n_dofs, 6 + N) of the coarse model, mass-normalised [kg^-1/2].
-    surface_vertices, surface_faces
-        (V, 3) [m] and (F, 3) of the surface that was voxelised.
-    fine_grid, fine_origin, fine_edge
-        Integer coordinates (M, 3) of the fine cells, position (3,) [m] of their origin, edge [m].
+    eigenvalues : (6 + N,) [rad^2/s^2]
+        Ascending, those of the rigid motions first.
+    modes : (n_dofs, 6 + N) [kg^-1/2]
+        Of the coarse model, mass-normalised.
+    surface_vertices : (V, 3) [m]
+        Of the surface that was voxelised.
+    surface_faces : (F, 3)
+        Vertices of its triangles.
+    fine_grid : (M, 3)
+        Integer coordinates of the fine cells.
+    fine_origin : (3,) [m]
+        Position of their origin.
+    fine_edge : float [m]
+        Edge of a fine cell.
     history
         Rows of `HISTORY_TYPE`, see `HISTORY`.
-    settings
+    settings : dict
         The project as resolved.
-    evidence
+    evidence : dict
         How the result was come by and how good it is.
-    provenance
+    provenance : dict
         Origin of the numbers; filled in on reading.
     """
 
@@ -200,10 +206,10 @@ def _fault(design: Design) -> str:
         ("surface faces", design.surface_faces, (None, 3)),
     ]
     for name, data, shape in expected:
-        found = (len(data),) if isinstance(data, (list, tuple)) else data.shape
-        if not _matches(found, shape):
-            wanted = str(shape).replace("None", "any")
-            return f"holds {name} of shape {found}, expected {wanted}"
+        own = (len(data),) if isinstance(data, (list, tuple)) else data.shape
+        if not _matches(own, shape):
+            any_shape = str(shape).replace("None", "any")
+            return f"holds {name} of shape {own}, expected {any_shape}"
     numbers = [(name, data) for name, data, _ in expected if isinstance(data, np.ndarray)]
     for name, data in [*numbers, ("frequencies", targets.frequencies), ("moduli", design.young)]:
         if data.dtype.kind not in "fiu" or not np.isfinite(data).all():
@@ -216,8 +222,8 @@ def _fault(design: Design) -> str:
     return ""
 
 
-def _matches(found: tuple[int, ...], shape: tuple[int | None, ...]) -> bool:
-    return len(found) == len(shape) and all(b in (a, None) for a, b in zip(found, shape))
+def _matches(own: tuple[int, ...], expected: tuple[int | None, ...]) -> bool:
+    return len(own) == len(expected) and all(b in (a, None) for a, b in zip(own, expected))
 
 
 def _put_strikes(group: h5py.Group, strikes: Sequence[Strike]) -> None:

@@ -42,9 +42,9 @@ class TargetEntry:
 
     name: str
     clip: str
-    at: tuple[float, float, float] | None = None
-    vertex: int | None = None
-    modes: int | None = None
+    at: tuple[float, float, float] | None
+    vertex: int | None
+    modes: int | None
 
 
 @dataclass(frozen=True)
@@ -187,8 +187,8 @@ def with_optimiser(project: Project, **given: Any) -> Project:
 def _target(number: int, entry: Mapping[str, Any], folder: Path) -> TargetEntry:
     at, vertex = entry["at"], entry["vertex"]
     if (at is None) == (vertex is None):
-        found = "neither" if at is None else "both"
-        raise UserError(f"targets[{number}]: expected at or vertex, found {found}")
+        given = "neither" if at is None else "both"
+        raise UserError(f"targets[{number}]: expected at or vertex, found {given}")
     name = entry["name"]
     if name.isspace() or not name.isprintable():
         raise UserError(

@@ -25,10 +25,12 @@ class Bank:
 
     Parameters
     ----------
-    frequencies, dampings
-        (k,) [Hz] and [1/s].
-    rate
-        Samples per second [Hz]; modes from half of it on stay silent.
+    frequencies : (k,) [Hz]
+        f.
+    dampings : (k,) [1/s]
+        d.
+    rate : int [Hz]
+        Samples per second; modes from half of it on stay silent.
     """
 
     def __init__(self, frequencies: Array, dampings: Array, rate: int) -> None:

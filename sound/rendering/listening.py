@@ -25,12 +25,14 @@ class Listening:
 
     Attributes
     ----------
-    positions
-        (T, 3) of the struck points [m].
-    gains
-        (T,) samples of full scale per amplitude [kg^1/2 N^-1 s^-1].
-    residuals, rates
-        The clips less their modes, after 1 N s, and their sampling rates [Hz].
+    positions : (T, 3) [m]
+        Of the struck points.
+    gains : (T,) [kg^1/2 N^-1 s^-1]
+        Samples of full scale per amplitude.
+    residuals : T arrays (s,)
+        The clips less their modes, after 1 N s.
+    rates : T integers [Hz]
+        Sampling rates of the residuals.
     """
 
     positions: Array

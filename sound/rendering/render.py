@@ -42,16 +42,22 @@ def render(
 
     Parameters
     ----------
-    seconds, rate
-        Length, and samples per second [Hz].  Modes from half of `rate` on are left out.
-    contact_seconds
+    solid
+        What sounds.
+    hits
+        Its strikes.
+    seconds : float [s]
+        Length.
+    rate : int [Hz]
+        Samples per second.  Modes from half of it on are left out.
+    contact_seconds : float [s]
         Duration of the force, half a sine; 0 is an impulse.  A force that takes longer excites
         high modes less.  It does not change the residuals, which come from a recording.
     listening
         Loudness and residuals of a design's clips: samples are then of full scale as the clips' are
         and residuals are added in proportion to |impulse| over 1 N s.  Without it samples are the
         plain sum of the modes' amplitudes [kg^-1/2 N s].
-    residual
+    residual : bool
         Whether residuals are added.
     """
     count = round(seconds * rate)

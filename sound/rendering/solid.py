@@ -25,12 +25,14 @@ class SoundingSolid:
 
     Attributes
     ----------
-    frequencies, dampings
-        (k,) of the sound [Hz] and [1/s], as in Eq. 3 of the appendix.
+    frequencies : (k,) [Hz]
+        Of the sound, as in Eq. 3 of the appendix.
+    dampings : (k,) [1/s]
+        The same.
     mesh
         Mesh that the modes are given on.
-    modes
-        (n_dofs, k) mass-normalised [kg^-1/2].
+    modes : (n_dofs, k) [kg^-1/2]
+        Mass-normalised.
     """
 
     frequencies: Array

@@ -121,6 +121,37 @@ hostile(
     plain=True,
 )
 
+# init ---------------------------------------------------------------------------------------------
+
+INIT = "init p.yaml --mesh builtin:bar"
+hostile("init without a mesh", "init p.yaml", "--mesh")
+each(
+    "init of mesh",
+    "init p.yaml --mesh VALUE",
+    [
+        *("builtin:bra", "builtin:", "nowhere.obj", "ZOO/nan.obj", "ZOO/metal.wav", "", "."),
+        *("ZOO/odd/pipe.obj", "ZOO/odd/folder.obj", "x" * 300 + ".obj"),
+    ],
+)
+each(
+    "init of clip",
+    f"{INIT} --clips VALUE",
+    ["nowhere.wav", "ZOO/nan.wav", "ZOO/silence.wav", "ZOO/noise.wav", "ZOO/box.obj", "", "."],
+)
+hostile("init of a clip of one mode", f"{INIT} --clips ZOO/tone.wav", "1 mode")
+hostile("init of no clip", f"{INIT} --clips", "--clips")
+hostile("init of a name that is not printed", f"{INIT} --clips 'a\tb.wav'")
+each(
+    "init to",
+    "init VALUE --mesh builtin:bar",
+    ["p.txt", "p", "nowhere/p.yaml", "/proc/p.yaml", "/proc", "x" * 300 + ".yaml", "p.yaml/"],
+)
+for kind in ("null", "full", "pipe", "socket", "link"):
+    hostile(f"init to {kind}", INIT, "there already", files={"p.yaml": Place(kind, "nowhere")})
+hostile("init onto a project", INIT, "there already", files={"p.yaml": PROJECT})
+hostile("init into a folder with a project", "init --mesh builtin:bar", files={"project.yaml": ""})
+hostile("init on a full disk", INIT, "make room", file_size=100)
+
 # design: the project ------------------------------------------------------------------------------
 
 DESIGN = "design p.yaml --evaluations 1 --out d.h5"
@@ -271,7 +302,7 @@ for damage in ("cut", "flipped", "unsealed", "nan", "kind", "missing", "claims",
 hostile("design goes on from modes", RUN, "d.h5", files={"d.h5": Copy("modes.h5")})
 each(
     "design starts from",
-    f"{RUN} --start VALUE",
+    f"{RUN} --initial-design VALUE",
     [
         "ZOO/modes.h5",
         "ZOO/design-cut.h5",
@@ -452,6 +483,8 @@ control(
     ["clip", "wood", "--seconds", "0.3", "--out", "{o} 'x'.wav"],
     "{o} 'x'.wav",
 )
+control("init", f"{INIT} --clips ZOO/metal.wav ZOO/wood.wav", "p.yaml")
+control("init here", "init --mesh builtin:bell", "project.yaml")
 control("clip by a link", "clip metal --seconds 0.3 --out ./o.wav", "o.wav")
 control(
     "project with a mark of its order of bytes",

@@ -48,7 +48,7 @@ def project_of(wildcards):
 
 def start_argument(wildcards, input):
     """The design to go on from, if there is one."""
-    return options({"start": str(input.before)})
+    return options({"initial_design": str(input.before)})
 
 
 def design_before(wildcards):

@@ -11,16 +11,18 @@ from sound.design.interrupts import interruptible
 from sound.design.optimisers import OPTIMISERS
 from sound.design.outcome import Outcome, require_modes
 from sound.design.pool import Pool, Task
-from sound.design.preparation import Prepared, coordinates_of
+from sound.design.preparation import DesignProblem, coordinates_of
 from sound.design.search import BudgetSpentError, Search
 from sound.project.design_file import HISTORY_TYPE, Design
 
+KEEP_SECONDS = 30.0
+"""Time between two designs that are kept while a search goes on [s]."""
 
-def design(
-    prepared: Prepared,
-    former: Design | None = None,
+
+def optimise(
+    problem: DesignProblem,
+    initial: Design | None = None,
     keep: Callable[[Design], None] | None = None,
-    keep_every: float = 30.0,
     watch: Callable[[Search], None] | None = None,
 ) -> Design:
     """Search for a material until the project's budget is spent, or somebody interrupts.
@@ -29,12 +31,12 @@ def design(
 
     Parameters
     ----------
-    prepared
+    problem
         Of the project.
-    former
+    initial
         Design to go on from, of the same mesh; its targets may be others.
     keep
-        Called with the design so far every `keep_every` seconds of the search.
+        Called with the design so far every `KEEP_SECONDS` of the search.
     watch
         Called after every round of evaluations.
 
@@ -43,16 +45,16 @@ def design(
     UserError
         See `coordinates_of`; or if the material to start from has no modes.
     """
-    project, setting = prepared.project, prepared.setting
+    project, setting = problem.project, problem.setting
     z = np.zeros(setting.material.dimensions)
     before = (0.0, 0)
     rows = np.empty(0, HISTORY_TYPE)
-    if former is not None:
-        z = coordinates_of(prepared, former)
-        rows = former.history
+    if initial is not None:
+        z = coordinates_of(problem, initial)
+        rows = initial.history
     if len(rows):
         before = (float(rows["seconds"][-1]), int(rows["evaluations"][-1]))
-    outcome = Outcome(prepared, rows)
+    outcome = Outcome(problem, rows)
     budget = project.optimiser
     kept = time.monotonic()
 
@@ -62,13 +64,13 @@ def design(
             nonlocal kept
             if watch is not None:
                 watch(search)
-            if keep is not None and time.monotonic() - kept >= keep_every and search.best:
+            if keep is not None and time.monotonic() - kept >= KEEP_SECONDS and search.best:
                 keep(outcome.of(search))
                 kept = time.monotonic()
             return interrupted()
 
         search = Search(
-            lambda: Pool(setting, prepared.workers),
+            lambda: Pool(setting, problem.workers),
             budget.seconds,
             budget.evaluations,
             look,

@@ -1,0 +1,154 @@
+"""`python -m sound init`: a project file to begin with."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from carillon.errors import UserError
+from carillon.options import REQUIRED, add_options, collect, option
+
+ENDINGS = (".yaml", ".yml")
+"""Of projects."""
+DEFAULT_NAME = "project.yaml"
+PLACEHOLDER = "clip.wav"
+"""Clip that a project names if none was given."""
+DIGITS = 5
+"""Of positions, which name vertices without being theirs to the last bit."""
+
+EXAMPLES = """examples:
+  init pan.yaml --mesh builtin:frying-pan --clips plate.wav handle.wav
+  init jugs --mesh jug.obj
+"""
+
+
+@dataclass(frozen=True)
+class InitOptions:
+    """The project to begin with."""
+
+    mesh: str = option(REQUIRED, "surface mesh file, or builtin:NAME")
+    path: str | None = option(
+        None,
+        f"folder or file (.yaml) to write (default: {DEFAULT_NAME} in this folder)",
+        nargs="?",
+        metavar="FOLDER|FILE",
+    )
+    clips: list[str] | None = option(
+        None, "a strike each, at points spread over the surface", nargs="+", metavar="CLIP.wav"
+    )
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command line."""
+    add_options(parser, InitOptions, positional=("path",))
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Look at mesh and clips, write the project and say what to do next."""
+    from carillon.documents import parse_yaml
+    from carillon.files import atomic_path
+    from sound.outputs import require_output
+    from sound.project.project import project_of
+    from sound.project.schema import check, project_schema
+    from sound.project.template import project_text
+
+    options = collect(InitOptions, arguments)
+    path = require_output(_file_of(options.path or "."), ENDINGS)
+    values = _values(options, path.parent)
+    text = project_text(values)
+    described = parse_yaml(text)
+    check(described, project_schema())
+    if options.clips is not None:
+        project_of(described, path.parent)
+    with atomic_path(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    print(_sentence(options, path))
+    return 0
+
+
+def _file_of(path: str) -> str:
+    """The file to write, which is not there yet."""
+    file = os.path.join(path, DEFAULT_NAME) if os.path.isdir(path) else path
+    if os.path.lexists(file):
+        raise UserError(f"{file}: is there already; name another file, or remove it first")
+    return file
+
+
+def _values(options: InitOptions, folder: Path) -> dict[str, Any]:
+    """Keys and values that are not left to their defaults."""
+    from carillon.fem.geometry.surface import BUILTIN_PREFIX
+
+    builtin = options.mesh.startswith(BUILTIN_PREFIX)
+    mesh = options.mesh if builtin else _seen_from(folder, options.mesh)
+    if options.clips is None:
+        return {"mesh": mesh, "targets": _targets(options.mesh, [PLACEHOLDER])}
+    clips = [_seen_from(folder, clip) for clip in options.clips]
+    targets = _targets(options.mesh, clips)
+    return {"mesh": mesh, "targets": targets, **_modes(options.clips)}
+
+
+def _targets(mesh: str, clips: Sequence[str]) -> list[dict[str, Any]]:
+    """A target for each clip, far from each other on the surface."""
+    import numpy as np
+
+    from sound.clips.files import clip_names
+    from sound.strikes import spread
+    from sound.surface import longest_side, struck_surface
+
+    surface = struck_surface(mesh)
+    vertices = np.asarray(surface.vertices)[np.unique(surface.faces)]
+    chosen = spread(vertices, surface.bounds.mean(axis=0)[None], len(clips))
+    if len(chosen) < len(clips):
+        raise UserError(
+            f"{len(clips):,} clips for {len(chosen):,} points of the surface; give fewer"
+        )
+    decimals = DIGITS - int(np.ceil(np.log10(longest_side(surface))))
+    positions = np.round(vertices[chosen], decimals) + 0.0  # no -0.0
+    return [
+        {"name": name, "at": position, "clip": clip}
+        for name, position, clip in zip(clip_names(clips), positions.tolist(), clips)
+    ]
+
+
+def _modes(clips: Sequence[str]) -> dict[str, int]:
+    """The number of modes, if the clips have fewer than a project asks for by itself.
+
+    Raises
+    ------
+    UserError
+        If a clip is unusable, or all have too few modes for a design.
+    """
+    from sound.clips.files import clip_names, extract_file
+    from sound.clips.targets import share_frequencies
+    from sound.project.schema import project_schema
+
+    part = project_schema()["properties"]["modes"]
+    sounds = [extract_file(clip, visible=True) for clip in clips]
+    count = len(share_frequencies(clip_names(clips), sounds).frequencies)
+    if count < part["minimum"]:
+        raise UserError(
+            f"the clips have {count} mode in all, a design needs {part['minimum']} at least; give "
+            "another clip"
+        )
+    return {} if count >= part["default"] else {"modes": count}
+
+
+def _seen_from(folder: Path, path: str) -> str:
+    """Name of a file in a project that lies in `folder`; an absolute one stays as it is."""
+    if os.path.isabs(path):
+        return path
+    own = Path(path)
+    return os.path.relpath(own.parent.resolve() / own.name, folder.resolve())
+
+
+def _sentence(options: InitOptions, path: Path) -> str:
+    run = shlex.join(["carillon", "design", str(path), "--out", str(path.with_suffix(".h5"))])
+    if options.clips is not None:
+        return f"{path}: a project of {options.mesh}; next: {run}"
+    clip = path.parent / PLACEHOLDER
+    return f"{path}: a project of {options.mesh}; record a strike as {clip}, then: {run}"

@@ -1,0 +1,125 @@
+"""`sound init`: a project with all keys in it, which is a project as it is."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+import yaml
+
+from sound.__main__ import main
+from sound.project.project import load_project, project_of
+from sound.project.schema import project_schema, with_defaults
+
+SCHEMA = project_schema()
+_KEY_BEHIND_A_MARK = re.compile(r"^( *)#( *[a-z]+:)", re.MULTILINE)
+
+
+@pytest.fixture(scope="module")
+def clips(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder with a clip of many modes and one of few."""
+    folder = tmp_path_factory.mktemp("clips")
+    for name in ("metal", "wood"):
+        words = ["--seconds", "0.5", "--rate", "22050", "--out", str(folder / f"{name}.wav")]
+        assert main(["clip", name, *words]) == 0
+    return folder
+
+
+@pytest.fixture
+def here(clips: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with the clips in it, where commands are typed."""
+    for clip in clips.iterdir():
+        shutil.copy(clip, tmp_path)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def written(path: Path, *clips: str) -> str:
+    assert main(["init", str(path), "--mesh", "builtin:bar", *clips]) == 0
+    return path.read_text()
+
+
+def without_marks(text: str) -> str:
+    return _KEY_BEHIND_A_MARK.sub(r"\1\2", text)
+
+
+def test_what_is_not_asked_for_has_its_default(here):
+    described = yaml.safe_load(written(here / "bar.yaml", "--clips", "metal.wav"))
+    defaults = with_defaults({key: described[key] for key in ("mesh", "targets")}, SCHEMA)
+    filled = load_project(here / "bar.yaml").as_dict()
+    for key in SCHEMA["properties"]:
+        if key not in ("mesh", "targets", "modes"):
+            assert filled[key] == defaults[key], key
+
+
+def test_every_key_is_there_with_its_default_and_its_meaning(here):
+    text = written(here / "bar.yaml", "--clips", "wood.wav", "metal.wav")
+    everything = yaml.safe_load(without_marks(text))
+    assert set(everything) == set(SCHEMA["properties"])
+    assert project_of(everything, here) == load_project(here / "bar.yaml")
+    target = SCHEMA["properties"]["targets"]["items"]
+    assert set(everything["targets"][0]) == set(target["properties"])
+    for part in (SCHEMA, target, *SCHEMA["properties"].values()):
+        for each in part.get("properties", {}).values():
+            assert re.search(rf"# {re.escape(each['description'])}( \(|$)", text, re.MULTILINE)
+
+
+def test_no_more_modes_are_asked_for_than_the_clips_have(here):
+    main(["extract", "wood.wav", "--out", "wood.json"])
+    count = len(json.loads(Path("wood.json").read_text())["frequencies_hz"])
+    written(here / "bar.yaml", "--clips", "wood.wav")
+    assert load_project(here / "bar.yaml").modes == count < 30
+
+
+def test_points_are_on_the_surface_and_apart(here):
+    written(here / "bar.yaml", "--clips", "metal.wav", "wood.wav", "metal.wav")
+    project = load_project(here / "bar.yaml")
+    assert [target.name for target in project.targets] == ["clip 1", "clip 2", "clip 3"]
+    assert len(project.strikes(project.surface())) == 3
+
+
+def test_a_design_is_made_of_it_as_it_is(here):
+    written(here / "bar.yaml", "--clips", "metal.wav", "wood.wav")
+    assert main(["design", "bar.yaml", "--evaluations", "2", "--out", "bar.h5"]) == 0
+    assert (here / "bar.h5").exists()
+
+
+def test_files_are_named_as_the_project_sees_them(here):
+    (here / "projects").mkdir()
+    shutil.copy("metal.wav", "läute 鐘.wav")
+    assert main(["init", "projects", "--mesh", "builtin:bar", "--clips", "läute 鐘.wav"]) == 0
+    project = load_project(here / "projects" / "project.yaml")
+    assert project.targets[0].name == "läute 鐘"
+    assert Path(project.targets[0].clip).resolve() == here.resolve() / "läute 鐘.wav"
+
+
+def test_without_a_clip_one_is_to_be_recorded(here, capsys):
+    assert yaml.safe_load(written(here / "bar.yaml"))["targets"][0]["clip"] == "clip.wav"
+    assert "clip.wav" in capsys.readouterr().out
+    shutil.copy("metal.wav", "clip.wav")
+    assert load_project(here / "bar.yaml").modes == 30
+
+
+def test_nothing_is_overwritten(here, refuses):
+    (here / "bar.yaml").write_text("mine")
+    said = refuses(main, "init", "bar.yaml", "--mesh", "builtin:bar")
+    assert "bar.yaml: is there already" in said
+    assert (here / "bar.yaml").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["bar.txt", "--mesh", "builtin:bar"], "bar.txt: ends in .txt, expected .* .yaml or .yml"),
+        (["bar.yaml", "--mesh", "builtin:bra"], "bra"),
+        (["bar.yaml", "--mesh", "bar.obj"], "bar.obj: no such file"),
+        (["bar.yaml", "--mesh", "builtin:bar", "--clips", "none.wav"], "none.wav: no such file"),
+        (["bar.yaml"], "--mesh"),
+    ],
+)
+def test_a_mistake_is_answered_in_one_sentence(here, refuses, words, says):
+    assert re.search(says, refuses(main, "init", *words))
+    assert not (here / "bar.yaml").exists()
