@@ -156,8 +156,9 @@ def test_a_design_without_a_history_can_be_gone_on_from(problem, designed):
 
 def test_a_design_goes_on_from_where_it_was(problem, designed):
     again = optimise(with_options(problem, evaluations=30), initial=designed)
-    # Analyses of one material from different modes agree to their tolerance.
-    assert again.evidence["cost"] <= designed.evidence["cost"] * (1 + 1e-6)
+    # Analyses of one material from different modes agree to their tolerance, and so do the terms
+    # whose squares a cost is the sum of.
+    assert np.sqrt(again.evidence["cost"]) <= np.sqrt(designed.evidence["cost"]) + 1e-6
     assert again.history["evaluations"][-1] > designed.history["evaluations"][-1]
     assert (np.diff(again.history["seconds"]) >= 0.0).all()
 
