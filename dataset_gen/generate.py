@@ -13,12 +13,10 @@ from typing import Any
 import numpy as np
 
 from carillon.errors import UserError
-from carillon.fem.element import DEFAULT_POISSON
 from carillon.files import require_writable
 from carillon.progress import track
 from dataset_gen.journal import Journal, discard_journal, journal_of
-from dataset_gen.objectives import DEFAULT_OBJECTIVE
-from dataset_gen.settings import settings_of
+from dataset_gen.settings import ShardOptions, settings_of
 from dataset_gen.shards import Shard, origin_of, read_settings, shard_of, write_rows
 from dataset_gen.tasks import ROW, Plan, rows_of
 from dataset_gen.workers import in_this_process, in_workers
@@ -47,20 +45,8 @@ def engine_of(workers: int) -> Engine:
     return lambda plan, tasks: in_workers(plan, tasks, workers)
 
 
-def generate(
-    total: int,
-    seed: int = 0,
-    shard: int = 0,
-    shards: int = 1,
-    objective: str = DEFAULT_OBJECTIVE,
-    poisson: float = DEFAULT_POISSON,
-    workers: int = 1,
-    progress: bool = True,
-    distribution: str = "uniform",
-    low: float | None = None,
-    high: float | None = None,
-) -> Shard:
-    """Fit one shard of the first `total` samples of `seed`, in memory.
+def generate(options: ShardOptions, workers: int = 1, progress: bool = True) -> Shard:
+    """Fit one shard in memory.
 
     A script that asks for several workers needs the usual `if __name__ == "__main__":`, since they
     import it.
@@ -71,12 +57,13 @@ def generate(
         For an unknown objective or distribution, an impossible split, seed, range of moduli,
         Poisson's ratio or number of workers.
     """
-    settings = settings_of(total, seed, shard, shards, objective, poisson, distribution, low, high)
+    settings = settings_of(options)
     plan = Plan(settings)
-    label = f"fitting {objective}"
-    found = _tracked(plan, engine_of(workers)(plan, range(plan.tasks)), label, visible=progress)
-    rows = np.concatenate([rows_of(work) for work in found])
-    return shard_of(settings, rows, origin_of(settings, total, shard, shards))
+    label = f"fitting {settings.objective}"
+    results = engine_of(workers)(plan, range(plan.tasks))
+    tracked = _tracked(plan, results, label, visible=progress)
+    rows = np.concatenate([rows_of(work) for work in tracked])
+    return shard_of(settings, rows, origin_of(settings, options))
 
 
 def generate_file(

@@ -16,7 +16,6 @@ from forests.layout import FEATURE_BITS, FEATURE_MASK
 from forests.model import CONSTANT, HIGH, LOW, Model
 from forests.ordering import FLIPS, order_code
 from forests.prefetch import prefetch
-from forests.reference import coarsen_reference
 from forests.scaling import (
     FEATURES,
     LARGEST_MODULUS,
@@ -27,8 +26,6 @@ from forests.scaling import (
     modulus_of,
     prepare_block,
 )
-
-__all__ = ["coarsen", "coarsen_reference", "coarsen_with_derivatives", "leaf_numbers"]
 
 STRIDE = 8
 """Features of an origin with padding, which saves a multiplication."""
@@ -164,24 +161,6 @@ def _moduli(
         for origin in range(8):
             target = _target(leaves, found[origin], features, origin)
             moduli[block, origin] = modulus_of(target, scale[origin], logarithmic)
-
-
-@numba.njit(cache=True, nogil=True)
-def _leaf_numbers(
-    young: Array,
-    logarithmic: bool,
-    roots: NDArray[np.int32],
-    thresholds: NDArray[np.float32],
-    links: NDArray[np.int32],
-    leaves: NDArray[np.float32],
-    numbers: NDArray[np.int32],
-) -> None:
-    """Leaves (n, 8, trees) of blocks (n, 8)."""
-    values, scale, references, features, table, pattern, found = _scratch(len(roots))
-    for block in range(len(young)):
-        prepare_block(young[block], logarithmic, values, table, pattern, scale, references)
-        _find(roots, thresholds, links, leaves, features, pattern, found)
-        numbers[block] = found
 
 
 @numba.njit(inline="always")
@@ -386,14 +365,3 @@ def coarsen_with_derivatives(model: Model, e: ArrayLike, threads: int = 1) -> tu
     moduli, derivatives = np.empty_like(young), np.empty((len(young), 8, 8))
     _run(_derivatives, model, young, threads, moduli, derivatives)
     return moduli, derivatives
-
-
-def leaf_numbers(model: Model, e: ArrayLike, threads: int = 1) -> NDArray[np.int32]:
-    """Leaves (m, 8, trees), rows of `Forests.leaves`, that the origins of blocks (m, 8) come to.
-
-    Parameters and errors are those of `coarsen`.
-    """
-    young = require_blocks(e)
-    numbers = np.empty((*young.shape, model.forests.trees), dtype=np.int32)
-    _run(_leaf_numbers, model, young, threads, numbers)
-    return numbers

@@ -6,7 +6,7 @@ import pytest
 
 from dataset_gen.generate import generate_file
 from dataset_gen.journal import journal_of
-from dataset_gen.settings import settings_of
+from dataset_gen.settings import ShardOptions, settings_of
 from dataset_gen.shards import origin_of
 from dataset_gen.tasks import Plan
 
@@ -43,8 +43,8 @@ def options(path, *more):
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory):
     path = tmp_path_factory.mktemp("reference") / "shard.h5"
-    plan = Plan(settings_of(SAMPLES, 4), TASK)
-    generate_file(path, plan, origin_of(plan.settings, SAMPLES, 0, 1))
+    plan = Plan(settings_of(ShardOptions(SAMPLES, 4)), TASK)
+    generate_file(path, plan, origin_of(plan.settings, ShardOptions(SAMPLES)))
     return path.read_bytes()
 
 

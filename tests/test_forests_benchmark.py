@@ -8,12 +8,12 @@ import pytest
 from carillon import cli
 from forests import load_model, save_model
 from forests.__main__ import main
-from forests.evaluate import coarsen, leaf_numbers
+from forests.evaluate import coarsen
 from forests.model import FILLED, VOID
-from forests.reference import coarsen_reference
 from forests.scaling import prepare
 from forests.studies.benchmark import SIZES, benchmark, caches
 from forests.studies.synthetic import coherent_blocks, complete_forests, random_blocks
+from tests.forests_reference import coarsen_reference, leaf_numbers
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from dataset_gen.generate import generate
-from dataset_gen.shards import write_shard
+from dataset_gen.settings import ShardOptions
 from forests import coarsen, load_model
+from tests.shard_files import write_shard
 
 pytestmark = pytest.mark.mpi
 
@@ -16,7 +17,7 @@ OPTIONS = ("--trees", 2, "--max-leaves", 200, "--structure-rows", 20_000)
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("ranks")
-    whole = generate(140_000, 1, progress=False, objective="chen2015")
+    whole = generate(ShardOptions(140_000, 1, objective="chen2015"), progress=False)
     write_shard(folder / "0.h5", whole.part(0, 70_000))
     write_shard(folder / "1.h5", whole.part(70_000, 140_000))
     return folder

@@ -19,10 +19,9 @@ from carillon.fem.element import CORNERS, quadrature_stiffness, rigid_motions
 from dataset_gen.generate import generate
 from dataset_gen.objectives import fit
 from dataset_gen.objectives.patterns import straining_motions
-from dataset_gen.shards import write_shard
+from dataset_gen.settings import ShardOptions
 from forests.__main__ import main
 from forests.baselines import average, galerkin
-from forests.comparison import methods as methods_module
 from forests.comparison.block_error import LOADS, coarse_flexibility, displacement_errors, tables_of
 from forests.comparison.cases import CASES
 from forests.comparison.condensation import condense, corner_flexibility
@@ -30,12 +29,12 @@ from forests.comparison.methods import (
     common_poisson,
     databases_of,
     direct_fit,
-    load_models,
     static_condensation,
 )
 from forests.comparison.plot import plot
 from forests.comparison.table import as_text, table
 from forests.model import Model, load_model
+from tests.shard_files import write_shard
 
 POISSON = 0.25
 SOLID = (True,) * 8
@@ -221,7 +220,7 @@ def run(*arguments):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("table")
-    write_shard(folder / "shard.h5", generate(1500, 1, progress=False))
+    write_shard(folder / "shard.h5", generate(ShardOptions(1500, 1), progress=False))
     assert run("train", folder / "shard.h5", "--trees", 1, "--out", folder / "forests.h5") == 0
     return folder
 
@@ -288,12 +287,6 @@ def test_picture_of_an_unknown_kind_is_refused_before_work(folder, capsys):
     model = folder / "forests.h5"
     assert run("table", "--model", model, "--plot", folder / "table.txt") == 2
     assert ".png" in capsys.readouterr().err
-
-
-def test_forests_are_asked_for(monkeypatch):
-    monkeypatch.delattr(methods_module.forest_model, "default_path", raising=False)
-    with pytest.raises(UserError, match="--model"):
-        load_models(None)
 
 
 def test_forests_of_different_poisson_ratios_are_not_compared(folder):

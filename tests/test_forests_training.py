@@ -7,14 +7,16 @@ import pytest
 
 from carillon.errors import UserError
 from dataset_gen.generate import generate
-from dataset_gen.shards import write_shard
+from dataset_gen.settings import ShardOptions
 from forests.scaling import PATTERNS
 from forests.training.dataset import dataset_of, open_dataset
 from forests.training.leaves import ANCESTOR_ROWS, Sums, add_rows, leaf_of, solve_leaves
 from forests.training.moments import ENTRIES, fit_error, solve
 from forests.training.structure import GROWERS, Limits, Rows, tree_of
-from forests.training.train import Training, grow_trees, parameters_of, train
+from forests.training.train import Training, grow_trees, parameters_of
 from forests.training.tree_file import load_trees, save_tree
+from tests.shard_files import write_shard
+from tests.small_forests import train
 
 QUICK = Training(trees=2, max_leaves=300, structure_rows=20_000)
 
@@ -160,7 +162,8 @@ def shards():
     """4,000 samples, log-uniform and uniform ones."""
     options = {"log-uniform": 1500, "uniform": 2500}
     return [
-        generate(count, 3, distribution=name, progress=False) for name, count in options.items()
+        generate(ShardOptions(count, 3, distribution=name), progress=False)
+        for name, count in options.items()
     ]
 
 
@@ -233,7 +236,7 @@ def test_too_few_rows_for_the_depth_are_told(shards, caplog):
 
 def test_too_few_samples_are_refused():
     with pytest.raises(UserError, match="generate more"):
-        train([generate(3, progress=False)], progress=False)
+        train([generate(ShardOptions(3), progress=False)], progress=False)
 
 
 @pytest.mark.parametrize(

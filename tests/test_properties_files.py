@@ -16,8 +16,8 @@ from carillon.fem.geometry.surface import load_surface
 from carillon.fem.moduli_file import read_moduli
 from dataset_gen.generate import generate_file
 from dataset_gen.journal import journal_of
-from dataset_gen.settings import settings_of
-from dataset_gen.shards import origin_of, read_shard
+from dataset_gen.settings import ShardOptions, settings_of
+from dataset_gen.shards import origin_of
 from dataset_gen.tasks import Plan
 from forests.model import load_model
 from forests.training.tree_file import load_trees
@@ -26,6 +26,7 @@ from solver.response.response_file import read_response
 from sound.clips.wav import read_wav
 from sound.project.design_file import read_design
 from tests.hostile.fuzzing import damaged, examples, or_refused
+from tests.shard_files import read_shard
 from tests.solids import box_mesh
 
 # Sealed files ------------------------------------------------------------------------------------
@@ -106,9 +107,10 @@ class Begun:
 
 @pytest.fixture(scope="module")
 def begun(tmp_path_factory):
-    settings = settings_of(6, objective="oversampled")
+    options = ShardOptions(6, objective="oversampled")
+    settings = settings_of(options)
     plan = Plan(settings, task_rows=1)
-    origin = origin_of(settings, 6, 0, 1)
+    origin = origin_of(settings, options)
     folder = tmp_path_factory.mktemp("begun")
 
     def stopped(plan, tasks):

@@ -223,9 +223,7 @@ def pattern_errors(
     return found
 
 
-def displacement_errors(
-    young: Array, coarse: Sequence[Array], poisson: float, at_most: int = AT_ONCE
-) -> list[Errors]:
+def displacement_errors(young: Array, coarse: Sequence[Array], poisson: float) -> list[Errors]:
     """Errors of several coarsenings of any blocks (n, 8); see `pattern_errors`.
 
     Squared displacements are for forces of unit variance, in the unit of 1 / (modulus x edge).
@@ -236,7 +234,7 @@ def displacement_errors(
         return {name: np.empty(count) for name in LOADS}
 
     found = [Errors(empty(), empty(), empty()) for _ in coarse]
-    for mask, rows in pattern_rows(young, at_most):
+    for mask, rows in pattern_rows(young, AT_ONCE):
         parts = pattern_errors(young[rows], [part[rows] for part in coarse], mask, poisson)
         for whole, part in zip(found, parts):
             for into, values in zip(whole, part):

@@ -12,13 +12,11 @@ from carillon.errors import UserError
 from carillon.fem.element import Array
 from carillon.files import require_writable
 from dataset_gen.objectives import closed_form, fit
-from forests import model as forest_model
 from forests.baselines import average, galerkin
 from forests.comparison.cases import Case
 from forests.comparison.condensation import condense, corner_flexibility
 from forests.comparison.database import (
     MATERIALS,
-    REPRESENTATIVES,
     Database,
     base_materials,
     build,
@@ -27,7 +25,7 @@ from forests.comparison.database import (
     save_databases,
 )
 from forests.evaluate import coarsen
-from forests.model import Model
+from forests.model import Model, default_path, load_model
 
 
 @dataclass(frozen=True)
@@ -126,7 +124,6 @@ def databases_of(
     poisson: float,
     path: str | Path | None = None,
     materials: int = MATERIALS,
-    representatives: int = REPRESENTATIVES,
 ) -> dict[Case, Database]:
     """A database made for each case that is not another one scaled.
 
@@ -151,7 +148,7 @@ def databases_of(
     if path is not None:
         require_writable(path)
     found = {
-        case: build(base, poisson, representatives, f"database of {case.name}", progress=True)
+        case: build(base, poisson, label=f"database of {case.name}", progress=True)
         for case, base in wanted.items()
     }
     if path is not None:
@@ -214,8 +211,5 @@ def load_models(paths: Sequence[str] | None) -> dict[str, Model]:
         If a file is not a model, or none is named and there are no default forests.
     """
     if not paths:
-        default = getattr(forest_model, "default_path", None)
-        if default is None:
-            raise UserError("there are no default forests: name a model file with --model")
-        paths = [str(default())]
-    return {path: forest_model.load_model(path) for path in dict.fromkeys(paths)}
+        paths = [str(default_path())]
+    return {path: load_model(path) for path in dict.fromkeys(paths)}

@@ -106,7 +106,6 @@ def table(
     models: dict[str, Model],
     blocks: int = 10_000,
     seed: int = 0,
-    cases: Sequence[Case] = CASES,
     databases: dict[Case, Database] | None = None,
 ) -> list[Row]:
     """Rows of Fig. 9 on `blocks` random blocks of each case, on one core.
@@ -132,9 +131,9 @@ def table(
     """
     poisson = common_poisson(models)
     if databases is None:
-        databases = databases_of(cases, poisson)
+        databases = databases_of(CASES, poisson)
     rows: list[Row] = []
-    for case in cases:
+    for case in CASES:
         young = case.blocks(blocks, seed)
         methods = [*methods_of(models), *database_methods(case, databases)]
         errors = errors_of(young, methods, poisson, case.name)

@@ -14,6 +14,7 @@ from carillon.errors import UserError
 from carillon.fem.element import Array
 from carillon.files import atomic_path
 from dataset_gen.generate import generate
+from dataset_gen.settings import ShardOptions
 from forests.layout import NODE
 from forests.model import RECORD
 from forests.training.dataset import Dataset, Samples, dataset_of, joined
@@ -49,24 +50,24 @@ VARIANTS: dict[str, dict[str, Any]] = {
 """Trainings that are compared, as what they change of the default one."""
 
 
-def fresh_samples(dataset: Dataset, samples: int = TEST_SAMPLES) -> dict[str, Samples]:
+def fresh_samples(dataset: Dataset) -> dict[str, Samples]:
     """Fitted samples by distribution, of a seed that the dataset does not have."""
     seed = 1 + max(part.seed for part in dataset.settings)
     drawn = dict.fromkeys(part.moduli for part in dataset.settings)
     found = {}
     for each in drawn:
-        shard = generate(
-            samples,
+        options = ShardOptions(
+            TEST_SAMPLES,
             seed,
             objective=dataset.objective,
             poisson=dataset.poisson,
-            progress=False,
             distribution=each.distribution,
             low=each.low,
             high=each.high,
         )
+        shard = generate(options, progress=False)
         name = f"{each.distribution} {each.low:g}..{each.high:g} GPa"
-        found[name] = joined(dataset_of([shard]).read(0, samples))
+        found[name] = joined(dataset_of([shard]).read(0, TEST_SAMPLES))
     return found
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple, TypeVar
@@ -15,10 +15,9 @@ from joblib import Parallel, delayed
 from carillon import provenance
 from carillon.errors import UserError
 from carillon.progress import track
-from dataset_gen.shards import Shard
 from forests.model import FILLED, VOID, Model
 from forests.scaling import TRANSFORMS
-from forests.training.dataset import Dataset, Samples, dataset_of, joined
+from forests.training.dataset import Dataset, Samples, joined
 from forests.training.join import join
 from forests.training.leaves import Leaves, Sums, add_rows, solve_leaves
 from forests.training.ranks import Ranks
@@ -280,31 +279,6 @@ def model_of(dataset: Dataset, training: Training, trained: Trained) -> Model:
         "depth": float(max(tree.depth for tree in trained.trees.values())),
     }
     return replace(model, scores=scores)
-
-
-def train(
-    dataset: Dataset | Sequence[Shard],
-    training: Training | None = None,
-    workers: int = 1,
-    progress: bool = True,
-) -> Model:
-    """Train the forests of void and of filled origins on a dataset's converged samples.
-
-    Parameters
-    ----------
-    workers : threads; the result does not depend on it.
-
-    Raises
-    ------
-    UserError
-        For impossible parameters, shards that do not belong together, or too few samples of either
-        kind.
-    """
-    training = training or Training()
-    data = dataset if isinstance(dataset, Dataset) else dataset_of(dataset)
-    trained = train_trees(data, training, Ranks(), workers, progress)
-    assert trained is not None
-    return model_of(data, training, trained)
 
 
 def parameters_of(dataset: Dataset, training: Training) -> dict[str, Any]:

@@ -23,6 +23,9 @@ VIEW = (22.0, -58.0)
 DRAWN_AMPLITUDE = 0.08
 ARROW_LENGTH = 0.22
 
+#: Rings of neighbours over which normals are averaged to show the shape behind the voxels.
+SMOOTHING_RINGS = 4
+
 
 def draw(
     ax: Axes3D,
@@ -105,7 +108,6 @@ def draw_surface(
     faces: np.ndarray,
     mesh: HexMesh,
     up: str = "auto",
-    view: tuple[float, float] = VIEW,
 ) -> None:
     """Draw triangles as `draw` draws their voxels: in the same place, size and light.
 
@@ -119,13 +121,13 @@ def draw_surface(
     turn = _rotation(guess_up(mesh) if up == "auto" else up)
     corners = (np.asarray(vertices) @ turn.T)[faces]
     normal = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    towards = normal @ _direction(*np.radians(view))
+    towards = normal @ _direction(*np.radians(VIEW))
     normal *= np.where(towards < 0.0, -1.0, 1.0)[:, None]
-    colours = np.clip(np.array(PLAIN) * _brightness(normal, view)[:, None], 0, 1)
+    colours = np.clip(np.array(PLAIN) * _brightness(normal, VIEW)[:, None], 0, 1)
     polygons = Poly3DCollection(corners, facecolors=colours, edgecolors=colours)
     polygons.set_linewidth(0.2)
     ax.add_collection3d(polygons)
-    _frame(ax, mesh.nodes[np.unique(surface_quads(mesh))] @ turn.T, view)
+    _frame(ax, mesh.nodes[np.unique(surface_quads(mesh))] @ turn.T, VIEW)
 
 
 def mark(
@@ -220,19 +222,17 @@ def _on_faces(mesh: HexMesh, values: np.ndarray, quads: np.ndarray, cell: np.nda
     )
 
 
-def _light(
-    points: np.ndarray, quads: np.ndarray, view: tuple[float, float], rounds: int = 4
-) -> np.ndarray:
+def _light(points: np.ndarray, quads: np.ndarray, view: tuple[float, float]) -> np.ndarray:
     """Brightness of each face (q,): ambient, key and fill light.
 
-    The face's own normal shows the voxels; the normal averaged over `rounds` rings of neighbours
-    shows the shape that they approximate. Their sum shows both.
+    The face's own normal shows the voxels; the normal averaged over `SMOOTHING_RINGS` rings of
+    neighbours shows the shape that they approximate. Their sum shows both.
     """
     corners = points[quads]
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     normal = _unit(normal)
     smooth = normal
-    for _ in range(rounds):
+    for _ in range(SMOOTHING_RINGS):
         at_nodes = np.zeros_like(points)
         np.add.at(at_nodes, quads, smooth[:, None, :])
         smooth = _unit(_unit(at_nodes)[quads].mean(axis=1))
