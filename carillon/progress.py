@@ -39,18 +39,18 @@ def track(
     if not visible:
         yield from items
         return
-    shown: tqdm | _Lines
+    shown: tqdm | _LineProgress
     if sys.stderr.isatty():
         shown = tqdm(desc=label, total=total, unit=f" {unit}", initial=done, dynamic_ncols=True)
     else:
-        shown = _Lines(label, total, unit, done)
+        shown = _LineProgress(label, total, unit, done)
     with shown:
         for item in items:
             yield item
             shown.update(1 if weight is None else weight(item))
 
 
-class _Lines:
+class _LineProgress:
     """A line on standard error every `LINE_SECONDS`, in the place of a bar."""
 
     def __init__(self, label: str, total: int | None, unit: str, done: int) -> None:
@@ -59,7 +59,7 @@ class _Lines:
         self.begin = time.monotonic()
         self.due = self.begin + LINE_SECONDS
 
-    def __enter__(self) -> _Lines:
+    def __enter__(self) -> _LineProgress:
         return self
 
     def __exit__(self, *_: object) -> None:

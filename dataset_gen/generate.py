@@ -18,12 +18,12 @@ from carillon.progress import track
 from dataset_gen.journal import Journal, discard_journal, journal_of
 from dataset_gen.settings import ShardOptions, settings_of
 from dataset_gen.shards import Shard, origin_of, read_settings, shard_of, write_rows
-from dataset_gen.tasks import ROW, Plan, rows_of
+from dataset_gen.tasks import ROW, ShardPlan, rows_of
 from dataset_gen.workers import in_this_process, in_workers
 
 logger = logging.getLogger(__name__)
 
-Engine = Callable[[Plan, range], Generator[bytes, None, None]]
+Engine = Callable[[ShardPlan, range], Generator[bytes, None, None]]
 """Yields the results of tasks in order; see `dataset_gen.workers` and `dataset_gen.ranks`."""
 
 _ENVIRONMENT = ("commit", "versions", "processor")
@@ -58,7 +58,7 @@ def generate(options: ShardOptions, workers: int = 1, progress: bool = True) -> 
         Poisson's ratio or number of workers.
     """
     settings = settings_of(options)
-    plan = Plan(settings)
+    plan = ShardPlan(settings)
     label = f"fitting {settings.objective}"
     results = engine_of(workers)(plan, range(plan.tasks))
     tracked = _tracked(plan, results, label, visible=progress)
@@ -67,7 +67,7 @@ def generate(options: ShardOptions, workers: int = 1, progress: bool = True) -> 
 
 
 def generate_file(
-    path: str | Path, plan: Plan, origin: dict[str, Any], engine: Engine = in_this_process
+    path: str | Path, plan: ShardPlan, origin: dict[str, Any], engine: Engine = in_this_process
 ) -> int | None:
     """Fit one shard and write it to `path` in constant memory; go on where an earlier run ended.
 
@@ -107,7 +107,7 @@ def generate_file(
     return plan.settings.count - before
 
 
-def _require_room(path: Path, plan: Plan) -> None:
+def _require_room(path: Path, plan: ShardPlan) -> None:
     """Refuse a shard that the disk cannot take: journal and shard are there at the same time."""
     free = shutil.disk_usage(path.parent).free
     begun = journal_of(path)
@@ -121,7 +121,7 @@ def _require_room(path: Path, plan: Plan) -> None:
         )
 
 
-def _is_there(path: Path, plan: Plan) -> bool:
+def _is_there(path: Path, plan: ShardPlan) -> bool:
     """Whether the finished shard of `plan` is at `path`; anything else but nothing is refused."""
     if not path.exists():
         return False
@@ -162,7 +162,7 @@ def _results(journal: Journal, engine: Engine) -> Iterator[bytes]:
 
 
 def _tracked(
-    plan: Plan, results: Iterator[bytes], label: str, done: int = 0, visible: bool = True
+    plan: ShardPlan, results: Iterator[bytes], label: str, done: int = 0, visible: bool = True
 ) -> Iterator[bytes]:
     return track(
         results,

@@ -23,7 +23,7 @@ from carillon.errors import UserError
 from carillon.files import cause, sync_folder
 from carillon.locks import take
 from dataset_gen.settings import settings_from
-from dataset_gen.tasks import Plan
+from dataset_gen.tasks import ShardPlan
 
 logger = logging.getLogger(__name__)
 
@@ -64,7 +64,7 @@ class Journal:
         beginning, or belongs to other settings.
     """
 
-    def __init__(self, path: Path, plan: Plan, environment: dict[str, Any]) -> None:
+    def __init__(self, path: Path, plan: ShardPlan, environment: dict[str, Any]) -> None:
         self.path = journal_of(path)
         self.plan = plan
         self.tasks = 0
@@ -164,7 +164,7 @@ class Journal:
     def _require_same_plan(self, content: bytes) -> None:
         values = json.loads(content)
         try:
-            found = Plan(settings_from(values["settings"]), int(values["task_rows"]))
+            found = ShardPlan(settings_from(values["settings"]), int(values["task_rows"]))
         except (KeyError, TypeError, ValueError) as error:
             raise UserError(
                 f"{self.path}: was begun by another version of Carillon ({error}); remove it to "

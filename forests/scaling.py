@@ -45,7 +45,7 @@ LARGEST_MODULUS = 1e300
 Features = NDArray[np.float32]
 
 
-class Prepared(NamedTuple):
+class PreparedBlocks(NamedTuple):
     """Blocks as the forests see them.
 
     features (n, 8 origins, 7) of e'2..e'8; pattern (n, 8), see `PATTERNS`; scale (n, 8) in the unit
@@ -180,11 +180,11 @@ def is_logarithmic(transform: str) -> bool:
     return transform == "log"
 
 
-def prepare(young: Array, transform: str) -> Prepared:
+def prepare(young: Array, transform: str) -> PreparedBlocks:
     """Prepare blocks (n, 8), none of them all void, as the evaluation of a mesh does."""
     young = np.ascontiguousarray(young, dtype=float)
     shape = young.shape
-    prepared = Prepared(
+    prepared = PreparedBlocks(
         np.empty((*shape, FEATURES), dtype=np.float32),
         np.empty(shape, dtype=np.uint8),
         np.empty(shape),

@@ -17,7 +17,7 @@ from forests.scaling import (
     RATIO_CEILING,
     RATIO_FLOOR,
     Features,
-    Prepared,
+    PreparedBlocks,
 )
 
 _AXES = np.array([1, 2, 4])
@@ -43,7 +43,7 @@ def cell_order_reference(young: Array) -> NDArray[np.int64]:
     return np.asarray(flips ^ origin[None])
 
 
-def prepare_reference(young: Array, transform: str) -> Prepared:
+def prepare_reference(young: Array, transform: str) -> PreparedBlocks:
     """The same as `forests.scaling.prepare`, bit for bit."""
     filled = young > 0.0
     total = np.zeros(len(young))
@@ -62,7 +62,7 @@ def prepare_reference(young: Array, transform: str) -> Prepared:
             ratios = young[rows, cells] / scale[..., None]
         features = np.where(missing, 0.0, np.clip(ratios, RATIO_FLOOR, RATIO_CEILING))
     pattern = (missing << np.arange(FEATURES)).sum(axis=-1)
-    return Prepared(features.astype(np.float32), pattern.astype(np.uint8), scale, filled)
+    return PreparedBlocks(features.astype(np.float32), pattern.astype(np.uint8), scale, filled)
 
 
 def leaf_numbers(model: Model, young: Array) -> NDArray[np.int64]:

@@ -9,18 +9,18 @@ from dataset_gen.shards import Shard
 from forests.model import Model
 from forests.training.dataset import Dataset, dataset_of
 from forests.training.ranks import Ranks
-from forests.training.train import Training, model_of, train_trees
+from forests.training.train import TrainingOptions, model_of, train_trees
 from tests.conftest import Run
 
 
 def train(
     dataset: Dataset | Sequence[Shard],
-    training: Training | None = None,
+    training: TrainingOptions | None = None,
     workers: int = 1,
     progress: bool = True,
 ) -> Model:
     """Forests of shards in memory, trained in this process."""
-    training = training or Training()
+    training = training or TrainingOptions()
     data = dataset if isinstance(dataset, Dataset) else dataset_of(dataset)
     trained = train_trees(data, training, Ranks(), workers, progress)
     assert trained is not None

@@ -8,7 +8,7 @@ from dataset_gen.generate import generate_file
 from dataset_gen.journal import journal_of
 from dataset_gen.settings import ShardOptions, settings_of
 from dataset_gen.shards import origin_of
-from dataset_gen.tasks import Plan
+from dataset_gen.tasks import ShardPlan
 
 pytestmark = pytest.mark.mpi
 
@@ -22,7 +22,7 @@ from dataset_gen import tasks
 from dataset_gen.__main__ import main
 from dataset_gen.commands import generate as program
 
-class Plan(tasks.Plan):
+class ShardPlan(tasks.ShardPlan):
     def work(self, task):
         comm, failing = ranks.world(), {{failing}}
         if failing and (comm.rank, task) in failing:
@@ -31,7 +31,7 @@ class Plan(tasks.Plan):
             time.sleep(0.05)  # so that the failing rank gets its share
         return super().work(task)
 
-program.Plan = lambda settings: Plan(settings, {TASK})
+program.ShardPlan = lambda settings: ShardPlan(settings, {TASK})
 sys.exit(main())
 """
 
@@ -43,7 +43,7 @@ def options(path, *more):
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory):
     path = tmp_path_factory.mktemp("reference") / "shard.h5"
-    plan = Plan(settings_of(ShardOptions(SAMPLES, 4)), TASK)
+    plan = ShardPlan(settings_of(ShardOptions(SAMPLES, 4)), TASK)
     generate_file(path, plan, origin_of(plan.settings, ShardOptions(SAMPLES)))
     return path.read_bytes()
 

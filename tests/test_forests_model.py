@@ -22,7 +22,7 @@ from forests.summary import as_text, describe
 from forests.training.join import join
 from forests.training.leaves import Leaves
 from forests.training.structure import tree_of
-from forests.training.train import Training
+from forests.training.train import TrainingOptions
 from tests.small_forests import train
 
 TRANSFORMS = ("log", "ratio")
@@ -35,7 +35,9 @@ def shard():
 
 @pytest.fixture(scope="module")
 def models(shard):
-    return {name: train([shard], Training(transform=name), progress=False) for name in TRANSFORMS}
+    return {
+        name: train([shard], TrainingOptions(transform=name), progress=False) for name in TRANSFORMS
+    }
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from dataset_gen.generate import generate_file
 from dataset_gen.journal import journal_of
 from dataset_gen.settings import ShardOptions, settings_of
 from dataset_gen.shards import origin_of
-from dataset_gen.tasks import Plan
+from dataset_gen.tasks import ShardPlan
 from forests.model import load_model
 from forests.training.tree_file import load_trees
 from solver.files.modes_file import read_modes
@@ -99,7 +99,7 @@ def test_a_file_of_another_kind_is_refused(kind, other, zoo):
 class Begun:
     """A shard under way: its plan and origin, its journal's bytes, the bytes it ends with."""
 
-    plan: Plan
+    plan: ShardPlan
     origin: dict
     journal: bytes
     shard: bytes
@@ -109,7 +109,7 @@ class Begun:
 def begun(tmp_path_factory):
     options = ShardOptions(6, objective="oversampled")
     settings = settings_of(options)
-    plan = Plan(settings, task_rows=1)
+    plan = ShardPlan(settings, task_rows=1)
     origin = origin_of(settings, options)
     folder = tmp_path_factory.mktemp("begun")
 

@@ -14,14 +14,13 @@ from carillon.errors import UserError
 from carillon.options import add_options, collect
 from carillon.progress import say
 from carillon.ranks import world
-from dataset_gen import ranks
 from dataset_gen.generate import Engine, engine_of, generate_file
+from dataset_gen.ranks import run_on_ranks
 from dataset_gen.settings import ShardOptions, settings_of
 from dataset_gen.shards import origin_of
 from dataset_gen.speed import Speed
-from dataset_gen.tasks import Plan
+from dataset_gen.tasks import ShardPlan
 
-PROGRAM = "dataset_gen generate"
 EXAMPLES = """examples:
   generate --samples 100000 --seed 1 --out shard.h5
   generate --samples 1000000 --seed 1 --shard 3 --shards 16 --workers 8 --out shard-3.h5
@@ -41,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
     if comm is None:
         return _generate(arguments, engine_of(arguments.workers))
 
-    def lead(engine: Engine) -> int:
+    def make(engine: Engine) -> int:
         if arguments.workers > 1:
             raise UserError(
                 f"{arguments.workers} workers on each of {comm.size} ranks: every rank is one "
@@ -49,7 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
             )
         return _generate(arguments, engine)
 
-    return ranks.share(comm, PROGRAM, lead)
+    return run_on_ranks(comm, make)
 
 
 def _generate(arguments: argparse.Namespace, engine: Engine) -> int:
@@ -57,7 +56,9 @@ def _generate(arguments: argparse.Namespace, engine: Engine) -> int:
     settings = settings_of(options)
     speed = Speed()
     try:
-        fitted = generate_file(arguments.out, Plan(settings), origin_of(settings, options), engine)
+        fitted = generate_file(
+            arguments.out, ShardPlan(settings), origin_of(settings, options), engine
+        )
     except KeyboardInterrupt:
         say(f"{arguments.out}: interrupted; the same command goes on from here")
         return cli.EXIT_INTERRUPTED

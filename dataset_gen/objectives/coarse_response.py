@@ -51,7 +51,7 @@ class Coarse(NamedTuple):
     strains: Array
 
 
-class Response(NamedTuple):
+class CoarseResponse(NamedTuple):
     """Answer of the coarse elements in the lanes.
 
     Attributes
@@ -93,9 +93,9 @@ def coarse_of(mask: int, poisson: float) -> Coarse:
 
 
 @compiled
-def empty_response() -> Response:
+def empty_response() -> CoarseResponse:
     """Room for an answer."""
-    return Response(
+    return CoarseResponse(
         empty(WEIGHTS),
         empty(LOWER),
         empty(MOTIONS**2),
@@ -105,7 +105,7 @@ def empty_response() -> Response:
 
 
 @compiled
-def respond(coarse: Coarse, logs: Array, response: Response) -> None:
+def respond(coarse: Coarse, logs: Array, response: CoarseResponse) -> None:
     """Answer of elements with moduli exp(`logs`), (8)."""
     weights, factor, flexibility, scaled, strained = response
     for q in range(8):
@@ -130,7 +130,7 @@ def respond(coarse: Coarse, logs: Array, response: Response) -> None:
 
 
 @compiled
-def write_curvature(response: Response, slope: Array, out: Array) -> None:
+def write_curvature(response: CoarseResponse, slope: Array, out: Array) -> None:
     """Write what the second derivatives of B in log E add to an objective's Hessian.
 
     With M (18, 18) the objective's derivative in B, they add `2 <R_p M R_q^T, Y_p Y_q^T>`, Y_q^T

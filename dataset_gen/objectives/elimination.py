@@ -32,7 +32,7 @@ class Links(NamedTuple):
     tile: Indices
 
 
-class Factor(NamedTuple):
+class FactorStructure(NamedTuple):
     """Structure of a Cholesky factor L whose tiles are stored row by row.
 
     Attributes
@@ -69,7 +69,7 @@ class Sum(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Elimination:
+class SymbolicFactorisation:
     """Unknowns of a void pattern in the order of elimination.
 
     Attributes
@@ -83,7 +83,7 @@ class Elimination:
     dofs: Indices
     linked: NDArray[np.bool_]
     filled: NDArray[np.bool_]
-    factor: Factor
+    factor: FactorStructure
 
 
 def _order(cells: NDArray[np.int64]) -> list[int]:
@@ -103,7 +103,7 @@ def _order(cells: NDArray[np.int64]) -> list[int]:
 
 
 @cache
-def elimination_of(mask: int) -> Elimination:
+def elimination_of(mask: int) -> SymbolicFactorisation:
     """Order and structure of the pattern whose filled cells are the set bits of `mask` (1..255)."""
     cells = CELL_NODES[np.flatnonzero(mask >> np.arange(8) & 1)]
     nodes = np.array(_order(cells))
@@ -113,10 +113,10 @@ def elimination_of(mask: int) -> Elimination:
     for node in range(len(filled)):
         front = node + 1 + np.flatnonzero(filled[node + 1 :, node])
         filled[np.ix_(front, front)] = True
-    return Elimination(degrees_of_freedom(nodes), linked, filled, factor_of(filled))
+    return SymbolicFactorisation(degrees_of_freedom(nodes), linked, filled, factor_of(filled))
 
 
-def factor_of(filled: NDArray[np.bool_]) -> Factor:
+def factor_of(filled: NDArray[np.bool_]) -> FactorStructure:
     """Structure of a factor that has the lower tiles of `filled` (n, n)."""
     lower = np.tril(filled)
     number = np.zeros(filled.shape, dtype=np.int64)
@@ -128,7 +128,7 @@ def factor_of(filled: NDArray[np.bool_]) -> Factor:
         i, j = front[row], front[column]
         updates.append(np.stack([number[i, j], number[i, k], number[j, k]], axis=1))
     updated, left, right = np.concatenate(updates).T
-    return Factor(
+    return FactorStructure(
         rows=_links(np.tril(filled, -1), number),
         columns=_links(np.triu(filled, 1), number.T),
         diagonal=np.diagonal(number).copy(),

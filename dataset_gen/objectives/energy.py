@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from carillon.fem.element import Array
 from dataset_gen.objectives.coarse_response import (
     Coarse,
-    Response,
+    CoarseResponse,
     coarse_of,
     empty_response,
     respond,
@@ -99,7 +99,7 @@ def _fine_response(coarse: Coarse, young: Array, first: int, fine: Fine) -> None
 
 @compiled
 def _evaluate(
-    coarse: Coarse, fine: Fine, response: Response, forms: Array, logs: Array, out: Array
+    coarse: Coarse, fine: Fine, response: CoarseResponse, forms: Array, logs: Array, out: Array
 ) -> None:
     """Value, gradient and Hessian of `2 |B - V^T K^+ V|^2 + (tr B - tr K^+)^2` in log E."""
     respond(coarse, logs, response)

@@ -16,7 +16,7 @@ from carillon.fem.block import cell_stiffness
 from carillon.fem.element import Array
 from carillon.serial import serial_blas
 from dataset_gen.objectives.elimination import (
-    Factor,
+    FactorStructure,
     Sum,
     elimination_of,
     lower_tiles_of,
@@ -45,7 +45,7 @@ class FreeBlock(NamedTuple):
     null : flat (a, k) orthonormal motions without strain, zero columns up to a multiple of six.
     """
 
-    factor: Factor
+    factor: FactorStructure
     stiffness: Sum
     null: Array
 

@@ -18,7 +18,7 @@ from carillon.serial import serial_blas
 from dataset_gen.objectives import flops
 from dataset_gen.objectives.elimination import (
     TILE,
-    Factor,
+    FactorStructure,
     Links,
     Sum,
     elimination_of,
@@ -79,7 +79,7 @@ class Patch(NamedTuple):
     strains : flat (48, 18) strains of the coarse element in its straining motions.
     """
 
-    factor: Factor
+    factor: FactorStructure
     held: Sum
     loads: Sum
     links: Links

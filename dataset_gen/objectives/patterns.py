@@ -33,7 +33,7 @@ NULL_TOLERANCE = 1e-10
 
 
 @dataclass(frozen=True)
-class Pattern:
+class VoidPattern:
     """Matrices of the block's active nodes (those that touch a filled cell) for unit moduli.
 
     Attributes
@@ -79,7 +79,7 @@ class Pattern:
 
 @cache
 @serial_blas
-def pattern_of(mask: int, poisson: float) -> Pattern:
+def pattern_of(mask: int, poisson: float) -> VoidPattern:
     """Matrices of the pattern whose filled cells are the set bits of `mask` (1..255)."""
     filled = (mask >> np.arange(8) & 1).astype(bool)
     cells = np.flatnonzero(filled)
@@ -90,7 +90,7 @@ def pattern_of(mask: int, poisson: float) -> Pattern:
     nodal = cell_mass()[cells].sum(axis=0)[np.ix_(nodes, nodes)]
     interpolation = prolongation()[dofs]
     values, vectors = np.linalg.eigh(stiffness.sum(axis=0))
-    return Pattern(
+    return VoidPattern(
         cells=cells,
         dofs=dofs,
         stiffness=np.ascontiguousarray(stiffness.reshape(len(cells), -1)),

@@ -9,12 +9,12 @@ from carillon.arguments import LARGEST, number_between, number_of_workers, whole
 from forests.layout import MOST_LEAVES
 from forests.scaling import TRANSFORMS
 from forests.training.structure import GROWERS
-from forests.training.train import Training
+from forests.training.train import TrainingOptions
 
 
 def add_training(parser: argparse.ArgumentParser) -> None:
     """Add the shards and the parameters of a training to a command."""
-    default = Training()
+    default = TrainingOptions()
     parser.add_argument("datasets", nargs="+", metavar="DATASET", help="shards of dataset_gen")
     wholes = {
         "trees": (1000, "of each of the two forests"),
@@ -50,9 +50,9 @@ def add_workers(parser: argparse.ArgumentParser, meaning: str = "threads") -> No
     parser.add_argument("--workers", type=number_of_workers, default=1, help=meaning)
 
 
-def training_of(arguments: argparse.Namespace) -> Training:
+def training_of(arguments: argparse.Namespace) -> TrainingOptions:
     """The parameters that `add_training` has read."""
-    names = [name for name in vars(Training()) if hasattr(arguments, name)]
-    training = replace(Training(), **{name: getattr(arguments, name) for name in names})
+    names = [name for name in vars(TrainingOptions()) if hasattr(arguments, name)]
+    training = replace(TrainingOptions(), **{name: getattr(arguments, name) for name in names})
     training.validate()
     return training

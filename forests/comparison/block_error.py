@@ -63,7 +63,7 @@ class Load(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Tables:
+class ErrorTables:
     """What a void pattern decides; r = active degrees of freedom less motions without strain.
 
     Attributes
@@ -81,7 +81,7 @@ class Tables:
     loads: dict[str, Load]
 
 
-class Response(NamedTuple):
+class FineResponse(NamedTuple):
     """Fine answers of n blocks to one load case.
 
     Attributes
@@ -122,7 +122,7 @@ class Errors(NamedTuple):
 
 @cache
 @serial_blas
-def tables_of(mask: int, poisson: float) -> Tables:
+def tables_of(mask: int, poisson: float) -> ErrorTables:
     """Tables of the pattern whose filled cells are the set bits of `mask` (1..255)."""
     pattern, motions = pattern_of(mask, poisson), straining_motions()
     size, nulls = pattern.null.shape
@@ -142,31 +142,31 @@ def tables_of(mask: int, poisson: float) -> Tables:
         "inertial": Load(factor, factor.T @ basis.T @ inertia),
         "corner": Load(unit, unit),
     }
-    return Tables(stiffness, basis, inertia, corners, loads)
+    return ErrorTables(stiffness, basis, inertia, corners, loads)
 
 
 def _square(matrices: Array) -> Array:
     return np.asarray(np.einsum("nij,nij->n", matrices, matrices))
 
 
-def fine_responses(young: Array, mask: int, poisson: float) -> dict[str, Response]:
+def fine_responses(young: Array, mask: int, poisson: float) -> dict[str, FineResponse]:
     """Answers of blocks (n, 8) that share one void pattern, by load case."""
     tables = tables_of(mask, poisson)
     size = len(tables.basis)
     flexibility = np.linalg.inv((young @ tables.stiffness).reshape(-1, size, size))
 
-    def response(answer: Array) -> Response:
+    def response(answer: Array) -> FineResponse:
         target = tables.basis.T @ answer
         total = _square(answer)
-        return Response(target, np.maximum(total - _square(target), 0.0), total)
+        return FineResponse(target, np.maximum(total - _square(target), 0.0), total)
 
     nodal = _square(flexibility)
     answered = tables.basis.T @ flexibility @ tables.basis
     corner = tables.corners.T @ flexibility @ tables.corners
     return {
-        "nodal": Response(answered, np.maximum(nodal - _square(answered), 0.0), nodal),
+        "nodal": FineResponse(answered, np.maximum(nodal - _square(answered), 0.0), nodal),
         "inertial": response(flexibility @ tables.inertia),
-        "corner": Response(corner, np.zeros(len(young)), _square(corner)),
+        "corner": FineResponse(corner, np.zeros(len(young)), _square(corner)),
     }
 
 

@@ -19,7 +19,7 @@ STREAMS = 16
 
 
 @dataclass(frozen=True)
-class Case:
+class BlockCase:
     """A distribution of blocks.
 
     Attributes
@@ -54,7 +54,7 @@ class Case:
         """Distribution of the moduli before scaling."""
         return moduli(self.distribution, self.low, self.high)
 
-    def alike(self, other: Case) -> bool:
+    def alike(self, other: BlockCase) -> bool:
         """Whether blocks of both cases differ in nothing but the range of their moduli."""
         return (self.distribution, self.void) == (other.distribution, other.void)
 
@@ -84,11 +84,11 @@ class Case:
 
 
 CASES = (
-    Case(0.0, 10.0, "uniform", void=False, stream=0),
-    Case(100.0, 10_000.0, "uniform", void=False, stream=1),
-    Case(0.01, 1000.0, "log-uniform", void=False, stream=2),
-    Case(0.0, 10.0, "uniform", void=True, stream=3),
-    Case(0.0, 10.0, "uniform", void=False, stream=0, scaled_by=1000.0),
+    BlockCase(0.0, 10.0, "uniform", void=False, stream=0),
+    BlockCase(100.0, 10_000.0, "uniform", void=False, stream=1),
+    BlockCase(0.01, 1000.0, "log-uniform", void=False, stream=2),
+    BlockCase(0.0, 10.0, "uniform", void=True, stream=3),
+    BlockCase(0.0, 10.0, "uniform", void=False, stream=0, scaled_by=1000.0),
 )
 """The paper's trained range and its untrained one; rubber to diamond; partly void; scaled."""
 

@@ -13,7 +13,7 @@ from carillon.fem.element import Array
 from carillon.files import require_writable
 from dataset_gen.objectives import closed_form, fit
 from forests.baselines import average, galerkin
-from forests.comparison.cases import Case
+from forests.comparison.cases import BlockCase
 from forests.comparison.condensation import condense, corner_flexibility
 from forests.comparison.database import (
     MATERIALS,
@@ -120,11 +120,11 @@ def metamaterials(database: Database, name: str, clamped: bool = False) -> Metho
 
 
 def databases_of(
-    cases: Sequence[Case],
+    cases: Sequence[BlockCase],
     poisson: float,
     path: str | Path | None = None,
     materials: int = MATERIALS,
-) -> dict[Case, Database]:
+) -> dict[BlockCase, Database]:
     """A database made for each case that is not another one scaled.
 
     Parameters
@@ -169,7 +169,7 @@ def _stored(
     )
 
 
-def database_methods(case: Case, databases: dict[Case, Database]) -> list[Method]:
+def database_methods(case: BlockCase, databases: dict[BlockCase, Database]) -> list[Method]:
     """The database made for the blocks of a case, and those made for a lower range of such blocks.
 
     The latter take moduli beyond their range for their stiffest material.

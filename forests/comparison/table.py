@@ -20,7 +20,7 @@ from carillon.fem.element import Array
 from carillon.progress import track
 from carillon.serial import serial_blas
 from forests.comparison.block_error import AT_ONCE, Errors, displacement_errors
-from forests.comparison.cases import CASES, Case
+from forests.comparison.cases import CASES, BlockCase
 from forests.comparison.database import Database
 from forests.comparison.methods import (
     Method,
@@ -106,7 +106,7 @@ def table(
     models: dict[str, Model],
     blocks: int = 10_000,
     seed: int = 0,
-    databases: dict[Case, Database] | None = None,
+    databases: dict[BlockCase, Database] | None = None,
 ) -> list[Row]:
     """Rows of Fig. 9 on `blocks` random blocks of each case, on one core.
 
@@ -143,7 +143,7 @@ def table(
     return rows
 
 
-def _row(case: Case, method: Method, young: Array, errors: Errors) -> Row:
+def _row(case: BlockCase, method: Method, young: Array, errors: Errors) -> Row:
     return {
         "method": method.name,
         **case.columns(),

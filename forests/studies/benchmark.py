@@ -70,7 +70,7 @@ class Rival:
 
 
 @dataclass(frozen=True)
-class Size:
+class SizeTiming:
     """A forest of complete trees; microseconds of a block, nanoseconds of one walk down a tree."""
 
     megabytes: float
@@ -97,7 +97,7 @@ class Result:
     load_ms: float
     evaluation: dict[str, Timing]
     rival: Rival
-    sizes: list[Size]
+    sizes: list[SizeTiming]
     caches: dict[str, str]
     processor: str
 
@@ -190,7 +190,7 @@ def against_scikit_learn(young: Array, trees: int, leaves: int) -> Rival:
     )
 
 
-def over_size(sizes: Sequence[tuple[int, int]], young: Array, mesh: Array) -> list[Size]:
+def over_size(sizes: Sequence[tuple[int, int]], young: Array, mesh: Array) -> list[SizeTiming]:
     """Measure forests of complete trees on random blocks and on those of a mesh."""
     found = []
     for trees, depth in track(sizes, "forests of growing size", unit="forests"):
@@ -198,7 +198,9 @@ def over_size(sizes: Sequence[tuple[int, int]], young: Array, mesh: Array) -> li
         random = timed(partial(coarsen, model, young), len(young))
         coherent = timed(partial(coarsen, model, mesh), len(mesh))
         walks = [1e3 * timing.median / (8 * trees) for timing in (random, coherent)]
-        found.append(Size(model.nbytes / 1e6, trees, depth, random, coherent, walks[0], walks[1]))
+        found.append(
+            SizeTiming(model.nbytes / 1e6, trees, depth, random, coherent, walks[0], walks[1])
+        )
     return found
 
 

@@ -23,7 +23,7 @@ from forests.training.ranks import Ranks
 from forests.training.rows import modulus_over_scale, rows_of
 from forests.training.scores import scores_of
 from forests.training.structure import Tree
-from forests.training.train import Trained, Training, train_trees
+from forests.training.train import Trained, TrainingOptions, train_trees
 
 logger = logging.getLogger(__name__)
 
@@ -71,7 +71,7 @@ def fresh_samples(dataset: Dataset) -> dict[str, Samples]:
     return found
 
 
-def _errors(trained: Trained, samples: Samples, training: Training) -> Array:
+def _errors(trained: Trained, samples: Samples, training: TrainingOptions) -> Array:
     """Errors (n, 8) of log E, also with transforms that cannot be evaluated on a mesh."""
     errors = np.empty_like(samples.moduli)
     filled = samples.young > 0
@@ -92,7 +92,9 @@ def storage_of(trees: Iterable[Tree]) -> int:
     return sum(NODE.itemsize * len(tree.left) + 4 * RECORD * tree.leaves for tree in trees)
 
 
-def _row(dataset: Dataset, training: Training, workers: int, test: dict[str, Samples]) -> Row:
+def _row(
+    dataset: Dataset, training: TrainingOptions, workers: int, test: dict[str, Samples]
+) -> Row:
     trained = train_trees(dataset, training, Ranks(), workers)
     assert trained is not None
     leaves = sum(tree.leaves for tree in trained.trees.values())
@@ -110,7 +112,7 @@ def _row(dataset: Dataset, training: Training, workers: int, test: dict[str, Sam
 
 def variants(
     dataset: Dataset,
-    training: Training,
+    training: TrainingOptions,
     workers: int = 1,
     names: Sequence[str] = tuple(VARIANTS),
 ) -> list[Row]:
@@ -135,7 +137,7 @@ def variants(
 
 
 def learning_curve(
-    dataset: Dataset, training: Training, rows: Sequence[int], workers: int = 1
+    dataset: Dataset, training: TrainingOptions, rows: Sequence[int], workers: int = 1
 ) -> list[Row]:
     """Trainings on about so many rows of the dataset each, scored on fresh samples.
 

@@ -23,7 +23,7 @@ from forests.training.leaves import Leaves, Sums, add_rows, solve_leaves
 from forests.training.ranks import Ranks
 from forests.training.rows import STUDIED, rows_of
 from forests.training.scores import held_out_scores, uniform_scores
-from forests.training.structure import GROWERS, Limits, Rows, Tree
+from forests.training.structure import GROWERS, Rows, Tree, TreeLimits
 
 logger = logging.getLogger(__name__)
 
@@ -33,7 +33,7 @@ KINDS = {VOID: "void", FILLED: "filled"}
 
 
 @dataclass(frozen=True)
-class Training:
+class TrainingOptions:
     """Parameters of the training.
 
     Attributes
@@ -59,9 +59,9 @@ class Training:
     seed: int = 0
 
     @property
-    def limits(self) -> Limits:
+    def limits(self) -> TreeLimits:
         """What a tree may grow to."""
-        return Limits(self.max_leaves, self.min_leaf, self.depth)
+        return TreeLimits(self.max_leaves, self.min_leaf, self.depth)
 
     @property
     def jobs(self) -> range:
@@ -90,7 +90,7 @@ class Training:
 
 def grow_trees(
     dataset: Dataset,
-    training: Training,
+    training: TrainingOptions,
     jobs: range,
     workers: int = 1,
     progress: bool = True,
@@ -125,7 +125,7 @@ def grow_trees(
     return dict(zip(jobs, found, strict=True))
 
 
-def _require_rows(rows: Rows, kind: int, training: Training, tell: bool) -> None:
+def _require_rows(rows: Rows, kind: int, training: TrainingOptions, tell: bool) -> None:
     if len(rows) < 2 * training.min_leaf:
         raise UserError(
             f"{len(rows)} rows with a {KINDS[kind]} origin, expected at least "
@@ -142,7 +142,7 @@ def _require_rows(rows: Rows, kind: int, training: Training, tell: bool) -> None
 
 def fit_leaves(
     dataset: Dataset,
-    training: Training,
+    training: TrainingOptions,
     trees: dict[int, Tree],
     ranks: Ranks,
     workers: int = 1,
@@ -156,7 +156,7 @@ def fit_leaves(
     """
     sums = {job: Sums.nothing(tree.leaves) for job, tree in trees.items()}
     held: list[Samples] = []
-    begin, end = ranks.share(dataset.count)
+    begin, end = ranks.own_samples(dataset.count)
 
     def prepared() -> Iterator[tuple[tuple[Rows, Rows], int]]:
         for piece in dataset.read(begin, end):
@@ -215,7 +215,7 @@ class Trained(NamedTuple):
 
 def train_trees(
     dataset: Dataset,
-    training: Training,
+    training: TrainingOptions,
     ranks: Ranks,
     workers: int = 1,
     progress: bool = True,
@@ -236,7 +236,7 @@ def train_trees(
     begin = time.perf_counter()
     if grown is None:
         shown = progress and ranks.first
-        mine = grow_trees(dataset, training, ranks.deal(training.jobs), workers, shown)
+        mine = grow_trees(dataset, training, ranks.own_jobs(training.jobs), workers, shown)
         grown = ranks.together(mine), time.perf_counter() - begin
     found, structure_seconds = grown
     trees = {job: found[job] for job in training.jobs}
@@ -257,7 +257,7 @@ def train_trees(
     return Trained(trees, leaves, held, facts)
 
 
-def model_of(dataset: Dataset, training: Training, trained: Trained) -> Model:
+def model_of(dataset: Dataset, training: TrainingOptions, trained: Trained) -> Model:
     """The model that evaluates trained trees, with its scores and its provenance."""
     void, filled = (
         [(trained.trees[j], trained.leaves[j]) for j in training.jobs if training.kind(j) == kind]
@@ -281,7 +281,7 @@ def model_of(dataset: Dataset, training: Training, trained: Trained) -> Model:
     return replace(model, scores=scores)
 
 
-def parameters_of(dataset: Dataset, training: Training) -> dict[str, Any]:
+def parameters_of(dataset: Dataset, training: TrainingOptions) -> dict[str, Any]:
     """What a training depends on, for the provenance."""
     ranges = [
         [part.seed, part.distribution, part.low, part.high, part.start, part.stop]
