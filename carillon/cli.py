@@ -122,7 +122,7 @@ def _nobody_reads() -> bool:
     poll = select.poll()
     with suppress(OSError, ValueError):
         poll.register(sys.stdout.fileno(), 0)
-        return any(found & select.POLLERR for _, found in poll.poll(0))
+        return any(events & select.POLLERR for _, events in poll.poll(0))
     return False
 
 

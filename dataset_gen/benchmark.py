@@ -28,11 +28,11 @@ MATRIX = 768
 
 
 class Rate(NamedTuple):
-    """Items per second: median, least and largest of the runs."""
+    """Items per second: median, minimum and maximum of the runs."""
 
     median: float
-    least: float
-    largest: float
+    minimum: float
+    maximum: float
 
 
 def _rate(work: Callable[[], Any], items: float) -> Rate:
@@ -59,7 +59,7 @@ def _sampled_rate(young: Array, poisson: float) -> Rate:
 def _blas_gflops() -> float:
     """Billions of operations per second of a product of full matrices by BLAS on one core."""
     left = np.random.default_rng(0).random((MATRIX, MATRIX))
-    return _rate(lambda: left @ left, 2e-9 * MATRIX**3).largest
+    return _rate(lambda: left @ left, 2e-9 * MATRIX**3).maximum
 
 
 @compiled
@@ -77,7 +77,7 @@ def _peak_gflops() -> float:
     """Billions of operations per second of multiplications and additions within registers."""
     repetitions = 20_000
     operations = 2e-9 * LANES * 18 * 8 * repetitions
-    return _rate(lambda: _multiply_in_registers(repetitions), operations).largest
+    return _rate(lambda: _multiply_in_registers(repetitions), operations).maximum
 
 
 def _flops_per_fit(objective: str, young: Array, poisson: float) -> float | None:
@@ -86,9 +86,9 @@ def _flops_per_fit(objective: str, young: Array, poisson: float) -> float | None
     The least squares at the end, a few thousandths of it, are left out.
     """
     fit(objective, young, poisson)
-    with flops.counted() as found:
+    with flops.counted() as counts:
         fit(objective, young, poisson)
-    return sum(found) / len(young) if found else None
+    return sum(counts) / len(young) if counts else None
 
 
 def benchmark(
@@ -105,7 +105,7 @@ def benchmark(
     dict with
 
     fits_per_second : of the `closed_form` and of Eq. (8) with `sampled` forces; a fit has
-        `rows_per_fit` moduli. `spread` has least and largest of the runs.
+        `rows_per_fit` moduli. `spread` has minimum and maximum of the runs.
     objectives : fits per second by name.
     flops_per_fit, gflops : operations of the closed form and billions of them per second, null for
         an iterative one. `gflops_dgemm` is what BLAS reaches on the same core, `gflops_peak` the

@@ -126,13 +126,13 @@ def _is_there(path: Path, plan: ShardPlan) -> bool:
     if not path.exists():
         return False
     try:
-        found = read_settings(path)
+        existing = read_settings(path)
     except UserError as error:
         raise UserError(
             f"{path}: exists and is not the shard asked for ({error}); remove it or choose another "
             "name"
         ) from None
-    different = found.difference(plan.settings)
+    different = existing.difference(plan.settings)
     if different is not None:
         raise UserError(
             f"{path}: exists with {different}; remove it or choose another name for the new shard"

@@ -229,9 +229,9 @@ def _require_sane(path: Path, shard: Shard) -> None:
         )
 
 
-def _require_consistent(paths: Sequence[str | Path], found: Sequence[Settings]) -> None:
-    first = found[0]
-    for path, settings in zip(paths, found):
+def _require_consistent(paths: Sequence[str | Path], all_settings: Sequence[Settings]) -> None:
+    first = all_settings[0]
+    for path, settings in zip(paths, all_settings):
         for name, label in _OF_ONE_KIND.items():
             mine, expected = getattr(settings, name), getattr(first, name)
             if mine != expected:
@@ -241,10 +241,10 @@ def _require_consistent(paths: Sequence[str | Path], found: Sequence[Settings]) 
                 )
 
 
-def _require_disjoint(paths: Sequence[str | Path], found: Sequence[Settings]) -> None:
-    order = sorted(range(len(found)), key=lambda i: _place(found[i]))
+def _require_disjoint(paths: Sequence[str | Path], all_settings: Sequence[Settings]) -> None:
+    order = sorted(range(len(all_settings)), key=lambda i: _place(all_settings[i]))
     for before, after in zip(order, order[1:]):
-        one, two = found[before], found[after]
+        one, two = all_settings[before], all_settings[after]
         same = (one.seed, one.moduli) == (two.seed, two.moduli)
         if same and two.start < one.stop:
             raise UserError(
@@ -259,7 +259,7 @@ def _place(settings: Settings) -> tuple[int, str, float, float, int]:
 
 
 def in_order(
-    paths: Sequence[str | Path], found: Sequence[Settings]
+    paths: Sequence[str | Path], all_settings: Sequence[Settings]
 ) -> list[tuple[str | Path, Settings]]:
     """Shards that belong together, ordered by seed, distribution and sample number.
 
@@ -271,6 +271,6 @@ def in_order(
     """
     if not paths:
         raise UserError("no dataset given, name at least one shard")
-    _require_consistent(paths, found)
-    _require_disjoint(paths, found)
-    return sorted(zip(paths, found), key=lambda pair: _place(pair[1]))
+    _require_consistent(paths, all_settings)
+    _require_disjoint(paths, all_settings)
+    return sorted(zip(paths, all_settings), key=lambda pair: _place(pair[1]))

@@ -54,9 +54,9 @@ def _walk(
     tree: int,
     features: Features,
     pattern: NDArray[np.int64],
-    found: NDArray[np.int64],
+    numbers: NDArray[np.int64],
 ) -> None:
-    """Leaves found[:, tree] of the eight origins of a block.
+    """Leaves `numbers[:, tree]` of the eight origins of a block.
 
     The eight walk in step, without a branch that depends on the data: so the processor waits for
     the memory of all of them at once and guesses wrong once a tree at most.
@@ -82,8 +82,14 @@ def _walk(
         f = _step(thresholds, links, features, 5, f, to_f)
         g = _step(thresholds, links, features, 6, g, to_g)
         h = _step(thresholds, links, features, 7, h, to_h)
-    found[0, tree], found[1, tree], found[2, tree], found[3, tree] = ~to_a, ~to_b, ~to_c, ~to_d
-    found[4, tree], found[5, tree], found[6, tree], found[7, tree] = ~to_e, ~to_f, ~to_g, ~to_h
+    numbers[0, tree] = ~to_a
+    numbers[1, tree] = ~to_b
+    numbers[2, tree] = ~to_c
+    numbers[3, tree] = ~to_d
+    numbers[4, tree] = ~to_e
+    numbers[5, tree] = ~to_f
+    numbers[6, tree] = ~to_g
+    numbers[7, tree] = ~to_h
 
 
 @numba.njit(inline="always")
@@ -94,13 +100,13 @@ def _find(
     leaves: NDArray[np.float32],
     features: Features,
     pattern: NDArray[np.int64],
-    found: NDArray[np.int64],
+    numbers: NDArray[np.int64],
 ) -> None:
-    """Leaves found (8, trees) of a block; their memory is asked for while the next trees run."""
+    """Leaves `numbers` (8, trees) of a block; their memory is asked for while other trees run."""
     for tree in range(len(roots)):
-        _walk(roots, thresholds, links, tree, features, pattern, found)
+        _walk(roots, thresholds, links, tree, features, pattern, numbers)
         for origin in range(8):
-            prefetch(leaves, found[origin, tree])
+            prefetch(leaves, numbers[origin, tree])
 
 
 @numba.njit(inline="always")
@@ -114,16 +120,16 @@ def _linear(leaf: NDArray[np.float32], features: Features, origin: int) -> float
 
 @numba.njit(inline="always")
 def _target(
-    leaves: NDArray[np.float32], found: NDArray[np.int64], features: Features, origin: int
+    leaves: NDArray[np.float32], numbers: NDArray[np.int64], features: Features, origin: int
 ) -> float:
-    """Mean answer of the trees whose leaves are `found` (trees,)."""
+    """Mean answer of the trees whose leaves are `numbers` (trees,)."""
     total = 0.0
-    for tree in range(len(found)):
-        leaf = leaves[found[tree]]
+    for tree in range(len(numbers)):
+        leaf = leaves[numbers[tree]]
         answer = _linear(leaf, features, origin)
         low, high = float(leaf[LOW]), float(leaf[HIGH])
         total += min(max(answer, low), high)
-    return total / len(found)
+    return total / len(numbers)
 
 
 @numba.njit(inline="always")
@@ -139,8 +145,8 @@ def _scratch(
     features = np.zeros(8 * STRIDE, dtype=np.float32)
     table = features.reshape(8, STRIDE)
     pattern = np.empty(8, dtype=np.int64)
-    found = np.empty((8, trees), dtype=np.int64)
-    return values, scale, references, features, table, pattern, found
+    numbers = np.empty((8, trees), dtype=np.int64)
+    return values, scale, references, features, table, pattern, numbers
 
 
 @numba.njit(cache=True, nogil=True)
@@ -154,31 +160,31 @@ def _moduli(
     moduli: Array,
 ) -> None:
     """Coarse moduli (n, 8) of blocks (n, 8)."""
-    values, scale, references, features, table, pattern, found = _scratch(len(roots))
+    values, scale, references, features, table, pattern, numbers = _scratch(len(roots))
     for block in range(len(young)):
         prepare_block(young[block], logarithmic, values, table, pattern, scale, references)
-        _find(roots, thresholds, links, leaves, features, pattern, found)
+        _find(roots, thresholds, links, leaves, features, pattern, numbers)
         for origin in range(8):
-            target = _target(leaves, found[origin], features, origin)
+            target = _target(leaves, numbers[origin], features, origin)
             moduli[block, origin] = modulus_of(target, scale[origin], logarithmic)
 
 
 @numba.njit(inline="always")
 def _slopes(
     leaves: NDArray[np.float32],
-    found: NDArray[np.int64],
+    numbers: NDArray[np.int64],
     features: Features,
     origin: int,
     slopes: Array,
 ) -> None:
     """Mean slopes (7,) of the trees' answers, zero where an answer is at its bounds."""
     slopes[:] = 0.0
-    for tree in range(len(found)):
-        leaf = leaves[found[tree]]
+    for tree in range(len(numbers)):
+        leaf = leaves[numbers[tree]]
         answer = _linear(leaf, features, origin)
         if leaf[LOW] <= answer <= leaf[HIGH]:
             for k in range(FEATURES):
-                slopes[k] += np.float64(leaf[k]) / len(found)
+                slopes[k] += np.float64(leaf[k]) / len(numbers)
 
 
 @numba.njit(inline="always")
@@ -227,16 +233,16 @@ def _derivatives(
     derivatives: Array,
 ) -> None:
     """Coarse moduli (n, 8) of blocks (n, 8) and their derivatives (n, 8, 8)."""
-    values, scale, references, features, table, pattern, found = _scratch(len(roots))
+    values, scale, references, features, table, pattern, numbers = _scratch(len(roots))
     slopes = np.empty(FEATURES)
     for block in range(len(young)):
         prepare_block(young[block], logarithmic, values, table, pattern, scale, references)
-        _find(roots, thresholds, links, leaves, features, pattern, found)
+        _find(roots, thresholds, links, leaves, features, pattern, numbers)
         for origin in range(8):
-            target = _target(leaves, found[origin], features, origin)
+            target = _target(leaves, numbers[origin], features, origin)
             modulus = modulus_of(target, scale[origin], logarithmic)
             moduli[block, origin] = modulus
-            _slopes(leaves, found[origin], features, origin, slopes)
+            _slopes(leaves, numbers[origin], features, origin, slopes)
             _gradient(
                 young[block],
                 logarithmic,

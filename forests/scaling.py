@@ -141,8 +141,8 @@ def prepare_block(
         for k in range(FEATURES):
             cell = origin ^ FLIPS[code, k]
             missing = void >> cell & 1
-            found = feature_of(values[cell], reference, logarithmic)
-            features[origin, k] = np.float32(void_feature if missing else found)
+            feature = feature_of(values[cell], reference, logarithmic)
+            features[origin, k] = np.float32(void_feature if missing else feature)
             bits |= missing << k
         pattern[origin] = bits
 

@@ -59,7 +59,7 @@ def test_measurements_are_complete_and_agree_with_scikit_learn(path):
     assert result.leaves == 256 and result.load_ms > 0
     assert len(result.evaluation) == 5
     for timing in (*result.evaluation.values(), result.rival.predict, result.rival.coarsen):
-        assert 0 < timing.least <= timing.median <= timing.most and timing.runs >= 7
+        assert 0 < timing.min <= timing.median <= timing.max and timing.runs >= 7
     assert result.rival.difference < 1e-5 and result.rival.leaves > 200
     (size,) = result.sizes
     assert (size.trees, size.depth) == SIZES[0] and 0.5 < size.megabytes < 1.0

@@ -151,13 +151,13 @@ def test_no_element_falls_below_the_least_error_and_one_reaches_it():
     found = displacement_errors(young, answers(young), POISSON)
     for errors in found:
         for load in LOADS:
-            assert (errors.relative(load) >= errors.relative_least(load) * (1 - 1e-12)).all()
+            assert (errors.relative(load) >= errors.relative_minimum(load) * (1 - 1e-12)).all()
     inverse = np.linalg.inv(tables_of(255, POISSON).loads["nodal"].left)
     free = [FreeBlock(block) for block in young]
     basis = free[0].without_null @ prolongation() @ straining_motions() @ inverse
     best = np.stack([inverse @ basis.T @ one.flexibility @ basis @ inverse.T for one in free])
     (errors,) = displacement_errors(young, [best], POISSON)
-    np.testing.assert_allclose(errors.squared["nodal"], errors.least["nodal"], rtol=1e-9)
+    np.testing.assert_allclose(errors.squared["nodal"], errors.minimum["nodal"], rtol=1e-9)
 
 
 def test_uniform_blocks_are_coarsened_alike_by_average_and_galerkin():
@@ -241,10 +241,10 @@ def test_rows_have_every_method_in_every_case(rows):
     for row in rows:
         numbers = [row[key] for key in row if "error" in key or key == "mean_squared_m2"]
         assert len(numbers) == 9 and np.isfinite(numbers).all() and min(numbers) >= 0.0
-        cost = [row[f"seconds_per_block{end}"] for end in ("_least", "", "_most")]
+        cost = [row[f"seconds_per_block{end}"] for end in ("_min", "", "_max")]
         assert cost == sorted(cost) and min(cost) > 0.0 and row["timed_runs"] > 2
         assert row["storage_bytes"] >= 0
-        assert row["mean_error"] >= row["least_mean_error"]
+        assert row["mean_error"] >= row["min_mean_error"]
     assert all(row["storage_bytes"] == 0 for row in rows if "fitted" in row["method"])
 
 

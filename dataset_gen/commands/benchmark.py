@@ -26,5 +26,5 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Measure and print."""
-    found = benchmark.benchmark(arguments.samples, arguments.poisson, arguments.objective)
-    print(json.dumps(found, indent=2) if arguments.json else benchmark.as_text(found))
+    result = benchmark.benchmark(arguments.samples, arguments.poisson, arguments.objective)
+    print(json.dumps(result, indent=2) if arguments.json else benchmark.as_text(result))

@@ -168,7 +168,7 @@ def fit_samples(objective: str, e: Array, seed: int, first: int, poisson: float)
     """
     if objective != SAMPLED:
         return fit(objective, e, poisson)
-    found = [
+    fits = [
         sampled_energy.fit_sample(young, seed, first + row, poisson) for row, young in enumerate(e)
     ]
-    return Fits(*(np.concatenate(column) for column in zip(*found)))
+    return Fits(*(np.concatenate(column) for column in zip(*fits)))

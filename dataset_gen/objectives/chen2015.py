@@ -90,10 +90,10 @@ def corner_selection(mask: int, poisson: float) -> Array:
     pattern = pattern_of(mask, poisson)
     selection = pattern.to_corners.copy()
     for row, dof in enumerate(degrees_of_freedom(CORNER_NODES)):
-        found = np.flatnonzero(pattern.dofs == dof)
-        if len(found):
+        position = np.flatnonzero(pattern.dofs == dof)
+        if len(position):
             selection[row] = 0.0
-            selection[row, found] = 1.0
+            selection[row, position] = 1.0
     return selection
 
 

@@ -25,19 +25,19 @@ _counter: ContextVar[list[int] | None] = ContextVar("counter", default=None)
 @contextmanager
 def counted() -> Iterator[list[int]]:
     """Collect what `count` is told meanwhile."""
-    found: list[int] = []
-    token = _counter.set(found)
+    counts: list[int] = []
+    token = _counter.set(counts)
     try:
-        yield found
+        yield counts
     finally:
         _counter.reset(token)
 
 
 def count(flops: int) -> None:
     """Report operations to those who count."""
-    found = _counter.get()
-    if found is not None:
-        found.append(flops)
+    counts = _counter.get()
+    if counts is not None:
+        counts.append(flops)
 
 
 def assembly(*sums: Sum) -> int:

@@ -21,6 +21,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Measure and print."""
     require_outputs(arguments, *([arguments.model] if arguments.model else []))
-    found = benchmark.benchmark(arguments.model, arguments.blocks, arguments.largest)
-    text = benchmark.as_text(found)
-    publish(arguments, benchmark.as_json(found), text, max(benchmark.THREADS))
+    result = benchmark.benchmark(arguments.model, arguments.blocks, arguments.largest)
+    text = benchmark.as_text(result)
+    publish(arguments, benchmark.as_json(result), text, max(benchmark.THREADS))

@@ -66,10 +66,10 @@ def _train(
         return
     model = model_of(dataset, training, trained)
     save_model(arguments.out, model)
-    told = trained.facts
+    facts = trained.facts
     scores = "".join(f", {name} {value:.4g}" for name, value in model.scores.items())
     say(
-        f"{arguments.out}: {told['training_rows']:,} rows; structure "
-        f"{told['structure_seconds']:.1f} s, leaves {told['leaves_seconds']:.1f} s = "
-        f"{told['rows_per_second']:,.0f} rows/s{scores}"
+        f"{arguments.out}: {facts['training_rows']:,} rows; structure "
+        f"{facts['structure_seconds']:.1f} s, leaves {facts['leaves_seconds']:.1f} s = "
+        f"{facts['rows_per_second']:,.0f} rows/s{scores}"
     )

@@ -102,22 +102,22 @@ class Errors(NamedTuple):
     Attributes
     ----------
     squared : E|u_c - u|^2.
-    least : what it cannot fall below, whatever the element: the part of u that no motion of the
+    minimum : what it cannot fall below, whatever the element: the part of u that no motion of the
         corners gives; 0 for loads on the corners.
     reference : E|u|^2.
     """
 
     squared: dict[str, Array]
-    least: dict[str, Array]
+    minimum: dict[str, Array]
     reference: dict[str, Array]
 
     def relative(self, load: str) -> Array:
         """E|u_c - u|^2 / E|u|^2 of each block."""
         return np.asarray(self.squared[load] / self.reference[load])
 
-    def relative_least(self, load: str) -> Array:
+    def relative_minimum(self, load: str) -> Array:
         """Least possible error relative to E|u|^2 of each block."""
-        return np.asarray(self.least[load] / self.reference[load])
+        return np.asarray(self.minimum[load] / self.reference[load])
 
 
 @cache
@@ -210,17 +210,17 @@ def pattern_errors(
     """
     loads = tables_of(mask, poisson).loads
     fine = fine_responses(young, mask, poisson)
-    least = {name: fine[name].rest for name in LOADS}
+    minimum = {name: fine[name].rest for name in LOADS}
     reference = {name: fine[name].total for name in LOADS}
-    found = []
+    errors = []
     for answer in coarse:
         flexibility = coarse_flexibility(answer, poisson) if answer.ndim == 2 else answer
         squared = {}
         for name in LOADS:
             error = loads[name].left @ flexibility @ loads[name].right - fine[name].target
             squared[name] = _square(error) + fine[name].rest
-        found.append(Errors(squared, least, reference))
-    return found
+        errors.append(Errors(squared, minimum, reference))
+    return errors
 
 
 def displacement_errors(young: Array, coarse: Sequence[Array], poisson: float) -> list[Errors]:
@@ -233,11 +233,11 @@ def displacement_errors(young: Array, coarse: Sequence[Array], poisson: float) -
     def empty() -> dict[str, Array]:
         return {name: np.empty(count) for name in LOADS}
 
-    found = [Errors(empty(), empty(), empty()) for _ in coarse]
+    errors = [Errors(empty(), empty(), empty()) for _ in coarse]
     for mask, rows in pattern_rows(young, AT_ONCE):
         parts = pattern_errors(young[rows], [part[rows] for part in coarse], mask, poisson)
-        for whole, part in zip(found, parts):
+        for whole, part in zip(errors, parts):
             for into, values in zip(whole, part):
                 for name in LOADS:
                     into[name][rows] = values[name]
-    return found
+    return errors

@@ -96,6 +96,6 @@ CASES = (
 def turned(young: Array) -> Array:
     """Blocks (n, 8), each turned by a symmetry of the cube to the least image of its pattern."""
     turn = orientations()[1][(young > 0.0) @ (1 << np.arange(8))]
-    found = np.empty_like(young)
-    np.put_along_axis(found, turn, young, axis=1)
-    return found
+    images = np.empty_like(young)
+    np.put_along_axis(images, turn, young, axis=1)
+    return images

@@ -90,7 +90,7 @@ def _stored(database: Database) -> dict[str, NDArray]:
 
 
 def base_materials(moduli: Moduli, count: int, void: bool = False) -> Array:
-    """Young's moduli (count,) to represent a range, in its unit; void is one of them if wanted.
+    """Young's moduli (count,) to represent a range, in its unit; void is one of them if `void`.
 
     Each stands in the middle of an equal part of the range, on the scale of logarithms for
     log-uniform moduli. For uniform ones the scale is that of square roots: soft cells decide how
@@ -199,14 +199,14 @@ def _look_up(
                 high = middle
         if low == len(keys) or keys[low] != key:
             return block
-        found = moduli[entries[low]]
+        entry = moduli[entries[low]]
         out[block] = 0.0
         count = 0
         for g in range(turns):
             if turned[g] == key:
                 count += 1
                 for j in range(8):
-                    out[block, j] += found[images[g, j]]
+                    out[block, j] += entry[images[g, j]]
         out[block] /= count
     return -1
 

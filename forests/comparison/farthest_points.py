@@ -90,7 +90,7 @@ def _pick(
                 gap += away * away
             if gap >= farthest[box]:
                 continue
-            most = 0.0
+            largest = 0.0
             for point in range(bounds[box], bounds[box + 1]):
                 distance = 0.0
                 for k in range(axes):
@@ -98,8 +98,8 @@ def _pick(
                 if distance < square[point]:
                     square[point] = distance
                     nearest[point] = number
-                most = max(most, square[point])
-            farthest[box] = most
+                largest = max(largest, square[point])
+            farthest[box] = largest
         radius[number] = np.sqrt(farthest.max())
     return len(chosen)
 

@@ -98,7 +98,7 @@ def methods_of(models: dict[str, Model]) -> list[Method]:
     poisson = common_poisson(models)
     learned = (closed_form(model.objective) for model in models.values())
     objectives = dict.fromkeys(["energy", "chen2015", *learned])
-    found = [
+    methods = [
         Method("average", average),
         Method("Galerkin", galerkin),
         static_condensation(poisson),
@@ -106,8 +106,8 @@ def methods_of(models: dict[str, Model]) -> list[Method]:
     ]
     for name, model in models.items():
         suffix = f" of {name}" if len(models) > 1 else ""
-        found.append(trained(f"{model.objective}, forests{suffix}", model))
-    return found
+        methods.append(trained(f"{model.objective}, forests{suffix}", model))
+    return methods
 
 
 def metamaterials(database: Database, name: str, clamped: bool = False) -> Method:
@@ -137,23 +137,23 @@ def databases_of(
     UserError
         If the file has other databases, or cannot be written.
     """
-    wanted = {
+    bases = {
         case: base_materials(case.moduli, materials, case.void)
         for case in cases
         if case.scaled_by == 1.0
     }
     if path is not None and Path(path).exists():
         stored = load_databases(path)
-        return {case: _stored(stored, base, poisson, path) for case, base in wanted.items()}
+        return {case: _stored(stored, base, poisson, path) for case, base in bases.items()}
     if path is not None:
         require_writable(path)
-    found = {
+    databases = {
         case: build(base, poisson, label=f"database of {case.name}", progress=True)
-        for case, base in wanted.items()
+        for case, base in bases.items()
     }
     if path is not None:
-        save_databases(path, list(found.values()))
-    return found
+        save_databases(path, list(databases.values()))
+    return databases
 
 
 def _stored(
@@ -174,15 +174,15 @@ def database_methods(case: BlockCase, databases: dict[BlockCase, Database]) -> l
 
     The latter take moduli beyond their range for their stiffest material.
     """
-    found = []
+    methods = []
     for other, database in databases.items():
         low, high = other.range_gpa
         name = f"Chen et al. 2015, database {low:g}..{high:g} GPa"
         if other == case:
-            found.append(metamaterials(database, name))
+            methods.append(metamaterials(database, name))
         elif other.alike(case) and high < case.range_gpa[1]:
-            found.append(metamaterials(database, f"{name}, clamped", clamped=True))
-    return found
+            methods.append(metamaterials(database, f"{name}, clamped", clamped=True))
+    return methods
 
 
 def common_poisson(models: dict[str, Model]) -> float:
@@ -193,13 +193,13 @@ def common_poisson(models: dict[str, Model]) -> float:
     UserError
         If there is no model, or they differ.
     """
-    found = {name: model.poisson for name, model in models.items()}
-    if not found:
+    ratios = {name: model.poisson for name, model in models.items()}
+    if not ratios:
         raise UserError("there are no forests to compare: name a model file with --model")
-    if len(set(found.values())) > 1:
-        listed = ", ".join(f"{name} has {value:g}" for name, value in found.items())
+    if len(set(ratios.values())) > 1:
+        listed = ", ".join(f"{name} has {value:g}" for name, value in ratios.items())
         raise UserError(f"forests of different Poisson's ratios ({listed}): make a table of each")
-    return next(iter(found.values()))
+    return next(iter(ratios.values()))
 
 
 def load_models(paths: Sequence[str] | None) -> dict[str, Model]:

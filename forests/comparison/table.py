@@ -35,7 +35,7 @@ TIMED_BLOCKS = 2000
 """Most blocks that a run for the cost per block takes."""
 
 TIMED_RUNS = 5
-"""Runs whose median is the cost per block, after one that warms up; least and most are kept too."""
+"""Runs whose median is the cost per block, after one that warms up; min and max are kept too."""
 
 SQUARE_METRES = 1e-18
 """Square of the displacement [m^2] that `block_error` calls 1 when moduli are in GPa.
@@ -58,22 +58,22 @@ def cost_per_block(method: Method, young: Array) -> Row:
     timed = seconds[1:]
     return {
         "seconds_per_block": statistics.median(timed),
-        "seconds_per_block_least": min(timed),
-        "seconds_per_block_most": max(timed),
+        "seconds_per_block_min": min(timed),
+        "seconds_per_block_max": max(timed),
         "timed_runs": TIMED_RUNS,
     }
 
 
 def summary(errors: Errors) -> Row:
     """Errors over all blocks: mean and median, and the least that any element can reach."""
-    nodal, least = errors.relative("nodal"), errors.relative_least("nodal")
+    nodal, minimum = errors.relative("nodal"), errors.relative_minimum("nodal")
     row = {"mean_error": float(nodal.mean()), "median_error": float(np.median(nodal))}
     for load in ("inertial", "corner"):
         relative = errors.relative(load)
         row[f"mean_error_{load}"] = float(relative.mean())
         row[f"median_error_{load}"] = float(np.median(relative))
-    row["least_mean_error"] = float(least.mean())
-    row["least_median_error"] = float(np.median(least))
+    row["min_mean_error"] = float(minimum.mean())
+    row["min_median_error"] = float(np.median(minimum))
     row["mean_squared_m2"] = float(errors.squared["nodal"].mean()) * SQUARE_METRES
     return row
 
@@ -119,9 +119,9 @@ def table(
     -------
     One row for each case and method: `method`, `range_gpa`, `distribution`, `fill`, `scaled_by`
     (of the case), `mean_error`, `median_error` (nodal forces), the same for inertial and corner
-    loads, `least_mean_error`, `least_median_error` (nodal, of any element whatsoever),
+    loads, `min_mean_error`, `min_median_error` (nodal, of any element whatsoever),
     `mean_squared_m2` (absolute, nodal), `seconds_per_block` (median of `timed_runs`, with
-    `seconds_per_block_least` and `_most`), `storage_bytes`, `training_seconds` (None if unknown),
+    `seconds_per_block_min` and `_max`), `storage_bytes`, `training_seconds` (None if unknown),
     `clamped` (made for lower moduli than the blocks have), `blocks`, `seed`.
 
     Raises
@@ -137,7 +137,7 @@ def table(
         young = case.blocks(blocks, seed)
         methods = [*methods_of(models), *database_methods(case, databases)]
         errors = errors_of(young, methods, poisson, case.name)
-        rows += [_row(case, method, young, found) for method, found in zip(methods, errors)]
+        rows += [_row(case, method, young, each) for method, each in zip(methods, errors)]
         for row in rows:
             row.update(blocks=blocks, seed=seed)
     return rows
@@ -194,7 +194,7 @@ def _heading(row: Row, width: int) -> list[str]:
     scaled = f", trained range times {row['scaled_by']:g}" if row["scaled_by"] != 1.0 else ""
     return [
         f"{low:g}..{high:g} GPa, {row['distribution']}, {row['fill']}{scaled}; least nodal error "
-        f"of any element {row['least_mean_error']:.4f} (median {row['least_median_error']:.4f})",
+        f"of any element {row['min_mean_error']:.4f} (median {row['min_median_error']:.4f})",
         "method".ljust(width) + "".join(name.rjust(size) for name, size in COLUMNS),
     ]
 

@@ -48,8 +48,8 @@ class Timing:
     """Microseconds of a block in warm runs, and how many runs there were."""
 
     median: float
-    least: float
-    most: float
+    min: float
+    max: float
     runs: int
 
 
@@ -122,7 +122,7 @@ def timed(function: Callable[[], object], blocks: int) -> Timing:
 
 def caches(folder: Path = CACHE_FOLDER) -> dict[str, str]:
     """Size of each cache that the first core uses, such as `{"L1 Data": "48K"}`."""
-    found = {}
+    sizes = {}
     for entry in sorted(folder.glob("index*")):
         try:
             level, kind, size = (
@@ -130,8 +130,8 @@ def caches(folder: Path = CACHE_FOLDER) -> dict[str, str]:
             )
         except OSError:
             continue
-        found[f"L{level}" if kind == "Unified" else f"L{level} {kind}"] = size
-    return found
+        sizes[f"L{level}" if kind == "Unified" else f"L{level} {kind}"] = size
+    return sizes
 
 
 def _scikit_forests(trees: int, leaves: int) -> tuple[list[Any], Model]:
@@ -192,16 +192,16 @@ def against_scikit_learn(young: Array, trees: int, leaves: int) -> Rival:
 
 def over_size(sizes: Sequence[tuple[int, int]], young: Array, mesh: Array) -> list[SizeTiming]:
     """Measure forests of complete trees on random blocks and on those of a mesh."""
-    found = []
+    timings = []
     for trees, depth in track(sizes, "forests of growing size", unit="forests"):
         model = complete_forests(trees, depth)
         random = timed(partial(coarsen, model, young), len(young))
         coherent = timed(partial(coarsen, model, mesh), len(mesh))
         walks = [1e3 * timing.median / (8 * trees) for timing in (random, coherent)]
-        found.append(
+        timings.append(
             SizeTiming(model.nbytes / 1e6, trees, depth, random, coherent, walks[0], walks[1])
         )
-    return found
+    return timings
 
 
 def benchmark(
@@ -260,7 +260,7 @@ def as_json(result: Result) -> dict[str, Any]:
 
 
 def _line(name: str, timing: Timing) -> str:
-    return f"{name:<42}{timing.median:>8.2f}{timing.least:>8.2f}{timing.most:>8.2f}"
+    return f"{name:<42}{timing.median:>8.2f}{timing.min:>8.2f}{timing.max:>8.2f}"
 
 
 def as_text(result: Result) -> str:
@@ -271,7 +271,7 @@ def as_text(result: Result) -> str:
         f"{result.model}: 2 x {result.trees} trees, {result.leaves:,} leaves, "
         f"{result.megabytes:.1f} MB, loaded in {result.load_ms:.1f} ms",
         f"{result.blocks:,} random blocks, {RUNS} warm runs",
-        f"{'microseconds of a block':<42}{'median':>8}{'least':>8}{'most':>8}",
+        f"{'microseconds of a block':<42}{'median':>8}{'min':>8}{'max':>8}",
         *(_line(name, timing) for name, timing in result.evaluation.items()),
         "",
         f"trees of scikit-learn, 2 x {rival.trees} with {rival.leaves:,} leaves, one core",

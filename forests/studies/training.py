@@ -54,7 +54,7 @@ def fresh_samples(dataset: Dataset) -> dict[str, Samples]:
     """Fitted samples by distribution, of a seed that the dataset does not have."""
     seed = 1 + max(part.seed for part in dataset.settings)
     drawn = dict.fromkeys(part.moduli for part in dataset.settings)
-    found = {}
+    by_distribution = {}
     for each in drawn:
         options = ShardOptions(
             TEST_SAMPLES,
@@ -67,8 +67,8 @@ def fresh_samples(dataset: Dataset) -> dict[str, Samples]:
         )
         shard = generate(options, progress=False)
         name = f"{each.distribution} {each.low:g}..{each.high:g} GPa"
-        found[name] = joined(dataset_of([shard]).read(0, TEST_SAMPLES))
-    return found
+        by_distribution[name] = joined(dataset_of([shard]).read(0, TEST_SAMPLES))
+    return by_distribution
 
 
 def _errors(trained: Trained, samples: Samples, training: TrainingOptions) -> Array:
@@ -146,18 +146,18 @@ def learning_curve(
     UserError
         If the dataset has fewer rows than asked for.
     """
-    most = 8 * dataset.count
-    if max(rows) > most:
+    available = 8 * dataset.count
+    if max(rows) > available:
         raise UserError(
-            f"a curve up to {max(rows):,} rows: the dataset has {most:,}, name more shards"
+            f"a curve up to {max(rows):,} rows: the dataset has {available:,}, name more shards"
         )
     test = fresh_samples(dataset)
-    found = []
+    results = []
     for count in rows:
         part = dataset.thinned(-(-count // 8))
         logger.info(f"{8 * part.count:,} rows")
-        found.append({"rows": 8 * part.count, **_row(part, training, workers, test)})
-    return found
+        results.append({"rows": 8 * part.count, **_row(part, training, workers, test)})
+    return results
 
 
 def as_text(rows: Sequence[Row]) -> str:

@@ -72,14 +72,14 @@ def find_leaves(
     roots: NDArray[np.int32],
 ) -> NDArray[np.int32]:
     """Leaf number (n,) of each row (n, 7) float32 with its void pattern (n,)."""
-    found = np.empty(len(features), dtype=np.int32)
+    leaf_numbers = np.empty(len(features), dtype=np.int32)
     for row in range(len(features)):
         node = roots[pattern[row]]
         while left[node] >= 0:
             go_left = features[row, feature[node]] <= threshold[node]
             node = left[node] if go_left else right[node]
-        found[row] = leaf[node]
-    return found
+        leaf_numbers[row] = leaf[node]
+    return leaf_numbers
 
 
 def leaf_of(tree: Tree, features: Features, pattern: NDArray[np.uint8]) -> NDArray[np.int32]:
@@ -103,15 +103,15 @@ def _accumulate(
     features: Features,
     target: Array,
     weight: Array,
-    found: NDArray[np.int32],
+    leaf_numbers: NDArray[np.int32],
     moments: Array,
     rows: NDArray[np.int64],
     low: Array,
     high: Array,
 ) -> None:
     values = np.empty(FEATURES + 2)
-    for row in range(len(found)):
-        leaf = found[row]
+    for row in range(len(leaf_numbers)):
+        leaf = leaf_numbers[row]
         for k in range(FEATURES):
             values[k] = features[row, k]
         values[FEATURES] = 1.0
@@ -130,12 +130,12 @@ def _accumulate(
 
 def add_rows(sums: Sums, tree: Tree, rows: Rows) -> None:
     """Add rows to the sums of a tree's leaves."""
-    found = leaf_of(tree, rows.features, rows.pattern)
+    leaf_numbers = leaf_of(tree, rows.features, rows.pattern)
     _accumulate(
         rows.features,
         rows.target,
         rows.weight,
-        found,
+        leaf_numbers,
         sums.moments,
         sums.rows,
         sums.low,
@@ -205,7 +205,7 @@ def solve_leaves(tree: Tree, sums: Sums, prior: float) -> Leaves:
 
 def answers_of(tree: Tree, leaves: Leaves, rows: Rows) -> Array:
     """Answers (n,) of a tree to rows, bounded."""
-    found = leaf_of(tree, rows.features, rows.pattern)
-    coefficients = leaves.coefficients[found]
+    leaf_numbers = leaf_of(tree, rows.features, rows.pattern)
+    coefficients = leaves.coefficients[leaf_numbers]
     linear = (rows.features * coefficients[:, :FEATURES]).sum(axis=1) + coefficients[:, FEATURES]
-    return np.asarray(np.clip(linear, leaves.low[found], leaves.high[found]))
+    return np.asarray(np.clip(linear, leaves.low[leaf_numbers], leaves.high[leaf_numbers]))

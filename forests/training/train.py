@@ -121,8 +121,8 @@ def grow_trees(
     grown = Parallel(n_jobs=workers, prefer="threads", return_as="generator")(
         delayed(grow)(job) for job in jobs
     )
-    found = track(grown, "growing", total=len(jobs), unit="trees", visible=progress)
-    return dict(zip(jobs, found, strict=True))
+    trees = track(grown, "growing", total=len(jobs), unit="trees", visible=progress)
+    return dict(zip(jobs, trees, strict=True))
 
 
 def _require_rows(rows: Rows, kind: int, training: TrainingOptions, tell: bool) -> None:
@@ -238,8 +238,8 @@ def train_trees(
         shown = progress and ranks.first
         mine = grow_trees(dataset, training, ranks.own_jobs(training.jobs), workers, shown)
         grown = ranks.together(mine), time.perf_counter() - begin
-    found, structure_seconds = grown
-    trees = {job: found[job] for job in training.jobs}
+    splits, structure_seconds = grown
+    trees = {job: splits[job] for job in training.jobs}
     begin = time.perf_counter()
     leaves, held, used = fit_leaves(dataset, training, trees, ranks, workers, progress)
     if not ranks.first:

@@ -92,8 +92,8 @@ def winding_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.n
 
 def _length(voxels: np.ndarray) -> int:
     """Voxels along the longest side of the box around those that are set."""
-    found = np.argwhere(voxels)
-    return int(np.ptp(found, axis=0).max()) + 1 if len(found) else 0
+    cells = np.argwhere(voxels)
+    return int(np.ptp(cells, axis=0).max()) + 1 if len(cells) else 0
 
 
 def centre_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.ndarray]:

@@ -38,7 +38,7 @@ def draw(
     cmap: str = "viridis",
     limits: tuple[float, float] | None = None,
 ) -> Poly3DCollection:
-    """Draw the surface of a mesh, deformed if wanted, lit from the upper left.
+    """Draw the surface of a mesh, deformed if asked for, lit from the upper left.
 
     Parameters
     ----------

@@ -74,7 +74,7 @@ def surface_name(mesh: str) -> str:
     return mesh.removeprefix(BUILTIN_PREFIX) if mesh.startswith(BUILTIN_PREFIX) else Path(mesh).stem
 
 
-class _Beside(FilePathResolver):
+class _MeshFolder(FilePathResolver):
     """Other files that a mesh names: regular ones in its folder, which end, as pipes may not."""
 
     def absolute(self, name: str) -> Path:
@@ -94,7 +94,7 @@ def _read(path: Path) -> trimesh.Trimesh:
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
-            loaded = trimesh.load(path, resolver=_Beside(str(path)), process=False)
+            loaded = trimesh.load(path, resolver=_MeshFolder(str(path)), process=False)
             if isinstance(loaded, trimesh.Scene):
                 loaded = loaded.to_geometry() if loaded.geometry else trimesh.Trimesh()
             if isinstance(loaded, trimesh.Trimesh):

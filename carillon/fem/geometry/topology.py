@@ -15,8 +15,8 @@ FACES = ndimage.generate_binary_structure(3, 1)
 _POSITIONS = np.array(list(product((-1, 0, 1), repeat=3)))
 
 
-def _bits(wanted: np.ndarray) -> int:
-    return sum(1 << int(bit) for bit in np.flatnonzero(wanted))
+def _bits(positions: np.ndarray) -> int:
+    return sum(1 << int(bit) for bit in np.flatnonzero(positions))
 
 
 def _around(position: np.ndarray, steps: tuple[int, ...]) -> int:
