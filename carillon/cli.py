@@ -34,8 +34,9 @@ def run(program: str, main: Callable[[], int | None], comm: Comm = None) -> int:
 
     Returns
     -------
-    0; 2 for bad input, or lack of memory or room; 3 if a solver missed its tolerance; 130 for an
-    interrupt from the keyboard.
+    int
+        0; 2 for bad input, or lack of memory or room; 3 if a solver missed its tolerance; 130 for
+        an interrupt from the keyboard.
     """
     _require_streams()
     logs.show()

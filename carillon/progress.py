@@ -30,9 +30,12 @@ def track(
 
     Parameters
     ----------
-    total : units in all, those `done` before included; the number of items unless told.
-    weight : units of an item, one unless told.
-    done : units that were there before the first item, which do not count for the rate.
+    total
+        Units in all, those `done` before included; the number of items unless told.
+    weight
+        Units of an item, one unless told.
+    done
+        Units that were there before the first item, which do not count for the rate.
     """
     if total is None and isinstance(items, Sized):
         total = len(items)

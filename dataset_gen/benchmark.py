@@ -98,18 +98,20 @@ def benchmark(
 
     Parameters
     ----------
-    objective : the closed form to time; with None the default one, and beside it all others.
+    objective : str or None
+        The closed form to time; with None the default one, and all others too.
 
     Returns
     -------
-    dict with
-
-    fits_per_second : of the `closed_form` and of Eq. (8) with `sampled` forces; a fit has
-        `rows_per_fit` moduli. `spread` has minimum and maximum of the runs.
-    objectives : fits per second by name.
-    flops_per_fit, gflops : operations of the closed form and billions of them per second, null for
-        an iterative one. `gflops_dgemm` is what BLAS reaches on the same core, `gflops_peak` the
-        processor without loads and stores, `peak_fraction` the share of the latter.
+    fits_per_second
+        Of the `closed_form` and of Eq. (8) with `sampled` forces; a fit has `rows_per_fit` moduli.
+        `spread` has minimum and maximum of the runs.
+    objectives
+        Fits per second by name.
+    flops_per_fit, gflops
+        Operations of the closed form and billions of them per second, null for an iterative one.
+        `gflops_dgemm` is what BLAS reaches on the same core, `gflops_peak` the processor without
+        loads and stores, `peak_fraction` the share of the latter.
     """
     young = samples(0, 0, count)
     chosen = objective or DEFAULT_OBJECTIVE

@@ -78,7 +78,8 @@ def generate_file(
 
     Returns
     -------
-    Samples that were fitted; None if `path` is this very shard already.
+    int or None
+        Samples that were fitted; None if `path` is this very shard already.
 
     Raises
     ------

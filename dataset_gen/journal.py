@@ -54,8 +54,10 @@ class Journal:
 
     Attributes
     ----------
-    tasks : tasks it holds, the first ones of the plan.
-    environments : where the work was done, one record for each change.
+    tasks
+        Tasks it holds, the first ones of the plan.
+    environments
+        Where the work was done, one record for each change.
 
     Raises
     ------

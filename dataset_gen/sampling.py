@@ -127,13 +127,17 @@ class Mixture:
 
     Attributes
     ----------
-    void : share of blocks with at least one void cell (never all eight).
-    uniform : share whose filled cells all have the mean of the block that was drawn.
-    two_phase : share with two values. Uniform: their ratio is log-uniform up to `phase_ratio`, or
-        up to what the range allows. Log-uniform: the softer one is log-uniform between the range's
-        lower end and the stiffer one.
-    blended : share pulled towards the block's mean, the contrast log-uniform down to `contrast`.
-        The rest fills the hypercube as it is.
+    void
+        Share of blocks with at least one void cell (never all eight).
+    uniform
+        Share whose filled cells all have the mean of the block that was drawn.
+    two_phase
+        Share with two values. Uniform: their ratio is log-uniform up to `phase_ratio`, or up to
+        what the range allows. Log-uniform: the softer one is log-uniform between the range's lower
+        end and the stiffer one.
+    blended
+        Share pulled towards the block's mean, the contrast log-uniform down to `contrast`. The rest
+        fills the hypercube as it is.
     """
 
     void: float = 0.5

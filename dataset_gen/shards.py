@@ -44,7 +44,16 @@ _OF_ONE_KIND = {"objective": "objective", "poisson": "Poisson's ratio", "code": 
 class Shard:
     """Samples with their fits, of a whole shard or of a piece of one.
 
-    fine and coarse (n, 8) in GPa, residual (n,), converged (n,).
+    Attributes
+    ----------
+    settings
+        What decides about the rows.
+    fine, coarse : (n, 8)
+        Moduli [GPa].
+    residual, converged : (n,)
+        See `dataset_gen.objectives.Fits`.
+    provenance
+        Of the shard, by name.
     """
 
     settings: Settings

@@ -320,12 +320,15 @@ def coarsen(model: Model, e: ArrayLike, threads: int = 1) -> Array:
 
     Parameters
     ----------
-    e : (m, 8) fine moduli in bit order, any unit, 0 where a cell is void.
-    threads : blocks are shared among so many threads; the result does not depend on it.
+    e : (m, 8)
+        Fine moduli in bit order, any unit, 0 where a cell is void.
+    threads
+        Blocks are shared among so many threads; the result does not depend on it.
 
     Returns
     -------
-    (m, 8) positive moduli at the coarse quadrature points, in the unit of `e`.
+    (m, 8)
+        Positive moduli at the coarse quadrature points, in the unit of `e`.
 
     Raises
     ------

@@ -48,8 +48,16 @@ Features = NDArray[np.float32]
 class PreparedBlocks(NamedTuple):
     """Blocks as the forests see them.
 
-    features (n, 8 origins, 7) of e'2..e'8; pattern (n, 8), see `PATTERNS`; scale (n, 8) in the unit
-    of the moduli; filled (n, 8) origins.
+    Attributes
+    ----------
+    features : (n, 8 origins, 7) float32
+        Of e'2..e'8.
+    pattern : (n, 8) uint8
+        See `PATTERNS`.
+    scale : (n, 8)
+        In the unit of the moduli.
+    filled : (n, 8) bool
+        Whether the origin is filled.
     """
 
     features: Features

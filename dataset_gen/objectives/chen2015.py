@@ -59,9 +59,12 @@ class Corners(NamedTuple):
 
     Attributes
     ----------
-    block : the free block.
-    loads : flat (a, 18), C^T Z: forces dual to the straining motions Z of the corners.
-    strains : flat (48, 18) strains of the coarse element in its straining motions.
+    block
+        The free block.
+    loads : flat (a, 18)
+        C^T Z: forces dual to the straining motions Z of the corners.
+    strains : flat (48, 18)
+        Strains of the coarse element in its straining motions.
     """
 
     block: FreeBlock

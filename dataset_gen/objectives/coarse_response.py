@@ -39,10 +39,14 @@ class Coarse(NamedTuple):
 
     Attributes
     ----------
-    block : the free block.
-    basis : flat (a, 18), V on the active nodes in the order of elimination.
-    stiffness : the lower tiles of sum_q E_q S_q^T S_q.
-    strains : flat (18, 48), all S_q^T.
+    block
+        The free block.
+    basis : flat (a, 18)
+        V on the active nodes in the order of elimination.
+    stiffness
+        The lower tiles of sum_q E_q S_q^T S_q.
+    strains : flat (18, 48)
+        All S_q^T.
     """
 
     block: FreeBlock
@@ -56,12 +60,17 @@ class CoarseResponse(NamedTuple):
 
     Attributes
     ----------
-    weights : (9) moduli E.
-    factor : lower tiles of L with B^-1 = L L^T.
-    flexibility : (18, 18), B.
-    scaled : (18, 48), L^-1 S_q^T sqrt(E_q).
-    strained : (18, 48), B S_q^T sqrt(E_q); the derivative of B in log E_q is -R_q^T R_q with R_q^T
-        columns 6 q to 6 q + 5.
+    weights : (9)
+        Moduli E.
+    factor
+        Lower tiles of L with B^-1 = L L^T.
+    flexibility : (18, 18)
+        B.
+    scaled : (18, 48)
+        L^-1 S_q^T sqrt(E_q).
+    strained : (18, 48)
+        B S_q^T sqrt(E_q); the derivative of B in log E_q is -R_q^T R_q with R_q^T columns 6 q to 6
+        q + 5.
     """
 
     weights: Array

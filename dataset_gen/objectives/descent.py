@@ -57,14 +57,21 @@ class DescentState(NamedTuple):
 
     Attributes
     ----------
-    bounds : (2) of log E, in all lanes.
-    x, trial : (8) logarithms of the moduli.
-    here, there : at x and at trial, one after the other: value (1), gradient (8), the Hessian of
-        Gauss and Newton (8, 8), and what it lacks (8, 8); of both only the lower half.
-    scale : (1) size of the objective at E = 0.
-    damping : (1) share of the Hessian's diagonal that is added to it.
-    left : (1) length of the step of Gauss and Newton.
-    active : (1) 1 until the lane has converged, then 0.
+    bounds : (2)
+        Of log E, in all lanes.
+    x, trial : (8)
+        Logarithms of the moduli.
+    here, there
+        At x and at trial, one after the other: value (1), gradient (8), the Hessian of Gauss and
+        Newton (8, 8), and what it lacks (8, 8); of both only the lower half.
+    scale : (1)
+        Size of the objective at E = 0.
+    damping : (1)
+        Share of the Hessian's diagonal that is added to it.
+    left : (1)
+        Length of the step of Gauss and Newton.
+    active : (1)
+        1 until the lane has converged, then 0.
     """
 
     bounds: Array

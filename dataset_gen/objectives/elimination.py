@@ -37,11 +37,16 @@ class FactorStructure(NamedTuple):
 
     Attributes
     ----------
-    rows : tiles left of the diagonal in each row, by ascending node.
-    columns : tiles below the diagonal in each column, by ascending node.
-    diagonal : (n,) tile on the diagonal of each row.
-    start : (n + 1,) where the updates by each column begin: column k takes L_ik L_jk^T from all ij.
-    updated, left, right : (p,) the tiles ij, L_ik and L_jk.
+    rows
+        Tiles left of the diagonal in each row, by ascending node.
+    columns
+        Tiles below the diagonal in each column, by ascending node.
+    diagonal : (n,)
+        Tile on the diagonal of each row.
+    start : (n + 1,)
+        Where the updates by each column begin: column k takes L_ik L_jk^T from all ij.
+    updated, left, right : (p,)
+        The tiles ij, L_ik and L_jk.
     """
 
     rows: Links
@@ -58,9 +63,12 @@ class Sum(NamedTuple):
 
     Attributes
     ----------
-    start : (t + 1,) where the terms of each tile begin.
-    weight : (s,) number of the weight of each term.
-    values : (9 s,) its fixed tile.
+    start : (t + 1,)
+        Where the terms of each tile begin.
+    weight : (s,)
+        Number of the weight of each term.
+    values : (9 s,)
+        Its fixed tile.
     """
 
     start: Indices
@@ -74,10 +82,14 @@ class SymbolicFactorisation:
 
     Attributes
     ----------
-    dofs : (a,) degrees of freedom of the active nodes among the block's 81, in order.
-    linked : (n, n) whether two of the nodes touch a common filled cell.
-    filled : (n, n) whether the factor has a tile between them.
-    factor : structure of the factor.
+    dofs : (a,)
+        Degrees of freedom of the active nodes among the block's 81, in order.
+    linked : (n, n)
+        Whether two of the nodes touch a common filled cell.
+    filled : (n, n)
+        Whether the factor has a tile between them.
+    factor
+        Structure of the factor.
     """
 
     dofs: Indices

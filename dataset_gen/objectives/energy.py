@@ -67,9 +67,11 @@ class Fine(NamedTuple):
 
     Attributes
     ----------
-    flexibility : (18, 18), V^T K^+ V.
-    norms : (3) trace of K^+, mean square of the energies f^T K^+ f, and the part of it that no
-        coarse element can answer, twice |K^+|^2 - |V^T K^+ V|^2.
+    flexibility : (18, 18)
+        V^T K^+ V.
+    norms : (3)
+        Trace of K^+, mean square of the energies f^T K^+ f, and the part of it that no coarse
+        element can answer, twice |K^+|^2 - |V^T K^+ V|^2.
     """
 
     flexibility: Array

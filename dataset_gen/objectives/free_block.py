@@ -40,9 +40,12 @@ class FreeBlock(NamedTuple):
 
     Attributes
     ----------
-    factor : structure of the factor.
-    stiffness : K with springs of the mean modulus.
-    null : flat (a, k) orthonormal motions without strain, zero columns up to a multiple of six.
+    factor
+        Structure of the factor.
+    stiffness
+        K with springs of the mean modulus.
+    null : flat (a, k)
+        Orthonormal motions without strain, zero columns up to a multiple of six.
     """
 
     factor: FactorStructure

@@ -45,10 +45,14 @@ class InertialTables(NamedTuple):
 
     Attributes
     ----------
-    block : the free block.
-    loads : flat (a, 24).
-    to_corners : flat (18, a), straining motions nearest to nodal displacements.
-    strains : flat (48, 18) strains of the coarse element in its straining motions.
+    block
+        The free block.
+    loads : flat (a, 24)
+        Inertial forces of the trilinear motions.
+    to_corners : flat (18, a)
+        Straining motions nearest to nodal displacements.
+    strains : flat (48, 18)
+        Strains of the coarse element in its straining motions.
     """
 
     block: FreeBlock

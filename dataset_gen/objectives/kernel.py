@@ -345,9 +345,12 @@ def all_forms(motions: Array, energies: Array, fields: int, strains: Array, form
 
     Parameters
     ----------
-    motions : (fields, 18) straining motions of the corners in each field.
-    energies : (fields, fields) fine energies.
-    strains : flat (48, 18) strains of the straining motions.
+    motions : (fields, 18)
+        Straining motions of the corners in each field.
+    energies : (fields, fields)
+        Fine energies.
+    strains : flat (48, 18)
+        Strains of the straining motions.
     """
     strained = empty(fields * STRAINS)
     multiply(strained, (motions, 0, MOTIONS, 1), (strains, 0, MOTIONS, 1), fields, STRAINS, MOTIONS)

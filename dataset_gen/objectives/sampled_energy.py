@@ -75,8 +75,10 @@ class Loaded(NamedTuple):
 
     Attributes
     ----------
-    felt : (18, columns) what the coarse element feels of them, V^T f.
-    energies : (columns) fine energies f^T K^+ f.
+    felt : (18, columns)
+        What the coarse element feels of them, V^T f.
+    energies : (columns)
+        Fine energies f^T K^+ f.
     """
 
     felt: Array

@@ -55,7 +55,12 @@ AT_ONCE = 500
 class Load(NamedTuple):
     """A load case in terms of the coarse element: it answers `left K_c^-1 right`.
 
-    left : (18, 18); right : (18, m).
+    Attributes
+    ----------
+    left : (18, 18)
+        What its answer is taken to.
+    right : (18, m)
+        The load.
     """
 
     left: Array
@@ -68,10 +73,14 @@ class ErrorTables:
 
     Attributes
     ----------
-    stiffness : (8, r * r) flattened K_j of the cells on the complement of N, zero for void ones.
-    basis : (r, 18) orthonormal basis V of the coarse element's displacements Y = V R.
-    inertia, corners : (r, 18) inertial loads W and corner forces C^T Z.
-    loads : the load cases by name.
+    stiffness : (8, r * r)
+        Flattened K_j of the cells on the complement of N, zero for void ones.
+    basis : (r, 18)
+        Orthonormal basis V of the coarse element's displacements Y = V R.
+    inertia, corners : (r, 18)
+        Inertial loads W and corner forces C^T Z.
+    loads
+        The load cases by name.
     """
 
     stiffness: Array
@@ -86,9 +95,12 @@ class FineResponse(NamedTuple):
 
     Attributes
     ----------
-    target : (n, 18, m) part that a coarse element can answer.
-    rest : (n,) square of what it cannot.
-    total : (n,) square of both.
+    target : (n, 18, m)
+        Part that a coarse element can answer.
+    rest : (n,)
+        Square of what it cannot.
+    total : (n,)
+        Square of both.
     """
 
     target: Array
@@ -101,10 +113,13 @@ class Errors(NamedTuple):
 
     Attributes
     ----------
-    squared : E|u_c - u|^2.
-    minimum : what it cannot fall below, whatever the element: the part of u that no motion of the
-        corners gives; 0 for loads on the corners.
-    reference : E|u|^2.
+    squared
+        E|u_c - u|^2.
+    minimum
+        What it cannot fall below, whatever the element: the part of u that no motion of the corners
+        gives; 0 for loads on the corners.
+    reference
+        E|u|^2.
     """
 
     squared: dict[str, Array]
@@ -205,8 +220,9 @@ def pattern_errors(
 
     Parameters
     ----------
-    coarse : for each coarsening either its moduli (n, 8) or the flexibility (n, 18, 18) of its
-        elements in the straining motions.
+    coarse
+        For each coarsening either its moduli (n, 8) or the flexibility (n, 18, 18) of its elements
+        in the straining motions.
     """
     loads = tables_of(mask, poisson).loads
     fine = fine_responses(young, mask, poisson)

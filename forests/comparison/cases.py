@@ -24,12 +24,17 @@ class BlockCase:
 
     Attributes
     ----------
-    low, high : range of the moduli of filled cells [GPa], before scaling.
-    distribution : "uniform" or "log-uniform", cells independent.
-    void : whether every block has void cells, of a pattern drawn by class as in training data;
-        else none has.
-    stream : number of the sequence of samples; cases of one stream have the same blocks.
-    scaled_by : factor on all moduli.
+    low, high
+        Range of the moduli of filled cells [GPa], before scaling.
+    distribution
+        "uniform" or "log-uniform", cells independent.
+    void
+        Whether every block has void cells, of a pattern drawn by class as in training data; else
+        none has.
+    stream
+        Number of the sequence of samples; cases of one stream have the same blocks.
+    scaled_by
+        Factor on all moduli.
     """
 
     low: float

@@ -57,13 +57,20 @@ class Database:
 
     Attributes
     ----------
-    materials : (m,) Young's moduli in ascending order, any unit; the first may be 0, void.
-    keys : (k,) of combinations, see `forests.comparison.combinations`; ascending.
-    entries : (k,) representative of each combination.
-    moduli : (r, 8) coarse moduli of the representatives, in the unit of the materials.
-    poisson : Poisson's ratio of all materials.
-    radius : largest distance of a metamaterial from its representative, |log E - log E'|.
-    seconds : time that building it took on one core.
+    materials : (m,)
+        Young's moduli in ascending order, any unit; the first may be 0, void.
+    keys : (k,)
+        Of combinations, see `forests.comparison.combinations`; ascending.
+    entries : (k,)
+        Representative of each combination.
+    moduli : (r, 8)
+        Coarse moduli of the representatives, in the unit of the materials.
+    poisson
+        Poisson's ratio of all materials.
+    radius
+        Largest distance of a metamaterial from its representative, |log E - log E'|.
+    seconds
+        Time that building it took on one core.
     """
 
     materials: Array
@@ -126,9 +133,11 @@ def build(
 
     Parameters
     ----------
-    materials : (m,) ascending, 0 for void.
-    representatives : how many metamaterials to keep; None keeps all of them. Distances between
-        metamaterials are those of their logarithmic moduli.
+    materials : (m,)
+        Ascending, 0 for void.
+    representatives
+        How many metamaterials to keep; None keeps all of them. Distances between metamaterials are
+        those of their logarithmic moduli.
 
     Raises
     ------

@@ -29,9 +29,12 @@ class Cover(NamedTuple):
 
     Attributes
     ----------
-    chosen : (r,) distinct points, in the order they were picked.
-    nearest : (n,) number of the representative nearest to each point, the earlier one of equals.
-    radius : (r,) largest distance of any point from the first 1, 2, .., r representatives.
+    chosen : (r,)
+        Distinct points, in the order they were picked.
+    nearest : (n,)
+        Number of the representative nearest to each point, the earlier one of equals.
+    radius : (r,)
+        Largest distance of any point from the first 1, 2, .., r representatives.
     """
 
     chosen: NDArray[np.int64]

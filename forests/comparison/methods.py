@@ -34,12 +34,18 @@ class Method:
 
     Attributes
     ----------
-    name : unique among the methods of a table.
-    coarsen : what is timed: moduli (n, 8), or whatever else the method keeps of each block.
-    storage_bytes : kept beforehand.
-    training_seconds : spent beforehand; None if unknown.
-    flexibility : coarse flexibility (n, 18, 18) for the errors, of methods without moduli.
-    clamped : whether blocks have moduli beyond the range that the method was made for.
+    name
+        Unique among the methods of a table.
+    coarsen
+        What is timed: moduli (n, 8), or whatever else the method keeps of each block.
+    storage_bytes
+        Kept beforehand.
+    training_seconds
+        Spent beforehand; None if unknown.
+    flexibility
+        Coarse flexibility (n, 18, 18) for the errors, of methods without moduli.
+    clamped
+        Whether blocks have moduli beyond the range that the method was made for.
     """
 
     name: str
@@ -129,8 +135,10 @@ def databases_of(
 
     Parameters
     ----------
-    path : file to read them from; if there is none, they are built and written to it.
-    materials : base materials of each, void included.
+    path
+        File to read them from; if there is none, they are built and written to it.
+    materials
+        Base materials of each, void included.
 
     Raises
     ------

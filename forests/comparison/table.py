@@ -112,17 +112,20 @@ def table(
 
     Parameters
     ----------
-    models : forests by the names of their files, all of one Poisson's ratio.
-    databases : of metamaterials, see `forests.comparison.methods.databases_of`; built if not given.
+    models
+        Forests by the names of their files, all of one Poisson's ratio.
+    databases
+        Of metamaterials, see `forests.comparison.methods.databases_of`; built if not given.
 
     Returns
     -------
-    One row for each case and method: `method`, `range_gpa`, `distribution`, `fill`, `scaled_by`
-    (of the case), `mean_error`, `median_error` (nodal forces), the same for inertial and corner
-    loads, `min_mean_error`, `min_median_error` (nodal, of any element whatsoever),
-    `mean_squared_m2` (absolute, nodal), `seconds_per_block` (median of `timed_runs`, with
-    `seconds_per_block_min` and `_max`), `storage_bytes`, `training_seconds` (None if unknown),
-    `clamped` (made for lower moduli than the blocks have), `blocks`, `seed`.
+    list of dict
+        One row for each case and method: `method`, `range_gpa`, `distribution`, `fill`, `scaled_by`
+        (of the case), `mean_error`, `median_error` (nodal forces), the same for inertial and corner
+        loads, `min_mean_error`, `min_median_error` (nodal, of any element whatsoever),
+        `mean_squared_m2` (absolute, nodal), `seconds_per_block` (median of `timed_runs`, with
+        `seconds_per_block_min` and `_max`), `storage_bytes`, `training_seconds` (None if unknown),
+        `clamped` (made for lower moduli than the blocks have), `blocks`, `seed`.
 
     Raises
     ------

@@ -57,8 +57,18 @@ class Timing:
 class Rival:
     """scikit-learn's `predict` and ours for the same trees on the same blocks, on one core.
 
-    leaves : of all trees; predict, coarsen : see `Timing`; coarsen also computes the features,
-    which `predict` is given. difference : largest relative one of the moduli.
+    Attributes
+    ----------
+    trees : int
+        Of each forest.
+    leaves : int
+        Of all trees.
+    predict, coarsen : Timing
+        `coarsen` also computes the features, which `predict` is given.
+    ratio : float
+        How many times as fast ours is.
+    difference : float
+        Largest relative one of the moduli.
     """
 
     trees: int
@@ -86,7 +96,12 @@ class SizeTiming:
 class Result:
     """All measurements.
 
-    evaluation : by name and threads; load_ms : median time of loading the model, checks included.
+    Attributes
+    ----------
+    evaluation : dict
+        Timings by name and threads.
+    load_ms : float
+        Median time of loading the model [ms], checks included.
     """
 
     model: str
@@ -211,8 +226,10 @@ def benchmark(
 
     Parameters
     ----------
-    blocks : how many are evaluated in one run.
-    largest : megabytes of the largest forest.
+    blocks
+        How many are evaluated in one run.
+    largest
+        Megabytes of the largest forest.
 
     Raises
     ------

@@ -178,10 +178,12 @@ def solve_leaves(tree: Tree, sums: Sums, prior: float) -> Leaves:
 
     Parameters
     ----------
-    sums : over the rows of each leaf.
-    prior : rows that the nearest ancestor with `ANCESTOR_ROWS` counts for in a leaf's regression.
-        A leaf with few rows, or with rows that leave a slope open, so falls back to what holds
-        around it, and one without rows takes the ancestor's function.
+    sums
+        Over the rows of each leaf.
+    prior
+        Rows that the nearest ancestor with `ANCESTOR_ROWS` counts for in a leaf's regression. A
+        leaf with few rows, or with rows that leave a slope open, so falls back to what holds around
+        it, and one without rows takes the ancestor's function.
     """
     nodes, parent = _over_nodes(tree, sums)
     leaves = np.flatnonzero(tree.left < 0)

@@ -38,13 +38,20 @@ class TrainingOptions:
 
     Attributes
     ----------
-    trees, depth : trees a forest, their largest depth.
-    max_leaves : most leaves of a tree; 56 bytes each in the model.
-    min_leaf : rows of the subset that a leaf needs.
-    structure_rows : rows of the subset that the splits of both forests are chosen from.
-    prior : see `forests.training.leaves.solve_leaves`.
-    uniform_weight : weight of blocks of one material; they are few but fill most real objects.
-    transform, grower : see `forests.scaling`, `forests.training.structure`.
+    trees, depth
+        Trees a forest, their largest depth.
+    max_leaves
+        Most leaves of a tree; 56 bytes each in the model.
+    min_leaf
+        Rows of the subset that a leaf needs.
+    structure_rows
+        Rows of the subset that the splits of both forests are chosen from.
+    prior
+        See `forests.training.leaves.solve_leaves`.
+    uniform_weight
+        Weight of blocks of one material; they are few but fill most real objects.
+    transform, grower
+        See `forests.scaling`, `forests.training.structure`.
     """
 
     trees: int = 3
@@ -152,7 +159,12 @@ def fit_leaves(
 
     Returns
     -------
-    Leaves of every tree, samples held out, and how many were trained on; on the first rank.
+    leaves : dict
+        Leaves of every tree, on the first rank.
+    held_out : Samples
+        Samples that were not trained on, on the first rank.
+    used : int
+        How many were trained on, on the first rank.
     """
     sums = {job: Sums.nothing(tree.leaves) for job, tree in trees.items()}
     held: list[Samples] = []
@@ -204,7 +216,14 @@ def _ahead(pool: ThreadPoolExecutor, items: Iterator[T]) -> Iterator[T]:
 class Trained(NamedTuple):
     """Both steps' result.
 
-    trees and leaves by tree number; samples held out; facts: seconds, rows, ranks, workers.
+    Attributes
+    ----------
+    trees, leaves
+        By tree number.
+    held_out
+        Samples that were not trained on.
+    facts
+        Seconds, rows, ranks and workers by name.
     """
 
     trees: dict[int, Tree]
@@ -225,12 +244,16 @@ def train_trees(
 
     Parameters
     ----------
-    workers : threads of every rank.
-    grown : splits by tree number from `grow_trees` and the seconds they took, if they are there.
+    workers
+        Threads of every rank.
+    grown
+        Splits by tree number from `grow_trees` and the seconds they took, if they are there.
 
     Returns
     -------
-    The trees on the first rank, None on the others. They depend on the number of ranks to rounding.
+    Trained or None
+        The trees on the first rank, None on the others. They depend on the number of ranks to
+        rounding.
     """
     training.validate()
     begin = time.perf_counter()

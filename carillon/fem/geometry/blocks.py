@@ -16,10 +16,13 @@ class Blocks:
 
     Attributes
     ----------
-    fine : the fine mesh.
-    coarse : mesh of the blocks, edge twice the fine one, the same origin.
-    fine_of_block : (mc, 8) int32, index of the fine cell at position ``x + 2*y + 4*z`` of its
-        block, -1 where the block is void.
+    fine
+        The fine mesh.
+    coarse
+        Mesh of the blocks, edge twice the fine one, the same origin.
+    fine_of_block : (mc, 8) int32
+        Index of the fine cell at position ``x + 2*y + 4*z`` of its block, -1 where the block is
+        void.
     """
 
     fine: HexMesh

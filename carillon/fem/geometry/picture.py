@@ -42,21 +42,31 @@ def draw(
 
     Parameters
     ----------
-    ax : axes made with ``projection="3d"``.
-    mesh : fine or coarse mesh.
-    displacement : (n, 3) or (3*n,) displacement of the nodes, any unit.
-    values : (n,) per node or (m,) per cell, shown in colour; without them a deformed body is
-        coloured by the length of its displacement and a body at rest is plain.
-    scale : factor of the displacement, or ``"auto"``: the largest is drawn as `DRAWN_AMPLITUDE`
-        of the object's diagonal.
-    up : axis that points upwards, ``"x"``, ``"y"`` or ``"z"``; ``"auto"`` asks `guess_up`.
-    view : elevation and azimuth of the eye [degrees].
-    cmap : name of a matplotlib colour map.
-    limits : values at both ends of the colour map; their range by default.
+    ax
+        Axes made with ``projection="3d"``.
+    mesh
+        Fine or coarse mesh.
+    displacement : (n, 3) or (3 n,)
+        Displacement of the nodes, any unit.
+    values : (n,) or (m,)
+        Per node or per cell, shown in colour; without them a deformed body is coloured by the
+        length of its displacement and a body at rest is plain.
+    scale
+        Factor of the displacement, or ``"auto"``: the largest is drawn as `DRAWN_AMPLITUDE` of the
+        object's diagonal.
+    up
+        Axis that points upwards, ``"x"``, ``"y"`` or ``"z"``; ``"auto"`` asks `guess_up`.
+    view
+        Elevation and azimuth of the eye [degrees].
+    cmap
+        Name of a matplotlib colour map.
+    limits
+        Values at both ends of the colour map; their range by default.
 
     Returns
     -------
-    The polygons, with the values as their array, so that ``figure.colorbar`` accepts them.
+    Poly3DCollection
+        The polygons, with the values as their array, so that ``figure.colorbar`` accepts them.
 
     Raises
     ------
@@ -113,8 +123,12 @@ def draw_surface(
 
     Parameters
     ----------
-    vertices, faces : (v, 3) [m] and (f, 3), wound either way.
-    mesh : the voxels.
+    vertices : (v, 3)
+        Positions [m].
+    faces : (f, 3)
+        Triangles, wound either way.
+    mesh
+        The voxels.
     """
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 

@@ -32,14 +32,17 @@ def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
 
     Parameters
     ----------
-    mesh : path of a file that trimesh reads (obj, stl, ply, off, glb, ...; the objects of a scene
-        are concatenated), or ``builtin:NAME`` for a built-in object.
-    unit : metres per unit of the mesh's coordinates; built-in objects are in metres already, so
-        for them it is a scale factor.
+    mesh
+        Path of a file that trimesh reads (obj, stl, ply, off, glb, ...; the objects of a scene are
+        concatenated), or ``builtin:NAME`` for a built-in object.
+    unit
+        Metres per unit of the mesh's coordinates; built-in objects are in metres already, so for
+        them it is a scale factor.
 
     Returns
     -------
-    Surface with vertices in metres. It need not be closed or manifold.
+    trimesh.Trimesh
+        Surface with vertices in metres. It need not be closed or manifold.
 
     Raises
     ------
