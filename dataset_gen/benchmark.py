@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from carillon.arguments import poisson_ratio, whole_number
 from carillon.fem.element import DEFAULT_POISSON, Array
+from carillon.options import option
 from carillon.progress import track
 from carillon.provenance import processor
 from carillon.serial import serial_blas
@@ -22,6 +25,9 @@ RUNS = 7
 
 SAMPLED_SHARE = 100
 """The sampled evaluator is timed on one block in so many; it is that much slower."""
+
+MOST_TIMED = 1_000_000
+"""Samples that a benchmark keeps in memory."""
 
 MATRIX = 768
 """Size of the matrices of the BLAS product that the arithmetic is compared with."""
@@ -91,15 +97,17 @@ def _flops_per_fit(objective: str, young: Array, poisson: float) -> float | None
     return sum(counts) / len(young) if counts else None
 
 
-def benchmark(
-    count: int, poisson: float = DEFAULT_POISSON, objective: str | None = None
-) -> dict[str, Any]:
-    """Time the fits on the first `count` samples of seed 0, on one core.
+@dataclass(frozen=True)
+class FitBenchmarkOptions:
+    """Which fits are timed."""
 
-    Parameters
-    ----------
-    objective : str or None
-        The closed form to time; with None the default one, and all others too.
+    samples: int = option(4000, "of seed 0", type=whole_number(1, MOST_TIMED))
+    objective: str | None = option(None, "this one only", choices=OBJECTIVES)
+    poisson: float = option(DEFAULT_POISSON, "Poisson's ratio", type=poisson_ratio)
+
+
+def benchmark(options: FitBenchmarkOptions) -> dict[str, Any]:
+    """Time the fits on one core: of one objective, or of the default one and all others too.
 
     Returns
     -------
@@ -113,9 +121,10 @@ def benchmark(
         `gflops_dgemm` is what BLAS reaches on the same core, `gflops_peak` the processor without
         loads and stores, `peak_fraction` the share of the latter.
     """
+    count, poisson = options.samples, options.poisson
     young = samples(0, 0, count)
-    chosen = objective or DEFAULT_OBJECTIVE
-    names = list(OBJECTIVES) if objective is None else [objective]
+    chosen = options.objective or DEFAULT_OBJECTIVE
+    names = list(OBJECTIVES) if options.objective is None else [options.objective]
     rates: dict[str, Rate] = {}
     for name in track(names, "timing", total=len(names), unit="objective"):
         rates[name] = _rate(partial(fit, name, young, poisson), count)

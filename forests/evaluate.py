@@ -27,6 +27,9 @@ from forests.scaling import (
     prepare_block,
 )
 
+MOST_BLOCKS = 1_000_000
+"""Blocks that a comparison or a benchmark keeps in memory."""
+
 STRIDE = 8
 """Features of an origin with padding, which saves a multiplication."""
 

@@ -78,7 +78,9 @@ def test_bytes_do_not_depend_on_the_number_of_ranks(ranks, path, program, refere
 
 
 def sentences(done):
-    return [line for line in done.stderr.splitlines() if line.startswith("dataset_gen")]
+    return [
+        line for line in done.stderr.splitlines() if line.startswith(("dataset_gen", "carillon"))
+    ]
 
 
 @pytest.mark.parametrize("rank", [0, 2])
@@ -103,15 +105,16 @@ def test_a_mistake_of_the_program_on_one_rank_ends_all_with_its_traceback(path, 
 
 
 @pytest.mark.parametrize(
-    ("more", "sentence"),
+    ("program", "more", "sentence"),
     [
-        (("--low", "-1"), "expected 0 or above"),
-        (("--workers", 2), "ask for more ranks instead"),
+        ("dataset_gen", ("--low", "-1"), "expected 0 or above"),
+        ("dataset_gen", ("--workers", 2), "ask for more ranks instead"),
+        ("carillon", ("--shard", 2), "shard 2 of 1"),
     ],
 )
-def test_bad_input_is_one_sentence_on_all_ranks(more, sentence, path, mpiexec):
-    done = mpiexec(3, "dataset_gen", *options(path, *more))
+def test_bad_input_is_one_sentence_on_all_ranks(program, more, sentence, path, mpiexec):
+    done = mpiexec(3, program, *options(path, *more))
     assert done.returncode == 2
     (line,) = sentences(done)
-    assert sentence in line
+    assert line.startswith(f"{program} generate: ") and sentence in line
     assert list(path.parent.iterdir()) == []

@@ -59,7 +59,7 @@ def test_trees_grown_by_jobs_of_their_own_make_the_same_forests(folder, referenc
 
 
 def sentences(done):
-    return [line for line in done.stderr.splitlines() if line.startswith("forests")]
+    return [line for line in done.stderr.splitlines() if line.startswith(("forests", "carillon"))]
 
 
 @pytest.mark.parametrize(
@@ -107,6 +107,13 @@ def test_an_error_on_one_rank_ends_all(rank, folder, tmp_path, mpiexec):
     assert done.returncode == 2
     assert sentences(done) == ["forests train: planted"]
     assert not (folder / "new.h5").exists()
+
+
+def test_errors_carry_the_name_that_was_typed(folder, mpiexec):
+    done = mpiexec(2, "carillon", "train", "0.h5", "0.h5", "--out", "new.h5", cwd=folder)
+    assert done.returncode == 2
+    (line,) = sentences(done)
+    assert line.startswith("carillon train: ") and "overlap" in line
 
 
 def test_a_damaged_shard_is_named_and_nothing_is_written(folder, tmp_path, mpiexec):

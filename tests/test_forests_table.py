@@ -32,7 +32,7 @@ from forests.comparison.methods import (
     static_condensation,
 )
 from forests.comparison.plot import plot
-from forests.comparison.table import as_text, table
+from forests.comparison.table import TableOptions, as_text, table
 from forests.model import Model, load_model
 from tests.shard_files import write_shard
 
@@ -228,7 +228,7 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def rows(folder):
     models = {"forests.h5": load_model(folder / "forests.h5")}
-    return table(models, blocks=40, databases=databases_of(CASES, POISSON, materials=3))
+    return table(models, TableOptions(blocks=40), databases_of(CASES, POISSON, materials=3))
 
 
 def test_rows_have_every_method_in_every_case(rows):

@@ -12,16 +12,19 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from carillon.arguments import whole_number
 from carillon.fem.element import Array
+from carillon.options import option
 from carillon.progress import track
 from carillon.serial import serial_blas
 from forests.comparison.block_error import AT_ONCE, Errors, displacement_errors
 from forests.comparison.cases import CASES, BlockCase
-from forests.comparison.database import Database
+from forests.comparison.database import MATERIALS, MOST_MATERIALS, Database
 from forests.comparison.methods import (
     Method,
     common_poisson,
@@ -29,6 +32,7 @@ from forests.comparison.methods import (
     databases_of,
     methods_of,
 )
+from forests.evaluate import MOST_BLOCKS
 from forests.model import Model
 
 TIMED_BLOCKS = 2000
@@ -46,6 +50,17 @@ and no coarsening reaches their displacements; the relative errors weigh all blo
 """
 
 Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class TableOptions:
+    """Blocks that the coarsenings are compared on."""
+
+    blocks: int = option(10_000, "of each range", type=whole_number(1, MOST_BLOCKS))
+    seed: int = option(0, "of the blocks", type=whole_number(0))
+    materials: int = option(
+        MATERIALS, "base materials of a database", type=whole_number(2, MOST_MATERIALS)
+    )
 
 
 def cost_per_block(method: Method, young: Array) -> Row:
@@ -104,11 +119,10 @@ def _joined(pieces: Sequence[Errors]) -> Errors:
 @serial_blas
 def table(
     models: dict[str, Model],
-    blocks: int = 10_000,
-    seed: int = 0,
+    options: TableOptions = TableOptions(),
     databases: dict[BlockCase, Database] | None = None,
 ) -> list[Row]:
-    """Rows of Fig. 9 on `blocks` random blocks of each case, on one core.
+    """Rows of Fig. 9 on random blocks of each case, on one core.
 
     Parameters
     ----------
@@ -134,15 +148,15 @@ def table(
     """
     poisson = common_poisson(models)
     if databases is None:
-        databases = databases_of(CASES, poisson)
+        databases = databases_of(CASES, poisson, materials=options.materials)
     rows: list[Row] = []
     for case in CASES:
-        young = case.blocks(blocks, seed)
+        young = case.blocks(options.blocks, options.seed)
         methods = [*methods_of(models), *database_methods(case, databases)]
         errors = errors_of(young, methods, poisson, case.name)
         rows += [_row(case, method, young, each) for method, each in zip(methods, errors)]
         for row in rows:
-            row.update(blocks=blocks, seed=seed)
+            row.update(blocks=options.blocks, seed=options.seed)
     return rows
 
 

@@ -14,9 +14,11 @@ from typing import Any
 import numpy as np
 
 from carillon import provenance
+from carillon.arguments import number_between, whole_number
 from carillon.fem.element import Array
+from carillon.options import option
 from carillon.progress import track
-from forests.evaluate import coarsen, coarsen_with_derivatives
+from forests.evaluate import MOST_BLOCKS, coarsen, coarsen_with_derivatives
 from forests.model import FILLED, VOID, Model, default_path, load_model
 from forests.scaling import FEATURES, prepare
 from forests.studies.synthetic import coherent_blocks, complete_forests, random_blocks
@@ -41,6 +43,19 @@ DEPTH = 20
 
 BLOCKS_PER_LEAF = 5
 """Random blocks to grow scikit-learn's trees on: ten rows a leaf where the origin is void."""
+
+
+@dataclass(frozen=True)
+class ForestBenchmarkOptions:
+    """What is measured."""
+
+    forest: str | None = option(
+        None, "forests to measure (HDF5; default: those of the package)", metavar="FILE"
+    )
+    blocks: int = option(100_000, "evaluated in one run", type=whole_number(1, MOST_BLOCKS))
+    largest: float = option(
+        600.0, "of the largest forest [MB]", type=number_between(1e-3, 1e6), metavar="MB"
+    )
 
 
 @dataclass(frozen=True)
@@ -219,24 +234,16 @@ def over_size(sizes: Sequence[tuple[int, int]], young: Array, mesh: Array) -> li
     return timings
 
 
-def benchmark(
-    path: str | Path | None = None, blocks: int = 100_000, largest: float = 600.0
-) -> Result:
-    """Measure the model at `path`, by default the one that comes with the package.
-
-    Parameters
-    ----------
-    blocks
-        How many are evaluated in one run.
-    largest
-        Megabytes of the largest forest.
+def benchmark(options: ForestBenchmarkOptions) -> Result:
+    """Measure forests.
 
     Raises
     ------
     UserError
         See `forests.model.load_model`.
     """
-    path = default_path() if path is None else Path(path)
+    path = default_path() if options.forest is None else Path(options.forest)
+    blocks = options.blocks
     model = load_model(path)
     young, mesh = random_blocks(blocks), coherent_blocks(blocks)
     functions = {"coarsen": coarsen, "coarsen with derivatives": coarsen_with_derivatives}
@@ -254,7 +261,7 @@ def benchmark(
     sizes = [
         (trees, depth)
         for trees, depth in SIZES
-        if 2 * trees * BYTES_OF_LEAF * 2**depth <= 1e6 * largest
+        if 2 * trees * BYTES_OF_LEAF * 2**depth <= 1e6 * options.largest
     ]
     return Result(
         model=str(path),

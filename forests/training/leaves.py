@@ -28,8 +28,12 @@ ANCESTOR_ROWS = 64
 class Leaves:
     """Linear functions of one tree's leaves.
 
-    coefficients (leaves, 8): slopes of the seven features and the constant; low and high (leaves,):
-    range of the targets seen in the leaf, which bounds its answers.
+    Attributes
+    ----------
+    coefficients : (leaves, 8)
+        Slopes of the seven features and the constant.
+    low, high : (leaves,)
+        Range of the targets seen in the leaf, which bounds its answers.
     """
 
     coefficients: Array
@@ -41,7 +45,14 @@ class Leaves:
 class Sums:
     """What the rows seen so far mean for each leaf or node.
 
-    moments (n, 45), see `moments`; rows (n,) how many; low and high (n,) of their targets.
+    Attributes
+    ----------
+    moments : (n, 45)
+        See `moments`.
+    rows : (n,)
+        How many.
+    low, high : (n,)
+        Range of their targets.
     """
 
     moments: Array

@@ -13,8 +13,11 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from carillon import provenance
+from carillon.arguments import number_between, whole_number
 from carillon.errors import UserError
+from carillon.options import option
 from carillon.progress import track
+from forests.layout import MOST_LEAVES
 from forests.model import FILLED, VOID, Model
 from forests.scaling import TRANSFORMS
 from forests.training.dataset import Dataset, Samples, joined
@@ -34,36 +37,30 @@ KINDS = {VOID: "void", FILLED: "filled"}
 
 @dataclass(frozen=True)
 class TrainingOptions:
-    """Parameters of the training.
+    """Parameters of the training."""
 
-    Attributes
-    ----------
-    trees, depth
-        Trees a forest, their largest depth.
-    max_leaves
-        Most leaves of a tree; 56 bytes each in the model.
-    min_leaf
-        Rows of the subset that a leaf needs.
-    structure_rows
-        Rows of the subset that the splits of both forests are chosen from.
-    prior
-        See `forests.training.leaves.solve_leaves`.
-    uniform_weight
-        Weight of blocks of one material; they are few but fill most real objects.
-    transform, grower
-        See `forests.scaling`, `forests.training.structure`.
-    """
-
-    trees: int = 3
-    depth: int = 20
-    max_leaves: int = 30_000
-    min_leaf: int = 30
-    structure_rows: int = 5_000_000
-    prior: float = 0.5
-    uniform_weight: float = 400.0
-    transform: str = "log"
-    grower: str = "linear"
-    seed: int = 0
+    trees: int = option(3, "of each of the two forests", type=whole_number(1, 1000))
+    depth: int = option(20, "of a tree, at most", type=whole_number(1, 1000))
+    max_leaves: int = option(
+        30_000, "of a tree, at most; 56 bytes each", type=whole_number(1, MOST_LEAVES)
+    )
+    min_leaf: int = option(30, "rows of the subset that a leaf needs", type=whole_number(1))
+    structure_rows: int = option(
+        5_000_000, "rows of the subset that splits are chosen from", type=whole_number(1)
+    )
+    prior: float = option(
+        0.5,
+        "rows that the surroundings of a leaf count for in it",
+        type=number_between(1e-9, 1e9),
+    )
+    uniform_weight: float = option(
+        400.0,
+        "weight of blocks of one material; they are few but fill most real objects",
+        type=number_between(1e-9, 1e9),
+    )
+    transform: str = option("log", "of the features and the target", choices=TRANSFORMS)
+    grower: str = option("linear", "how splits are chosen", choices=GROWERS)
+    seed: int = option(0, "of the splits", type=whole_number(0))
 
     @property
     def limits(self) -> TreeLimits:
