@@ -24,11 +24,11 @@ LONGER = {
 
 def commands() -> dict[str, Command]:
     """All commands by name."""
-    found = {"environment": Command("carillon.environment", "versions, BLAS and cores in use")}
+    by_name = {"environment": Command("carillon.environment", "versions, BLAS and cores in use")}
     for room in ROOMS[1:]:
         own: dict[str, Command] = import_module(f"{room}.commands").COMMANDS
-        found |= {LONGER.get(room, {}).get(name, name): command for name, command in own.items()}
-    return found
+        by_name |= {LONGER.get(room, {}).get(name, name): command for name, command in own.items()}
+    return by_name
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -37,17 +37,17 @@ class Parser(argparse.ArgumentParser):
         raise UserError(f"{message} (see {self.prog} --help)")
 
 
-def whole_number(least: int, most: int = LARGEST) -> Callable[[str], int]:
-    """Argument type: an integer in `least`..`most`, in digits."""
+def whole_number(minimum: int, maximum: int = LARGEST) -> Callable[[str], int]:
+    """Argument type: an integer in `minimum`..`maximum`, in digits."""
 
     def convert(text: str) -> int:
         if not _WHOLE.fullmatch(text):
             raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
         value = int(text)
-        if value < least:
-            raise argparse.ArgumentTypeError(f"{value} is too small, expected at least {least}")
-        if value > most:
-            raise argparse.ArgumentTypeError(f"{value} is too large, expected at most {most}")
+        if value < minimum:
+            raise argparse.ArgumentTypeError(f"{value} is too small, expected at least {minimum}")
+        if value > maximum:
+            raise argparse.ArgumentTypeError(f"{value} is too large, expected at most {maximum}")
         return value
 
     return convert

@@ -34,8 +34,9 @@ def run(program: str, main: Callable[[], int | None], comm: Comm = None) -> int:
 
     Returns
     -------
-    0; 2 for bad input, or lack of memory or room; 3 if a solver missed its tolerance; 130 for an
-    interrupt from the keyboard.
+    int
+        0; 2 for bad input, or lack of memory or room; 3 if a solver missed its tolerance; 130 for
+        an interrupt from the keyboard.
     """
     _require_streams()
     logs.show()
@@ -122,7 +123,7 @@ def _nobody_reads() -> bool:
     poll = select.poll()
     with suppress(OSError, ValueError):
         poll.register(sys.stdout.fileno(), 0)
-        return any(found & select.POLLERR for _, found in poll.poll(0))
+        return any(events & select.POLLERR for _, events in poll.poll(0))
     return False
 
 

@@ -58,16 +58,16 @@ def find(
     UserError
         If it is anything else; nothing of it has been read then.
     """
-    found = group.get(name)
-    if not isinstance(found, h5py.Dataset):
+    dataset = group.get(name)
+    if not isinstance(dataset, h5py.Dataset):
         raise refused(group, f"is incomplete, it has no dataset {name!r}")
-    if found.dtype.kind not in kind:
-        raise refused(group, f"dataset {name!r} holds {found.dtype}, expected {_NAMES[kind]}")
-    fits = found.shape is not None and len(found.shape) == len(shape)
-    if not fits or any(b not in (None, a) for a, b in zip(found.shape, shape)):
-        wanted = str(tuple(shape)).replace("None", "any")
-        raise refused(group, f"dataset {name!r} has shape {found.shape}, expected {wanted}")
-    return found
+    if dataset.dtype.kind not in kind:
+        raise refused(group, f"dataset {name!r} holds {dataset.dtype}, expected {_NAMES[kind]}")
+    fits = dataset.shape is not None and len(dataset.shape) == len(shape)
+    if not fits or any(b not in (None, a) for a, b in zip(dataset.shape, shape)):
+        expected = str(tuple(shape)).replace("None", "any")
+        raise refused(group, f"dataset {name!r} has shape {dataset.shape}, expected {expected}")
+    return dataset
 
 
 def read(

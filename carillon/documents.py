@@ -92,13 +92,13 @@ def read_yaml(path: str | Path, what: str) -> dict[str, Any]:
     if len(content) > MOST_BYTES:
         raise UserError(f"{path}: longer than {MOST_BYTES:,} bytes, expected {what} (YAML)")
     try:
-        found = parse_yaml(content.decode("utf-8-sig"))
+        document = parse_yaml(content.decode("utf-8-sig"))
     except (UnicodeDecodeError, UserError) as error:
         said = error.reason if isinstance(error, UnicodeDecodeError) else str(error)
         raise UserError(f"{path}: is not readable as YAML ({said}), expected {what}") from None
-    if not isinstance(found, dict):
+    if not isinstance(document, dict):
         raise UserError(f"{path}: expected {what}, keys and values such as mesh: builtin:bell")
-    return found
+    return document
 
 
 def parse_yaml(text: str) -> Any:

@@ -48,20 +48,20 @@ def _dotted(version: tuple[int, ...]) -> str:
     return ".".join(str(part) for part in version)
 
 
-def _print_table(found: dict[str, Any]) -> None:
-    versions = dict(found["versions"])
+def _print_table(description: dict[str, Any]) -> None:
+    versions = dict(description["versions"])
     rows = {
         "Carillon": f"{versions.pop('carillon')} on Python {versions.pop('python')}",
         "packages": ", ".join(f"{name} {version}" for name, version in versions.items()),
-        "MPI": found["mpi"],
-        "PETSc": found["petsc"],
-        "SLEPc": found["slepc"],
+        "MPI": description["mpi"],
+        "PETSc": description["petsc"],
+        "SLEPc": description["slepc"],
         "solvers": ", ".join(
-            f"{label} {'yes' if found[key] else 'no'}"
+            f"{label} {'yes' if description[key] else 'no'}"
             for key, label in (("mumps", "MUMPS"), ("cholmod", "CHOLMOD"), ("arpack", "ARPACK"))
         ),
-        "BLAS": found["blas"],
-        "processor": f"{found['processor']}, {found['cores']} cores usable",
+        "BLAS": description["blas"],
+        "processor": f"{description['processor']}, {description['cores']} cores usable",
     }
     for name, text in rows.items():
         print(f"{name:<10} {text}")
@@ -74,9 +74,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Print the description of the environment, as a table or as JSON."""
-    found = describe()
+    description = describe()
     if arguments.json:
-        print(json.dumps(found, indent=2))
+        print(json.dumps(description, indent=2))
     else:
-        _print_table(found)
+        _print_table(description)
     runtime.warn_about_reference_blas()

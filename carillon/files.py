@@ -208,10 +208,10 @@ def _is_sealed(path: Path) -> bool:
 @cache
 def _is_version_sealed(path: Path, inode: int, size: int, changed: int) -> bool:
     with open(path, "rb") as stream:
-        found = stream.read(SEAL_BYTES)
-        if not found.startswith(_SEAL):
+        seal = stream.read(SEAL_BYTES)
+        if not seal.startswith(_SEAL):
             return False
-        if found != _seal_of(stream):
+        if seal != _seal_of(stream):
             raise UserError(
                 f"{path}: is damaged (its bytes do not match their checksum); remove it and "
                 "generate the file again"
@@ -291,16 +291,16 @@ def _require_whole(path: Path, file: h5py.File) -> None:
 
 def _require_kind(path: Path, file: h5py.File, kind: str, schema: int) -> None:
     try:
-        found_kind = str(file.attrs.get("kind", "something else"))
-        found = int(file.attrs.get("schema_version", -1))
+        stored_kind = str(file.attrs.get("kind", "something else"))
+        stored_schema = int(file.attrs.get("schema_version", -1))
     except Exception as error:  # HDF5 has many ways to say that bytes make no sense
         raise UserError(
             f"{path}: is damaged ({first_line(error)}); generate the file again"
         ) from None
-    if found_kind != kind:
-        raise UserError(f"{path}: holds {found_kind!r}, expected a Carillon {kind} file")
-    if found != schema:
+    if stored_kind != kind:
+        raise UserError(f"{path}: holds {stored_kind!r}, expected a Carillon {kind} file")
+    if stored_schema != schema:
         raise UserError(
-            f"{path}: written with {kind} schema {found}, this version reads schema {schema}; "
-            f"generate the file again"
+            f"{path}: written with {kind} schema {stored_schema}, this version reads schema "
+            f"{schema}; generate the file again"
         )

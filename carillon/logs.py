@@ -12,7 +12,7 @@ from carillon import ROOMS
 from carillon.progress import say
 
 
-class _Lines(logging.Handler):
+class _LineHandler(logging.Handler):
     """Messages as lines among those of the progress."""
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -20,7 +20,7 @@ class _Lines(logging.Handler):
         say(self.format(record))
 
 
-_LINES = _Lines()
+_LINES = _LineHandler()
 
 
 def show() -> None:

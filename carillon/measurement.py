@@ -21,8 +21,10 @@ def measured(
 
     Parameters
     ----------
-    ranks : MPI ranks, or several numbers of them that were measured one after the other.
-    threads : of each rank; what the process may use if None.
+    ranks
+        MPI ranks, or several numbers of them that were measured one after the other.
+    threads
+        Of each rank; what the process may use if None.
     """
     counts = [ranks] if isinstance(ranks, int) else ranks
     return {

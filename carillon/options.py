@@ -86,24 +86,24 @@ def _add(
     parser: argparse._ActionsContainer, field: dataclasses.Field[Any], positional: bool
 ) -> None:
     default = field.default
-    told = {key: value for key, value in field.metadata.items() if value is not None}
+    arguments = {key: value for key, value in field.metadata.items() if value is not None}
     if positional:
-        parser.add_argument(field.name, **{"metavar": field.name.upper(), **told})
+        parser.add_argument(field.name, **{"metavar": field.name.upper(), **arguments})
         return
     flag = f"--{field.name.replace('_', '-')}"
-    told["help"] = f"{told['help']}{_told_default(default, told['help'])}"
+    arguments["help"] = f"{arguments['help']}{_default_in_words(default, arguments['help'])}"
     if default is REQUIRED:
-        parser.add_argument(flag, required=True, **told)
+        parser.add_argument(flag, required=True, **arguments)
     elif default is False:
-        parser.add_argument(flag, action="store_true", help=told["help"])
+        parser.add_argument(flag, action="store_true", help=arguments["help"])
     elif field.type in ("bool | None", "bool"):
         action = argparse.BooleanOptionalAction
-        parser.add_argument(flag, action=action, default=default, help=told["help"])
+        parser.add_argument(flag, action=action, default=default, help=arguments["help"])
     else:
-        parser.add_argument(flag, default=default, **told)
+        parser.add_argument(flag, default=default, **arguments)
 
 
-def _told_default(default: Any, help: str) -> str:
+def _default_in_words(default: Any, help: str) -> str:
     if default is REQUIRED or default is None or default is False or "default" in help:
         return ""
     shown = f"{default:g}" if isinstance(default, float) else default

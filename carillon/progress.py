@@ -30,27 +30,30 @@ def track(
 
     Parameters
     ----------
-    total : units in all, those `done` before included; the number of items unless told.
-    weight : units of an item, one unless told.
-    done : units that were there before the first item, which do not count for the rate.
+    total
+        Units in all, those `done` before included; the number of items unless told.
+    weight
+        Units of an item, one unless told.
+    done
+        Units that were there before the first item, which do not count for the rate.
     """
     if total is None and isinstance(items, Sized):
         total = len(items)
     if not visible:
         yield from items
         return
-    shown: tqdm | _Lines
+    shown: tqdm | _LineProgress
     if sys.stderr.isatty():
         shown = tqdm(desc=label, total=total, unit=f" {unit}", initial=done, dynamic_ncols=True)
     else:
-        shown = _Lines(label, total, unit, done)
+        shown = _LineProgress(label, total, unit, done)
     with shown:
         for item in items:
             yield item
             shown.update(1 if weight is None else weight(item))
 
 
-class _Lines:
+class _LineProgress:
     """A line on standard error every `LINE_SECONDS`, in the place of a bar."""
 
     def __init__(self, label: str, total: int | None, unit: str, done: int) -> None:
@@ -59,7 +62,7 @@ class _Lines:
         self.begin = time.monotonic()
         self.due = self.begin + LINE_SECONDS
 
-    def __enter__(self) -> _Lines:
+    def __enter__(self) -> _LineProgress:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -51,13 +51,13 @@ def commit() -> str:
 @cache
 def versions() -> dict[str, str]:
     """Versions of Carillon, Python and the numerical packages in use."""
-    found = {"carillon": __version__, "python": platform.python_version()}
+    by_package = {"carillon": __version__, "python": platform.python_version()}
     for package in _PACKAGES:
         try:
-            found[package] = metadata.version(package)
+            by_package[package] = metadata.version(package)
         except metadata.PackageNotFoundError:
             continue
-    return found
+    return by_package
 
 
 @cache

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import sys
-import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
-from carillon import cli
-from carillon.errors import UserError
+from carillon.errors import LocalUserError, UserError
 
 Comm = Any
 """mpi4py's communicator; mpi4py is imported only where a launcher started several ranks."""
@@ -37,11 +37,16 @@ def world() -> Comm | None:
     return MPI.COMM_WORLD if MPI.COMM_WORLD.size > 1 else None
 
 
-def give_up(comm: Comm, program: str, error: BaseException) -> None:
-    """Say what has happened to this rank alone, and end all of them."""
-    status, sentence = cli.meaning(error)
-    if sentence is None:
-        traceback.print_exc()
-    else:
-        cli.tell(f"{program}: {sentence}")
-    comm.Abort(status)
+@contextmanager
+def alone() -> Iterator[None]:
+    """Work of one rank of which the others do not know: input refused in it ends all ranks.
+
+    Raises
+    ------
+    LocalUserError
+        If the body raises UserError.
+    """
+    try:
+        yield
+    except UserError as error:
+        raise LocalUserError(str(error)) from error

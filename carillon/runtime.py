@@ -35,8 +35,8 @@ def loaded_blas() -> list[dict[str, str]]:
 
     Ordered by path, numpy's copy before scipy's; threadpoolctl's own order changes from run to run.
     """
-    found = [info for info in ThreadpoolController().info() if info["user_api"] == "blas"]
-    return sorted(found, key=lambda info: str(info["filepath"]))
+    libraries = [info for info in ThreadpoolController().info() if info["user_api"] == "blas"]
+    return sorted(libraries, key=lambda info: str(info["filepath"]))
 
 
 def system_blas_path() -> str | None:
@@ -145,8 +145,8 @@ def available_memory() -> int | None:
 
     None where the system does not tell.
     """
-    found = [_memory_of_machine(), _memory_of_group()]
-    known = [each for each in found if each is not None]
+    limits = [_memory_of_machine(), _memory_of_group()]
+    known = [each for each in limits if each is not None]
     return min(known) if known else None
 
 

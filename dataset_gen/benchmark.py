@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from carillon.arguments import poisson_ratio, whole_number
 from carillon.fem.element import DEFAULT_POISSON, Array
+from carillon.options import option
 from carillon.progress import track
 from carillon.provenance import processor
 from carillon.serial import serial_blas
@@ -23,16 +26,19 @@ RUNS = 7
 SAMPLED_SHARE = 100
 """The sampled evaluator is timed on one block in so many; it is that much slower."""
 
+MOST_TIMED = 1_000_000
+"""Samples that a benchmark keeps in memory."""
+
 MATRIX = 768
 """Size of the matrices of the BLAS product that the arithmetic is compared with."""
 
 
 class Rate(NamedTuple):
-    """Items per second: median, least and largest of the runs."""
+    """Items per second: median, minimum and maximum of the runs."""
 
     median: float
-    least: float
-    largest: float
+    minimum: float
+    maximum: float
 
 
 def _rate(work: Callable[[], Any], items: float) -> Rate:
@@ -59,7 +65,7 @@ def _sampled_rate(young: Array, poisson: float) -> Rate:
 def _blas_gflops() -> float:
     """Billions of operations per second of a product of full matrices by BLAS on one core."""
     left = np.random.default_rng(0).random((MATRIX, MATRIX))
-    return _rate(lambda: left @ left, 2e-9 * MATRIX**3).largest
+    return _rate(lambda: left @ left, 2e-9 * MATRIX**3).maximum
 
 
 @compiled
@@ -77,7 +83,7 @@ def _peak_gflops() -> float:
     """Billions of operations per second of multiplications and additions within registers."""
     repetitions = 20_000
     operations = 2e-9 * LANES * 18 * 8 * repetitions
-    return _rate(lambda: _multiply_in_registers(repetitions), operations).largest
+    return _rate(lambda: _multiply_in_registers(repetitions), operations).maximum
 
 
 def _flops_per_fit(objective: str, young: Array, poisson: float) -> float | None:
@@ -86,34 +92,39 @@ def _flops_per_fit(objective: str, young: Array, poisson: float) -> float | None
     The least squares at the end, a few thousandths of it, are left out.
     """
     fit(objective, young, poisson)
-    with flops.counted() as found:
+    with flops.counted() as counts:
         fit(objective, young, poisson)
-    return sum(found) / len(young) if found else None
+    return sum(counts) / len(young) if counts else None
 
 
-def benchmark(
-    count: int, poisson: float = DEFAULT_POISSON, objective: str | None = None
-) -> dict[str, Any]:
-    """Time the fits on the first `count` samples of seed 0, on one core.
+@dataclass(frozen=True)
+class FitBenchmarkOptions:
+    """Which fits are timed."""
 
-    Parameters
-    ----------
-    objective : the closed form to time; with None the default one, and beside it all others.
+    samples: int = option(4000, "of seed 0", type=whole_number(1, MOST_TIMED))
+    objective: str | None = option(None, "this one only", choices=OBJECTIVES)
+    poisson: float = option(DEFAULT_POISSON, "Poisson's ratio", type=poisson_ratio)
+
+
+def benchmark(options: FitBenchmarkOptions) -> dict[str, Any]:
+    """Time the fits on one core: of one objective, or of the default one and all others too.
 
     Returns
     -------
-    dict with
-
-    fits_per_second : of the `closed_form` and of Eq. (8) with `sampled` forces; a fit has
-        `rows_per_fit` moduli. `spread` has least and largest of the runs.
-    objectives : fits per second by name.
-    flops_per_fit, gflops : operations of the closed form and billions of them per second, null for
-        an iterative one. `gflops_dgemm` is what BLAS reaches on the same core, `gflops_peak` the
-        processor without loads and stores, `peak_fraction` the share of the latter.
+    fits_per_second
+        Of the `closed_form` and of Eq. (8) with `sampled` forces; a fit has `rows_per_fit` moduli.
+        `spread` has minimum and maximum of the runs.
+    objectives
+        Fits per second by name.
+    flops_per_fit, gflops
+        Operations of the closed form and billions of them per second, null for an iterative one.
+        `gflops_dgemm` is what BLAS reaches on the same core, `gflops_peak` the processor without
+        loads and stores, `peak_fraction` the share of the latter.
     """
+    count, poisson = options.samples, options.poisson
     young = samples(0, 0, count)
-    chosen = objective or DEFAULT_OBJECTIVE
-    names = list(OBJECTIVES) if objective is None else [objective]
+    chosen = options.objective or DEFAULT_OBJECTIVE
+    names = list(OBJECTIVES) if options.objective is None else [options.objective]
     rates: dict[str, Rate] = {}
     for name in track(names, "timing", total=len(names), unit="objective"):
         rates[name] = _rate(partial(fit, name, young, poisson), count)

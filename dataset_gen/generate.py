@@ -13,19 +13,17 @@ from typing import Any
 import numpy as np
 
 from carillon.errors import UserError
-from carillon.fem.element import DEFAULT_POISSON
 from carillon.files import require_writable
 from carillon.progress import track
 from dataset_gen.journal import Journal, discard_journal, journal_of
-from dataset_gen.objectives import DEFAULT_OBJECTIVE
-from dataset_gen.settings import settings_of
+from dataset_gen.settings import ShardOptions, settings_of
 from dataset_gen.shards import Shard, origin_of, read_settings, shard_of, write_rows
-from dataset_gen.tasks import ROW, Plan, rows_of
+from dataset_gen.tasks import ROW, ShardPlan, rows_of
 from dataset_gen.workers import in_this_process, in_workers
 
 logger = logging.getLogger(__name__)
 
-Engine = Callable[[Plan, range], Generator[bytes, None, None]]
+Engine = Callable[[ShardPlan, range], Generator[bytes, None, None]]
 """Yields the results of tasks in order; see `dataset_gen.workers` and `dataset_gen.ranks`."""
 
 _ENVIRONMENT = ("commit", "versions", "processor")
@@ -47,20 +45,8 @@ def engine_of(workers: int) -> Engine:
     return lambda plan, tasks: in_workers(plan, tasks, workers)
 
 
-def generate(
-    total: int,
-    seed: int = 0,
-    shard: int = 0,
-    shards: int = 1,
-    objective: str = DEFAULT_OBJECTIVE,
-    poisson: float = DEFAULT_POISSON,
-    workers: int = 1,
-    progress: bool = True,
-    distribution: str = "uniform",
-    low: float | None = None,
-    high: float | None = None,
-) -> Shard:
-    """Fit one shard of the first `total` samples of `seed`, in memory.
+def generate(options: ShardOptions, workers: int = 1, progress: bool = True) -> Shard:
+    """Fit one shard in memory.
 
     A script that asks for several workers needs the usual `if __name__ == "__main__":`, since they
     import it.
@@ -71,16 +57,17 @@ def generate(
         For an unknown objective or distribution, an impossible split, seed, range of moduli,
         Poisson's ratio or number of workers.
     """
-    settings = settings_of(total, seed, shard, shards, objective, poisson, distribution, low, high)
-    plan = Plan(settings)
-    label = f"fitting {objective}"
-    found = _tracked(plan, engine_of(workers)(plan, range(plan.tasks)), label, visible=progress)
-    rows = np.concatenate([rows_of(work) for work in found])
-    return shard_of(settings, rows, origin_of(settings, total, shard, shards))
+    settings = settings_of(options)
+    plan = ShardPlan(settings)
+    label = f"fitting {settings.objective}"
+    results = engine_of(workers)(plan, range(plan.tasks))
+    tracked = _tracked(plan, results, label, visible=progress)
+    rows = np.concatenate([rows_of(work) for work in tracked])
+    return shard_of(settings, rows, origin_of(settings, options))
 
 
 def generate_file(
-    path: str | Path, plan: Plan, origin: dict[str, Any], engine: Engine = in_this_process
+    path: str | Path, plan: ShardPlan, origin: dict[str, Any], engine: Engine = in_this_process
 ) -> int | None:
     """Fit one shard and write it to `path` in constant memory; go on where an earlier run ended.
 
@@ -91,7 +78,8 @@ def generate_file(
 
     Returns
     -------
-    Samples that were fitted; None if `path` is this very shard already.
+    int or None
+        Samples that were fitted; None if `path` is this very shard already.
 
     Raises
     ------
@@ -120,7 +108,7 @@ def generate_file(
     return plan.settings.count - before
 
 
-def _require_room(path: Path, plan: Plan) -> None:
+def _require_room(path: Path, plan: ShardPlan) -> None:
     """Refuse a shard that the disk cannot take: journal and shard are there at the same time."""
     free = shutil.disk_usage(path.parent).free
     begun = journal_of(path)
@@ -134,18 +122,18 @@ def _require_room(path: Path, plan: Plan) -> None:
         )
 
 
-def _is_there(path: Path, plan: Plan) -> bool:
+def _is_there(path: Path, plan: ShardPlan) -> bool:
     """Whether the finished shard of `plan` is at `path`; anything else but nothing is refused."""
     if not path.exists():
         return False
     try:
-        found = read_settings(path)
+        existing = read_settings(path)
     except UserError as error:
         raise UserError(
             f"{path}: exists and is not the shard asked for ({error}); remove it or choose another "
             "name"
         ) from None
-    different = found.difference(plan.settings)
+    different = existing.difference(plan.settings)
     if different is not None:
         raise UserError(
             f"{path}: exists with {different}; remove it or choose another name for the new shard"
@@ -175,7 +163,7 @@ def _results(journal: Journal, engine: Engine) -> Iterator[bytes]:
 
 
 def _tracked(
-    plan: Plan, results: Iterator[bytes], label: str, done: int = 0, visible: bool = True
+    plan: ShardPlan, results: Iterator[bytes], label: str, done: int = 0, visible: bool = True
 ) -> Iterator[bytes]:
     return track(
         results,

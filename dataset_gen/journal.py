@@ -23,7 +23,7 @@ from carillon.errors import UserError
 from carillon.files import cause, sync_folder
 from carillon.locks import take
 from dataset_gen.settings import settings_from
-from dataset_gen.tasks import Plan
+from dataset_gen.tasks import ShardPlan
 
 logger = logging.getLogger(__name__)
 
@@ -54,8 +54,10 @@ class Journal:
 
     Attributes
     ----------
-    tasks : tasks it holds, the first ones of the plan.
-    environments : where the work was done, one record for each change.
+    tasks
+        Tasks it holds, the first ones of the plan.
+    environments
+        Where the work was done, one record for each change.
 
     Raises
     ------
@@ -64,7 +66,7 @@ class Journal:
         beginning, or belongs to other settings.
     """
 
-    def __init__(self, path: Path, plan: Plan, environment: dict[str, Any]) -> None:
+    def __init__(self, path: Path, plan: ShardPlan, environment: dict[str, Any]) -> None:
         self.path = journal_of(path)
         self.plan = plan
         self.tasks = 0
@@ -147,8 +149,8 @@ class Journal:
     def _begun(self) -> int:
         """Write the beginning of a new journal; an older one may only be cut off within it."""
         beginning = _TITLE + _framed(_PLAN, json.dumps(self._plan_values()).encode())
-        found = os.pread(self._file, len(beginning) + 1, 0)
-        if len(found) > len(beginning) or not _TITLE.startswith(found[: len(_TITLE)]):
+        existing = os.pread(self._file, len(beginning) + 1, 0)
+        if len(existing) > len(beginning) or not _TITLE.startswith(existing[: len(_TITLE)]):
             raise UserError(
                 f"{self.path}: is no journal or damaged at its beginning, so that the work in it "
                 "cannot be used; remove it to begin again"
@@ -164,15 +166,15 @@ class Journal:
     def _require_same_plan(self, content: bytes) -> None:
         values = json.loads(content)
         try:
-            found = Plan(settings_from(values["settings"]), int(values["task_rows"]))
+            begun = ShardPlan(settings_from(values["settings"]), int(values["task_rows"]))
         except (KeyError, TypeError, ValueError) as error:
             raise UserError(
                 f"{self.path}: was begun by another version of Carillon ({error}); remove it to "
                 "begin again"
             ) from None
-        different = found.settings.difference(self.plan.settings)
-        if different is None and found.task_rows != self.plan.task_rows:
-            different = f"tasks of {found.task_rows} samples where {self.plan.task_rows} are usual"
+        different = begun.settings.difference(self.plan.settings)
+        if different is None and begun.task_rows != self.plan.task_rows:
+            different = f"tasks of {begun.task_rows} samples where {self.plan.task_rows} are usual"
         if different is not None:
             raise UserError(
                 f"{self._shard}: was begun with {different}; finish it with the settings it was "

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import logging
 import os
-import sys
 import time
 from collections.abc import Callable, Generator
+from dataclasses import dataclass
 from functools import partial
 
-from carillon.cli import EXIT_BAD_INPUT
-from carillon.errors import UserError
-from carillon.ranks import Comm, give_up
-from dataset_gen.crew import lead
+from carillon.errors import LocalUserError, UserError
+from carillon.ranks import Comm, alone
+from dataset_gen import task_farm
 from dataset_gen.generate import Engine
-from dataset_gen.tasks import Plan
+from dataset_gen.tasks import ShardPlan
 
 logger = logging.getLogger(__name__)
 
@@ -22,50 +21,64 @@ PAUSE = 1e-3
 """Seconds between two looks for messages, so that waiting takes no core from the work."""
 
 
-def share(comm: Comm, program: str, make: Callable[[Engine], int]) -> int:
+def run_on_ranks(comm: Comm, make: Callable[[Engine], int]) -> int:
     """Call `make` on rank 0 with an engine for which all ranks work; its exit status on every rank.
 
-    An error on any rank is printed there and ends all of them.
+    Raises
+    ------
+    UserError
+        On every rank if `make` raises it before the ranks have begun to work.
+    LocalUserError
+        On the one rank that raised it later, see `carillon.cli.run`, which ends all of them.
     """
-    busy: list[Plan] = []
+    _warn_about_cores(comm)
+    if comm.rank > 0:
+        return _follow(comm)
+    busy: list[ShardPlan] = []
     try:
-        _warn_about_cores(comm)
-        if comm.rank > 0:
-            return _follow(comm)
-        status = make(partial(_in_ranks, comm, busy))
-        if busy:  # interrupted, with the others in the middle of their work
-            comm.Abort(status)
+        status = make(partial(_on_ranks, comm, busy))
     except UserError as error:
-        print(f"{program}: {error}", file=sys.stderr, flush=True)
-        if busy or comm.rank > 0:
-            comm.Abort(EXIT_BAD_INPUT)
-        status = EXIT_BAD_INPUT
-    except BaseException as error:
-        give_up(comm, program, error)
-    for rank in range(1, comm.size):
-        comm.send(_End(status), dest=rank)
+        if not busy:
+            _end(comm, _Refusal(str(error)))
+            raise
+        raise LocalUserError(str(error)) from error
+    if busy:  # interrupted, with the others in the middle of their work
+        comm.Abort(status)
+    _end(comm, _End(status))
     return status
 
 
+@dataclass(frozen=True)
 class _End:
     """Message to the other ranks that there is no more work, with the status to end with."""
 
-    def __init__(self, status: int) -> None:
-        self.status = status
+    status: int
 
 
-def _in_ranks(
-    comm: Comm, busy: list[Plan], plan: Plan, tasks: range
+@dataclass(frozen=True)
+class _Refusal:
+    """Message to the other ranks that there is no work, and why."""
+
+    sentence: str
+
+
+def _end(comm: Comm, message: _End | _Refusal) -> None:
+    for rank in range(1, comm.size):
+        comm.send(message, dest=rank)
+
+
+def _on_ranks(
+    comm: Comm, busy: list[ShardPlan], plan: ShardPlan, tasks: range
 ) -> Generator[bytes, None, None]:
     """Results of `tasks` in order, from all ranks."""
     busy.append(plan)
     for rank in range(1, comm.size):
         comm.send(plan, dest=rank)
-    yield from lead(plan, tasks, _Ranks(comm))
+    yield from task_farm.run(plan, tasks, _OtherRanks(comm))
     busy.clear()
 
 
-class _Ranks:
+class _OtherRanks:
     """The other ranks, as rank 0 sees them."""
 
     def __init__(self, comm: Comm) -> None:
@@ -74,9 +87,9 @@ class _Ranks:
     def __len__(self) -> int:
         return int(self._comm.size) - 1
 
-    def send(self, other: int, task: int) -> None:
+    def send(self, worker: int, task: int) -> None:
         """Hand over a task."""
-        self._comm.send(task, dest=other + 1)
+        self._comm.send(task, dest=worker + 1)
 
     def receive(self) -> tuple[int, int, bytes] | None:
         """A finished task, if there is one after a `PAUSE`."""
@@ -84,25 +97,29 @@ class _Ranks:
             time.sleep(PAUSE)
             if not self._comm.iprobe():
                 return None
-        rank, task, work = self._comm.recv()
-        return rank - 1, task, work
+        rank, task, rows = self._comm.recv()
+        return rank - 1, task, rows
 
 
 def _follow(comm: Comm) -> int:
-    """Do the tasks that rank 0 deals until it says that this is the end."""
-    plan: Plan | None = None
+    """Do the tasks that rank 0 hands out until it says that this is the end."""
+    plan: ShardPlan | None = None
     while True:
         while not comm.iprobe(source=0):
             time.sleep(PAUSE)
-        order = comm.recv(source=0)
-        if isinstance(order, _End):
-            return order.status
-        if isinstance(order, Plan):
-            plan = order
-        else:
-            assert plan is not None
-            # Blocks until rank 0 takes it, which is at once: it does not wait for its own work.
-            comm.send((comm.rank, order, plan.work(order)), dest=0)
+        message = comm.recv(source=0)
+        if isinstance(message, _End):
+            return message.status
+        if isinstance(message, _Refusal):
+            raise UserError(message.sentence)
+        if isinstance(message, ShardPlan):
+            plan = message
+            continue
+        assert plan is not None
+        with alone():
+            rows = plan.work(message)
+        # Blocks until rank 0 takes it, which is at once: it does not wait for its own work.
+        comm.send((comm.rank, message, rows), dest=0)
 
 
 def _warn_about_cores(comm: Comm) -> None:

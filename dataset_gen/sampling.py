@@ -54,12 +54,12 @@ class Moduli:
                 f"distribution {self.distribution!r} is unknown, choose "
                 f"{' or '.join(DISTRIBUTIONS)}"
             )
-        least, most = EXTREMES
-        in_range = (self.low == 0.0 or self.low >= least) and least <= self.high <= most
+        smallest, largest = EXTREMES
+        in_range = (self.low == 0.0 or self.low >= smallest) and smallest <= self.high <= largest
         if not (in_range and self.low < self.high):
             raise UserError(
                 f"moduli from {self.low:g} to {self.high:g} GPa: expected low < high, high up to "
-                f"{most:g}, both {least:g} at least, or low 0"
+                f"{largest:g}, both {smallest:g} at least, or low 0"
             )
         if self.logarithmic and self.high > LARGEST_CONTRAST * self.low:
             raise UserError(
@@ -109,13 +109,13 @@ def moduli(
         For an unknown distribution or an impossible range.
     """
     lowest, highest = DISTRIBUTIONS.get(distribution, (0.0, 1.0))
-    found = Moduli(
+    drawn = Moduli(
         distribution,
         lowest if low is None else float(low),
         highest if high is None else float(high),
     )
-    found.validate()
-    return found
+    drawn.validate()
+    return drawn
 
 
 @dataclass(frozen=True)
@@ -127,13 +127,17 @@ class Mixture:
 
     Attributes
     ----------
-    void : share of blocks with at least one void cell (never all eight).
-    uniform : share whose filled cells all have the mean of the block that was drawn.
-    two_phase : share with two values. Uniform: their ratio is log-uniform up to `phase_ratio`, or
-        up to what the range allows. Log-uniform: the softer one is log-uniform between the range's
-        lower end and the stiffer one.
-    blended : share pulled towards the block's mean, the contrast log-uniform down to `contrast`.
-        The rest fills the hypercube as it is.
+    void
+        Share of blocks with at least one void cell (never all eight).
+    uniform
+        Share whose filled cells all have the mean of the block that was drawn.
+    two_phase
+        Share with two values. Uniform: their ratio is log-uniform up to `phase_ratio`, or up to
+        what the range allows. Log-uniform: the softer one is log-uniform between the range's lower
+        end and the stiffer one.
+    blended
+        Share pulled towards the block's mean, the contrast log-uniform down to `contrast`. The rest
+        fills the hypercube as it is.
     """
 
     void: float = 0.5

@@ -10,9 +10,16 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 from carillon import __version__
+from carillon.arguments import (
+    non_negative_number,
+    poisson_ratio,
+    positive_number,
+    whole_number,
+)
 from carillon.errors import UserError
 from carillon.fem import block, element
 from carillon.fem.element import DEFAULT_POISSON
+from carillon.options import REQUIRED, option
 from dataset_gen import objectives, sampling
 from dataset_gen.objectives import (
     DATASET_OBJECTIVES,
@@ -20,7 +27,7 @@ from dataset_gen.objectives import (
     require_objective,
     require_poisson,
 )
-from dataset_gen.sampling import Moduli, moduli, shard_range
+from dataset_gen.sampling import DISTRIBUTIONS, Moduli, moduli, shard_range
 
 SEED_BITS = 63
 """Seeds fit into a signed integer of the file format."""
@@ -47,6 +54,21 @@ def code_of_rows() -> str:
             if file.suffix in (".py", ".json"):
                 digest.update(file.name.encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()[:12]
+
+
+@dataclass(frozen=True)
+class ShardOptions:
+    """One of several nearly equal shards of the first samples of a seed, and how to fit them."""
+
+    samples: int = option(REQUIRED, "of all shards", type=whole_number(1))
+    seed: int = option(0, "of the samples", type=whole_number(0))
+    shard: int = option(0, "number of this shard", type=whole_number(0))
+    shards: int = option(1, "number of all shards", type=whole_number(1))
+    objective: str = option(DEFAULT_OBJECTIVE, "of the fits", choices=DATASET_OBJECTIVES)
+    poisson: float = option(DEFAULT_POISSON, "Poisson's ratio", type=poisson_ratio)
+    distribution: str = option("uniform", "of the fine moduli", choices=DISTRIBUTIONS)
+    low: float | None = option(None, "least modulus [GPa] (0 or 0.01)", type=non_negative_number)
+    high: float | None = option(None, "largest modulus [GPa] (10 or 1000)", type=positive_number)
 
 
 @dataclass(frozen=True)
@@ -101,18 +123,8 @@ _LABELS = {
 }
 
 
-def settings_of(
-    total: int,
-    seed: int = 0,
-    shard: int = 0,
-    shards: int = 1,
-    objective: str = DEFAULT_OBJECTIVE,
-    poisson: float = DEFAULT_POISSON,
-    distribution: str = "uniform",
-    low: float | None = None,
-    high: float | None = None,
-) -> Settings:
-    """Settings of one of `shards` parts of the first `total` samples of `seed`.
+def settings_of(options: ShardOptions) -> Settings:
+    """Settings of a shard.
 
     Raises
     ------
@@ -120,16 +132,16 @@ def settings_of(
         For an unknown objective or distribution, an impossible split, seed, range of moduli or
         Poisson's ratio.
     """
-    require_objective(objective, DATASET_OBJECTIVES)
-    require_poisson(poisson)
-    if not 0 <= seed < 1 << SEED_BITS:
-        raise UserError(f"seed {seed}: expected 0 or more, and less than 2^{SEED_BITS}")
-    drawn = moduli(distribution, low, high)
-    start, stop = shard_range(total, shard, shards)
+    require_objective(options.objective, DATASET_OBJECTIVES)
+    require_poisson(options.poisson)
+    if not 0 <= options.seed < 1 << SEED_BITS:
+        raise UserError(f"seed {options.seed}: expected 0 or more, and less than 2^{SEED_BITS}")
+    drawn = moduli(options.distribution, options.low, options.high)
+    start, stop = shard_range(options.samples, options.shard, options.shards)
     return Settings(
-        objective=objective,
-        poisson=float(poisson),
-        seed=seed,
+        objective=options.objective,
+        poisson=float(options.poisson),
+        seed=options.seed,
         start=start,
         stop=stop,
         distribution=drawn.distribution,

@@ -17,7 +17,7 @@ from carillon.errors import UserError
 from carillon.fem.element import Array
 from carillon.files import create_h5, open_h5
 from dataset_gen.sampling import Moduli
-from dataset_gen.settings import Settings, settings_from
+from dataset_gen.settings import Settings, ShardOptions, settings_from
 from dataset_gen.tasks import ROW
 
 KIND = "dataset"
@@ -44,7 +44,16 @@ _OF_ONE_KIND = {"objective": "objective", "poisson": "Poisson's ratio", "code": 
 class Shard:
     """Samples with their fits, of a whole shard or of a piece of one.
 
-    fine and coarse (n, 8) in GPa, residual (n,), converged (n,).
+    Attributes
+    ----------
+    settings
+        What decides about the rows.
+    fine, coarse : (n, 8)
+        Moduli [GPa].
+    residual, converged : (n,)
+        See `dataset_gen.objectives.Fits`.
+    provenance
+        Of the shard, by name.
     """
 
     settings: Settings
@@ -97,21 +106,21 @@ def shard_of(settings: Settings, rows: NDArray[np.void], origin: dict[str, Any])
     return Shard(settings=settings, provenance=origin, **columns)
 
 
-def origin_of(settings: Settings, total: int, shard: int, shards: int) -> dict[str, Any]:
+def origin_of(settings: Settings, options: ShardOptions) -> dict[str, Any]:
     """Provenance of a shard: that of any result, less what must not matter.
 
     The command is the one that makes this shard with one process on one rank. The number of cores
     and the BLAS, which may be PETSc's if that is loaded too and which fits do not call, are left
     out, so that a shard has the same bytes however it was made.
     """
-    split = {"samples": total, "shard": shard, "shards": shards}
-    found = provenance.record({**settings.as_dict(), **split})
-    del found["cores"], found["blas"]
+    split = {name: getattr(options, name) for name in ("samples", "shard", "shards")}
+    origin = provenance.record({**settings.as_dict(), **split})
+    del origin["cores"], origin["blas"]
     named = {"seed": settings.seed, **split, "objective": settings.objective}
     named |= {"poisson": settings.poisson, "distribution": settings.distribution}
     named |= {"low": settings.low, "high": settings.high}
-    options = " ".join(f"--{name} {value}" for name, value in named.items())
-    return found | {"command": f"python -m dataset_gen generate {options}"}
+    words = " ".join(f"--{name} {value}" for name, value in named.items())
+    return origin | {"command": f"python -m dataset_gen generate {words}"}
 
 
 def write_rows(
@@ -153,14 +162,6 @@ def _new_column(file: h5py.File, name: str, count: int) -> h5py.Dataset:
     column.attrs["long_name"] = _LONG_NAMES[name]
     column.attrs["units"] = UNIT if name in ("fine", "coarse") else "1"
     return column
-
-
-def write_shard(path: str | Path, shard: Shard) -> None:
-    """Write a shard that is in memory, atomically, with checksums and provenance."""
-    rows = np.empty(len(shard.fine), dtype=ROW)
-    for name in _LONG_NAMES:
-        rows[name] = getattr(shard, name)
-    write_rows(path, shard.settings, [rows], shard.provenance)
 
 
 @contextmanager
@@ -226,22 +227,6 @@ def iterate_shard(
             yield piece
 
 
-def read_shard(path: str | Path) -> Shard:
-    """Read and validate one whole shard.
-
-    Raises
-    ------
-    UserError
-        See `iterate_shard`.
-    """
-    pieces = list(iterate_shard(path))
-    columns = {
-        name: np.concatenate([getattr(piece, name) for piece in pieces]) for name in _LONG_NAMES
-    }
-    whole = replace(pieces[0].settings, stop=pieces[-1].stop)
-    return Shard(settings=whole, provenance=pieces[0].provenance, **columns)
-
-
 def _require_sane(path: Path, shard: Shard) -> None:
     bad = ~np.isfinite(shard.fine).all(axis=1) | ~np.isfinite(shard.coarse).all(axis=1)
     bad |= (shard.fine < 0).any(axis=1) | ~shard.fine.any(axis=1) | (shard.coarse <= 0).any(axis=1)
@@ -253,9 +238,9 @@ def _require_sane(path: Path, shard: Shard) -> None:
         )
 
 
-def _require_consistent(paths: Sequence[str | Path], found: Sequence[Settings]) -> None:
-    first = found[0]
-    for path, settings in zip(paths, found):
+def _require_consistent(paths: Sequence[str | Path], all_settings: Sequence[Settings]) -> None:
+    first = all_settings[0]
+    for path, settings in zip(paths, all_settings):
         for name, label in _OF_ONE_KIND.items():
             mine, expected = getattr(settings, name), getattr(first, name)
             if mine != expected:
@@ -265,10 +250,10 @@ def _require_consistent(paths: Sequence[str | Path], found: Sequence[Settings]) 
                 )
 
 
-def _require_disjoint(paths: Sequence[str | Path], found: Sequence[Settings]) -> None:
-    order = sorted(range(len(found)), key=lambda i: _place(found[i]))
+def _require_disjoint(paths: Sequence[str | Path], all_settings: Sequence[Settings]) -> None:
+    order = sorted(range(len(all_settings)), key=lambda i: _place(all_settings[i]))
     for before, after in zip(order, order[1:]):
-        one, two = found[before], found[after]
+        one, two = all_settings[before], all_settings[after]
         same = (one.seed, one.moduli) == (two.seed, two.moduli)
         if same and two.start < one.stop:
             raise UserError(
@@ -283,7 +268,7 @@ def _place(settings: Settings) -> tuple[int, str, float, float, int]:
 
 
 def in_order(
-    paths: Sequence[str | Path], found: Sequence[Settings]
+    paths: Sequence[str | Path], all_settings: Sequence[Settings]
 ) -> list[tuple[str | Path, Settings]]:
     """Shards that belong together, ordered by seed, distribution and sample number.
 
@@ -295,19 +280,6 @@ def in_order(
     """
     if not paths:
         raise UserError("no dataset given, name at least one shard")
-    _require_consistent(paths, found)
-    _require_disjoint(paths, found)
-    return sorted(zip(paths, found), key=lambda pair: _place(pair[1]))
-
-
-def read_shards(paths: Sequence[str | Path]) -> list[Shard]:
-    """Read shards that belong together, ordered by seed, distribution and sample number.
-
-    Raises
-    ------
-    UserError
-        If one is invalid, see `iterate_shard`, or they do not belong together, see `in_order`.
-    """
-    shards = {str(path): read_shard(path) for path in paths}
-    ordered = in_order(paths, [shards[str(path)].settings for path in paths])
-    return [shards[str(path)] for path, _ in ordered]
+    _require_consistent(paths, all_settings)
+    _require_disjoint(paths, all_settings)
+    return sorted(zip(paths, all_settings), key=lambda pair: _place(pair[1]))

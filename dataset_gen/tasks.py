@@ -12,7 +12,7 @@ from dataset_gen.sampling import samples
 from dataset_gen.settings import Settings
 
 TASK_ROWS = 8192
-"""Samples of a task: whole hypercubes, cheap to deal out, a fraction of a second's work."""
+"""Samples of a task: whole hypercubes, cheap to hand out, a fraction of a second's work."""
 
 ROW = np.dtype(
     [("fine", "<f8", (8,)), ("coarse", "<f8", (8,)), ("residual", "<f8"), ("converged", "?")]
@@ -21,7 +21,7 @@ ROW = np.dtype(
 
 
 @dataclass(frozen=True)
-class Plan:
+class ShardPlan:
     """A shard's settings and the samples of each task; the last task may have fewer."""
 
     settings: Settings

@@ -16,7 +16,6 @@ from forests.layout import FEATURE_BITS, FEATURE_MASK
 from forests.model import CONSTANT, HIGH, LOW, Model
 from forests.ordering import FLIPS, order_code
 from forests.prefetch import prefetch
-from forests.reference import coarsen_reference
 from forests.scaling import (
     FEATURES,
     LARGEST_MODULUS,
@@ -28,7 +27,8 @@ from forests.scaling import (
     prepare_block,
 )
 
-__all__ = ["coarsen", "coarsen_reference", "coarsen_with_derivatives", "leaf_numbers"]
+MOST_BLOCKS = 1_000_000
+"""Blocks that a comparison or a benchmark keeps in memory."""
 
 STRIDE = 8
 """Features of an origin with padding, which saves a multiplication."""
@@ -57,9 +57,9 @@ def _walk(
     tree: int,
     features: Features,
     pattern: NDArray[np.int64],
-    found: NDArray[np.int64],
+    numbers: NDArray[np.int64],
 ) -> None:
-    """Leaves found[:, tree] of the eight origins of a block.
+    """Leaves `numbers[:, tree]` of the eight origins of a block.
 
     The eight walk in step, without a branch that depends on the data: so the processor waits for
     the memory of all of them at once and guesses wrong once a tree at most.
@@ -85,8 +85,14 @@ def _walk(
         f = _step(thresholds, links, features, 5, f, to_f)
         g = _step(thresholds, links, features, 6, g, to_g)
         h = _step(thresholds, links, features, 7, h, to_h)
-    found[0, tree], found[1, tree], found[2, tree], found[3, tree] = ~to_a, ~to_b, ~to_c, ~to_d
-    found[4, tree], found[5, tree], found[6, tree], found[7, tree] = ~to_e, ~to_f, ~to_g, ~to_h
+    numbers[0, tree] = ~to_a
+    numbers[1, tree] = ~to_b
+    numbers[2, tree] = ~to_c
+    numbers[3, tree] = ~to_d
+    numbers[4, tree] = ~to_e
+    numbers[5, tree] = ~to_f
+    numbers[6, tree] = ~to_g
+    numbers[7, tree] = ~to_h
 
 
 @numba.njit(inline="always")
@@ -97,13 +103,13 @@ def _find(
     leaves: NDArray[np.float32],
     features: Features,
     pattern: NDArray[np.int64],
-    found: NDArray[np.int64],
+    numbers: NDArray[np.int64],
 ) -> None:
-    """Leaves found (8, trees) of a block; their memory is asked for while the next trees run."""
+    """Leaves `numbers` (8, trees) of a block; their memory is asked for while other trees run."""
     for tree in range(len(roots)):
-        _walk(roots, thresholds, links, tree, features, pattern, found)
+        _walk(roots, thresholds, links, tree, features, pattern, numbers)
         for origin in range(8):
-            prefetch(leaves, found[origin, tree])
+            prefetch(leaves, numbers[origin, tree])
 
 
 @numba.njit(inline="always")
@@ -117,16 +123,16 @@ def _linear(leaf: NDArray[np.float32], features: Features, origin: int) -> float
 
 @numba.njit(inline="always")
 def _target(
-    leaves: NDArray[np.float32], found: NDArray[np.int64], features: Features, origin: int
+    leaves: NDArray[np.float32], numbers: NDArray[np.int64], features: Features, origin: int
 ) -> float:
-    """Mean answer of the trees whose leaves are `found` (trees,)."""
+    """Mean answer of the trees whose leaves are `numbers` (trees,)."""
     total = 0.0
-    for tree in range(len(found)):
-        leaf = leaves[found[tree]]
+    for tree in range(len(numbers)):
+        leaf = leaves[numbers[tree]]
         answer = _linear(leaf, features, origin)
         low, high = float(leaf[LOW]), float(leaf[HIGH])
         total += min(max(answer, low), high)
-    return total / len(found)
+    return total / len(numbers)
 
 
 @numba.njit(inline="always")
@@ -142,8 +148,8 @@ def _scratch(
     features = np.zeros(8 * STRIDE, dtype=np.float32)
     table = features.reshape(8, STRIDE)
     pattern = np.empty(8, dtype=np.int64)
-    found = np.empty((8, trees), dtype=np.int64)
-    return values, scale, references, features, table, pattern, found
+    numbers = np.empty((8, trees), dtype=np.int64)
+    return values, scale, references, features, table, pattern, numbers
 
 
 @numba.njit(cache=True, nogil=True)
@@ -157,49 +163,31 @@ def _moduli(
     moduli: Array,
 ) -> None:
     """Coarse moduli (n, 8) of blocks (n, 8)."""
-    values, scale, references, features, table, pattern, found = _scratch(len(roots))
+    values, scale, references, features, table, pattern, numbers = _scratch(len(roots))
     for block in range(len(young)):
         prepare_block(young[block], logarithmic, values, table, pattern, scale, references)
-        _find(roots, thresholds, links, leaves, features, pattern, found)
+        _find(roots, thresholds, links, leaves, features, pattern, numbers)
         for origin in range(8):
-            target = _target(leaves, found[origin], features, origin)
+            target = _target(leaves, numbers[origin], features, origin)
             moduli[block, origin] = modulus_of(target, scale[origin], logarithmic)
-
-
-@numba.njit(cache=True, nogil=True)
-def _leaf_numbers(
-    young: Array,
-    logarithmic: bool,
-    roots: NDArray[np.int32],
-    thresholds: NDArray[np.float32],
-    links: NDArray[np.int32],
-    leaves: NDArray[np.float32],
-    numbers: NDArray[np.int32],
-) -> None:
-    """Leaves (n, 8, trees) of blocks (n, 8)."""
-    values, scale, references, features, table, pattern, found = _scratch(len(roots))
-    for block in range(len(young)):
-        prepare_block(young[block], logarithmic, values, table, pattern, scale, references)
-        _find(roots, thresholds, links, leaves, features, pattern, found)
-        numbers[block] = found
 
 
 @numba.njit(inline="always")
 def _slopes(
     leaves: NDArray[np.float32],
-    found: NDArray[np.int64],
+    numbers: NDArray[np.int64],
     features: Features,
     origin: int,
     slopes: Array,
 ) -> None:
     """Mean slopes (7,) of the trees' answers, zero where an answer is at its bounds."""
     slopes[:] = 0.0
-    for tree in range(len(found)):
-        leaf = leaves[found[tree]]
+    for tree in range(len(numbers)):
+        leaf = leaves[numbers[tree]]
         answer = _linear(leaf, features, origin)
         if leaf[LOW] <= answer <= leaf[HIGH]:
             for k in range(FEATURES):
-                slopes[k] += np.float64(leaf[k]) / len(found)
+                slopes[k] += np.float64(leaf[k]) / len(numbers)
 
 
 @numba.njit(inline="always")
@@ -248,16 +236,16 @@ def _derivatives(
     derivatives: Array,
 ) -> None:
     """Coarse moduli (n, 8) of blocks (n, 8) and their derivatives (n, 8, 8)."""
-    values, scale, references, features, table, pattern, found = _scratch(len(roots))
+    values, scale, references, features, table, pattern, numbers = _scratch(len(roots))
     slopes = np.empty(FEATURES)
     for block in range(len(young)):
         prepare_block(young[block], logarithmic, values, table, pattern, scale, references)
-        _find(roots, thresholds, links, leaves, features, pattern, found)
+        _find(roots, thresholds, links, leaves, features, pattern, numbers)
         for origin in range(8):
-            target = _target(leaves, found[origin], features, origin)
+            target = _target(leaves, numbers[origin], features, origin)
             modulus = modulus_of(target, scale[origin], logarithmic)
             moduli[block, origin] = modulus
-            _slopes(leaves, found[origin], features, origin, slopes)
+            _slopes(leaves, numbers[origin], features, origin, slopes)
             _gradient(
                 young[block],
                 logarithmic,
@@ -335,12 +323,15 @@ def coarsen(model: Model, e: ArrayLike, threads: int = 1) -> Array:
 
     Parameters
     ----------
-    e : (m, 8) fine moduli in bit order, any unit, 0 where a cell is void.
-    threads : blocks are shared among so many threads; the result does not depend on it.
+    e : (m, 8)
+        Fine moduli in bit order, any unit, 0 where a cell is void.
+    threads
+        Blocks are shared among so many threads; the result does not depend on it.
 
     Returns
     -------
-    (m, 8) positive moduli at the coarse quadrature points, in the unit of `e`.
+    (m, 8)
+        Positive moduli at the coarse quadrature points, in the unit of `e`.
 
     Raises
     ------
@@ -386,14 +377,3 @@ def coarsen_with_derivatives(model: Model, e: ArrayLike, threads: int = 1) -> tu
     moduli, derivatives = np.empty_like(young), np.empty((len(young), 8, 8))
     _run(_derivatives, model, young, threads, moduli, derivatives)
     return moduli, derivatives
-
-
-def leaf_numbers(model: Model, e: ArrayLike, threads: int = 1) -> NDArray[np.int32]:
-    """Leaves (m, 8, trees), rows of `Forests.leaves`, that the origins of blocks (m, 8) come to.
-
-    Parameters and errors are those of `coarsen`.
-    """
-    young = require_blocks(e)
-    numbers = np.empty((*young.shape, model.forests.trees), dtype=np.int32)
-    _run(_leaf_numbers, model, young, threads, numbers)
-    return numbers

@@ -115,14 +115,23 @@ def pack(
 
     Parameters
     ----------
-    feature, threshold, left, right, leaf : (nodes,) as in `forests.structure.Tree`.
-    roots : (...) root nodes.
-    records : (leaves, 10) one for each leaf.
-    levels : see `positions`.
+    feature, threshold, left, right, leaf : (nodes,)
+        As in `forests.training.structure.Tree`.
+    roots : (...)
+        Root nodes.
+    records : (leaves, 10)
+        One for each leaf.
+    levels
+        See `positions`.
 
     Returns
     -------
-    Roots (...), nodes (n,) of type `NODE`, and the records, which follow the order of the nodes.
+    roots : (...)
+        Where the root nodes are now.
+    nodes : (n,) of type `NODE`
+        In the order of `positions`.
+    records : (leaves, 10)
+        In the order of the nodes.
 
     Raises
     ------

@@ -39,9 +39,12 @@ class Forests:
 
     Attributes
     ----------
-    roots : (2, trees, 128) root nodes of the void and the filled forest, one for each void pattern.
-    nodes : (nodes,) of type `forests.layout.NODE`; links lead to later nodes only.
-    leaves : (leaves, 10) slopes of the seven features, constant, bounds of the answer.
+    roots : (2, trees, 128)
+        Root nodes of the void and the filled forest, one for each void pattern.
+    nodes : (nodes,)
+        Of type `forests.layout.NODE`; links lead to later nodes only.
+    leaves : (leaves, 10)
+        Slopes of the seven features, constant, bounds of the answer.
     """
 
     roots: NDArray[np.int32]
@@ -68,8 +71,18 @@ class Forests:
 class Model:
     """Everything a coarsening needs to know.
 
-    objective and Poisson's ratio of the fits, feature transform, arrays, held-out scores,
-    provenance of the training.
+    Attributes
+    ----------
+    objective, poisson
+        Objective and Poisson's ratio of the fits.
+    transform
+        Of the features and the target, one of `forests.scaling.TRANSFORMS`.
+    forests
+        The arrays.
+    scores
+        On samples that were held out, by name.
+    provenance
+        Of the training, by name.
     """
 
     objective: str

@@ -49,26 +49,3 @@ def order_code(young: Array, origin: int) -> int:
         | _is_after(young, origin, 1, 4) << 1
         | _is_after(young, origin, 2, 4) << 2
     )
-
-
-@numba.njit(cache=True, nogil=True)
-def _cell_order(young: Array, cells: NDArray[np.int64]) -> None:
-    for block in range(len(young)):
-        for origin in range(8):
-            code = order_code(young[block], origin)
-            cells[block, origin, 0] = origin
-            for k in range(7):
-                cells[block, origin, k + 1] = origin ^ FLIPS[code, k]
-
-
-def cell_order(young: Array) -> NDArray[np.int64]:
-    """Cells e'1..e'8 (n, 8 origins, 8) of blocks (n, 8)."""
-    cells = np.empty((len(young), 8, 8), dtype=np.int64)
-    _cell_order(np.ascontiguousarray(young, dtype=float), cells)
-    return cells
-
-
-def ordered_moduli(young: Array) -> Array:
-    """Moduli e'1..e'8 (n, 8 origins, 8) of blocks (n, 8)."""
-    rows = np.arange(len(young))[:, None, None]
-    return np.asarray(young[rows, cell_order(young)])

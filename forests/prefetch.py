@@ -14,12 +14,12 @@ def _prefetch(context: Any, array: types.Array, index: types.Integer) -> Any:
     """Bring the beginning and the end of row `index` of a C-contiguous matrix into the cache."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        found = context.make_array(signature.args[0])(context, builder, arguments[0])
+        matrix = context.make_array(signature.args[0])(context, builder, arguments[0])
         byte, word = ir.IntType(8).as_pointer(), ir.IntType(32)
         kind = ir.FunctionType(ir.VoidType(), [byte, word, word, word])
         function = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
-        stride = builder.extract_value(found.strides, 0)
-        first = builder.bitcast(found.data, byte)
+        stride = builder.extract_value(matrix.strides, 0)
+        first = builder.bitcast(matrix.data, byte)
         row = builder.gep(first, [builder.mul(stride, arguments[1])])
         end = builder.sub(stride, ir.Constant(stride.type, 1))
         # To read, of use again, data.

@@ -45,11 +45,19 @@ LARGEST_MODULUS = 1e300
 Features = NDArray[np.float32]
 
 
-class Prepared(NamedTuple):
+class PreparedBlocks(NamedTuple):
     """Blocks as the forests see them.
 
-    features (n, 8 origins, 7) of e'2..e'8; pattern (n, 8), see `PATTERNS`; scale (n, 8) in the unit
-    of the moduli; filled (n, 8) origins.
+    Attributes
+    ----------
+    features : (n, 8 origins, 7) float32
+        Of e'2..e'8.
+    pattern : (n, 8) uint8
+        See `PATTERNS`.
+    scale : (n, 8)
+        In the unit of the moduli.
+    filled : (n, 8) bool
+        Whether the origin is filled.
     """
 
     features: Features
@@ -141,8 +149,8 @@ def prepare_block(
         for k in range(FEATURES):
             cell = origin ^ FLIPS[code, k]
             missing = void >> cell & 1
-            found = feature_of(values[cell], reference, logarithmic)
-            features[origin, k] = np.float32(void_feature if missing else found)
+            feature = feature_of(values[cell], reference, logarithmic)
+            features[origin, k] = np.float32(void_feature if missing else feature)
             bits |= missing << k
         pattern[origin] = bits
 
@@ -180,11 +188,11 @@ def is_logarithmic(transform: str) -> bool:
     return transform == "log"
 
 
-def prepare(young: Array, transform: str) -> Prepared:
+def prepare(young: Array, transform: str) -> PreparedBlocks:
     """Prepare blocks (n, 8), none of them all void, as the evaluation of a mesh does."""
     young = np.ascontiguousarray(young, dtype=float)
     shape = young.shape
-    prepared = Prepared(
+    prepared = PreparedBlocks(
         np.empty((*shape, FEATURES), dtype=np.float32),
         np.empty(shape, dtype=np.uint8),
         np.empty(shape),

@@ -11,21 +11,23 @@ from pathlib import Path
 import numpy as np
 
 from dataset_gen.generate import generate
+from dataset_gen.settings import ShardOptions
 from forests.training.dataset import dataset_of
-from forests.training.train import Training, train
+from forests.training.train import TrainingOptions
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from sound.design.optimise import optimise
 from sound.design.preparation import prepare
 from tests import small_project, solids
+from tests.small_forests import train
 
 TOLERANCE = 1e-7
 
 
 def results(folder: Path) -> dict[str, np.ndarray]:
     """Arrays by a name that begins with their kind: shard, forests, design, or modes."""
-    shard = generate(1000, 3, progress=False)
-    model = train(dataset_of([shard]), Training(trees=1, max_leaves=60), progress=False)
+    shard = generate(ShardOptions(1000, 3), progress=False)
+    model = train(dataset_of([shard]), TrainingOptions(trees=1, max_leaves=60), progress=False)
     project = small_project.project(folder, evaluations=15)
     small_project.write_clips(folder, np.linspace(400.0, 3000.0, project.modes))
     design = optimise(prepare(project))

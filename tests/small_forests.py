@@ -2,9 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
+from dataset_gen.shards import Shard
+from forests.model import Model
+from forests.training.dataset import Dataset, dataset_of
+from forests.training.ranks import Ranks
+from forests.training.train import TrainingOptions, model_of, train_trees
 from tests.conftest import Run
+
+
+def train(
+    dataset: Dataset | Sequence[Shard],
+    training: TrainingOptions | None = None,
+    workers: int = 1,
+    progress: bool = True,
+) -> Model:
+    """Forests of shards in memory, trained in this process."""
+    training = training or TrainingOptions()
+    data = dataset if isinstance(dataset, Dataset) else dataset_of(dataset)
+    trained = train_trees(data, training, Ranks(), workers, progress)
+    assert trained is not None
+    return model_of(data, training, trained)
 
 
 def train_small_forests(folder: Path, run_cli: Run) -> Path:

@@ -13,7 +13,9 @@ from dataset_gen.commands import generate as program
 from dataset_gen.generate import generate
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, OBJECTIVES
 from dataset_gen.objectives.quadratic import MODULUS_FLOOR
-from dataset_gen.shards import iterate_shard, write_shard
+from dataset_gen.settings import ShardOptions
+from dataset_gen.shards import iterate_shard
+from tests.shard_files import write_shard
 
 
 def run(*arguments):
@@ -37,7 +39,7 @@ def test_generate_then_inspect(tmp_path, capsys):
 
 
 def test_inspect_counts_what_is_there(tmp_path, capsys):
-    shard = generate(2990, 7, distribution="log-uniform", progress=False)
+    shard = generate(ShardOptions(2990, 7, distribution="log-uniform"), progress=False)
     converged = shard.converged.copy()
     converged[:299] = False
     write_shard(tmp_path / "a.h5", replace(shard, converged=converged))
@@ -58,7 +60,7 @@ def test_inspect_counts_what_is_there(tmp_path, capsys):
 
 
 def test_inspect_does_not_depend_on_the_pieces(tmp_path, monkeypatch):
-    write_shard(tmp_path / "a.h5", generate(3000, 7, progress=False))
+    write_shard(tmp_path / "a.h5", generate(ShardOptions(3000, 7), progress=False))
     whole = summary.describe(tmp_path / "a.h5")
     pieces = partial(iterate_shard, rows=170)
     monkeypatch.setattr(summary, "iterate_shard", pieces)

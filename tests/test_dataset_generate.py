@@ -19,27 +19,28 @@ import pytest
 from carillon.errors import UserError
 from dataset_gen import generate as generate_module
 from dataset_gen import settings as settings_module
-from dataset_gen.crew import Dealer
 from dataset_gen.generate import engine_of, generate, generate_file
 from dataset_gen.journal import Journal, journal_of
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, SAMPLED, fit, fit_samples
-from dataset_gen.settings import settings_of
-from dataset_gen.shards import origin_of, read_shard
-from dataset_gen.tasks import ROW, Plan
+from dataset_gen.settings import ShardOptions, settings_of
+from dataset_gen.shards import origin_of
+from dataset_gen.task_farm import OrderedQueue
+from dataset_gen.tasks import ROW, ShardPlan
 from dataset_gen.workers import in_this_process
 from tests.patience import HANG_SECONDS, wait_for
+from tests.shard_files import read_shard
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 SAMPLES, TASK = 3000, 128
 
 
 def plan_of(samples=SAMPLES, task_rows=TASK, **settings):
-    return Plan(settings_of(samples, 4, **settings), task_rows)
+    return ShardPlan(settings_of(ShardOptions(samples, 4, **settings)), task_rows)
 
 
 def make(path, plan=None, engine=in_this_process):
     plan = plan or plan_of()
-    return generate_file(path, plan, origin_of(plan.settings, SAMPLES, 0, 1), engine)
+    return generate_file(path, plan, origin_of(plan.settings, ShardOptions(SAMPLES)), engine)
 
 
 def stopping_after(tasks):
@@ -91,7 +92,10 @@ def test_sampled_forces_do_not_depend_on_workers_nor_on_shards(path):
     again = path.with_name("again.h5")
     assert make(again, plan, engine_of(2)) == 20
     assert again.read_bytes() == path.read_bytes()
-    parts = [generate(20, 4, shard, 3, SAMPLED, progress=False).coarse for shard in range(3)]
+    parts = [
+        generate(ShardOptions(20, 4, shard, 3, SAMPLED), progress=False).coarse
+        for shard in range(3)
+    ]
     np.testing.assert_array_equal(np.concatenate(parts), read_shard(path).coarse)
 
 
@@ -119,7 +123,7 @@ def test_a_shard_finished_elsewhere_says_so(begun, reference, monkeypatch):
         return origin_of(*arguments) | {"processor": "another"}
 
     plan = plan_of()
-    generate_file(begun, plan, elsewhere(plan.settings, SAMPLES, 0, 1))
+    generate_file(begun, plan, elsewhere(plan.settings, ShardOptions(SAMPLES)))
     origin = read_shard(begun).provenance
     assert origin["processor"] != "another"
     assert [record["processor"] for record in json.loads(origin["resumed_on"])] == ["another"]
@@ -130,9 +134,9 @@ import sys, time
 from carillon import cli, files
 from dataset_gen import journal
 from dataset_gen.generate import engine_of, generate, generate_file
-from dataset_gen.settings import settings_of
+from dataset_gen.settings import ShardOptions, settings_of
 from dataset_gen.shards import origin_of
-from dataset_gen.tasks import Plan
+from dataset_gen.tasks import ShardPlan
 
 path, workers, seconds = sys.argv[1], int(sys.argv[2]), float(sys.argv[3])
 
@@ -152,9 +156,9 @@ def sealed_slowly(stream, seal=files._seal_of):
 
 def main():
     journal.Journal.work, files._seal_of = slowly, sealed_slowly
-    plan = Plan(settings_of({SAMPLES}, 4), {TASK})
+    plan = ShardPlan(settings_of(ShardOptions({SAMPLES}, 4)), {TASK})
     print("begin", flush=True)
-    generate_file(path, plan, origin_of(plan.settings, {SAMPLES}, 0, 1), slow)
+    generate_file(path, plan, origin_of(plan.settings, ShardOptions({SAMPLES})), slow)
 
 if __name__ == "__main__":
     sys.exit(cli.run("program", main))
@@ -368,8 +372,8 @@ def test_the_same_shard_is_not_made_twice(path, monkeypatch):
         ),
         (plan_of(201), "samples up to 200 where 201"),
         (plan_of(200, low=1), "moduli from 0.0 where 1.0"),
-        (Plan(settings_of(200, 5)), "seed 4 where 5"),
-        (Plan(settings_of(400, 4, 1, 2)), "first sample 0 where 200"),
+        (ShardPlan(settings_of(ShardOptions(200, 5))), "seed 4 where 5"),
+        (ShardPlan(settings_of(ShardOptions(400, 4, 1, 2))), "first sample 0 where 200"),
     ],
 )
 def test_another_shard_is_not_overwritten(path, plan, message):
@@ -442,17 +446,17 @@ def test_no_failed_write_leaves_half_a_task(path, monkeypatch, number):
     again.close(remove=True)
 
 
-# Dealing -----------------------------------------------------------------------------------------
+# Ordered queue -----------------------------------------------------------------------------------
 
 
 def test_results_come_in_order_and_no_more_than_a_window_is_kept():
     generator = np.random.default_rng(1)
-    dealer, out, seen, most = Dealer(range(3, 200), window=8), [], [], 0
-    while not dealer.finished:
-        while (task := dealer.deal()) is not None:
+    queue, out, seen, largest = OrderedQueue(range(3, 200), window=8), [], [], 0
+    while not queue.finished:
+        while (task := queue.next_task()) is not None:
             out.append(task)
-        most = max(most, len(out) + len(dealer._kept))
+        largest = max(largest, len(out) + len(queue._results))
         task = out.pop(int(generator.integers(len(out))))
-        dealer.keep(task, str(task).encode())
-        seen += [int(work) for work in dealer.ready()]
-    assert seen == list(range(3, 200)) and most <= 8
+        queue.put(task, str(task).encode())
+        seen += [int(work) for work in queue.ready()]
+    assert seen == list(range(3, 200)) and largest <= 8

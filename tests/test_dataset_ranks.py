@@ -6,9 +6,9 @@ import pytest
 
 from dataset_gen.generate import generate_file
 from dataset_gen.journal import journal_of
-from dataset_gen.settings import settings_of
+from dataset_gen.settings import ShardOptions, settings_of
 from dataset_gen.shards import origin_of
-from dataset_gen.tasks import Plan
+from dataset_gen.tasks import ShardPlan
 
 pytestmark = pytest.mark.mpi
 
@@ -22,7 +22,7 @@ from dataset_gen import tasks
 from dataset_gen.__main__ import main
 from dataset_gen.commands import generate as program
 
-class Plan(tasks.Plan):
+class ShardPlan(tasks.ShardPlan):
     def work(self, task):
         comm, failing = ranks.world(), {{failing}}
         if failing and (comm.rank, task) in failing:
@@ -31,7 +31,7 @@ class Plan(tasks.Plan):
             time.sleep(0.05)  # so that the failing rank gets its share
         return super().work(task)
 
-program.Plan = lambda settings: Plan(settings, {TASK})
+program.ShardPlan = lambda settings: ShardPlan(settings, {TASK})
 sys.exit(main())
 """
 
@@ -43,8 +43,8 @@ def options(path, *more):
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory):
     path = tmp_path_factory.mktemp("reference") / "shard.h5"
-    plan = Plan(settings_of(SAMPLES, 4), TASK)
-    generate_file(path, plan, origin_of(plan.settings, SAMPLES, 0, 1))
+    plan = ShardPlan(settings_of(ShardOptions(SAMPLES, 4)), TASK)
+    generate_file(path, plan, origin_of(plan.settings, ShardOptions(SAMPLES)))
     return path.read_bytes()
 
 
@@ -78,7 +78,9 @@ def test_bytes_do_not_depend_on_the_number_of_ranks(ranks, path, program, refere
 
 
 def sentences(done):
-    return [line for line in done.stderr.splitlines() if line.startswith("dataset_gen")]
+    return [
+        line for line in done.stderr.splitlines() if line.startswith(("dataset_gen", "carillon"))
+    ]
 
 
 @pytest.mark.parametrize("rank", [0, 2])
@@ -103,14 +105,15 @@ def test_a_mistake_of_the_program_on_one_rank_ends_all_with_its_traceback(path, 
 
 
 @pytest.mark.parametrize(
-    ("more", "sentence"),
+    ("program", "more", "sentence"),
     [
-        (("--low", "-1"), "expected 0 or above"),
-        (("--workers", 2), "ask for more ranks instead"),
+        ("dataset_gen", ("--low", "-1"), "expected 0 or above"),
+        ("dataset_gen", ("--workers", 2), "ask for more ranks instead"),
+        ("carillon", ("--shard", 2), "carillon generate: shard 2 of 1"),
     ],
 )
-def test_bad_input_is_one_sentence_on_all_ranks(more, sentence, path, mpiexec):
-    done = mpiexec(3, "dataset_gen", *options(path, *more))
+def test_bad_input_is_one_sentence_on_all_ranks(program, more, sentence, path, mpiexec):
+    done = mpiexec(3, program, *options(path, *more))
     assert done.returncode == 2
     (line,) = sentences(done)
     assert sentence in line

@@ -11,22 +11,17 @@ from carillon.errors import UserError
 from dataset_gen import shards as shards_module
 from dataset_gen.generate import generate
 from dataset_gen.objectives import DEFAULT_OBJECTIVE
-from dataset_gen.settings import settings_of
-from dataset_gen.shards import (
-    iterate_shard,
-    read_settings,
-    read_shard,
-    read_shards,
-    write_shard,
-)
+from dataset_gen.settings import ShardOptions, settings_of
+from dataset_gen.shards import iterate_shard, read_settings
 from tests.edited_files import edited
+from tests.shard_files import read_shard, read_shards, write_shard
 
 COLUMNS = ("fine", "coarse", "residual", "converged")
 
 
 @pytest.fixture(scope="module")
 def shard():
-    return generate(300, seed=2, progress=False)
+    return generate(ShardOptions(300, seed=2), progress=False)
 
 
 @pytest.fixture
@@ -44,7 +39,7 @@ def test_round_trip_keeps_every_bit(path, shard):
     found = read_shard(path)
     for name in COLUMNS:
         np.testing.assert_array_equal(getattr(found, name), getattr(shard, name))
-    assert found.settings == read_settings(path) == settings_of(300, seed=2)
+    assert found.settings == read_settings(path) == settings_of(ShardOptions(300, seed=2))
     assert (found.objective, found.seed, found.start, found.stop) == (DEFAULT_OBJECTIVE, 2, 0, 300)
     assert found.provenance["commit"]
 
@@ -81,9 +76,9 @@ def test_pieces_are_the_shard(path, shard, rows):
     ("count", "workers", "drawn"), [(2, 1, {}), (3, 2, {"distribution": "log-uniform"})]
 )
 def test_dataset_does_not_depend_on_shards_or_workers(count, workers, drawn):
-    whole = generate(300, 2, progress=False, **drawn)
+    whole = generate(ShardOptions(300, 2, **drawn), progress=False)
     parts = [
-        generate(300, 2, number, count, workers=workers, progress=False, **drawn)
+        generate(ShardOptions(300, 2, number, count, **drawn), workers=workers, progress=False)
         for number in range(count)
     ]
     for name in COLUMNS:
@@ -188,7 +183,7 @@ def write_all(tmp_path, several):
 
 
 def test_shards_are_read_in_order_of_samples(tmp_path):
-    parts = [generate(30, 2, number, 3, progress=False) for number in (2, 0, 1)]
+    parts = [generate(ShardOptions(30, 2, number, 3), progress=False) for number in (2, 0, 1)]
     assert [s.start for s in read_shards(write_all(tmp_path, parts))] == [0, 10, 20]
 
 
@@ -229,4 +224,4 @@ def test_no_shard_at_all_is_refused():
 @pytest.mark.parametrize("seed", [-1, 1 << 63])
 def test_seeds_that_no_file_can_hold_are_refused(seed):
     with pytest.raises(UserError, match=f"seed {seed}"):
-        settings_of(10, seed=seed)
+        settings_of(ShardOptions(10, seed=seed))

@@ -8,12 +8,12 @@ import pytest
 from carillon import cli
 from forests import load_model, save_model
 from forests.__main__ import main
-from forests.evaluate import coarsen, leaf_numbers
+from forests.evaluate import coarsen
 from forests.model import FILLED, VOID
-from forests.reference import coarsen_reference
 from forests.scaling import prepare
-from forests.studies.benchmark import SIZES, benchmark, caches
+from forests.studies.benchmark import SIZES, ForestBenchmarkOptions, benchmark, caches
 from forests.studies.synthetic import coherent_blocks, complete_forests, random_blocks
+from tests.forests_reference import coarsen_reference, leaf_numbers
 
 
 @pytest.fixture(scope="module")
@@ -55,11 +55,11 @@ def test_complete_forests_have_all_leaves_and_spread_the_blocks(path):
 
 
 def test_measurements_are_complete_and_agree_with_scikit_learn(path):
-    result = benchmark(path, blocks=300, largest=1.0)
+    result = benchmark(ForestBenchmarkOptions(str(path), blocks=300, largest=1.0))
     assert result.leaves == 256 and result.load_ms > 0
     assert len(result.evaluation) == 5
     for timing in (*result.evaluation.values(), result.rival.predict, result.rival.coarsen):
-        assert 0 < timing.least <= timing.median <= timing.most and timing.runs >= 7
+        assert 0 < timing.min <= timing.median <= timing.max and timing.runs >= 7
     assert result.rival.difference < 1e-5 and result.rival.leaves > 200
     (size,) = result.sizes
     assert (size.trees, size.depth) == SIZES[0] and 0.5 < size.megabytes < 1.0
@@ -83,7 +83,7 @@ def test_caches_are_read_where_the_system_tells_them(tmp_path):
 
 
 def test_command_prints_columns_or_json(path, capsys):
-    arguments = ["benchmark", "--model", str(path), "--blocks", "200", "--largest", "1"]
+    arguments = ["benchmark", "--forest", str(path), "--blocks", "200", "--largest", "1"]
     assert cli.run("forests", lambda: main([*arguments, "--json"])) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["trees"] == 2 and found["evaluation"]["coarsen, 1 thread"]["median"] > 0
@@ -92,6 +92,6 @@ def test_command_prints_columns_or_json(path, capsys):
 
 
 def test_a_missing_model_is_one_line(capsys, tmp_path):
-    arguments = ["benchmark", "--model", str(tmp_path / "no.h5")]
+    arguments = ["benchmark", "--forest", str(tmp_path / "no.h5")]
     assert cli.run("forests", lambda: main(arguments)) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1

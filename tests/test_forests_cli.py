@@ -6,8 +6,9 @@ import pytest
 
 from dataset_gen.generate import generate
 from dataset_gen.objectives import DEFAULT_OBJECTIVE
-from dataset_gen.shards import write_shard
+from dataset_gen.settings import ShardOptions
 from forests.__main__ import main
+from tests.shard_files import write_shard
 
 
 def run(*arguments):
@@ -18,7 +19,9 @@ def run(*arguments):
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("forests")
     for number in range(2):
-        write_shard(folder / f"{number}.h5", generate(1500, 1, number, 2, progress=False))
+        write_shard(
+            folder / f"{number}.h5", generate(ShardOptions(1500, 1, number, 2), progress=False)
+        )
     shards = [folder / "0.h5", folder / "1.h5"]
     assert run("train", *shards, "--trees", 2, "--out", folder / "forests.h5") == 0
     return folder

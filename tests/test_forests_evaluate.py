@@ -9,15 +9,18 @@ from sklearn.tree import ExtraTreeRegressor
 from carillon.errors import UserError
 from carillon.fem.block import symmetries
 from forests import coarsen, coarsen_with_derivatives
-from forests.evaluate import leaf_numbers
 from forests.layout import pack, positions, rounded_down
 from forests.model import CONSTANT, FILLED, HIGH, LOW, VOID, Model
-from forests.ordering import cell_order
-from forests.reference import coarsen_reference, leaf_numbers_reference, prepare_reference
 from forests.scaling import FEATURES, LOG_FLOOR, LOG_VOID, PATTERNS, TRANSFORMS, prepare
 from forests.training.join import join
 from forests.training.leaves import Leaves
 from forests.training.structure import flatten
+from tests.forests_reference import (
+    cell_order_reference,
+    coarsen_reference,
+    leaf_numbers,
+    prepare_reference,
+)
 
 EVERY = pytest.mark.parametrize("transform", TRANSFORMS)
 TREES = 3
@@ -90,10 +93,6 @@ def blocks():
 
 
 def assert_as_reference(model, young):
-    prepared = prepare_reference(young, model.transform)
-    np.testing.assert_array_equal(
-        leaf_numbers(model, young), leaf_numbers_reference(model.forests, prepared)
-    )
     found = coarsen(model, young)
     np.testing.assert_array_equal(found, coarsen_reference(model, young))
     return found
@@ -305,7 +304,7 @@ def test_derivatives_are_those_of_finite_differences(models, transform):
     young = random_blocks(400, seed=11)
     young[:40, 3] *= 1e-6  # Log features at their floor.
     moduli, derivatives = coarsen_with_derivatives(model, young)
-    leaves, order = leaf_numbers(model, young), cell_order(young)
+    leaves, order = leaf_numbers(model, young), cell_order_reference(young)
     tested = 0
     for b, block in enumerate(young):
         if is_held(model, block, leaves[b]):
@@ -392,7 +391,7 @@ def test_derivatives_are_constant_or_elasticities_are(models):
         ([[1.0] * 8, [1.0] * 7 + [np.nan]], "block 1 must be finite"),
     ],
 )
-@pytest.mark.parametrize("function", [coarsen, coarsen_with_derivatives, leaf_numbers])
+@pytest.mark.parametrize("function", [coarsen, coarsen_with_derivatives])
 def test_bad_blocks_are_refused(models, young, message, function):
     with pytest.raises(UserError, match=message) as error:
         function(models["log"], young)

@@ -12,6 +12,7 @@ from carillon.files import create_h5
 from dataset_gen.generate import generate
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, fit
 from dataset_gen.sampling import samples
+from dataset_gen.settings import ShardOptions
 from forests import coarsen, load_model, save_model
 from forests import model as forests_model
 from forests.baselines import average, galerkin
@@ -21,19 +22,22 @@ from forests.summary import as_text, describe
 from forests.training.join import join
 from forests.training.leaves import Leaves
 from forests.training.structure import tree_of
-from forests.training.train import Training, train
+from forests.training.train import TrainingOptions
+from tests.small_forests import train
 
 TRANSFORMS = ("log", "ratio")
 
 
 @pytest.fixture(scope="module")
 def shard():
-    return generate(8000, seed=1, progress=False)
+    return generate(ShardOptions(8000, seed=1), progress=False)
 
 
 @pytest.fixture(scope="module")
 def models(shard):
-    return {name: train([shard], Training(transform=name), progress=False) for name in TRANSFORMS}
+    return {
+        name: train([shard], TrainingOptions(transform=name), progress=False) for name in TRANSFORMS
+    }
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,19 @@ import numpy as np
 
 from carillon.fem.block import symmetries
 from dataset_gen.sampling import samples
-from forests.ordering import cell_order, ordered_moduli
-from forests.reference import cell_order_reference
+from forests.ordering import FLIPS, order_code
+from tests.forests_reference import cell_order_reference
+
+
+def cell_order(young):
+    """Cells e'1..e'8 (n, 8 origins, 8) of blocks (n, 8)."""
+    flips = [[[0, *FLIPS[order_code(block, origin)]] for origin in range(8)] for block in young]
+    return np.array(flips) ^ np.arange(8)[:, None]
+
+
+def ordered_moduli(young):
+    """Moduli e'1..e'8 (n, 8 origins, 8) of blocks (n, 8)."""
+    return young[np.arange(len(young))[:, None, None], cell_order(young)]
 
 
 def test_order_seen_from_every_origin_for_every_ranking_of_the_axes():

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from dataset_gen.generate import generate
-from dataset_gen.shards import write_shard
+from dataset_gen.settings import ShardOptions
 from forests import coarsen, load_model
+from tests.shard_files import write_shard
 
 pytestmark = pytest.mark.mpi
 
@@ -16,7 +17,7 @@ OPTIONS = ("--trees", 2, "--max-leaves", 200, "--structure-rows", 20_000)
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("ranks")
-    whole = generate(140_000, 1, progress=False, objective="chen2015")
+    whole = generate(ShardOptions(140_000, 1, objective="chen2015"), progress=False)
     write_shard(folder / "0.h5", whole.part(0, 70_000))
     write_shard(folder / "1.h5", whole.part(70_000, 140_000))
     return folder
@@ -58,7 +59,7 @@ def test_trees_grown_by_jobs_of_their_own_make_the_same_forests(folder, referenc
 
 
 def sentences(done):
-    return [line for line in done.stderr.splitlines() if line.startswith("forests")]
+    return [line for line in done.stderr.splitlines() if line.startswith(("forests", "carillon"))]
 
 
 @pytest.mark.parametrize(
@@ -106,6 +107,13 @@ def test_an_error_on_one_rank_ends_all(rank, folder, tmp_path, mpiexec):
     assert done.returncode == 2
     assert sentences(done) == ["forests train: planted"]
     assert not (folder / "new.h5").exists()
+
+
+def test_errors_carry_the_name_that_was_typed(folder, mpiexec):
+    done = mpiexec(2, "carillon", "train", "0.h5", "0.h5", "--out", "new.h5", cwd=folder)
+    assert done.returncode == 2
+    (line,) = sentences(done)
+    assert line.startswith("carillon train: ") and "overlap" in line
 
 
 def test_a_damaged_shard_is_named_and_nothing_is_written(folder, tmp_path, mpiexec):

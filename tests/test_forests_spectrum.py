@@ -5,17 +5,21 @@ import pytest
 
 from dataset_gen.generate import generate
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, fit, lumped_share
+from dataset_gen.settings import ShardOptions
 from forests import coarsen
 from forests.baselines import average, galerkin
-from forests.training.train import Training, train
+from forests.training.train import TrainingOptions
 from tests.dataset_spectra import box_fields, coarse_frequencies, fine_frequencies, rms_error
+from tests.small_forests import train
 
 MODES = 30
 
 
 @pytest.fixture(scope="module")
 def model():
-    return train([generate(8000, seed=1, progress=False)], Training(), progress=False)
+    return train(
+        [generate(ShardOptions(8000, seed=1), progress=False)], TrainingOptions(), progress=False
+    )
 
 
 @pytest.fixture(scope="module")

@@ -7,16 +7,18 @@ import pytest
 
 from carillon.errors import UserError
 from dataset_gen.generate import generate
-from dataset_gen.shards import write_shard
+from dataset_gen.settings import ShardOptions
 from forests.scaling import PATTERNS
 from forests.training.dataset import dataset_of, open_dataset
 from forests.training.leaves import ANCESTOR_ROWS, Sums, add_rows, leaf_of, solve_leaves
 from forests.training.moments import ENTRIES, fit_error, solve
-from forests.training.structure import GROWERS, Limits, Rows, tree_of
-from forests.training.train import Training, grow_trees, parameters_of, train
+from forests.training.structure import GROWERS, Rows, TreeLimits, tree_of
+from forests.training.train import TrainingOptions, grow_trees, parameters_of
 from forests.training.tree_file import load_trees, save_tree
+from tests.shard_files import write_shard
+from tests.small_forests import train
 
-QUICK = Training(trees=2, max_leaves=300, structure_rows=20_000)
+QUICK = TrainingOptions(trees=2, max_leaves=300, structure_rows=20_000)
 
 
 def rows_from(features, target, weight=None, pattern=None):
@@ -130,7 +132,7 @@ def kinks():
 
 
 def test_linear_splits_find_kinks_where_variance_splits_follow_trends(kinks):
-    limits = Limits(max_leaves=60, min_leaf=30, depth=20)
+    limits = TreeLimits(max_leaves=60, min_leaf=30, depth=20)
     error = {
         name: np.std(predict(GROWERS[name](kinks, limits, 0), kinks) - kinks.target)
         for name in GROWERS
@@ -140,7 +142,7 @@ def test_linear_splits_find_kinks_where_variance_splits_follow_trends(kinks):
 
 @pytest.mark.parametrize("name", GROWERS)
 def test_trees_keep_their_limits(name, kinks):
-    for limits in (Limits(50, 100, 20), Limits(10_000, 500, 20), Limits(10_000, 10, 4)):
+    for limits in (TreeLimits(50, 100, 20), TreeLimits(10_000, 500, 20), TreeLimits(10_000, 10, 4)):
         tree = GROWERS[name](kinks, limits, 0)
         count = np.bincount(leaf_of(tree, kinks.features, kinks.pattern), minlength=tree.leaves)
         assert 2 <= tree.leaves <= limits.max_leaves
@@ -149,7 +151,7 @@ def test_trees_keep_their_limits(name, kinks):
 
 
 def test_every_void_pattern_has_its_own_root_or_its_neighbours(kinks):
-    tree = GROWERS["linear"](kinks, Limits(50, 30, 20), 0)
+    tree = GROWERS["linear"](kinks, TreeLimits(50, 30, 20), 0)
     np.testing.assert_array_equal(tree.roots[:3], [0, 1, 2])
     # 0b110 and 0b010 differ in one cell.
     assert tree.roots[6] == 2 and set(tree.roots) == {0, 1, 2}
@@ -160,7 +162,8 @@ def shards():
     """4,000 samples, log-uniform and uniform ones."""
     options = {"log-uniform": 1500, "uniform": 2500}
     return [
-        generate(count, 3, distribution=name, progress=False) for name, count in options.items()
+        generate(ShardOptions(count, 3, distribution=name), progress=False)
+        for name, count in options.items()
     ]
 
 
@@ -233,7 +236,7 @@ def test_too_few_rows_for_the_depth_are_told(shards, caplog):
 
 def test_too_few_samples_are_refused():
     with pytest.raises(UserError, match="generate more"):
-        train([generate(3, progress=False)], progress=False)
+        train([generate(ShardOptions(3), progress=False)], progress=False)
 
 
 @pytest.mark.parametrize(
@@ -249,7 +252,7 @@ def test_too_few_samples_are_refused():
 )
 def test_impossible_parameters_are_refused(shards, wrong):
     with pytest.raises(UserError):
-        train(shards, Training(**wrong), progress=False)
+        train(shards, TrainingOptions(**wrong), progress=False)
 
 
 def test_trees_grown_apart_are_refused_where_they_do_not_fit(shards, tmp_path):

@@ -16,9 +16,9 @@ from carillon.fem.geometry.surface import load_surface
 from carillon.fem.moduli_file import read_moduli
 from dataset_gen.generate import generate_file
 from dataset_gen.journal import journal_of
-from dataset_gen.settings import settings_of
-from dataset_gen.shards import origin_of, read_shard
-from dataset_gen.tasks import Plan
+from dataset_gen.settings import ShardOptions, settings_of
+from dataset_gen.shards import origin_of
+from dataset_gen.tasks import ShardPlan
 from forests.model import load_model
 from forests.training.tree_file import load_trees
 from solver.files.modes_file import read_modes
@@ -26,6 +26,7 @@ from solver.response.response_file import read_response
 from sound.clips.wav import read_wav
 from sound.project.design_file import read_design
 from tests.hostile.fuzzing import damaged, examples, or_refused
+from tests.shard_files import read_shard
 from tests.solids import box_mesh
 
 # Sealed files ------------------------------------------------------------------------------------
@@ -98,7 +99,7 @@ def test_a_file_of_another_kind_is_refused(kind, other, zoo):
 class Begun:
     """A shard under way: its plan and origin, its journal's bytes, the bytes it ends with."""
 
-    plan: Plan
+    plan: ShardPlan
     origin: dict
     journal: bytes
     shard: bytes
@@ -106,9 +107,10 @@ class Begun:
 
 @pytest.fixture(scope="module")
 def begun(tmp_path_factory):
-    settings = settings_of(6, objective="oversampled")
-    plan = Plan(settings, task_rows=1)
-    origin = origin_of(settings, 6, 0, 1)
+    options = ShardOptions(6, objective="oversampled")
+    settings = settings_of(options)
+    plan = ShardPlan(settings, task_rows=1)
+    origin = origin_of(settings, options)
     folder = tmp_path_factory.mktemp("begun")
 
     def stopped(plan, tasks):

@@ -69,12 +69,12 @@ def test_another_poisson_ratio_is_answered_with_what_to_train(forests, as_defaul
         assert words in str(caught.value)
 
 
-def test_absent_default_forests_are_left_out_with_a_sentence(no_default, capsys):
+def test_absent_default_forests_are_left_out_with_a_sentence(no_default, caplog):
     assert forest_or_reason(None, 0.25) == (None, "without ddfem: default.h5: no such file")
     row = benchmark_row(BOX, BRIEFLY)
     assert row["seconds"]["ddfem_hcms_ec"] is None and "ddfem" not in row["frequency_error"]
     assert row["without_forest"] == "without ddfem: default.h5: no such file"
-    assert capsys.readouterr().err.startswith("without ddfem: default.h5: no such file\n")
+    assert caplog.messages[0] == "without ddfem: default.h5: no such file"
     with pytest.raises(UserError):
         forest_or_reason("absent.h5", 0.25)
 
@@ -99,11 +99,11 @@ def test_forests_stand_beside_the_fit_they_learned(forests):
     assert forest == pytest.approx(fit, rel=0.5)
 
 
-def test_without_forests_their_row_is_left_out(no_default, capsys):
+def test_without_forests_their_row_is_left_out(no_default, caplog):
     found = rate_objectives(BOX, 20, ("chen2015",))
     assert found["forest"] is None and "default.h5" in found["without_forest"]
     assert [row["coarsening"] for row in found["rows"]] == ["chen2015", *BASELINES]
-    assert "without ddfem: default.h5" in capsys.readouterr().err
+    assert "without ddfem: default.h5" in caplog.text
 
 
 def test_benchmark_times_the_default_forests(as_default):

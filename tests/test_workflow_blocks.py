@@ -19,12 +19,12 @@ def rated(method: str, high: float = 10.0, **changes) -> dict:
         "fill": "solid",
         "scaled_by": 1.0,
         **errors,
-        "least_mean_error": 0.4,
-        "least_median_error": 0.3,
+        "min_mean_error": 0.4,
+        "min_median_error": 0.3,
         "mean_squared_m2": 1e-12,
         "seconds_per_block": 1e-6,
-        "seconds_per_block_least": 5e-7,
-        "seconds_per_block_most": 4e-6,
+        "seconds_per_block_min": 5e-7,
+        "seconds_per_block_max": 4e-6,
         "timed_runs": 5,
         "storage_bytes": 100,
         "training_seconds": 2.0,
@@ -51,7 +51,7 @@ def test_kinds_of_blocks_are_columns_and_databases_one_row():
     assert list(rows) == ["average", "database", LOWER_BOUND]
     assert (rows["average"]["kind0_nodal"], rows["average"]["kind1_nodal"]) == (0.5, 0.7)
     assert rows["average"]["seconds_per_block"] == 2e-6
-    assert rows["average"]["seconds_per_block_least"] == 5e-7
+    assert rows["average"]["seconds_per_block_min"] == 5e-7
     assert repeats(ROWS).runs.startswith("5 ")
     assert rows["database"]["kind1_nodal"] == 0.5, "not that beyond its range"
     assert (rows["database"]["storage_bytes"], rows["database"]["training_seconds"]) == (200, 2.0)

@@ -38,7 +38,7 @@ def spreads(**changes: float) -> Table:
     """Times of two methods on a solid; `changes` are factors by method."""
     rows = []
     for method, seconds in (("SLEPc", 4.0), ("HCMS", 1.0)):
-        ends = {"": 1.0, "_least": 0.9, "_most": 1.2}
+        ends = {"": 1.0, "_min": 0.9, "_max": 1.2}
         scaled = seconds * changes.get(method, 1.0)
         times = {f"seconds{end}": scaled * factor for end, factor in ends.items()}
         rows.append({"model": "bell", "method": method, **times, "error": 0.02})
@@ -48,7 +48,7 @@ def spreads(**changes: float) -> Table:
         [
             Column("model", "Solid"),
             Column("method", "Method"),
-            *(Column(f"seconds{end}", "Time", "seconds", "s") for end in ("", "_least", "_most")),
+            *(Column(f"seconds{end}", "Time", "seconds", "s") for end in ("", "_min", "_max")),
             Column("error", "Error", "percent"),
         ],
         rows,

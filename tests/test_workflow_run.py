@@ -181,7 +181,7 @@ def test_every_benchmark_table_tells_its_conditions(page, results, name):
         assert escape(table.conditions.headline) in page.source
     timed = [column.key for column in table.columns if column.kind == "seconds"]
     if name in ("spreads", "blocks"):
-        assert any(f"{key}_least" in timed and f"{key}_most" in timed for key in timed)
+        assert any(f"{key}_min" in timed and f"{key}_max" in timed for key in timed)
 
 
 def test_timed_rules_leave_benchmarks(results):

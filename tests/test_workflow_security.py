@@ -17,8 +17,8 @@ import yaml
 from carillon import limits
 from carillon.errors import UserError
 from carillon.fem.geometry import builtin_surface
-from forests.commands.table import MOST_BLOCKS
 from forests.comparison.database import MOST_MATERIALS
+from forests.evaluate import MOST_BLOCKS
 from forests.layout import MOST_LEAVES
 from solver.studies.scaling import launch
 from tests.workflow_runs import CHECKOUT, snakemake

@@ -142,7 +142,7 @@ def test_scaling_keeps_the_slowest_run_beside_the_fastest():
     part = {"runs": [run], "model": {"rows": [modelled]}}
     found = {"bell": {"strong": part, "weak": None}}
     measured_row, modelled_row = scaling(found, {"bell": "A bell"}).rows
-    assert (measured_row["measured"], measured_row["measured_most"]) == (1.0, 1.5)
+    assert (measured_row["measured"], measured_row["measured_max"]) == (1.0, 1.5)
     assert measured_row["peak_memory"] == 7.0 and measured_row["note"] == "measured"
     assert modelled_row["measured"] is None and modelled_row["modelled"] == 0.6
     assert repeats(found).runs.startswith("3")

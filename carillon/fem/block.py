@@ -22,8 +22,8 @@ from carillon.fem.element import (
     uniform_stiffness,
 )
 
-FINE_EDGE = 1.0
 COARSE_EDGE = 2.0
+"""Edge of the coarse cell; that of a fine cell is 1."""
 
 ALL_FILLED = 0b11111111
 """Void pattern without void cells; bit j of a pattern is set where cell j is filled."""
@@ -76,11 +76,11 @@ def cell_stiffness(poisson: float = DEFAULT_POISSON) -> Array:
 
 
 @cache
-def cell_mass(lumped: bool = False) -> Array:
+def cell_mass() -> Array:
     """Nodal mass (8, 27, 27) of each fine cell for unit density."""
     matrices = np.zeros((8, 27, 27))
     for cell, nodes in enumerate(CELL_NODES):
-        matrices[cell][np.ix_(nodes, nodes)] = nodal_mass(lumped)
+        matrices[cell][np.ix_(nodes, nodes)] = nodal_mass()
     matrices.setflags(write=False)
     return matrices
 

@@ -121,7 +121,8 @@ def rigid_motions(nodes: Array, centre: Array | None = None) -> Array:
 
     Returns
     -------
-    (3n, 6) displacements of the nodes.
+    (3 n, 6)
+        Displacements of the nodes.
     """
     centred = nodes - (nodes.mean(axis=0) if centre is None else centre)
     motions = np.zeros((len(nodes), 3, 6))

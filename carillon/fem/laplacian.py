@@ -32,8 +32,8 @@ def face_neighbours(mesh: HexMesh) -> NDArray[np.int64]:
         position = np.searchsorted(keys, keys + stride, sorter=order)
         position = np.minimum(position, len(keys) - 1)
         neighbour = order[position]
-        found = keys[neighbour] == keys + stride
-        pairs.append(np.column_stack([np.flatnonzero(found), neighbour[found]]))
+        adjacent = keys[neighbour] == keys + stride
+        pairs.append(np.column_stack([np.flatnonzero(adjacent), neighbour[adjacent]]))
     return np.concatenate(pairs)
 
 

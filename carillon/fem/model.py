@@ -29,8 +29,10 @@ class Elements:
 
     Attributes
     ----------
-    young, fill
-        (c, 8) [Pa] and (c,), see `ElasticModel`.
+    young : (c, 8)
+        See `ElasticModel` [Pa].
+    fill : (c,)
+        See `ElasticModel`.
     edge
         Edge of an element [m].
     poisson, density, lumped, lumped_share
@@ -83,11 +85,11 @@ class ElasticModel:
     ----------
     mesh
         Nodes and cells.
-    young
-        (m, 8) Young's modulus [Pa] at each cell's quadrature points, taken as it is: what users
+    young : (m, 8)
+        Young's modulus [Pa] at each cell's quadrature points, taken as it is: what users
         give goes through `fine_model` and `with_young`.
-    fill
-        (m,) bit pattern of the octants of each cell that hold mass; 255 everywhere on a fine mesh.
+    fill : (m,)
+        Bit pattern of the octants of each cell that hold mass; 255 everywhere on a fine mesh.
     poisson
         Poisson's ratio.
     density

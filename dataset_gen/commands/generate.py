@@ -9,27 +9,18 @@ from __future__ import annotations
 import argparse
 
 from carillon import cli
-from carillon.arguments import (
-    non_negative_number,
-    number_of_workers,
-    poisson_ratio,
-    positive_number,
-    whole_number,
-)
+from carillon.arguments import number_of_workers
 from carillon.errors import UserError
-from carillon.fem.element import DEFAULT_POISSON
+from carillon.options import add_options, collect
 from carillon.progress import say
 from carillon.ranks import world
-from dataset_gen import ranks
 from dataset_gen.generate import Engine, engine_of, generate_file
-from dataset_gen.objectives import DATASET_OBJECTIVES, DEFAULT_OBJECTIVE
-from dataset_gen.sampling import DISTRIBUTIONS
-from dataset_gen.settings import settings_of
+from dataset_gen.ranks import run_on_ranks
+from dataset_gen.settings import ShardOptions, settings_of
 from dataset_gen.shards import origin_of
 from dataset_gen.speed import Speed
-from dataset_gen.tasks import Plan
+from dataset_gen.tasks import ShardPlan
 
-PROGRAM = "dataset_gen generate"
 EXAMPLES = """examples:
   generate --samples 100000 --seed 1 --out shard.h5
   generate --samples 1000000 --seed 1 --shard 3 --shards 16 --workers 8 --out shard-3.h5
@@ -38,15 +29,7 @@ EXAMPLES = """examples:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    parser.add_argument("--samples", type=whole_number(1), required=True, help="of all shards")
-    parser.add_argument("--seed", type=whole_number(0), default=0, help="(default 0)")
-    parser.add_argument("--shard", type=whole_number(0), default=0, help="number of this shard")
-    parser.add_argument("--shards", type=whole_number(1), default=1, help="number of all shards")
-    parser.add_argument("--objective", choices=DATASET_OBJECTIVES, default=DEFAULT_OBJECTIVE)
-    parser.add_argument("--poisson", type=poisson_ratio, default=DEFAULT_POISSON)
-    parser.add_argument("--distribution", choices=tuple(DISTRIBUTIONS), default="uniform")
-    parser.add_argument("--low", type=non_negative_number, help="least modulus [GPa] (0 or 0.01)")
-    parser.add_argument("--high", type=positive_number, help="largest modulus [GPa] (10 or 1000)")
+    add_options(parser, ShardOptions)
     parser.add_argument("--workers", type=number_of_workers, default=1, help="processes")
     parser.add_argument("--out", required=True, help="HDF5 file to write")
 
@@ -57,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
     if comm is None:
         return _generate(arguments, engine_of(arguments.workers))
 
-    def lead(engine: Engine) -> int:
+    def make(engine: Engine) -> int:
         if arguments.workers > 1:
             raise UserError(
                 f"{arguments.workers} workers on each of {comm.size} ranks: every rank is one "
@@ -65,25 +48,17 @@ def run(arguments: argparse.Namespace) -> int:
             )
         return _generate(arguments, engine)
 
-    return ranks.share(comm, PROGRAM, lead)
+    return run_on_ranks(comm, make)
 
 
 def _generate(arguments: argparse.Namespace, engine: Engine) -> int:
-    split = (arguments.samples, arguments.shard, arguments.shards)
-    settings = settings_of(
-        arguments.samples,
-        arguments.seed,
-        arguments.shard,
-        arguments.shards,
-        arguments.objective,
-        arguments.poisson,
-        arguments.distribution,
-        arguments.low,
-        arguments.high,
-    )
+    options = collect(ShardOptions, arguments)
+    settings = settings_of(options)
     speed = Speed()
     try:
-        fitted = generate_file(arguments.out, Plan(settings), origin_of(settings, *split), engine)
+        fitted = generate_file(
+            arguments.out, ShardPlan(settings), origin_of(settings, options), engine
+        )
     except KeyboardInterrupt:
         say(f"{arguments.out}: interrupted; the same command goes on from here")
         return cli.EXIT_INTERRUPTED

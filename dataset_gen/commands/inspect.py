@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Read all of the shard and print its summary."""
     speed = Speed()
-    found = summary.describe(arguments.file)
-    first, past = found["samples"]
+    description = summary.describe(arguments.file)
+    first, past = description["samples"]
     say(f"read {speed.report(arguments.file, past - first)}")
-    print(json.dumps(found, indent=2) if arguments.json else summary.as_text(found))
+    print(json.dumps(description, indent=2) if arguments.json else summary.as_text(description))

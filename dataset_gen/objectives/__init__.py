@@ -58,9 +58,12 @@ class Fits(NamedTuple):
 
     Attributes
     ----------
-    moduli : (n, 8) coarse moduli E, in the unit of the fine ones, positive.
-    residual : (n,) root of the objective relative to its value for E = 0.
-    converged : (n,) whether the minimiser settled.
+    moduli : (n, 8)
+        Coarse moduli E, in the unit of the fine ones, positive.
+    residual : (n,)
+        Root of the objective relative to its value for E = 0.
+    converged : (n,)
+        Whether the minimiser settled.
     """
 
     moduli: Array
@@ -118,9 +121,12 @@ def fit(objective: str, e: ArrayLike, poisson: float = DEFAULT_POISSON) -> Fits:
 
     Parameters
     ----------
-    objective : name in `OBJECTIVES`.
-    e : (n, 8) fine moduli in bit order, any unit, 0 where a cell is void.
-    poisson : Poisson's ratio of all cells.
+    objective
+        Name in `OBJECTIVES`.
+    e : (n, 8)
+        Fine moduli in bit order, any unit, 0 where a cell is void.
+    poisson
+        Poisson's ratio of all cells.
 
     Raises
     ------
@@ -163,12 +169,14 @@ def fit_samples(objective: str, e: Array, seed: int, first: int, poisson: float)
 
     Parameters
     ----------
-    objective : name in `DATASET_OBJECTIVES`.
-    seed : of the dataset; what is drawn for a fit depends on it and on the sample's number alone.
+    objective
+        Name in `DATASET_OBJECTIVES`.
+    seed
+        Of the dataset; what is drawn for a fit depends on it and on the sample's number alone.
     """
     if objective != SAMPLED:
         return fit(objective, e, poisson)
-    found = [
+    fits = [
         sampled_energy.fit_sample(young, seed, first + row, poisson) for row, young in enumerate(e)
     ]
-    return Fits(*(np.concatenate(column) for column in zip(*found)))
+    return Fits(*(np.concatenate(column) for column in zip(*fits)))

@@ -146,13 +146,19 @@ def minimise_above(
 
     Parameters
     ----------
-    matrices : (n, 8, 8) symmetric positive definite A.
-    vectors : (n, 8) right-hand sides b.
-    lower : (n,) lower bound common to a row's unknowns.
+    matrices : (n, 8, 8)
+        Symmetric positive definite A.
+    vectors : (n, 8)
+        Right-hand sides b.
+    lower : (n,)
+        Lower bound common to a row's unknowns.
 
     Returns
     -------
-    (n, 8) minimisers and (n,) flags: whether the active set settled.
+    (n, 8)
+        Minimisers.
+    (n,) bool
+        Whether the active set settled.
     """
     count = len(vectors)
     solutions = np.empty((count, 8))

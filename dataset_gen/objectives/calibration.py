@@ -30,12 +30,16 @@ class Calibration:
 
     Attributes
     ----------
-    factors : (256, 8) factors on the moduli of a block of one material, by void pattern; rows of
-        patterns that are not the least of their class under the cube's symmetries are not used.
-    galerkin_filled, galerkin_void : exponent of Galerkin's answer to contrast in blocks without
-        and with void cells; the rest is the answer of `oversampled`.
-    lumped_share : share of row-sum lumped mass in coarse cells whose octants are all filled.
-    provenance : how the constants were found.
+    factors : (256, 8)
+        Factors on the moduli of a block of one material, by void pattern; rows of patterns that are
+        not the least of their class under the cube's symmetries are not used.
+    galerkin_filled, galerkin_void
+        Exponent of Galerkin's answer to contrast in blocks without and with void cells; the rest is
+        the answer of `oversampled`.
+    lumped_share
+        Share of row-sum lumped mass in coarse cells whose octants are all filled.
+    provenance
+        How the constants were found.
     """
 
     factors: Array

@@ -59,9 +59,12 @@ class Corners(NamedTuple):
 
     Attributes
     ----------
-    block : the free block.
-    loads : flat (a, 18), C^T Z: forces dual to the straining motions Z of the corners.
-    strains : flat (48, 18) strains of the coarse element in its straining motions.
+    block
+        The free block.
+    loads : flat (a, 18)
+        C^T Z: forces dual to the straining motions Z of the corners.
+    strains : flat (48, 18)
+        Strains of the coarse element in its straining motions.
     """
 
     block: FreeBlock
@@ -90,10 +93,10 @@ def corner_selection(mask: int, poisson: float) -> Array:
     pattern = pattern_of(mask, poisson)
     selection = pattern.to_corners.copy()
     for row, dof in enumerate(degrees_of_freedom(CORNER_NODES)):
-        found = np.flatnonzero(pattern.dofs == dof)
-        if len(found):
+        position = np.flatnonzero(pattern.dofs == dof)
+        if len(position):
             selection[row] = 0.0
-            selection[row, found] = 1.0
+            selection[row, position] = 1.0
     return selection
 
 

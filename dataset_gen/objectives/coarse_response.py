@@ -39,10 +39,14 @@ class Coarse(NamedTuple):
 
     Attributes
     ----------
-    block : the free block.
-    basis : flat (a, 18), V on the active nodes in the order of elimination.
-    stiffness : the lower tiles of sum_q E_q S_q^T S_q.
-    strains : flat (18, 48), all S_q^T.
+    block
+        The free block.
+    basis : flat (a, 18)
+        V on the active nodes in the order of elimination.
+    stiffness
+        The lower tiles of sum_q E_q S_q^T S_q.
+    strains : flat (18, 48)
+        All S_q^T.
     """
 
     block: FreeBlock
@@ -51,17 +55,22 @@ class Coarse(NamedTuple):
     strains: Array
 
 
-class Response(NamedTuple):
+class CoarseResponse(NamedTuple):
     """Answer of the coarse elements in the lanes.
 
     Attributes
     ----------
-    weights : (9) moduli E.
-    factor : lower tiles of L with B^-1 = L L^T.
-    flexibility : (18, 18), B.
-    scaled : (18, 48), L^-1 S_q^T sqrt(E_q).
-    strained : (18, 48), B S_q^T sqrt(E_q); the derivative of B in log E_q is -R_q^T R_q with R_q^T
-        columns 6 q to 6 q + 5.
+    weights : (9)
+        Moduli E.
+    factor
+        Lower tiles of L with B^-1 = L L^T.
+    flexibility : (18, 18)
+        B.
+    scaled : (18, 48)
+        L^-1 S_q^T sqrt(E_q).
+    strained : (18, 48)
+        B S_q^T sqrt(E_q); the derivative of B in log E_q is -R_q^T R_q with R_q^T columns 6 q to 6
+        q + 5.
     """
 
     weights: Array
@@ -93,9 +102,9 @@ def coarse_of(mask: int, poisson: float) -> Coarse:
 
 
 @compiled
-def empty_response() -> Response:
+def empty_response() -> CoarseResponse:
     """Room for an answer."""
-    return Response(
+    return CoarseResponse(
         empty(WEIGHTS),
         empty(LOWER),
         empty(MOTIONS**2),
@@ -105,7 +114,7 @@ def empty_response() -> Response:
 
 
 @compiled
-def respond(coarse: Coarse, logs: Array, response: Response) -> None:
+def respond(coarse: Coarse, logs: Array, response: CoarseResponse) -> None:
     """Answer of elements with moduli exp(`logs`), (8)."""
     weights, factor, flexibility, scaled, strained = response
     for q in range(8):
@@ -130,7 +139,7 @@ def respond(coarse: Coarse, logs: Array, response: Response) -> None:
 
 
 @compiled
-def write_curvature(response: Response, slope: Array, out: Array) -> None:
+def write_curvature(response: CoarseResponse, slope: Array, out: Array) -> None:
     """Write what the second derivatives of B in log E add to an objective's Hessian.
 
     With M (18, 18) the objective's derivative in B, they add `2 <R_p M R_q^T, Y_p Y_q^T>`, Y_q^T

@@ -52,19 +52,26 @@ SLACK = 1e-12
 """Rise of the cost taken for rounding, as a share of the objective's scale."""
 
 
-class Descent(NamedTuple):
+class DescentState(NamedTuple):
     """State of the lanes: where they are, what they try, and the objective at both.
 
     Attributes
     ----------
-    bounds : (2) of log E, in all lanes.
-    x, trial : (8) logarithms of the moduli.
-    here, there : at x and at trial, one after the other: value (1), gradient (8), the Hessian of
-        Gauss and Newton (8, 8), and what it lacks (8, 8); of both only the lower half.
-    scale : (1) size of the objective at E = 0.
-    damping : (1) share of the Hessian's diagonal that is added to it.
-    left : (1) length of the step of Gauss and Newton.
-    active : (1) 1 until the lane has converged, then 0.
+    bounds : (2)
+        Of log E, in all lanes.
+    x, trial : (8)
+        Logarithms of the moduli.
+    here, there
+        At x and at trial, one after the other: value (1), gradient (8), the Hessian of Gauss and
+        Newton (8, 8), and what it lacks (8, 8); of both only the lower half.
+    scale : (1)
+        Size of the objective at E = 0.
+    damping : (1)
+        Share of the Hessian's diagonal that is added to it.
+    left : (1)
+        Length of the step of Gauss and Newton.
+    active : (1)
+        1 until the lane has converged, then 0.
     """
 
     bounds: Array
@@ -83,9 +90,9 @@ VALUE, GRADIENT, HESSIAN, CURVATURE, DERIVATIVES = 0, 1, 9, 73, 137
 
 
 @compiled
-def begin(low: float, high: float) -> Descent:
+def begin(low: float, high: float) -> DescentState:
     """State with room for everything."""
-    state = Descent(
+    state = DescentState(
         empty(2),
         empty(8),
         empty(8),
@@ -102,7 +109,7 @@ def begin(low: float, high: float) -> Descent:
 
 
 @compiled
-def start(state: Descent) -> None:
+def start(state: DescentState) -> None:
     """Begin the descent at `trial`, where the objective has just been evaluated."""
     for i in range(8):
         store(state.x, i, load(state.trial, i))
@@ -113,7 +120,7 @@ def start(state: Descent) -> None:
 
 
 @compiled
-def _newton_step(state: Descent, damping: Vector, share: Vector, step: Array) -> Vector:
+def _newton_step(state: DescentState, damping: Vector, share: Vector, step: Array) -> Vector:
     """Damped step with `share` of what the Hessian of Gauss and Newton lacks, and its length.
 
     A modulus at a bound that it would cross is held. The length is infinite where the matrix is not
@@ -142,7 +149,7 @@ def _newton_step(state: Descent, damping: Vector, share: Vector, step: Array) ->
 
 
 @compiled
-def _curved_step(state: Descent, step: Array) -> Vector:
+def _curved_step(state: DescentState, step: Array) -> Vector:
     """Newton's step with all of the Hessian, and its length.
 
     Where the Hessian is not positive, it is shifted by half as much again as makes it so: near a
@@ -165,7 +172,7 @@ def _curved_step(state: Descent, step: Array) -> Vector:
 
 
 @compiled
-def propose(state: Descent) -> None:
+def propose(state: DescentState) -> None:
     """Write the next point of each lane to `trial`: far from the end by Gauss and Newton."""
     zero, one, far = spread(0.0), spread(1.0), spread(NEAR)
     low, high = load(state.bounds, 0), load(state.bounds, 1)
@@ -185,7 +192,7 @@ def propose(state: Descent) -> None:
 
 
 @compiled
-def judge(state: Descent) -> bool:
+def judge(state: DescentState) -> bool:
     """Accept or refuse each lane's trial; whether all lanes have converged."""
     zero = spread(0.0)
     damping, active = load(state.damping, 0), load(state.active, 0)
@@ -214,7 +221,7 @@ def judge(state: Descent) -> bool:
 
 
 @compiled
-def converged(state: Descent, lane: int) -> bool:
+def converged(state: DescentState, lane: int) -> bool:
     """Whether a lane has stopped on its own, at finite moduli."""
     finite = True
     for i in range(8):

@@ -32,16 +32,21 @@ class Links(NamedTuple):
     tile: Indices
 
 
-class Factor(NamedTuple):
+class FactorStructure(NamedTuple):
     """Structure of a Cholesky factor L whose tiles are stored row by row.
 
     Attributes
     ----------
-    rows : tiles left of the diagonal in each row, by ascending node.
-    columns : tiles below the diagonal in each column, by ascending node.
-    diagonal : (n,) tile on the diagonal of each row.
-    start : (n + 1,) where the updates by each column begin: column k takes L_ik L_jk^T from all ij.
-    updated, left, right : (p,) the tiles ij, L_ik and L_jk.
+    rows
+        Tiles left of the diagonal in each row, by ascending node.
+    columns
+        Tiles below the diagonal in each column, by ascending node.
+    diagonal : (n,)
+        Tile on the diagonal of each row.
+    start : (n + 1,)
+        Where the updates by each column begin: column k takes L_ik L_jk^T from all ij.
+    updated, left, right : (p,)
+        The tiles ij, L_ik and L_jk.
     """
 
     rows: Links
@@ -58,9 +63,12 @@ class Sum(NamedTuple):
 
     Attributes
     ----------
-    start : (t + 1,) where the terms of each tile begin.
-    weight : (s,) number of the weight of each term.
-    values : (9 s,) its fixed tile.
+    start : (t + 1,)
+        Where the terms of each tile begin.
+    weight : (s,)
+        Number of the weight of each term.
+    values : (9 s,)
+        Its fixed tile.
     """
 
     start: Indices
@@ -69,21 +77,25 @@ class Sum(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Elimination:
+class SymbolicFactorisation:
     """Unknowns of a void pattern in the order of elimination.
 
     Attributes
     ----------
-    dofs : (a,) degrees of freedom of the active nodes among the block's 81, in order.
-    linked : (n, n) whether two of the nodes touch a common filled cell.
-    filled : (n, n) whether the factor has a tile between them.
-    factor : structure of the factor.
+    dofs : (a,)
+        Degrees of freedom of the active nodes among the block's 81, in order.
+    linked : (n, n)
+        Whether two of the nodes touch a common filled cell.
+    filled : (n, n)
+        Whether the factor has a tile between them.
+    factor
+        Structure of the factor.
     """
 
     dofs: Indices
     linked: NDArray[np.bool_]
     filled: NDArray[np.bool_]
-    factor: Factor
+    factor: FactorStructure
 
 
 def _order(cells: NDArray[np.int64]) -> list[int]:
@@ -103,7 +115,7 @@ def _order(cells: NDArray[np.int64]) -> list[int]:
 
 
 @cache
-def elimination_of(mask: int) -> Elimination:
+def elimination_of(mask: int) -> SymbolicFactorisation:
     """Order and structure of the pattern whose filled cells are the set bits of `mask` (1..255)."""
     cells = CELL_NODES[np.flatnonzero(mask >> np.arange(8) & 1)]
     nodes = np.array(_order(cells))
@@ -113,10 +125,10 @@ def elimination_of(mask: int) -> Elimination:
     for node in range(len(filled)):
         front = node + 1 + np.flatnonzero(filled[node + 1 :, node])
         filled[np.ix_(front, front)] = True
-    return Elimination(degrees_of_freedom(nodes), linked, filled, factor_of(filled))
+    return SymbolicFactorisation(degrees_of_freedom(nodes), linked, filled, factor_of(filled))
 
 
-def factor_of(filled: NDArray[np.bool_]) -> Factor:
+def factor_of(filled: NDArray[np.bool_]) -> FactorStructure:
     """Structure of a factor that has the lower tiles of `filled` (n, n)."""
     lower = np.tril(filled)
     number = np.zeros(filled.shape, dtype=np.int64)
@@ -128,7 +140,7 @@ def factor_of(filled: NDArray[np.bool_]) -> Factor:
         i, j = front[row], front[column]
         updates.append(np.stack([number[i, j], number[i, k], number[j, k]], axis=1))
     updated, left, right = np.concatenate(updates).T
-    return Factor(
+    return FactorStructure(
         rows=_links(np.tril(filled, -1), number),
         columns=_links(np.triu(filled, 1), number.T),
         diagonal=np.diagonal(number).copy(),

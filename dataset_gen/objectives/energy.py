@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from carillon.fem.element import Array
 from dataset_gen.objectives.coarse_response import (
     Coarse,
-    Response,
+    CoarseResponse,
     coarse_of,
     empty_response,
     respond,
@@ -67,9 +67,11 @@ class Fine(NamedTuple):
 
     Attributes
     ----------
-    flexibility : (18, 18), V^T K^+ V.
-    norms : (3) trace of K^+, mean square of the energies f^T K^+ f, and the part of it that no
-        coarse element can answer, twice |K^+|^2 - |V^T K^+ V|^2.
+    flexibility : (18, 18)
+        V^T K^+ V.
+    norms : (3)
+        Trace of K^+, mean square of the energies f^T K^+ f, and the part of it that no coarse
+        element can answer, twice |K^+|^2 - |V^T K^+ V|^2.
     """
 
     flexibility: Array
@@ -99,7 +101,7 @@ def _fine_response(coarse: Coarse, young: Array, first: int, fine: Fine) -> None
 
 @compiled
 def _evaluate(
-    coarse: Coarse, fine: Fine, response: Response, forms: Array, logs: Array, out: Array
+    coarse: Coarse, fine: Fine, response: CoarseResponse, forms: Array, logs: Array, out: Array
 ) -> None:
     """Value, gradient and Hessian of `2 |B - V^T K^+ V|^2 + (tr B - tr K^+)^2` in log E."""
     respond(coarse, logs, response)

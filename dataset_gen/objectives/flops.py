@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-from dataset_gen.objectives.elimination import TILE, Factor, Links, Sum
+from dataset_gen.objectives.elimination import TILE, FactorStructure, Links, Sum
 from dataset_gen.objectives.kernel import MOTIONS, STRAINS
 
 INVERTED_ROOT = 28
@@ -25,19 +25,19 @@ _counter: ContextVar[list[int] | None] = ContextVar("counter", default=None)
 @contextmanager
 def counted() -> Iterator[list[int]]:
     """Collect what `count` is told meanwhile."""
-    found: list[int] = []
-    token = _counter.set(found)
+    counts: list[int] = []
+    token = _counter.set(counts)
     try:
-        yield found
+        yield counts
     finally:
         _counter.reset(token)
 
 
 def count(flops: int) -> None:
     """Report operations to those who count."""
-    found = _counter.get()
-    if found is not None:
-        found.append(flops)
+    counts = _counter.get()
+    if counts is not None:
+        counts.append(flops)
 
 
 def assembly(*sums: Sum) -> int:
@@ -45,13 +45,13 @@ def assembly(*sums: Sum) -> int:
     return sum(2 * len(terms.values) for terms in sums)
 
 
-def factorisation(factor: Factor) -> int:
+def factorisation(factor: FactorStructure) -> int:
     """Operations that factorise a matrix."""
     products = len(factor.updated) + len(factor.columns.tile)
     return TILE_PRODUCT * products + INVERTED_ROOT * len(factor.diagonal)
 
 
-def substitution(factor: Factor, columns: int) -> int:
+def substitution(factor: FactorStructure, columns: int) -> int:
     """Operations that solve with L or with its transpose."""
     return 2 * TILE * columns * (len(factor.rows.tile) + len(factor.diagonal))
 
@@ -75,7 +75,7 @@ def normal_equations(fields: int) -> int:
     return product(fields, STRAINS, MOTIONS) + forms + inner
 
 
-def flexibility(factor: Factor, width: int) -> int:
+def flexibility(factor: FactorStructure, width: int) -> int:
     """Operations that find trace and norm of K^+; `width` motions without strain.
 
     Six columns of the inverse at a time, each from its own node down, and the sums of squares.

@@ -16,7 +16,7 @@ from carillon.fem.block import cell_stiffness
 from carillon.fem.element import Array
 from carillon.serial import serial_blas
 from dataset_gen.objectives.elimination import (
-    Factor,
+    FactorStructure,
     Sum,
     elimination_of,
     lower_tiles_of,
@@ -40,12 +40,15 @@ class FreeBlock(NamedTuple):
 
     Attributes
     ----------
-    factor : structure of the factor.
-    stiffness : K with springs of the mean modulus.
-    null : flat (a, k) orthonormal motions without strain, zero columns up to a multiple of six.
+    factor
+        Structure of the factor.
+    stiffness
+        K with springs of the mean modulus.
+    null : flat (a, k)
+        Orthonormal motions without strain, zero columns up to a multiple of six.
     """
 
-    factor: Factor
+    factor: FactorStructure
     stiffness: Sum
     null: Array
 

@@ -40,15 +40,19 @@ from dataset_gen.objectives.quadratic import (
 LOADS = 24
 
 
-class Inertia(NamedTuple):
+class InertialTables(NamedTuple):
     """Loads of a void pattern, on the active nodes in the order of elimination.
 
     Attributes
     ----------
-    block : the free block.
-    loads : flat (a, 24).
-    to_corners : flat (18, a), straining motions nearest to nodal displacements.
-    strains : flat (48, 18) strains of the coarse element in its straining motions.
+    block
+        The free block.
+    loads : flat (a, 24)
+        Inertial forces of the trilinear motions.
+    to_corners : flat (18, a)
+        Straining motions nearest to nodal displacements.
+    strains : flat (48, 18)
+        Strains of the coarse element in its straining motions.
     """
 
     block: FreeBlock
@@ -86,13 +90,13 @@ def inertia_loads(mask: int, poisson: float) -> Array:
 
 @cache
 @serial_blas
-def inertia_of(mask: int, poisson: float) -> Inertia:
+def inertia_of(mask: int, poisson: float) -> InertialTables:
     """Tables of the pattern whose filled cells are the set bits of `mask` (1..255)."""
     pattern = pattern_of(mask, poisson)
     order = pattern.positions(elimination_of(mask).dofs)
     motions = straining_motions()
     to_corners = pattern.without_null(pattern.to_corners.T @ motions).T
-    return Inertia(
+    return InertialTables(
         block=free_block_of(mask, poisson),
         loads=inertia_loads(mask, poisson)[order].ravel(),
         to_corners=to_corners[:, order].ravel(),
@@ -101,7 +105,7 @@ def inertia_of(mask: int, poisson: float) -> Inertia:
 
 
 @compiled
-def _form_equations(inertia: Inertia, young: Array, equations: NormalEquations) -> None:
+def _form_equations(inertia: InertialTables, young: Array, equations: NormalEquations) -> None:
     factor, stiffness, _ = inertia.block
     size = 3 * len(factor.diagonal)
     weights, tiles = empty(WEIGHTS), empty(TILE * (len(stiffness.start) - 1))

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from carillon.fem.element import Array
-from dataset_gen.objectives.elimination import TILE, Factor, Links, Sum, factor_of
+from dataset_gen.objectives.elimination import TILE, FactorStructure, Links, Sum, factor_of
 from dataset_gen.objectives.lanes import (
     LANES,
     Vector,
@@ -99,7 +99,7 @@ def _invert_root(tiles: Array, at: int) -> None:
 
 
 @compiled
-def factorise(factor: Factor, tiles: Array) -> None:
+def factorise(factor: FactorStructure, tiles: Array) -> None:
     """Replace a symmetric positive definite matrix by its Cholesky factor L.
 
     The tiles on the diagonal become those of L^-1.
@@ -119,7 +119,9 @@ def factorise(factor: Factor, tiles: Array) -> None:
 
 
 @compiled
-def solve_lower(factor: Factor, tiles: Array, x: Array, columns: int, first: int = 0) -> None:
+def solve_lower(
+    factor: FactorStructure, tiles: Array, x: Array, columns: int, first: int = 0
+) -> None:
     """Replace x (3 n, columns) by L^-1 x; with `first`, x is zero above that node and stays so."""
     rows = factor.rows
     for panel in range(0, columns, PANEL):
@@ -139,7 +141,9 @@ def solve_lower(factor: Factor, tiles: Array, x: Array, columns: int, first: int
 
 
 @compiled
-def solve_upper(factor: Factor, tiles: Array, x: Array, columns: int, first: int = 0) -> None:
+def solve_upper(
+    factor: FactorStructure, tiles: Array, x: Array, columns: int, first: int = 0
+) -> None:
     """Replace x (3 n, columns) by L^-T x, from node `first` on."""
     below = factor.columns
     for panel in range(0, columns, PANEL):
@@ -341,9 +345,12 @@ def all_forms(motions: Array, energies: Array, fields: int, strains: Array, form
 
     Parameters
     ----------
-    motions : (fields, 18) straining motions of the corners in each field.
-    energies : (fields, fields) fine energies.
-    strains : flat (48, 18) strains of the straining motions.
+    motions : (fields, 18)
+        Straining motions of the corners in each field.
+    energies : (fields, fields)
+        Fine energies.
+    strains : flat (48, 18)
+        Strains of the straining motions.
     """
     strained = empty(fields * STRAINS)
     multiply(strained, (motions, 0, MOTIONS, 1), (strains, 0, MOTIONS, 1), fields, STRAINS, MOTIONS)

@@ -18,7 +18,7 @@ from carillon.serial import serial_blas
 from dataset_gen.objectives import flops
 from dataset_gen.objectives.elimination import (
     TILE,
-    Factor,
+    FactorStructure,
     Links,
     Sum,
     elimination_of,
@@ -71,15 +71,21 @@ class Patch(NamedTuple):
 
     Attributes
     ----------
-    factor : structure of the factor.
-    held : stiffness of the patch from each octant.
-    loads : (a, 18) loads of the prescribed fields from each octant.
-    links, own : where and what the block's own stiffness is, half of it on the diagonal.
-    to_corners : flat (18, a), straining motions nearest to nodal displacements.
-    strains : flat (48, 18) strains of the coarse element in its straining motions.
+    factor
+        Structure of the factor.
+    held
+        Stiffness of the patch from each octant.
+    loads : (a, 18)
+        Loads of the prescribed fields from each octant.
+    links, own
+        Where and what the block's own stiffness is, half of it on the diagonal.
+    to_corners : flat (18, a)
+        Straining motions nearest to nodal displacements.
+    strains : flat (48, 18)
+        Strains of the coarse element in its straining motions.
     """
 
-    factor: Factor
+    factor: FactorStructure
     held: Sum
     loads: Sum
     links: Links

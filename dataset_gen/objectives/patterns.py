@@ -33,19 +33,27 @@ NULL_TOLERANCE = 1e-10
 
 
 @dataclass(frozen=True)
-class Pattern:
+class VoidPattern:
     """Matrices of the block's active nodes (those that touch a filled cell) for unit moduli.
 
     Attributes
     ----------
-    cells : (f,) indices of the filled cells.
-    dofs : (a,) degrees of freedom of the active nodes among the block's 81.
-    stiffness : (f, a * a) flattened K_j of the filled cells, fine edge 1.
-    mass : (a, a) consistent mass of the filled cells, unit density.
-    interpolation : (a, 24) rows of the trilinear prolongation, P_a.
-    to_corners : (24, a) its pseudo-inverse: the trilinear motion nearest to nodal displacements.
-    rigid : (a, 6) orthonormal rigid motions.
-    null : (a, k) orthonormal motions without strain; k > 6 where cells hinge on edges or corners.
+    cells : (f,)
+        Indices of the filled cells.
+    dofs : (a,)
+        Degrees of freedom of the active nodes among the block's 81.
+    stiffness : (f, a * a)
+        Flattened K_j of the filled cells, fine edge 1.
+    mass : (a, a)
+        Consistent mass of the filled cells, unit density.
+    interpolation : (a, 24)
+        Rows of the trilinear prolongation, P_a.
+    to_corners : (24, a)
+        Its pseudo-inverse: the trilinear motion nearest to nodal displacements.
+    rigid : (a, 6)
+        Orthonormal rigid motions.
+    null : (a, k)
+        Orthonormal motions without strain; k > 6 where cells hinge on edges or corners.
     """
 
     cells: NDArray[np.int64]
@@ -79,7 +87,7 @@ class Pattern:
 
 @cache
 @serial_blas
-def pattern_of(mask: int, poisson: float) -> Pattern:
+def pattern_of(mask: int, poisson: float) -> VoidPattern:
     """Matrices of the pattern whose filled cells are the set bits of `mask` (1..255)."""
     filled = (mask >> np.arange(8) & 1).astype(bool)
     cells = np.flatnonzero(filled)
@@ -90,7 +98,7 @@ def pattern_of(mask: int, poisson: float) -> Pattern:
     nodal = cell_mass()[cells].sum(axis=0)[np.ix_(nodes, nodes)]
     interpolation = prolongation()[dofs]
     values, vectors = np.linalg.eigh(stiffness.sum(axis=0))
-    return Pattern(
+    return VoidPattern(
         cells=cells,
         dofs=dofs,
         stiffness=np.ascontiguousarray(stiffness.reshape(len(cells), -1)),

@@ -22,14 +22,14 @@ MODULUS_FLOOR = 1e-2
 """Lower bound of every coarse modulus, as a share of the block's largest fine modulus."""
 
 
-class Tables(Protocol):
+class PatternTables(Protocol):
     """What an objective knows of a void pattern."""
 
     def flops(self) -> int:
         """Floating-point operations of one block's normal equations."""
 
 
-T = TypeVar("T", bound=Tables)
+T = TypeVar("T", bound=PatternTables)
 
 
 class PatternFits(NamedTuple):

@@ -14,7 +14,7 @@ from carillon.fem.element import DEFAULT_POISSON, Array
 from carillon.serial import serial_blas
 from dataset_gen.objectives.coarse_response import (
     Coarse,
-    Response,
+    CoarseResponse,
     coarse_of,
     empty_response,
     respond,
@@ -75,8 +75,10 @@ class Loaded(NamedTuple):
 
     Attributes
     ----------
-    felt : (18, columns) what the coarse element feels of them, V^T f.
-    energies : (columns) fine energies f^T K^+ f.
+    felt : (18, columns)
+        What the coarse element feels of them, V^T f.
+    energies : (columns)
+        Fine energies f^T K^+ f.
     """
 
     felt: Array
@@ -151,7 +153,7 @@ def _sum_lanes(numbers: Array) -> None:
 
 @compiled
 def _evaluate(
-    coarse: Coarse, loaded: Loaded, response: Response, room: Room, logs: Array, out: Array
+    coarse: Coarse, loaded: Loaded, response: CoarseResponse, room: Room, logs: Array, out: Array
 ) -> None:
     """Value, gradient and Hessian in log E of the sum over all forces of (coarse - fine energy)^2.
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from forests.commands.results import add_outputs, publish, require_outputs
+from carillon.outputs import require_outputs
+from forests.commands.results import add_outputs, publish
 from forests.commands.training import add_training, add_workers, training_of
 from forests.studies import training
 from forests.training.dataset import open_dataset
@@ -21,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Train on each number of rows and print the scores."""
-    require_outputs(arguments, *arguments.datasets)
+    require_outputs(arguments, arguments.datasets)
     how = training_of(arguments)
     dataset = open_dataset(arguments.datasets)
     counts = training.require_counts(arguments.rows)

@@ -17,5 +17,5 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Read the forests and print their summary."""
-    found = summary.describe(default_path() if arguments.file is None else arguments.file)
-    print(json.dumps(found, indent=2) if arguments.json else summary.as_text(found))
+    description = summary.describe(default_path() if arguments.file is None else arguments.file)
+    print(json.dumps(description, indent=2) if arguments.json else summary.as_text(description))

@@ -5,9 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 
-from carillon.files import atomic_path, require_writable
+from carillon.files import atomic_path
 from carillon.measurement import measured
-from carillon.pictures import require_plottable
 
 HIDDEN = ("out", "json", "plot")
 """Arguments on which a result does not depend."""
@@ -17,14 +16,6 @@ def add_outputs(parser: argparse.ArgumentParser) -> None:
     """Add `--json` and `--out`."""
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument("--out", metavar="FILE", help="result and provenance, as JSON")
-
-
-def require_outputs(arguments: argparse.Namespace, *inputs: str) -> None:
-    """Check that results can be written, and not in the place of what they are made from."""
-    if getattr(arguments, "plot", None):
-        require_writable(require_plottable(arguments.plot))
-    if arguments.out is not None:
-        require_writable(arguments.out, inputs)
 
 
 def publish(arguments: argparse.Namespace, result: object, text: str, threads: int) -> None:

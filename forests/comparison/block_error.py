@@ -55,7 +55,12 @@ AT_ONCE = 500
 class Load(NamedTuple):
     """A load case in terms of the coarse element: it answers `left K_c^-1 right`.
 
-    left : (18, 18); right : (18, m).
+    Attributes
+    ----------
+    left : (18, 18)
+        What its answer is taken to.
+    right : (18, m)
+        The load.
     """
 
     left: Array
@@ -63,15 +68,19 @@ class Load(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Tables:
+class ErrorTables:
     """What a void pattern decides; r = active degrees of freedom less motions without strain.
 
     Attributes
     ----------
-    stiffness : (8, r * r) flattened K_j of the cells on the complement of N, zero for void ones.
-    basis : (r, 18) orthonormal basis V of the coarse element's displacements Y = V R.
-    inertia, corners : (r, 18) inertial loads W and corner forces C^T Z.
-    loads : the load cases by name.
+    stiffness : (8, r * r)
+        Flattened K_j of the cells on the complement of N, zero for void ones.
+    basis : (r, 18)
+        Orthonormal basis V of the coarse element's displacements Y = V R.
+    inertia, corners : (r, 18)
+        Inertial loads W and corner forces C^T Z.
+    loads
+        The load cases by name.
     """
 
     stiffness: Array
@@ -81,14 +90,17 @@ class Tables:
     loads: dict[str, Load]
 
 
-class Response(NamedTuple):
+class FineResponse(NamedTuple):
     """Fine answers of n blocks to one load case.
 
     Attributes
     ----------
-    target : (n, 18, m) part that a coarse element can answer.
-    rest : (n,) square of what it cannot.
-    total : (n,) square of both.
+    target : (n, 18, m)
+        Part that a coarse element can answer.
+    rest : (n,)
+        Square of what it cannot.
+    total : (n,)
+        Square of both.
     """
 
     target: Array
@@ -101,28 +113,31 @@ class Errors(NamedTuple):
 
     Attributes
     ----------
-    squared : E|u_c - u|^2.
-    least : what it cannot fall below, whatever the element: the part of u that no motion of the
-        corners gives; 0 for loads on the corners.
-    reference : E|u|^2.
+    squared
+        E|u_c - u|^2.
+    minimum
+        What it cannot fall below, whatever the element: the part of u that no motion of the corners
+        gives; 0 for loads on the corners.
+    reference
+        E|u|^2.
     """
 
     squared: dict[str, Array]
-    least: dict[str, Array]
+    minimum: dict[str, Array]
     reference: dict[str, Array]
 
     def relative(self, load: str) -> Array:
         """E|u_c - u|^2 / E|u|^2 of each block."""
         return np.asarray(self.squared[load] / self.reference[load])
 
-    def relative_least(self, load: str) -> Array:
+    def relative_minimum(self, load: str) -> Array:
         """Least possible error relative to E|u|^2 of each block."""
-        return np.asarray(self.least[load] / self.reference[load])
+        return np.asarray(self.minimum[load] / self.reference[load])
 
 
 @cache
 @serial_blas
-def tables_of(mask: int, poisson: float) -> Tables:
+def tables_of(mask: int, poisson: float) -> ErrorTables:
     """Tables of the pattern whose filled cells are the set bits of `mask` (1..255)."""
     pattern, motions = pattern_of(mask, poisson), straining_motions()
     size, nulls = pattern.null.shape
@@ -142,31 +157,31 @@ def tables_of(mask: int, poisson: float) -> Tables:
         "inertial": Load(factor, factor.T @ basis.T @ inertia),
         "corner": Load(unit, unit),
     }
-    return Tables(stiffness, basis, inertia, corners, loads)
+    return ErrorTables(stiffness, basis, inertia, corners, loads)
 
 
 def _square(matrices: Array) -> Array:
     return np.asarray(np.einsum("nij,nij->n", matrices, matrices))
 
 
-def fine_responses(young: Array, mask: int, poisson: float) -> dict[str, Response]:
+def fine_responses(young: Array, mask: int, poisson: float) -> dict[str, FineResponse]:
     """Answers of blocks (n, 8) that share one void pattern, by load case."""
     tables = tables_of(mask, poisson)
     size = len(tables.basis)
     flexibility = np.linalg.inv((young @ tables.stiffness).reshape(-1, size, size))
 
-    def response(answer: Array) -> Response:
+    def response(answer: Array) -> FineResponse:
         target = tables.basis.T @ answer
         total = _square(answer)
-        return Response(target, np.maximum(total - _square(target), 0.0), total)
+        return FineResponse(target, np.maximum(total - _square(target), 0.0), total)
 
     nodal = _square(flexibility)
     answered = tables.basis.T @ flexibility @ tables.basis
     corner = tables.corners.T @ flexibility @ tables.corners
     return {
-        "nodal": Response(answered, np.maximum(nodal - _square(answered), 0.0), nodal),
+        "nodal": FineResponse(answered, np.maximum(nodal - _square(answered), 0.0), nodal),
         "inertial": response(flexibility @ tables.inertia),
-        "corner": Response(corner, np.zeros(len(young)), _square(corner)),
+        "corner": FineResponse(corner, np.zeros(len(young)), _square(corner)),
     }
 
 
@@ -205,27 +220,26 @@ def pattern_errors(
 
     Parameters
     ----------
-    coarse : for each coarsening either its moduli (n, 8) or the flexibility (n, 18, 18) of its
-        elements in the straining motions.
+    coarse
+        For each coarsening either its moduli (n, 8) or the flexibility (n, 18, 18) of its elements
+        in the straining motions.
     """
     loads = tables_of(mask, poisson).loads
     fine = fine_responses(young, mask, poisson)
-    least = {name: fine[name].rest for name in LOADS}
+    minimum = {name: fine[name].rest for name in LOADS}
     reference = {name: fine[name].total for name in LOADS}
-    found = []
+    errors = []
     for answer in coarse:
         flexibility = coarse_flexibility(answer, poisson) if answer.ndim == 2 else answer
         squared = {}
         for name in LOADS:
             error = loads[name].left @ flexibility @ loads[name].right - fine[name].target
             squared[name] = _square(error) + fine[name].rest
-        found.append(Errors(squared, least, reference))
-    return found
+        errors.append(Errors(squared, minimum, reference))
+    return errors
 
 
-def displacement_errors(
-    young: Array, coarse: Sequence[Array], poisson: float, at_most: int = AT_ONCE
-) -> list[Errors]:
+def displacement_errors(young: Array, coarse: Sequence[Array], poisson: float) -> list[Errors]:
     """Errors of several coarsenings of any blocks (n, 8); see `pattern_errors`.
 
     Squared displacements are for forces of unit variance, in the unit of 1 / (modulus x edge).
@@ -235,11 +249,11 @@ def displacement_errors(
     def empty() -> dict[str, Array]:
         return {name: np.empty(count) for name in LOADS}
 
-    found = [Errors(empty(), empty(), empty()) for _ in coarse]
-    for mask, rows in pattern_rows(young, at_most):
+    errors = [Errors(empty(), empty(), empty()) for _ in coarse]
+    for mask, rows in pattern_rows(young, AT_ONCE):
         parts = pattern_errors(young[rows], [part[rows] for part in coarse], mask, poisson)
-        for whole, part in zip(found, parts):
+        for whole, part in zip(errors, parts):
             for into, values in zip(whole, part):
                 for name in LOADS:
                     into[name][rows] = values[name]
-    return found
+    return errors

@@ -19,17 +19,22 @@ STREAMS = 16
 
 
 @dataclass(frozen=True)
-class Case:
+class BlockCase:
     """A distribution of blocks.
 
     Attributes
     ----------
-    low, high : range of the moduli of filled cells [GPa], before scaling.
-    distribution : "uniform" or "log-uniform", cells independent.
-    void : whether every block has void cells, of a pattern drawn by class as in training data;
-        else none has.
-    stream : number of the sequence of samples; cases of one stream have the same blocks.
-    scaled_by : factor on all moduli.
+    low, high
+        Range of the moduli of filled cells [GPa], before scaling.
+    distribution
+        "uniform" or "log-uniform", cells independent.
+    void
+        Whether every block has void cells, of a pattern drawn by class as in training data; else
+        none has.
+    stream
+        Number of the sequence of samples; cases of one stream have the same blocks.
+    scaled_by
+        Factor on all moduli.
     """
 
     low: float
@@ -54,7 +59,7 @@ class Case:
         """Distribution of the moduli before scaling."""
         return moduli(self.distribution, self.low, self.high)
 
-    def alike(self, other: Case) -> bool:
+    def alike(self, other: BlockCase) -> bool:
         """Whether blocks of both cases differ in nothing but the range of their moduli."""
         return (self.distribution, self.void) == (other.distribution, other.void)
 
@@ -84,11 +89,11 @@ class Case:
 
 
 CASES = (
-    Case(0.0, 10.0, "uniform", void=False, stream=0),
-    Case(100.0, 10_000.0, "uniform", void=False, stream=1),
-    Case(0.01, 1000.0, "log-uniform", void=False, stream=2),
-    Case(0.0, 10.0, "uniform", void=True, stream=3),
-    Case(0.0, 10.0, "uniform", void=False, stream=0, scaled_by=1000.0),
+    BlockCase(0.0, 10.0, "uniform", void=False, stream=0),
+    BlockCase(100.0, 10_000.0, "uniform", void=False, stream=1),
+    BlockCase(0.01, 1000.0, "log-uniform", void=False, stream=2),
+    BlockCase(0.0, 10.0, "uniform", void=True, stream=3),
+    BlockCase(0.0, 10.0, "uniform", void=False, stream=0, scaled_by=1000.0),
 )
 """The paper's trained range and its untrained one; rubber to diamond; partly void; scaled."""
 
@@ -96,6 +101,6 @@ CASES = (
 def turned(young: Array) -> Array:
     """Blocks (n, 8), each turned by a symmetry of the cube to the least image of its pattern."""
     turn = orientations()[1][(young > 0.0) @ (1 << np.arange(8))]
-    found = np.empty_like(young)
-    np.put_along_axis(found, turn, young, axis=1)
-    return found
+    images = np.empty_like(young)
+    np.put_along_axis(images, turn, young, axis=1)
+    return images

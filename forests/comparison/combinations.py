@@ -40,9 +40,9 @@ def _orbit(image: NDArray[np.int64], cell: int) -> list[int]:
 
 @numba.njit(cache=True, nogil=True)
 def _least_images(
-    materials: int, weights: NDArray[np.int64], found: NDArray[np.uint32]
+    materials: int, weights: NDArray[np.int64], keys: NDArray[np.uint32]
 ) -> NDArray[np.uint32]:
-    """Keys of the combinations that are the least of their images, ascending, into `found`."""
+    """Keys of the combinations that are the least of their images, ascending, into `keys`."""
     digits = np.zeros(8, dtype=np.int64)
     count = 0
     for key in range(materials**8):
@@ -55,7 +55,7 @@ def _least_images(
                 least = False
                 break
         if least:
-            found[count] = key
+            keys[count] = key
             count += 1
         j = 0
         while j < 8:
@@ -64,13 +64,13 @@ def _least_images(
                 break
             digits[j] = 0
             j += 1
-    return found[:count]
+    return keys[:count]
 
 
 def combination_keys(materials: int) -> NDArray[np.uint32]:
     """Keys (k,) of all combinations, each the least of its images, ascending."""
-    found = np.empty(combinations(materials), dtype=np.uint32)
-    return np.asarray(_least_images(materials, places(materials), found))
+    keys = np.empty(combinations(materials), dtype=np.uint32)
+    return np.asarray(_least_images(materials, places(materials), keys))
 
 
 def cells_of(keys: NDArray[np.uint32], materials: Array) -> Array:

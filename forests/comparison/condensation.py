@@ -56,12 +56,12 @@ def corner_flexibility(young: ArrayLike, poisson: float = DEFAULT_POISSON) -> Ar
     the part of a load counts that the block can carry.
     """
     blocks = np.ascontiguousarray(young, dtype=float)
-    found = np.empty((len(blocks), MOTIONS, MOTIONS))
+    flexibility = np.empty((len(blocks), MOTIONS, MOTIONS))
     for mask, rows in pattern_rows(blocks, len(blocks)):
         part = np.empty((len(rows), MOTIONS**2))
         _flexibility(corners_of(mask, poisson), blocks[rows], part)
-        found[rows] = part.reshape(-1, MOTIONS, MOTIONS)
-    return found
+        flexibility[rows] = part.reshape(-1, MOTIONS, MOTIONS)
+    return flexibility
 
 
 @serial_blas

@@ -57,13 +57,20 @@ class Database:
 
     Attributes
     ----------
-    materials : (m,) Young's moduli in ascending order, any unit; the first may be 0, void.
-    keys : (k,) of combinations, see `forests.comparison.combinations`; ascending.
-    entries : (k,) representative of each combination.
-    moduli : (r, 8) coarse moduli of the representatives, in the unit of the materials.
-    poisson : Poisson's ratio of all materials.
-    radius : largest distance of a metamaterial from its representative, |log E - log E'|.
-    seconds : time that building it took on one core.
+    materials : (m,)
+        Young's moduli in ascending order, any unit; the first may be 0, void.
+    keys : (k,)
+        Of combinations, see `forests.comparison.combinations`; ascending.
+    entries : (k,)
+        Representative of each combination.
+    moduli : (r, 8)
+        Coarse moduli of the representatives, in the unit of the materials.
+    poisson
+        Poisson's ratio of all materials.
+    radius
+        Largest distance of a metamaterial from its representative, |log E - log E'|.
+    seconds
+        Time that building it took on one core.
     """
 
     materials: Array
@@ -90,7 +97,7 @@ def _stored(database: Database) -> dict[str, NDArray]:
 
 
 def base_materials(moduli: Moduli, count: int, void: bool = False) -> Array:
-    """Young's moduli (count,) to represent a range, in its unit; void is one of them if wanted.
+    """Young's moduli (count,) to represent a range, in its unit; void is one of them if `void`.
 
     Each stands in the middle of an equal part of the range, on the scale of logarithms for
     log-uniform moduli. For uniform ones the scale is that of square roots: soft cells decide how
@@ -126,9 +133,11 @@ def build(
 
     Parameters
     ----------
-    materials : (m,) ascending, 0 for void.
-    representatives : how many metamaterials to keep; None keeps all of them. Distances between
-        metamaterials are those of their logarithmic moduli.
+    materials : (m,)
+        Ascending, 0 for void.
+    representatives
+        How many metamaterials to keep; None keeps all of them. Distances between metamaterials are
+        those of their logarithmic moduli.
 
     Raises
     ------
@@ -199,14 +208,14 @@ def _look_up(
                 high = middle
         if low == len(keys) or keys[low] != key:
             return block
-        found = moduli[entries[low]]
+        entry = moduli[entries[low]]
         out[block] = 0.0
         count = 0
         for g in range(turns):
             if turned[g] == key:
                 count += 1
                 for j in range(8):
-                    out[block, j] += found[images[g, j]]
+                    out[block, j] += entry[images[g, j]]
         out[block] /= count
     return -1
 

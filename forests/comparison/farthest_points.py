@@ -29,9 +29,12 @@ class Cover(NamedTuple):
 
     Attributes
     ----------
-    chosen : (r,) distinct points, in the order they were picked.
-    nearest : (n,) number of the representative nearest to each point, the earlier one of equals.
-    radius : (r,) largest distance of any point from the first 1, 2, .., r representatives.
+    chosen : (r,)
+        Distinct points, in the order they were picked.
+    nearest : (n,)
+        Number of the representative nearest to each point, the earlier one of equals.
+    radius : (r,)
+        Largest distance of any point from the first 1, 2, .., r representatives.
     """
 
     chosen: NDArray[np.int64]
@@ -90,7 +93,7 @@ def _pick(
                 gap += away * away
             if gap >= farthest[box]:
                 continue
-            most = 0.0
+            largest = 0.0
             for point in range(bounds[box], bounds[box + 1]):
                 distance = 0.0
                 for k in range(axes):
@@ -98,8 +101,8 @@ def _pick(
                 if distance < square[point]:
                     square[point] = distance
                     nearest[point] = number
-                most = max(most, square[point])
-            farthest[box] = most
+                largest = max(largest, square[point])
+            farthest[box] = largest
         radius[number] = np.sqrt(farthest.max())
     return len(chosen)
 

@@ -12,13 +12,11 @@ from carillon.errors import UserError
 from carillon.fem.element import Array
 from carillon.files import require_writable
 from dataset_gen.objectives import closed_form, fit
-from forests import model as forest_model
 from forests.baselines import average, galerkin
-from forests.comparison.cases import Case
+from forests.comparison.cases import BlockCase
 from forests.comparison.condensation import condense, corner_flexibility
 from forests.comparison.database import (
     MATERIALS,
-    REPRESENTATIVES,
     Database,
     base_materials,
     build,
@@ -27,7 +25,7 @@ from forests.comparison.database import (
     save_databases,
 )
 from forests.evaluate import coarsen
-from forests.model import Model
+from forests.model import Model, default_path, load_model
 
 
 @dataclass(frozen=True)
@@ -36,12 +34,18 @@ class Method:
 
     Attributes
     ----------
-    name : unique among the methods of a table.
-    coarsen : what is timed: moduli (n, 8), or whatever else the method keeps of each block.
-    storage_bytes : kept beforehand.
-    training_seconds : spent beforehand; None if unknown.
-    flexibility : coarse flexibility (n, 18, 18) for the errors, of methods without moduli.
-    clamped : whether blocks have moduli beyond the range that the method was made for.
+    name
+        Unique among the methods of a table.
+    coarsen
+        What is timed: moduli (n, 8), or whatever else the method keeps of each block.
+    storage_bytes
+        Kept beforehand.
+    training_seconds
+        Spent beforehand; None if unknown.
+    flexibility
+        Coarse flexibility (n, 18, 18) for the errors, of methods without moduli.
+    clamped
+        Whether blocks have moduli beyond the range that the method was made for.
     """
 
     name: str
@@ -100,7 +104,7 @@ def methods_of(models: dict[str, Model]) -> list[Method]:
     poisson = common_poisson(models)
     learned = (closed_form(model.objective) for model in models.values())
     objectives = dict.fromkeys(["energy", "chen2015", *learned])
-    found = [
+    methods = [
         Method("average", average),
         Method("Galerkin", galerkin),
         static_condensation(poisson),
@@ -108,8 +112,8 @@ def methods_of(models: dict[str, Model]) -> list[Method]:
     ]
     for name, model in models.items():
         suffix = f" of {name}" if len(models) > 1 else ""
-        found.append(trained(f"{model.objective}, forests{suffix}", model))
-    return found
+        methods.append(trained(f"{model.objective}, forests{suffix}", model))
+    return methods
 
 
 def metamaterials(database: Database, name: str, clamped: bool = False) -> Method:
@@ -122,41 +126,42 @@ def metamaterials(database: Database, name: str, clamped: bool = False) -> Metho
 
 
 def databases_of(
-    cases: Sequence[Case],
+    cases: Sequence[BlockCase],
     poisson: float,
     path: str | Path | None = None,
     materials: int = MATERIALS,
-    representatives: int = REPRESENTATIVES,
-) -> dict[Case, Database]:
+) -> dict[BlockCase, Database]:
     """A database made for each case that is not another one scaled.
 
     Parameters
     ----------
-    path : file to read them from; if there is none, they are built and written to it.
-    materials : base materials of each, void included.
+    path
+        File to read them from; if there is none, they are built and written to it.
+    materials
+        Base materials of each, void included.
 
     Raises
     ------
     UserError
         If the file has other databases, or cannot be written.
     """
-    wanted = {
+    bases = {
         case: base_materials(case.moduli, materials, case.void)
         for case in cases
         if case.scaled_by == 1.0
     }
     if path is not None and Path(path).exists():
         stored = load_databases(path)
-        return {case: _stored(stored, base, poisson, path) for case, base in wanted.items()}
+        return {case: _stored(stored, base, poisson, path) for case, base in bases.items()}
     if path is not None:
         require_writable(path)
-    found = {
-        case: build(base, poisson, representatives, f"database of {case.name}", progress=True)
-        for case, base in wanted.items()
+    databases = {
+        case: build(base, poisson, label=f"database of {case.name}", progress=True)
+        for case, base in bases.items()
     }
     if path is not None:
-        save_databases(path, list(found.values()))
-    return found
+        save_databases(path, list(databases.values()))
+    return databases
 
 
 def _stored(
@@ -172,20 +177,20 @@ def _stored(
     )
 
 
-def database_methods(case: Case, databases: dict[Case, Database]) -> list[Method]:
+def database_methods(case: BlockCase, databases: dict[BlockCase, Database]) -> list[Method]:
     """The database made for the blocks of a case, and those made for a lower range of such blocks.
 
     The latter take moduli beyond their range for their stiffest material.
     """
-    found = []
+    methods = []
     for other, database in databases.items():
         low, high = other.range_gpa
         name = f"Chen et al. 2015, database {low:g}..{high:g} GPa"
         if other == case:
-            found.append(metamaterials(database, name))
+            methods.append(metamaterials(database, name))
         elif other.alike(case) and high < case.range_gpa[1]:
-            found.append(metamaterials(database, f"{name}, clamped", clamped=True))
-    return found
+            methods.append(metamaterials(database, f"{name}, clamped", clamped=True))
+    return methods
 
 
 def common_poisson(models: dict[str, Model]) -> float:
@@ -196,13 +201,13 @@ def common_poisson(models: dict[str, Model]) -> float:
     UserError
         If there is no model, or they differ.
     """
-    found = {name: model.poisson for name, model in models.items()}
-    if not found:
+    ratios = {name: model.poisson for name, model in models.items()}
+    if not ratios:
         raise UserError("there are no forests to compare: name a model file with --model")
-    if len(set(found.values())) > 1:
-        listed = ", ".join(f"{name} has {value:g}" for name, value in found.items())
+    if len(set(ratios.values())) > 1:
+        listed = ", ".join(f"{name} has {value:g}" for name, value in ratios.items())
         raise UserError(f"forests of different Poisson's ratios ({listed}): make a table of each")
-    return next(iter(found.values()))
+    return next(iter(ratios.values()))
 
 
 def load_models(paths: Sequence[str] | None) -> dict[str, Model]:
@@ -214,8 +219,5 @@ def load_models(paths: Sequence[str] | None) -> dict[str, Model]:
         If a file is not a model, or none is named and there are no default forests.
     """
     if not paths:
-        default = getattr(forest_model, "default_path", None)
-        if default is None:
-            raise UserError("there are no default forests: name a model file with --model")
-        paths = [str(default())]
-    return {path: forest_model.load_model(path) for path in dict.fromkeys(paths)}
+        paths = [str(default_path())]
+    return {path: load_model(path) for path in dict.fromkeys(paths)}

@@ -51,8 +51,8 @@ def plot(rows: Sequence[dict[str, Any]], path: str | Path) -> None:
                 s=60,
                 zorder=3,
             )
-        least = next(row["least_mean_error"] for row in shown if _case(row) == case)
-        marks["least of any element"] = axis.axhline(least, color="0.4", linestyle="--", zorder=2)
+        minimum = next(row["min_mean_error"] for row in shown if _case(row) == case)
+        marks["least of any element"] = axis.axhline(minimum, color="0.4", linestyle="--", zorder=2)
         axis.set(xscale="log", yscale="log", title=", ".join(case))
         axis.yaxis.set_major_formatter(FormatStrFormatter("%g"))
         axis.yaxis.set_minor_formatter(FormatStrFormatter("%g"))

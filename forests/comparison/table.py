@@ -12,16 +12,19 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from carillon.arguments import whole_number
 from carillon.fem.element import Array
+from carillon.options import option
 from carillon.progress import track
 from carillon.serial import serial_blas
 from forests.comparison.block_error import AT_ONCE, Errors, displacement_errors
-from forests.comparison.cases import CASES, Case
-from forests.comparison.database import Database
+from forests.comparison.cases import CASES, BlockCase
+from forests.comparison.database import MATERIALS, MOST_MATERIALS, Database
 from forests.comparison.methods import (
     Method,
     common_poisson,
@@ -29,13 +32,14 @@ from forests.comparison.methods import (
     databases_of,
     methods_of,
 )
+from forests.evaluate import MOST_BLOCKS
 from forests.model import Model
 
 TIMED_BLOCKS = 2000
 """Most blocks that a run for the cost per block takes."""
 
 TIMED_RUNS = 5
-"""Runs whose median is the cost per block, after one that warms up; least and most are kept too."""
+"""Runs whose median is the cost per block, after one that warms up; min and max are kept too."""
 
 SQUARE_METRES = 1e-18
 """Square of the displacement [m^2] that `block_error` calls 1 when moduli are in GPa.
@@ -48,6 +52,17 @@ and no coarsening reaches their displacements; the relative errors weigh all blo
 Row = dict[str, Any]
 
 
+@dataclass(frozen=True)
+class TableOptions:
+    """Blocks that the coarsenings are compared on."""
+
+    blocks: int = option(10_000, "of each range", type=whole_number(1, MOST_BLOCKS))
+    seed: int = option(0, "of the blocks", type=whole_number(0))
+    materials: int = option(
+        MATERIALS, "base materials of a database", type=whole_number(2, MOST_MATERIALS)
+    )
+
+
 def cost_per_block(method: Method, young: Array) -> Row:
     """Cost [s] of blocks (n, 8) that are coarsened together on one core, and in how many runs."""
     seconds = []
@@ -58,22 +73,22 @@ def cost_per_block(method: Method, young: Array) -> Row:
     timed = seconds[1:]
     return {
         "seconds_per_block": statistics.median(timed),
-        "seconds_per_block_least": min(timed),
-        "seconds_per_block_most": max(timed),
+        "seconds_per_block_min": min(timed),
+        "seconds_per_block_max": max(timed),
         "timed_runs": TIMED_RUNS,
     }
 
 
 def summary(errors: Errors) -> Row:
     """Errors over all blocks: mean and median, and the least that any element can reach."""
-    nodal, least = errors.relative("nodal"), errors.relative_least("nodal")
+    nodal, minimum = errors.relative("nodal"), errors.relative_minimum("nodal")
     row = {"mean_error": float(nodal.mean()), "median_error": float(np.median(nodal))}
     for load in ("inertial", "corner"):
         relative = errors.relative(load)
         row[f"mean_error_{load}"] = float(relative.mean())
         row[f"median_error_{load}"] = float(np.median(relative))
-    row["least_mean_error"] = float(least.mean())
-    row["least_median_error"] = float(np.median(least))
+    row["min_mean_error"] = float(minimum.mean())
+    row["min_median_error"] = float(np.median(minimum))
     row["mean_squared_m2"] = float(errors.squared["nodal"].mean()) * SQUARE_METRES
     return row
 
@@ -104,26 +119,27 @@ def _joined(pieces: Sequence[Errors]) -> Errors:
 @serial_blas
 def table(
     models: dict[str, Model],
-    blocks: int = 10_000,
-    seed: int = 0,
-    cases: Sequence[Case] = CASES,
-    databases: dict[Case, Database] | None = None,
+    options: TableOptions = TableOptions(),
+    databases: dict[BlockCase, Database] | None = None,
 ) -> list[Row]:
-    """Rows of Fig. 9 on `blocks` random blocks of each case, on one core.
+    """Rows of Fig. 9 on random blocks of each case, on one core.
 
     Parameters
     ----------
-    models : forests by the names of their files, all of one Poisson's ratio.
-    databases : of metamaterials, see `forests.comparison.methods.databases_of`; built if not given.
+    models
+        Forests by the names of their files, all of one Poisson's ratio.
+    databases
+        Of metamaterials, see `forests.comparison.methods.databases_of`; built if not given.
 
     Returns
     -------
-    One row for each case and method: `method`, `range_gpa`, `distribution`, `fill`, `scaled_by`
-    (of the case), `mean_error`, `median_error` (nodal forces), the same for inertial and corner
-    loads, `least_mean_error`, `least_median_error` (nodal, of any element whatsoever),
-    `mean_squared_m2` (absolute, nodal), `seconds_per_block` (median of `timed_runs`, with
-    `seconds_per_block_least` and `_most`), `storage_bytes`, `training_seconds` (None if unknown),
-    `clamped` (made for lower moduli than the blocks have), `blocks`, `seed`.
+    list of dict
+        One row for each case and method: `method`, `range_gpa`, `distribution`, `fill`, `scaled_by`
+        (of the case), `mean_error`, `median_error` (nodal forces), the same for inertial and corner
+        loads, `min_mean_error`, `min_median_error` (nodal, of any element whatsoever),
+        `mean_squared_m2` (absolute, nodal), `seconds_per_block` (median of `timed_runs`, with
+        `seconds_per_block_min` and `_max`), `storage_bytes`, `training_seconds` (None if unknown),
+        `clamped` (made for lower moduli than the blocks have), `blocks`, `seed`.
 
     Raises
     ------
@@ -132,19 +148,19 @@ def table(
     """
     poisson = common_poisson(models)
     if databases is None:
-        databases = databases_of(cases, poisson)
+        databases = databases_of(CASES, poisson, materials=options.materials)
     rows: list[Row] = []
-    for case in cases:
-        young = case.blocks(blocks, seed)
+    for case in CASES:
+        young = case.blocks(options.blocks, options.seed)
         methods = [*methods_of(models), *database_methods(case, databases)]
         errors = errors_of(young, methods, poisson, case.name)
-        rows += [_row(case, method, young, found) for method, found in zip(methods, errors)]
+        rows += [_row(case, method, young, each) for method, each in zip(methods, errors)]
         for row in rows:
-            row.update(blocks=blocks, seed=seed)
+            row.update(blocks=options.blocks, seed=options.seed)
     return rows
 
 
-def _row(case: Case, method: Method, young: Array, errors: Errors) -> Row:
+def _row(case: BlockCase, method: Method, young: Array, errors: Errors) -> Row:
     return {
         "method": method.name,
         **case.columns(),
@@ -195,7 +211,7 @@ def _heading(row: Row, width: int) -> list[str]:
     scaled = f", trained range times {row['scaled_by']:g}" if row["scaled_by"] != 1.0 else ""
     return [
         f"{low:g}..{high:g} GPa, {row['distribution']}, {row['fill']}{scaled}; least nodal error "
-        f"of any element {row['least_mean_error']:.4f} (median {row['least_median_error']:.4f})",
+        f"of any element {row['min_mean_error']:.4f} (median {row['min_median_error']:.4f})",
         "method".ljust(width) + "".join(name.rjust(size) for name, size in COLUMNS),
     ]
 

@@ -14,9 +14,11 @@ from typing import Any
 import numpy as np
 
 from carillon import provenance
+from carillon.arguments import number_between, whole_number
 from carillon.fem.element import Array
+from carillon.options import option
 from carillon.progress import track
-from forests.evaluate import coarsen, coarsen_with_derivatives
+from forests.evaluate import MOST_BLOCKS, coarsen, coarsen_with_derivatives
 from forests.model import FILLED, VOID, Model, default_path, load_model
 from forests.scaling import FEATURES, prepare
 from forests.studies.synthetic import coherent_blocks, complete_forests, random_blocks
@@ -44,12 +46,25 @@ BLOCKS_PER_LEAF = 5
 
 
 @dataclass(frozen=True)
+class ForestBenchmarkOptions:
+    """What is measured."""
+
+    forest: str | None = option(
+        None, "forests to measure (HDF5; default: those of the package)", metavar="FILE"
+    )
+    blocks: int = option(100_000, "evaluated in one run", type=whole_number(1, MOST_BLOCKS))
+    largest: float = option(
+        600.0, "of the largest forest [MB]", type=number_between(1e-3, 1e6), metavar="MB"
+    )
+
+
+@dataclass(frozen=True)
 class Timing:
     """Microseconds of a block in warm runs, and how many runs there were."""
 
     median: float
-    least: float
-    most: float
+    min: float
+    max: float
     runs: int
 
 
@@ -57,8 +72,18 @@ class Timing:
 class Rival:
     """scikit-learn's `predict` and ours for the same trees on the same blocks, on one core.
 
-    leaves : of all trees; predict, coarsen : see `Timing`; coarsen also computes the features,
-    which `predict` is given. difference : largest relative one of the moduli.
+    Attributes
+    ----------
+    trees : int
+        Of each forest.
+    leaves : int
+        Of all trees.
+    predict, coarsen : Timing
+        `coarsen` also computes the features, which `predict` is given.
+    ratio : float
+        How many times as fast ours is.
+    difference : float
+        Largest relative one of the moduli.
     """
 
     trees: int
@@ -70,7 +95,7 @@ class Rival:
 
 
 @dataclass(frozen=True)
-class Size:
+class SizeTiming:
     """A forest of complete trees; microseconds of a block, nanoseconds of one walk down a tree."""
 
     megabytes: float
@@ -86,7 +111,12 @@ class Size:
 class Result:
     """All measurements.
 
-    evaluation : by name and threads; load_ms : median time of loading the model, checks included.
+    Attributes
+    ----------
+    evaluation : dict
+        Timings by name and threads.
+    load_ms : float
+        Median time of loading the model [ms], checks included.
     """
 
     model: str
@@ -97,7 +127,7 @@ class Result:
     load_ms: float
     evaluation: dict[str, Timing]
     rival: Rival
-    sizes: list[Size]
+    sizes: list[SizeTiming]
     caches: dict[str, str]
     processor: str
 
@@ -122,7 +152,7 @@ def timed(function: Callable[[], object], blocks: int) -> Timing:
 
 def caches(folder: Path = CACHE_FOLDER) -> dict[str, str]:
     """Size of each cache that the first core uses, such as `{"L1 Data": "48K"}`."""
-    found = {}
+    sizes = {}
     for entry in sorted(folder.glob("index*")):
         try:
             level, kind, size = (
@@ -130,8 +160,8 @@ def caches(folder: Path = CACHE_FOLDER) -> dict[str, str]:
             )
         except OSError:
             continue
-        found[f"L{level}" if kind == "Unified" else f"L{level} {kind}"] = size
-    return found
+        sizes[f"L{level}" if kind == "Unified" else f"L{level} {kind}"] = size
+    return sizes
 
 
 def _scikit_forests(trees: int, leaves: int) -> tuple[list[Any], Model]:
@@ -190,34 +220,30 @@ def against_scikit_learn(young: Array, trees: int, leaves: int) -> Rival:
     )
 
 
-def over_size(sizes: Sequence[tuple[int, int]], young: Array, mesh: Array) -> list[Size]:
+def over_size(sizes: Sequence[tuple[int, int]], young: Array, mesh: Array) -> list[SizeTiming]:
     """Measure forests of complete trees on random blocks and on those of a mesh."""
-    found = []
+    timings = []
     for trees, depth in track(sizes, "forests of growing size", unit="forests"):
         model = complete_forests(trees, depth)
         random = timed(partial(coarsen, model, young), len(young))
         coherent = timed(partial(coarsen, model, mesh), len(mesh))
         walks = [1e3 * timing.median / (8 * trees) for timing in (random, coherent)]
-        found.append(Size(model.nbytes / 1e6, trees, depth, random, coherent, walks[0], walks[1]))
-    return found
+        timings.append(
+            SizeTiming(model.nbytes / 1e6, trees, depth, random, coherent, walks[0], walks[1])
+        )
+    return timings
 
 
-def benchmark(
-    path: str | Path | None = None, blocks: int = 100_000, largest: float = 600.0
-) -> Result:
-    """Measure the model at `path`, by default the one that comes with the package.
-
-    Parameters
-    ----------
-    blocks : how many are evaluated in one run.
-    largest : megabytes of the largest forest.
+def benchmark(options: ForestBenchmarkOptions) -> Result:
+    """Measure forests.
 
     Raises
     ------
     UserError
         See `forests.model.load_model`.
     """
-    path = default_path() if path is None else Path(path)
+    path = default_path() if options.forest is None else Path(options.forest)
+    blocks = options.blocks
     model = load_model(path)
     young, mesh = random_blocks(blocks), coherent_blocks(blocks)
     functions = {"coarsen": coarsen, "coarsen with derivatives": coarsen_with_derivatives}
@@ -235,7 +261,7 @@ def benchmark(
     sizes = [
         (trees, depth)
         for trees, depth in SIZES
-        if 2 * trees * BYTES_OF_LEAF * 2**depth <= 1e6 * largest
+        if 2 * trees * BYTES_OF_LEAF * 2**depth <= 1e6 * options.largest
     ]
     return Result(
         model=str(path),
@@ -258,7 +284,7 @@ def as_json(result: Result) -> dict[str, Any]:
 
 
 def _line(name: str, timing: Timing) -> str:
-    return f"{name:<42}{timing.median:>8.2f}{timing.least:>8.2f}{timing.most:>8.2f}"
+    return f"{name:<42}{timing.median:>8.2f}{timing.min:>8.2f}{timing.max:>8.2f}"
 
 
 def as_text(result: Result) -> str:
@@ -269,7 +295,7 @@ def as_text(result: Result) -> str:
         f"{result.model}: 2 x {result.trees} trees, {result.leaves:,} leaves, "
         f"{result.megabytes:.1f} MB, loaded in {result.load_ms:.1f} ms",
         f"{result.blocks:,} random blocks, {RUNS} warm runs",
-        f"{'microseconds of a block':<42}{'median':>8}{'least':>8}{'most':>8}",
+        f"{'microseconds of a block':<42}{'median':>8}{'min':>8}{'max':>8}",
         *(_line(name, timing) for name, timing in result.evaluation.items()),
         "",
         f"trees of scikit-learn, 2 x {rival.trees} with {rival.leaves:,} leaves, one core",

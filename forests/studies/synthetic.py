@@ -18,6 +18,9 @@ MOST_VOID = 0.5
 
 PIVOT_ROWS = 9
 
+SPLIT_ROWS = 1 << 20
+"""Origins of either kind that splits are chosen from, at most; as many as leaves do."""
+
 
 def random_blocks(count: int, seed: int = 0) -> Array:
     """Blocks (count, 8) of independent moduli in 0..10 GPa; up to half of the cells are void."""
@@ -89,17 +92,12 @@ def _splits(
     return feature, threshold
 
 
-def complete_forests(trees: int, depth: int, seed: int = 0, rows: int = 1 << 20) -> Model:
-    """Forests of complete trees, 56 bytes a leaf, whose leaves random blocks visit about evenly.
-
-    Parameters
-    ----------
-    rows : origins of either kind that the splits are chosen from, at most; as many as leaves do.
-    """
-    generator = np.random.default_rng(seed)
-    rows = min(rows, 8 << depth)
+def complete_forests(trees: int, depth: int) -> Model:
+    """Forests of complete trees, 56 bytes a leaf, whose leaves random blocks visit about evenly."""
+    generator = np.random.default_rng(0)
+    rows = min(SPLIT_ROWS, 8 << depth)
     # A quarter of the origins is void.
-    prepared = prepare(random_blocks(rows // 2, seed + 1), "log")
+    prepared = prepare(random_blocks(rows // 2, seed=1), "log")
     by_kind = [
         prepared.features[prepared.filled == bool(kind)][:rows].copy() for kind in (VOID, FILLED)
     ]

@@ -14,6 +14,7 @@ from carillon.errors import UserError
 from carillon.fem.element import Array
 from carillon.files import atomic_path
 from dataset_gen.generate import generate
+from dataset_gen.settings import ShardOptions
 from forests.layout import NODE
 from forests.model import RECORD
 from forests.training.dataset import Dataset, Samples, dataset_of, joined
@@ -22,7 +23,7 @@ from forests.training.ranks import Ranks
 from forests.training.rows import modulus_over_scale, rows_of
 from forests.training.scores import scores_of
 from forests.training.structure import Tree
-from forests.training.train import Trained, Training, train_trees
+from forests.training.train import Trained, TrainingOptions, train_trees
 
 logger = logging.getLogger(__name__)
 
@@ -49,28 +50,28 @@ VARIANTS: dict[str, dict[str, Any]] = {
 """Trainings that are compared, as what they change of the default one."""
 
 
-def fresh_samples(dataset: Dataset, samples: int = TEST_SAMPLES) -> dict[str, Samples]:
+def fresh_samples(dataset: Dataset) -> dict[str, Samples]:
     """Fitted samples by distribution, of a seed that the dataset does not have."""
     seed = 1 + max(part.seed for part in dataset.settings)
     drawn = dict.fromkeys(part.moduli for part in dataset.settings)
-    found = {}
+    by_distribution = {}
     for each in drawn:
-        shard = generate(
-            samples,
+        options = ShardOptions(
+            TEST_SAMPLES,
             seed,
             objective=dataset.objective,
             poisson=dataset.poisson,
-            progress=False,
             distribution=each.distribution,
             low=each.low,
             high=each.high,
         )
+        shard = generate(options, progress=False)
         name = f"{each.distribution} {each.low:g}..{each.high:g} GPa"
-        found[name] = joined(dataset_of([shard]).read(0, samples))
-    return found
+        by_distribution[name] = joined(dataset_of([shard]).read(0, TEST_SAMPLES))
+    return by_distribution
 
 
-def _errors(trained: Trained, samples: Samples, training: Training) -> Array:
+def _errors(trained: Trained, samples: Samples, training: TrainingOptions) -> Array:
     """Errors (n, 8) of log E, also with transforms that cannot be evaluated on a mesh."""
     errors = np.empty_like(samples.moduli)
     filled = samples.young > 0
@@ -91,7 +92,9 @@ def storage_of(trees: Iterable[Tree]) -> int:
     return sum(NODE.itemsize * len(tree.left) + 4 * RECORD * tree.leaves for tree in trees)
 
 
-def _row(dataset: Dataset, training: Training, workers: int, test: dict[str, Samples]) -> Row:
+def _row(
+    dataset: Dataset, training: TrainingOptions, workers: int, test: dict[str, Samples]
+) -> Row:
     trained = train_trees(dataset, training, Ranks(), workers)
     assert trained is not None
     leaves = sum(tree.leaves for tree in trained.trees.values())
@@ -109,7 +112,7 @@ def _row(dataset: Dataset, training: Training, workers: int, test: dict[str, Sam
 
 def variants(
     dataset: Dataset,
-    training: Training,
+    training: TrainingOptions,
     workers: int = 1,
     names: Sequence[str] = tuple(VARIANTS),
 ) -> list[Row]:
@@ -134,7 +137,7 @@ def variants(
 
 
 def learning_curve(
-    dataset: Dataset, training: Training, rows: Sequence[int], workers: int = 1
+    dataset: Dataset, training: TrainingOptions, rows: Sequence[int], workers: int = 1
 ) -> list[Row]:
     """Trainings on about so many rows of the dataset each, scored on fresh samples.
 
@@ -143,18 +146,18 @@ def learning_curve(
     UserError
         If the dataset has fewer rows than asked for.
     """
-    most = 8 * dataset.count
-    if max(rows) > most:
+    available = 8 * dataset.count
+    if max(rows) > available:
         raise UserError(
-            f"a curve up to {max(rows):,} rows: the dataset has {most:,}, name more shards"
+            f"a curve up to {max(rows):,} rows: the dataset has {available:,}, name more shards"
         )
     test = fresh_samples(dataset)
-    found = []
+    results = []
     for count in rows:
         part = dataset.thinned(-(-count // 8))
         logger.info(f"{8 * part.count:,} rows")
-        found.append({"rows": 8 * part.count, **_row(part, training, workers, test)})
-    return found
+        results.append({"rows": 8 * part.count, **_row(part, training, workers, test)})
+    return results
 
 
 def as_text(rows: Sequence[Row]) -> str:

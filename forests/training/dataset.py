@@ -91,16 +91,16 @@ class Dataset:
     def subset(self, samples: int) -> Samples:
         """About so many of the samples that are trained on: whole hypercubes, evenly spread."""
         cubes = -(-self.count // HYPERCUBE)
-        wanted = min(cubes, max(1, -(-samples // HYPERCUBE)))
-        chosen = (np.arange(wanted) * cubes + cubes // 2) // wanted
+        number = min(cubes, max(1, -(-samples // HYPERCUBE)))
+        chosen = (np.arange(number) * cubes + cubes // 2) // number
         runs = np.split(chosen, np.flatnonzero(np.diff(chosen) > 1) + 1)
         bounds = [(run[0] * HYPERCUBE, (run[-1] + 1) * HYPERCUBE) for run in runs]
         return joined(piece for run in bounds for piece in self.training(*map(int, run)))
 
     def thinned(self, samples: int) -> Dataset:
         """About so many samples: the first ones of every shard, in proportion."""
-        wanted = [max(1, -(-part.count * samples // self.count)) for part in self.settings]
-        pairs = zip(self.settings, wanted, self.readers, strict=True)
+        counts = [max(1, -(-part.count * samples // self.count)) for part in self.settings]
+        pairs = zip(self.settings, counts, self.readers, strict=True)
         return _dataset(
             [(replace(part, stop=part.start + count), reader) for part, count, reader in pairs]
         )
@@ -130,8 +130,10 @@ def open_dataset(paths: Sequence[str | Path]) -> Dataset:
     UserError
         If there is none, one is missing or damaged, or they do not belong together.
     """
-    found = [read_settings(path) for path in paths]
-    return _dataset([(settings, _reader_of(path)) for path, settings in in_order(paths, found)])
+    all_settings = [read_settings(path) for path in paths]
+    return _dataset(
+        [(settings, _reader_of(path)) for path, settings in in_order(paths, all_settings)]
+    )
 
 
 def _reader_of(path: str | Path) -> Reader:

@@ -28,8 +28,12 @@ ANCESTOR_ROWS = 64
 class Leaves:
     """Linear functions of one tree's leaves.
 
-    coefficients (leaves, 8): slopes of the seven features and the constant; low and high (leaves,):
-    range of the targets seen in the leaf, which bounds its answers.
+    Attributes
+    ----------
+    coefficients : (leaves, 8)
+        Slopes of the seven features and the constant.
+    low, high : (leaves,)
+        Range of the targets seen in the leaf, which bounds its answers.
     """
 
     coefficients: Array
@@ -41,7 +45,14 @@ class Leaves:
 class Sums:
     """What the rows seen so far mean for each leaf or node.
 
-    moments (n, 45), see `moments`; rows (n,) how many; low and high (n,) of their targets.
+    Attributes
+    ----------
+    moments : (n, 45)
+        See `moments`.
+    rows : (n,)
+        How many.
+    low, high : (n,)
+        Range of their targets.
     """
 
     moments: Array
@@ -72,14 +83,14 @@ def find_leaves(
     roots: NDArray[np.int32],
 ) -> NDArray[np.int32]:
     """Leaf number (n,) of each row (n, 7) float32 with its void pattern (n,)."""
-    found = np.empty(len(features), dtype=np.int32)
+    leaf_numbers = np.empty(len(features), dtype=np.int32)
     for row in range(len(features)):
         node = roots[pattern[row]]
         while left[node] >= 0:
             go_left = features[row, feature[node]] <= threshold[node]
             node = left[node] if go_left else right[node]
-        found[row] = leaf[node]
-    return found
+        leaf_numbers[row] = leaf[node]
+    return leaf_numbers
 
 
 def leaf_of(tree: Tree, features: Features, pattern: NDArray[np.uint8]) -> NDArray[np.int32]:
@@ -103,15 +114,15 @@ def _accumulate(
     features: Features,
     target: Array,
     weight: Array,
-    found: NDArray[np.int32],
+    leaf_numbers: NDArray[np.int32],
     moments: Array,
     rows: NDArray[np.int64],
     low: Array,
     high: Array,
 ) -> None:
     values = np.empty(FEATURES + 2)
-    for row in range(len(found)):
-        leaf = found[row]
+    for row in range(len(leaf_numbers)):
+        leaf = leaf_numbers[row]
         for k in range(FEATURES):
             values[k] = features[row, k]
         values[FEATURES] = 1.0
@@ -130,12 +141,12 @@ def _accumulate(
 
 def add_rows(sums: Sums, tree: Tree, rows: Rows) -> None:
     """Add rows to the sums of a tree's leaves."""
-    found = leaf_of(tree, rows.features, rows.pattern)
+    leaf_numbers = leaf_of(tree, rows.features, rows.pattern)
     _accumulate(
         rows.features,
         rows.target,
         rows.weight,
-        found,
+        leaf_numbers,
         sums.moments,
         sums.rows,
         sums.low,
@@ -178,10 +189,12 @@ def solve_leaves(tree: Tree, sums: Sums, prior: float) -> Leaves:
 
     Parameters
     ----------
-    sums : over the rows of each leaf.
-    prior : rows that the nearest ancestor with `ANCESTOR_ROWS` counts for in a leaf's regression.
-        A leaf with few rows, or with rows that leave a slope open, so falls back to what holds
-        around it, and one without rows takes the ancestor's function.
+    sums
+        Over the rows of each leaf.
+    prior
+        Rows that the nearest ancestor with `ANCESTOR_ROWS` counts for in a leaf's regression. A
+        leaf with few rows, or with rows that leave a slope open, so falls back to what holds around
+        it, and one without rows takes the ancestor's function.
     """
     nodes, parent = _over_nodes(tree, sums)
     leaves = np.flatnonzero(tree.left < 0)
@@ -205,7 +218,7 @@ def solve_leaves(tree: Tree, sums: Sums, prior: float) -> Leaves:
 
 def answers_of(tree: Tree, leaves: Leaves, rows: Rows) -> Array:
     """Answers (n,) of a tree to rows, bounded."""
-    found = leaf_of(tree, rows.features, rows.pattern)
-    coefficients = leaves.coefficients[found]
+    leaf_numbers = leaf_of(tree, rows.features, rows.pattern)
+    coefficients = leaves.coefficients[leaf_numbers]
     linear = (rows.features * coefficients[:, :FEATURES]).sum(axis=1) + coefficients[:, FEATURES]
-    return np.asarray(np.clip(linear, leaves.low[found], leaves.high[found]))
+    return np.asarray(np.clip(linear, leaves.low[leaf_numbers], leaves.high[leaf_numbers]))

@@ -142,15 +142,21 @@ def grow_linear(
 
     Parameters
     ----------
-    features, target, weight : all rows (n, 7), (n,), (n,).
-    rows, starts : group g has the rows `rows[starts[g]:starts[g + 1]]`, in random order; `rows` is
-        reordered.
-    max_leaves, min_leaf, depth : leaves in all, rows a leaf needs, splits from root to leaf.
-    generator : draws the thresholds that are tried.
+    features : (n, 7) float32
+        Of all rows.
+    target, weight : (n,)
+        Of all rows.
+    rows, starts
+        Group g has the rows `rows[starts[g]:starts[g + 1]]`, in random order; `rows` is reordered.
+    max_leaves, min_leaf, depth
+        Leaves in all, rows a leaf needs, splits from root to leaf.
+    generator
+        Draws the thresholds that are tried.
 
     Returns
     -------
-    feature, threshold, left, right over the nodes; group g has root g, leaves have `left` -1.
+    feature, threshold, left, right : (nodes,)
+        Splits; group g has root g, leaves have `left` -1.
     """
     roots = len(starts) - 1
     size = roots + 2 * max(0, min(max_leaves, len(rows)) - roots)

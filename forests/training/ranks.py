@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from carillon.errors import UserError
-from carillon.ranks import give_up
 from dataset_gen.shards import PIECE_ROWS
 from forests.training.leaves import Sums
 
@@ -27,11 +25,11 @@ class Ranks:
         """Whether this rank writes the result and speaks for all."""
         return self.rank == 0
 
-    def deal(self, jobs: range) -> range:
+    def own_jobs(self, jobs: range) -> range:
         """This rank's share of independent jobs, one after the other to all ranks."""
         return jobs[self.rank :: self.size]
 
-    def share(self, samples: int) -> tuple[int, int]:
+    def own_samples(self, samples: int) -> tuple[int, int]:
         """First and past-the-last position of this rank's samples: whole pieces, in order."""
         pieces = -(-samples // PIECE_ROWS)
         begin, end = (pieces * (self.rank + k) // self.size * PIECE_ROWS for k in (0, 1))
@@ -65,25 +63,22 @@ class Ranks:
             else:
                 self._comm.Reduce(values, None, operation)
 
-    def agree(self, program: str, action: Callable[[], T]) -> T | None:
-        """The result of `action`; None on every rank if it was refused input on any of them.
+    def agree(self, action: Callable[[], T]) -> T:
+        """The result of `action`, which refuses its input on every rank if it does on any of them.
 
-        What was wrong is printed once.
+        Raises
+        ------
+        UserError
+            On every rank, what the first of those that refused it said.
         """
         if self._comm is None:
             return action()
-        result, complaint = None, None
+        result, refusal = None, None
         try:
             result = action()
         except UserError as error:
-            complaint = str(error)
-        complaints = [found for found in self._comm.allgather(complaint) if found is not None]
-        if not complaints:
-            return result
-        if self.first:
-            print(f"{program}: {complaints[0]}", file=sys.stderr, flush=True)
-        return None
-
-    def end_all(self, program: str, error: BaseException) -> None:
-        """Say what has happened to this rank alone, and end all of them."""
-        give_up(self._comm, program, error)
+            refusal = str(error)
+        refusals = [each for each in self._comm.allgather(refusal) if each is not None]
+        if refusals:
+            raise UserError(refusals[0])
+        return cast(T, result)

@@ -48,7 +48,7 @@ class Tree:
 
 
 @dataclass(frozen=True)
-class Limits:
+class TreeLimits:
     """What a tree may grow to: leaves, rows a leaf needs, splits from a root to a leaf."""
 
     max_leaves: int
@@ -102,7 +102,7 @@ def flatten(tree: Any) -> Tree:
 def _by_variance(kind: str, split_features: int) -> Callable[..., Tree]:
     """Grower by scikit-learn's estimator of that name, whose splits leave the least variance."""
 
-    def grow(rows: Rows, limits: Limits, seed: int) -> Tree:
+    def grow(rows: Rows, limits: TreeLimits, seed: int) -> Tree:
         from sklearn import tree  # whose import takes a second, and only training has use of it
 
         estimator = getattr(tree, kind)(
@@ -118,7 +118,7 @@ def _by_variance(kind: str, split_features: int) -> Callable[..., Tree]:
     return grow
 
 
-def _by_linear_fit(rows: Rows, limits: Limits, seed: int) -> Tree:
+def _by_linear_fit(rows: Rows, limits: TreeLimits, seed: int) -> Tree:
     """Grower whose splits leave the least error of linear leaves, see `linear_splits`."""
     generator = np.random.default_rng(seed)
     order = generator.permutation(len(rows))
@@ -141,7 +141,7 @@ def _by_linear_fit(rows: Rows, limits: Limits, seed: int) -> Tree:
     return tree_of(*splits, roots=differing.argmin(axis=1))
 
 
-GROWERS: dict[str, Callable[[Rows, Limits, int], Tree]] = {
+GROWERS: dict[str, Callable[[Rows, TreeLimits, int], Tree]] = {
     "linear": _by_linear_fit,
     "best": _by_variance("DecisionTreeRegressor", SPLIT_FEATURES),
     "extra": _by_variance("ExtraTreeRegressor", FEATURES),

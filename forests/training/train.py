@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple, TypeVar
@@ -13,18 +13,20 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from carillon import provenance
+from carillon.arguments import number_between, whole_number
 from carillon.errors import UserError
+from carillon.options import option
 from carillon.progress import track
-from dataset_gen.shards import Shard
+from forests.layout import MOST_LEAVES
 from forests.model import FILLED, VOID, Model
 from forests.scaling import TRANSFORMS
-from forests.training.dataset import Dataset, Samples, dataset_of, joined
+from forests.training.dataset import Dataset, Samples, joined
 from forests.training.join import join
 from forests.training.leaves import Leaves, Sums, add_rows, solve_leaves
 from forests.training.ranks import Ranks
 from forests.training.rows import STUDIED, rows_of
 from forests.training.scores import held_out_scores, uniform_scores
-from forests.training.structure import GROWERS, Limits, Rows, Tree
+from forests.training.structure import GROWERS, Rows, Tree, TreeLimits
 
 logger = logging.getLogger(__name__)
 
@@ -34,35 +36,36 @@ KINDS = {VOID: "void", FILLED: "filled"}
 
 
 @dataclass(frozen=True)
-class Training:
-    """Parameters of the training.
+class TrainingOptions:
+    """Parameters of the training."""
 
-    Attributes
-    ----------
-    trees, depth : trees a forest, their largest depth.
-    max_leaves : most leaves of a tree; 56 bytes each in the model.
-    min_leaf : rows of the subset that a leaf needs.
-    structure_rows : rows of the subset that the splits of both forests are chosen from.
-    prior : see `forests.training.leaves.solve_leaves`.
-    uniform_weight : weight of blocks of one material; they are few but fill most real objects.
-    transform, grower : see `forests.scaling`, `forests.training.structure`.
-    """
-
-    trees: int = 3
-    depth: int = 20
-    max_leaves: int = 30_000
-    min_leaf: int = 30
-    structure_rows: int = 5_000_000
-    prior: float = 0.5
-    uniform_weight: float = 400.0
-    transform: str = "log"
-    grower: str = "linear"
-    seed: int = 0
+    trees: int = option(3, "of each of the two forests", type=whole_number(1, 1000))
+    depth: int = option(20, "of a tree, at most", type=whole_number(1, 1000))
+    max_leaves: int = option(
+        30_000, "of a tree, at most; 56 bytes each", type=whole_number(1, MOST_LEAVES)
+    )
+    min_leaf: int = option(30, "rows of the subset that a leaf needs", type=whole_number(1))
+    structure_rows: int = option(
+        5_000_000, "rows of the subset that splits are chosen from", type=whole_number(1)
+    )
+    prior: float = option(
+        0.5,
+        "rows that the surroundings of a leaf count for in it",
+        type=number_between(1e-9, 1e9),
+    )
+    uniform_weight: float = option(
+        400.0,
+        "weight of blocks of one material; they are few but fill most real objects",
+        type=number_between(1e-9, 1e9),
+    )
+    transform: str = option("log", "of the features and the target", choices=TRANSFORMS)
+    grower: str = option("linear", "how splits are chosen", choices=GROWERS)
+    seed: int = option(0, "of the splits", type=whole_number(0))
 
     @property
-    def limits(self) -> Limits:
+    def limits(self) -> TreeLimits:
         """What a tree may grow to."""
-        return Limits(self.max_leaves, self.min_leaf, self.depth)
+        return TreeLimits(self.max_leaves, self.min_leaf, self.depth)
 
     @property
     def jobs(self) -> range:
@@ -91,7 +94,7 @@ class Training:
 
 def grow_trees(
     dataset: Dataset,
-    training: Training,
+    training: TrainingOptions,
     jobs: range,
     workers: int = 1,
     progress: bool = True,
@@ -122,11 +125,11 @@ def grow_trees(
     grown = Parallel(n_jobs=workers, prefer="threads", return_as="generator")(
         delayed(grow)(job) for job in jobs
     )
-    found = track(grown, "growing", total=len(jobs), unit="trees", visible=progress)
-    return dict(zip(jobs, found, strict=True))
+    trees = track(grown, "growing", total=len(jobs), unit="trees", visible=progress)
+    return dict(zip(jobs, trees, strict=True))
 
 
-def _require_rows(rows: Rows, kind: int, training: Training, tell: bool) -> None:
+def _require_rows(rows: Rows, kind: int, training: TrainingOptions, tell: bool) -> None:
     if len(rows) < 2 * training.min_leaf:
         raise UserError(
             f"{len(rows)} rows with a {KINDS[kind]} origin, expected at least "
@@ -143,7 +146,7 @@ def _require_rows(rows: Rows, kind: int, training: Training, tell: bool) -> None
 
 def fit_leaves(
     dataset: Dataset,
-    training: Training,
+    training: TrainingOptions,
     trees: dict[int, Tree],
     ranks: Ranks,
     workers: int = 1,
@@ -153,11 +156,16 @@ def fit_leaves(
 
     Returns
     -------
-    Leaves of every tree, samples held out, and how many were trained on; on the first rank.
+    leaves : dict
+        Leaves of every tree, on the first rank.
+    held_out : Samples
+        Samples that were not trained on, on the first rank.
+    used : int
+        How many were trained on, on the first rank.
     """
     sums = {job: Sums.nothing(tree.leaves) for job, tree in trees.items()}
     held: list[Samples] = []
-    begin, end = ranks.share(dataset.count)
+    begin, end = ranks.own_samples(dataset.count)
 
     def prepared() -> Iterator[tuple[tuple[Rows, Rows], int]]:
         for piece in dataset.read(begin, end):
@@ -205,7 +213,14 @@ def _ahead(pool: ThreadPoolExecutor, items: Iterator[T]) -> Iterator[T]:
 class Trained(NamedTuple):
     """Both steps' result.
 
-    trees and leaves by tree number; samples held out; facts: seconds, rows, ranks, workers.
+    Attributes
+    ----------
+    trees, leaves
+        By tree number.
+    held_out
+        Samples that were not trained on.
+    facts
+        Seconds, rows, ranks and workers by name.
     """
 
     trees: dict[int, Tree]
@@ -216,7 +231,7 @@ class Trained(NamedTuple):
 
 def train_trees(
     dataset: Dataset,
-    training: Training,
+    training: TrainingOptions,
     ranks: Ranks,
     workers: int = 1,
     progress: bool = True,
@@ -226,21 +241,25 @@ def train_trees(
 
     Parameters
     ----------
-    workers : threads of every rank.
-    grown : splits by tree number from `grow_trees` and the seconds they took, if they are there.
+    workers
+        Threads of every rank.
+    grown
+        Splits by tree number from `grow_trees` and the seconds they took, if they are there.
 
     Returns
     -------
-    The trees on the first rank, None on the others. They depend on the number of ranks to rounding.
+    Trained or None
+        The trees on the first rank, None on the others. They depend on the number of ranks to
+        rounding.
     """
     training.validate()
     begin = time.perf_counter()
     if grown is None:
         shown = progress and ranks.first
-        mine = grow_trees(dataset, training, ranks.deal(training.jobs), workers, shown)
+        mine = grow_trees(dataset, training, ranks.own_jobs(training.jobs), workers, shown)
         grown = ranks.together(mine), time.perf_counter() - begin
-    found, structure_seconds = grown
-    trees = {job: found[job] for job in training.jobs}
+    splits, structure_seconds = grown
+    trees = {job: splits[job] for job in training.jobs}
     begin = time.perf_counter()
     leaves, held, used = fit_leaves(dataset, training, trees, ranks, workers, progress)
     if not ranks.first:
@@ -258,7 +277,7 @@ def train_trees(
     return Trained(trees, leaves, held, facts)
 
 
-def model_of(dataset: Dataset, training: Training, trained: Trained) -> Model:
+def model_of(dataset: Dataset, training: TrainingOptions, trained: Trained) -> Model:
     """The model that evaluates trained trees, with its scores and its provenance."""
     void, filled = (
         [(trained.trees[j], trained.leaves[j]) for j in training.jobs if training.kind(j) == kind]
@@ -282,32 +301,7 @@ def model_of(dataset: Dataset, training: Training, trained: Trained) -> Model:
     return replace(model, scores=scores)
 
 
-def train(
-    dataset: Dataset | Sequence[Shard],
-    training: Training | None = None,
-    workers: int = 1,
-    progress: bool = True,
-) -> Model:
-    """Train the forests of void and of filled origins on a dataset's converged samples.
-
-    Parameters
-    ----------
-    workers : threads; the result does not depend on it.
-
-    Raises
-    ------
-    UserError
-        For impossible parameters, shards that do not belong together, or too few samples of either
-        kind.
-    """
-    training = training or Training()
-    data = dataset if isinstance(dataset, Dataset) else dataset_of(dataset)
-    trained = train_trees(data, training, Ranks(), workers, progress)
-    assert trained is not None
-    return model_of(data, training, trained)
-
-
-def parameters_of(dataset: Dataset, training: Training) -> dict[str, Any]:
+def parameters_of(dataset: Dataset, training: TrainingOptions) -> dict[str, Any]:
     """What a training depends on, for the provenance."""
     ranges = [
         [part.seed, part.distribution, part.low, part.high, part.start, part.stop]

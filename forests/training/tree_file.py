@@ -48,7 +48,7 @@ def load_trees(
         If a file is missing, damaged or of another training, or the trees are not each there once.
     """
     expected = json.dumps(parameters, sort_keys=True)
-    found: dict[int, Tree] = {}
+    trees: dict[int, Tree] = {}
     seconds = 0.0
     for path in paths:
         with open_h5(path, KIND, SCHEMA, sealed=True) as file:
@@ -59,17 +59,17 @@ def load_trees(
             tree = Tree(**{name: read(file, name, (None,), kind) for name, kind in kinds.items()})
         if theirs != expected:
             raise UserError(f"{path}: {_difference(json.loads(theirs), json.loads(expected))}")
-        if job in found:
+        if job in trees:
             raise UserError(f"{path}: is tree {job}, which another file holds too")
         _require_sound(path, tree)
-        found[job] = tree
-    wanted = set(range(2 * parameters["trees"]))
-    if missing := sorted(wanted - set(found)):
+        trees[job] = tree
+    numbers = set(range(2 * parameters["trees"]))
+    if missing := sorted(numbers - set(trees)):
         raise UserError(
-            f"tree {missing[0]} is missing, {len(found)} of {len(wanted)} trees are named; grow it "
-            f"with python -m forests grow --tree {missing[0]}"
+            f"tree {missing[0]} is missing, {len(trees)} of {len(numbers)} trees are named; grow "
+            f"it with python -m forests grow --tree {missing[0]}"
         )
-    return found, seconds
+    return trees, seconds
 
 
 def _difference(theirs: dict[str, Any], expected: dict[str, Any]) -> str:

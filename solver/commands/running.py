@@ -11,9 +11,9 @@ from typing import Any
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from carillon.files import atomic_path, require_writable
+from carillon import outputs
+from carillon.files import atomic_path
 from carillon.options import add_options
-from carillon.pictures import require_plottable
 from carillon.runtime import limit_threads, warn_about_reference_blas
 from solver.analysis.problem import ProblemOptions
 from solver.distribution.collective import bcast_from_root
@@ -58,11 +58,7 @@ def require_outputs(arguments: argparse.Namespace, comm: MPI.Comm = MPI.COMM_SEL
         given = vars(arguments)
         inputs = [given[name] for name in INPUTS if given.get(name) is not None]
         files = [path for each in inputs for path in (each if isinstance(each, list) else [each])]
-        if given.get("plot") is not None:
-            require_plottable(given["plot"])
-        for name in ("out", "plot"):
-            if given.get(name) is not None:
-                require_writable(given[name], files)
+        outputs.require_outputs(arguments, files)
 
     bcast_from_root(comm, check)
 

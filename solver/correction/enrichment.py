@@ -183,7 +183,8 @@ def _independent(system: System, ritz: Ritz, Z: Array) -> tuple[Array, Array, Ar
 
     Returns
     -------
-    The columns (local, a), X^T M Z, Z^T M Z, and whether Z was good as it is.
+    tuple[Array, Array, Array, bool]
+        The columns (local, a), X^T M Z, Z^T M Z, and whether Z was good as it is.
     """
     for passes in range(MOST_PASSES):
         Z -= system.rigid @ system.inner(ritz.mass_rigid, Z)
@@ -214,7 +215,8 @@ def _lowest(
 
     Returns
     -------
-    values (k,), and coefficients of X (m, k) and of Z (a, k).
+    tuple[Array, Array, Array]
+        Values (k,), and coefficients of X (m, k) and of Z (a, k).
     """
     basis, _ = orthonormal(_outside(overlap, gram))
     # Q = (Z - X C) T is orthonormal and orthogonal to X; K X is Theta M X within the subspace.

@@ -72,7 +72,8 @@ def decompose(
 
     Returns
     -------
-    The decomposition and the nodes (n,) in its order: by subdomain, then by number.
+    tuple[Decomposition, NDArray[np.int64]]
+        The decomposition and the nodes (n,) in its order: by subdomain, then by number.
 
     Raises
     ------

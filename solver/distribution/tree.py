@@ -72,7 +72,9 @@ def build_tree(
 
     Returns
     -------
-    The tree, and the new number (parts,) of each subdomain: leaves of the tree from left to right.
+    tuple[MergeTree, NDArray[np.int32]]
+        The tree, and the new number (parts,) of each subdomain: leaves of the tree from left to
+        right.
 
     Notes
     -----

@@ -116,8 +116,9 @@ class Subdomain:
 
         Returns
         -------
-        values (k,) [rad^2/s^2] and mass-orthonormal vectors (3 (stop - start), k), with which the
-        stiffness of the subdomain by itself is diagonal.
+        tuple[Array, Array]
+            Values (k,) [rad^2/s^2] and mass-orthonormal vectors (3 (stop - start), k), with which
+            the stiffness of the subdomain by itself is diagonal.
         """
         stiffness, mass = elements.stiffness(), elements.nodal_mass()
         alone = NodeRows(self.pattern)

@@ -64,8 +64,9 @@ def lowest_modes(
 
     Returns
     -------
-    values (count,) ascending and M-orthonormal vectors (3 n, count), Ritz pairs of each other:
-    the values are upper bounds, and close for all but the last ones.
+    tuple[Array, Array]
+        Values (count,) ascending and M-orthonormal vectors (3 n, count), Ritz pairs of each other:
+        the values are upper bounds, and close for all but the last ones.
     """
     size = 3 * len(planes)
     if size <= DENSE_UNKNOWNS or count > DENSE_FRACTION * size:

@@ -218,7 +218,8 @@ def lowest_pairs(
 
     Returns
     -------
-    values (k,) and coefficients Q (k1 + k2, k).
+    tuple[Array, Array]
+        Values (k,) and coefficients Q (k1 + k2, k).
     """
     K, M = reduced
     tally.flops += eigen_flops(len(K), M is not None)

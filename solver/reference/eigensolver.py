@@ -62,9 +62,10 @@ def smallest_eigenpairs(
 
     Returns
     -------
-    values (k,) ascending, vectors (local, k), outer iterations; k may be smaller than
-    `count`, which is for the caller to judge.  The vectors are M-orthonormal but for copies of a
-    multiple eigenvalue, which are so to the tolerance.
+    tuple[Array, Array, int]
+        Values (k,) ascending, vectors (local, k), outer iterations; k may be smaller than `count`,
+        which is for the caller to judge.  The vectors are M-orthonormal but for copies of a
+        multiple eigenvalue, which are so to the tolerance.
 
     Raises
     ------

@@ -146,7 +146,9 @@ def complete(
 
     Returns
     -------
-    Eigenpairs, of which the first `modes` are complete, and the count with what is computed now.
+    tuple[Truth, Inertia | None]
+        Eigenpairs, of which the first `modes` are complete, and the count with what is computed
+        now.
 
     Raises
     ------

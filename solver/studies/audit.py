@@ -126,7 +126,8 @@ def gap_below_last(values: Array) -> tuple[float, int]:
 
     Returns
     -------
-    The value in the gap, and how many of the `values` are below it.
+    tuple[float, int]
+        The value in the gap, and how many of the `values` are below it.
 
     Examples
     --------

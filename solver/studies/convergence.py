@@ -58,8 +58,9 @@ def correction_history(
 
     Returns
     -------
-    Plain values: `exact` (modes - 6,), and `histories`, each with `start`, `acceleration`, `values`
-    (steps + 1, modes - 6) and their errors, `eigenvalue_error`.
+    dict[str, Any]
+        Plain values: `exact` (modes - 6,), and `histories`, each with `start`, `acceleration`,
+        `values` (steps + 1, modes - 6) and their errors, `eigenvalue_error`.
 
     Raises
     ------

@@ -188,16 +188,16 @@ hostile(
     "table --model ZOO/forests.h5 --blocks 10 --materials 2 --database no/d.h5",
     "no/",
 )
-hostile("benchmark of no model", "benchmark --model nowhere.h5", "nowhere.h5")
+hostile("benchmark of no model", "benchmark --forest nowhere.h5", "nowhere.h5")
 each(
     "benchmark's blocks",
-    "benchmark --model ZOO/forests.h5 --blocks VALUE",
+    "benchmark --forest ZOO/forests.h5 --blocks VALUE",
     ["0", "nan", str(2**64), "9000000000000000000"],
     "blocks",
 )
 each(
     "benchmark's largest",
-    "benchmark --model ZOO/forests.h5 --blocks 10 --largest VALUE",
+    "benchmark --forest ZOO/forests.h5 --blocks 10 --largest VALUE",
     [*NO_NUMBERS, "0", "-1", "1e300", "1e9"],
     "largest",
 )

@@ -33,8 +33,8 @@ def cost(study: ForestsStudy) -> Table:
         [
             Column("evaluation", "Evaluation"),
             Column("seconds", "Median", "seconds", "s"),
-            Column(f"seconds{LEAST}", "least", "seconds", "s"),
-            Column(f"seconds{MOST}", "most", "seconds", "s"),
+            Column(f"seconds{LEAST}", "min", "seconds", "s"),
+            Column(f"seconds{MOST}", "max", "seconds", "s"),
         ],
         [{"evaluation": name, **_spread("seconds", timing)} for name, timing in timings.items()],
         conditions=conditions(
@@ -58,7 +58,7 @@ def _first_timing(study: ForestsStudy) -> dict[str, Any]:
 
 def _spread(key: str, timing: dict[str, Any]) -> dict[str, float]:
     """Median, least and most of a timing [s], as values of the column `key` and its two others."""
-    ends = {"": "median", LEAST: "least", MOST: "most"}
+    ends = {"": "median", LEAST: "min", MOST: "max"}
     return {f"{key}{end}": MICRO * timing[name] for end, name in ends.items()}
 
 
@@ -73,12 +73,12 @@ def sizes(study: ForestsStudy) -> Table:
             Column("trees", "Trees of each forest", "count"),
             Column("depth", "Depth", "count"),
             Column("random", "Random blocks", "seconds", "s"),
-            Column(f"random{LEAST}", "least", "seconds", "s", shown=False),
-            Column(f"random{MOST}", "most", "seconds", "s", shown=False),
+            Column(f"random{LEAST}", "min", "seconds", "s", shown=False),
+            Column(f"random{MOST}", "max", "seconds", "s", shown=False),
             Column("random_walk", "a walk", "seconds", "s"),
             Column("coherent", "Blocks of a mesh", "seconds", "s"),
-            Column(f"coherent{LEAST}", "least", "seconds", "s", shown=False),
-            Column(f"coherent{MOST}", "most", "seconds", "s", shown=False),
+            Column(f"coherent{LEAST}", "min", "seconds", "s", shown=False),
+            Column(f"coherent{MOST}", "max", "seconds", "s", shown=False),
             Column("coherent_walk", "a walk", "seconds", "s"),
         ],
         [_size_row(size) for size in study.benchmark["sizes"]],

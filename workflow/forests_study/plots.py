@@ -80,7 +80,7 @@ def _panel(axis: Any, rows: Sequence[Row], marks: dict[str, tuple[str, str]]) ->
             linestyle="none",
             label=method_of(row),
         )
-    least = rows[0]["least_mean_error"]
+    least = rows[0]["min_mean_error"]
     axis.axhline(least, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)), label="least of any")
     axis.set(xscale="log", yscale="log")
     _plain(axis.yaxis)

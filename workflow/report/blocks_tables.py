@@ -16,8 +16,8 @@ LOWER_BOUND = "least of any element"
 
 COST = (
     Column("seconds_per_block", "Cost per block", "seconds", "s"),
-    Column(f"seconds_per_block{LEAST}", "least", "seconds", "s"),
-    Column(f"seconds_per_block{MOST}", "most", "seconds", "s"),
+    Column(f"seconds_per_block{LEAST}", "min", "seconds", "s"),
+    Column(f"seconds_per_block{MOST}", "max", "seconds", "s"),
 )
 
 MEASURE = (
@@ -123,8 +123,8 @@ def _least_row(rows: Sequence[Row], kinds: Sequence[str]) -> Row:
     for row in rows:
         key = f"kind{kinds.index(kind_of(row))}"
         found |= {
-            f"{key}_nodal": row["least_mean_error"],
-            f"{key}_nodal_median": row["least_median_error"],
+            f"{key}_nodal": row["min_mean_error"],
+            f"{key}_nodal_median": row["min_median_error"],
         }
     return found
 

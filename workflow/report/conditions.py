@@ -94,7 +94,7 @@ class Repeats:
     spread: str
 
 
-IN_COLUMNS = "least and most of the runs: columns ending in _least and _most of the CSV file"
+IN_COLUMNS = "min and max of the runs: columns ending in _min and _max of the CSV file"
 ONE_COLD_RUN = Repeats("1, cold", "unknown, as of any single run")
 NOT_TIMED = Repeats("1", "none, as nothing is timed; a repetition differs by rounding")
 

@@ -38,7 +38,7 @@ def methods(found: Mapping[str, Row], titles: Mapping[str, str]) -> Table:
     extremes = [
         Column(f"{name}{end}", f"{METHODS[name]}, {label}", "seconds", "s", shown=False)
         for name in timed
-        for end, label in ((LEAST, "least"), (MOST, "most"))
+        for end, label in ((LEAST, "min"), (MOST, "max"))
     ]
     return Table(
         "methods",
@@ -130,8 +130,8 @@ def spreads(found: Mapping[str, Row], titles: Mapping[str, str]) -> Table:
             Column("method", "Method"),
             Column("runs", "Runs", "count"),
             Column("seconds", "Median", "seconds", "s"),
-            Column(f"seconds{LEAST}", "least", "seconds", "s"),
-            Column(f"seconds{MOST}", "most", "seconds", "s"),
+            Column(f"seconds{LEAST}", "min", "seconds", "s"),
+            Column(f"seconds{MOST}", "max", "seconds", "s"),
             Column("error_median", "Error, median", "percent"),
             Column("error_p90", "90 % below", "percent"),
             Column("error_max", "worst", "percent"),
@@ -172,11 +172,11 @@ def ratios(found: Mapping[str, Row], titles: Mapping[str, str]) -> Table:
             Column("method", "Method"),
             Column("base", "Base"),
             Column("ratio", "Speed-up", "times"),
-            Column(f"ratio{LEAST}", "least", "times"),
-            Column(f"ratio{MOST}", "most", "times"),
+            Column(f"ratio{LEAST}", "min", "times"),
+            Column(f"ratio{MOST}", "max", "times"),
             Column("with_precompute", "with precomputation", "times"),
-            Column(f"with_precompute{LEAST}", "least", "times", shown=False),
-            Column(f"with_precompute{MOST}", "most", "times", shown=False),
+            Column(f"with_precompute{LEAST}", "min", "times", shown=False),
+            Column(f"with_precompute{MOST}", "max", "times", shown=False),
         ],
         [
             {

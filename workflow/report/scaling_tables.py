@@ -35,7 +35,7 @@ def scaling(found: Mapping[str, Row], titles: Mapping[str, str]) -> Table:
             Column("n_dofs", "Unknowns", "count"),
             Column("subdomains", "Subdomains", "count"),
             Column("measured", "Measured", "seconds", "s"),
-            Column(f"measured{LEAST}", "least", "seconds", "s", shown=False),
+            Column(f"measured{LEAST}", "min", "seconds", "s", shown=False),
             Column(f"measured{MOST}", "slowest", "seconds", "s"),
             Column("modelled", "Model", "modelled", "s"),
             Column("note", "Note"),

@@ -3,7 +3,7 @@
 The CSV file begins with lines `# key: value`: which columns tell rows apart, of what kind each
 column is, and under which conditions the numbers were measured. Readers skip them as comments, for
 instance `pandas.read_csv(path, comment="#")`. Where a number was measured several times, the
-columns `NAME_least` and `NAME_most` hold the spread of the column `NAME`; a column `NAME_kind` says
+columns `NAME_min` and `NAME_max` hold the spread of the column `NAME`; a column `NAME_kind` says
 of what kind the values of `NAME` are, row by row.
 """
 
@@ -21,7 +21,7 @@ from carillon.files import atomic_path
 from workflow.report.conditions import Conditions, read_conditions
 from workflow.report.numbers import show
 
-LEAST, MOST, KIND = "_least", "_most", "_kind"
+LEAST, MOST, KIND = "_min", "_max", "_kind"
 """Endings of columns that tell something about another column."""
 COMMENT = "# "
 

@@ -54,7 +54,7 @@ rule benchmark_forests:
         blocks=config["forests_study"]["timed_blocks"],
         largest=config["forests_study"]["largest"],
     shell:
-        "python -m forests benchmark --model {input:q} --blocks {params.blocks:q}"
+        "python -m forests benchmark --forest {input:q} --blocks {params.blocks:q}"
         " --largest {params.largest:q} --out {output:q} > {log:q} 2>&1"
 
 

@@ -16,10 +16,13 @@ class Blocks:
 
     Attributes
     ----------
-    fine : the fine mesh.
-    coarse : mesh of the blocks, edge twice the fine one, the same origin.
-    fine_of_block : (mc, 8) int32, index of the fine cell at position ``x + 2*y + 4*z`` of its
-        block, -1 where the block is void.
+    fine
+        The fine mesh.
+    coarse
+        Mesh of the blocks, edge twice the fine one, the same origin.
+    fine_of_block : (mc, 8) int32
+        Index of the fine cell at position ``x + 2*y + 4*z`` of its block, -1 where the block is
+        void.
     """
 
     fine: HexMesh
@@ -76,12 +79,12 @@ def prolongation(fine: HexMesh, coarse: HexMesh) -> sp.csr_matrix:
     for offset in CORNER_OFFSETS:
         # An even coordinate has one coarse neighbour along its axis, an odd one has two.
         use = np.flatnonzero((odd >= offset).all(axis=1))
-        wanted = (low[use] + offset) @ stride
-        found = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-        if not np.array_equal(keys[found], wanted):
+        corner_keys = (low[use] + offset) @ stride
+        position = np.minimum(np.searchsorted(keys, corner_keys), len(keys) - 1)
+        if not np.array_equal(keys[position], corner_keys):
             raise ValueError("the coarse mesh does not cover the fine mesh")
         rows.append(use)
-        columns.append(found)
+        columns.append(position)
     row, column = np.concatenate(rows), np.concatenate(columns)
     weight = 0.5 ** odd.sum(axis=1)[row]
     return sp.csr_matrix((weight, (row, column)), shape=(fine.n_nodes, coarse.n_nodes))

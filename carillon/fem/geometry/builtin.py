@@ -18,6 +18,9 @@ from carillon.errors import UserError
 #: Segments of a full turn.
 SECTIONS = 96
 
+#: Points of a curve that a part is swept along.
+SPLINE_POINTS = 41
+
 
 def bar() -> trimesh.Trimesh:
     """Marimba bar, 240 x 45 x 30 mm, with the arch below its middle that tunes the overtones."""
@@ -232,13 +235,13 @@ def _sweep(sections: np.ndarray) -> trimesh.Trimesh:
     return _outward(trimesh.Trimesh(np.concatenate([sections.reshape(-1, 3), ends]), faces))
 
 
-def _spline(points: list[tuple[float, float]], count: int = 41) -> np.ndarray:
-    """Bezier curve of (x, z) control points in the plane y = 0, (count, 3)."""
+def _spline(points: list[tuple[float, float]]) -> np.ndarray:
+    """Bezier curve of (x, z) control points in the plane y = 0, (SPLINE_POINTS, 3)."""
     curve = np.array(points, dtype=float)[None]
-    t = np.linspace(0, 1, count)[:, None, None]
+    t = np.linspace(0, 1, SPLINE_POINTS)[:, None, None]
     while curve.shape[1] > 1:
         curve = (1 - t) * curve[:, :-1] + t * curve[:, 1:]
-    return np.stack([curve[:, 0, 0], np.zeros(count), curve[:, 0, 1]], axis=1)
+    return np.stack([curve[:, 0, 0], np.zeros(SPLINE_POINTS), curve[:, 0, 1]], axis=1)
 
 
 def _pull_lip(body: trimesh.Trimesh, start: float, top: float, reach: float) -> None:

@@ -68,10 +68,12 @@ def winding_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.n
 
     Returns
     -------
-    filled : (nx, ny, nz) bool, all False if its volume is not within a factor of `TOO_THIN` of the
-        volume inside the surface, or its length of the surface's: only a skeleton would be left of
-        walls that thin, and less of needles.
-    origin : (3,) corner of the grid [m].
+    filled : (nx, ny, nz) bool
+        All False if its volume is not within a factor of `TOO_THIN` of the volume inside the
+        surface, or its length of the surface's: only a skeleton would be left of walls that thin,
+        and less of needles.
+    origin : (3,)
+        Corner of the grid [m].
     """
     # The hierarchy behind fast winding numbers suffers from long triangles.
     surface = _cut(surface, 2 * grid.edge)
@@ -92,8 +94,8 @@ def winding_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.n
 
 def _length(voxels: np.ndarray) -> int:
     """Voxels along the longest side of the box around those that are set."""
-    found = np.argwhere(voxels)
-    return int(np.ptp(found, axis=0).max()) + 1 if len(found) else 0
+    cells = np.argwhere(voxels)
+    return int(np.ptp(cells, axis=0).max()) + 1 if len(cells) else 0
 
 
 def centre_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.ndarray]:

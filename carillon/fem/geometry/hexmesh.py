@@ -19,12 +19,17 @@ class HexMesh:
 
     Attributes
     ----------
-    cells : (m, 8) int32, node indices of each cell; local corner ``c`` has the offset
+    cells : (m, 8) int32
+        Node indices of each cell; local corner ``c`` has the offset
         ``(c & 1, c >> 1 & 1, c >> 2 & 1)``, so x runs fastest.
-    grid : (m, 3) int32, integer coordinates of the cells, ordered by (z, y, x).
-    node_grid : (n, 3) int32, integer coordinates of the nodes, ordered by (z, y, x).
-    origin : (3,) position of node coordinate (0, 0, 0) [m].
-    edge : edge of a cell [m].
+    grid : (m, 3) int32
+        Integer coordinates of the cells, ordered by (z, y, x).
+    node_grid : (n, 3) int32
+        Integer coordinates of the nodes, ordered by (z, y, x).
+    origin : (3,)
+        Position of node coordinate (0, 0, 0) [m].
+    edge
+        Edge of a cell [m].
     """
 
     cells: np.ndarray

@@ -23,6 +23,9 @@ VIEW = (22.0, -58.0)
 DRAWN_AMPLITUDE = 0.08
 ARROW_LENGTH = 0.22
 
+#: Rings of neighbours over which normals are averaged to show the shape behind the voxels.
+SMOOTHING_RINGS = 4
+
 
 def draw(
     ax: Axes3D,
@@ -35,25 +38,35 @@ def draw(
     cmap: str = "viridis",
     limits: tuple[float, float] | None = None,
 ) -> Poly3DCollection:
-    """Draw the surface of a mesh, deformed if wanted, lit from the upper left.
+    """Draw the surface of a mesh, deformed if asked for, lit from the upper left.
 
     Parameters
     ----------
-    ax : axes made with ``projection="3d"``.
-    mesh : fine or coarse mesh.
-    displacement : (n, 3) or (3*n,) displacement of the nodes, any unit.
-    values : (n,) per node or (m,) per cell, shown in colour; without them a deformed body is
-        coloured by the length of its displacement and a body at rest is plain.
-    scale : factor of the displacement, or ``"auto"``: the largest is drawn as `DRAWN_AMPLITUDE`
-        of the object's diagonal.
-    up : axis that points upwards, ``"x"``, ``"y"`` or ``"z"``; ``"auto"`` asks `guess_up`.
-    view : elevation and azimuth of the eye [degrees].
-    cmap : name of a matplotlib colour map.
-    limits : values at both ends of the colour map; their range by default.
+    ax
+        Axes made with ``projection="3d"``.
+    mesh
+        Fine or coarse mesh.
+    displacement : (n, 3) or (3 n,)
+        Displacement of the nodes, any unit.
+    values : (n,) or (m,)
+        Per node or per cell, shown in colour; without them a deformed body is coloured by the
+        length of its displacement and a body at rest is plain.
+    scale
+        Factor of the displacement, or ``"auto"``: the largest is drawn as `DRAWN_AMPLITUDE` of the
+        object's diagonal.
+    up
+        Axis that points upwards, ``"x"``, ``"y"`` or ``"z"``; ``"auto"`` asks `guess_up`.
+    view
+        Elevation and azimuth of the eye [degrees].
+    cmap
+        Name of a matplotlib colour map.
+    limits
+        Values at both ends of the colour map; their range by default.
 
     Returns
     -------
-    The polygons, with the values as their array, so that ``figure.colorbar`` accepts them.
+    Poly3DCollection
+        The polygons, with the values as their array, so that ``figure.colorbar`` accepts them.
 
     Raises
     ------
@@ -105,27 +118,30 @@ def draw_surface(
     faces: np.ndarray,
     mesh: HexMesh,
     up: str = "auto",
-    view: tuple[float, float] = VIEW,
 ) -> None:
     """Draw triangles as `draw` draws their voxels: in the same place, size and light.
 
     Parameters
     ----------
-    vertices, faces : (v, 3) [m] and (f, 3), wound either way.
-    mesh : the voxels.
+    vertices : (v, 3)
+        Positions [m].
+    faces : (f, 3)
+        Triangles, wound either way.
+    mesh
+        The voxels.
     """
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     turn = _rotation(guess_up(mesh) if up == "auto" else up)
     corners = (np.asarray(vertices) @ turn.T)[faces]
     normal = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    towards = normal @ _direction(*np.radians(view))
+    towards = normal @ _direction(*np.radians(VIEW))
     normal *= np.where(towards < 0.0, -1.0, 1.0)[:, None]
-    colours = np.clip(np.array(PLAIN) * _brightness(normal, view)[:, None], 0, 1)
+    colours = np.clip(np.array(PLAIN) * _brightness(normal, VIEW)[:, None], 0, 1)
     polygons = Poly3DCollection(corners, facecolors=colours, edgecolors=colours)
     polygons.set_linewidth(0.2)
     ax.add_collection3d(polygons)
-    _frame(ax, mesh.nodes[np.unique(surface_quads(mesh))] @ turn.T, view)
+    _frame(ax, mesh.nodes[np.unique(surface_quads(mesh))] @ turn.T, VIEW)
 
 
 def mark(
@@ -220,19 +236,17 @@ def _on_faces(mesh: HexMesh, values: np.ndarray, quads: np.ndarray, cell: np.nda
     )
 
 
-def _light(
-    points: np.ndarray, quads: np.ndarray, view: tuple[float, float], rounds: int = 4
-) -> np.ndarray:
+def _light(points: np.ndarray, quads: np.ndarray, view: tuple[float, float]) -> np.ndarray:
     """Brightness of each face (q,): ambient, key and fill light.
 
-    The face's own normal shows the voxels; the normal averaged over `rounds` rings of neighbours
-    shows the shape that they approximate. Their sum shows both.
+    The face's own normal shows the voxels; the normal averaged over `SMOOTHING_RINGS` rings of
+    neighbours shows the shape that they approximate. Their sum shows both.
     """
     corners = points[quads]
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     normal = _unit(normal)
     smooth = normal
-    for _ in range(rounds):
+    for _ in range(SMOOTHING_RINGS):
         at_nodes = np.zeros_like(points)
         np.add.at(at_nodes, quads, smooth[:, None, :])
         smooth = _unit(_unit(at_nodes)[quads].mean(axis=1))

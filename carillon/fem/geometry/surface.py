@@ -32,14 +32,17 @@ def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
 
     Parameters
     ----------
-    mesh : path of a file that trimesh reads (obj, stl, ply, off, glb, ...; the objects of a scene
-        are concatenated), or ``builtin:NAME`` for a built-in object.
-    unit : metres per unit of the mesh's coordinates; built-in objects are in metres already, so
-        for them it is a scale factor.
+    mesh
+        Path of a file that trimesh reads (obj, stl, ply, off, glb, ...; the objects of a scene are
+        concatenated), or ``builtin:NAME`` for a built-in object.
+    unit
+        Metres per unit of the mesh's coordinates; built-in objects are in metres already, so for
+        them it is a scale factor.
 
     Returns
     -------
-    Surface with vertices in metres. It need not be closed or manifold.
+    trimesh.Trimesh
+        Surface with vertices in metres. It need not be closed or manifold.
 
     Raises
     ------
@@ -74,7 +77,7 @@ def surface_name(mesh: str) -> str:
     return mesh.removeprefix(BUILTIN_PREFIX) if mesh.startswith(BUILTIN_PREFIX) else Path(mesh).stem
 
 
-class _Beside(FilePathResolver):
+class _MeshFolder(FilePathResolver):
     """Other files that a mesh names: regular ones in its folder, which end, as pipes may not."""
 
     def absolute(self, name: str) -> Path:
@@ -94,7 +97,7 @@ def _read(path: Path) -> trimesh.Trimesh:
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
-            loaded = trimesh.load(path, resolver=_Beside(str(path)), process=False)
+            loaded = trimesh.load(path, resolver=_MeshFolder(str(path)), process=False)
             if isinstance(loaded, trimesh.Scene):
                 loaded = loaded.to_geometry() if loaded.geometry else trimesh.Trimesh()
             if isinstance(loaded, trimesh.Trimesh):

@@ -15,8 +15,8 @@ FACES = ndimage.generate_binary_structure(3, 1)
 _POSITIONS = np.array(list(product((-1, 0, 1), repeat=3)))
 
 
-def _bits(wanted: np.ndarray) -> int:
-    return sum(1 << int(bit) for bit in np.flatnonzero(wanted))
+def _bits(positions: np.ndarray) -> int:
+    return sum(1 << int(bit) for bit in np.flatnonzero(positions))
 
 
 def _around(position: np.ndarray, steps: tuple[int, ...]) -> int:
@@ -38,8 +38,10 @@ def pieces(filled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     Returns
     -------
-    labels : like `filled`, 0 outside, 1 for the largest piece, and so on (ties: first in the grid).
-    sizes : (n_pieces,) voxels in each piece, descending.
+    labels : (nx, ny, nz)
+        0 outside, 1 for the largest piece, and so on (ties: first in the grid).
+    sizes : (n_pieces,)
+        Voxels in each piece, descending.
     """
     raw, count = ndimage.label(filled, structure=FACES)
     sizes = np.bincount(raw.ravel(), minlength=count + 1)[1:]
@@ -59,7 +61,8 @@ def is_simple(neighbourhood: int) -> bool:
 
     Parameters
     ----------
-    neighbourhood : bit ``9*x + 3*y + z`` tells whether position (x, y, z) in 0..2 is solid.
+    neighbourhood : int
+        Bit ``9*x + 3*y + z`` tells whether position (x, y, z) in 0..2 is solid.
 
     Examples
     --------
@@ -92,12 +95,15 @@ def thin_to(cover: np.ndarray, keep: np.ndarray, rank: np.ndarray) -> np.ndarray
 
     Parameters
     ----------
-    cover, keep : (nx, ny, nz) bool, with `keep` inside `cover`.
-    rank : (nx, ny, nz), voxels of lowest rank go first; ties in grid order.
+    cover, keep : (nx, ny, nz) bool
+        With `keep` inside `cover`.
+    rank : (nx, ny, nz)
+        Voxels of lowest rank go first; ties in grid order.
 
     Returns
     -------
-    Set between `keep` and `cover` with the pieces, tunnels and cavities of `cover`.
+    (nx, ny, nz) bool
+        Set between `keep` and `cover` with the pieces, tunnels and cavities of `cover`.
     """
     shape = tuple(size + 2 for size in cover.shape)
     stride = np.array([shape[1] * shape[2], shape[2], 1])

@@ -35,11 +35,16 @@ class VoxelModel:
 
     Attributes
     ----------
-    filled : (nx, ny, nz) bool with even nx, ny, nz, so that 2x2x2 blocks start at index 0.
-    origin : (3,) corner of the grid with the lowest coordinates [m].
-    edge : edge of a voxel [m].
-    name : name of the model for messages and files.
-    resolution : voxels along the longest side of the surface's bounding box.
+    filled : (nx, ny, nz) bool
+        With even nx, ny, nz, so that 2x2x2 blocks start at index 0.
+    origin : (3,)
+        Corner of the grid with the lowest coordinates [m].
+    edge
+        Edge of a voxel [m].
+    name
+        Name of the model for messages and files.
+    resolution
+        Voxels along the longest side of the surface's bounding box.
     """
 
     filled: np.ndarray
@@ -81,17 +86,23 @@ def voxelize(
 
     Parameters
     ----------
-    surface : triangles in metres; holes and overlapping shells are allowed.
-    resolution : voxels along the longest side of the bounding box, at least 2.
-    fill : how voxels are chosen, a key of `FILLS`; see `carillon.fem.geometry.fill`.
-    components : ``"error"`` rejects a model of several face-connected pieces, ``"largest"`` keeps
-        the largest. Cubes that share but an edge or a corner would be joined by a hinge, which adds
+    surface
+        Triangles in metres; holes and overlapping shells are allowed.
+    resolution
+        Voxels along the longest side of the bounding box, at least 2.
+    fill
+        How voxels are chosen, a key of `FILLS`; see `carillon.fem.geometry.fill`.
+    components
+        ``"error"`` rejects a model of several face-connected pieces, ``"largest"`` keeps the
+        largest. Cubes that share but an edge or a corner would be joined by a hinge, which adds
         zero-frequency modes that the object does not have.
-    name : name of the model.
+    name
+        Name of the model.
 
     Returns
     -------
-    Voxel model, the same for the same input.
+    VoxelModel
+        The same for the same input.
 
     Raises
     ------

@@ -114,8 +114,9 @@ def benchmark_row(
 
     Returns
     -------
-    Plain values: `seconds`, `spread`, `eigenvalue_error`, `frequency_error`, `speedup` by method,
-    sizes, the machine; `meaning` explains them.
+    dict[str, Any]
+        Plain values: `seconds`, `spread`, `eigenvalue_error`, `frequency_error`, `speedup` by
+        method, sizes, the machine; `meaning` explains them.
 
     Raises
     ------

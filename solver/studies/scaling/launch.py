@@ -50,7 +50,8 @@ def measure_each(
 
     Returns
     -------
-    What the runs found, and what those that failed said, by number of ranks.
+    tuple[list[dict[str, Any]], dict[int, str]]
+        What the runs found, and what those that failed said, by number of ranks.
 
     Raises
     ------

@@ -45,9 +45,10 @@ def measure(
 
     Returns
     -------
-    Plain values: `phases` with seconds, waiting [s], flops, bytes and messages of each rank,
-    `seconds` of all but the partition, `peak_memory_bytes` of each rank, `link` (latency [s],
-    bandwidth [B/s] between two ranks; None on one), sizes, ranks and cores.
+    dict[str, Any]
+        Plain values: `phases` with seconds, waiting [s], flops, bytes and messages of each rank,
+        `seconds` of all but the partition, `peak_memory_bytes` of each rank, `link` (latency [s],
+        bandwidth [B/s] between two ranks; None on one), sizes, ranks and cores.
 
     Raises
     ------

@@ -86,8 +86,9 @@ def scaling_study(
 
     Returns
     -------
-    Plain values: `strong` and `weak` (None unless asked for), each with `runs`, what was said by
-    those that `failed`, and `model`.
+    Result
+        Plain values: `strong` and `weak` (None unless asked for), each with `runs`, what was said
+        by those that `failed`, and `model`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The evaluation of forests in plain numpy, written apart from the compiled one to check it."""
+"""The evaluation of forests in plain numpy, written apart from the compiled one (test support)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from carillon.fem.element import Array
 from forests.layout import FEATURE_BITS, FEATURE_MASK
-from forests.model import CONSTANT, FILLED, HIGH, LOW, VOID, Forests, Model
+from forests.model import CONSTANT, FILLED, HIGH, LOW, VOID, Model
 from forests.scaling import (
     FEATURES,
     LOG_FLOOR,
@@ -17,7 +17,7 @@ from forests.scaling import (
     RATIO_CEILING,
     RATIO_FLOOR,
     Features,
-    Prepared,
+    PreparedBlocks,
 )
 
 _AXES = np.array([1, 2, 4])
@@ -33,7 +33,7 @@ _exp = np.frompyfunc(math.exp, 1, 1)
 
 
 def cell_order_reference(young: Array) -> NDArray[np.int64]:
-    """The same as `forests.ordering.cell_order`."""
+    """Cells e'1..e'8 (n, 8 origins, 8) of blocks (n, 8), see `forests.ordering`."""
     origin = np.arange(8)[:, None]
     neighbour = young[:, origin ^ _AXES]
     opposite = young[:, origin ^ 7 ^ _AXES]
@@ -43,7 +43,7 @@ def cell_order_reference(young: Array) -> NDArray[np.int64]:
     return np.asarray(flips ^ origin[None])
 
 
-def prepare_reference(young: Array, transform: str) -> Prepared:
+def prepare_reference(young: Array, transform: str) -> PreparedBlocks:
     """The same as `forests.scaling.prepare`, bit for bit."""
     filled = young > 0.0
     total = np.zeros(len(young))
@@ -62,11 +62,12 @@ def prepare_reference(young: Array, transform: str) -> Prepared:
             ratios = young[rows, cells] / scale[..., None]
         features = np.where(missing, 0.0, np.clip(ratios, RATIO_FLOOR, RATIO_CEILING))
     pattern = (missing << np.arange(FEATURES)).sum(axis=-1)
-    return Prepared(features.astype(np.float32), pattern.astype(np.uint8), scale, filled)
+    return PreparedBlocks(features.astype(np.float32), pattern.astype(np.uint8), scale, filled)
 
 
-def leaf_numbers_reference(forests: Forests, prepared: Prepared) -> NDArray[np.int64]:
-    """Leaves (m, 8, trees) of prepared blocks."""
+def leaf_numbers(model: Model, young: Array) -> NDArray[np.int64]:
+    """Leaves (m, 8, trees), rows of `Forests.leaves`, that the origins of blocks (m, 8) come to."""
+    forests, prepared = model.forests, prepare_reference(young, model.transform)
     kind = np.where(prepared.filled, FILLED, VOID)
     node = forests.roots[kind, :, prepared.pattern].astype(np.int64)
     features = prepared.features[:, :, None]
@@ -89,7 +90,7 @@ def _answers(leaves: NDArray[np.float32], features: Features) -> Array:
 def coarsen_reference(model: Model, e: ArrayLike) -> Array:
     """The same as `forests.evaluate.coarsen`, bit for bit; slower, for blocks that are fit."""
     prepared = prepare_reference(np.asarray(e, dtype=float), model.transform)
-    numbers = leaf_numbers_reference(model.forests, prepared)
+    numbers = leaf_numbers(model, np.asarray(e, dtype=float))
     total = np.zeros(prepared.scale.shape)
     for tree in range(model.forests.trees):
         total = total + _answers(model.forests.leaves[numbers[..., tree]], prepared.features)
