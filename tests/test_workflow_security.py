@@ -385,7 +385,7 @@ TABLE = {"name": "t", "caption": "", "columns": [{"key": "a", "label": "A"}], "r
     ],
 )
 def test_a_table_that_is_none_is_named(tmp_path, text):
-    from workflow.compare.folders import read_folder
+    from workflow.studies.comparison.folders import read_folder
 
     path = tmp_path / "tables" / "t.json"
     path.parent.mkdir()

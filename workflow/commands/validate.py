@@ -31,10 +31,10 @@ from solver.analysis.problem import ProblemOptions, build_problem
 from solver.coarsening.forest import load_forest
 from solver.response.contact import surface_node
 from workflow import settings
-from workflow.report.table import read_table
 from workflow.room import make_folder
 from workflow.settings import BUILTIN, DEFAULT_FORESTS
-from workflow.validate.verdict import headline
+from workflow.studies.base.table import read_table
+from workflow.studies.validation.verdict import headline
 
 CONFIGURATION = "validate.yaml"
 """File in the folder of the results that the run is started with."""

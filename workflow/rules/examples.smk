@@ -1,8 +1,8 @@
 # Examples of sound design: their files, and arguments of the programs.
 from dataclasses import asdict
 
-from workflow.sounds import examples as sound_examples
-from workflow.sounds.examples import DESIGN, ELSEWHERE, PROJECT, START, TRUTH
+from workflow.studies.sounds import examples as sound_examples
+from workflow.studies.sounds.examples import DESIGN, ELSEWHERE, PROJECT, START, TRUTH
 
 SOUND_FOLDER = sound_examples.FOLDER
 SOUND = f"{RESULTS}/{SOUND_FOLDER}"

@@ -106,10 +106,10 @@ rule write_project:
         mem_mb=500,
         runtime="5m",
     params:
-        source=source("workflow.scripts.write_project"),
-        project=project_of,
+        source=source("workflow.scripts.write_yaml"),
+        content=project_of,
     script:
-        "../scripts/write_project.py"
+        "../scripts/write_yaml.py"
 
 
 # The search takes all cores, since what it finds depends on how much it evaluates in its time.
@@ -258,16 +258,10 @@ rule build_sound_page:
         truth=f"{SOUND}/{{example}}/{TRUTH}",
         sounds=all_sounds,
         optimisers=comparison,
-        templates=templates("sounds"),
+        templates=templates("sounds", "page.html.j2", "tables.yaml"),
     output:
-        page=report(
-            f"{SOUND}/{{example}}/page.html",
-            caption="../report/captions/sound.rst",
-            category="Sounds",
-            labels={"example": "{example}"},
-        ),
-        designs=f"{SOUND}/{{example}}/tables/designs.json",
-        frequencies=f"{SOUND}/{{example}}/tables/frequencies.json",
+        marks.page(catalogue.SOUND, f"{SOUND}/{{example}}/page.html", "Sounds", example="{example}"),
+        found=[f"{SOUND}/{{example}}/tables/{name}.json" for name in ("designs", "frequencies")],
     log:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/page.log",
     localrule: True
@@ -275,28 +269,23 @@ rule build_sound_page:
         mem_mb=2000,
         runtime="15m",
     params:
-        source=source("workflow.scripts.build_sound_page"),
+        source=made_by("page", *pages_of(catalogue.SOUND)),
+        results=catalogue.SOUND.results,
+        folder=catalogue.SOUND.folder or ".",
+        tables=catalogue.SOUND.tables,
+        page=catalogue.SOUND.page,
     script:
-        "../scripts/build_sound_page.py"
+        "../scripts/page.py"
 
 
 rule build_sounds_index:
     input:
         config=f"{RESULTS}/config.yaml",
         pages=expand(f"{SOUND}/{{example}}/page.html", example=EXAMPLES),
-        tables=expand(
-            f"{SOUND}/{{example}}/tables/{{table}}.json",
-            example=EXAMPLES,
-            table=["designs", "frequencies"],
-        ),
-        templates=[settings.FOLDER / "sounds" / "index.html.j2", *templates("sounds")],
+        found=expand(rules.build_sound_page.output.found, example=EXAMPLES),
+        templates=templates("sounds", "index.html.j2", "index.yaml"),
     output:
-        page=report(
-            f"{SOUND}/index.html",
-            caption="../report/captions/sounds.rst",
-            category="Sounds",
-            labels={"example": "all"},
-        ),
+        marks.page(catalogue.SOUNDS, f"{SOUND}/index.html", "Sounds", example="all"),
         table=f"{SOUND}/tables/sounds.json",
     log:
         f"{LOGS}/{SOUND_FOLDER}/index.log",
@@ -305,7 +294,10 @@ rule build_sounds_index:
         mem_mb=1000,
         runtime="10m",
     params:
-        source=source("workflow.scripts.build_sounds_index"),
-        examples=list(EXAMPLES),
+        source=made_by("page", *pages_of(catalogue.SOUNDS)),
+        results=catalogue.SOUNDS.results,
+        folder=catalogue.SOUNDS.folder or ".",
+        tables=catalogue.SOUNDS.tables,
+        page=catalogue.SOUNDS.page,
     script:
-        "../scripts/build_sounds_index.py"
+        "../scripts/page.py"

@@ -1,0 +1,145 @@
+"""How figures look, and how they are written."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import matplotlib
+import numpy as np
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from carillon.files import atomic_path
+
+matplotlib.use("Agg")
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+INK, MUTED, FAINT = "#23211d", "#6f6a60", "#dedad1"
+"""Text and truth, axes, grid."""
+
+COLOURS = {
+    "truth": INK,
+    "ddfem_slepc": "#7a6a9c",
+    "hcms": "#8a94a0",
+    "hcms_ec": "#1f7a6d",
+    "ddfem_hcms_ec_accurate": "#8fb3a6",
+    "ddfem_hcms_ec": "#b8641b",
+    "random": "#b03a5b",
+}
+"""Colour of each variant, the same in all figures and on the page."""
+
+THEMED = {
+    INK: "--ink",
+    MUTED: "--muted",
+    FAINT: "--faint",
+    **{colour: f"--{name.replace('_', '-')}" for name, colour in COLOURS.items() if colour != INK},
+}
+"""Style-sheet variables that take the place of colours on the page, so that figures follow it into
+the dark."""
+
+SETTINGS: Any = {
+    "font.family": "sans-serif",
+    "font.size": 9.0,
+    "axes.labelsize": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.edgecolor": MUTED,
+    "axes.labelcolor": INK,
+    "axes.titlecolor": INK,
+    "axes.linewidth": 0.7,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "grid.color": FAINT,
+    "grid.linewidth": 0.7,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.minor.visible": False,
+    "ytick.minor.visible": False,
+    "text.color": INK,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "figure.facecolor": "none",
+    "axes.facecolor": "none",
+    "savefig.facecolor": "none",
+    "svg.fonttype": "none",
+    "figure.constrained_layout.use": True,
+}
+
+PNG_DPI = 200
+
+
+def plain(text: str) -> str:
+    """Text for a figure, in which dollars are no sign of a formula."""
+    return text.replace("$", r"\$")
+
+
+def save(figure: Figure, paths: Iterable[str | Path]) -> None:
+    """Write a figure as SVG or, on white, as PNG, by the ending of each path."""
+    for path in map(Path, paths):
+        with atomic_path(path) as temporary, matplotlib.rc_context(SETTINGS):
+            if path.suffix == ".svg":
+                temporary.write_text(svg(figure, path.stem), encoding="utf-8")
+            else:
+                figure.savefig(temporary, format="png", dpi=PNG_DPI, facecolor="white")
+
+
+def svg(figure: Figure, name: str) -> str:
+    """The figure as an `<svg>` element whose identifiers all begin with `name`.
+
+    Several such elements can then stand in one page. Text stays text, in the page's own font.
+    """
+    text = io.StringIO()
+    with matplotlib.rc_context({**SETTINGS, "svg.hashsalt": name}):
+        figure.savefig(text, format="svg", metadata={"Date": None})
+    source = text.getvalue()
+    source = source[source.index("<svg") :]
+    source = re.sub(r"<metadata>.*?</metadata>", "", source, flags=re.DOTALL)
+    source = re.sub(r'\bid="', f'id="{name}-', source)
+    return re.sub(r'(href="#|url\(#)', rf"\g<1>{name}-", source)
+
+
+def themed(source: str) -> str:
+    """Replace colours and fonts of an SVG by style-sheet variables, which only a page defines."""
+    for colour, variable in THEMED.items():
+        source = re.sub(colour, f"var({variable})", source, flags=re.IGNORECASE)
+    return re.sub(r"font-family: [^;\"]*", "font-family: var(--sans)", source)
+
+
+def inlined(figure: Figure, name: str) -> Markup:
+    """The figure as part of a page, in the page's own colours and font; it is closed."""
+    import matplotlib.pyplot as plt
+
+    source = themed(svg(figure, name))
+    plt.close(figure)
+    return Markup(source)
+
+
+def pixels(figure: Any) -> NDArray[np.uint8]:
+    """The figure without background as RGBA values (h, w, 4); the figure is closed."""
+    import matplotlib.pyplot as plt
+
+    figure.set_dpi(PNG_DPI)
+    figure.patch.set_alpha(0.0)
+    figure.canvas.draw()
+    values = np.array(figure.canvas.buffer_rgba())
+    plt.close(figure)
+    return values
+
+
+def save_pixels(picture: NDArray[np.uint8], path: str | Path) -> None:
+    """Write RGBA values (h, w, 4) as PNG."""
+    import matplotlib.image
+
+    with atomic_path(path) as temporary:
+        matplotlib.image.imsave(temporary, np.ascontiguousarray(picture), format="png")
