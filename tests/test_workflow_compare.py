@@ -15,7 +15,7 @@ from tests.workflow_runs import TINY, snakemake
 from workflow.__main__ import main
 from workflow.studies.base.conditions import Repeats, conditions
 from workflow.studies.base.table import Column, Table, read_csv_table, write_table
-from workflow.studies.comparison.cells import Comparison, compare
+from workflow.studies.comparison.comparison import Comparison, compare
 from workflow.studies.comparison.folders import read_folder
 from workflow.studies.comparison.noise import SAME, Value, verdict
 from workflow.studies.comparison.reference import write_reference

@@ -7,7 +7,7 @@ import json
 
 from carillon.errors import UserError
 from workflow.studies.comparison import report
-from workflow.studies.comparison.cells import compare
+from workflow.studies.comparison.comparison import compare
 from workflow.studies.comparison.folders import read_folder, require_apart
 from workflow.studies.comparison.noise import WORSE
 

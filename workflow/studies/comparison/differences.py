@@ -19,14 +19,7 @@ Difference = dict[str, str]
 
 def of_conditions(before: Folder, now: Folder) -> list[Difference]:
     """Conditions that differ in tables of both folders."""
-    old, new = (
-        {
-            path: _told(table.conditions.told)
-            for path, table in each.tables.items()
-            if table.conditions
-        }
-        for each in (before, now)
-    )
+    old, new = _told_by_table(before), _told_by_table(now)
     shared = [path for path in new if path in old]
     found: dict[tuple[str, str, str], list[str]] = {}
     for path in shared:

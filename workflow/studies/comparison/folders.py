@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import pandas as pd
 
 from carillon.documents import read_yaml
 from carillon.errors import UserError
 from carillon.files import cause
 from carillon.places import require_file
-from workflow.studies.base.numbers import show
-from workflow.studies.base.table import Table, kind_in, read_csv_table, read_table
-from workflow.studies.comparison.noise import Value, verdict
+from workflow.studies.base.table import Table, read_csv_table, read_table
+from workflow.studies.comparison.cells import cells_of
 
 PARTS = ("tables", "paper/tables", "forests_study/tables")
 """Folders of tables below a folder of results."""
-READERS = {".json": read_table, ".csv": read_csv_table}
-"""How a table is read, by the ending of its file; the first file that exists counts."""
+READERS = {".csv": read_csv_table, ".json": read_table}
+"""How a table is read, by the ending of its file; the last file that exists counts."""
 _SENSELESS = (
     *(ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError),
     *(RecursionError, csv.Error),
@@ -35,12 +36,14 @@ class Folder:
     ----------
     path : of the folder.
     tables : by their path below the folder, without ending.
+    cells : their values by the same path, see `cells_of`.
     config : the resolved configuration; empty if the folder has none.
     """
 
     path: Path
     tables: dict[str, Table]
-    config: dict[str, Any] = field(default_factory=dict)
+    cells: dict[str, pd.DataFrame]
+    config: dict[str, Any]
 
 
 def read_folder(path: str | Path) -> Folder:
@@ -51,36 +54,40 @@ def read_folder(path: str | Path) -> Folder:
     UserError
         If there is no such folder, if it holds no tables, or if one cannot be read.
     """
-    path = require_tables(path)
+    path = Path(path)
+    read = {name: _read(name, file) for name, file in require_tables(path).items()}
     config = path / "config.yaml"
     return Folder(
         path,
-        {str(stem.relative_to(path)): _read(stem) for stem in _stems(path)},
+        {name: table for name, (table, _) in read.items()},
+        {name: cells for name, (_, cells) in read.items()},
         read_yaml(config, "the configuration of a run") if config.exists() else {},
     )
 
 
-def require_tables(path: str | Path) -> Path:
-    """Check that a folder holds tables.
+def require_tables(path: str | Path) -> dict[str, Path]:
+    """Files of the tables in a folder, by their path below it without ending.
 
     Raises
     ------
     UserError
-        If it does not, or does not exist.
+        If there are none, or there is no such folder.
     """
     path = Path(path)
     try:
-        is_folder, stems = path.is_dir(), _stems(path)
+        is_folder = path.is_dir()
+        files = [file for part in PARTS for file in sorted((path / part).glob("*"))]
+        files = [file for file in files if file.suffix in READERS and file.exists()]
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({cause(error)}), expected results") from None
     if not is_folder:
         raise UserError(f"{path}: there is no such folder, expected one with the results of a run")
-    if not stems:
+    if not files:
         raise UserError(
             f"{path}: holds no tables, expected {PARTS[0]}/*.json or {PARTS[0]}/*.csv as a run or "
             "the target reference leaves them"
         )
-    return path
+    return {str(file.relative_to(path).with_suffix("")): file for file in files}
 
 
 def require_apart(out: str | Path, *compared: Folder) -> Path:
@@ -114,44 +121,23 @@ def require_baseline(config: Mapping[str, Any]) -> list[str]:
     return []
 
 
-def _stems(path: Path) -> list[Path]:
-    """Files of tables without their endings, each once."""
-    files = (file for part in PARTS for file in sorted((path / part).glob("*")))
-    return list(
-        dict.fromkeys(
-            file.with_suffix("") for file in files if file.suffix in READERS and file.exists()
-        )
-    )
+def _read(name: str, file: Path) -> tuple[Table, pd.DataFrame]:
+    require_file(file, "a table")
+    try:
+        table = READERS[file.suffix](file)
+        _require_texts(table)
+        return table, cells_of(name, table)
+    except OSError as error:
+        raise UserError(f"{file}: cannot be read ({cause(error)})") from None
+    except _SENSELESS:
+        raise UserError(
+            f"{file}: is no table of this version, or damaged; run the workflow again"
+        ) from None
 
 
-def _read(stem: Path) -> Table:
-    for ending, read in READERS.items():
-        file = stem.with_suffix(ending)
-        if file.exists():
-            require_file(file, "a table")
-            try:
-                table = read(file)
-                _try(table)
-            except OSError as error:
-                raise UserError(f"{file}: cannot be read ({cause(error)})") from None
-            except _SENSELESS:
-                raise UserError(
-                    f"{file}: is no table of this version, or damaged; run the workflow again"
-                ) from None
-            return table
-    raise FileNotFoundError(stem)
-
-
-def _try(table: Table) -> None:
-    """Do once with every value what a comparison does; what is no value of its kind raises."""
-    if table.conditions is not None:
-        "".join(table.conditions.told.values())
-    ", ".join([table.name, *table.keys, *(column.label for column in table.columns)])
-    known = {column.key for column in table.columns}
-    if not known or not known.issuperset(table.keys):
+def _require_texts(table: Table) -> None:
+    """Use once what tells about the values; what is no text, or no column, raises."""
+    "".join([*(table.conditions.told.values() if table.conditions else ()), table.name])
+    "".join(column.label for column in table.columns)
+    if not {column.key for column in table.columns}.issuperset(table.keys):
         raise KeyError(table.keys)
-    for row in table.rows:
-        for column in table.columns:
-            kind, value = kind_in(row, column), Value(row.get(column.key))
-            show(value.value, kind)
-            verdict(kind, value, value)

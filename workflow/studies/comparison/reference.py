@@ -15,7 +15,7 @@ from carillon.progress import say
 from workflow.studies.base.conditions import LABELS
 from workflow.studies.base.numbers import show
 from workflow.studies.base.table import Table
-from workflow.studies.comparison.cells import APART, name_of
+from workflow.studies.comparison.comparison import APART, name_of
 from workflow.studies.comparison.folders import Folder, read_folder
 
 FOLDER = "reference"

@@ -13,8 +13,9 @@ from workflow.studies.base.conditions import LABELS
 from workflow.studies.base.numbers import show
 from workflow.studies.base.page import rendered
 from workflow.studies.base.table import Table, columns_of
-from workflow.studies.comparison.cells import ENDS, KEYS, SIDES, Comparison, Row, shown
-from workflow.studies.comparison.differences import dates, of_conditions, of_configurations
+from workflow.studies.comparison.cells import ENDS, KEYS, SHOWN, Row
+from workflow.studies.comparison.comparison import SIDES, Comparison
+from workflow.studies.comparison.differences import dates
 from workflow.studies.comparison.noise import BETTER, RULES, VERDICTS, WORSE
 
 NAME = "comparison"
@@ -26,6 +27,8 @@ MOST_LISTED = 200
 """Numbers of a table up to which the page lists all of them."""
 TITLE = "What moved"
 RAW = [*KEYS, "kind", *(f"{side}{end}" for side in SIDES for end in ENDS), "ratio", "verdict"]
+MARKS = {**dict.fromkeys(WORSE, "worse"), **dict.fromkeys(BETTER, "better")}
+"""How verdicts are marked on a page."""
 
 
 def write(comparison: Comparison, folder: Path) -> None:
@@ -46,8 +49,8 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
     return {
         "before": str(before.path),
         "now": str(now.path),
-        "conditions": of_conditions(before, now),
-        "configuration": of_configurations(before, now),
+        "conditions": comparison.conditions,
+        "configuration": comparison.configuration,
         "compared": len(comparison.cells),
         "moved": every_number(comparison.moved.sort_index()).rows,
         "only_before": comparison.only_before,
@@ -59,13 +62,13 @@ def as_text(comparison: Comparison, most: int = MOST_MOVED) -> str:
     """The short form, for a terminal."""
     before, now = comparison.before, comparison.now
     lines = [f"{before.path} (baseline) and {now.path} (this run)"]
-    for item in (*of_conditions(before, now), *of_configurations(before, now)):
+    for item in (*comparison.conditions, *comparison.configuration):
         where = f" ({_cut(item['where'])})" if item["where"] else ""
         lines.append(f"  {item['what']}: {_cut(item['before'])} -> {_cut(item['now'])}{where}")
     lines += [*_caution(comparison), summary(comparison)]
     for cell in comparison.moved.head(most).to_dict("records"):
         place = f"{cell['verdict']}: {cell['table']}, {cell['row']}, {cell['label']}"
-        lines.append(f"  {place}: {shown(cell, 'before')} -> {shown(cell, 'now')}")
+        lines.append(f"  {place}: {cell['before_shown']} -> {cell['now_shown']}")
     if len(comparison.moved) > most:
         lines.append(f"  and {len(comparison.moved) - most:,} more")
     sides = _one_sided(comparison).items()
@@ -156,6 +159,7 @@ def counts(comparison: Comparison) -> Table:
 
 def listed(name: str, cells: pd.DataFrame) -> Table:
     """Numbers of a table side by side, for people."""
+    shown = {side: cells[f"{side}{SHOWN}"] for side in SIDES}
     return Table(
         name,
         "",
@@ -170,21 +174,9 @@ def listed(name: str, cells: pd.DataFrame) -> Table:
             ratio    Ratio     times
             """
         ),
-        [
-            {
-                **{key: cell[key] for key in ("table", "row", "label", "verdict", "ratio")},
-                **{side: shown(cell, side) for side in SIDES},
-                "verdict_mark": mark(cell["verdict"]),
-            }
-            for cell in _rows(cells)
-        ],
+        _rows(cells.assign(**shown, verdict_mark=cells["verdict"].map(MARKS).fillna(""))),
         KEYS,
     )
-
-
-def mark(verdict: str) -> str:
-    """How a verdict is marked on a page."""
-    return "worse" if verdict in WORSE else "better" if verdict in BETTER else ""
 
 
 def _rows(frame: pd.DataFrame) -> list[Row]:
@@ -207,7 +199,7 @@ def _sides(comparison: Comparison) -> str:
 
 def _caution(comparison: Comparison) -> list[str]:
     """A sentence about times where the machine is not the same; none otherwise."""
-    found = {item["what"] for item in of_conditions(comparison.before, comparison.now)}
+    found = {item["what"] for item in comparison.conditions}
     different = [LABELS[key] for key in MACHINE if LABELS[key] in found]
     if not different:
         return []
@@ -216,17 +208,17 @@ def _caution(comparison: Comparison) -> list[str]:
 
 def _differing(comparison: Comparison) -> list[Table]:
     """What is not the same, for people."""
-    made = []
-    for name, head, find in (
-        ("conditions", "Condition", of_conditions),
-        ("configuration", "Key", of_configurations),
-    ):
-        rows = find(comparison.before, comparison.now)
+    found = {
+        "conditions": ("Condition", comparison.conditions),
+        "configuration": ("Key", comparison.configuration),
+    }
+    tables = []
+    for name, (head, rows) in found.items():
         flag = "" if any(row["where"] for row in rows) else "  hidden"
         columns = f"what  {head}\nbefore  Baseline\nnow  This run\nwhere  Tables{flag}"
         everywhere = [{**row, "where": row["where"] or "all"} for row in rows]
-        made.append(Table(name, "", columns_of(columns), everywhere))
-    return [table for table in made if table.rows]
+        tables.append(Table(name, "", columns_of(columns), everywhere))
+    return [table for table in tables if table.rows]
 
 
 def _one_sided(comparison: Comparison) -> dict[str, list[str]]:
