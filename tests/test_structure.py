@@ -90,7 +90,7 @@ ARROWS = {
     "workflow.studies.comparison": "workflow workflow.studies.base",
     "workflow.commands": """dataset_gen.objectives solver.coarsening solver.response
         solver.analysis workflow workflow.studies.base workflow.studies.comparison workflow.estimate
-        workflow.studies.validation""",
+        workflow.studies.report""",
     "workflow.scripts": """solver.analysis sound.project workflow.studies.base
         workflow.studies.report workflow.studies.comparison workflow.studies.sounds""",
 }

@@ -11,6 +11,19 @@ from workflow import settings
 Config = Mapping[str, Any]
 STUDIED = ("figures", "objectives")
 """Sections with solids of their own, which are left out if they have no mesh."""
+MEASURED = {
+    "report": {
+        "methods": "times.models",
+        "convergence": "convergence.models",
+        "scaling": "scaling.models",
+    },
+    "figures": {
+        "methods": "figures.models",
+        "convergence": "figures.convergence",
+        "scaling": "figures.scaling",
+    },
+}
+"""Where the configuration names the solids that a study measures, by the file of what is found."""
 
 
 def mesh_of(config: Config, section: str, solid: str) -> str:

@@ -34,7 +34,7 @@ from workflow import settings
 from workflow.room import make_folder
 from workflow.settings import BUILTIN, DEFAULT_FORESTS
 from workflow.studies.base.table import read_table
-from workflow.studies.validation.verdict import headline
+from workflow.studies.report.findings import headline
 
 CONFIGURATION = "validate.yaml"
 """File in the folder of the results that the run is started with."""

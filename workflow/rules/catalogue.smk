@@ -40,6 +40,11 @@ def made_by(script, *references):
     return source(f"workflow.scripts.{script}", *modules_of(*references))
 
 
+def told(study, *names):
+    """What a script has to know of a study."""
+    return {name: getattr(study, name) for name in ("folder", "results", *names)}
+
+
 def pages_of(study):
     """What a page is made by whose rule makes its tables as well."""
     return [study.results, study.page, *study.table_modules]
@@ -55,9 +60,12 @@ def descriptions(study):
 def measured_for(study):
     """Files that the tables of a study are made from."""
     folder = place(study)
+    measured = [
+        f"{folder}/models/{solid}/{file}.json"
+        for file, where in solids.MEASURED.get(study.name, {}).items()
+        for solid in solids.named(config, where)
+    ]
     if study is catalogue.REPORT:
-        parts = {"convergence": "convergence", "methods": "times", "scaling": "scaling"}
-        models = {file: config[part]["models"] for file, part in parts.items()}
         modes = expand("{model}/{variant}.h5", model=MODELS, variant=variants.VARIANTS)
         compared = expand(
             "{model}/{variant}.comparison.json", model=MODELS, variant=variants.CANDIDATES
@@ -67,12 +75,10 @@ def measured_for(study):
             f"{folder}/forests/table.json",
             *(f"{folder}/dataset/{name}.json" for name in settings.own_shards(config)),
             *(f"{folder}/models/{file}" for file in modes + compared),
-            *(f"{folder}/models/{model}/{file}.json" for file in models for model in models[file]),
+            *measured,
         ]
     if study is catalogue.FIGURES:
-        parts = {"methods": "models", "convergence": "convergence", "scaling": "scaling"}
-        shapes = {file: solids.named(config, f"figures.{part}") for file, part in parts.items()}
-        return [f"{folder}/models/{name}/{file}.json" for file in shapes for name in shapes[file]]
+        return measured
     if study is catalogue.OBJECTIVES:
         return [f"{folder}/cases/{case.path}" for case in cases_of(config)]
     parts = ("model", "blocks", "benchmark", "variants", "curve")

@@ -270,10 +270,7 @@ rule build_sound_page:
         runtime="15m",
     params:
         source=made_by("page", *pages_of(catalogue.SOUND)),
-        results=catalogue.SOUND.results,
-        folder=catalogue.SOUND.folder or ".",
-        tables=catalogue.SOUND.tables,
-        page=catalogue.SOUND.page,
+        study=told(catalogue.SOUND, "tables", "page"),
     script:
         "../scripts/page.py"
 
@@ -295,9 +292,6 @@ rule build_sounds_index:
         runtime="10m",
     params:
         source=made_by("page", *pages_of(catalogue.SOUNDS)),
-        results=catalogue.SOUNDS.results,
-        folder=catalogue.SOUNDS.folder or ".",
-        tables=catalogue.SOUNDS.tables,
-        page=catalogue.SOUNDS.page,
+        study=told(catalogue.SOUNDS, "tables", "page"),
     script:
         "../scripts/page.py"

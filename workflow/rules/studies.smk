@@ -36,9 +36,7 @@ for study in catalogue.STUDIES:
             runtime="10m",
         params:
             source=made_by("tabulate", study.results, *study.table_modules),
-            results=study.results,
-            folder=study.folder or ".",
-            tables=study.tables,
+            study=told(study, "tables"),
         script:
             "../scripts/tabulate.py"
 
@@ -62,8 +60,7 @@ for study in catalogue.STUDIES:
                 runtime="10m",
             params:
                 source=made_by("plot", study.results, figure.draw),
-                results=study.results,
-                folder=study.folder or ".",
+                study=told(study),
                 draw=figure.draw,
             script:
                 "../scripts/plot.py"
@@ -87,9 +84,7 @@ for study in catalogue.STUDIES:
             runtime="10m",
         params:
             source=made_by("page", study.results, study.page),
-            results=study.results,
-            folder=study.folder or ".",
-            page=study.page,
+            study=told(study, "page"),
         script:
             "../scripts/page.py"
 
@@ -145,8 +140,7 @@ rule draw_overview:
         runtime="10m",
     params:
         source=made_by("plot", "report.overview:overview_figure"),
-        results=catalogue.REPORT.results,
-        folder=catalogue.REPORT.folder or ".",
+        study=told(catalogue.REPORT),
         draw="report.overview:overview_figure",
     script:
         "../scripts/plot.py"

@@ -72,9 +72,6 @@ rule validate_model:
         runtime="15m",
     params:
         source=made_by("page", *pages_of(catalogue.VALIDATION)),
-        results=catalogue.VALIDATION.results,
-        folder=catalogue.VALIDATION.folder or ".",
-        tables=catalogue.VALIDATION.tables,
-        page=catalogue.VALIDATION.page,
+        study=told(catalogue.VALIDATION, "tables", "page"),
     script:
         "../scripts/page.py"

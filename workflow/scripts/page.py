@@ -8,15 +8,16 @@ from workflow.studies.base.study import logged, named
 from workflow.studies.base.table import read_table, write_table
 
 with logged(snakemake.log):
-    folder = Path(snakemake.input.config).parent / snakemake.params.folder
-    results = named(snakemake.params.results)(folder, *snakemake.wildcards)
+    study = snakemake.params.study
+    folder = Path(snakemake.input.config).parent / study["folder"]
+    results = named(study["results"])(folder, *snakemake.wildcards)
     tables = {Path(path).stem: read_table(path) for path in snakemake.input.get("tables", [])}
     page = Path(snakemake.output[0])
-    described = snakemake.params.get("tables")
+    described = study.get("tables")
     for name, make in tables_of(described).items() if described else ():
         if name not in getattr(results, "absent", ()):
             tables[name] = make(results)
             write_table(tables[name], page.parent / "tables")
-    html = named(snakemake.params.page)(results, tables)
+    html = named(study["page"])(results, tables)
     with atomic_path(page) as temporary:
         temporary.write_text(html, encoding="utf-8")

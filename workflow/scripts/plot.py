@@ -6,6 +6,7 @@ from workflow.studies.base.study import logged, named
 from workflow.studies.base.style import save
 
 with logged(snakemake.log):
-    folder = Path(snakemake.input.config).parent / snakemake.params.folder
-    results = named(snakemake.params.results)(folder)
+    study = snakemake.params.study
+    folder = Path(snakemake.input.config).parent / study["folder"]
+    results = named(study["results"])(folder)
     save(named(snakemake.params.draw)(results, *snakemake.wildcards), snakemake.output)

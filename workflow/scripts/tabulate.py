@@ -8,9 +8,10 @@ from workflow.studies.base.study import logged, named
 from workflow.studies.base.table import write_table
 
 with logged(snakemake.log):
-    folder = Path(snakemake.input.config).parent / snakemake.params.folder
-    results = named(snakemake.params.results)(folder)
+    study = snakemake.params.study
+    folder = Path(snakemake.input.config).parent / study["folder"]
+    results = named(study["results"])(folder)
     if results.without:
         say(results.without)
-    for make in tables_of(snakemake.params.tables).values():
+    for make in tables_of(study["tables"]).values():
         write_table(make(results), Path(snakemake.output[0]).parent)

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 import matplotlib.image
 import matplotlib.pyplot as plt
 import numpy as np
+from markupsafe import Markup
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.io import wavfile
 
+from carillon.files import atomic_path
 from solver.response.response import FLOOR_DECIBELS, SAMPLE_RATE_HERTZ, decibels, spectrogram
 from workflow.studies.base.page import data_uri
-from workflow.studies.base.style import MUTED, SETTINGS, pixels
+from workflow.studies.base.style import MUTED, PNG_DPI, svg, themed
 
 Array = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
@@ -29,14 +32,36 @@ PEAK = 0.9
 """Level of the loudest sample, where 1 is the most that a sample can hold."""
 
 
+def inlined(figure: Figure, name: str) -> Markup:
+    """The figure as part of a page, in the page's own colours and font; it is closed."""
+    source = themed(svg(figure, name))
+    plt.close(figure)
+    return Markup(source)
+
+
+def pixels(figure: Any) -> Pixels:
+    """The figure without background as RGBA values (h, w, 4); the figure is closed."""
+    figure.set_dpi(PNG_DPI)
+    figure.patch.set_alpha(0.0)
+    figure.canvas.draw()
+    values = np.array(figure.canvas.buffer_rgba())
+    plt.close(figure)
+    return values
+
+
+def save_pixels(picture: Pixels, path: str | Path) -> None:
+    """Write RGBA values (h, w, 4) as PNG."""
+    with atomic_path(path) as temporary:
+        matplotlib.image.imsave(temporary, np.ascontiguousarray(picture), format="png")
+
+
 def solid_picture(draw_on: Callable[[Any], Any], border: float = 0.0) -> Pixels:
     """What `draw_on` draws on 3-D axes, with an empty border of that share of the picture."""
-    with plt.rc_context(SETTINGS):
-        figure = plt.figure(figsize=PICTURE_INCHES, layout="none")
-        inside = 1.0 - 2.0 * border
-        axes = figure.add_axes((border, border, inside, inside), projection="3d")
-        draw_on(axes)
-        axes.patch.set_alpha(0.0)
+    figure = plt.figure(figsize=PICTURE_INCHES, layout="none")
+    inside = 1.0 - 2.0 * border
+    axes = figure.add_axes((border, border, inside, inside), projection="3d")
+    draw_on(axes)
+    axes.patch.set_alpha(0.0)
     return pixels(figure)
 
 
@@ -73,7 +98,7 @@ def spectrogram_figure(
     times, hertz, magnitudes = spectrogram(sound, rate)
     shown = hertz <= highest
     levels = decibels(magnitudes[shown], loudest)
-    with plt.rc_context({**SETTINGS, "axes.grid": False}):
+    with plt.rc_context({"axes.grid": False}):
         figure, axes = plt.subplots(figsize=(4.7, 2.9))
         extent = (1e3 * times[0], 1e3 * times[-1], 0.0, 1e-3 * hertz[shown][-1])
         shades: dict[str, Any] = {"vmin": FLOOR_DECIBELS, "vmax": 0.0, "cmap": "magma"}

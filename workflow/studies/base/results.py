@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 import yaml
 
+from workflow import solids
 from workflow.studies.base.table import Table, read_table
 
 
@@ -23,11 +24,14 @@ class Results:
     folder
         It, or the one above, holds the run's `config.yaml`.
     section
-        Of the configuration: names of the parts that lead to the study's `models`.
+        Of the configuration that holds the study's `models`; all of it if empty.
+    study
+        What `workflow.solids.MEASURED` calls the study, if it measures any of these.
     """
 
     folder: Path
-    section: ClassVar[tuple[str, ...]] = ()
+    section: ClassVar[str] = ""
+    study: ClassVar[str] = ""
 
     @cached_property
     def config(self) -> dict[str, Any]:
@@ -39,15 +43,13 @@ class Results:
     @property
     def part(self) -> dict[str, Any]:
         """The study's own part of the configuration."""
-        found = self.config
-        for name in self.section:
-            found = found[name]
-        return found
+        part: dict[str, Any] = self.config[self.section] if self.section else self.config
+        return part
 
     @property
     def without(self) -> str:
         """One sentence about the solids that are left out; empty if there are none."""
-        return ""
+        return solids.without(self.config, self.section) if self.section in solids.STUDIED else ""
 
     @property
     def titles(self) -> dict[str, str]:
@@ -62,6 +64,25 @@ class Results:
     def read_json(self, path: str | Path) -> Any:
         """Content of a JSON file, by its path below the folder."""
         return json.loads((self.folder / path).read_text())
+
+    @cached_property
+    def methods(self) -> dict[str, Any]:
+        """Output of `solver benchmark` for the solids that have one."""
+        return self._measured("methods")
+
+    @cached_property
+    def convergence(self) -> dict[str, Any]:
+        """Output of `solver convergence` for the solids that have one."""
+        return self._measured("convergence")
+
+    @cached_property
+    def scaling(self) -> dict[str, Any]:
+        """Output of `solver scaling` for the solids that have one."""
+        return self._measured("scaling")
+
+    def _measured(self, file: str) -> dict[str, Any]:
+        names = solids.named(self.config, solids.MEASURED[self.study][file])
+        return self.by_model(f"{file}.json", names)
 
     def by_model(self, file: str, names: Iterable[str]) -> dict[str, Any]:
         """Content of the JSON files of that name of some solids."""

@@ -9,9 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import matplotlib
-import numpy as np
-from markupsafe import Markup
-from numpy.typing import NDArray
 
 from carillon.files import atomic_path
 
@@ -75,6 +72,7 @@ SETTINGS: Any = {
     "svg.fonttype": "none",
     "figure.constrained_layout.use": True,
 }
+matplotlib.rcParams.update(SETTINGS)
 
 PNG_DPI = 200
 
@@ -87,7 +85,7 @@ def plain(text: str) -> str:
 def save(figure: Figure, paths: Iterable[str | Path]) -> None:
     """Write a figure as SVG or, on white, as PNG, by the ending of each path."""
     for path in map(Path, paths):
-        with atomic_path(path) as temporary, matplotlib.rc_context(SETTINGS):
+        with atomic_path(path) as temporary:
             if path.suffix == ".svg":
                 temporary.write_text(svg(figure, path.stem), encoding="utf-8")
             else:
@@ -100,7 +98,7 @@ def svg(figure: Figure, name: str) -> str:
     Several such elements can then stand in one page. Text stays text, in the page's own font.
     """
     text = io.StringIO()
-    with matplotlib.rc_context({**SETTINGS, "svg.hashsalt": name}):
+    with matplotlib.rc_context({"svg.hashsalt": name}):
         figure.savefig(text, format="svg", metadata={"Date": None})
     source = text.getvalue()
     source = source[source.index("<svg") :]
@@ -114,32 +112,3 @@ def themed(source: str) -> str:
     for colour, variable in THEMED.items():
         source = re.sub(colour, f"var({variable})", source, flags=re.IGNORECASE)
     return re.sub(r"font-family: [^;\"]*", "font-family: var(--sans)", source)
-
-
-def inlined(figure: Figure, name: str) -> Markup:
-    """The figure as part of a page, in the page's own colours and font; it is closed."""
-    import matplotlib.pyplot as plt
-
-    source = themed(svg(figure, name))
-    plt.close(figure)
-    return Markup(source)
-
-
-def pixels(figure: Any) -> NDArray[np.uint8]:
-    """The figure without background as RGBA values (h, w, 4); the figure is closed."""
-    import matplotlib.pyplot as plt
-
-    figure.set_dpi(PNG_DPI)
-    figure.patch.set_alpha(0.0)
-    figure.canvas.draw()
-    values = np.array(figure.canvas.buffer_rgba())
-    plt.close(figure)
-    return values
-
-
-def save_pixels(picture: NDArray[np.uint8], path: str | Path) -> None:
-    """Write RGBA values (h, w, 4) as PNG."""
-    import matplotlib.image
-
-    with atomic_path(path) as temporary:
-        matplotlib.image.imsave(temporary, np.ascontiguousarray(picture), format="png")

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from workflow.studies.base.entry import Row
-from workflow.studies.base.style import COLOURS, MUTED, SETTINGS
+from workflow.studies.base.style import COLOURS, MUTED
 from workflow.studies.forests.results import ForestsStudy
 from workflow.studies.report.blocks_tables import compared, kind_of, kinds_of, method_of
 
@@ -46,19 +46,18 @@ def blocks_figure(study: ForestsStudy) -> Figure:
     rows = compared(study.result("blocks"))
     kinds = kinds_of(rows)
     marks = _marks(list(dict.fromkeys(map(method_of, rows))))
-    with plt.rc_context(SETTINGS):
-        figure, axes = plt.subplots(
-            -(-len(kinds) // 2), 2, figsize=(7.6, 1.2 + 1.45 * len(kinds)), sharex=True, sharey=True
-        )
-        for axis, kind in zip(axes.flat, kinds):
-            _panel(axis, [row for row in rows if kind_of(row) == kind], marks)
-            axis.set_title(kind)
-        for axis in axes[-1]:
-            axis.set_xlabel("cost per block [µs], one core")
-        for axis in axes[:, 0]:
-            axis.set_ylabel("E|u_c − u|² / E|u|²")
-        handles, labels = axes.flat[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper left", ncols=3, columnspacing=1.2)
+    figure, axes = plt.subplots(
+        -(-len(kinds) // 2), 2, figsize=(7.6, 1.2 + 1.45 * len(kinds)), sharex=True, sharey=True
+    )
+    for axis, kind in zip(axes.flat, kinds):
+        _panel(axis, [row for row in rows if kind_of(row) == kind], marks)
+        axis.set_title(kind)
+    for axis in axes[-1]:
+        axis.set_xlabel("cost per block [µs], one core")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("E|u_c − u|² / E|u|²")
+    handles, labels = axes.flat[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper left", ncols=3, columnspacing=1.2)
     return figure
 
 
@@ -89,23 +88,22 @@ def _panel(axis: Any, rows: Sequence[Row], marks: dict[str, tuple[str, str]]) ->
 def curve_figure(study: ForestsStudy) -> Figure:
     """Errors on fresh blocks over the rows trained on."""
     rows = study.result("curve")
-    with plt.rc_context(SETTINGS):
-        figure, axes = plt.subplots(figsize=(7.6, 4.2))
-        for distribution, colour in zip(rows[0]["scores"], DISTRIBUTIONS):
-            for key, label, look in PARTS:
-                values = [row["scores"][distribution][key] for row in rows]
-                axes.loglog(
-                    [row["rows"] for row in rows],
-                    values,
-                    marker="o",
-                    markersize=4.5,
-                    color=colour,
-                    label=f"{distribution.replace('..', '…')}, {label}",
-                    **look,
-                )
-        _plain(axes.yaxis)
-        axes.set(xlabel="rows trained on", ylabel="rms error of log E on fresh blocks")
-        figure.legend(loc="outside upper left", ncols=2, columnspacing=1.2)
+    figure, axes = plt.subplots(figsize=(7.6, 4.2))
+    for distribution, colour in zip(rows[0]["scores"], DISTRIBUTIONS):
+        for key, label, look in PARTS:
+            values = [row["scores"][distribution][key] for row in rows]
+            axes.loglog(
+                [row["rows"] for row in rows],
+                values,
+                marker="o",
+                markersize=4.5,
+                color=colour,
+                label=f"{distribution.replace('..', '…')}, {label}",
+                **look,
+            )
+    _plain(axes.yaxis)
+    axes.set(xlabel="rows trained on", ylabel="rms error of log E on fresh blocks")
+    figure.legend(loc="outside upper left", ncols=2, columnspacing=1.2)
     return figure
 
 
@@ -114,28 +112,27 @@ def variants_figure(study: ForestsStudy) -> Figure:
     rows = study.result("variants")
     names = [row["variant"] for row in rows]
     distributions = list(rows[0]["scores"])
-    with plt.rc_context(SETTINGS):
-        figure, axes = plt.subplots(figsize=(7.6, 1.3 + 0.32 * len(names)))
-        for number, (distribution, colour) in enumerate(zip(distributions, DISTRIBUTIONS)):
-            shift = (number + 0.5) / len(distributions) - 0.5
-            for key, label, look in PARTS:
-                axes.plot(
-                    [row["scores"][distribution][key] for row in rows],
-                    [position + 0.5 * shift for position in range(len(names))],
-                    "o",
-                    markersize=4.5,
-                    color=colour,
-                    markerfacecolor=look.get("markerfacecolor", colour),
-                    label=f"{distribution.replace('..', '…')}, {label}",
-                )
-        axes.set_xscale("log")
-        _plain(axes.xaxis)
-        axes.set_yticks(range(len(names)), names)
-        axes.tick_params(axis="y", length=0)
-        axes.grid(axis="y", visible=False)
-        axes.set_ylim(len(names) - 0.5, -0.5)
-        axes.set_xlabel("rms error of log E on fresh blocks")
-        figure.legend(loc="outside upper left", ncols=2, columnspacing=1.2)
+    figure, axes = plt.subplots(figsize=(7.6, 1.3 + 0.32 * len(names)))
+    for number, (distribution, colour) in enumerate(zip(distributions, DISTRIBUTIONS)):
+        shift = (number + 0.5) / len(distributions) - 0.5
+        for key, label, look in PARTS:
+            axes.plot(
+                [row["scores"][distribution][key] for row in rows],
+                [position + 0.5 * shift for position in range(len(names))],
+                "o",
+                markersize=4.5,
+                color=colour,
+                markerfacecolor=look.get("markerfacecolor", colour),
+                label=f"{distribution.replace('..', '…')}, {label}",
+            )
+    axes.set_xscale("log")
+    _plain(axes.xaxis)
+    axes.set_yticks(range(len(names)), names)
+    axes.tick_params(axis="y", length=0)
+    axes.grid(axis="y", visible=False)
+    axes.set_ylim(len(names) - 0.5, -0.5)
+    axes.set_xlabel("rms error of log E on fresh blocks")
+    figure.legend(loc="outside upper left", ncols=2, columnspacing=1.2)
     return figure
 
 
@@ -143,19 +140,18 @@ def sizes_figure(study: ForestsStudy) -> Figure:
     """Time of a block over the size of forests."""
     found = study.result("benchmark")["sizes"]
     ours = study.result("benchmark")["megabytes"]
-    with plt.rc_context(SETTINGS):
-        figure, axes = plt.subplots(figsize=(7.6, 3.4))
-        for (key, label), colour in zip(SIZED.items(), DISTRIBUTIONS):
-            values = [size[key]["median"] for size in found]
-            megabytes = [size["megabytes"] for size in found]
-            axes.loglog(megabytes, values, "o-", markersize=4.5, color=colour, label=label)
-        axes.axvline(
-            ours, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)), label="the forests studied"
-        )
-        _plain(axes.xaxis)
-        _plain(axes.yaxis)
-        axes.set(xlabel="storage of the forests [MB]", ylabel="time of a block [µs], one core")
-        figure.legend(loc="outside upper left", ncols=3, columnspacing=1.2)
+    figure, axes = plt.subplots(figsize=(7.6, 3.4))
+    for (key, label), colour in zip(SIZED.items(), DISTRIBUTIONS):
+        values = [size[key]["median"] for size in found]
+        megabytes = [size["megabytes"] for size in found]
+        axes.loglog(megabytes, values, "o-", markersize=4.5, color=colour, label=label)
+    axes.axvline(
+        ours, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)), label="the forests studied"
+    )
+    _plain(axes.xaxis)
+    _plain(axes.yaxis)
+    axes.set(xlabel="storage of the forests [MB]", ylabel="time of a block [µs], one core")
+    figure.legend(loc="outside upper left", ncols=3, columnspacing=1.2)
     return figure
 
 

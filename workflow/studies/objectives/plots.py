@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, PercentFormatter
 
-from workflow.studies.base.style import COLOURS, MUTED, SETTINGS
+from workflow.studies.base.style import COLOURS, FAINT, MUTED
 from workflow.studies.objectives.goals import rms_limits
 from workflow.studies.objectives.results import Objectives
 
@@ -33,21 +33,20 @@ def errors_figure(study: Objectives, solid: str) -> Figure:
     finest = max(row["resolution"] for row in rows)
     materials = list(dict.fromkeys(row["material"] for row in rows))
     height = 0.8 / len(materials)
-    with plt.rc_context(SETTINGS):
-        figure, axes = plt.subplots(figsize=(4.7, 1.1 + 0.34 * len(names)))
-        for limit in limits:
-            axes.axvline(limit, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)), zorder=0)
-        for row in rows:
-            at = names.index(row["coarsening"]) - 0.4
-            at += (materials.index(row["material"]) + 0.5) * height
-            _mark(axes, row, at, row["resolution"] == finest)
-        for material in materials:
-            marker, colour = MATERIALS[material]
-            axes.plot([], [], marker, color=colour, markersize=4.5, label=material)
-        _finish(axes, names)
-        figure.legend(
-            loc="outside upper left", ncols=3, columnspacing=1.0, handletextpad=0.1, borderpad=0.0
-        )
+    figure, axes = plt.subplots(figsize=(4.7, 1.1 + 0.34 * len(names)))
+    for limit in limits:
+        axes.axvline(limit, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)), zorder=0)
+    for row in rows:
+        at = names.index(row["coarsening"]) - 0.4
+        at += (materials.index(row["material"]) + 0.5) * height
+        _mark(axes, row, at, row["resolution"] == finest)
+    for material in materials:
+        marker, colour = MATERIALS[material]
+        axes.plot([], [], marker, color=colour, markersize=4.5, label=material)
+    _finish(axes, names)
+    figure.legend(
+        loc="outside upper left", ncols=3, columnspacing=1.0, handletextpad=0.1, borderpad=0.0
+    )
     return figure
 
 
@@ -66,6 +65,6 @@ def _finish(axes: Any, names: list[str]) -> None:
     axes.tick_params(axis="y", length=0)
     axes.grid(axis="y", visible=False)
     for edge in range(1, len(names)):
-        axes.axhline(edge - 0.5, color=SETTINGS["grid.color"], linewidth=0.5)
+        axes.axhline(edge - 0.5, color=FAINT, linewidth=0.5)
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.set_xlabel("rms frequency error")

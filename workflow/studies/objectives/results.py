@@ -47,12 +47,7 @@ def solids_of(config: Mapping[str, Any]) -> list[str]:
 class Objectives(Results):
     """The folder of the objectives' study."""
 
-    section = (SECTION,)
-
-    @property
-    def without(self) -> str:
-        """One sentence about the solids that are left out; empty if there are none."""
-        return solids.without(self.config, SECTION)
+    section = SECTION
 
     @cached_property
     def found(self) -> dict[Case, dict[str, Any]]:

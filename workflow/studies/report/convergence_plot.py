@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from carillon.fem.model import RIGID_MODES
 from workflow.studies.base.results import Results
-from workflow.studies.base.style import COLOURS, SETTINGS
+from workflow.studies.base.style import COLOURS
 from workflow.studies.report.convergence_tables import ACCELERATIONS, PAPER, RANDOM, start_label
 from workflow.variants import TRUTH
 
@@ -33,27 +33,26 @@ def convergence_figure(results: Results, model: str) -> Figure:
     }
     starts = list(dict.fromkeys(start for _, start in curves))
     colours = _colours(starts)
-    with plt.rc_context(SETTINGS):
-        figure = plt.figure(figsize=(1.2 + 2.15 * len(starts), 8.2))
-        grid = figure.add_gridspec(
-            1 + len(ACCELERATIONS), len(starts), height_ratios=(1.2, *(1 for _ in ACCELERATIONS))
-        )
-        paper = {start: curves[PAPER, start] for start in starts}
-        _plot_eigenvalues(figure.add_subplot(grid[0, :]), paper, exact, colours)
-        shared = None
-        for row, (acceleration, label) in enumerate(ACCELERATIONS.items(), start=1):
-            for column, start in enumerate(starts):
-                axes = figure.add_subplot(grid[row, column], sharey=shared, sharex=shared)
-                _plot_errors(axes, curves[acceleration, start], exact, colours[start])
-                if row == 1:
-                    axes.set_title(start_label(start).removesuffix(" interfaces"))
-                if row == len(ACCELERATIONS):
-                    axes.set_xlabel("mode number")
-                if column:
-                    axes.tick_params(labelleft=False)
-                else:
-                    axes.set_ylabel(f"relative error\n{label}")
-                shared = shared or axes
+    figure = plt.figure(figsize=(1.2 + 2.15 * len(starts), 8.2))
+    grid = figure.add_gridspec(
+        1 + len(ACCELERATIONS), len(starts), height_ratios=(1.2, *(1 for _ in ACCELERATIONS))
+    )
+    paper = {start: curves[PAPER, start] for start in starts}
+    _plot_eigenvalues(figure.add_subplot(grid[0, :]), paper, exact, colours)
+    shared = None
+    for row, (acceleration, label) in enumerate(ACCELERATIONS.items(), start=1):
+        for column, start in enumerate(starts):
+            axes = figure.add_subplot(grid[row, column], sharey=shared, sharex=shared)
+            _plot_errors(axes, curves[acceleration, start], exact, colours[start])
+            if row == 1:
+                axes.set_title(start_label(start).removesuffix(" interfaces"))
+            if row == len(ACCELERATIONS):
+                axes.set_xlabel("mode number")
+            if column:
+                axes.tick_params(labelleft=False)
+            else:
+                axes.set_ylabel(f"relative error\n{label}")
+            shared = shared or axes
     return figure
 
 

@@ -6,7 +6,7 @@ import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
 from workflow.studies.base.results import Results
-from workflow.studies.base.style import COLOURS, FAINT, INK, MUTED, SETTINGS, plain
+from workflow.studies.base.style import COLOURS, FAINT, INK, MUTED, plain
 from workflow.studies.base.table import MAX, MIN
 from workflow.studies.report.methods_tables import METHODS
 
@@ -29,34 +29,32 @@ def methods_figure(results: Results) -> Figure:
     keys = {column.key for column in methods.columns}
     timed = [name for name in METHODS if name in keys]
     height = 0.8 / len(timed)
-    with plt.rc_context(SETTINGS):
-        figure, axes = plt.subplots(figsize=(7.6, 1.1 + 1.5 * len(methods.rows)))
-        for index, name in enumerate(timed):
-            rows = [
-                (number - 0.4 + (index + 0.5) * height, row)
-                for number, row in enumerate(methods.rows)
-                if row.get(name) is not None
-            ]
-            medians = [row[name] for _, row in rows]
-            below = [row[name] - row[f"{name}{MIN}"] for _, row in rows]
-            above = [row[f"{name}{MAX}"] - row[name] for _, row in rows]
-            axes.barh(
-                [at for at, _ in rows],
-                medians,
-                0.86 * height,
-                xerr=[below, above],
-                color=METHOD_COLOURS[name],
-                error_kw={"elinewidth": 0.9, "ecolor": INK},
-                label=METHODS[name],
-            )
-        axes.set_xscale("log")
-        axes.set_yticks(
-            range(len(methods.rows)),
-            [plain(row["title"]).replace(", ", "\n") for row in methods.rows],
+    figure, axes = plt.subplots(figsize=(7.6, 1.1 + 1.5 * len(methods.rows)))
+    for index, name in enumerate(timed):
+        rows = [
+            (number - 0.4 + (index + 0.5) * height, row)
+            for number, row in enumerate(methods.rows)
+            if row.get(name) is not None
+        ]
+        medians = [row[name] for _, row in rows]
+        below = [row[name] - row[f"{name}{MIN}"] for _, row in rows]
+        above = [row[f"{name}{MAX}"] - row[name] for _, row in rows]
+        axes.barh(
+            [at for at, _ in rows],
+            medians,
+            0.86 * height,
+            xerr=[below, above],
+            color=METHOD_COLOURS[name],
+            error_kw={"elinewidth": 0.9, "ecolor": INK},
+            label=METHODS[name],
         )
-        axes.tick_params(axis="y", length=0)
-        axes.grid(axis="y", visible=False)
-        axes.invert_yaxis()
-        axes.set_xlabel("wall time [s]")
-        figure.legend(loc="outside upper left", ncols=4, columnspacing=1.2)
+    axes.set_xscale("log")
+    axes.set_yticks(
+        range(len(methods.rows)), [plain(row["title"]).replace(", ", "\n") for row in methods.rows]
+    )
+    axes.tick_params(axis="y", length=0)
+    axes.grid(axis="y", visible=False)
+    axes.invert_yaxis()
+    axes.set_xlabel("wall time [s]")
+    figure.legend(loc="outside upper left", ncols=4, columnspacing=1.2)
     return figure

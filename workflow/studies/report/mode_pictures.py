@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,7 @@ from carillon.fem.geometry.boundary import surface_quads
 from carillon.fem.geometry.picture import DRAWN_AMPLITUDE, draw, guess_up
 from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import ModesFile, read_modes
-from workflow.studies.base.media import PICTURE_INCHES, cropped
-from workflow.studies.base.style import SETTINGS, pixels, save_pixels
+from workflow.studies.base.media import cropped, save_pixels, solid_picture
 from workflow.studies.report.results import Run
 from workflow.variants import SHOWN, TRUTH
 
@@ -31,12 +31,13 @@ def draw_first_elastic_modes(
     """Draw mode 7 of every shown variant to `paths`; return frequency and likeness of each."""
     truth = read_modes(results.modes_path(model, TRUTH))
     wanted = displacement(truth, RIGID_MODES)
-    view = View(truth.mesh, wanted)
+    view = view_of(truth.mesh, wanted)
     description, pictures = {}, []
     for variant in SHOWN:
         found = read_modes(results.modes_path(model, variant))
         motion, likeness = aligned(found, truth, wanted)
-        pictures.append(pixels(mode_figure(found.mesh, motion, view)))
+        drawn = partial(draw, mesh=found.mesh, displacement=motion, **view)
+        pictures.append(solid_picture(drawn))
         description[variant] = {
             "hertz": float(found.frequencies[RIGID_MODES]),
             "likeness": likeness,
@@ -62,7 +63,7 @@ def cluster(frequencies: Array) -> list[int]:
 
 
 def aligned(file: ModesFile, truth: ModesFile, wanted: Array) -> tuple[Array, float]:
-    """First elastic motion of `file`, signed and turned within its cluster to match the truth.s.
+    """First elastic motion of `file`, signed and turned within its cluster to match the truth's.
 
     Returns
     -------
@@ -79,32 +80,14 @@ def aligned(file: ModesFile, truth: ModesFile, wanted: Array) -> tuple[Array, fl
     return (motion * (target_length / max(float(length), 1e-300))).reshape(-1, 3), likeness
 
 
-class View:
-    """How all pictures of one mode are drawn, decided by the ground truth `mesh` and `motion`.
+def view_of(mesh: HexMesh, motion: Array) -> dict[str, Any]:
+    """How all pictures of one mode are drawn, decided by the truth's `mesh` and `motion` (n, 3).
 
-    Attributes
-    ----------
-    scale, limits, up
-        Arguments of `carillon.fem.geometry.picture.draw`. Colours end at the largest motion that
-        can be seen: inside, a body may move more than its surface does.
+    Arguments of `carillon.fem.geometry.picture.draw`. Colours end at the largest motion that can be
+    seen: inside, a body may move more than its surface does.
     """
-
-    def __init__(self, mesh: HexMesh, motion: Array) -> None:
-        seen = np.unique(surface_quads(mesh))
-        largest = float(np.linalg.norm(motion[seen], axis=1).max())
-        diagonal = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
-        self.scale = DRAWN_AMPLITUDE * diagonal / largest
-        self.limits = (0.0, largest)
-        self.up = guess_up(mesh)
-
-
-def mode_figure(mesh: HexMesh, motion: Array, view: View) -> Any:
-    """One deformed body, coloured by the length of its displacement."""
-    import matplotlib.pyplot as plt
-
-    with plt.rc_context(SETTINGS):
-        figure = plt.figure(figsize=PICTURE_INCHES, layout="none")
-        axes = figure.add_axes((0, 0, 1, 1), projection="3d")
-        draw(axes, mesh, motion, scale=view.scale, limits=view.limits, up=view.up)
-        axes.patch.set_alpha(0.0)
-    return figure
+    seen = np.unique(surface_quads(mesh))
+    largest = float(np.linalg.norm(motion[seen], axis=1).max())
+    diagonal = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+    scale = DRAWN_AMPLITUDE * diagonal / largest
+    return {"scale": scale, "limits": (0.0, largest), "up": guess_up(mesh)}

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from carillon.fem.geometry.picture import draw
 from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import read_modes
-from workflow.studies.base.style import COLOURS, MUTED, SETTINGS, plain
-from workflow.studies.report.mode_pictures import View, aligned, displacement
+from workflow.studies.base.style import COLOURS, MUTED, plain
+from workflow.studies.report.mode_pictures import aligned, displacement, view_of
 from workflow.studies.report.plots import LINES
 from workflow.studies.report.results import Run
 from workflow.variants import TRUTH, VARIANTS
@@ -24,15 +24,15 @@ def overview_figure(results: Run, model: str) -> Figure:
     """First elastic mode of the truth and of the fast method, and the spectra of both."""
     truth = read_modes(results.modes_path(model, TRUTH))
     wanted = displacement(truth, RIGID_MODES)
-    view = View(truth.mesh, wanted)
-    with plt.rc_context({**SETTINGS, "figure.constrained_layout.use": False}):
+    view = view_of(truth.mesh, wanted)
+    with plt.rc_context({"figure.constrained_layout.use": False}):
         figure = plt.figure(figsize=(11.6, 3.9))
         for column, variant in enumerate((TRUTH, FAST)):
             left = 0.01 + 0.3 * column
             file = truth if variant == TRUTH else read_modes(results.modes_path(model, FAST))
             motion, _ = aligned(file, truth, wanted)
             body = figure.add_axes((left, 0.0, 0.29, 0.84), projection="3d")
-            draw(body, file.mesh, motion, scale=view.scale, limits=view.limits, up=view.up)
+            draw(body, file.mesh, motion, **view)
             figure.text(left + 0.01, 0.93, _label(variant), weight="bold", size=10.5)
             hertz = file.frequencies[RIGID_MODES]
             text = f"{file.mesh.n_dofs:,} unknowns, mode 7 at {hertz:,.0f} Hz"

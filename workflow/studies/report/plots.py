@@ -7,6 +7,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
+from solver.studies.scaling import plot
 from workflow.studies.base.numbers import show
 from workflow.studies.base.results import Results
 from workflow.studies.base.style import COLOURS, FAINT, SETTINGS, plain
@@ -26,20 +27,19 @@ def spectrum_figure(run: Results, model: str) -> Figure:
     """Frequencies by mode number above, their relative errors below."""
     rows = [row for row in run.table("frequencies").rows if row["model"] == model]
     mode = [row["mode"] for row in rows]
-    with plt.rc_context(SETTINGS):
-        figure, (above, below) = plt.subplots(
-            2, 1, figsize=(4.7, 5.0), sharex=True, height_ratios=(1, 1.15)
-        )
-        for variant in SHOWN:
-            style = {"color": COLOURS[variant], "label": VARIANTS[variant].label, **LINES[variant]}
-            above.plot(mode, [row[variant] for row in rows], **style)
-            if variant != TRUTH:
-                below.semilogy(mode, visible([row[f"{variant}_error"] for row in rows]), **style)
-        above.set(ylabel="frequency [Hz]", title="Natural frequencies")
-        above.set_ylim(bottom=0)
-        above.legend(loc="lower right")
-        below.set(xlabel="mode number", ylabel="|relative error|", title="Error of the frequency")
-        below.set_xlim(mode[0], mode[-1])
+    figure, (above, below) = plt.subplots(
+        2, 1, figsize=(4.7, 5.0), sharex=True, height_ratios=(1, 1.15)
+    )
+    for variant in SHOWN:
+        style = {"color": COLOURS[variant], "label": VARIANTS[variant].label, **LINES[variant]}
+        above.plot(mode, [row[variant] for row in rows], **style)
+        if variant != TRUTH:
+            below.semilogy(mode, visible([row[f"{variant}_error"] for row in rows]), **style)
+    above.set(ylabel="frequency [Hz]", title="Natural frequencies")
+    above.set_ylim(bottom=0)
+    above.legend(loc="lower right")
+    below.set(xlabel="mode number", ylabel="|relative error|", title="Error of the frequency")
+    below.set_xlim(mode[0], mode[-1])
     return figure
 
 
@@ -49,24 +49,26 @@ def times_figure(run: Results) -> Figure:
     rows = times.rows
     labels = {column.key: column.label for column in times.columns}
     height = 0.8 / len(TIMED)
-    with plt.rc_context(SETTINGS):
-        figure, axes = plt.subplots(figsize=(7.6, 0.9 + 1.05 * len(rows)))
-        smallest = min(row[variant] for row in rows for variant in TIMED)
-        for index, variant in enumerate(TIMED):
-            at = [position - 0.4 + (index + 0.5) * height for position in range(len(rows))]
-            seconds = [row[variant] for row in rows]
-            bars = axes.barh(
-                at, seconds, 0.86 * height, color=COLOURS[variant], label=labels[variant]
-            )
-            axes.bar_label(bars, [show(value, "seconds") for value in seconds], padding=3, size=8)
-        axes.set_xscale("log")
-        axes.set_xlim(left=smallest / 2)
-        axes.margins(x=0.12)
-        axes.set_yticks(range(len(rows)), [plain(row["title"]).replace(", ", "\n") for row in rows])
-        axes.tick_params(axis="y", length=0)
-        axes.grid(axis="y", visible=False)
-        axes.spines["left"].set_color(FAINT)
-        axes.invert_yaxis()
-        axes.set_xlabel("wall time [s]")
-        figure.legend(loc="outside upper left", ncols=len(TIMED), columnspacing=1.2)
+    figure, axes = plt.subplots(figsize=(7.6, 0.9 + 1.05 * len(rows)))
+    smallest = min(row[variant] for row in rows for variant in TIMED)
+    for index, variant in enumerate(TIMED):
+        at = [position - 0.4 + (index + 0.5) * height for position in range(len(rows))]
+        seconds = [row[variant] for row in rows]
+        bars = axes.barh(at, seconds, 0.86 * height, color=COLOURS[variant], label=labels[variant])
+        axes.bar_label(bars, [show(value, "seconds") for value in seconds], padding=3, size=8)
+    axes.set_xscale("log")
+    axes.set_xlim(left=smallest / 2)
+    axes.margins(x=0.12)
+    axes.set_yticks(range(len(rows)), [plain(row["title"]).replace(", ", "\n") for row in rows])
+    axes.tick_params(axis="y", length=0)
+    axes.grid(axis="y", visible=False)
+    axes.spines["left"].set_color(FAINT)
+    axes.invert_yaxis()
+    axes.set_xlabel("wall time [s]")
+    figure.legend(loc="outside upper left", ncols=len(TIMED), columnspacing=1.2)
     return figure
+
+
+def scaling_figure(results: Results, model: str) -> Figure:
+    """Measured and modelled wall times over the number of ranks."""
+    return plot.scaling_figure(results.read_json(f"models/{model}/scaling.json"), SETTINGS)

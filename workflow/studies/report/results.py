@@ -20,6 +20,8 @@ PRECOMPUTATION = ("mesh", "material")
 class Run(Results):
     """The folder of a run."""
 
+    study = "report"
+
     @property
     def models(self) -> list[str]:
         """Names of the models in the order of the configuration."""
@@ -54,21 +56,6 @@ class Run(Results):
             variant: self.by_model(f"{variant}.comparison.json", self.models)
             for variant in CANDIDATES
         }
-
-    @cached_property
-    def convergence(self) -> dict[str, Any]:
-        """Output of `solver convergence` for the models that have one."""
-        return self.by_model("convergence.json", self.config["convergence"]["models"])
-
-    @cached_property
-    def methods(self) -> dict[str, Any]:
-        """Output of `solver benchmark` for the models that have one."""
-        return self.by_model("methods.json", self.config["times"]["models"])
-
-    @cached_property
-    def scaling(self) -> dict[str, Any]:
-        """Output of `solver scaling` for the models that have one."""
-        return self.by_model("scaling.json", self.config["scaling"]["models"])
 
     @cached_property
     def shards(self) -> dict[str, dict[str, Any]]:

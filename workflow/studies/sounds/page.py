@@ -12,9 +12,14 @@ from numpy.typing import NDArray
 
 from solver.response.response import spectrogram
 from sound.strikes import locate
-from workflow.studies.base.media import embedded, highest_hertz, spectrogram_figure, wav_uri
+from workflow.studies.base.media import (
+    embedded,
+    highest_hertz,
+    inlined,
+    spectrogram_figure,
+    wav_uri,
+)
 from workflow.studies.base.page import rendered
-from workflow.studies.base.style import inlined
 from workflow.studies.base.table import Table
 from workflow.studies.sounds import plots
 from workflow.studies.sounds.examples import DESIGN, ELSEWHERE, PROJECT, START, TRUTH

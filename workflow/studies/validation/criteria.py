@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 
 from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import frequencies
@@ -15,12 +17,11 @@ from workflow.studies.base.numbers import show
 from workflow.studies.validation.evidence import COARSENED, SOLVED, Evidence
 from workflow.variants import TRUTH
 
-GROUPS = {
-    TRUTH: "Is the ground truth true?",
-    SOLVED: "Does the fast solver find the same spectrum?",
-    COARSENED: "Is the coarsened solid close enough?",
-}
-"""The three questions, by the variant that each is about."""
+TEXTS: dict[str, Any] = yaml.safe_load(
+    Path(__file__).with_name("criteria.yaml").read_text(encoding="utf-8")
+)
+Limited = tuple[float | None, float]
+"""What was found, and its limit."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Criterion:
 
     Attributes
     ----------
-    group : variant that is judged, see `GROUPS`.
+    group : variant that is judged.
     key : name within the group.
     label : what is measured.
     found, limit : values; None if nothing was found.
@@ -57,132 +58,83 @@ class Criterion:
         return self.found == self.limit if self.exact else self.found <= self.limit
 
     @property
+    def shown(self) -> str:
+        """What was found, for people."""
+        return show(self.found, self.kind)
+
+    @property
+    def required(self) -> str:
+        """The limit, for people."""
+        return ("" if self.exact else "≤ ") + show(self.limit, self.kind)
+
+    @property
     def row(self) -> dict[str, Any]:
         """Row of the table of criteria."""
-        relation = "" if self.exact else "≤ "
-        return {
-            "group": self.group,
-            "key": self.key,
-            "label": self.label,
-            "shown": show(self.found, self.kind),
-            "required": relation + show(self.limit, self.kind),
-            "verdict": "met" if self.passed else "missed",
-            "found": self.found,
-            "limit": self.limit,
-            "why": self.why,
-            "source": self.source,
-        }
+        told = ("group", "key", "label", "shown", "required", "found", "limit", "why", "source")
+        verdict = "met" if self.passed else "missed"
+        return {**{name: getattr(self, name) for name in told}, "verdict": verdict}
 
 
 def judge(evidence: Evidence) -> list[Criterion]:
     """All criteria of a model, group by group."""
     limits = evidence.tolerances
     return [
-        *_sound(evidence, TRUTH, limits["truth_residual"]),
+        *_spectrum(evidence, TRUTH, limits["truth_residual"]),
         *_solver(evidence),
-        *_sound(evidence, SOLVED, limits["residual"]),
+        *_spectrum(evidence, SOLVED, limits["residual"]),
         *_coarsening(evidence),
-        *_sound(evidence, COARSENED, limits["residual"]),
+        *_spectrum(evidence, COARSENED, limits["residual"]),
     ]
 
 
-def _sound(evidence: Evidence, variant: str, residual: float) -> Iterator[Criterion]:
-    """What any set of eigenpairs of its own K and M has to satisfy, found anew by the audit."""
+def _spectrum(evidence: Evidence, variant: str, residual: float) -> Iterator[Criterion]:
     found = evidence.audit["spectra"][variant]
-    source = f"{evidence.file('audit.json')}: spectra.{variant}"
-    orthogonality = evidence.tolerances["orthogonality"]
     counted, expected = found["counted"], found["expected"]
-    # Without a count there is nothing to find, and what was expected is the limit.
-    both = (None, expected) if counted is None else (expected, counted)
+    values = {
+        "residual": (found["residual_max"], residual),
+        "orthogonality": (found["orthogonality"], evidence.tolerances["orthogonality"]),
+        "rigid": (found["rigid_modes"], RIGID_MODES),
+        # Without a count there is nothing to find, and what was expected is the limit.
+        "counted": (None, expected) if counted is None else (expected, counted),
+    }
     below = show(float(frequencies(np.array(found["counted_below"]))), "hertz")
-    for key, label, where, (value, limit), kind, why in (
-        (
-            "residual",
-            "Largest residual |Kx − λMx| / (λ|Mx|)",
-            "residual_max",
-            (found["residual_max"], residual),
-            "small",
-            "Each pair must satisfy the equation itself, whatever solver it came from.",
-        ),
-        (
-            "orthogonality",
-            "Largest entry of |XᵀMX − I|",
-            "orthogonality",
-            (found["orthogonality"], orthogonality),
-            "small",
-            "Otherwise the same mode could be counted twice.",
-        ),
-        (
-            "rigid",
-            "Modes of frequency zero",
-            "rigid_modes",
-            (found["rigid_modes"], RIGID_MODES),
-            "count",
-            "A free body in one piece has six; more mean a hinge or a loose part.",
-        ),
-        (
-            "counted",
-            f"Eigenvalues below {below} Hz, found against counted",
-            "counted",
-            both,
-            "count",
-            "The inertia of K − μM counts them without computing any: none is missing.",
-        ),
-    ):
-        exact = kind == "count"
-        yield Criterion(variant, key, label, value, limit, kind, why, f"{source}.{where}", exact)
+    return _criteria(evidence, "spectrum", variant, values, below=below)
 
 
 def _solver(evidence: Evidence) -> Iterator[Criterion]:
     found, limits = evidence.compared[SOLVED], evidence.tolerances
-    file = f"{evidence.file(SOLVED)}.comparison.json"
-    for key, label, value, kind, why, source in (
-        (
-            "eigenvalue_error",
-            "Worst relative error of an eigenvalue",
-            found["eigenvalue_relative_error"]["max"],
-            "small",
-            "The same K and M have one spectrum; this is what the solver adds to the error.",
-            f"{file}: eigenvalue_relative_error.max",
-        ),
-        (
-            "subspace_angle",
-            "Largest angle between spaces of modes",
-            found["subspace_angle_max"],
-            "angle",
-            "Right frequencies with wrong shapes would sound at wrong places.",
-            f"{file}: subspace_angle_max",
-        ),
-        (
-            "response",
-            "Error of the motion after a strike",
-            evidence.response.responses[SOLVED].difference,
-            "small",
-            "Frequencies, shapes and amplitudes together decide what is seen and heard.",
-            f"{evidence.file('response.h5')}: spectra/{SOLVED}, difference",
-        ),
-    ):
-        yield Criterion(SOLVED, key, label, value, limits[key], kind, why, source)
+    values = {
+        "eigenvalue_error": found["eigenvalue_relative_error"]["max"],
+        "subspace_angle": found["subspace_angle_max"],
+        "response": evidence.response.responses[SOLVED].difference,
+    }
+    limited = {key: (value, limits[key]) for key, value in values.items()}
+    return _criteria(evidence, "solver", SOLVED, limited)
 
 
 def _coarsening(evidence: Evidence) -> Iterator[Criterion]:
     found, limits = evidence.compared[COARSENED], evidence.tolerances
     last = min(AUDIBLE_LAST, RIGID_MODES + found["modes_compared"])
+    rms, worst = (found[f"frequency_{name}_relative_error_7_60"] for name in ("rms", "max"))
+    limited = {
+        "frequency_rms": (rms, limits["frequency_rms"]),
+        "frequency_worst": (worst, limits["frequency_worst"]),
+    }
     modes = f"modes {AUDIBLE_FIRST}–{last}"
-    file = f"{evidence.file(COARSENED)}.comparison.json"
-    for key, label, where, why in (
-        (
-            "frequency_rms",
-            f"Rms error of the frequencies of {modes}",
-            "frequency_rms_relative_error_7_60",
-            "What a mesh of an eighth of the cells costs in pitch, on the whole.",
-        ),
-        (
-            "frequency_worst",
-            f"Worst error of a frequency of {modes}",
-            "frequency_max_relative_error_7_60",
-            "A mean hides a single mode that is far off; 6 % is a semitone.",
-        ),
-    ):
-        source = f"{file}: {where}"
-        yield Criterion(COARSENED, key, label, found[where], limits[key], "percent", why, source)
+    return _criteria(evidence, "coarsening", COARSENED, limited, modes=modes)
+
+
+def _criteria(
+    evidence: Evidence, part: str, variant: str, values: dict[str, Limited], **names: str
+) -> Iterator[Criterion]:
+    """Criteria of a part of the texts, whose labels may hold the `names`."""
+    names |= {
+        "variant": variant,
+        "audit": evidence.file("audit.json"),
+        "comparison": evidence.file(f"{variant}.comparison.json"),
+        "response": evidence.file("response.h5"),
+    }
+    for key, (found, limit) in values.items():
+        told = {name: text.format(**names) for name, text in TEXTS[part][key].items()}
+        exact = told["kind"] == "count"
+        yield Criterion(variant, key, found=found, limit=limit, exact=exact, **told)

@@ -13,9 +13,8 @@ from carillon import provenance
 from carillon.fem.geometry import load_surface
 from solver.response.response import STRIKE_SECONDS
 from workflow import settings
-from workflow.studies.base.media import embedded, wav_uri
+from workflow.studies.base.media import embedded, inlined, wav_uri
 from workflow.studies.base.page import listed_modes, rendered
-from workflow.studies.base.style import inlined
 from workflow.studies.base.table import Table
 from workflow.studies.report.page import mode_pictures
 from workflow.studies.validation import plots

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,17 +25,13 @@ STRUCK, OBSERVED = COLOURS["random"], COLOURS["hcms_ec"]
 def solid_pictures(surface: trimesh.Trimesh, mesh: HexMesh, young: Array) -> list[Pixels]:
     """The surface, the voxels, and the voxels coloured by log10 of their moduli (m,) [Pa]."""
     up = guess_up(mesh)
-    return cropped(
-        [
-            solid_picture(
-                lambda axes: draw_surface(axes, surface.vertices, surface.faces, mesh, up)
-            ),
-            solid_picture(lambda axes: draw(axes, mesh, up=up)),
-            solid_picture(
-                lambda axes: draw(axes, mesh, values=np.log10(young), up=up, cmap=COLOUR_MAP)
-            ),
-        ]
-    )
+    vertices, faces = surface.vertices, surface.faces
+    drawn: list[Callable[[Any], Any]] = [
+        partial(draw_surface, vertices=vertices, faces=faces, mesh=mesh, up=up),
+        partial(draw, mesh=mesh, up=up),
+        partial(draw, mesh=mesh, values=np.log10(young), up=up, cmap=COLOUR_MAP),
+    ]
+    return cropped(list(map(solid_picture, drawn)))
 
 
 def struck_picture(mesh: HexMesh, strike: Contact, observed: Contact) -> Pixels:

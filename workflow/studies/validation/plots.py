@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from solver.response.response import SAMPLE_RATE_HERTZ, spectrogram
 from solver.response.response_file import ResponseFile
 from workflow.studies.base.media import COLOUR_MAP, highest_hertz, spectrogram_figure
-from workflow.studies.base.style import COLOURS, SETTINGS
+from workflow.studies.base.style import COLOURS
 from workflow.studies.base.table import Table
 from workflow.studies.report.convergence_plot import visible
 from workflow.studies.report.plots import LINES
@@ -31,38 +31,36 @@ SMALLEST_ANGLE = 1e-10
 def errors_figure(errors: Table, tolerances: Mapping[str, float]) -> Figure:
     """Frequencies, and relative errors of eigenvalues and frequencies, by mode number."""
     mode = [row["mode"] for row in errors.rows]
-    with plt.rc_context(SETTINGS):
-        figure, (left, middle, right) = plt.subplots(1, 3, figsize=(9.6, 3.3))
-        for variant in SHOWN:
-            left.plot(mode, [row[variant] for row in errors.rows], **_line(variant))
-        for variant in COMPARED:
-            for axes, quantity in ((middle, "eigenvalue"), (right, "frequency")):
-                values = [row[f"{variant}_{quantity}"] for row in errors.rows]
-                axes.semilogy(mode, visible(values), **_line(variant))
-        _limit(middle, tolerances["eigenvalue_error"], SOLVED)
-        _limit(right, tolerances["frequency_worst"], COARSENED)
-        left.set(ylabel="frequency [Hz]", title="Natural frequencies")
-        left.set_ylim(bottom=0)
-        left.legend(loc="lower right")
-        middle.set(ylabel="|relative error| [1]", title="Error of the eigenvalue")
-        right.set(ylabel="|relative error| [1]", title="Error of the frequency")
-        for axes in (left, middle, right):
-            axes.set(xlabel="mode number", xlim=(mode[0], max(mode[-1], mode[0] + 1)))
+    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(9.6, 3.3))
+    for variant in SHOWN:
+        left.plot(mode, [row[variant] for row in errors.rows], **_line(variant))
+    for variant in COMPARED:
+        for axes, quantity in ((middle, "eigenvalue"), (right, "frequency")):
+            values = [row[f"{variant}_{quantity}"] for row in errors.rows]
+            axes.semilogy(mode, visible(values), **_line(variant))
+    _limit(middle, tolerances["eigenvalue_error"], SOLVED)
+    _limit(right, tolerances["frequency_worst"], COARSENED)
+    left.set(ylabel="frequency [Hz]", title="Natural frequencies")
+    left.set_ylim(bottom=0)
+    left.legend(loc="lower right")
+    middle.set(ylabel="|relative error| [1]", title="Error of the eigenvalue")
+    right.set(ylabel="|relative error| [1]", title="Error of the frequency")
+    for axes in (left, middle, right):
+        axes.set(xlabel="mode number", xlim=(mode[0], max(mode[-1], mode[0] + 1)))
     return figure
 
 
 def shapes_figure(evidence: Evidence) -> Figure:
     """Angles between the truth's clusters and each method's, by mode number."""
-    with plt.rc_context(SETTINGS):
-        figure, axes = plt.subplots(figsize=(4.7, 3.1))
-        for variant in COMPARED:
-            clusters = evidence.compared[variant]["clusters"]
-            mode = [0.5 * (cluster["first"] + cluster["last"]) for cluster in clusters]
-            angle = [max(cluster["angle"], SMALLEST_ANGLE) for cluster in clusters]
-            axes.semilogy(mode, np.degrees(angle), ".", ms=4, **_line(variant, line=False))
-        _limit(axes, float(np.degrees(evidence.tolerances["subspace_angle"])), SOLVED)
-        axes.set(xlabel="mode number", ylabel="angle [°]", title="Angle to the ground truth")
-        figure.legend(loc="outside lower center", ncols=len(COMPARED), columnspacing=1.0)
+    figure, axes = plt.subplots(figsize=(4.7, 3.1))
+    for variant in COMPARED:
+        clusters = evidence.compared[variant]["clusters"]
+        mode = [0.5 * (cluster["first"] + cluster["last"]) for cluster in clusters]
+        angle = [max(cluster["angle"], SMALLEST_ANGLE) for cluster in clusters]
+        axes.semilogy(mode, np.degrees(angle), ".", ms=4, **_line(variant, line=False))
+    _limit(axes, float(np.degrees(evidence.tolerances["subspace_angle"])), SOLVED)
+    axes.set(xlabel="mode number", ylabel="angle [°]", title="Angle to the ground truth")
+    figure.legend(loc="outside lower center", ncols=len(COMPARED), columnspacing=1.0)
     return figure
 
 
@@ -75,13 +73,12 @@ def moduli_figure(young: Array) -> Figure:
     counts, _ = np.histogram(decades, edges)
     middles = 0.5 * (edges[1:] + edges[:-1])
     shade = np.zeros(1) if uniform else (middles - low) / (high - low)
-    with plt.rc_context(SETTINGS):
-        figure, axes = plt.subplots(figsize=(4.7, 2.4))
-        left, width = 10.0 ** edges[:-1], np.diff(10.0**edges)
-        axes.bar(left, counts, width, align="edge", color=plt.get_cmap(COLOUR_MAP)(shade))
-        axes.set_xscale("log")
-        axes.grid(axis="x", visible=False)
-        axes.set(xlabel="Young’s modulus [Pa]", ylabel="voxels", title="Moduli")
+    figure, axes = plt.subplots(figsize=(4.7, 2.4))
+    left, width = 10.0 ** edges[:-1], np.diff(10.0**edges)
+    axes.bar(left, counts, width, align="edge", color=plt.get_cmap(COLOUR_MAP)(shade))
+    axes.set_xscale("log")
+    axes.grid(axis="x", visible=False)
+    axes.set(xlabel="Young’s modulus [Pa]", ylabel="voxels", title="Moduli")
     return figure
 
 
@@ -92,30 +89,29 @@ def motion_figure(response: ResponseFile) -> Figure:
     milliseconds = 1e3 * response.seconds
     peak = float(np.linalg.norm(truth, axis=1).max())
     factor, unit = _length_unit(peak)
-    with plt.rc_context(SETTINGS):
-        figure, (above, below) = plt.subplots(
-            2, 1, figsize=(7.6, 4.9), sharex=True, height_ratios=(1.5, 1)
-        )
-        for variant in SHOWN:
-            found = response.responses[variant].displacement
-            above.plot(milliseconds, factor * found @ direction, **_line(variant))
-            if variant != TRUTH:
-                # At the first instant nothing has moved yet.
-                difference = np.linalg.norm(found - truth, axis=1)[1:] / peak
-                below.semilogy(milliseconds[1:], visible(difference), **_line(variant))
-        above.set(ylabel=f"displacement [{unit}]", title="Motion of the observed point")
-        below.set(
-            xlabel="time after the strike [ms]",
-            ylabel="|difference| [1]",
-            title="Difference from the ground truth, over its largest displacement",
-        )
-        below.set_xlim(0.0, milliseconds[-1])
-        figure.legend(
-            *above.get_legend_handles_labels(),
-            loc="outside lower center",
-            ncols=len(SHOWN),
-            columnspacing=1.2,
-        )
+    figure, (above, below) = plt.subplots(
+        2, 1, figsize=(7.6, 4.9), sharex=True, height_ratios=(1.5, 1)
+    )
+    for variant in SHOWN:
+        found = response.responses[variant].displacement
+        above.plot(milliseconds, factor * found @ direction, **_line(variant))
+        if variant != TRUTH:
+            # At the first instant nothing has moved yet.
+            difference = np.linalg.norm(found - truth, axis=1)[1:] / peak
+            below.semilogy(milliseconds[1:], visible(difference), **_line(variant))
+    above.set(ylabel=f"displacement [{unit}]", title="Motion of the observed point")
+    below.set(
+        xlabel="time after the strike [ms]",
+        ylabel="|difference| [1]",
+        title="Difference from the ground truth, over its largest displacement",
+    )
+    below.set_xlim(0.0, milliseconds[-1])
+    figure.legend(
+        *above.get_legend_handles_labels(),
+        loc="outside lower center",
+        ncols=len(SHOWN),
+        columnspacing=1.2,
+    )
     return figure
 
 
