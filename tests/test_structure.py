@@ -78,7 +78,7 @@ ARROWS = {
     "workflow.studies": "workflow.studies.base",
     "workflow.studies.report": """solver.files solver.hcms solver.studies.scaling workflow
         workflow.studies.base""",
-    "workflow.studies.figures": "workflow workflow.studies.base workflow.studies.report",
+    "workflow.studies.figures": "workflow.studies.base workflow.studies.report",
     "workflow.studies.forests": """dataset_gen.objectives workflow.studies.base
         workflow.studies.report""",
     "workflow.studies.objectives": """dataset_gen.objectives solver.coarsening workflow
