@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pandas as pd
 
+from workflow.studies.base.entry import Row
 from workflow.studies.base.numbers import MISSING, show
 from workflow.studies.base.table import KIND, MAX, MIN, Column, Table, kind_in
 from workflow.studies.comparison.noise import UNJUDGED, Value, verdict
-
-Row = dict[str, Any]
 
 KEYS = ["table", "row", "column"]
 ENDS = ("", MIN, MAX)
@@ -26,6 +23,8 @@ def cells_of(path: str, table: Table) -> pd.DataFrame:
     """
     keys = table.keys or [table.columns[0].key]
     named = [column for column in table.columns if column.key in keys]
+    if len(named) < len(set(keys)):
+        raise KeyError(keys)
     rows = {", ".join(_word(row, column) for column in named): row for row in table.rows}
     cells = [
         dict(zip(KEYS, (path, name, column.key))) | _cell(row, column)

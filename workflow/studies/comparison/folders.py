@@ -122,10 +122,11 @@ def require_baseline(config: Mapping[str, Any]) -> list[str]:
 
 
 def _read(name: str, file: Path) -> tuple[Table, pd.DataFrame]:
+    """A table and its cells; what is used of it for people is made once, to see if it can be."""
     require_file(file, "a table")
     try:
         table = READERS[file.suffix](file)
-        _require_texts(table)
+        table.as_markdown()
         return table, cells_of(name, table)
     except OSError as error:
         raise UserError(f"{file}: cannot be read ({cause(error)})") from None
@@ -133,11 +134,3 @@ def _read(name: str, file: Path) -> tuple[Table, pd.DataFrame]:
         raise UserError(
             f"{file}: is no table of this version, or damaged; run the workflow again"
         ) from None
-
-
-def _require_texts(table: Table) -> None:
-    """Use once what tells about the values; what is no text, or no column, raises."""
-    "".join([*(table.conditions.told.values() if table.conditions else ()), table.name])
-    "".join(column.label for column in table.columns)
-    if not {column.key for column in table.columns}.issuperset(table.keys):
-        raise KeyError(table.keys)

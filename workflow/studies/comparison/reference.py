@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -27,22 +27,34 @@ LARGE = 300_000
 """Bytes from which on the folder is too large to be kept with the source."""
 TIMED = "tables/times"
 """Table whose conditions are those of the run."""
-OF_THE_RUN = (
-    "processor",
-    "cores",
-    "memory",
-    "ranks",
-    "threads",
-    "blas",
-    "versions",
-    "commit",
-    "configuration",
-    "date",
-    "differing",
-)
-"""Conditions that the description tells."""
+OF_TABLES = ("runs", "spread")
+"""Conditions that are not the run's, so that its description does not tell them."""
 LEFT_OUT = (FOLDER, "comparison")
 """Folders that are no results of the run."""
+DESCRIPTION = f"""\
+# Reference: {{title}}
+
+Tables of a complete run, made by `snakemake reference`, to set others beside them:
+
+    snakemake --profile workflow/profiles/default compare --config baseline={{place}}
+    python -m workflow compare {{place}} RESULTS
+
+Numbers have {DIGITS} digits; tables of {LONG} rows and more are there as CSV alone.
+
+## Conditions
+
+{{conditions}}
+
+## Wall time
+
+Of the jobs that are benchmarked (`benchmarks/`), which are all that take long:
+
+{{seconds}}
+
+## Disk
+
+{{sizes}}
+"""
 
 
 def write_reference(results: str | Path) -> None:
@@ -83,40 +95,19 @@ def description(folder: Folder) -> str:
     """What the reference is, on which machine it was made, and what that took."""
     conditions = folder.tables[TIMED].conditions
     told = conditions.told if conditions else {}
-    seconds, sizes = seconds_by_part(folder.path), sizes_by_part(folder.path)
-    return "\n".join(
-        [
-            f"# Reference: {folder.config['title']}",
-            "",
-            "Tables of a complete run, made by `snakemake reference`, to set others beside them:",
-            "",
-            "    snakemake --profile workflow/profiles/default compare "
-            f"--config baseline={folder.path / FOLDER}",
-            f"    python -m workflow compare {folder.path / FOLDER} RESULTS",
-            "",
-            f"Numbers have {DIGITS} digits; tables of {LONG} rows and more are there as CSV alone.",
-            "",
-            "## Conditions",
-            "",
-            *_lines(("", ""), {LABELS[key]: told[key] for key in OF_THE_RUN if key in told}),
-            "",
-            "## Wall time",
-            "",
-            "Of the jobs that are benchmarked (`benchmarks/`), which are all that take long:",
-            "",
-            *_lines(("Jobs", "Time"), seconds, "seconds"),
-            "",
-            "## Disk",
-            "",
-            *_lines(("Results", "Size"), sizes, "bytes"),
-            "",
-        ]
+    of_run = {LABELS[key]: text for key, text in told.items() if key not in OF_TABLES}
+    return DESCRIPTION.format(
+        title=folder.config["title"],
+        place=folder.path / FOLDER,
+        conditions=_table("", "", of_run),
+        seconds=_table("Jobs", "Time", seconds_by_part(folder.path), "seconds"),
+        sizes=_table("Results", "Size", sizes_by_part(folder.path), "bytes"),
     )
 
 
-def _lines(heads: tuple[str, str], rows: Mapping[str, Any], kind: str = "text") -> list[str]:
-    lines = [heads, ("---", "---"), *((name, show(value, kind)) for name, value in rows.items())]
-    return [f"| {name} | {value} |" for name, value in lines]
+def _table(name: str, value: str, rows: Mapping[str, Any], kind: str = "text") -> str:
+    cells = [(name, value), ("---", "---"), *((key, show(rows[key], kind)) for key in rows)]
+    return "\n".join(f"| {key} | {text} |" for key, text in cells)
 
 
 def seconds_by_part(results: Path) -> dict[str, float]:
@@ -130,7 +121,7 @@ def seconds_by_part(results: Path) -> dict[str, float]:
 def sizes_by_part(results: Path) -> dict[str, float]:
     """Bytes of the results by folder, and in all."""
     parts = [path for path in sorted(results.iterdir()) if path.name not in LEFT_OUT]
-    return _summed([path.name for path in parts], map(size_of, parts))
+    return _summed([path.name for path in parts], list(map(size_of, parts)))
 
 
 def size_of(path: Path) -> int:
@@ -139,8 +130,6 @@ def size_of(path: Path) -> int:
     return sum(file.stat().st_size for file in files if file.is_file())
 
 
-def _summed(names: list[str], values: Iterable[float]) -> dict[str, float]:
-    found: dict[str, float] = {}
-    for name, value in zip(names, values):
-        found[name] = found.get(name, 0) + value
-    return {**found, "all": sum(found.values())}
+def _summed(names: list[str], values: list[float]) -> dict[str, float]:
+    by_name = pd.Series(values, names).groupby(level=0, sort=False).sum()
+    return {**by_name.to_dict(), "all": by_name.sum()}

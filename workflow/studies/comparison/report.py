@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +11,13 @@ import pandas as pd
 from carillon.files import atomic_path
 from workflow.room import make_folder
 from workflow.studies.base.conditions import LABELS
+from workflow.studies.base.entry import Row, tables_of
 from workflow.studies.base.numbers import show
 from workflow.studies.base.page import rendered
-from workflow.studies.base.table import Table, columns_of
-from workflow.studies.comparison.cells import ENDS, KEYS, SHOWN, Row
+from workflow.studies.base.table import Table
+from workflow.studies.comparison.cells import ENDS, KEYS, SHOWN
 from workflow.studies.comparison.comparison import SIDES, Comparison
-from workflow.studies.comparison.differences import dates
+from workflow.studies.comparison.differences import Difference, dates
 from workflow.studies.comparison.noise import BETTER, RULES, VERDICTS, WORSE
 
 NAME = "comparison"
@@ -26,6 +28,7 @@ MOST_MOVED = 25
 MOST_LISTED = 200
 """Numbers of a table up to which the page lists all of them."""
 TITLE = "What moved"
+TABLES = tables_of("comparison/tables.yaml")
 RAW = [*KEYS, "kind", *(f"{side}{end}" for side in SIDES for end in ENDS), "ratio", "verdict"]
 MARKS = {**dict.fromkeys(WORSE, "worse"), **dict.fromkeys(BETTER, "better")}
 """How verdicts are marked on a page."""
@@ -35,7 +38,7 @@ def write(comparison: Comparison, folder: Path) -> None:
     """Write `comparison.csv`, `comparison.md` and `comparison.html`."""
     make_folder(folder)
     for ending, text in (
-        ("csv", every_number(comparison.cells).as_csv()),
+        ("csv", TABLES[NAME](comparison.cells).as_csv()),
         ("md", as_markdown(comparison)),
         ("html", as_page(comparison)),
     ):
@@ -52,7 +55,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
         "conditions": comparison.conditions,
         "configuration": comparison.configuration,
         "compared": len(comparison.cells),
-        "moved": every_number(comparison.moved.sort_index()).rows,
+        "moved": every_number(comparison.moved.sort_index()),
         "only_before": comparison.only_before,
         "only_now": comparison.only_now,
     }
@@ -82,12 +85,12 @@ def as_markdown(comparison: Comparison) -> str:
     parts += [each.as_markdown() for each in _differing(comparison)] or ["The same."]
     parts += [*_caution(comparison), "## Moved"]
     for path, moved in _by_table(comparison.moved):
-        parts += [f"### {path}", listed(path, moved.head(MOST_MOVED)).as_markdown()]
+        parts += [f"### {path}", _listed(path, moved.head(MOST_MOVED)).as_markdown()]
         if len(moved) > MOST_MOVED:
             parts.append(f"And {len(moved) - MOST_MOVED:,} more, see {NAME}.csv.")
     if comparison.moved.empty:
         parts.append("Nothing.")
-    parts += ["## By table", counts(comparison).as_markdown()]
+    parts += ["## By table", TABLES["counts"](comparison.cells).as_markdown()]
     for side, only in _one_sided(comparison).items():
         parts += [f"## {side}", "\n".join(f"- {name}" for name in only)]
     parts += ["## Rules", "\n".join(f"- {kind}: {rule}." for kind, rule in RULES.items())]
@@ -105,12 +108,12 @@ def as_page(comparison: Comparison) -> str:
         differing=_differing(comparison),
         cautions=_caution(comparison),
         moved=[
-            (path, listed(f"{path}-moved", moved.head(MOST_MOVED)), len(moved))
+            (path, _listed(f"{path}-moved", moved.head(MOST_MOVED)), len(moved))
             for path, moved in _by_table(comparison.moved)
         ],
         most=MOST_MOVED,
-        counts=counts(comparison),
-        listed=[listed(path, cells) for path, cells in by_table if len(cells) <= MOST_LISTED],
+        counts=TABLES["counts"](comparison.cells),
+        listed=[_listed(path, cells) for path, cells in by_table if len(cells) <= MOST_LISTED],
         unlisted=[path for path, cells in by_table if len(cells) > MOST_LISTED],
         one_sided=_one_sided(comparison),
         rules=RULES,
@@ -125,63 +128,44 @@ def summary(comparison: Comparison) -> str:
     return f"{numbers}: {', '.join(told) if told else 'none moved beyond noise'}"
 
 
-def every_number(cells: pd.DataFrame) -> Table:
+def every_number(cells: pd.DataFrame) -> list[Row]:
     """All numbers of both folders, raw."""
-    columns = columns_of("\n".join(f"{name}  {name}" for name in RAW))
-    return Table(NAME, "Every number of both folders.", columns, _rows(cells[RAW]), KEYS)
+    rows: list[Row] = cells[RAW].to_dict("records")
+    return rows
 
 
-def counts(comparison: Comparison) -> Table:
+def counts(cells: pd.DataFrame) -> list[Row]:
     """How many numbers of each table were compared, and what became of them."""
-    cells = comparison.cells
     moved = cells["verdict"].isin(VERDICTS)
     worse, better = (cells["verdict"].isin(verdicts) for verdicts in (WORSE, BETTER))
     found = pd.DataFrame(
         {"compared": 1, "worse": worse, "better": better, "other": moved & ~worse & ~better}
     )
     summed = found.groupby(cells["table"], sort=False).sum().astype(int)
-    return Table(
-        "counts",
-        "Numbers that both folders have, by table. Worse is slower, less accurate or larger, "
-        "better the opposite; what changed otherwise is neither.",
-        columns_of(
-            """
-            table     Table
-            compared  Compared           count
-            worse     Worse              count
-            better    Better             count
-            other     Changed otherwise  count
-            """
-        ),
-        _rows(summed.reset_index()),
-    )
+    rows: list[Row] = summed.reset_index().to_dict("records")
+    return rows
 
 
-def listed(name: str, cells: pd.DataFrame) -> Table:
+def listed(cells: pd.DataFrame) -> list[Row]:
     """Numbers of a table side by side, for people."""
     shown = {side: cells[f"{side}{SHOWN}"] for side in SIDES}
-    return Table(
-        name,
-        "",
-        columns_of(
-            """
-            table    Table     hidden
-            row      Row
-            label    Quantity
-            verdict  Verdict
-            before   Baseline
-            now      This run
-            ratio    Ratio     times
-            """
-        ),
-        _rows(cells.assign(**shown, verdict_mark=cells["verdict"].map(MARKS).fillna(""))),
-        KEYS,
-    )
-
-
-def _rows(frame: pd.DataFrame) -> list[Row]:
-    rows: list[Row] = frame.to_dict("records")
+    marks = cells["verdict"].map(MARKS).fillna("")
+    rows: list[Row] = cells.assign(**shown, verdict_mark=marks).to_dict("records")
     return rows
+
+
+def differing(differences: list[Difference]) -> list[Row]:
+    """What is not the same, for people."""
+    return [{**each, "where": each["where"] or "all"} for each in differences]
+
+
+def everywhere(differences: list[Difference]) -> bool:
+    """Whether all that differs does so in all tables."""
+    return not any(each["where"] for each in differences)
+
+
+def _listed(name: str, cells: pd.DataFrame) -> Table:
+    return replace(TABLES["listed"](cells), name=name)
 
 
 def _by_table(cells: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
@@ -207,17 +191,7 @@ def _caution(comparison: Comparison) -> list[str]:
 
 
 def _differing(comparison: Comparison) -> list[Table]:
-    """What is not the same, for people."""
-    found = {
-        "conditions": ("Condition", comparison.conditions),
-        "configuration": ("Key", comparison.configuration),
-    }
-    tables = []
-    for name, (head, rows) in found.items():
-        flag = "" if any(row["where"] for row in rows) else "  hidden"
-        columns = f"what  {head}\nbefore  Baseline\nnow  This run\nwhere  Tables{flag}"
-        everywhere = [{**row, "where": row["where"] or "all"} for row in rows]
-        tables.append(Table(name, "", columns_of(columns), everywhere))
+    tables = (TABLES[name](getattr(comparison, name)) for name in ("conditions", "configuration"))
     return [table for table in tables if table.rows]
 
 
