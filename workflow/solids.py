@@ -13,8 +13,8 @@ STUDIED = ("figures", "objectives")
 """Sections with solids of their own, which are left out if they have no mesh."""
 MEASURED = {
     "report": {
-        "methods": "times.models",
         "convergence": "convergence.models",
+        "methods": "times.models",
         "scaling": "scaling.models",
     },
     "figures": {

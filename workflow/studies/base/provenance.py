@@ -9,9 +9,9 @@ from typing import Any
 from workflow.studies.base.entry import Row
 
 
-def rows_of(origins: Mapping[str, Mapping[str, Any]]) -> list[Row]:
-    """Rows of the table `provenance` from the provenance records by result file."""
-    return [_row(file, origin) for file, origin in origins.items()]
+def rows_of(results: Any) -> list[Row]:
+    """Rows of the table `provenance` from the `origins` of results: records by file."""
+    return [_row(file, origin) for file, origin in results.origins.items()]
 
 
 def _row(file: str, origin: Mapping[str, Any]) -> Row:

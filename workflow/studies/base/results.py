@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 import yaml
 
 from workflow import solids
+from workflow.studies.base.conditions import Record
 from workflow.studies.base.table import Table, read_table
 
 
@@ -83,6 +84,15 @@ class Results:
     def _measured(self, file: str) -> dict[str, Any]:
         names = solids.named(self.config, solids.MEASURED[self.study][file])
         return self.by_model(f"{file}.json", names)
+
+    @property
+    def origins(self) -> dict[str, Record]:
+        """Provenance of the result files by name."""
+        return {
+            f"models/{name}/{file}.json": found["provenance"]
+            for file in solids.MEASURED[self.study]
+            for name, found in getattr(self, file).items()
+        }
 
     def by_model(self, file: str, names: Iterable[str]) -> dict[str, Any]:
         """Content of the JSON files of that name of some solids."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Any
 
+from workflow.studies.base.conditions import Record
 from workflow.studies.base.results import Results
 
 MEASUREMENTS = ("blocks", "benchmark", "variants", "curve")
@@ -29,10 +30,16 @@ class ForestsStudy(Results):
         """What a measurement found."""
         return self._file(name)["result"]
 
-    def record(self, name: str) -> dict[str, Any]:
+    def record(self, name: str) -> Record:
         """Provenance of a measurement."""
-        record: dict[str, Any] = self._file(name)["provenance"]
+        record: Record = self._file(name)["provenance"]
         return record
+
+    @property
+    def origins(self) -> dict[str, Record]:
+        """Provenance of the forests and of the measurements."""
+        measured = {f"forests_study/{name}.json": self.record(name) for name in MEASUREMENTS}
+        return {self.model["path"]: self.model["provenance"], **measured}
 
     def _file(self, name: str) -> dict[str, Any]:
         """A measurement: `result` and `provenance`."""

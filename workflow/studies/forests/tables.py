@@ -8,8 +8,7 @@ from typing import Any
 from workflow.studies.base.conditions import IN_COLUMNS, ONE_COLD_RUN, Repeats, measured
 from workflow.studies.base.entry import Row
 from workflow.studies.base.numbers import show
-from workflow.studies.base.provenance import rows_of
-from workflow.studies.forests.results import MEASUREMENTS, ForestsStudy
+from workflow.studies.forests.results import ForestsStudy
 from workflow.studies.report.blocks_tables import MEASURE as MEASURE
 from workflow.studies.report.blocks_tables import MEASURED as MEASURED
 from workflow.studies.report.blocks_tables import kind_of, on_blocks
@@ -107,9 +106,3 @@ def sizes(study: ForestsStudy) -> Iterator[Row]:
         for kind in ("random", "coherent"):
             row |= _seconds(kind, size[kind]) | {f"{kind}_walk": NANO * size[f"{kind}_walk_ns"]}
         yield row
-
-
-def provenance(study: ForestsStudy) -> list[Row]:
-    """Origin of the forests and of the files of the study."""
-    measured = {f"forests_study/{name}.json": study.record(name) for name in MEASUREMENTS}
-    return rows_of({study.model["path"]: study.model["provenance"], **measured})

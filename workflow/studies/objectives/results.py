@@ -9,6 +9,7 @@ from typing import Any
 
 from solver.coarsening.forest import FOREST
 from workflow import solids
+from workflow.studies.base.conditions import Record
 from workflow.studies.base.results import Results
 
 SECTION = "objectives"
@@ -53,6 +54,11 @@ class Objectives(Results):
     def found(self) -> dict[Case, dict[str, Any]]:
         """Output of `solver objectives` by case."""
         return {case: self.read_json(f"cases/{case.path}") for case in cases_of(self.config)}
+
+    @property
+    def origins(self) -> dict[str, Record]:
+        """Provenance of every case."""
+        return {f"cases/{case.path}": each["provenance"] for case, each in self.found.items()}
 
     @property
     def solids(self) -> list[str]:

@@ -14,7 +14,6 @@ from carillon.fem.model import RIGID_MODES
 from dataset_gen.objectives import OBJECTIVES
 from solver.coarsening.forest import FOREST
 from workflow.studies.base.entry import Row
-from workflow.studies.base.provenance import rows_of
 from workflow.studies.objectives.results import Case, Objectives
 
 FIRST = RIGID_MODES + 1
@@ -141,8 +140,3 @@ def materials(study: Objectives) -> Iterable[Row]:
 
 def _first_line(documented: object) -> str:
     return (inspect.getdoc(documented) or "").split("\n", 1)[0]
-
-
-def provenance(study: Objectives) -> list[Row]:
-    """Origin of every case."""
-    return rows_of({f"cases/{case.path}": each["provenance"] for case, each in study.found.items()})

@@ -75,6 +75,20 @@ class Run(Results):
         loaded: dict[str, Any] = self.read_json("forests/table.json")
         return loaded
 
+    @property
+    def origins(self) -> dict[str, Record]:
+        """Provenance of the result files by name."""
+        origins = {f"dataset/{name}.h5": each["provenance"] for name, each in self.shards.items()}
+        forests = self.config["forests"]["model"] or "forests/forests.h5"
+        origins[forests] = self.forests["provenance"]
+        origins["forests/table.json"] = self.on_blocks["provenance"]
+        for model, spectra in self.spectra.items():
+            place = f"models/{model}/"
+            origins |= {f"{place}{name}.h5": found.provenance for name, found in spectra.items()}
+            measured = super().origins.items()
+            origins |= {file: record for file, record in measured if file.startswith(place)}
+        return origins
+
 
 def records(run: Run) -> dict[str, Record]:
     """Provenance of all modes files."""

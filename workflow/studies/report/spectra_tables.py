@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from carillon.fem.model import RIGID_MODES
 from workflow.studies.base.conditions import NOT_TIMED, ONE_COLD_RUN, measured
 from workflow.studies.base.entry import Row
-from workflow.studies.base.provenance import rows_of
 from workflow.studies.report.results import Run, precomputation_seconds, records, solve_seconds
 from workflow.variants import CANDIDATES, SHOWN, TRUTH, VARIANTS
 from workflow.variants import COARSENED as COARSENED
@@ -104,19 +103,3 @@ def evidence(run: Run) -> Iterator[Row]:
             "corrections": found.get("corrections", 0 if found["method"] == "hcms" else None),
             "estimate": found.get("eigenvalue_error_estimate"),
         }
-
-
-def provenance(run: Run) -> list[Row]:
-    """Origin of every result file."""
-    origins = {f"dataset/{name}.h5": shard["provenance"] for name, shard in run.shards.items()}
-    forests = run.config["forests"]["model"] or "forests/forests.h5"
-    origins[forests] = run.forests["provenance"]
-    origins["forests/table.json"] = run.on_blocks["provenance"]
-    for model, spectra in run.spectra.items():
-        for variant, spectrum in spectra.items():
-            origins[f"models/{model}/{variant}.h5"] = spectrum.provenance
-        for part in ("convergence", "methods", "scaling"):
-            found = getattr(run, part)
-            if model in found:
-                origins[f"models/{model}/{part}.json"] = found[model]["provenance"]
-    return rows_of(origins)

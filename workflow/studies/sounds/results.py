@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from solver.files.modes_file import ModesFile, read_modes
 from sound.clips.wav import read_wav
 from sound.project.design_file import Design, read_design
+from workflow.studies.base.conditions import Record
 from workflow.studies.sounds.examples import DESIGN, START, TRUTH, Example, examples
 
 Array = NDArray[np.float64]
@@ -75,6 +76,17 @@ class Found:
     def absent(self) -> tuple[str, ...]:
         """Tables that there is nothing for."""
         return () if self.optimisers else ("optimisers", "evaluation")
+
+    @property
+    def origins(self) -> dict[str, Record]:
+        """Provenance of every file that the page draws on."""
+        name, compared = self.example.name, self.optimisers
+        return {
+            **{f"{part}/{DESIGN}": each.provenance for part, each in self.designs.items()},
+            f"{name}/{START}": self.start.provenance,
+            f"{name}/{TRUTH}": self.truth.provenance,
+            **({f"{name}/optimisers.json": compared.get("provenance", {})} if compared else {}),
+        }
 
     def history(self, part: str) -> NDArray[np.void]:
         """Rows of an edit's own search, its seconds and evaluations counted from its beginning."""

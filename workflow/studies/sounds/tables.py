@@ -13,8 +13,6 @@ from sound.project.design_file import Design
 from sound.rendering.solid import SoundingSolid
 from workflow.studies.base.conditions import ONE_COLD_RUN, Record, measured
 from workflow.studies.base.entry import Row
-from workflow.studies.base.provenance import rows_of
-from workflow.studies.sounds.examples import DESIGN, START, TRUTH
 from workflow.studies.sounds.results import Found
 
 Array = NDArray[np.float64]
@@ -114,17 +112,6 @@ def optimisers(found: Found) -> Iterator[Row]:
 def evaluation(found: Found) -> list[Row]:
     """How long an evaluation takes."""
     return [found.optimisers["evaluation"]]
-
-
-def provenance(found: Found) -> list[Row]:
-    """Provenance of every file that the page draws on."""
-    name = found.example.name
-    records = {f"{part}/{DESIGN}": each.provenance for part, each in found.designs.items()}
-    records[f"{name}/{START}"] = found.start.provenance
-    records[f"{name}/{TRUTH}"] = found.truth.provenance
-    if found.optimisers:
-        records[f"{name}/optimisers.json"] = found.optimisers.get("provenance", {})
-    return rows_of(records)
 
 
 def _bark_difference(found: Array, wanted: Array) -> Array:

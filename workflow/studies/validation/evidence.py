@@ -8,6 +8,7 @@ from typing import Any
 
 from solver.files.modes_file import ModesFile, read_modes
 from solver.response.response_file import ResponseFile, read_response
+from workflow.studies.base.conditions import Record
 from workflow.studies.report.results import Run
 from workflow.variants import SHOWN, TRUTH
 
@@ -68,6 +69,16 @@ class Evidence(Run):
         """Frequency and likeness of the first elastic mode by variant."""
         loaded: dict[str, dict[str, Any]] = self.read_json(f"figures/{self.model}-mode.json")
         return loaded
+
+    @property
+    def origins(self) -> dict[str, Record]:
+        """Provenance of every file that the page draws on."""
+        found = {f"{variant}.h5": spectrum.provenance for variant, spectrum in self.shown.items()}
+        for variant, comparison in self.compared.items():
+            found[f"{variant}.comparison.json"] = comparison.get("provenance", {})
+        found["audit.json"] = self.audit["provenance"]
+        found["response.h5"] = self.response.provenance
+        return {self.file(name): record for name, record in found.items()}
 
     def file(self, name: str) -> str:
         """Name of one of the model's files below the folder of the run."""

@@ -8,7 +8,6 @@ import numpy as np
 
 from carillon.fem.model import RIGID_MODES
 from workflow.studies.base.entry import Row
-from workflow.studies.base.provenance import rows_of
 from workflow.studies.validation.criteria import judge
 from workflow.studies.validation.evidence import COMPARED, Evidence
 from workflow.variants import SHOWN, TRUTH, VARIANTS
@@ -73,13 +72,3 @@ def responses(evidence: Evidence) -> Iterator[Row]:
         if variant != TRUTH:
             row |= {"difference": found.difference, "distance_decibels": found.distance_decibels}
         yield row
-
-
-def provenance(evidence: Evidence) -> list[Row]:
-    """Provenance of every file that the page draws on."""
-    found = {f"{variant}.h5": spectrum.provenance for variant, spectrum in evidence.shown.items()}
-    for variant, comparison in evidence.compared.items():
-        found[f"{variant}.comparison.json"] = comparison.get("provenance", {})
-    found["audit.json"] = evidence.audit["provenance"]
-    found["response.h5"] = evidence.response.provenance
-    return rows_of({evidence.file(name): record for name, record in found.items()})
