@@ -85,11 +85,6 @@ def measured_for(study):
     return [f"{folder}/{part}.json" for part in parts]
 
 
-def drawn_from(study, figure):
-    """File that a figure is drawn from."""
-    return f"{place(study)}/{figure.needs}"
-
-
 def shown_beside(study):
     """What a page shows beside its tables and figures."""
     if study is not catalogue.REPORT:
@@ -100,11 +95,6 @@ def shown_beside(study):
         *(f"{RESULTS}/figures/{model}-mode.json" for model in MODELS),
         *(f"{RESULTS}/validation/tables/{model}-criteria.json" for model in MODELS),
     ]
-
-
-def case_mesh(wildcards):
-    """Mesh file of a case of the objectives; none for a built-in object."""
-    return solids.mesh_files(config, "objectives", wildcards.solid)
 
 
 def case_arguments(wildcards):

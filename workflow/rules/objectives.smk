@@ -8,7 +8,7 @@ rule objectives:
 
 rule rate_objectives:
     input:
-        mesh=case_mesh,
+        mesh=lambda wildcards: solids.mesh_files(config, "objectives", wildcards.solid),
         forest=settings.studied_forest_files(config),
     output:
         f"{place(catalogue.OBJECTIVES)}/cases/{{solid}}/{{resolution}}-{{material}}.json",

@@ -20,7 +20,7 @@ rule synthesise_clip:
         runtime=growing(10),
     params:
         source=source("sound.commands.clip"),
-        how=clip_arguments,
+        how=lambda wildcards: targets_of(wildcards)[wildcards.point].clip.split(),
     shell:
         "OMP_NUM_THREADS={threads} python -m sound clip {params.how:q} --out {output:q}"
         " > {log:q} 2>&1"
@@ -40,7 +40,7 @@ rule check_design:
         runtime=growing(60),
     params:
         source=source("solver.commands.modes"),
-        solid=fine_solid,
+        solid=lambda wildcards: sound_examples.solid_arguments(EXAMPLES[wildcards.example]),
     shell:
         "OMP_NUM_THREADS={threads} python -m solver modes {params.solid:q}"
         " --material {input.young:q} --coarsen none --method slepc --out {output:q}"
@@ -107,7 +107,9 @@ rule write_project:
         runtime="5m",
     params:
         source=source("workflow.scripts.write_yaml"),
-        content=project_of,
+        content=lambda wildcards: sound_examples.project(
+            example_of(wildcards), wildcards.part, config
+        ),
     script:
         "../scripts/write_yaml.py"
 
@@ -116,7 +118,7 @@ rule write_project:
 rule design_sound:
     input:
         project=f"{SOUND}/{{part}}/{PROJECT}",
-        mesh=part_mesh,
+        mesh=lambda wildcards: example_of(wildcards).mesh_files,
         clips=part_clips,
         before=design_before,
         forests=settings.default_forest_files(),
@@ -132,7 +134,7 @@ rule design_sound:
         runtime=growing(60),
     params:
         source=source("sound.commands.design"),
-        start=start_argument,
+        start=lambda wildcards, input: options({"start": str(input.before)}),
     shell:
         "OMP_NUM_THREADS={threads} python -m sound design {input.project:q} {params.start:q}"
         " --out {output:q} > {log:q} 2>&1"

@@ -49,7 +49,7 @@ for study in catalogue.STUDIES:
                 else f"plot_{study.name}_{figure.name}"
             input:
                 config=f"{RESULTS}/config.yaml",
-                found=drawn_from(study, figure),
+                found=f"{place(study)}/{figure.needs}",
             output:
                 marks.figure(study, figure, place(study)),
             log:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import matplotlib
+from matplotlib.axis import Axis
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from carillon.files import atomic_path
 
@@ -80,6 +82,21 @@ PNG_DPI = 200
 def plain(text: str) -> str:
     """Text for a figure, in which dollars are no sign of a formula."""
     return text.replace("$", r"\$")
+
+
+def plain_numbers(axis: Axis) -> None:
+    """Ticks of a logarithmic axis at 1, 2 and 5 of every decade, as plain numbers."""
+    axis.set_major_locator(LogLocator(10, subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(NullFormatter())
+
+
+def named_rows(axes: Any, names: Sequence[str]) -> None:
+    """Names of rows at 0, 1, 2 ..., from the top down, without ticks and lines."""
+    axes.set_yticks(range(len(names)), names)
+    axes.tick_params(axis="y", length=0)
+    axes.grid(axis="y", visible=False)
+    axes.invert_yaxis()
 
 
 def save(figure: Figure, paths: Iterable[str | Path]) -> None:

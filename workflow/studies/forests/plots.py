@@ -7,10 +7,9 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from workflow.studies.base.entry import Row
-from workflow.studies.base.style import COLOURS, MUTED
+from workflow.studies.base.style import COLOURS, MUTED, named_rows, plain_numbers
 from workflow.studies.forests.results import ForestsStudy
 from workflow.studies.report.blocks_tables import compared, kind_of, kinds_of, method_of
 
@@ -82,7 +81,7 @@ def _panel(axis: Any, rows: Sequence[Row], marks: dict[str, tuple[str, str]]) ->
     least = rows[0]["least_mean_error"]
     axis.axhline(least, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)), label="least of any")
     axis.set(xscale="log", yscale="log")
-    _plain(axis.yaxis)
+    plain_numbers(axis.yaxis)
 
 
 def curve_figure(study: ForestsStudy) -> Figure:
@@ -101,7 +100,7 @@ def curve_figure(study: ForestsStudy) -> Figure:
                 label=f"{distribution.replace('..', '…')}, {label}",
                 **look,
             )
-    _plain(axes.yaxis)
+    plain_numbers(axes.yaxis)
     axes.set(xlabel="rows trained on", ylabel="rms error of log E on fresh blocks")
     figure.legend(loc="outside upper left", ncols=2, columnspacing=1.2)
     return figure
@@ -126,10 +125,8 @@ def variants_figure(study: ForestsStudy) -> Figure:
                 label=f"{distribution.replace('..', '…')}, {label}",
             )
     axes.set_xscale("log")
-    _plain(axes.xaxis)
-    axes.set_yticks(range(len(names)), names)
-    axes.tick_params(axis="y", length=0)
-    axes.grid(axis="y", visible=False)
+    plain_numbers(axes.xaxis)
+    named_rows(axes, names)
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.set_xlabel("rms error of log E on fresh blocks")
     figure.legend(loc="outside upper left", ncols=2, columnspacing=1.2)
@@ -148,15 +145,8 @@ def sizes_figure(study: ForestsStudy) -> Figure:
     axes.axvline(
         ours, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)), label="the forests studied"
     )
-    _plain(axes.xaxis)
-    _plain(axes.yaxis)
+    plain_numbers(axes.xaxis)
+    plain_numbers(axes.yaxis)
     axes.set(xlabel="storage of the forests [MB]", ylabel="time of a block [µs], one core")
     figure.legend(loc="outside upper left", ncols=3, columnspacing=1.2)
     return figure
-
-
-def _plain(axis: Any) -> None:
-    """Ticks of a logarithmic axis as plain numbers."""
-    axis.set_major_locator(LogLocator(10, subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_formatter(NullFormatter())

@@ -6,9 +6,9 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter, PercentFormatter
+from matplotlib.ticker import PercentFormatter
 
-from workflow.studies.base.style import COLOURS, FAINT, MUTED
+from workflow.studies.base.style import COLOURS, FAINT, MUTED, named_rows, plain_numbers
 from workflow.studies.objectives.goals import rms_limits
 from workflow.studies.objectives.results import Objectives
 
@@ -58,12 +58,9 @@ def _mark(axes: Any, row: dict[str, Any], at: float, filled: bool) -> None:
 
 def _finish(axes: Any, names: list[str]) -> None:
     axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(10, subs=(1.0, 2.0, 5.0)))
+    plain_numbers(axes.xaxis)
     axes.xaxis.set_major_formatter(PercentFormatter(1.0))
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.set_yticks(range(len(names)), names)
-    axes.tick_params(axis="y", length=0)
-    axes.grid(axis="y", visible=False)
+    named_rows(axes, names)
     for edge in range(1, len(names)):
         axes.axhline(edge - 0.5, color=FAINT, linewidth=0.5)
     axes.set_ylim(len(names) - 0.5, -0.5)

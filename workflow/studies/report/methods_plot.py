@@ -6,7 +6,7 @@ import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
 from workflow.studies.base.results import Results
-from workflow.studies.base.style import COLOURS, FAINT, INK, MUTED, plain
+from workflow.studies.base.style import COLOURS, FAINT, INK, MUTED, named_rows, plain
 from workflow.studies.base.table import MAX, MIN
 from workflow.studies.report.methods_tables import METHODS
 
@@ -49,12 +49,7 @@ def methods_figure(results: Results) -> Figure:
             label=METHODS[name],
         )
     axes.set_xscale("log")
-    axes.set_yticks(
-        range(len(methods.rows)), [plain(row["title"]).replace(", ", "\n") for row in methods.rows]
-    )
-    axes.tick_params(axis="y", length=0)
-    axes.grid(axis="y", visible=False)
-    axes.invert_yaxis()
+    named_rows(axes, [plain(row["title"]).replace(", ", "\n") for row in methods.rows])
     axes.set_xlabel("wall time [s]")
     figure.legend(loc="outside upper left", ncols=4, columnspacing=1.2)
     return figure

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from solver.studies.scaling import plot
 from workflow.studies.base.numbers import show
 from workflow.studies.base.results import Results
-from workflow.studies.base.style import COLOURS, FAINT, SETTINGS, plain
+from workflow.studies.base.style import COLOURS, FAINT, SETTINGS, named_rows, plain
 from workflow.studies.report.convergence_plot import visible
 from workflow.studies.report.spectra_tables import TIMED
 from workflow.variants import SHOWN, TRUTH, VARIANTS
@@ -59,11 +59,8 @@ def times_figure(run: Results) -> Figure:
     axes.set_xscale("log")
     axes.set_xlim(left=smallest / 2)
     axes.margins(x=0.12)
-    axes.set_yticks(range(len(rows)), [plain(row["title"]).replace(", ", "\n") for row in rows])
-    axes.tick_params(axis="y", length=0)
-    axes.grid(axis="y", visible=False)
+    named_rows(axes, [plain(row["title"]).replace(", ", "\n") for row in rows])
     axes.spines["left"].set_color(FAINT)
-    axes.invert_yaxis()
     axes.set_xlabel("wall time [s]")
     figure.legend(loc="outside upper left", ncols=len(TIMED), columnspacing=1.2)
     return figure

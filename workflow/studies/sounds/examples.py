@@ -38,8 +38,8 @@ class Target:
 
     name: str
     at: tuple[float, float, float]
-    clip: str
-    edit: int
+    clip: str = ""
+    edit: int = 1
 
 
 @dataclass(frozen=True)
@@ -179,30 +179,20 @@ def _example(name: str, config: Mapping[str, Any]) -> Example:
     there = (mesh.startswith(BUILTIN) or Path(mesh).is_file() for mesh in meshes)
     chosen = list(there).index(True)
     solid = described["solids"][chosen]
-    targets = [
-        Target(
-            each["name"],
-            tuple(solid["places"][each["name"]]),
-            each.get("clip", ""),
-            each.get("edit", 1),
-        )
-        for each in described["targets"]
-    ]
+    places = solid["places"]
+    targets = [Target(at=tuple(places[each["name"]]), **each) for each in described["targets"]]
+    told = {key: described[key] for key in ("title", "figure", "about", "density", "dimensions")}
     return Example(
-        name,
-        described["title"],
-        described["figure"],
-        described["about"],
-        meshes[chosen],
-        wanted["resolution"] or solid["resolution"],
-        described["density"],
-        wanted["modes"] or described["modes"],
-        described["dimensions"],
-        wanted["seconds"] or described["seconds"],
-        tuple(targets),
-        (solid["elsewhere"]["name"], tuple(solid["elsewhere"]["at"])),
-        described.get("compared", False),
-        Recording(**described["recorded"]) if "recorded" in described else None,
+        name=name,
+        **told,
+        mesh=meshes[chosen],
+        resolution=wanted["resolution"] or solid["resolution"],
+        modes=wanted["modes"] or described["modes"],
+        seconds=wanted["seconds"] or described["seconds"],
+        targets=tuple(targets),
+        elsewhere=(solid["elsewhere"]["name"], tuple(solid["elsewhere"]["at"])),
+        compared=described.get("compared", False),
+        recorded=Recording(**described["recorded"]) if "recorded" in described else None,
     )
 
 

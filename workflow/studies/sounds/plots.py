@@ -9,11 +9,10 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from workflow.studies.base.media import COLOUR_MAP
-from workflow.studies.base.style import COLOURS, INK, MUTED
+from workflow.studies.base.style import COLOURS, INK, MUTED, plain_numbers
 from workflow.studies.base.table import Table
 from workflow.studies.sounds.results import Found
 from workflow.studies.sounds.tables import METHODS
@@ -127,9 +126,7 @@ def limits(young: Array) -> tuple[float, float]:
 def _cost_axes(axes: Any) -> None:
     """Axes of costs over wall time, with plain numbers."""
     axes.set(yscale="log", xlabel="wall time [s]", ylabel="cost [1]", title="Cost")
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.yaxis.set_major_formatter("{x:g}")
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    plain_numbers(axes.yaxis)
 
 
 def _ticks(low: float, high: float) -> list[float]:
