@@ -70,7 +70,6 @@ ARROWS = {
     "sound.commands": """solver.files solver.response sound sound.clips sound.project sound.design
         sound.rendering sound.export""",
     #
-    "workflow.digest": "",
     "workflow": "dataset_gen dataset_gen.objectives forests forests.studies sound.project",
     "workflow.estimate": """dataset_gen dataset_gen.objectives forests.training forests.comparison
         workflow""",

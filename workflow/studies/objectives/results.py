@@ -40,11 +40,6 @@ def cases_of(config: Mapping[str, Any]) -> list[Case]:
     ]
 
 
-def solids_of(config: Mapping[str, Any]) -> list[str]:
-    """Names of the solids whose mesh exists."""
-    return list(dict.fromkeys(case.solid for case in cases_of(config)))
-
-
 class Objectives(Results):
     """The folder of the objectives' study."""
 
@@ -63,7 +58,7 @@ class Objectives(Results):
     @property
     def solids(self) -> list[str]:
         """Names of the solids studied."""
-        return solids_of(self.config)
+        return solids.named(self.config, f"{SECTION}.models")
 
     @property
     def materials(self) -> list[str]:
