@@ -1,6 +1,6 @@
 # A run beside another one: `snakemake compare --config baseline=FOLDER`, and the small tables that
 # are kept for others to compare theirs with: `snakemake reference`.
-from workflow.studies.comparison.folders import require_baseline, require_tables
+from workflow.studies.comparison.folders import require_tables
 
 if config["baseline"]:
     try:
@@ -9,9 +9,16 @@ if config["baseline"]:
         raise WorkflowError(f"baseline: {error}") from None
 
 
+def require_baseline(wildcards):
+    """No files: they may be those of the rule `reference`, which must not be made anew for this."""
+    if not config["baseline"]:
+        raise WorkflowError("baseline: names no folder, run with --config baseline=FOLDER")
+    return []
+
+
 rule compare:
     input:
-        lambda wildcards: require_baseline(config),
+        require_baseline,
         config=f"{RESULTS}/config.yaml",
         tables=tables_in(catalogue.REPORT),
     log:

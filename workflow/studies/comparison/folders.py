@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -102,23 +101,6 @@ def require_apart(out: str | Path, *compared: Folder) -> Path:
     if out.resolve() in {(folder.path / part).resolve() for folder in compared for part in PARTS}:
         raise UserError(f"{out}: holds tables that are compared; name another folder to write to")
     return out
-
-
-def require_baseline(config: Mapping[str, Any]) -> list[str]:
-    """Check before anything runs that a configuration names a baseline, for the rule's input.
-
-    Returns
-    -------
-    No files: they may be those of the rule `reference`, which must not be made anew for this.
-
-    Raises
-    ------
-    UserError
-        If the configuration names none.
-    """
-    if not config["baseline"]:
-        raise UserError("baseline: names no folder, run with --config baseline=FOLDER")
-    return []
 
 
 def _read(name: str, file: Path) -> tuple[Table, pd.DataFrame]:
