@@ -119,3 +119,10 @@ def shape_arguments(wildcards):
     how = {key: model[key] for key in ("resolution", "material", "pieces")}
     mesh = solids.mesh_of(config, "figures", wildcards.shape)
     return [mesh, *options(how | {"poisson": config["poisson"]})]
+
+
+def require_baseline(wildcards):
+    """No files: they may be those of the rule `reference`, which must not be made anew for this."""
+    if not config["baseline"]:
+        raise WorkflowError("baseline: names no folder, run with --config baseline=FOLDER")
+    return []

@@ -105,9 +105,14 @@ def _told(moved: bool, for_the_worse: bool, worse: str, better: str) -> str:
     return worse if for_the_worse else better
 
 
-def _time_moved(kind: str, old: float, new: float, *spreads: tuple[float, float] | None) -> bool:
-    """Whether a time [s] or a speed-up moved, beyond the spreads of its runs if both have some."""
-    before, now = spreads
+def _time_moved(
+    kind: str,
+    old: float,
+    new: float,
+    before: tuple[float, float] | None,
+    now: tuple[float, float] | None,
+) -> bool:
+    """Whether a time [s] or a speed-up moved, given the spreads of its runs."""
     if before and now:
         apart = before[1] < now[0] or now[1] < before[0]
         return apart and _excess(old, new) > TIME_TOLERANCE
