@@ -104,11 +104,10 @@ def require_apart(out: str | Path, *compared: Folder) -> Path:
 
 
 def _read(name: str, file: Path) -> tuple[Table, pd.DataFrame]:
-    """A table and its cells; what is used of it for people is made once, to see if it can be."""
     require_file(file, "a table")
     try:
         table = READERS[file.suffix](file)
-        table.as_markdown()
+        _require_texts(table)
         return table, cells_of(name, table)
     except OSError as error:
         raise UserError(f"{file}: cannot be read ({cause(error)})") from None
@@ -116,3 +115,9 @@ def _read(name: str, file: Path) -> tuple[Table, pd.DataFrame]:
         raise UserError(
             f"{file}: is no table of this version, or damaged; run the workflow again"
         ) from None
+
+
+def _require_texts(table: Table) -> None:
+    """Join what is told about the values once; what is no text raises."""
+    told = table.conditions.told.values() if table.conditions else ()
+    "".join([table.name, *told, *(column.label for column in table.columns)])
