@@ -28,7 +28,7 @@ except UserError as error:
     raise WorkflowError(str(error)) from None
 
 
-report: f"{settings.FOLDER}/report/captions/workflow.rst"
+report: f"{settings.FOLDER}/studies/captions/workflow.rst"
 
 
 include: f"{RULES}/common.smk"
@@ -36,13 +36,11 @@ include: f"{RULES}/dataset.smk"
 include: f"{RULES}/forests.smk"
 include: f"{RULES}/model.smk"
 include: f"{RULES}/spectra.smk"
-include: f"{RULES}/tables.smk"
-include: f"{RULES}/report.smk"
+include: f"{RULES}/catalogue.smk"
+include: f"{RULES}/studies.smk"
 include: f"{RULES}/validation.smk"
-include: f"{RULES}/shapes.smk"
 include: f"{RULES}/figures.smk"
 include: f"{RULES}/scaling.smk"
-include: f"{RULES}/study.smk"
 include: f"{RULES}/objectives.smk"
 include: f"{RULES}/default_forest.smk"
 include: f"{RULES}/forests_study.smk"

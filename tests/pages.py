@@ -7,9 +7,9 @@ import re
 from html.parser import HTMLParser
 from pathlib import Path
 
-from workflow.report.numbers import show
-from workflow.report.page import unbroken
-from workflow.report.table import kind_in, read_table
+from workflow.studies.base.numbers import show
+from workflow.studies.base.page import unbroken
+from workflow.studies.base.table import kind_in, read_table
 
 
 class Page(HTMLParser):

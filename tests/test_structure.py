@@ -70,24 +70,28 @@ ARROWS = {
     "sound.commands": """solver.files solver.response sound sound.clips sound.project sound.design
         sound.rendering sound.export""",
     #
-    "workflow.digest": "",
     "workflow": "dataset_gen dataset_gen.objectives forests forests.studies sound.project",
     "workflow.estimate": """dataset_gen dataset_gen.objectives forests.training forests.comparison
         workflow""",
-    "workflow.report": "solver.files solver.response solver.hcms solver.studies workflow",
-    "workflow.compare": "workflow workflow.report",
-    "workflow.figures": "workflow workflow.report",
-    "workflow.forests_study": "dataset_gen.objectives workflow workflow.report",
-    "workflow.sounds": """solver.files solver.response sound sound.clips sound.project sound.design
-        sound.rendering workflow workflow.report""",
-    "workflow.study": "dataset_gen.objectives solver.coarsening workflow workflow.report",
-    "workflow.validate": "solver.files solver.response solver.studies workflow workflow.report",
+    "workflow.studies.base": "solver.response workflow",
+    "workflow.studies": "workflow.studies.base",
+    "workflow.studies.report": """solver.files solver.hcms solver.studies.scaling workflow
+        workflow.studies.base""",
+    "workflow.studies.figures": "workflow.studies.base workflow.studies.report",
+    "workflow.studies.forests": """dataset_gen.objectives workflow.studies.base
+        workflow.studies.report""",
+    "workflow.studies.objectives": """dataset_gen.objectives solver.coarsening workflow
+        workflow.studies.base""",
+    "workflow.studies.sounds": """solver.files solver.response sound sound.clips sound.project
+        sound.design sound.rendering workflow workflow.studies.base""",
+    "workflow.studies.validation": """solver.files solver.response solver.studies workflow
+        workflow.studies.base workflow.studies.report""",
+    "workflow.studies.comparison": "workflow workflow.studies.base",
     "workflow.commands": """dataset_gen.objectives solver.coarsening solver.response
-        solver.analysis workflow workflow.report workflow.compare workflow.estimate
-        workflow.validate""",
-    "workflow.scripts": """solver.analysis solver.studies.scaling sound.project
-        workflow.report workflow.compare workflow.figures workflow.forests_study workflow.sounds
-        workflow.study workflow.validate""",
+        solver.analysis workflow workflow.studies.base workflow.studies.comparison workflow.estimate
+        workflow.studies.report""",
+    "workflow.scripts": """solver.analysis sound.project workflow.studies.base
+        workflow.studies.report workflow.studies.comparison workflow.studies.sounds""",
 }
 """Packages, from the bottom to the top, with those that they import beside `EVERYBODY`."""
 

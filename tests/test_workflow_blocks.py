@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from workflow.report.blocks_tables import LOWER_BOUND, every_row, overview, repeats
+from types import SimpleNamespace
+
+from workflow.studies.catalogue import FORESTS, REPORT
+from workflow.studies.report.blocks_tables import LOWER_BOUND
 
 
 def rated(method: str, high: float = 10.0, **changes) -> dict:
@@ -45,14 +48,17 @@ ROWS = [
 ]
 
 
+RESULTS = SimpleNamespace(on_blocks={"result": ROWS, "provenance": {}}, config={})
+
+
 def test_kinds_of_blocks_are_columns_and_databases_one_row():
-    table = overview(ROWS)
+    table = REPORT.entries["blocks"](RESULTS)
     rows = {row["method"]: row for row in table.rows}
     assert list(rows) == ["average", "database", LOWER_BOUND]
     assert (rows["average"]["kind0_nodal"], rows["average"]["kind1_nodal"]) == (0.5, 0.7)
     assert rows["average"]["seconds_per_block"] == 2e-6
     assert rows["average"]["seconds_per_block_min"] == 5e-7
-    assert repeats(ROWS).runs.startswith("5 ")
+    assert table.conditions.runs.startswith("5 ")
     assert rows["database"]["kind1_nodal"] == 0.5, "not that beyond its range"
     assert (rows["database"]["storage_bytes"], rows["database"]["training_seconds"]) == (200, 2.0)
     assert rows[LOWER_BOUND]["kind0_nodal"] == 0.4
@@ -62,7 +68,7 @@ def test_kinds_of_blocks_are_columns_and_databases_one_row():
 
 
 def test_every_row_says_what_its_blocks_are():
-    rows = every_row(ROWS).rows
+    rows = FORESTS.entries["every-block"](RESULTS).rows
     assert len(rows) == len(ROWS)
     assert rows[0]["blocks"] == "0…10 GPa uniform, solid"
     assert rows[-1]["blocks"].endswith("(others times 1,000)")

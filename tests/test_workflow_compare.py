@@ -13,12 +13,12 @@ import yaml
 from tests.pages import Page, assert_self_contained
 from tests.workflow_runs import TINY, snakemake
 from workflow.__main__ import main
-from workflow.compare.cells import Comparison, compare
-from workflow.compare.folders import read_folder
-from workflow.compare.noise import SAME, Value, verdict
-from workflow.compare.reference import write_reference
-from workflow.report.conditions import Repeats, conditions
-from workflow.report.table import Column, Table, read_csv_table, write_table
+from workflow.studies.base.conditions import Repeats, conditions
+from workflow.studies.base.table import Column, Table, read_csv_table, write_table
+from workflow.studies.comparison.comparison import Comparison, compare
+from workflow.studies.comparison.folders import read_folder
+from workflow.studies.comparison.noise import SAME, Value, verdict
+from workflow.studies.comparison.reference import write_reference
 
 CONFIG = {"title": "A run", "results_dir": "a", "mesh_folder": "m", "solver": {"modes": 30}}
 RECORD = {
@@ -84,7 +84,7 @@ def before(tmp_path):
 def test_equal_folders_have_not_moved(before, tmp_path, capsys):
     now = shutil.copytree(before, tmp_path / "now")
     found = compared(before, now)
-    assert len(found.cells) == 4 and not found.moved
+    assert len(found.cells) == 4 and found.moved.empty
     assert found.only_before == found.only_now == []
     assert run(before, now, "--fail-on-move", "--out", tmp_path / "out") == 0
     assert "4 numbers compared: none moved" in capsys.readouterr().out
@@ -93,7 +93,8 @@ def test_equal_folders_have_not_moved(before, tmp_path, capsys):
 
 def test_a_slowed_method_is_slower_and_a_faster_one_faster(before, tmp_path, capsys):
     now = write(tmp_path / "now", spreads(HCMS=1.5, SLEPc=0.5))
-    moved = {cell.row: cell.verdict for cell in compared(before, now).moved}
+    found = compared(before, now).moved
+    moved = dict(zip(found["row"], found["verdict"]))
     assert moved == {"bell, SLEPc": "faster", "bell, HCMS": "slower"}
     assert run(before, now) == 0
     told = capsys.readouterr().out
@@ -105,7 +106,7 @@ def test_a_slowed_method_is_slower_and_a_faster_one_faster(before, tmp_path, cap
 
 
 def test_moves_within_the_spread_are_noise(before, tmp_path):
-    assert not compared(before, write(tmp_path / "now", spreads(HCMS=1.25, SLEPc=0.8))).moved
+    assert compared(before, write(tmp_path / "now", spreads(HCMS=1.25, SLEPc=0.8))).moved.empty
 
 
 @pytest.mark.parametrize(
@@ -182,10 +183,10 @@ def test_a_reference_of_text_serves_as_baseline(tmp_path):
     assert "| models | 2.50 s |" in (reference / "README.md").read_text()
     assert (reference / "tables" / "times.md").is_file()
     found = compared(reference, results)
-    assert len(found.cells) == 12 and not found.moved and not found.only_now
+    assert len(found.cells) == 12 and found.moved.empty and not found.only_now
     slower = write(tmp_path / "slower", spreads(HCMS=1.5))
-    assert [cell.verdict for cell in compared(reference, slower).moved] == ["slower"]
-    assert [cell.verdict for cell in compared(slower, reference).moved] == ["faster"]
+    assert list(compared(reference, slower).moved["verdict"]) == ["slower"]
+    assert list(compared(slower, reference).moved["verdict"]) == ["faster"]
 
 
 def test_all_forms_say_the_same(before, tmp_path, capsys):

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 import yaml
 
 from tests.pages import Page, assert_same_numbers, assert_self_contained
 from tests.workflow_runs import CHECKOUT, PROFILE, TINY, planned, snakemake
-from workflow.figures import results
-from workflow.figures.tables import BUILDERS
-from workflow.report.convergence_tables import convergence, convergence_sentences
-from workflow.report.methods_tables import methods, ratios
-from workflow.report.table import read_table
+from workflow import solids
+from workflow.studies.base.table import read_table
+from workflow.studies.catalogue import FIGURES
+from workflow.studies.report.convergence_tables import convergence_sentences
 
+convergence, methods, ratios = map(FIGURES.entries.get, ("convergence", "methods", "ratios"))
 CONFIG = yaml.safe_load((CHECKOUT / "workflow" / "config" / "laptop.yaml").read_text())
 
 
@@ -30,9 +32,10 @@ def test_figures_are_no_part_of_the_default_run(tmp_path):
 def test_meshes_that_exist_take_part_and_others_are_named(tmp_path):
     (tmp_path / "teapot.obj").touch()
     config = {**CONFIG, "mesh_folder": str(tmp_path)}
-    assert "teapot" in results.present(config) and "bunny" not in results.present(config)
-    assert results.present(config, "convergence") == ["frying-pan"]
-    sentence = results.without(config)
+    present = solids.named(config, "figures.models")
+    assert "teapot" in present and "bunny" not in present
+    assert solids.named(config, "figures.convergence") == ["frying-pan"]
+    sentence = solids.without(config, "figures")
     assert "Without bunny:" in sentence and "stanford-bunny.obj" in sentence
 
 
@@ -52,34 +55,41 @@ def row(**seconds) -> dict:
         "speedup_with_precompute": {"hcms_ec": {"slepc": 1.5}},
         "slepc_configuration": {"package": "cholmod", "subspace": 1.5},
         "slepc_configurations_tried": [{}] * 6,
+        "provenance": {},
     }
 
 
+def found(**methods: dict) -> SimpleNamespace:
+    """Results of a study with such a bar."""
+    titles = dict.fromkeys(methods, "A bar")
+    return SimpleNamespace(methods=methods, convergence={}, titles=titles, config={})
+
+
 def test_the_table_of_methods_has_what_was_timed_and_says_how():
-    table = methods({"bar": row(hcms_ec=2.0)}, {"bar": "A bar"})
+    table = methods(found(bar=row(hcms_ec=2.0)))
     keys = [column.key for column in table.columns]
     assert "hcms_ec" in keys and "arpack" not in keys and "hcms_ec_min" in keys
     assert "CHOLMOD, 1.5 Lanczos vectors a mode, the fastest of 6 tried" in table.caption
     assert "5 rounds (ARPACK 1)" in table.caption
     assert "bar, HCMS: too few modes." in table.caption
-    assert table.rows[0]["hcms_ec_max"] == 5.0 and table.rows[0]["ddfem_error"] is None
+    assert table.rows[0]["hcms_ec_max"] == 5.0 and table.rows[0].get("ddfem_error") is None
 
 
 def test_ratios_name_their_base():
-    (found,) = ratios({"bar": row(hcms_ec=2.0)}, {"bar": "A bar"}).rows
-    assert (found["method"], found["base"], found["ratio"]) == ("HCMS + EC", "SLEPc", 2.0)
-    assert found["with_precompute"] == 1.5
-    assert (found["ratio_min"], found["ratio_max"]) == (0.5 / 5.0, 5.0 / 0.5)
+    (ratio,) = ratios(found(bar=row(hcms_ec=2.0))).rows
+    assert (ratio["method"], ratio["base"], ratio["ratio"]) == ("HCMS + EC", "SLEPc", 2.0)
+    assert ratio["with_precompute"] == 1.5
+    assert (ratio["ratio_min"], ratio["ratio_max"]) == (0.5 / 5.0, 5.0 / 0.5)
     # What is needed beforehand takes 2/3 s, run by run.
-    assert found["with_precompute_max"] == pytest.approx(5.0 / (0.5 + 4.0 / 1.5 - 2.0))
+    assert ratio["with_precompute_max"] == pytest.approx(5.0 / (0.5 + 4.0 / 1.5 - 2.0))
     once = row(hcms_ec=2.0) | {"runs": {"slepc": 1, "hcms_ec": 5}}
-    (found,) = ratios({"bar": once}, {"bar": "A bar"}).rows
-    assert found["ratio"] == 2.0 and "ratio_min" not in found
+    (ratio,) = ratios(found(bar=once)).rows
+    assert ratio["ratio"] == 2.0 and "ratio_min" not in ratio
 
 
 def test_tables_of_nothing_have_no_rows():
-    assert methods({}, {}).rows == ratios({}, {}).rows == []
-    assert convergence_sentences(convergence({}, {})) == []
+    assert methods(found()).rows == ratios(found()).rows == []
+    assert convergence_sentences(convergence(found())) == []
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +98,7 @@ def finished(tmp_path_factory):
     folder = tmp_path_factory.mktemp("figures")
     done = snakemake(folder, "figures", "--profile", PROFILE, "--configfile", TINY)
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-6000:]
-    return folder / "results-tiny" / results.FOLDER
+    return folder / "results-tiny" / FIGURES.folder
 
 
 @pytest.mark.slow
@@ -97,7 +107,7 @@ def test_the_page_of_miniature_figures_holds_its_tables_and_plots(finished):
     page = Page(finished / "report.html")
     assert_self_contained(page)
     assert {"plot-times", "plot-bar-convergence", "plot-bar-scaling"} <= set(page.ids)
-    for name in BUILDERS:
+    for name in FIGURES.entries:
         assert_same_numbers(page, finished / "tables", name)
     for name in ("times", "bar-convergence", "bar-scaling"):
         assert (finished / "figures" / f"{name}.png").stat().st_size > 5000
@@ -107,10 +117,10 @@ def test_the_page_of_miniature_figures_holds_its_tables_and_plots(finished):
 @pytest.mark.slow
 @pytest.mark.mpi
 def test_miniature_figures_find_what_the_paper_found(finished):
-    found = read_table(finished / "tables" / "convergence.json").rows
+    rows = read_table(finished / "tables" / "convergence.json").rows
     last = {
         row["start"]: row["median"]
-        for row in found
+        for row in rows
         if row["corrections"] == 3 and "paper" in row["acceleration"]
     }
     assert last["HCMS, free interfaces"] < last["random vectors"]

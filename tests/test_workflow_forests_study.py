@@ -12,11 +12,11 @@ from forests import model as forest_model
 from tests.pages import Page, assert_same_numbers, assert_self_contained
 from tests.workflow_runs import CHECKOUT, PROFILE, TINY, planned, snakemake
 from workflow import settings
-from workflow.forests_study.plots import FIGURES
-from workflow.forests_study.tables import BUILDERS
-from workflow.report.table import read_table
+from workflow.studies.base.table import read_table
+from workflow.studies.catalogue import FORESTS
 
 FOLDER = "results-tiny"
+FIGURES = [figure.file for figure in FORESTS.figures]
 
 
 def test_default_forests_are_trained_tree_by_tree_and_not_in_the_default_run(tmp_path):
@@ -77,7 +77,7 @@ def test_the_page_of_a_miniature_study_holds_its_tables_and_figures(finished):
     page = Page(study / "report.html")
     assert_self_contained(page)
     assert {f"plot-{name}" for name in FIGURES} <= set(page.ids)
-    for name in BUILDERS:
+    for name in FORESTS.entries:
         assert_same_numbers(page, study / "tables", name)
     for name in FIGURES:
         assert (study / "figures" / f"{name}.png").stat().st_size > 5000

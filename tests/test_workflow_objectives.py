@@ -12,17 +12,18 @@ from dataset_gen.objectives import OBJECTIVES
 from tests.pages import Page, assert_same_numbers, assert_self_contained
 from tests.small_forests import train_small_forests
 from tests.workflow_runs import CHECKOUT, PROFILE, TINY, planned, snakemake
-from workflow import settings
-from workflow.report.table import read_table
-from workflow.study.cases import Study, absent_meshes, cases_of, without
-from workflow.study.errors_tables import errors, summary
-from workflow.study.evidence_tables import description
-from workflow.study.forest_tables import forest
-from workflow.study.goals import goals_of, judge
-from workflow.study.goals_tables import goal_cases, goals
-from workflow.study.page import shortened
-from workflow.study.tables import BUILDERS
+from workflow import settings, solids
+from workflow.studies import catalogue
+from workflow.studies.base.table import read_table
+from workflow.studies.objectives.goals import goals_of, judge
+from workflow.studies.objectives.page import shortened
+from workflow.studies.objectives.results import Objectives, cases_of
+from workflow.studies.objectives.tables import description
 
+summary, errors, forest, goals, goal_cases = (
+    catalogue.OBJECTIVES.entries[name]
+    for name in ("summary", "errors", "forest", "goals", "goal-cases")
+)
 STUDY = {
     "models": {
         "box": {"title": "", "mesh": "builtin:box", "resolutions": [8, 16], "components": "error"},
@@ -72,13 +73,13 @@ def rated(material: str, resolution: int) -> dict:
 
 
 @pytest.fixture
-def study(tmp_path) -> Study:
+def study(tmp_path) -> Objectives:
     """A study of a box, whose other solid has no mesh."""
     any_case = {"model": None, "resolutions": None, "materials": None}
     goals = [{**any_case, **goal} for goal in STUDY["goals"]]
     config = {"mesh_folder": str(tmp_path), "objectives": {**STUDY, "goals": goals}}
     (tmp_path / "config.yaml").write_text(yaml.safe_dump(config))
-    study = Study(tmp_path / "objectives")
+    study = Objectives(tmp_path / "objectives")
     for case in cases_of(config):
         path = study.folder / "cases" / case.path
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -150,10 +151,10 @@ def test_without_forests_their_table_is_empty_and_the_reason_is_kept(study):
 
 def test_a_solid_without_its_mesh_is_left_out_and_named(study, tmp_path):
     assert study.solids == ["box"]
-    assert list(absent_meshes(study.config)) == ["bust"]
-    assert without(study.config).startswith(f"Without bust: there is no {tmp_path}/bust.obj")
+    assert list(solids.absent_meshes(study.config, "objectives")) == ["bust"]
+    assert study.without.startswith(f"Without bust: there is no {tmp_path}/bust.obj")
     (tmp_path / "bust.obj").touch()
-    assert without(study.config) == ""
+    assert study.without == ""
     assert len(cases_of(study.config)) == 6
 
 
@@ -181,7 +182,7 @@ def test_the_study_is_no_part_of_the_default_run(tmp_path):
     study = planned(snakemake(tmp_path, "objectives", "--dry-run", "--cores", 1))
     # No mesh files lie here: box, bell and pan at two resolutions with five materials.
     assert study["rate_objectives"] == 3 * 2 * 5
-    assert study["plot_objectives"] == 3
+    assert study["plot_objectives_solid"] == 3
     assert "find_modes" not in study
 
 
@@ -206,7 +207,7 @@ def test_the_page_of_a_miniature_study_holds_its_tables(finished):
     assert_self_contained(page)
     assert {"model-box", "plot-box"} <= set(page.ids)
     sizes = ("title", "unknowns", "coarse_unknowns")
-    for name in BUILDERS:
+    for name in catalogue.OBJECTIVES.entries:
         hidden = sizes if name == "errors" else ("title",) if name == "goal-cases" else ()
         assert_same_numbers(page, finished / "tables", name, hidden)
     assert (finished / "figures" / "box.png").stat().st_size > 5000

@@ -9,11 +9,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from workflow.report import numbers
-from workflow.report.mode_pictures import aligned, cluster, cropped
-from workflow.report.numbers import show
-from workflow.report.style import COLOURS, svg, themed
-from workflow.report.table import Column, Table, read_table, write_table
+from workflow.studies.base import numbers
+from workflow.studies.base.media import cropped
+from workflow.studies.base.numbers import show
+from workflow.studies.base.style import COLOURS, svg, themed
+from workflow.studies.base.table import Column, Table, read_table, write_table
+from workflow.studies.report.mode_pictures import aligned, cluster
 
 TABLE = Table(
     "demo",

@@ -12,20 +12,15 @@ from docutils.core import publish_parts
 from carillon.errors import UserError
 from tests.workflow_runs import CHECKOUT, planned, snakemake
 from workflow import rule_graph
-from workflow.figures.tables import BUILDERS as FIGURE_TABLES
-from workflow.forests_study.plots import FIGURES
-from workflow.forests_study.tables import BUILDERS as FOREST_TABLES
-from workflow.report import marks
-from workflow.report.tables import BUILDERS as RUN_TABLES
-from workflow.study.tables import BUILDERS as STUDY_TABLES
+from workflow.studies import catalogue, marks
 
-CAPTIONS = sorted((CHECKOUT / "workflow" / "report" / "captions").glob("*.rst"))
+CAPTIONS = sorted((CHECKOUT / "workflow" / "studies" / "captions").glob("*.rst"))
 RULES = [CHECKOUT / "Snakefile", *(CHECKOUT / "workflow" / "rules").glob("*.smk")]
 
 
-def rendered(caption: str, figure: str) -> str:
+def rendered(caption: str) -> str:
     """A caption as Snakemake's report shows it; fails on what reStructuredText does not allow."""
-    wildcards = SimpleNamespace(model="bar", shape="bar", solid="bar", figure=figure)
+    wildcards = SimpleNamespace(model="bar", shape="bar", solid="bar")
     job = SimpleNamespace(wildcards=wildcards, config={"title": "A run"})
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined)
     text = environment.from_string(caption).render(snakemake=job)
@@ -53,24 +48,24 @@ def test_without_graphviz_a_sentence_says_what_is_missing(monkeypatch, tmp_path)
 
 @pytest.mark.parametrize("path", CAPTIONS, ids=lambda path: path.stem)
 def test_captions_are_sentences(path):
-    figures = FIGURES if "wildcards.figure" in path.read_text() else [""]
-    for figure in figures:
-        assert rendered(path.read_text(), figure).rstrip().removesuffix("</div>").count(".</p>")
+    assert rendered(path.read_text()).rstrip().removesuffix("</div>").count(".</p>")
 
 
 def test_every_caption_is_used_and_exists():
-    sources = "".join(path.read_text() for path in [*RULES, CHECKOUT / marks.__file__])
-    assert set(re.findall(r"captions/(\w+)\.rst", sources)) == {path.stem for path in CAPTIONS}
+    sources = "".join(path.read_text() for path in RULES)
+    named = {*re.findall(r"captions/(\w+)\.rst", sources), "table"}
+    alone = (catalogue.VALIDATION, catalogue.SOUND, catalogue.SOUNDS)
+    for study in (*catalogue.STUDIES, *alone):
+        named |= {study.caption, *(figure.caption for figure in study.figures)}
+    assert named == {path.stem for path in CAPTIONS}
 
 
-def test_every_table_is_listed_with_what_it_shows():
-    assert set(marks.SHOWS) == {*RUN_TABLES, *FIGURE_TABLES, *STUDY_TABLES, *FOREST_TABLES}
-
-
-def test_only_the_csv_files_of_tables_are_marked():
-    files = marks.tables("folder", ["times", "errors"], "all")
+@pytest.mark.parametrize("study", catalogue.STUDIES, ids=lambda study: study.name)
+def test_every_table_says_what_it_shows_and_only_its_csv_file_is_marked(study):
+    assert study.entries and all(entry.shows for entry in study.entries.values())
+    files = marks.tables(study, "folder")
     assert files == [
-        f"folder/{name}.{kind}" for name in ("times", "errors") for kind in ("csv", "md", "json")
+        f"folder/tables/{name}.{kind}" for name in study.entries for kind in ("csv", "md", "json")
     ]
     marked = [file for file in files if "report" in getattr(file, "flags", {})]
-    assert marked == ["folder/times.csv", "folder/errors.csv"]
+    assert marked == [f"folder/tables/{name}.csv" for name in study.entries]

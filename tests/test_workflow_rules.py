@@ -17,7 +17,7 @@ def test_default_run_is_planned_without_a_gap(tmp_path):
     assert jobs["generate_shard"] == shards
     assert jobs["find_modes"] == 7 * models
     assert jobs["compare_with_truth"] == 6 * models
-    assert jobs["train_forests"] == jobs["tabulate_results"] == jobs["build_report"] == 1
+    assert jobs["train_forests"] == jobs["tabulate_report"] == jobs["build_report"] == 1
 
 
 def test_default_profile_is_read(tmp_path):

@@ -14,11 +14,11 @@ from markupsafe import escape
 
 from tests.pages import Page, assert_same_numbers, assert_self_contained
 from tests.workflow_runs import PROFILE, TINY, planned, snakemake
-from workflow.report.conditions import LABELS
-from workflow.report.numbers import MISSING
-from workflow.report.table import read_table
-from workflow.report.tables import BUILDERS
 from workflow.settings import config_hash
+from workflow.studies.base.conditions import LABELS
+from workflow.studies.base.numbers import MISSING
+from workflow.studies.base.table import read_table
+from workflow.studies.catalogue import REPORT
 from workflow.variants import CANDIDATES, SHOWN, VARIANTS
 
 pytestmark = pytest.mark.slow
@@ -78,7 +78,7 @@ def test_snakemakes_own_report_holds_the_results_and_needs_nothing_from_elsewher
     assert set(categories) == {"Report", "Validation", "Figures", "Tables"}
     assert set(categories["Figures"]) == {*MODELS, "all models"}
     results = value_of("results", source)
-    assert {f"{NAME}/tables/{name}.csv" for name in BUILDERS} <= set(results)
+    assert {f"{NAME}/tables/{name}.csv" for name in REPORT.entries} <= set(results)
     assert all(result["caption"] and result["labels"] for result in results.values())
 
 
@@ -125,7 +125,7 @@ def test_page_shows_every_model_with_its_pictures(page, results):
     assert page.source.count("data:image/png;base64,") == len(MODELS) * len(SHOWN)
 
 
-@pytest.mark.parametrize("name", [name for name in BUILDERS if name not in NOT_SHOWN])
+@pytest.mark.parametrize("name", [name for name in REPORT.entries if name not in NOT_SHOWN])
 def test_page_and_files_hold_the_same_numbers(page, results, name):
     assert_same_numbers(page, results / "tables", name)
 
@@ -166,7 +166,7 @@ def test_every_result_tells_its_origin(results):
         assert row["command"] and row["commit"] and row["config_hash"] and row["versions"]
 
 
-@pytest.mark.parametrize("name", [name for name in BUILDERS if name not in TOLD_APART])
+@pytest.mark.parametrize("name", [name for name in REPORT.entries if name not in TOLD_APART])
 def test_every_benchmark_table_tells_its_conditions(page, results, name):
     table = read_table(results / "tables" / f"{name}.json")
     told = table.conditions.told

@@ -83,7 +83,7 @@ def test_no_path_is_taken_for_an_option():
 
 
 def test_options_leave_out_what_has_no_value_and_keep_zero():
-    assert options({"corrections": 0, "keep": None, "tune": False, "weak": True}) == [
+    assert options({"corrections": 0, "retained_modes": None, "tune": False, "weak": True}) == [
         *("--corrections", "0", "--weak")
     ]
 
@@ -385,7 +385,7 @@ TABLE = {"name": "t", "caption": "", "columns": [{"key": "a", "label": "A"}], "r
     ],
 )
 def test_a_table_that_is_none_is_named(tmp_path, text):
-    from workflow.compare.folders import read_folder
+    from workflow.studies.comparison.folders import read_folder
 
     path = tmp_path / "tables" / "t.json"
     path.parent.mkdir()

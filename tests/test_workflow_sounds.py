@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -25,9 +26,10 @@ from tests.small_design import N_MODES, SIDES, small_design
 from tests.workflow_runs import TINY, planned, snakemake
 from workflow import settings
 from workflow.commands.estimate import CONFIGURATIONS, load
-from workflow.report.table import write_table
-from workflow.sounds import index, page
-from workflow.sounds.examples import (
+from workflow.studies.base.table import write_table
+from workflow.studies.catalogue import SOUND, SOUNDS
+from workflow.studies.sounds import index, page, tables
+from workflow.studies.sounds.examples import (
     DESIGN,
     ELSEWHERE,
     FOLDER,
@@ -40,9 +42,9 @@ from workflow.sounds.examples import (
     names,
     project,
 )
-from workflow.sounds.pictures import fine_mesh
-from workflow.sounds.plots import _ticks
-from workflow.sounds.results import Found
+from workflow.studies.sounds.pictures import fine_mesh
+from workflow.studies.sounds.plots import _ticks
+from workflow.studies.sounds.results import Found
 
 RATE = 22_050
 EXAMPLE = Example(
@@ -141,9 +143,10 @@ def write_sounds(folder: Path, design: Design) -> None:
 
 @pytest.fixture(scope="module")
 def built(found: Found) -> Page:
-    html, tables = page.build(found)
-    for table in tables.values():
+    made = {name: make(found) for name, make in SOUND.entries.items()}
+    for table in made.values():
         write_table(table, found.folder / "tables")
+    html = page.page(found, made)
     (found.folder / "page.html").write_text(html, encoding="utf-8")
     return Page(found.folder / "page.html")
 
@@ -170,7 +173,7 @@ def test_tables_of_the_page_are_those_of_the_files(found, built, name):
 
 
 def test_every_edit_counts_its_own_time(found, built):
-    rows = page.tables.designs(found).rows
+    rows = list(tables.designs(found))
     assert [row["cost_before"] for row in rows] == [9.0, 6.0]
     assert [row["cost"] for row in rows] == [4.0, 0.5]
     assert rows[1]["seconds"] == pytest.approx(2.0) and rows[1]["evaluations"] == 20
@@ -178,7 +181,7 @@ def test_every_edit_counts_its_own_time(found, built):
 
 
 def test_the_fine_model_is_set_beside_the_coarse_one(found):
-    rows = page.tables.truth(found).rows
+    rows = list(tables.truth(found))
     assert len(rows) == N_MODES
     for row in rows:
         assert row["error"] == pytest.approx(row["found"] / row["truth"] - 1.0)
@@ -187,8 +190,10 @@ def test_the_fine_model_is_set_beside_the_coarse_one(found):
 
 def test_the_index_leads_to_the_page(found, built, tmp_path):
     (tmp_path / "tables").mkdir()
-    html, table = index.build([found])
+    results = SimpleNamespace(found=[found])
+    table = SOUNDS.entries["sounds"](results)
     write_table(table, tmp_path / "tables")
+    html = index.page(results, {"sounds": table})
     (tmp_path / "index.html").write_text(html, encoding="utf-8")
     read = Page(tmp_path / "index.html")
     assert_self_contained(read)

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import csv
 import json
+from types import SimpleNamespace
 
 import pytest
 
 from carillon.measurement import measured, memory_bytes
 from workflow import settings
-from workflow.report.conditions import LABELS, ONE_COLD_RUN, Conditions, conditions
-from workflow.report.numbers import MISSING
-from workflow.report.scaling_tables import repeats, scaling
-from workflow.report.table import Column, Table, read_csv_table, read_table, write_table
+from workflow.studies.base.conditions import LABELS, ONE_COLD_RUN, Conditions, conditions
+from workflow.studies.base.numbers import MISSING
+from workflow.studies.base.table import Column, Table, read_csv_table, read_table, write_table
+from workflow.studies.catalogue import REPORT
 
 CONFIG = {
     "title": "A run",
@@ -140,9 +141,11 @@ def test_scaling_keeps_the_slowest_run_beside_the_fastest():
     run |= {"repeats": 3, "oversubscribed": False, "cores": 2, "peak_memory_bytes": [5.0, 7.0]}
     modelled = {"ranks": 4, "n_dofs": 900, "subdomains": 4, "total": 0.6}
     part = {"runs": [run], "model": {"rows": [modelled]}}
-    found = {"bell": {"strong": part, "weak": None}}
-    measured_row, modelled_row = scaling(found, {"bell": "A bell"}).rows
+    bell = {"strong": part, "weak": None, "provenance": {}}
+    found = SimpleNamespace(scaling={"bell": bell}, titles={"bell": "A bell"}, config=CONFIG)
+    table = REPORT.entries["scaling"](found)
+    measured_row, modelled_row = table.rows
     assert (measured_row["measured"], measured_row["measured_max"]) == (1.0, 1.5)
     assert measured_row["peak_memory"] == 7.0 and measured_row["note"] == "measured"
-    assert modelled_row["measured"] is None and modelled_row["modelled"] == 0.6
-    assert repeats(found).runs.startswith("3")
+    assert modelled_row.get("measured") is None and modelled_row["modelled"] == 0.6
+    assert table.conditions.runs.startswith("3")

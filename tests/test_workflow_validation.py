@@ -20,11 +20,11 @@ from solver.studies.comparison import compare_files
 from tests.edited_files import edited
 from tests.pages import Page, assert_self_contained
 from workflow.__main__ import main
-from workflow.report.results import Results
-from workflow.report.table import read_table
-from workflow.validate.criteria import Criterion
-from workflow.validate.evidence import COMPARED, Evidence
-from workflow.validate.page import build
+from workflow.studies.base.table import read_table
+from workflow.studies.catalogue import VALIDATION
+from workflow.studies.validation.criteria import Criterion
+from workflow.studies.validation.evidence import COMPARED, Evidence
+from workflow.studies.validation.page import page as rendered
 from workflow.variants import SHOWN
 
 SIDES = (80.0, 40.0, 20.0)
@@ -131,7 +131,9 @@ def test_a_mode_that_is_missing_fails_in_words(run, tmp_path):
     (folder / "audit.json").write_text(json.dumps({"spectra": audits, "provenance": {}}))
     candidates = {variant: paths[variant] for variant in COMPARED}
     write_response(folder / "response.h5", respond(paths["truth"], candidates, StrikeOptions()), {})
-    html, tables = build(Evidence(Results(tmp_path / "spoiled"), "block"))
+    evidence = Evidence(tmp_path / "spoiled", "block")
+    tables = {name: make(evidence) for name, make in VALIDATION.entries.items()}
+    html = rendered(evidence, tables)
     (tmp_path / "page.html").write_text(html)
     text = words_of(Page(tmp_path / "page.html"))
     missed = {row["key"] for row in tables["criteria"].rows if row["verdict"] == "missed"}

@@ -31,7 +31,8 @@ def take(folder: Path = FOLDER) -> bool:
 
     Parameters
     ----------
-    folder : Snakemake's folder in the working directory.
+    folder
+        Snakemake's folder in the working directory.
     """
     folder.mkdir(exist_ok=True)
     file = (folder / "carillon.run").open("a+")

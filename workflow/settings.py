@@ -187,11 +187,6 @@ def modes_of(config: Mapping[str, Any], model: str) -> int:
     return int(own if own is not None else config["solver"]["modes"])
 
 
-def studied_mesh(config: Mapping[str, Any], solid: str) -> str:
-    """Mesh argument of the solver for a solid of the objectives' study."""
-    return located(config, config["objectives"]["models"][solid]["mesh"])
-
-
 def figured_mesh(config: Mapping[str, Any], solid: str) -> str:
     """Mesh argument of the solver for a solid of the figures."""
     return located(config, config["figures"]["models"][solid]["mesh"])

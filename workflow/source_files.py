@@ -32,9 +32,12 @@ class Source:
 
     Attributes
     ----------
-    names : what it imports, with the packages these lie in; some may be no modules.
-    data : names of data files that it mentions.
-    digest : SHA-256 of its syntax tree without docstrings and help texts.
+    names
+        What it imports, with the packages these lie in; some may be no modules.
+    data
+        Names of data files that it mentions.
+    digest
+        SHA-256 of its syntax tree without docstrings and help texts.
     """
 
     names: tuple[str, ...]

@@ -25,7 +25,8 @@ def fingerprint(*modules: str) -> str:
 
     Parameters
     ----------
-    modules : names such as `dataset_gen.generate`.
+    modules
+        Names such as `dataset_gen.generate`.
 
     Raises
     ------

@@ -17,10 +17,14 @@ class Training:
 
     Attributes
     ----------
-    section : where it stands in the configuration, for messages; empty for the run's own.
-    folder : where its files are, below the folder of the results.
-    dataset, forests : its sections of the configuration.
-    poisson : Poisson's ratio of the blocks.
+    section
+        Where it stands in the configuration, for messages; empty for the run's own.
+    folder
+        Where its files are, below the folder of the results.
+    dataset, forests
+        Its sections of the configuration.
+    poisson
+        Poisson's ratio of the blocks.
     """
 
     section: str

@@ -165,7 +165,7 @@ for key, values in {
     "ranks": ("0", "1000000", str(2**64)),
     "cores": ("0", "1.5"),
     "interface": ("loose",),
-    "keep": ("5",),
+    "retained_modes": ("5",),
     "subdomains": ("0", "1e300"),
 }.items():
     for value in values:

@@ -6,10 +6,10 @@ import argparse
 import json
 
 from carillon.errors import UserError
-from workflow.compare import report
-from workflow.compare.cells import compare
-from workflow.compare.folders import read_folder, require_apart
-from workflow.compare.noise import WORSE
+from workflow.studies.comparison import report
+from workflow.studies.comparison.comparison import compare
+from workflow.studies.comparison.folders import read_folder, require_apart
+from workflow.studies.comparison.noise import WORSE
 
 EXIT_WORSE = 1
 
@@ -36,7 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
     before, now = read_folder(arguments.before), read_folder(arguments.now)
     out = None if arguments.out is None else require_apart(arguments.out, before, now)
     comparison = compare(before, now)
-    if not comparison.cells:
+    if comparison.cells.empty:
         raise UserError(
             f"{arguments.before} and {arguments.now} have no table and row in common; expected "
             "results of the same models"
@@ -49,5 +49,5 @@ def run(arguments: argparse.Namespace) -> int:
         print(report.as_text(comparison))
         if out is not None:
             print(f"all of it: {out / report.NAME}.html")
-    moved = {cell.verdict for cell in comparison.moved}
-    return EXIT_WORSE if arguments.fail_on_move and moved & {*WORSE} else 0
+    worse = comparison.moved["verdict"].isin(WORSE).any()
+    return EXIT_WORSE if arguments.fail_on_move and worse else 0

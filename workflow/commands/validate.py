@@ -7,34 +7,29 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 
-from carillon.arguments import (
-    non_negative_number,
-    number_of_workers,
-    poisson_ratio,
-    positive_number,
-    whole_number,
-)
+from carillon.arguments import non_negative_number, number_of_workers, positive_number, whole_number
 from carillon.errors import UserError
-from carillon.fem.geometry import COMPONENTS, FILLS, surface_name
+from carillon.fem.geometry import surface_name
 from carillon.fem.materials import NAMES as MATERIALS
-from carillon.fem.model import DEFAULT_DENSITY
 from carillon.files import atomic_path
+from carillon.options import REQUIRED, add_options, collect, option
 from carillon.progress import say
 from carillon.runtime import allowed_cores
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.coarsening.forest import load_forest
 from solver.response.contact import surface_node
 from workflow import settings
-from workflow.report.table import read_table
 from workflow.room import make_folder
 from workflow.settings import BUILTIN, DEFAULT_FORESTS
-from workflow.validate.verdict import headline
+from workflow.studies.base.table import read_table
+from workflow.studies.report.findings import headline
 
 CONFIGURATION = "validate.yaml"
 """File in the folder of the results that the run is started with."""
@@ -44,6 +39,23 @@ LONGEST_NAME = 64
 """Characters of a model's name; a title may be longer."""
 
 
+@dataclass(frozen=True)
+class ValidateOptions:
+    """What a validation needs beside the solid."""
+
+    out: str = option(REQUIRED, "folder of all results", metavar="FOLDER")
+    name: str | None = option(None, "name of the solid's page (default: that of the mesh)")
+    modes: int = option(256, "rigid included", type=whole_number(12))
+    mass_damping: float | None = option(
+        None, "Rayleigh damping [1/s] (default: of a plastic)", type=non_negative_number
+    )
+    stiffness_damping: float | None = option(
+        None, "Rayleigh damping [s] (default: of a plastic)", type=non_negative_number
+    )
+    forest: str | None = option(None, "forests to coarsen by (default: those of the package)")
+    cores: int = option(allowed_cores(), "cores to use (default: all)", type=number_of_workers)
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     parser.description = (
@@ -51,36 +63,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "says how far they can be trusted. The same command goes on where it was stopped. Exit "
         f"status 0 if all criteria are met, {FAILED} if one is missed."
     )
-    parser.add_argument("mesh", metavar="MESH", help="surface mesh file, or builtin:NAME")
-    parser.add_argument(
-        "--resolution", type=whole_number(4), required=True, help="voxels along the longest side"
-    )
-    parser.add_argument(
-        "--material",
-        default="uniform",
-        help=f"{', '.join(MATERIALS)}, or a file with one Young's modulus [Pa] per voxel "
-        "(default %(default)s)",
-    )
-    parser.add_argument("--out", required=True, metavar="FOLDER", help="folder of all results")
-    parser.add_argument("--name", help="name of the solid's page (default: that of the mesh)")
-    parser.add_argument(
-        "--unit", type=positive_number, default=1.0, help="metres per mesh unit (default 1)"
-    )
-    parser.add_argument("--fill", choices=sorted(FILLS), default="winding", help="voxel filling")
-    parser.add_argument(
-        "--components", choices=COMPONENTS, default="error", help="if the voxels fall apart"
-    )
-    parser.add_argument(
-        "--density", type=positive_number, default=DEFAULT_DENSITY, help="kg/m^3 (default 1000)"
-    )
-    parser.add_argument(
-        "--poisson", type=poisson_ratio, default=0.25, help="Poisson's ratio (default 0.25)"
-    )
-    parser.add_argument(
-        "--modes", type=whole_number(12), default=256, help="rigid included (default 256)"
-    )
-    parser.add_argument("--seed", type=whole_number(0), default=0, help="of random materials")
-    parser.add_argument("--forest", help="forests to coarsen by (default: those of the package)")
+    own = ("coarsen", "forest", "objective", "lumped")
+    add_options(parser, ProblemOptions, leave_out=own, positional=("mesh",))
+    add_options(parser, ValidateOptions)
     for name, what in (("strike", "that is struck"), ("observed", "that is watched")):
         parser.add_argument(
             f"--{name}",
@@ -89,12 +74,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             metavar=("X", "Y", "Z"),
             help=f"point of the surface {what}, in mesh units (default: chosen)",
         )
-    for name, unit in (("mass-damping", "1/s"), ("stiffness-damping", "s")):
-        parser.add_argument(
-            f"--{name}",
-            type=non_negative_number,
-            help=f"Rayleigh damping [{unit}] (default: of a plastic)",
-        )
     parser.add_argument(
         "--tolerances",
         nargs="+",
@@ -102,12 +81,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="NAME=VALUE",
         help=f"limits of the criteria: {', '.join(_tolerance_names())}",
-    )
-    parser.add_argument(
-        "--cores",
-        type=number_of_workers,
-        default=allowed_cores(),
-        help="cores to use (default: all)",
     )
 
 
@@ -139,30 +112,16 @@ def run(arguments: argparse.Namespace) -> int:
 
 def configuration(arguments: argparse.Namespace) -> dict[str, Any]:
     """Configuration of a run with this one solid; what it leaves out takes the defaults."""
+    given = vars(arguments)
+    keys = ("resolution", "unit", "fill", "components", "density", "modes", "seed")
+    named = arguments.material in MATERIALS
     model = {
         "mesh": arguments.mesh if arguments.mesh.startswith(BUILTIN) else _path(arguments.mesh),
-        "material": arguments.material
-        if arguments.material in MATERIALS
-        else _path(arguments.material),
-        **{
-            key: getattr(arguments, key)
-            for key in (
-                "resolution",
-                "unit",
-                "fill",
-                "components",
-                "density",
-                "modes",
-                "seed",
-                "strike",
-                "observed",
-            )
-        },
+        "material": arguments.material if named else _path(arguments.material),
+        **{key: given[key] for key in (*keys, "strike", "observed")},
     }
-    validation: dict[str, Any] = {"tolerances": dict(arguments.tolerances)}
-    for key in ("mass_damping", "stiffness_damping"):
-        if getattr(arguments, key) is not None:
-            validation[key] = getattr(arguments, key)
+    damping = {key: given[key] for key in ("mass_damping", "stiffness_damping")}
+    validation = {key: value for key, value in damping.items() if value is not None}
     title = arguments.name or surface_name(arguments.mesh)
     return {
         "title": f"Validation of {title}",
@@ -171,16 +130,14 @@ def configuration(arguments: argparse.Namespace) -> dict[str, Any]:
         "poisson": arguments.poisson,
         "models": {_model_name(title): {"title": title, **model}},
         "forests": {"model": _path(arguments.forest) if arguments.forest else DEFAULT_FORESTS},
-        "validation": validation,
+        "validation": {"tolerances": dict(arguments.tolerances), **validation},
     }
 
 
 def _checked_size(arguments: argparse.Namespace) -> str:
     """The size of the solid, made once to tell all that is wrong with it before anything runs."""
-    names = ("mesh", "resolution", "material", "unit", "fill", "components", "poisson", "density")
-    given = {name: getattr(arguments, name) for name in names}
     load_forest(arguments.forest, arguments.poisson)
-    solid = build_problem(ProblemOptions(**given, seed=arguments.seed))
+    solid = build_problem(collect(ProblemOptions, arguments))
     for name in ("strike", "observed"):
         point = getattr(arguments, name)
         if point is not None:

@@ -347,7 +347,8 @@ def measure() -> dict[str, Any]:
 
     Returns
     -------
-    Plain values, see `workflow/schemas/rates.schema.yaml`.
+    dict[str, Any]
+        Plain values, see `workflow/schemas/rates.schema.yaml`.
 
     Raises
     ------

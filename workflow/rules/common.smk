@@ -54,11 +54,11 @@ def training_memory(plan):
     return plan.forests["ranks"] * (tree_memory(plan) + int(leaves))
 
 
-def templates(package):
-    """Templates of a page: those of its package, and what all pages share."""
-    shared = [f"report/{name}" for name in ("base.html.j2", "macros.html.j2", "page.css")]
-    names = [f"{package}/page.html.j2", *shared]
-    return [settings.FOLDER / name for name in names]
+def templates(room, *names):
+    """Templates of a study's page: its own, and what all pages share."""
+    shared = ["base/base.html.j2", "base/macros.html.j2", "base/page.css"]
+    files = [f"{room}/{name}" for name in names or ["page.html.j2"]]
+    return [settings.FOLDER / "studies" / name for name in [*files, *shared]]
 
 
 def growing(first):

@@ -1,6 +1,6 @@
 # A run beside another one: `snakemake compare --config baseline=FOLDER`, and the small tables that
 # are kept for others to compare theirs with: `snakemake reference`.
-from workflow.compare.folders import require_baseline, require_tables
+from workflow.studies.comparison.folders import require_tables
 
 if config["baseline"]:
     try:
@@ -11,9 +11,9 @@ if config["baseline"]:
 
 rule compare:
     input:
-        lambda wildcards: require_baseline(config),
+        require_baseline,
         config=f"{RESULTS}/config.yaml",
-        tables=expand(f"{RESULTS}/tables/{{table}}.json", table=TABLES),
+        tables=tables_in(catalogue.REPORT),
     log:
         f"{LOGS}/compare.log",
     localrule: True
@@ -33,7 +33,7 @@ rule reference:
     input:
         config=f"{RESULTS}/config.yaml",
         report=f"{RESULTS}/report.html",
-        tables=expand(f"{RESULTS}/tables/{{table}}.json", table=TABLES),
+        tables=tables_in(catalogue.REPORT),
     output:
         f"{RESULTS}/reference/README.md",
     log:

@@ -1,8 +1,8 @@
 # Examples of sound design: their files, and arguments of the programs.
 from dataclasses import asdict
 
-from workflow.sounds import examples as sound_examples
-from workflow.sounds.examples import DESIGN, ELSEWHERE, PROJECT, START, TRUTH
+from workflow.studies.sounds import examples as sound_examples
+from workflow.studies.sounds.examples import DESIGN, ELSEWHERE, PROJECT, START, TRUTH
 
 SOUND_FOLDER = sound_examples.FOLDER
 SOUND = f"{RESULTS}/{SOUND_FOLDER}"
@@ -36,31 +36,11 @@ def part_clips(wildcards):
     return [f"{SOUND}/{example.name}/clips/{target.name}.wav" for target in targets]
 
 
-def part_mesh(wildcards):
-    """Mesh file of a part; none for a built-in object."""
-    return example_of(wildcards).mesh_files
-
-
-def project_of(wildcards):
-    """Content of the project file of a part."""
-    return sound_examples.project(example_of(wildcards), wildcards.part, config)
-
-
-def start_argument(wildcards, input):
-    """The design to go on from, if there is one."""
-    return options({"initial_design": str(input.before)})
-
-
 def design_before(wildcards):
     """The design of the edit before; none for the first."""
     example = example_of(wildcards)
     edit = example.edit_of(wildcards.part)
     return [] if edit == 1 else [f"{SOUND}/{example.part(edit - 1)}/{DESIGN}"]
-
-
-def clip_arguments(wildcards):
-    """What the clip of a point is made as."""
-    return targets_of(wildcards)[wildcards.point].clip.split()
 
 
 def recording_of(wildcards):
@@ -108,11 +88,6 @@ def mesh_files(wildcards):
 def example_designs(wildcards):
     """Designs of all edits of an example."""
     return [f"{SOUND}/{part}/{DESIGN}" for part in EXAMPLES[wildcards.example].parts]
-
-
-def fine_solid(wildcards):
-    """The fine model of an example, but for its material."""
-    return sound_examples.solid_arguments(EXAMPLES[wildcards.example])
 
 
 def comparison(wildcards):

@@ -1,9 +1,6 @@
 # What the default forests are worth, block by block: `snakemake forests_study`, no part of the
 # default run.
-from workflow.forests_study import plots as study_plots
-from workflow.forests_study import tables as study_tables
-
-FORESTS_STUDY = f"{RESULTS}/forests_study"
+FORESTS_STUDY = place(catalogue.FORESTS)
 STUDIED_FORESTS = settings.studied_model(config) or f"{DEFAULT_FOLDER}/forests.h5"
 STUDY_TRAINING = training.study(config)
 
@@ -108,76 +105,3 @@ rule follow_learning:
     shell:
         "python -m forests curve {input:q} {params.training:q} --rows {params.rows:q}"
         " --workers {threads} --out {output:q} > {log:q} 2>&1"
-
-
-rule tabulate_forests_study:
-    input:
-        config=f"{RESULTS}/config.yaml",
-        found=expand(
-            f"{FORESTS_STUDY}/{{part}}.json",
-            part=["model", "blocks", "benchmark", "variants", "curve"],
-        ),
-    output:
-        marks.tables(f"{FORESTS_STUDY}/tables", study_tables.BUILDERS, "forests_study"),
-    log:
-        f"{LOGS}/forests_study/tables.log",
-    localrule: True
-    resources:
-        mem_mb=1000,
-        runtime="10m",
-    params:
-        source=source("workflow.scripts.tabulate_forests_study"),
-    script:
-        "../scripts/tabulate_forests_study.py"
-
-
-rule plot_forests_study:
-    input:
-        config=f"{RESULTS}/config.yaml",
-        found=expand(
-            f"{FORESTS_STUDY}/{{part}}.json", part=["blocks", "benchmark", "variants", "curve"]
-        ),
-    output:
-        svg=report(
-            f"{FORESTS_STUDY}/figures/{{figure}}.svg",
-            caption="../report/captions/forest_scores.rst",
-            category="Figures",
-            subcategory="forests_study",
-            labels=lambda wildcards: {"figure": marks.SHOWS[wildcards.figure]},
-        ),
-        png=f"{FORESTS_STUDY}/figures/{{figure}}.png",
-    log:
-        f"{LOGS}/forests_study/{{figure}}.log",
-    localrule: True
-    resources:
-        mem_mb=1000,
-        runtime="10m",
-    params:
-        source=source("workflow.scripts.plot_forests_study"),
-    script:
-        "../scripts/plot_forests_study.py"
-
-
-rule build_forests_report:
-    input:
-        config=f"{RESULTS}/config.yaml",
-        tables=expand(f"{FORESTS_STUDY}/tables/{{table}}.json", table=list(study_tables.BUILDERS)),
-        figures=expand(f"{FORESTS_STUDY}/figures/{{figure}}.svg", figure=list(study_plots.FIGURES)),
-        templates=templates("forests_study"),
-    output:
-        report(
-            f"{FORESTS_STUDY}/report.html",
-            caption="../report/captions/forests.rst",
-            category="Report",
-            labels={"page": "The default forests"},
-        ),
-    log:
-        f"{LOGS}/forests_study/report.log",
-    localrule: True
-    resources:
-        mem_mb=1000,
-        runtime="10m",
-    params:
-        source=source("workflow.scripts.build_forests_report"),
-    script:
-        "../scripts/build_forests_report.py"

@@ -50,11 +50,6 @@ def hcms_arguments(corrected):
     return options(how)
 
 
-def timed_arguments(wildcards):
-    """The solid on which all methods are timed."""
-    return model_arguments(wildcards, config["times"]["resolution"])
-
-
 def times_arguments(part):
     """How methods are timed, from a part of the configuration."""
     keys = ("modes", "runs", "slow_runs", "tune", "arpack_regular")

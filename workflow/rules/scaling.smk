@@ -17,19 +17,3 @@ use rule measure_scaling as measure_scaling_of_run with:
         modes=config["scaling"]["modes"],
         ranks=",".join(map(str, config["scaling"]["ranks"])),
         weak=[],
-
-
-use rule plot_scaling as plot_scaling_of_run with:
-    input:
-        scaling=f"{RESULTS}/models/{{model}}/scaling.json",
-    output:
-        svg=report(
-            f"{RESULTS}/figures/{{model}}-scaling.svg",
-            caption="../report/captions/scaling.rst",
-            category="Figures",
-            subcategory="{model}",
-            labels={"figure": "Scaling over ranks"},
-        ),
-        png=f"{RESULTS}/figures/{{model}}-scaling.png",
-    log:
-        f"{LOGS}/figures/{{model}}-scaling.log",

@@ -20,7 +20,7 @@ rule synthesise_clip:
         runtime=growing(10),
     params:
         source=source("sound.commands.clip"),
-        how=clip_arguments,
+        how=lambda wildcards: targets_of(wildcards)[wildcards.point].clip.split(),
     shell:
         "OMP_NUM_THREADS={threads} python -m sound clip {params.how:q} --out {output:q}"
         " > {log:q} 2>&1"
@@ -40,7 +40,7 @@ rule check_design:
         runtime=growing(60),
     params:
         source=source("solver.commands.modes"),
-        solid=fine_solid,
+        solid=lambda wildcards: sound_examples.solid_arguments(EXAMPLES[wildcards.example]),
     shell:
         "OMP_NUM_THREADS={threads} python -m solver modes {params.solid:q}"
         " --material {input.young:q} --coarsen none --method slepc --out {output:q}"
@@ -106,17 +106,19 @@ rule write_project:
         mem_mb=500,
         runtime="5m",
     params:
-        source=source("workflow.scripts.write_project"),
-        project=project_of,
+        source=source("workflow.scripts.write_yaml"),
+        content=lambda wildcards: sound_examples.project(
+            example_of(wildcards), wildcards.part, config
+        ),
     script:
-        "../scripts/write_project.py"
+        "../scripts/write_yaml.py"
 
 
 # The search takes all cores, since what it finds depends on how much it evaluates in its time.
 rule design_sound:
     input:
         project=f"{SOUND}/{{part}}/{PROJECT}",
-        mesh=part_mesh,
+        mesh=lambda wildcards: example_of(wildcards).mesh_files,
         clips=part_clips,
         before=design_before,
         forests=settings.default_forest_files(),
@@ -132,7 +134,7 @@ rule design_sound:
         runtime=growing(60),
     params:
         source=source("sound.commands.design"),
-        start=start_argument,
+        start=lambda wildcards, input: options({"initial_design": str(input.before)}),
     shell:
         "OMP_NUM_THREADS={threads} python -m sound design {input.project:q} {params.start:q}"
         " --out {output:q} > {log:q} 2>&1"
@@ -258,16 +260,10 @@ rule build_sound_page:
         truth=f"{SOUND}/{{example}}/{TRUTH}",
         sounds=all_sounds,
         optimisers=comparison,
-        templates=templates("sounds"),
+        templates=templates("sounds", "page.html.j2", "tables.yaml"),
     output:
-        page=report(
-            f"{SOUND}/{{example}}/page.html",
-            caption="../report/captions/sound.rst",
-            category="Sounds",
-            labels={"example": "{example}"},
-        ),
-        designs=f"{SOUND}/{{example}}/tables/designs.json",
-        frequencies=f"{SOUND}/{{example}}/tables/frequencies.json",
+        marks.page(catalogue.SOUND, f"{SOUND}/{{example}}/page.html", "Sounds", example="{example}"),
+        found=[f"{SOUND}/{{example}}/tables/{name}.json" for name in ("designs", "frequencies")],
     log:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/page.log",
     localrule: True
@@ -275,28 +271,20 @@ rule build_sound_page:
         mem_mb=2000,
         runtime="15m",
     params:
-        source=source("workflow.scripts.build_sound_page"),
+        source=made_by("page", *pages_of(catalogue.SOUND)),
+        study=told(catalogue.SOUND, "tables", "page"),
     script:
-        "../scripts/build_sound_page.py"
+        "../scripts/page.py"
 
 
 rule build_sounds_index:
     input:
         config=f"{RESULTS}/config.yaml",
         pages=expand(f"{SOUND}/{{example}}/page.html", example=EXAMPLES),
-        tables=expand(
-            f"{SOUND}/{{example}}/tables/{{table}}.json",
-            example=EXAMPLES,
-            table=["designs", "frequencies"],
-        ),
-        templates=[settings.FOLDER / "sounds" / "index.html.j2", *templates("sounds")],
+        found=expand(rules.build_sound_page.output.found, example=EXAMPLES),
+        templates=templates("sounds", "index.html.j2", "index.yaml"),
     output:
-        page=report(
-            f"{SOUND}/index.html",
-            caption="../report/captions/sounds.rst",
-            category="Sounds",
-            labels={"example": "all"},
-        ),
+        marks.page(catalogue.SOUNDS, f"{SOUND}/index.html", "Sounds", example="all"),
         table=f"{SOUND}/tables/sounds.json",
     log:
         f"{LOGS}/{SOUND_FOLDER}/index.log",
@@ -305,7 +293,7 @@ rule build_sounds_index:
         mem_mb=1000,
         runtime="10m",
     params:
-        source=source("workflow.scripts.build_sounds_index"),
-        examples=list(EXAMPLES),
+        source=made_by("page", *pages_of(catalogue.SOUNDS)),
+        study=told(catalogue.SOUNDS, "tables", "page"),
     script:
-        "../scripts/build_sounds_index.py"
+        "../scripts/page.py"

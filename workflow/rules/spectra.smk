@@ -98,7 +98,7 @@ rule time_methods:
         source=source("solver.commands.benchmark"),
         ranks=RANKS,
         on_ranks=on_ranks(RANKS),
-        model=timed_arguments,
+        model=lambda wildcards: model_arguments(wildcards, config["times"]["resolution"]),
         how=times_arguments(config["times"]),
         forest=forest_argument,
     shell:

@@ -58,13 +58,10 @@ rule validate_model:
             f"{RESULTS}/figures/{{{{model}}}}-mode-{{variant}}.png", variant=variants.SHOWN
         ),
         description=f"{RESULTS}/figures/{{model}}-mode.json",
-        templates=templates("validate"),
+        templates=templates("validation", "page.html.j2", "tables.yaml"),
     output:
-        page=report(
-            f"{VALIDATION}/{{model}}.html",
-            caption="../report/captions/validation.rst",
-            category="Validation",
-            labels={"model": "{model}"},
+        marks.page(
+            catalogue.VALIDATION, f"{VALIDATION}/{{model}}.html", "Validation", model="{model}"
         ),
         criteria=f"{VALIDATION}/tables/{{model}}-criteria.json",
     log:
@@ -74,6 +71,7 @@ rule validate_model:
         mem_mb=2000,
         runtime="15m",
     params:
-        source=source("workflow.scripts.validate_model"),
+        source=made_by("page", *pages_of(catalogue.VALIDATION)),
+        study=told(catalogue.VALIDATION, "tables", "page"),
     script:
-        "../scripts/validate_model.py"
+        "../scripts/page.py"

@@ -4,7 +4,7 @@ import numpy as np
 
 from carillon.files import atomic_path
 from solver.analysis.problem import ProblemOptions, build_problem
-from workflow.sounds.examples import Recording
+from workflow.studies.sounds.examples import Recording
 
 example = snakemake.params.example
 mesh = build_problem(ProblemOptions(example["mesh"], example["resolution"])).fine

@@ -2,6 +2,6 @@
 
 from pathlib import Path
 
-from workflow.compare.reference import write_reference
+from workflow.studies.comparison.reference import write_reference
 
 write_reference(Path(snakemake.input.config).parent)

@@ -1,0 +1,128 @@
+# What the studies are made from, and where they lie.
+from workflow import solids
+from workflow.studies import catalogue, marks
+from workflow.studies.base.study import modules_of
+from workflow.studies.objectives.results import cases_of
+
+FOREST_ARGUMENT = options({"forest": settings.named_forest(config)})
+
+
+wildcard_constraints:
+    solid="|".join(config["objectives"]["models"]),
+    resolution=r"\d+",
+    material="|".join(config["objectives"]["materials"]),
+    shape="|".join(config["figures"]["models"]),
+
+
+def place(study):
+    """Folder of a study."""
+    return str(Path(RESULTS, study.folder))
+
+
+def logs_of(study):
+    """Folder of a study's logs."""
+    return str(Path(LOGS, study.folder))
+
+
+def tables_in(study):
+    """JSON files of a study's tables."""
+    return [f"{place(study)}/tables/{name}.json" for name in study.entries]
+
+
+def figures_of(study):
+    """SVG files of all figures of a study that are drawn."""
+    names = [name for figure in study.figures for name in figure.files(config)]
+    return [f"{place(study)}/figures/{name}.svg" for name in names]
+
+
+def made_by(script, *references):
+    """Fingerprint of what a script does for a study."""
+    return source(f"workflow.scripts.{script}", *modules_of(*references))
+
+
+def told(study, *names):
+    """What a script has to know of a study."""
+    return {name: getattr(study, name) for name in ("folder", "results", *names)}
+
+
+def pages_of(study):
+    """What a page is made by whose rule makes its tables as well."""
+    return [study.results, study.page, *study.table_modules]
+
+
+def descriptions(study):
+    """Files that describe the tables of a study."""
+    rooms = {entry.module.split(".")[0] for entry in study.entries.values()}
+    files = [study.tables, "base/tables.yaml", *(f"{room}/tables.yaml" for room in sorted(rooms))]
+    return [settings.FOLDER / "studies" / name for name in dict.fromkeys(files)]
+
+
+def measured_for(study):
+    """Files that the tables of a study are made from."""
+    folder = place(study)
+    measured = [
+        f"{folder}/models/{solid}/{file}.json"
+        for file, where in solids.MEASURED.get(study.name, {}).items()
+        for solid in solids.named(config, where)
+    ]
+    if study is catalogue.REPORT:
+        modes = expand("{model}/{variant}.h5", model=MODELS, variant=variants.VARIANTS)
+        compared = expand(
+            "{model}/{variant}.comparison.json", model=MODELS, variant=variants.CANDIDATES
+        )
+        return [
+            f"{folder}/forests/forests.json",
+            f"{folder}/forests/table.json",
+            *(f"{folder}/dataset/{name}.json" for name in settings.own_shards(config)),
+            *(f"{folder}/models/{file}" for file in modes + compared),
+            *measured,
+        ]
+    if study is catalogue.FIGURES:
+        return measured
+    if study is catalogue.OBJECTIVES:
+        return [f"{folder}/cases/{case.path}" for case in cases_of(config)]
+    parts = ("model", "blocks", "benchmark", "variants", "curve")
+    return [f"{folder}/{part}.json" for part in parts]
+
+
+def shown_beside(study):
+    """What a page shows beside its tables and figures."""
+    if study is not catalogue.REPORT:
+        return []
+    modes = expand("{model}-mode-{variant}.png", model=MODELS, variant=variants.SHOWN)
+    return [
+        *(f"{RESULTS}/figures/{name}" for name in modes),
+        *(f"{RESULTS}/figures/{model}-mode.json" for model in MODELS),
+        *(f"{RESULTS}/validation/tables/{model}-criteria.json" for model in MODELS),
+    ]
+
+
+def case_arguments(wildcards):
+    """What the solid of a case is: mesh, resolution, material."""
+    how = {
+        "resolution": wildcards.resolution,
+        "material": wildcards.material,
+        "poisson": config["poisson"],
+        "components": config["objectives"]["models"][wildcards.solid]["components"],
+    }
+    return [solids.mesh_of(config, "objectives", wildcards.solid), *options(how)]
+
+
+def shape_mesh(wildcards):
+    """Mesh file of a solid of the figures; none for a built-in object."""
+    return solids.mesh_files(config, "figures", wildcards.shape)
+
+
+def shape_arguments(wildcards):
+    """What the solid of a figure is: mesh, resolution, material."""
+    model = config["figures"]["models"][wildcards.shape]
+    how = {key: model[key] for key in ("resolution", "material", "components")}
+    mesh = solids.mesh_of(config, "figures", wildcards.shape)
+    return [mesh, *options(how | {"poisson": config["poisson"]})]
+
+
+def require_baseline(wildcards):
+    """No files: they may be those of the rule `reference`, which must not be made anew for this."""
+    if not config["baseline"]:
+        raise WorkflowError("baseline: names no folder, run with --config baseline=FOLDER")
+    return []

@@ -1,0 +1,72 @@
+"""Solids of a study whose meshes may be missing, and which are then left out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from workflow import settings
+
+Config = Mapping[str, Any]
+STUDIED = ("figures", "objectives")
+"""Sections with solids of their own, which are left out if they have no mesh."""
+MEASURED = {
+    "report": {
+        "convergence": "convergence.models",
+        "methods": "times.models",
+        "scaling": "scaling.models",
+    },
+    "figures": {
+        "methods": "figures.models",
+        "convergence": "figures.convergence",
+        "scaling": "figures.scaling",
+    },
+}
+"""Where the configuration names the solids that a study measures, by the file of what is found."""
+
+
+def mesh_of(config: Config, section: str, solid: str) -> str:
+    """Mesh argument of the solver for a solid of a section of the configuration."""
+    return settings.located(config, config[section]["models"][solid]["mesh"])
+
+
+def mesh_files(config: Config, section: str, solid: str) -> list[str]:
+    """Mesh file of a solid; none for a built-in object."""
+    mesh = mesh_of(config, section, solid)
+    return [] if mesh.startswith(settings.BUILTIN) else [mesh]
+
+
+def absent_meshes(config: Config, section: str) -> dict[str, str]:
+    """Mesh files that do not exist, by the solid that is left out for it."""
+    return {
+        solid: file
+        for solid in config[section]["models"]
+        for file in mesh_files(config, section, solid)
+        if not Path(file).is_file()
+    }
+
+
+def named(config: Config, where: str) -> list[str]:
+    """Solids that a part of the configuration names, as far as their mesh exists.
+
+    Parameters
+    ----------
+    where
+        Keys joined by dots, such as `models`, `scaling.models` or `figures.scaling`.
+    """
+    section, _, part = where.rpartition(".")
+    names = list(config[section][part] if section else config[part])
+    absent = absent_meshes(config, section) if section in STUDIED else {}
+    return [name for name in names if name not in absent]
+
+
+def without(config: Config, section: str) -> str:
+    """One sentence about the solids that are left out; empty if there are none."""
+    absent = absent_meshes(config, section)
+    if not absent:
+        return ""
+    return (
+        f"Without {' and '.join(absent)}: there is no {' and no '.join(absent.values())}; put "
+        "the files there, or set mesh_folder to the folder that holds them."
+    )

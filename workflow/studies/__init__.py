@@ -1,0 +1,1 @@
+"""Studies: results -> tables -> figures -> page, each in a room of its own."""

@@ -1,0 +1,191 @@
+"""Under which conditions the numbers of a table were measured."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any
+
+from workflow import settings
+from workflow.studies.base.numbers import MISSING, show
+
+Record = Mapping[str, Any]
+
+LABELS = {
+    "processor": "Processor",
+    "cores": "Cores",
+    "memory": "Memory",
+    "ranks": "MPI ranks",
+    "threads": "Threads of a rank",
+    "blas": "BLAS",
+    "versions": "Versions",
+    "commit": "Commit",
+    "configuration": "Hash of the configuration",
+    "runs": "Runs",
+    "spread": "Spread",
+    "date": "Date",
+    "differing": "Not the same for all rows",
+}
+"""Conditions for people, in the order in which they are told."""
+
+NAMED = 3
+"""Rows that are named where conditions differ; the others are counted."""
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Where, when, with what and how often the numbers of a table were measured, in words.
+
+    Attributes
+    ----------
+    processor, cores, memory, ranks, threads, blas, versions, commit
+        Of the measurement; `cores` are those that the process could use. Where rows differ, each
+        value is followed by its rows.
+    configuration
+        Hash of the resolved configuration, whatever the folders.
+    runs, spread
+        How often every number was measured, and how its spread is told.
+    date
+        Day of the measurement (UTC), or first and last day.
+    differing
+        Which of the above are not the same for all rows; empty if all are.
+    """
+
+    processor: str
+    cores: str
+    memory: str
+    ranks: str
+    threads: str
+    blas: str
+    versions: str
+    commit: str
+    configuration: str
+    runs: str
+    spread: str
+    date: str
+    differing: str = ""
+
+    @property
+    def told(self) -> dict[str, str]:
+        """Conditions by key, without `differing` where nothing differs."""
+        return {key: text for key, text in asdict(self).items() if text}
+
+    @property
+    def headline(self) -> str:
+        """Machine, ranks, runs and date in one line."""
+        warning = f"; not the same for all rows: {self.differing}" if self.differing else ""
+        return (
+            f"{self.processor}, {self.cores} cores, {self.memory}; ranks {self.ranks}, threads "
+            f"{self.threads}; runs {self.runs}; {self.date}{warning}"
+        )
+
+    def as_markdown(self) -> str:
+        """All conditions as a paragraph."""
+        told = (f"{LABELS[key]}: {text}" for key, text in self.told.items())
+        return f"*Conditions.* {'; '.join(told)}.\n"
+
+
+@dataclass(frozen=True)
+class Repeats:
+    """How often something was measured, and how the spread of the runs is told."""
+
+    runs: str
+    spread: str
+
+
+IN_COLUMNS = "min and max of the runs: columns ending in _min and _max of the CSV file"
+ONE_COLD_RUN = Repeats("1, cold", "unknown, as of any single run")
+NOT_TIMED = Repeats("1", "none, as nothing is timed; a repetition differs by rounding")
+
+
+def conditions(
+    records: Mapping[str, Record], config: Mapping[str, Any], repeats: Repeats, **said: str
+) -> Conditions | None:
+    """Conditions of a table from the provenance of its results; None if there are none.
+
+    Parameters
+    ----------
+    records
+        Provenance of each result, by the name of its rows.
+    config
+        The resolved configuration.
+    said
+        Conditions that the records do not tell, or not well.
+    """
+    if not records:
+        return None
+    told = {name: _texts(record) for name, record in records.items()}
+    keys = list(next(iter(told.values())))
+    values = {key: {name: texts[key] for name, texts in told.items()} for key in keys}
+    differing = [key for key in keys if key not in said and len(set(values[key].values())) > 1]
+    joined = {key: _joined(values[key]) for key in keys}
+    return Conditions(
+        **joined
+        | {
+            "configuration": settings.config_hash(config),
+            "runs": repeats.runs,
+            "spread": repeats.spread,
+            "date": _days(records),
+            "differing": ", ".join(differing),
+        }
+        | said
+    )
+
+
+def measured(
+    records: Callable[[Any], Mapping[str, Record]],
+    repeats: Repeats | Callable[[Any], Repeats],
+    **said: str,
+) -> Callable[[Any], Conditions | None]:
+    """The conditions of a table as a function of the results, from which the records come."""
+
+    def told(results: Any) -> Conditions | None:
+        how = repeats(results) if callable(repeats) else repeats
+        return conditions(records(results), results.config, how, **said)
+
+    return told
+
+
+def read_conditions(told: Mapping[str, str]) -> Conditions | None:
+    """Conditions from a table's file; None if it tells none."""
+    names = [field.name for field in fields(Conditions)]
+    found = {name: told[name] for name in names if name in told}
+    if not found:
+        return None
+    return replace(Conditions(*[MISSING] * (len(names) - 1)), **found)
+
+
+def _texts(record: Record) -> dict[str, str]:
+    """What a record tells, in words."""
+    versions = json.loads(record.get("versions", "{}"))
+    return {
+        **{
+            key: str(record.get(key, MISSING))
+            for key in ("processor", "cores", "ranks", "threads", "blas", "commit")
+        },
+        "memory": show(record.get("memory_bytes"), "bytes"),
+        "versions": ", ".join(f"{name} {version}" for name, version in versions.items()) or MISSING,
+    }
+
+
+def _joined(by_row: Mapping[str, str]) -> str:
+    """The text that all rows share, or every text with the rows that it holds for."""
+    rows: dict[str, list[str]] = {}
+    for row, text in by_row.items():
+        rows.setdefault(text, []).append(row)
+    if len(rows) == 1:
+        return next(iter(rows))
+    return "; ".join(f"{text} ({_named(names)})" for text, names in rows.items())
+
+
+def _named(rows: list[str]) -> str:
+    more = len(rows) - NAMED
+    return ", ".join(rows[:NAMED]) + (f" and {more} more" if more > 0 else "")
+
+
+def _days(records: Mapping[str, Record]) -> str:
+    days = sorted({record["date"][:10] for record in records.values() if "date" in record})
+    if not days:
+        return MISSING
+    return days[0] if len(days) == 1 else f"{days[0]} to {days[-1]}"

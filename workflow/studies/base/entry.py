@@ -1,0 +1,106 @@
+"""A table of a study as one entry of the file `tables.yaml` of its room.
+
+An entry is found by the table's name and says
+
+    shows       what it is about, short enough for the list of Snakemake's report,
+    rows        the function `MODULE.NAME` of the room that yields the rows from the results,
+    keys        the columns that tell the rows apart, the first one if there are none,
+    conditions  the function of that module which says how the results were measured,
+    caption     what the table shows, over which modes, against which base,
+    columns     see `columns_of`,
+    like        the room whose entry of the same name it takes over, but for what it says itself.
+
+Caption and columns are templates: they see the `results` and all names of the module. Rows hold
+values by key or source; a column without its value is empty.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import yaml
+from jinja2 import Environment, StrictUndefined
+
+from workflow.studies.base.numbers import show
+from workflow.studies.base.table import Column, Table, columns_of
+
+Row = dict[str, Any]
+ROOMS = "workflow.studies"
+STUDIES = Path(__file__).parent.parent
+_ABSENT = object()
+_TEMPLATES = Environment(
+    undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, autoescape=False
+)
+_TEMPLATES.filters["show"] = show
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A table, see above; `module` below `ROOMS` yields its rows."""
+
+    name: str
+    module: str
+    rows: str
+    columns: str
+    caption: str = ""
+    shows: str = ""
+    keys: str = ""
+    conditions: str = ""
+
+    def __call__(self, results: Any) -> Table:
+        """Make the table, its name behind the `prefix` of the results if they have one."""
+        names = vars(import_module(f"{ROOMS}.{self.module}"))
+        columns = columns_of(_rendered(self.columns, names, results))
+        return Table(
+            f"{getattr(results, 'prefix', '')}{self.name}",
+            _rendered(self.caption, names, results),
+            columns,
+            [_picked(row, columns) for row in names[self.rows](results)],
+            self.keys.split(),
+            names[self.conditions](results) if self.conditions else None,
+        )
+
+
+def tables_of(file: str) -> dict[str, Entry]:
+    """All entries of a file below the folder of the studies by name."""
+    return {name: _entry(Path(file), name) for name in _read(Path(file))}
+
+
+def _read(file: Path) -> dict[str, dict[str, str]]:
+    loaded: dict[str, dict[str, str]] = yaml.safe_load((STUDIES / file).read_text("utf-8"))
+    return loaded
+
+
+def _entry(file: Path, name: str) -> Entry:
+    told = {"room": file.parent.name, **_read(file)[name]}
+    if "like" in told:
+        other = told.pop("like")
+        told = {**_read(Path(other, "tables.yaml"))[name], **_own(told, other)}
+    module, _, rows = told.pop("rows").rpartition(".")
+    return Entry(name, f"{told.pop('room')}.{module}", rows, **told)
+
+
+def _own(told: Mapping[str, str], other: str) -> dict[str, str]:
+    """What an entry says beside another room's, whose function it is if it names none."""
+    return dict(told) if "rows" in told else {**told, "room": other}
+
+
+def _rendered(text: str, names: Mapping[str, Any], results: Any) -> str:
+    return _TEMPLATES.from_string(text).render({**names, "results": results}).strip()
+
+
+def _picked(row: Row, columns: Iterable[Column]) -> Row:
+    """The values of the columns."""
+    found = {column.key: _value(row, column.source or column.key) for column in columns}
+    return {key: value for key, value in found.items() if value is not _ABSENT}
+
+
+def _value(row: Any, source: str) -> Any:
+    if source in row:
+        return row[source]
+    first, _, rest = source.partition(".")
+    return _value(row[first], rest) if rest and isinstance(row.get(first), dict) else _ABSENT

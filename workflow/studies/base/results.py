@@ -1,0 +1,112 @@
+"""Where a study keeps its results, and how they are read."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar
+
+import yaml
+
+from workflow import solids
+from workflow.studies.base.conditions import Record
+from workflow.studies.base.table import Table, read_table
+
+
+@dataclass(frozen=True)
+class Results:
+    """The folder of a study; files are read when asked for.
+
+    Attributes
+    ----------
+    folder
+        It, or the one above, holds the run's `config.yaml`.
+    section
+        Of the configuration that holds the study's `models`; all of it if empty.
+    study
+        What `workflow.solids.MEASURED` calls the study, if it measures any of these.
+    """
+
+    folder: Path
+    section: ClassVar[str] = ""
+    study: ClassVar[str] = ""
+
+    @cached_property
+    def config(self) -> dict[str, Any]:
+        """The resolved configuration of the run."""
+        places = (folder / "config.yaml" for folder in (self.folder, self.folder.parent))
+        loaded: dict[str, Any] = yaml.safe_load(next(filter(Path.exists, places)).read_text())
+        return loaded
+
+    @property
+    def part(self) -> dict[str, Any]:
+        """The study's own part of the configuration."""
+        part: dict[str, Any] = self.config[self.section] if self.section else self.config
+        return part
+
+    @property
+    def without(self) -> str:
+        """One sentence about the solids that are left out; empty if there are none."""
+        return solids.without(self.config, self.section) if self.section in solids.STUDIED else ""
+
+    @property
+    def titles(self) -> dict[str, str]:
+        """Names of the solids for people."""
+        models = self.part["models"]
+        return {name: models[name]["title"] or spelt(name) for name in models}
+
+    def title(self, name: str) -> str:
+        """Name of a solid for people."""
+        return self.titles[name]
+
+    def read_json(self, path: str | Path) -> Any:
+        """Content of a JSON file, by its path below the folder."""
+        return json.loads((self.folder / path).read_text())
+
+    @cached_property
+    def methods(self) -> dict[str, Any]:
+        """Output of `solver benchmark` for the solids that have one."""
+        return self._measured("methods")
+
+    @cached_property
+    def convergence(self) -> dict[str, Any]:
+        """Output of `solver convergence` for the solids that have one."""
+        return self._measured("convergence")
+
+    @cached_property
+    def scaling(self) -> dict[str, Any]:
+        """Output of `solver scaling` for the solids that have one."""
+        return self._measured("scaling")
+
+    def _measured(self, file: str) -> dict[str, Any]:
+        names = solids.named(self.config, solids.MEASURED[self.study][file])
+        return self.by_model(f"{file}.json", names)
+
+    @property
+    def origins(self) -> dict[str, Record]:
+        """Provenance of the result files by name."""
+        return {
+            f"models/{name}/{file}.json": found["provenance"]
+            for file in solids.MEASURED[self.study]
+            for name, found in getattr(self, file).items()
+        }
+
+    def by_model(self, file: str, names: Iterable[str]) -> dict[str, Any]:
+        """Content of the JSON files of that name of some solids."""
+        return {name: self.read_json(f"models/{name}/{file}") for name in names}
+
+    def table(self, name: str) -> Table:
+        """A table that was written before."""
+        return read_table(self.folder / "tables" / f"{name}.json")
+
+    def figure(self, name: str) -> Path:
+        """A figure, by file name."""
+        return self.folder / "figures" / name
+
+
+def spelt(name: str) -> str:
+    """A name with hyphens as the beginning of a sentence."""
+    return name.replace("-", " ").capitalize()

@@ -1,0 +1,23 @@
+"""All studies, from `catalogue.yaml`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from workflow.studies.base.study import Figure, Study
+
+_DESCRIBED: dict[str, dict[str, Any]] = yaml.safe_load(
+    Path(__file__).with_suffix(".yaml").read_text("utf-8")
+)
+ALL = {
+    name: Study(
+        name, **told | {"figures": tuple(Figure(**each) for each in told.get("figures", ()))}
+    )
+    for name, told in _DESCRIBED.items()
+}
+REPORT, FIGURES, OBJECTIVES, FORESTS, VALIDATION, SOUND, SOUNDS = ALL.values()
+STUDIES = (REPORT, FIGURES, OBJECTIVES, FORESTS)
+"""Those whose tables, figures and page are made one after the other."""

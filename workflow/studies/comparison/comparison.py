@@ -1,0 +1,102 @@
+"""Two folders of results side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+
+from workflow.studies.comparison.cells import ENDS, KEYS, SHOWN
+from workflow.studies.comparison.differences import Difference, of_conditions, of_configurations
+from workflow.studies.comparison.folders import Folder
+from workflow.studies.comparison.noise import SAME, VERDICTS, Value, verdict
+
+APART = ("provenance",)
+"""Tables that are told as conditions instead."""
+SIDES = ("before", "now")
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Everything that two folders have in common, and what only one of them has.
+
+    Attributes
+    ----------
+    before, now
+        The baseline and the other folder.
+    cells
+        Values of both: `KEYS`, `label` for people, `kind`, those of both `SIDES` with their `ENDS`
+        and `SHOWN`, the `ratio` of both where that says something, and the `verdict`.
+    only_before, only_now
+        Tables, rows and columns of one folder alone, in words.
+    """
+
+    before: Folder
+    now: Folder
+    cells: pd.DataFrame
+    only_before: list[str]
+    only_now: list[str]
+
+    @cached_property
+    def moved(self) -> pd.DataFrame:
+        """Values that are not the same any more, the worst first."""
+        found = self.cells[self.cells["verdict"] != SAME]
+        ratio = pd.to_numeric(found["ratio"]).fillna(1.0).abs().replace(0.0, 1.0)
+        order = found["verdict"].map(VERDICTS.index)
+        return found.iloc[np.lexsort((-np.maximum(ratio, 1.0 / ratio), order))]
+
+    @cached_property
+    def conditions(self) -> list[Difference]:
+        """Conditions that differ."""
+        return of_conditions(self.before, self.now)
+
+    @cached_property
+    def configuration(self) -> list[Difference]:
+        """Keys of the configuration that differ."""
+        return of_configurations(self.before, self.now)
+
+
+def compare(before: Folder, now: Folder) -> Comparison:
+    """Set two folders side by side."""
+    old, new = _cells(before, "before"), _cells(now, "now")
+    cells = new.merge(old.drop(columns=["label", "kind"]), on=KEYS)
+    pairs = list(zip(*(map(Value, *(cells[f"{side}{end}"] for end in ENDS)) for side in SIDES)))
+    cells["ratio"] = pd.Series([_ratio(*pair) for pair in pairs], dtype=object)
+    found = [verdict(kind, *pair) for kind, pair in zip(cells["kind"], pairs)]
+    cells["verdict"] = pd.Series(found, dtype=object)
+    return Comparison(before, now, cells, list(_only(before, now)), list(_only(now, before)))
+
+
+def name_of(path: str) -> str:
+    """Name of a table by its path."""
+    return path.rpartition("/")[2]
+
+
+def _cells(folder: Folder, side: str) -> pd.DataFrame:
+    """All values of a folder, in columns of a side."""
+    told = [cells for path, cells in folder.cells.items() if name_of(path) not in APART]
+    cells = pd.concat(told, ignore_index=True).dropna(subset="label")
+    return cells.rename(columns={end: f"{side}{end}" for end in (*ENDS, SHOWN)})
+
+
+def _ratio(before: Value, now: Value) -> float | None:
+    """A number over that of the baseline; None where that says nothing."""
+    old, new = before.value, now.value
+    if isinstance(old, str) or isinstance(new, str) or not old or new is None:
+        return None
+    return new / old
+
+
+def _only(here: Folder, there: Folder) -> Iterator[str]:
+    """Tables, rows and columns that one folder has and the other has not."""
+    yield from (f"table {path}" for path in here.tables if path not in there.tables)
+    for path in here.tables:
+        if path in there.tables and name_of(path) not in APART:
+            rows, others = here.cells[path]["row"], there.cells[path]["row"]
+            yield from (f"{path}: row {name}" for name in rows[~rows.isin(others)].unique())
+            known = {column.key for column in there.tables[path].columns}
+            columns = [column.key for column in here.tables[path].columns]
+            yield from (f"{path}: column {key}" for key in columns if key not in known)

@@ -1,0 +1,135 @@
+"""The small tables of a run as text, kept for others to compare theirs with."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from carillon.files import atomic_path
+from carillon.progress import say
+from workflow.studies.base.conditions import LABELS
+from workflow.studies.base.numbers import show
+from workflow.studies.base.table import Table
+from workflow.studies.comparison.comparison import APART, name_of
+from workflow.studies.comparison.folders import Folder, read_folder
+
+FOLDER = "reference"
+DIGITS = 7
+"""Significant digits that are kept: more than any rule of the comparison looks at."""
+LONG = 200
+"""Rows from which on a table is kept as CSV alone."""
+LARGE = 300_000
+"""Bytes from which on the folder is too large to be kept with the source."""
+TIMED = "tables/times"
+"""Table whose conditions are those of the run."""
+OF_TABLES = ("runs", "spread")
+"""Conditions that are not the run's, so that its description does not tell them."""
+LEFT_OUT = (FOLDER, "comparison")
+"""Folders that are no results of the run."""
+DESCRIPTION = f"""\
+# Reference: {{title}}
+
+Tables of a complete run, made by `snakemake reference`, to set others beside them:
+
+    snakemake --profile workflow/profiles/default compare --config baseline={{place}}
+    python -m workflow compare {{place}} RESULTS
+
+Numbers have {DIGITS} digits; tables of {LONG} rows and more are there as CSV alone.
+
+## Conditions
+
+{{conditions}}
+
+## Wall time
+
+Of the jobs that are benchmarked (`benchmarks/`), which are all that take long:
+
+{{seconds}}
+
+## Disk
+
+{{sizes}}
+"""
+
+
+def write_reference(results: str | Path) -> None:
+    """Write tables, configuration and a description to `reference` below a folder of results."""
+    results = Path(results)
+    folder = read_folder(results)
+    target = results / FOLDER
+    shutil.rmtree(target, ignore_errors=True)
+    for path, table in folder.tables.items():
+        _put(target / f"{path}.csv", rounded(table).as_csv())
+        if len(table.rows) < LONG and name_of(path) not in APART:
+            _put(target / f"{path}.md", table.as_markdown())
+    _put(target / "config.yaml", (results / "config.yaml").read_text())
+    _put(target / "README.md", description(folder))
+    size = size_of(target)
+    if size > LARGE:
+        say(f"{target}: {size:,} bytes are much to keep with the source, {LARGE:,} would be less")
+
+
+def _put(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_path(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def rounded(table: Table) -> Table:
+    """A table whose numbers have `DIGITS` significant digits."""
+    return replace(
+        table, rows=[{key: _round(value) for key, value in row.items()} for row in table.rows]
+    )
+
+
+def _round(value: Any) -> Any:
+    return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
+
+
+def description(folder: Folder) -> str:
+    """What the reference is, on which machine it was made, and what that took."""
+    conditions = folder.tables[TIMED].conditions
+    told = conditions.told if conditions else {}
+    of_run = {LABELS[key]: text for key, text in told.items() if key not in OF_TABLES}
+    return DESCRIPTION.format(
+        title=folder.config["title"],
+        place=folder.path / FOLDER,
+        conditions=_table("", "", of_run),
+        seconds=_table("Jobs", "Time", seconds_by_part(folder.path), "seconds"),
+        sizes=_table("Results", "Size", sizes_by_part(folder.path), "bytes"),
+    )
+
+
+def _table(name: str, value: str, rows: Mapping[str, Any], kind: str = "text") -> str:
+    cells = [(name, value), ("---", "---"), *((key, show(rows[key], kind)) for key in rows)]
+    return "\n".join(f"| {key} | {text} |" for key, text in cells)
+
+
+def seconds_by_part(results: Path) -> dict[str, float]:
+    """Wall seconds of the benchmarked jobs by the folder of what they made, and in all."""
+    folder = results / "benchmarks"
+    files = sorted(folder.rglob("*.tsv"))
+    jobs = [pd.read_csv(file, sep="\t")["s"].sum() for file in files]
+    return _summed([file.relative_to(folder).parts[0] for file in files], jobs)
+
+
+def sizes_by_part(results: Path) -> dict[str, float]:
+    """Bytes of the results by folder, and in all."""
+    parts = [path for path in sorted(results.iterdir()) if path.name not in LEFT_OUT]
+    return _summed([path.name for path in parts], list(map(size_of, parts)))
+
+
+def size_of(path: Path) -> int:
+    """Bytes of a file, or of all files below a folder."""
+    files = path.rglob("*") if path.is_dir() else [path]
+    return sum(file.stat().st_size for file in files if file.is_file())
+
+
+def _summed(names: list[str], values: list[float]) -> dict[str, float]:
+    by_name = pd.Series(values, names).groupby(level=0, sort=False).sum()
+    return {**by_name.to_dict(), "all": by_name.sum()}

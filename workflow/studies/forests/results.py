@@ -1,0 +1,47 @@
+"""Where the study of the forests keeps its results."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+from workflow.studies.base.conditions import Record
+from workflow.studies.base.results import Results
+
+MEASUREMENTS = ("blocks", "benchmark", "variants", "curve")
+"""Names of the files of `forests table`, `benchmark`, `variants` and `curve`."""
+
+
+class ForestsStudy(Results):
+    """The folder of the study of the forests."""
+
+    @cached_property
+    def model(self) -> dict[str, Any]:
+        """Summary of the forests studied, from `forests inspect`."""
+        loaded: dict[str, Any] = self.read_json("model.json")
+        return loaded
+
+    @property
+    def on_blocks(self) -> dict[str, Any]:
+        """Output of `forests table`."""
+        return self._file("blocks")
+
+    def result(self, name: str) -> Any:
+        """What a measurement found."""
+        return self._file(name)["result"]
+
+    def record(self, name: str) -> Record:
+        """Provenance of a measurement."""
+        record: Record = self._file(name)["provenance"]
+        return record
+
+    @property
+    def origins(self) -> dict[str, Record]:
+        """Provenance of the forests and of the measurements."""
+        measured = {f"forests_study/{name}.json": self.record(name) for name in MEASUREMENTS}
+        return {self.model["path"]: self.model["provenance"], **measured}
+
+    def _file(self, name: str) -> dict[str, Any]:
+        """A measurement: `result` and `provenance`."""
+        loaded: dict[str, Any] = self.read_json(f"{name}.json")
+        return loaded

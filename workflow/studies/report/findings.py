@@ -1,0 +1,50 @@
+"""What the tables say, in the few numbers that a reader wants first."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pandas as pd
+
+from workflow.studies.base.table import Table
+
+PROVEN_RESIDUAL = 1e-6
+"""Residual that ground truth must stay below for the page to call it proven."""
+
+
+def findings(tables: dict[str, Table]) -> dict[str, Any]:
+    """Headline numbers over all models, from the tables of a run."""
+    summary, coarsening, times, evidence, frequencies = (
+        pd.DataFrame(tables[name].rows)
+        for name in ("summary", "coarsening", "times", "evidence", "frequencies")
+    )
+    truths = evidence.dropna(subset="inertia")
+    counts = truths["inertia"].str.split(" / ", expand=True)
+    residual = truths["residual_max"].max()
+    speed_ups = summary["speed_up"]
+    return {
+        # Worst eigenvalue of any model; rms frequency errors of the coarsened mesh.
+        "hcms_error": summary["hcms_error"].max(),
+        "hcms_ec_error": summary["hcms_ec_error"].max(),
+        "ddfem_error": summary["ddfem_error"].median(),
+        "ddfem_errors": (summary["ddfem_error"].min(), summary["ddfem_error"].max()),
+        "average_error": coarsening["average_hcms_ec_rms"].median(),
+        "galerkin_error": coarsening["galerkin_hcms_ec_rms"].median(),
+        # SLEPc's time over that of the fast method, and over HCMS + EC on the same mesh.
+        "speed_up": speed_ups.median(),
+        "speed_ups": (speed_ups.min(), speed_ups.max()),
+        "fine_ratio": (times["truth"] / times["hcms_ec"]).median(),
+        "coarse_ratio": (times["ddfem_slepc"] / times["ddfem_hcms_ec"]).median(),
+        "faster": speed_ups.min() > 1.0,
+        "proven": residual < PROVEN_RESIDUAL and (counts[0] == counts[1]).all(),
+        "residual": residual,
+        "elastic_modes": len(frequencies),
+        "unknowns": (summary["unknowns"].min(), summary["unknowns"].max()),
+    }
+
+
+def headline(count: int, missed: int) -> str:
+    """How many of the criteria are met."""
+    if missed == 0:
+        return f"Passed: all {count} criteria are met."
+    return f"Failed: {missed} of {count} criteria {'is' if missed == 1 else 'are'} missed."

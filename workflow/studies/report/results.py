@@ -1,0 +1,107 @@
+"""Where a run keeps its results, and how they are read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from solver.files.modes_file import CHECKS, ModesFile, read_modes
+from workflow import settings
+from workflow.studies.base.conditions import Record
+from workflow.studies.base.results import Results
+from workflow.variants import CANDIDATES, VARIANTS
+
+PRECOMPUTATION = ("mesh", "material")
+"""Phases that come before any method: they are needed once for a solid."""
+
+
+class Run(Results):
+    """The folder of a run."""
+
+    study = "report"
+
+    @property
+    def models(self) -> list[str]:
+        """Names of the models in the order of the configuration."""
+        return list(self.config["models"])
+
+    def modes_path(self, model: str, variant: str) -> Path:
+        """Modes file of a model and variant."""
+        return self.folder / "models" / model / f"{variant}.h5"
+
+    @cached_property
+    def spectra(self) -> dict[str, dict[str, ModesFile]]:
+        """Modes files without the modes themselves, by model and variant."""
+        return {
+            model: {
+                variant: read_modes(self.modes_path(model, variant), with_modes=False)
+                for variant in VARIANTS
+            }
+            for model in self.models
+        }
+
+    @property
+    def solved(self) -> Iterator[tuple[str, str, ModesFile]]:
+        """All modes files, each after its model and variant."""
+        for model, spectra in self.spectra.items():
+            for variant, spectrum in spectra.items():
+                yield model, variant, spectrum
+
+    @cached_property
+    def comparisons(self) -> dict[str, dict[str, Any]]:
+        """Output of `solver compare` against the truth, by variant and model."""
+        return {
+            variant: self.by_model(f"{variant}.comparison.json", self.models)
+            for variant in CANDIDATES
+        }
+
+    @cached_property
+    def shards(self) -> dict[str, dict[str, Any]]:
+        """Summaries of the training data by shard."""
+        names = settings.own_shards(self.config)
+        return {name: self.read_json(f"dataset/{name}.json") for name in names}
+
+    @cached_property
+    def forests(self) -> dict[str, Any]:
+        """Summary of the forests."""
+        loaded: dict[str, Any] = self.read_json("forests/forests.json")
+        return loaded
+
+    @cached_property
+    def on_blocks(self) -> dict[str, Any]:
+        """Output of `forests table`: how the coarsenings do on single blocks."""
+        loaded: dict[str, Any] = self.read_json("forests/table.json")
+        return loaded
+
+    @property
+    def origins(self) -> dict[str, Record]:
+        """Provenance of the result files by name."""
+        origins = {f"dataset/{name}.h5": each["provenance"] for name, each in self.shards.items()}
+        forests = self.config["forests"]["model"] or "forests/forests.h5"
+        origins[forests] = self.forests["provenance"]
+        origins["forests/table.json"] = self.on_blocks["provenance"]
+        for model, spectra in self.spectra.items():
+            place = f"models/{model}/"
+            origins |= {f"{place}{name}.h5": found.provenance for name, found in spectra.items()}
+            measured = super().origins.items()
+            origins |= {file: record for file, record in measured if file.startswith(place)}
+        return origins
+
+
+def records(run: Run) -> dict[str, Record]:
+    """Provenance of all modes files."""
+    return {f"{model} {variant}": spectrum.provenance for model, variant, spectrum in run.solved}
+
+
+def solve_seconds(spectrum: ModesFile) -> float:
+    """Wall time [s] from meshed solid and moduli to modes, coarsening included."""
+    outside = (*PRECOMPUTATION, *CHECKS)
+    timings: dict[str, float] = spectrum.attributes["timings"]
+    return sum(seconds for phase, seconds in timings.items() if phase not in outside)
+
+
+def precomputation_seconds(spectrum: ModesFile) -> float:
+    """Wall time [s] of voxels and material."""
+    return sum(spectrum.attributes["timings"].get(phase, 0.0) for phase in PRECOMPUTATION)

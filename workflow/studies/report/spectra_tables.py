@@ -1,0 +1,105 @@
+"""Tables of the spectra of a run: errors against the ground truth, wall times, proofs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from carillon.fem.model import RIGID_MODES
+from workflow.studies.base.conditions import NOT_TIMED, ONE_COLD_RUN, measured
+from workflow.studies.base.entry import Row
+from workflow.studies.report.results import Run, precomputation_seconds, records, solve_seconds
+from workflow.variants import CANDIDATES, SHOWN, TRUTH, VARIANTS
+from workflow.variants import COARSENED as COARSENED
+
+FAST = "ddfem_hcms_ec"
+TIMED = (TRUTH, "ddfem_slepc", "hcms", "hcms_ec", FAST)
+UNTIMED, ONE_RUN = measured(records, NOT_TIMED), measured(records, ONE_COLD_RUN)
+
+
+def _identity(run: Run, model: str) -> Row:
+    """Which solid a row is about, and how large it is."""
+    spectra = run.spectra[model]
+    return {
+        "model": model,
+        "title": run.title(model),
+        "unknowns": spectra[TRUTH].mesh.n_dofs,
+        "coarse_unknowns": spectra[FAST].mesh.n_dofs,
+    }
+
+
+def summary(run: Run) -> Iterator[Row]:
+    """One row a model: size, accuracy, time."""
+    for model, spectra in run.spectra.items():
+        compared = {variant: found[model] for variant, found in run.comparisons.items()}
+        truth, fast = (solve_seconds(spectra[variant]) for variant in (TRUTH, FAST))
+        yield {
+            **_identity(run, model),
+            "modes": len(spectra[TRUTH].eigenvalues),
+            "hcms_error": compared["hcms"]["eigenvalue_relative_error"]["max"],
+            "hcms_ec_error": compared["hcms_ec"]["eigenvalue_relative_error"]["max"],
+            "ddfem_error": compared[FAST]["frequency_rms_relative_error_7_60"],
+            "truth_seconds": truth,
+            "fast_seconds": fast,
+            "speed_up": truth / fast,
+        }
+
+
+def frequencies(run: Run) -> Iterator[Row]:
+    """Frequency of every elastic mode by the variants that are shown, and its error."""
+    for model, spectra in run.spectra.items():
+        count = min(len(spectra[variant].frequencies) for variant in SHOWN)
+        for index in range(RIGID_MODES, count):
+            row = {variant: float(spectra[variant].frequencies[index]) for variant in SHOWN}
+            errors = {f"{name}_error": row[name] / row[TRUTH] - 1.0 for name in SHOWN[1:]}
+            yield {"model": model, "mode": index + 1, **row, **errors}
+
+
+def errors(run: Run) -> Iterator[Row]:
+    """Distances of every variant from the truth."""
+    for model in run.models:
+        for variant in CANDIDATES:
+            label = VARIANTS[variant].label
+            yield {**run.comparisons[variant][model], "model": model, "variant": label}
+
+
+def coarsening(run: Run) -> Iterator[Row]:
+    """What the coarsening alone costs in accuracy."""
+    for model in run.models:
+        compared = {variant: found[model] for variant, found in run.comparisons.items()}
+        yield {**_identity(run, model), **compared}
+
+
+def times(run: Run) -> Iterator[Row]:
+    """Wall time of every method on every model, as in Fig. 11 of the paper."""
+    for model, spectra in run.spectra.items():
+        seconds = {variant: solve_seconds(spectra[variant]) for variant in TIMED}
+        yield {
+            **_identity(run, model),
+            "precomputation": precomputation_seconds(spectra[TRUTH]),
+            **seconds,
+            "speed_up": seconds[TRUTH] / seconds[FAST],
+        }
+
+
+def phases(run: Run) -> Iterator[Row]:
+    """Wall time by phase of every run."""
+    for model, variant, spectrum in run.solved:
+        for phase, seconds in spectrum.attributes["timings"].items():
+            label = VARIANTS[variant].label
+            yield {"model": model, "variant": label, "phase": phase, "seconds": seconds}
+
+
+def evidence(run: Run) -> Iterator[Row]:
+    """Residual, orthogonality, inertia count of every run."""
+    for model, variant, spectrum in run.solved:
+        found = spectrum.attributes
+        counted = found.get("inertia_count", -1)
+        yield {
+            **found,
+            "model": model,
+            "variant": VARIANTS[variant].label,
+            "residual_max": float(spectrum.residuals.max()),
+            "inertia": f"{found['inertia_expected']} / {counted}" if counted >= 0 else None,
+            "corrections": found.get("corrections", 0 if found["method"] == "hcms" else None),
+            "estimate": found.get("eigenvalue_error_estimate"),
+        }

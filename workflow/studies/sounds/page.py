@@ -1,0 +1,158 @@
+"""The page of an example: what was wanted, what was found, to see and to hear."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+import yaml
+from numpy.typing import NDArray
+
+from solver.response.response import spectrogram
+from sound.strikes import locate
+from workflow.studies.base.media import (
+    embedded,
+    highest_hertz,
+    inlined,
+    spectrogram_figure,
+    wav_uri,
+)
+from workflow.studies.base.page import rendered
+from workflow.studies.base.table import Table
+from workflow.studies.sounds import plots
+from workflow.studies.sounds.examples import DESIGN, ELSEWHERE, PROJECT, START, TRUTH
+from workflow.studies.sounds.pictures import ELSEWHERE_CLASS, Mark, marks_of, material_pictures
+from workflow.studies.sounds.results import Found
+
+Array = NDArray[np.float64]
+Sound = tuple[Array, int]
+
+SHOWN_SECONDS, PLAYED_SECONDS = 1.0, 2.0
+"""Longest time of a spectrogram and of a player."""
+DIGITS = 6
+"""Of coordinates after the point."""
+ROOM_ABOVE = 1.5
+"""Highest frequency of a spectrogram over that of the highest target."""
+STATES = {
+    "before": "Before",
+    "clips": "Target",
+    "after": "After",
+    "fine": "After, on the fine model",
+}
+"""Folders of sounds, and their names for people."""
+
+
+def page(found: Found, tables: dict[str, Table]) -> str:
+    """Build the page of an example from its tables and files."""
+    example, design = found.example, found.design
+    marks = marks_of(design)
+    elsewhere = _elsewhere(found)
+    frequencies = plots.frequency_figure(tables["frequencies"], tables["truth"])
+    compared = plots.optimisers_figure(found.optimisers) if found.optimisers else None
+    return rendered(
+        "sounds/page.html.j2",
+        title=example.title,
+        example=example,
+        design=design,
+        tables=tables,
+        edits=tables["designs"].rows,
+        worst=_worst(tables["frequencies"]),
+        points=_points(found, marks, tables["amplitudes"]),
+        elsewhere=elsewhere,
+        rest=_panel(found, "after", ELSEWHERE, [found.sound("after", ELSEWHERE)]),
+        cost=inlined(plots.cost_figure(found), "cost"),
+        frequencies=inlined(frequencies, "frequencies"),
+        optimisers=compared and inlined(compared, "optimisers"),
+        pictures=[embedded(each) for each in material_pictures(design, [*marks, elsewhere])],
+        colour_bar=inlined(plots.colour_bar(design.young), "colours"),
+        moduli=(design.young.min(), np.median(design.young), design.young.max()),
+        files=_files(found),
+        project=yaml.safe_dump(design.settings, sort_keys=False),
+    )
+
+
+def _worst(frequencies: Table) -> dict[str, float]:
+    """Largest differences [bark] from the targets before and after."""
+    return {
+        state: max(abs(row[f"{state}_bark"]) for row in frequencies.rows)
+        for state in ("start", "found")
+    }
+
+
+def _points(found: Found, marks: list[Mark], balance: Table) -> list[dict[str, Any]]:
+    """Sounds and balance of every struck point."""
+    names = found.design.targets.names
+    return [
+        {
+            "name": name,
+            "style": mark.style,
+            "position": np.round(mark.position / found.design.settings["unit"], DIGITS).tolist(),
+            "panels": _panels(found, name),
+            "balance": inlined(plots.balance_figure(balance, name), f"balance-{number}"),
+        }
+        for number, (name, mark) in enumerate(zip(names, marks))
+    ]
+
+
+def _panels(found: Found, name: str) -> list[dict[str, Any]]:
+    """Sound before, wanted and after at a point, on the same scales."""
+    sounds = [found.sound(state, name) for state in STATES]
+    return [_panel(found, state, name, sounds) for state in STATES]
+
+
+def _panel(found: Found, state: str, name: str, together: list[Sound]) -> dict[str, Any]:
+    """Spectrogram and player of a sound, scaled as those that are shown `together`."""
+    sound, rate = found.sound(state, name)
+    target = found.sound("clips", name) if state in STATES and name != ELSEWHERE else (sound, rate)
+    loudest = float(spectrogram(*target)[2].max())
+    seconds = min(SHOWN_SECONDS, max(len(each) / own for each, own in together))
+    shown = _first(sound, rate, seconds)
+    highest = min(highest_hertz(together), ROOM_ABOVE * found.design.targets.frequencies[-1])
+    figure = spectrogram_figure(shown, loudest, float(highest), rate)
+    peak = max(float(np.abs(each).max()) for each, _ in together)
+    return {
+        "state": STATES[state],
+        "plot": inlined(figure, f"sound-{state}-{name.replace(' ', '-')}"),
+        "source": wav_uri(sound[: round(PLAYED_SECONDS * rate)], rate, peak),
+    }
+
+
+def _first(sound: Array, rate: int, seconds: float) -> Array:
+    """The first seconds of a sound, followed by silence if it is shorter."""
+    count = round(seconds * rate)
+    return np.pad(sound[:count], (0, max(0, count - len(sound))))
+
+
+def _elsewhere(found: Found) -> Mark:
+    """The point without a target."""
+    surface = trimesh.Trimesh(
+        found.design.surface_vertices, found.design.surface_faces, process=False
+    )
+    strike = locate(surface, *found.example.elsewhere)
+    return Mark(ELSEWHERE_CLASS, strike.position, strike.inward)
+
+
+def _files(found: Found) -> list[dict[str, Any]]:
+    """Files beside the page that are of use elsewhere."""
+    told = {
+        PROJECT: "the project, for python -m sound design",
+        DESIGN: "the design: material, modes, targets, history",
+        START: "the same with the uniform material that the search began with",
+        TRUTH: "modes of the fine model with the material found",
+        "young.npy": "Young’s modulus [Pa] of every voxel, for solver modes --material",
+        "optimisers.json": "the optimisers beside each other",
+    }
+    for state, what in STATES.items():
+        for name in found.design.targets.names:
+            told[f"{state}/{name}.wav"] = f"{name}, {what[0].lower()}{what[1:]}"
+    told[f"after/{ELSEWHERE}.wav"] = f"{found.example.elsewhere[0]}, without a target"
+    for part in found.example.parts[:-1]:
+        below = Path(part).name
+        told[f"{below}/{DESIGN}"] = f"the design after {below.replace('-', ' ')}"
+    return [
+        {"name": name, "what": what, "bytes": (found.folder / name).stat().st_size}
+        for name, what in told.items()
+        if (found.folder / name).is_file()
+    ]

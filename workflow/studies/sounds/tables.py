@@ -1,0 +1,125 @@
+"""Tables of an example's page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.fem.model import RIGID_MODES
+from sound.design.bark import bark
+from sound.project.design_file import Design
+from sound.rendering.solid import SoundingSolid
+from workflow.studies.base.conditions import ONE_COLD_RUN, Record, measured
+from workflow.studies.base.entry import Row
+from workflow.studies.sounds.results import Found
+
+Array = NDArray[np.float64]
+
+METHODS = {"hybrid": "Hybrid", "cma": "CMA-ES alone", "bfgs": "L-BFGS alone"}
+"""Names of optimisers for people."""
+
+
+DESIGNED = measured(
+    lambda found: {
+        f"edit {n}": each.provenance for n, each in enumerate(found.designs.values(), 1)
+    },
+    ONE_COLD_RUN,
+)
+
+
+def designs(found: Found) -> Iterator[Row]:
+    """Cost before and after every edit, and how long it took."""
+    parts = {"cost": "cost", "frequency": "frequency_cost", "amplitude": "amplitude_cost"}
+    for number, part in enumerate(found.example.parts, 1):
+        rows = found.history(part)
+        first, last = rows[0], rows[-1]
+        yield {
+            "edit": number,
+            "points": ", ".join(found.designs[part].targets.names),
+            **{f"{key}_before": float(first[name]) for key, name in parts.items()},
+            **{key: float(last[name]) for key, name in parts.items()},
+            "fall": float(1.0 - last["cost"] / first["cost"]),
+            "evaluations": int(last["evaluations"]),
+            "seconds": float(last["seconds"]),
+            "per_minute": float(60.0 * last["evaluations"] / max(last["seconds"], 1e-9)),
+        }
+
+
+def frequencies(found: Found) -> Iterator[Row]:
+    """Frequencies wanted, before and after, mode by mode."""
+    targets = found.design.targets
+    return _by_mode(
+        target=targets.frequencies,
+        start=found.start.frequencies,
+        start_bark=_bark_difference(found.start.frequencies, targets.frequencies),
+        found=found.design.frequencies,
+        found_bark=_bark_difference(found.design.frequencies, targets.frequencies),
+        damping=targets.dampings,
+    )
+
+
+def truth(found: Found) -> Iterator[Row]:
+    """What the fine model with the same material sounds at."""
+    wanted, design = found.design.targets.frequencies, found.design
+    hertz = found.truth.frequencies[RIGID_MODES : RIGID_MODES + len(wanted)]
+    return _by_mode(
+        target=wanted,
+        found=design.frequencies,
+        truth=hertz,
+        error=design.frequencies / hertz - 1.0,
+        bark=_bark_difference(hertz, wanted),
+    )
+
+
+def amplitudes(found: Found) -> Iterator[Row]:
+    """Balance of the modes' amplitudes at every struck point."""
+    targets = found.design.targets
+    start, after = balance(found.start), balance(found.design)
+    wanted = shares(targets.amplitudes)
+    for point, name in enumerate(targets.names):
+        for row in _by_mode(target=wanted[point], start=start[point], found=after[point]):
+            yield {"point": name, **row}
+
+
+def balance(design: Design) -> Array:
+    """Amplitudes (T, N) of a design's modes at its struck points, as shares of the loudest."""
+    positions = np.array([strike.position for strike in design.strikes])
+    inward = np.array([strike.inward for strike in design.strikes])
+    return shares(SoundingSolid.of_design(design).amplitudes(positions, inward))
+
+
+def shares(amplitudes: Array) -> Array:
+    """Amplitudes (T, N) over the largest of their row."""
+    return np.asarray(amplitudes / amplitudes.max(axis=1, keepdims=True))
+
+
+def _record(found: Found) -> Mapping[str, Record]:
+    origin = found.optimisers.get("provenance")
+    return {"all": origin} if origin else {}
+
+
+COMPARED = measured(_record, ONE_COLD_RUN)
+
+
+def optimisers(found: Found) -> Iterator[Row]:
+    """The hybrid optimiser beside its two parts."""
+    for row in found.optimisers["rows"]:
+        yield {**row, "method": METHODS[row["method"]], "fall": row["fall_percent"] / 100.0}
+
+
+def evaluation(found: Found) -> list[Row]:
+    """How long an evaluation takes."""
+    return [found.optimisers["evaluation"]]
+
+
+def _bark_difference(found: Array, wanted: Array) -> Array:
+    """Differences [bark] of frequencies [Hz], without rounding errors."""
+    return np.round(bark(found) - bark(wanted), 9) + 0.0
+
+
+def _by_mode(**columns: Array) -> Iterator[Row]:
+    """Rows of columns (N,) with a value a mode."""
+    for index, values in enumerate(zip(*columns.values())):
+        yield {"mode": index + 1, **dict(zip(columns, map(float, values)))}

@@ -1,0 +1,148 @@
+"""What a spectrum has to satisfy to be trusted, and whether it does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from carillon.fem.model import RIGID_MODES
+from solver.files.modes_file import frequencies
+from solver.studies.comparison import AUDIBLE_FIRST, AUDIBLE_LAST
+from workflow.studies.base.numbers import show
+from workflow.studies.validation.evidence import COARSENED, SOLVED, Evidence
+from workflow.variants import TRUTH
+
+TEXTS: dict[str, Any] = yaml.safe_load(
+    Path(__file__).with_name("criteria.yaml").read_text(encoding="utf-8")
+)
+Limited = tuple[float | None, float]
+"""What was found, and its limit."""
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """One requirement.
+
+    Attributes
+    ----------
+    group
+        Variant that is judged.
+    key
+        Name within the group.
+    label
+        What is measured.
+    found, limit
+        Values; None if nothing was found.
+    kind
+        How both are shown, see `workflow.studies.base.numbers.show`.
+    exact
+        Whether the limit must be hit; otherwise it must not be passed.
+    why
+        Why it matters, in one sentence.
+    source
+        File below the folder of the run, and key in it.
+    """
+
+    group: str
+    key: str
+    label: str
+    found: float | None
+    limit: float
+    kind: str
+    why: str
+    source: str
+    exact: bool = False
+
+    @property
+    def passed(self) -> bool:
+        """Whether it is satisfied; what was not found, or is not a number, does not pass."""
+        if self.found is None:
+            return False
+        return self.found == self.limit if self.exact else self.found <= self.limit
+
+    @property
+    def shown(self) -> str:
+        """What was found, for people."""
+        return show(self.found, self.kind)
+
+    @property
+    def required(self) -> str:
+        """The limit, for people."""
+        return ("" if self.exact else "≤ ") + show(self.limit, self.kind)
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """Row of the table of criteria."""
+        told = ("group", "key", "label", "shown", "required", "found", "limit", "why", "source")
+        verdict = "met" if self.passed else "missed"
+        return {**{name: getattr(self, name) for name in told}, "verdict": verdict}
+
+
+def judge(evidence: Evidence) -> list[Criterion]:
+    """All criteria of a model, group by group."""
+    limits = evidence.tolerances
+    return [
+        *_spectrum(evidence, TRUTH, limits["truth_residual"]),
+        *_solver(evidence),
+        *_spectrum(evidence, SOLVED, limits["residual"]),
+        *_coarsening(evidence),
+        *_spectrum(evidence, COARSENED, limits["residual"]),
+    ]
+
+
+def _spectrum(evidence: Evidence, variant: str, residual: float) -> Iterator[Criterion]:
+    found = evidence.audit["spectra"][variant]
+    counted, expected = found["counted"], found["expected"]
+    values = {
+        "residual": (found["residual_max"], residual),
+        "orthogonality": (found["orthogonality"], evidence.tolerances["orthogonality"]),
+        "rigid": (found["rigid_modes"], RIGID_MODES),
+        # Without a count there is nothing to find, and what was expected is the limit.
+        "counted": (None, expected) if counted is None else (expected, counted),
+    }
+    below = show(float(frequencies(np.array(found["counted_below"]))), "hertz")
+    return _criteria(evidence, "spectrum", variant, values, below=below)
+
+
+def _solver(evidence: Evidence) -> Iterator[Criterion]:
+    found, limits = evidence.compared[SOLVED], evidence.tolerances
+    values = {
+        "eigenvalue_error": found["eigenvalue_relative_error"]["max"],
+        "subspace_angle": found["subspace_angle_max"],
+        "response": evidence.response.responses[SOLVED].difference,
+    }
+    limited = {key: (value, limits[key]) for key, value in values.items()}
+    return _criteria(evidence, "solver", SOLVED, limited)
+
+
+def _coarsening(evidence: Evidence) -> Iterator[Criterion]:
+    found, limits = evidence.compared[COARSENED], evidence.tolerances
+    last = min(AUDIBLE_LAST, RIGID_MODES + found["modes_compared"])
+    rms, worst = (found[f"frequency_{name}_relative_error_7_60"] for name in ("rms", "max"))
+    limited = {
+        "frequency_rms": (rms, limits["frequency_rms"]),
+        "frequency_worst": (worst, limits["frequency_worst"]),
+    }
+    modes = f"modes {AUDIBLE_FIRST}–{last}"
+    return _criteria(evidence, "coarsening", COARSENED, limited, modes=modes)
+
+
+def _criteria(
+    evidence: Evidence, part: str, variant: str, values: dict[str, Limited], **names: str
+) -> Iterator[Criterion]:
+    """Criteria of a part of the texts, whose labels may hold the `names`."""
+    names |= {
+        "variant": variant,
+        "audit": evidence.file("audit.json"),
+        "comparison": evidence.file(f"{variant}.comparison.json"),
+        "response": evidence.file("response.h5"),
+    }
+    for key, (found, limit) in values.items():
+        told = {name: text.format(**names) for name, text in TEXTS[part][key].items()}
+        exact = told["kind"] == "count"
+        yield Criterion(variant, key, found=found, limit=limit, exact=exact, **told)

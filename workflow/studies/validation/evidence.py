@@ -1,0 +1,85 @@
+"""All that a run found out about one model, read when asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from solver.files.modes_file import ModesFile, read_modes
+from solver.response.response_file import ResponseFile, read_response
+from workflow.studies.base.conditions import Record
+from workflow.studies.report.results import Run
+from workflow.variants import SHOWN, TRUTH
+
+SOLVED, COARSENED = "hcms_ec", "ddfem_hcms_ec"
+"""Variants that are judged: the solver on the fine mesh, and on the coarsened one."""
+COMPARED = tuple(variant for variant in SHOWN if variant != TRUTH)
+
+
+@dataclass(frozen=True)
+class Evidence(Run):
+    """Results of one model of a run."""
+
+    model: str
+
+    @property
+    def prefix(self) -> str:
+        """What the names of the model's tables begin with."""
+        return f"{self.model}-"
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The model's part of the configuration."""
+        part: dict[str, Any] = self.config["models"][self.model]
+        return part
+
+    @property
+    def tolerances(self) -> dict[str, float]:
+        """Limits by name."""
+        part: dict[str, float] = self.config["validation"]["tolerances"]
+        return part
+
+    @cached_property
+    def shown(self) -> dict[str, ModesFile]:
+        """Modes files by variant, without the modes."""
+        return {
+            variant: read_modes(self.modes_path(self.model, variant), with_modes=False)
+            for variant in SHOWN
+        }
+
+    @cached_property
+    def compared(self) -> dict[str, dict[str, Any]]:
+        """Output of `solver compare` against the truth by variant."""
+        return {name: self.read_json(self.file(f"{name}.comparison.json")) for name in COMPARED}
+
+    @cached_property
+    def audit(self) -> dict[str, Any]:
+        """Output of `solver audit`: `spectra` by variant, and `provenance`."""
+        loaded: dict[str, Any] = self.read_json(self.file("audit.json"))
+        return loaded
+
+    @cached_property
+    def response(self) -> ResponseFile:
+        """Output of `solver respond`."""
+        return read_response(self.folder / self.file("response.h5"))
+
+    @cached_property
+    def first_mode(self) -> dict[str, dict[str, Any]]:
+        """Frequency and likeness of the first elastic mode by variant."""
+        loaded: dict[str, dict[str, Any]] = self.read_json(f"figures/{self.model}-mode.json")
+        return loaded
+
+    @property
+    def origins(self) -> dict[str, Record]:
+        """Provenance of every file that the page draws on."""
+        found = {f"{variant}.h5": spectrum.provenance for variant, spectrum in self.shown.items()}
+        for variant, comparison in self.compared.items():
+            found[f"{variant}.comparison.json"] = comparison.get("provenance", {})
+        found["audit.json"] = self.audit["provenance"]
+        found["response.h5"] = self.response.provenance
+        return {self.file(name): record for name, record in found.items()}
+
+    def file(self, name: str) -> str:
+        """Name of one of the model's files below the folder of the run."""
+        return f"models/{self.model}/{name}"

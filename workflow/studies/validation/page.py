@@ -1,0 +1,146 @@
+"""The page that says how far the spectra of one model can be trusted, and why."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from carillon import provenance
+from carillon.fem.geometry import load_surface
+from solver.response.response import STRIKE_SECONDS
+from workflow import settings
+from workflow.studies.base.media import embedded, inlined, wav_uri
+from workflow.studies.base.page import listed_modes, rendered
+from workflow.studies.base.table import Table
+from workflow.studies.report.page import mode_pictures
+from workflow.studies.validation import plots
+from workflow.studies.validation.criteria import judge
+from workflow.studies.validation.evidence import Evidence
+from workflow.studies.validation.pictures import solid_pictures, struck_picture
+from workflow.studies.validation.verdict import verdict
+from workflow.variants import SHOWN, TRUTH, VARIANTS
+
+_DIGITS = 16
+
+
+def page(evidence: Evidence, tables: dict[str, Table]) -> str:
+    """Build the page of a model from its tables and files."""
+    return rendered(
+        "validation/page.html.j2",
+        title=evidence.title(evidence.model),
+        variants=VARIANTS,
+        truth=TRUTH,
+        config=evidence.config,
+        model=evidence.settings,
+        verdict=verdict(judge(evidence)),
+        tables=tables,
+        listed=listed_modes(tables["errors"].rows),
+        solid=_solid(evidence),
+        modes=mode_pictures(evidence, evidence.model),
+        strike=_strike(evidence),
+        sounds=_sounds(evidence),
+        strike_seconds=STRIKE_SECONDS,
+        errors=inlined(plots.errors_figure(tables["errors"], evidence.tolerances), "errors"),
+        shapes=inlined(plots.shapes_figure(evidence), "shapes"),
+        counted=_counted_by_run(evidence),
+        files=_digests(evidence),
+        configuration=_configuration(evidence),
+        page_record=provenance.record({"config": evidence.config}),
+    )
+
+
+def _solid(evidence: Evidence) -> dict[str, Any]:
+    """Pictures and sizes of the solid."""
+    mesh_name = settings.mesh_of(evidence.config, evidence.model)
+    surface = load_surface(mesh_name, evidence.settings["unit"])
+    file = evidence.shown[TRUTH]
+    mesh, young = file.mesh, file.model.young[:, 0]
+    titles = ("surface", "voxels", "material")
+    pictures = solid_pictures(surface, mesh, young)
+    return {
+        "mesh": mesh_name,
+        "triangles": len(surface.faces),
+        "closed": bool(surface.is_watertight),
+        "surface_volume": float(abs(surface.volume)),
+        "voxels": mesh.n_cells,
+        "voxel_volume": mesh.volume,
+        "edge": mesh.edge,
+        "sides": np.ptp(np.asarray(surface.bounds), axis=0).tolist(),
+        "mass": file.model.mass,
+        "moduli": (float(young.min()), float(np.median(young)), float(young.max())),
+        "coarse_cells": evidence.shown["ddfem_hcms_ec"].mesh.n_cells,
+        "pictures": [
+            embedded(picture, title=title) for title, picture in zip(titles, pictures, strict=True)
+        ],
+        "histogram": inlined(plots.moduli_figure(young), "moduli"),
+    }
+
+
+def _strike(evidence: Evidence) -> dict[str, Any]:
+    """Where and how the solid is struck."""
+    response = evidence.response
+    strike, observed = response.contacts["strike"], response.contacts["observed"]
+    picture = struck_picture(evidence.shown[TRUTH].mesh, strike, observed)
+    unit = evidence.settings["unit"]
+    return {
+        "picture": embedded(picture),
+        "points": {
+            name: (contact.position / unit).tolist() for name, contact in response.contacts.items()
+        },
+        "chosen": {name: evidence.settings[name] is not None for name in ("strike", "observed")},
+        "milliseconds": 1e3 * float(response.seconds[-1]),
+        "motion": inlined(plots.motion_figure(response), "motion"),
+        **response.attributes,
+    }
+
+
+def _sounds(evidence: Evidence) -> list[dict[str, Any]]:
+    """Sound and spectrogram of every method; nothing if no mode of the truth is heard."""
+    response = evidence.response
+    if not response.responses[TRUTH].sound.any():
+        return []
+    loudest = max(float(np.abs(part.sound).max()) for part in response.responses.values())
+    rate = int(response.attributes["sample_rate"])
+    return [
+        {
+            "variant": variant,
+            "plot": inlined(plots.sound_figure(response, variant), f"sound-{variant}"),
+            "source": wav_uri(response.responses[variant].sound, rate, loudest),
+            "audible": response.responses[variant].audible,
+            "distance": response.responses[variant].distance_decibels,
+        }
+        for variant in SHOWN
+    ]
+
+
+def _counted_by_run(evidence: Evidence) -> dict[str, Any] | None:
+    """What the run of the ground truth counted itself; None if it could not."""
+    told = evidence.shown[TRUTH].attributes
+    return told if "inertia_count" in told else None
+
+
+def _digests(evidence: Evidence) -> list[tuple[str, str]]:
+    """Names and first digits of the SHA-256 of the files that everything is made from."""
+    given = settings.model_files(evidence.config, evidence.model)
+    made = [str(evidence.modes_path(evidence.model, variant)) for variant in SHOWN]
+    found = []
+    for name in given + made:
+        with open(name, "rb") as stream:
+            digest = hashlib.file_digest(stream, "sha256").hexdigest()[:_DIGITS]
+        found.append((Path(name).name, digest))
+    return found
+
+
+def _configuration(evidence: Evidence) -> str:
+    """The part of the configuration that tells on this solid."""
+    config = evidence.config
+    parts = {key: config[key] for key in ("poisson", "solver", "validation")}
+    forests = {"model": config["forests"]["model"]}
+    return yaml.safe_dump(
+        {"models": {evidence.model: evidence.settings}, "forests": forests, **parts},
+        sort_keys=False,
+    )

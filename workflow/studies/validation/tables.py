@@ -1,0 +1,74 @@
+"""Tables of the page; their files are named after the model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from carillon.fem.model import RIGID_MODES
+from workflow.studies.base.entry import Row
+from workflow.studies.validation.criteria import judge
+from workflow.studies.validation.evidence import COMPARED, Evidence
+from workflow.variants import SHOWN, TRUTH, VARIANTS
+
+
+def criteria(evidence: Evidence) -> list[Row]:
+    """Every criterion with value, limit and verdict."""
+    return [criterion.row for criterion in judge(evidence)]
+
+
+def errors(evidence: Evidence) -> Iterator[Row]:
+    """Eigenvalue and frequency errors of every elastic mode."""
+    spectra = evidence.shown
+    truth = spectra[TRUTH]
+    for index in range(RIGID_MODES, min(len(part.eigenvalues) for part in spectra.values())):
+        row = {"mode": index + 1, TRUTH: float(truth.frequencies[index])}
+        for variant in COMPARED:
+            found = spectra[variant]
+            row[variant] = float(found.frequencies[index])
+            row[f"{variant}_frequency"] = row[variant] / row[TRUTH] - 1.0
+            ratio = found.eigenvalues[index] / truth.eigenvalues[index]
+            row[f"{variant}_eigenvalue"] = float(ratio) - 1.0
+        yield row
+
+
+def shapes(evidence: Evidence) -> Iterator[Row]:
+    """How far the spaces of modes are turned against the truth's."""
+    for variant in COMPARED:
+        clusters = evidence.compared[variant]["clusters"]
+        row = {
+            "method": VARIANTS[variant].label,
+            "clusters": len(clusters),
+            "likeness": evidence.first_mode[variant]["likeness"],
+        }
+        if clusters:
+            worst = max(clusters, key=lambda cluster: cluster["angle"])
+            alone = worst["first"] == worst["last"]
+            row |= {
+                "several": sum(cluster["last"] > cluster["first"] for cluster in clusters),
+                "median": float(np.median([cluster["angle"] for cluster in clusters])),
+                "largest": worst["angle"],
+                "modes": str(worst["first"]) if alone else f"{worst['first']}–{worst['last']}",
+            }
+        yield row
+
+
+def audits(evidence: Evidence) -> list[Row]:
+    """What each modes file proves, found anew from the file alone."""
+    found = evidence.audit["spectra"]
+    return [{"method": VARIANTS[name].label, **found[name]} for name in SHOWN if name in found]
+
+
+def responses(evidence: Evidence) -> Iterator[Row]:
+    """How far motion and sound after a strike are from the truth's."""
+    for variant in SHOWN:
+        found = evidence.response.responses[variant]
+        row = {
+            "method": VARIANTS[variant].label,
+            "audible": found.audible,
+            "peak": float(np.linalg.norm(found.displacement, axis=1).max()),
+        }
+        if variant != TRUTH:
+            row |= {"difference": found.difference, "distance_decibels": found.distance_decibels}
+        yield row
