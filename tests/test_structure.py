@@ -70,7 +70,7 @@ ARROWS = {
     "sound.commands": """solver.files solver.response sound sound.clips sound.project sound.design
         sound.rendering sound.export""",
     #
-    "workflow": "dataset_gen dataset_gen.objectives forests forests.studies sound.project",
+    "workflow": "dataset_gen dataset_gen.objectives forests forests.studies",
     "workflow.estimate": """dataset_gen dataset_gen.objectives forests.training forests.comparison
         workflow""",
     "workflow.studies.base": "solver.response workflow",

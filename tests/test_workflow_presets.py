@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import pytest
+import schema_tables
 
 from tests.test_workflow_config import every_key
-from tests.workflow_runs import CHECKOUT, planned, snakemake
-from workflow import schema_page, settings
+from tests.workflow_runs import planned, snakemake
+from workflow import settings
 from workflow.commands.estimate import CONFIGURATIONS, load
 from workflow.estimate.rates import load_rates
 
@@ -62,24 +63,19 @@ def test_a_shard_of_the_papers_data_is_about_an_hour():
     assert 0.5 < each / load_rates().fits_per_second[dataset["objective"]] / 3600.0 < 2.0
 
 
-def test_the_page_of_the_configuration_is_up_to_date():
-    written = (CHECKOUT / "docs" / "configuration.md").read_text()
-    assert written == schema_page.page(), "python -m workflow.schema_page > docs/configuration.md"
-    written = (CHECKOUT / "docs" / "project.md").read_text()
-    assert written == schema_page.project_page(), (
-        "python -m workflow.schema_page project > docs/project.md"
-    )
-
-
 def test_the_page_has_every_key():
-    text = schema_page.page()
+    text = schema_tables.of_configuration()
     for path, _ in every_key(settings.schema()):
         name = path.replace("*", "NAME")
         assert f"`{name}`" in text or f"## {name}" in text or name.endswith(".NAME"), name
 
 
 def test_the_page_tells_type_default_unit_and_meaning():
-    row = next(line for line in schema_page.page().splitlines() if "`dataset.shards`" in line)
+    row = next(
+        line for line in schema_tables.of_configuration().splitlines() if "`dataset.shards`" in line
+    )
     assert row.split(" | ")[1:4] == ["integer, at least 1, at most 10,000", "`2`", "1"]
-    density = next(line for line in schema_page.page().splitlines() if ".density`" in line)
+    density = next(
+        line for line in schema_tables.of_configuration().splitlines() if ".density`" in line
+    )
     assert "kg/m^3" in density and density.endswith("Mass density of the solid |")

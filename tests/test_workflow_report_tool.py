@@ -7,11 +7,11 @@ from types import SimpleNamespace
 
 import jinja2
 import pytest
+import rule_graph
 from docutils.core import publish_parts
 
 from carillon.errors import UserError
 from tests.workflow_runs import CHECKOUT, planned, snakemake
-from workflow import rule_graph
 from workflow.studies import catalogue, marks
 
 CAPTIONS = sorted((CHECKOUT / "workflow" / "studies" / "captions").glob("*.rst"))
@@ -29,9 +29,9 @@ def rendered(caption: str) -> str:
 
 
 def test_picture_of_the_rules_shows_the_default_run(tmp_path):
-    """If it fails: python -m workflow.rule_graph > docs/rules.svg"""
+    """If it fails: python docs/extensions/rule_graph.py"""
     jobs = planned(snakemake(tmp_path, "--dry-run", "--cores", 2))
-    picture = (CHECKOUT / "docs" / "rules.svg").read_text()
+    picture = rule_graph.PICTURE.read_text()
     assert set(re.findall(r">(\w+)</text>", picture)) == set(jobs) - {"all", "total"}
 
 

@@ -1,4 +1,4 @@
-"""The picture of the rules in the documentation: `python -m workflow.rule_graph > docs/rules.svg`.
+"""The picture of the rules in the documentation: `python docs/extensions/rule_graph.py`.
 
 Snakemake says which rule of the default run needs which; Graphviz, which nothing else needs, leaves
 out what follows from other arrows and lays out the rest.
@@ -11,12 +11,14 @@ import re
 import subprocess
 import sys
 import tempfile
+from pathlib import Path
 
 from carillon import cli
 from carillon.errors import UserError
 from workflow import settings
 
-PROGRAM = "workflow.rule_graph"
+PROGRAM = "rule_graph"
+PICTURE = Path(__file__).resolve().parent.parent / "rules.svg"
 TARGET = "all"
 """The rule that computes nothing, which is left out."""
 STYLE = """\
@@ -80,8 +82,8 @@ def _output_of(command: list[str], folder: str | None = None, text: str | None =
 
 
 def main() -> int:
-    """Write the picture to standard output."""
-    print(draw(needs()), end="")
+    """Draw the picture anew."""
+    PICTURE.write_text(draw(needs()))
     return 0
 
 

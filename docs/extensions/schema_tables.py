@@ -1,13 +1,9 @@
-"""The configuration as a page, from its schema: `python -m workflow.schema_page`.
-
-With the argument `project`, the page of the projects of `sound design`.
-"""
+"""Keys of the configuration and of projects as tables, from their schemas."""
 
 from __future__ import annotations
 
 import json
 import re
-import sys
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -16,34 +12,6 @@ import yaml
 from sound.project.schema import SCHEMA as PROJECT_SCHEMA
 from workflow import settings
 
-_CONFIGURATION = """# Configuration
-
-<!-- Made by python -m workflow.schema_page > docs/configuration.md; do not edit. -->
-
-{description}. Name the file with `snakemake --configfile FILE`. Presets are in `workflow/config/`:
-`tiny` for tests, `laptop` for a start, `cluster` and `paper`; `python -m workflow estimate --preset
-NAME` says what each takes. Mistakes are answered in one sentence before anything runs.
-
-Names of files and folders may hold blanks, quotes and whatever else means something to a shell, but
-none of `{{ }} < >`, which the rules take for placeholders. A file from somebody else is given to
-`python -m workflow estimate --configfile FILE` first, which runs nothing that is in it: Snakemake
-reads the file before the rules check it, and runs Python that stands in it (`__use_yte__`).
-
-A plain number has the unit 1. `NAME` stands for names of your own, `[]` for an entry of a list."""
-_PROJECT = """# Project of a sound design
-
-<!-- Made by python -m workflow.schema_page project > docs/project.md; do not edit. -->
-
-{description}. `python -m sound design PROJECT.yaml --out design.h5` reads it; mistakes are answered
-in one sentence. `python -m sound init` writes one with all keys in it. The least that one says:
-
-```yaml
-mesh: builtin:frying-pan
-targets:
-  - {{name: plate, at: [0.036, 0.054, 0.022], clip: plate.wav}}
-```
-
-A plain number has the unit 1. `[]` stands for an entry of a list."""
 _TABLE = "| key | type | default | unit | meaning |\n| --- | --- | --- | --- | --- |"
 _BOUNDS = {
     "minimum": "at least {}",
@@ -59,21 +27,19 @@ _UNIT = re.compile(r"^(.*) \[([^]]+)\]$")
 Schema = Mapping[str, Any]
 
 
-def page() -> str:
-    """The page of the configuration as Markdown."""
-    return _page(_CONFIGURATION, settings.schema(), "The run")
+def of_configuration() -> str:
+    """Sections with the keys of the configuration."""
+    return _sections(settings.schema(), "The run")
 
 
-def project_page() -> str:
-    """The page of a project of `sound design` as Markdown."""
-    schema = yaml.safe_load(PROJECT_SCHEMA.read_text(encoding="utf-8"))
-    return _page(_PROJECT, schema, "The solid")
+def of_project() -> str:
+    """Sections with the keys of a project."""
+    return _sections(yaml.safe_load(PROJECT_SCHEMA.read_text(encoding="utf-8")), "The solid")
 
 
-def _page(head: str, schema: Schema, plain_title: str) -> str:
-    parts = [head.format(description=schema["description"].rstrip("."))]
+def _sections(schema: Schema, plain_title: str) -> str:
     plain = {key: part for key, part in schema["properties"].items() if not _is_section(part)}
-    parts.append(f"## {plain_title}\n\n{_table(_rows(plain, '', schema['required']))}")
+    parts = [f"## {plain_title}\n\n{_table(_rows(plain, '', schema['required']))}"]
     for key, part in schema["properties"].items():
         if _is_section(part):
             required = _nested(part).get("required", ())
@@ -149,7 +115,3 @@ def _default(part: Schema) -> str:
 
 def _cell(text: str) -> str:
     return text.replace("|", "\\|")
-
-
-if __name__ == "__main__":
-    print(project_page() if sys.argv[1:] == ["project"] else page(), end="")
