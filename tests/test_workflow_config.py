@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,13 @@ import yaml
 from jsonschema import Draft202012Validator
 
 from carillon.errors import UserError
+from dataset_gen.settings import ShardOptions
+from forests.training.train import TrainingOptions
+from solver.analysis.options import SolverOptions
+from solver.analysis.problem import ProblemOptions
+from solver.response.response_file import StrikeOptions
+from solver.studies.benchmark.row import BenchmarkOptions
+from solver.studies.scaling.study import ScalingOptions
 from workflow import settings
 
 CHECKOUT = Path(__file__).resolve().parent.parent
@@ -126,6 +134,48 @@ def test_lists_of_models_name_models(part, key):
     config[part][key] = ["gong"]
     with pytest.raises(UserError, match=rf"{part}\.{key}: 'gong' is not among the models"):
         settings.check_links(config)
+
+
+OPTIONS = {
+    "models": (ProblemOptions, StrikeOptions),
+    "dataset": (ShardOptions,),
+    "forests": (TrainingOptions,),
+    "solver": (SolverOptions,),
+    "validation": (StrikeOptions,),
+    "scaling": (ScalingOptions,),
+    "figures": (BenchmarkOptions,),
+}
+"""Options of commands that a section of the configuration sets by the same names."""
+OTHER_DEFAULTS = {
+    "models.material": "a homogeneous solid would not show what this is for",
+    "dataset.samples": "an option that has to be given",
+    "dataset.shards": "two cores make two at once",
+    "solver.tolerance": "the option's depends on the method",
+    "scaling.modes": "a study of a few minutes",
+    "scaling.ranks": "a list, since JSON has no tuples",
+    "figures.slow_runs": "ARPACK takes minutes a run",
+    "figures.tune": "the figures compare with the best that there is",
+}
+"""Keys whose default is not that of the option, and why."""
+
+
+@pytest.mark.parametrize("section", OPTIONS)
+def test_keys_that_are_options_have_their_choices_and_defaults(section):
+    keys = {
+        path.split(".")[-1]: (path, part)
+        for path, part in every_key(
+            {"properties": {section: settings.schema()["properties"][section]}}
+        )
+    }
+    options = {each.name: each for kind in OPTIONS[section] for each in fields(kind)}
+    assert keys.keys() & options.keys()
+    for name in keys.keys() & options.keys():
+        path, part = keys[name]
+        choices = options[name].metadata.get("choices")
+        assert choices is None or set(part["enum"]) == set(choices), path
+        default, own = options[name].default, f"{section}.{name}"
+        if "default" in part and own not in OTHER_DEFAULTS:
+            assert part["default"] == default, path
 
 
 def test_materials_and_objectives_of_the_schema_exist():

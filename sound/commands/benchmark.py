@@ -15,7 +15,7 @@ from sound.commands.search_options import SearchOptions
 
 
 @dataclass(frozen=True)
-class BenchmarkOptions:
+class DesignBenchmarkOptions:
     """What is measured."""
 
     project: str = option(REQUIRED, "project file (YAML)")
@@ -25,7 +25,7 @@ class BenchmarkOptions:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    add_options(parser, BenchmarkOptions, positional=("project",))
+    add_options(parser, DesignBenchmarkOptions, positional=("project",))
     add_options(parser, SearchOptions, leave_out=("method",))
 
 
@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
     from sound.design.preparation import prepare
     from sound.project.project import load_project, with_optimiser
 
-    options = collect(BenchmarkOptions, arguments)
+    options = collect(DesignBenchmarkOptions, arguments)
     settings = asdict(collect(SearchOptions, arguments))
     project = with_optimiser(load_project(options.project), **settings)
     results = benchmark(prepare(project), options.runs, lambda what: say(f"measuring: {what}"))
