@@ -25,7 +25,7 @@ from tests.hostile.fuzzing import damaged, examples, or_refused, values, yaml_te
 from tests.hostile.zoo import CONFIGURATION, PROJECT
 from workflow import settings as configuration
 from workflow.commands.validate import _tolerance
-from workflow.estimate.rates import PACKAGED, rates_of
+from workflow.estimate.rates import PACKAGED, checked
 
 NUMBERS = st.one_of(
     st.text(max_size=30),
@@ -199,7 +199,7 @@ def test_any_value_in_a_configuration_fits_or_is_refused(place, value):
     value=values(),
 )
 def test_any_value_in_rates_fits_or_is_refused(place, value):
-    or_refused(lambda: rates_of(replaced(json.loads(PACKAGED.read_text()), place, value), "rates"))
+    or_refused(lambda: checked(replaced(json.loads(PACKAGED.read_text()), place, value), "rates"))
 
 
 def test_the_memory_of_a_reader_is_bounded():

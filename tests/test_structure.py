@@ -71,8 +71,7 @@ ARROWS = {
         sound.rendering sound.export""",
     #
     "workflow": "dataset_gen dataset_gen.objectives forests forests.studies",
-    "workflow.estimate": """dataset_gen dataset_gen.objectives forests.training forests.comparison
-        workflow""",
+    "workflow.estimate": "dataset_gen.objectives workflow",
     "workflow.studies.base": "solver.response workflow",
     "workflow.studies": "workflow.studies.base",
     "workflow.studies.report": """solver.files solver.hcms solver.studies.scaling workflow

@@ -60,7 +60,7 @@ def test_the_papers_counts():
 def test_a_shard_of_the_papers_data_is_about_an_hour():
     dataset = preset("paper")["dataset"]
     each = dataset["samples"] / dataset["shards"]
-    assert 0.5 < each / load_rates().fits_per_second[dataset["objective"]] / 3600.0 < 2.0
+    assert 0.5 < each / load_rates()["fits_per_second"][dataset["objective"]] / 3600.0 < 2.0
 
 
 def test_the_page_has_every_key():

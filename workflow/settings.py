@@ -23,6 +23,8 @@ from workflow.strict_schema import first_mistake, reason
 
 PLACES = ("results_dir", "mesh_folder", "baseline")
 """Keys that say where something lies, on which no result depends."""
+NO_RESULT = ("baseline", "resources")
+"""Keys that describe no run: what it is compared with, and what its jobs may take."""
 DEFAULT_FORESTS = "default"
 """Name of the forests that come with the package."""
 FOLDER = Path(__file__).resolve().parent
@@ -88,15 +90,31 @@ def check(config: Mapping[str, Any]) -> None:
         raise UserError(_sentence(mistake))
 
 
+def complete(files: Iterable[str | Path]) -> dict[str, Any]:
+    """A configuration from its files, checked and with its defaults; meshes may be absent.
+
+    Raises
+    ------
+    UserError
+        If it cannot be read, or holds anything that does not fit.
+    """
+    from snakemake.utils import validate  # Takes long to import, and --help should not.
+
+    config = read(files, {})
+    check(config)
+    validate(config, str(SCHEMA))
+    return config
+
+
 def resolved(config: Mapping[str, Any]) -> dict[str, Any]:
-    """What describes a run; the baseline that it is compared with does not."""
-    return {key: value for key, value in config.items() if key != "baseline"}
+    """What describes a run; what it is compared with and what its jobs may take does not."""
+    return {key: value for key, value in config.items() if key not in NO_RESULT}
 
 
 def config_hash(config: Mapping[str, Any]) -> str:
     """Short hash of a resolved configuration, wherever its files lie."""
     return provenance.config_hash(
-        {key: value for key, value in config.items() if key not in PLACES}
+        {key: value for key, value in resolved(config).items() if key not in PLACES}
     )
 
 

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
 from carillon.arguments import whole_number
+from carillon.fem.geometry import surface_name
 from carillon.files import require_writable
 from carillon.runtime import allowed_cores
 from dataset_gen.objectives import DATASET_OBJECTIVES
 from workflow import settings, training
 from workflow.estimate import summary
-from workflow.estimate.machine import Machine
-from workflow.estimate.rates import PACKAGED, Rates, load_rates, rates_of, save_rates
-from workflow.estimate.sizes import Size, Sizes, size_of
-from workflow.estimate.solver_stages import SolverStages
-from workflow.estimate.stages import Run, Stage
-from workflow.estimate.training_stages import TrainingStages
+from workflow.estimate.costs import Machine, costs
+from workflow.estimate.laws import Rates
+from workflow.estimate.plan import plan
+from workflow.estimate.rates import PACKAGED, checked, load_rates, save_rates
+from workflow.estimate.sizes import solid_of
+from workflow.estimate.solids import Size, Solid, size_of
 
 CONFIGURATIONS = Path(__file__).parent.parent / "config"
 DEFAULT_PRESET, PAPER = "laptop", "paper"
@@ -51,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--rates", metavar="FILE", help="rates to use, or to write with --measure")
     parser.add_argument(
-        "--measure", action="store_true", help="measure the rates here first, about three minutes"
+        "--measure", action="store_true", help="measure the rates here first, in some minutes"
     )
     parser.add_argument("--json", action="store_true", help="with the basis of every number")
 
@@ -64,22 +68,20 @@ def run(arguments: argparse.Namespace) -> int:
     UserError
         For a bad configuration or bad rates, or if a solid cannot be voxelised.
     """
-    file, preset = arguments.configfile, arguments.preset or DEFAULT_PRESET
-    path = _preset(preset) if file is None else Path(file)
+    preset = CONFIGURATIONS / f"{arguments.preset or DEFAULT_PRESET}.yaml"
+    path = preset if arguments.configfile is None else Path(arguments.configfile)
     config = load(path, arguments.objective)
     rates = _rates(arguments)
     machine = Machine(arguments.nodes, arguments.cores_per_node)
-    stages, sizes = estimate(config, rates, machine)
-    found = {"configuration": str(path), **summary.plain(stages, sizes, rates, machine)}
+    jobs, solids = estimate(config, rates, machine)
+    found = {"configuration": str(path), **summary.plain(jobs, solids, rates, machine)}
     if path.stem == PAPER:
-        found["paper"] = summary.beside_the_paper(stages, machine)
+        found["paper"] = summary.beside_the_paper(jobs, machine)
     if arguments.json:
         print(json.dumps(found, indent=2))
     else:
         objective = config["dataset"]["objective"]
         print(summary.as_text(found, f"{path.stem}, objective {objective},"))
-        if "paper" in found:
-            print(found["paper"])
     return 0
 
 
@@ -91,32 +93,30 @@ def load(path: Path, objective: str | None = None) -> dict[str, Any]:
     UserError
         If it cannot be read, or holds anything that does not fit.
     """
-    from snakemake.utils import validate  # Takes long to import, and --help should not.
-
-    config = settings.read([path], {})
-    settings.check(config)
-    validate(config, str(settings.SCHEMA))
+    config = settings.complete([path])
     if objective is not None:
         config["dataset"]["objective"] = objective
     training.own(config).check()
-    return dict(config)
+    return config
 
 
 def estimate(
-    config: dict[str, Any], rates: Rates, machine: Machine, sizes: Sizes = size_of
-) -> tuple[list[Stage], dict[str, Size]]:
-    """All stages in order, and the unknowns of all solids by name and resolution."""
-    context = Run(config, rates, machine)
-    trained = [] if config["forests"]["model"] else TrainingStages(context).stages()
-    spectra = SolverStages(context, sizes)
-    models, shapes = config["models"], config["figures"]["models"]
-    found = {f"{name} {models[name]['resolution']}": size for name, size in spectra.models.items()}
-    found |= {f"{name} {shapes[name]['resolution']}": size for name, size in spectra.shapes.items()}
-    return [*trained, *spectra.stages()], found
+    config: dict[str, Any],
+    rates: Rates,
+    machine: Machine,
+    count: Callable[[Solid], Size] = size_of,
+) -> tuple[pd.DataFrame, dict[str, Size]]:
+    """What every job takes, see `costs`, and the unknowns of all solids by name and resolution.
 
-
-def _preset(name: str) -> Path:
-    return CONFIGURATIONS / f"{name}.yaml"
+    Raises
+    ------
+    UserError
+        If a solid cannot be voxelised, or the rules do not accept the configuration.
+    """
+    jobs = plan(config, machine.cores_per_node, machine.cores)
+    solids = filter(None, dict.fromkeys(map(solid_of, jobs["command"])))
+    named = {f"{surface_name(each.mesh)} {each.resolution}": count(each) for each in solids}
+    return costs(jobs, rates, machine, count), named
 
 
 def _rates(arguments: argparse.Namespace) -> Rates:
@@ -126,7 +126,7 @@ def _rates(arguments: argparse.Namespace) -> Rates:
 
     if arguments.rates is not None:
         require_writable(arguments.rates)
-    values = measure()
+    rates = checked(measure(), "the rates measured")
     if arguments.rates is not None:
-        save_rates(arguments.rates, values)
-    return rates_of(values, "the rates measured")
+        save_rates(arguments.rates, rates)
+    return rates

@@ -1,65 +1,78 @@
-"""How many unknowns a solid has, from its voxels, or from a count where its mesh is absent."""
+"""What decides how long a job takes: the sizes of its work, read from its command."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cache
-from pathlib import Path
+import re
+import shlex
+from collections import defaultdict
+from collections.abc import Callable, Mapping
 
-from carillon.fem.geometry import blocks_from_mesh, hexmesh_from_voxels, load_surface, voxelize
-from workflow.settings import BUILTIN
+import pandas as pd
 
-TYPICAL_FINE, TYPICAL_COARSE = 0.8, 0.15
-"""Unknowns of a compact solid such as the Stanford bunny on the fine and the coarse mesh, over the
-cube of the voxels along its longest side."""
+from workflow.estimate.solids import Size, Solid, size_of
 
+ORIGINS = 8
+"""Rows of a sample, one for each corner of the block."""
 
-LARGEST_COUNTED = 128
-"""Resolution from which on voxels are no longer made to be counted, which would take gigabytes."""
-
-
-@dataclass(frozen=True)
-class Size:
-    """Unknowns of a solid on its fine mesh and on that of its blocks, and where they are from."""
-
-    fine: int
-    coarse: int
-    basis: str
+LEAST_LEAF = 4
+"""Rows of a leaf of a tree that ends for want of rows, as a multiple of `min_leaf`."""
 
 
-@dataclass(frozen=True)
-class Solid:
-    """What decides about the size: mesh argument of the solver, voxels along the longest side."""
+def options_of(command: str) -> dict[str, str]:
+    """First values of a command's options by name; an option without one has an empty text.
 
-    mesh: str
-    resolution: int
-    fill: str = "winding"
-    components: str = "error"
-
-
-Sizes = Callable[[Solid], Size]
-
-
-@cache
-def size_of(solid: Solid) -> Size:
-    """Unknowns of a solid: counted on its voxels if the mesh is there.
-
-    Raises
-    ------
-    UserError
-        If the mesh cannot be voxelised so.
+    Examples
+    --------
+    >>> options_of("python -m solver scaling --modes 8 --ranks 1,2 --weak > log")
+    {'modes': '8', 'ranks': '1,2', 'weak': ''}
     """
-    if not solid.mesh.startswith(BUILTIN) and not Path(solid.mesh).is_file():
-        cube = solid.resolution**3
-        fine, coarse = round(TYPICAL_FINE * cube), round(TYPICAL_COARSE * cube)
-        return Size(fine, coarse, f"guessed, {solid.mesh} is absent: as compact as the bunny")
-    if solid.resolution > LARGEST_COUNTED:
-        counted = size_of(replace(solid, resolution=LARGEST_COUNTED))
-        times = (solid.resolution / LARGEST_COUNTED) ** 3
-        basis = f"{counted.basis} at resolution {LARGEST_COUNTED}, times {times:,.1f}"
-        return Size(round(times * counted.fine), round(times * counted.coarse), basis)
-    surface = load_surface(solid.mesh)
-    voxels = voxelize(surface, solid.resolution, solid.fill, solid.components, solid.mesh)
-    mesh = hexmesh_from_voxels(voxels)
-    return Size(mesh.n_dofs, 3 * blocks_from_mesh(mesh).coarse.n_nodes, "counted on its voxels")
+    found = re.findall(r" --([a-z-]+)(?: ([^\s>-]\S*))?", command)
+    return {name.replace("-", "_"): value for name, value in found}
+
+
+def solid_of(command: str) -> Solid | None:
+    """The solid that a command makes voxels of, if it does."""
+    options = options_of(command)
+    if "resolution" not in options:
+        return None
+    words = shlex.split(command)
+    how = {name: options[name] for name in ("fill", "components") if name in options}
+    return Solid(words[words.index("solver") + 2], int(options["resolution"]), **how)
+
+
+def sizes_of(
+    jobs: pd.DataFrame,
+    fits_per_second: Mapping[str, float],
+    count: Callable[[Solid], Size] = size_of,
+) -> list[dict[str, float]]:
+    """Sizes of every job of `plan` by name, see `rules.yaml`; one that it has not is 1."""
+    made: dict[str, dict[str, float]] = {}
+    found = []
+    for job in jobs.itertuples():
+        options, solid = options_of(job.command), solid_of(job.command)
+        read = [made[file] for file in job.inputs if file in made]
+        sizes: dict[str, float] = defaultdict(lambda: 1.0)
+        for name in ("unknowns", "modes"):
+            sizes[name] = max((each[name] for each in read), default=1.0)
+        sizes["rows"] = ORIGINS * sum(each["samples"] for each in read if "samples" in each)
+        sizes |= {name: _number(value) for name, value in options.items()}
+        if solid is not None:
+            sizes["unknowns"] = count(solid).fine
+        if "samples" in sizes:
+            sizes["samples"] /= sizes["shards"]
+            sizes["fits"] = sizes["samples"] / fits_per_second[options["objective"]]
+        if "structure_rows" in sizes:
+            sizes["structure_rows"] = min(sizes["structure_rows"], sizes["rows"])
+            enough = sizes["structure_rows"] / (LEAST_LEAF * sizes["min_leaf"])
+            sizes["leaves"] = max(2.0, min(sizes["max_leaves"], enough))
+        found.append(sizes)
+        made |= dict.fromkeys(job.outputs, sizes)
+    return found
+
+
+def _number(value: str) -> float:
+    """Size that an option is: its number, the length of its list, 2 if it stands alone."""
+    try:
+        return max(1.0, float(value))
+    except ValueError:
+        return 1.0 + value.count(",") if value else 2.0

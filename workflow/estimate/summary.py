@@ -1,120 +1,123 @@
-"""An estimate as plain values, and as people read it."""
+"""The estimate by stages, as plain values and as text."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
-from workflow.estimate.machine import Machine
-from workflow.estimate.rates import Rates
-from workflow.estimate.sizes import Size
-from workflow.estimate.stages import Stage
+import pandas as pd
+from jinja2 import Environment, StrictUndefined
 
-HOUR = 3600.0
-GIGABYTE_MB = 1000.0
-SUMMED = ("jobs", "core_hours", "wall_hours", "kept_gb")
+from workflow.estimate.costs import Machine, serial_share
+from workflow.estimate.laws import QUANTITIES, Rates, table
+from workflow.estimate.solids import Size
 
-PAPER_COMPUTERS = 12
-PAPER_HOURS = {"data generation": 240.0, "growing trees": 48.0, "fitting leaves": 12.0}
-"""What the paper's section 8.1 says these took."""
-
-_HEAD = f"{'stage':<25}{'jobs':>6}{'core-hours':>12}{'wall time':>11}{'memory':>10}{'files':>10}"
+SUMMED, LARGEST = ["jobs", "core_hours", "wall_hours", "kept_gb"], ["memory_gb", "scratch_gb"]
 
 
 def plain(
-    stages: Sequence[Stage], sizes: Mapping[str, Size], rates: Rates, machine: Machine
+    jobs: pd.DataFrame, solids: Mapping[str, Size], rates: Rates, machine: Machine
 ) -> dict[str, Any]:
-    """Everything as plain values; each stage says under `basis` where its numbers come from."""
-    rows = [_row(stage, machine) for stage in stages]
-    totals: dict[str, Any] = {name: sum(row[name] for row in rows) for name in SUMMED}
-    for name in ("memory_gb", "scratch_gb"):
-        totals[name] = max(row[name] for row in rows)
+    """The jobs of `costs` by stage; each stage says under `basis` where its numbers come from."""
+    stages = [jobs[jobs["stage"] == name] for name in table()["stages"]]
+    stages = [same for same in stages if len(same)]
+    rows = pd.DataFrame([_row(same, rates, machine) for same in stages])
+    cautions = [told for same in stages for told in _cautions(same, rates)]
+    made, laws = rates["made"], rates["laws"]
+    if rates["serial_share"] is None:
+        cautions.append(table()["cautions"]["busy"].format(share=serial_share(rates), **made))
     return {
-        "machine": vars(machine),
-        "solids": {name: vars(size) for name, size in sizes.items()},
-        "stages": rows,
-        "totals": totals,
-        "cautions": [
-            *(caution for stage in stages for caution in stage.cautions),
-            *([rates.unmeasured] if rates.unmeasured else []),
-        ],
+        "machine": machine._asdict(),
+        "solids": {name: size._asdict() for name, size in solids.items()},
+        "stages": rows.to_dict("records"),
+        "totals": {
+            **{name: rows[name].sum().item() for name in SUMMED},
+            **{name: rows[name].max() for name in LARGEST},
+        },
+        "cautions": cautions,
         "rates": {
-            "origin": rates.origin,
-            "made": rates.made,
-            "how": rates.how,
-            "up_to": rates.up_to,
+            "origin": table()["origin"].format(**made),
+            "made": made,
+            "how": {name: f"{law['jobs']} jobs of measured runs" for name, law in laws.items()},
+            "up_to": {name: law["up_to"] for name, law in laws.items()},
         },
     }
 
 
-def _row(stage: Stage, machine: Machine) -> dict[str, Any]:
-    basis = stage.basis
+def _row(jobs: pd.DataFrame, rates: Rates, machine: Machine) -> dict[str, Any]:
+    """What the jobs of a stage take together."""
+    at_a_time = machine.slots(jobs["granted"].min())
+    basis = {name: _basis(jobs, rates, name) for name in QUANTITIES}
     return {
-        "stage": stage.name,
-        "target": stage.target,
-        "jobs": stage.count,
-        "core_hours": stage.core_hours,
-        "wall_hours": machine.wall(stage.jobs) / HOUR,
-        "longest_job_hours": max(jobs.seconds for jobs in stage.jobs) / HOUR,
-        "memory_gb": stage.memory_mb / GIGABYTE_MB,
-        "kept_gb": stage.kept_mb / GIGABYTE_MB,
-        "scratch_gb": stage.scratch_mb / GIGABYTE_MB,
-        "basis": {
-            "jobs": "done by the job before" if stage.continues else "as the rules make them",
-            "core_hours": f"cores that jobs occupy, used or not; {basis['seconds']}",
-            "wall_hours": "jobs on the cores asked for, stages one after the other; "
-            + basis["seconds"],
-            "longest_job_hours": basis["seconds"],
-            "memory_gb": f"peak of the largest job; {basis['memory']}",
-            "kept_gb": basis["files"],
-            "scratch_gb": basis["files"],
-        },
+        "stage": jobs["stage"].iloc[0],
+        "target": jobs["target"].iloc[0],
+        "jobs": len(jobs),
+        "core_hours": jobs["core_hours"].sum(),
+        "wall_hours": wall_hours(jobs, machine),
+        "longest_job_hours": jobs["hours"].max(),
+        "memory_gb": jobs["memory_gb"].max(),
+        "kept_gb": jobs["kept_gb"].sum(),
+        "scratch_gb": jobs["journal_gb"].nlargest(at_a_time).sum(),
+        "basis": {name: text.format(**basis) for name, text in table()["basis"].items()},
     }
+
+
+def wall_hours(jobs: pd.DataFrame, machine: Machine) -> float:
+    """Wall time of jobs whose rules run one after the other."""
+    rules = jobs.groupby("rule")
+    return sum(machine.wall(zip(same["hours"], same["granted"])) for _, same in rules)
+
+
+def _basis(jobs: pd.DataFrame, rates: Rates, quantity: str) -> str:
+    told = []
+    for name in sorted(set(jobs["law"]) - {""}):
+        law = rates["laws"][name][quantity]
+        powers = "".join(f" x {size}^{power:.2f}" for size, power in law["powers"].items())
+        told.append(f"{name} on one core {law['start']:.2g} + {law['factor']:.2g}{powers}")
+    others = jobs.loc[jobs["law"] == "", "local"]
+    told += [f"{serial_share(rates):.0%} of a solver run stays on more cores"] if told else []
+    told += ["others as a solver run without work, files not counted"] if others.any() else []
+    told += ["not measured: the limit of the rule, an upper bound"] if not others.all() else []
+    return "; ".join(told)
+
+
+def _cautions(jobs: pd.DataFrame, rates: Rates) -> Iterator[str]:
+    """What is not measured, or far beyond what is, in a stage."""
+    stage, texts = jobs["stage"].iloc[0], table()["cautions"]
+    for rule, same in jobs[(jobs["law"] == "") & ~jobs["local"]].groupby("rule"):
+        yield texts["unmeasured"].format(rule=rule, minutes=same["minutes"].max())
+    beyond: dict[str, tuple[float, ...]] = {}
+    for job in jobs[jobs["law"] != ""].itertuples():
+        for size, most in rates["laws"][job.law]["up_to"].items():
+            value = job.granted if size == "cores" else job.sizes[size]
+            beyond[size] = max(beyond.get(size, (0.0,)), (value / most, value, most))
+    for size, (times, value, most) in beyond.items():
+        if times > table()["far"]:
+            told = {"size": size.replace("_", " "), "value": value, "most": most, "times": times}
+            yield texts["cores" if size == "cores" else "beyond"].format(stage=stage, **told)
+    long = jobs[(jobs["rule"] == "generate_shard") & (jobs["hours"] > table()["long"])]
+    for job in long.head(1).itertuples():
+        shards = job.sizes["shards"] * job.hours
+        yield texts["shards"].format(stage=stage, hours=job.hours, shards=shards)
 
 
 def as_text(found: Mapping[str, Any], name: str) -> str:
-    """The result of `plain` as lines."""
-    machine, totals = found["machine"], found["totals"]
-    cores = machine["nodes"] * machine["cores_per_node"]
-    lines = [
-        f"{name} on {machine['nodes']} x {machine['cores_per_node']} = {cores:,} cores, "
-        "nothing done yet",
-        _HEAD,
-        *(_line(row["stage"], row) for row in found["stages"]),
-        _line("total", totals),
-        "figures belong to target figures, all else to the default run; core-hours are those of "
-        "the cores that jobs occupy;",
-        "memory is that of the largest job; files stay, beside them there are up to "
-        f"{_size(totals['scratch_gb'])} of journals for a while",
-        "",
-        f"rates of {found['rates']['origin']}",
-    ]
-    for solid, size in found["solids"].items():
-        lines.append(
-            f"{solid}: {size['fine']:,} unknowns, coarsened {size['coarse']:,}; {size['basis']}"
-        )
-    lines += [f"note: {caution}" for caution in found["cautions"]]
-    return "\n".join(lines)
+    """The result of `plain` as lines, see `estimate.txt.j2`."""
+    environment = Environment(trim_blocks=True, undefined=StrictUndefined)
+    environment.filters |= {"number": _number, "duration": duration, "size": _size}
+    template = environment.from_string(Path(__file__).with_name("estimate.txt.j2").read_text())
+    return template.render({"name": name, "paper": "", **found}).rstrip()
 
 
-def _line(name: str, row: Mapping[str, Any]) -> str:
-    return (
-        f"{name:<25}{row['jobs']:>6,}{_number(row['core_hours']):>12}"
-        f"{duration(row['wall_hours']):>11}{_size(row['memory_gb']):>10}{_size(row['kept_gb']):>10}"
-    )
-
-
-def beside_the_paper(stages: Sequence[Stage], machine: Machine) -> str:
+def beside_the_paper(jobs: pd.DataFrame, machine: Machine) -> str:
     """The paper's training times beside those estimated, also on as many nodes as it used."""
-    twelve = Machine(PAPER_COMPUTERS, machine.cores_per_node)
     told = []
-    for stage in stages:
-        if stage.name in PAPER_HOURS:
-            here, there = (duration(m.wall(stage.jobs) / HOUR) for m in (machine, twelve))
-            told.append(
-                f"{stage.name} {here}, on twelve such nodes {there} (the paper: "
-                f"{duration(PAPER_HOURS[stage.name])})"
-            )
+    for stage, took in table()["paper"].items():
+        same = jobs[jobs["stage"] == stage]
+        machines = (machine, Machine(12, machine.cores_per_node))
+        here, there = (duration(wall_hours(same, each)) for each in machines)
+        told.append(f"{stage} {here}, on twelve such nodes {there} (the paper: {took})")
     return f"beside the paper's twelve computers: {'; '.join(told)}"
 
 
@@ -127,10 +130,9 @@ def duration(hours: float) -> str:
     ['3.6 s', '6 min', '30 h', '10 d']
     """
     for unit, name in ((24.0, "d"), (1.0, "h"), (1.0 / 60.0, "min")):
-        least = 2.0 * unit
-        if hours >= least:
+        if hours >= 2.0 * unit:
             return f"{_number(hours / unit)} {name}"
-    return f"{_number(hours * HOUR)} s"
+    return f"{_number(3600.0 * hours)} s"
 
 
 def _size(gigabytes: float) -> str:

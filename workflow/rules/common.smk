@@ -43,6 +43,11 @@ def workers(plan):
     return " --workers {threads}" if plan.forests["ranks"] == 1 else ""
 
 
+def shard_memory(plan):
+    """Megabytes for drawing samples, in every worker and in what writes them."""
+    return 500 + 500 * plan.dataset["workers"]
+
+
 def tree_memory(plan):
     """Megabytes for growing trees: 128 bytes a row were measured, a third more is asked."""
     return 2000 + plan.forests["structure_rows"] // 6000
@@ -64,6 +69,15 @@ def templates(room, *names):
 def growing(first):
     """Resource that doubles with every try: a job that ran out of it gets more."""
     return lambda wildcards, attempt: first * 2 ** (attempt - 1)
+
+
+def limits(rule, memory=None):
+    """Memory and time of a rule from the configuration; `memory` [MB] is taken if it names none."""
+    asked = config["resources"][rule]
+    return {
+        "mem_mb": growing(asked["memory_mb"] or memory),
+        "runtime": growing(asked["minutes"]),
+    }
 
 
 wildcard_constraints:

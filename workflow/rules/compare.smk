@@ -17,9 +17,6 @@ rule compare:
     log:
         f"{LOGS}/compare.log",
     localrule: True
-    resources:
-        mem_mb=500,
-        runtime="5m",
     params:
         source=source("workflow.commands.compare"),
         baseline=config["baseline"],
@@ -39,9 +36,6 @@ rule reference:
     log:
         f"{LOGS}/reference.log",
     localrule: True
-    resources:
-        mem_mb=500,
-        runtime="5m",
     params:
         source=source("workflow.scripts.write_reference"),
     script:

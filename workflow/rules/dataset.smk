@@ -13,8 +13,7 @@ rule generate_shard:
     retries: 2
     threads: OWN.dataset["workers"]
     resources:
-        mem_mb=growing(500 + 500 * OWN.dataset["workers"]),
-        runtime=growing(120),
+        **limits("generate_shard", shard_memory(OWN)),
     params:
         source=source("dataset_gen.commands.generate"),
         samples=lambda wildcards: OWN.generate_arguments(wildcards.distribution, wildcards.shard),
@@ -30,10 +29,9 @@ rule describe_shard:
         f"{RESULTS}/dataset/{{distribution}}-{{shard}}.json",
     log:
         f"{LOGS}/dataset/describe-{{distribution}}-{{shard}}.log",
+    benchmark:
+        f"{BENCHMARKS}/dataset/describe-{{distribution}}-{{shard}}.tsv"
     localrule: True
-    resources:
-        mem_mb=1000,
-        runtime="10m",
     params:
         source=source("dataset_gen.commands.inspect"),
     shell:

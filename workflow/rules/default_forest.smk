@@ -24,8 +24,7 @@ use rule generate_shard as generate_default_shard with:
         f"{BENCHMARKS}/default_forest/dataset/{{distribution}}-{{shard}}.tsv"
     threads: DEFAULT.dataset["workers"]
     resources:
-        mem_mb=growing(500 + 500 * DEFAULT.dataset["workers"]),
-        runtime=growing(240),
+        **limits("generate_default_shard", shard_memory(DEFAULT)),
     params:
         source=source("dataset_gen.commands.generate"),
         samples=lambda wildcards: DEFAULT.generate_arguments(
@@ -45,8 +44,7 @@ rule grow_tree:
         f"{BENCHMARKS}/default_forest/trees/{{tree}}.tsv"
     threads: 1
     resources:
-        mem_mb=growing(tree_memory(DEFAULT)),
-        runtime=growing(240),
+        **limits("grow_tree", tree_memory(DEFAULT)),
     params:
         source=source("forests.commands.grow"),
         training=DEFAULT.train_arguments,
@@ -67,11 +65,10 @@ rule train_default_forest:
         f"{BENCHMARKS}/default_forest/train.tsv"
     threads: SOLVER_CORES
     resources:
+        **limits("train_default_forest", training_memory(DEFAULT)),
         mpi=launcher(DEFAULT.forests["ranks"]),
         tasks=DEFAULT.forests["ranks"],
         cpus_per_task=cores_of(DEFAULT.forests["ranks"]),
-        mem_mb=growing(training_memory(DEFAULT)),
-        runtime=growing(240),
     params:
         source=source("forests.commands.train"),
         on_ranks=on_ranks(DEFAULT.forests["ranks"]),
@@ -88,3 +85,4 @@ use rule describe_forests as describe_default_forest with:
         f"{DEFAULT_FOLDER}/forests.json",
     log:
         f"{LOGS}/default_forest/describe.log",
+    localrule: True

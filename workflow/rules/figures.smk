@@ -39,8 +39,7 @@ rule follow_convergence_in_full:
         f"{BENCHMARKS}/{catalogue.FIGURES.folder}/{{shape}}/convergence.tsv"
     threads: SOLVER_CORES
     resources:
-        mem_mb=growing(16000),
-        runtime=growing(120),
+        **limits("follow_convergence_in_full"),
     params:
         source=source("solver.commands.convergence"),
         shape=shape_arguments,
@@ -63,8 +62,7 @@ rule measure_scaling:
         f"{BENCHMARKS}/{catalogue.FIGURES.folder}/{{shape}}/scaling.tsv"
     threads: SOLVER_CORES
     resources:
-        mem_mb=growing(16000),
-        runtime=growing(120),
+        **limits("measure_scaling"),
     params:
         source=source("solver.commands.scaling"),
         shape=shape_arguments,

@@ -14,11 +14,10 @@ rule train_forests:
         f"{BENCHMARKS}/forests/train.tsv"
     threads: SOLVER_CORES
     resources:
+        **limits("train_forests", training_memory(OWN)),
         mpi=launcher(OWN.forests["ranks"]),
         tasks=OWN.forests["ranks"],
         cpus_per_task=cores_of(OWN.forests["ranks"]),
-        mem_mb=growing(training_memory(OWN)),
-        runtime=growing(240),
     params:
         source=source("forests.commands.train"),
         on_ranks=on_ranks(OWN.forests["ranks"]),
@@ -36,9 +35,6 @@ rule describe_forests:
     log:
         f"{LOGS}/forests/describe.log",
     localrule: True
-    resources:
-        mem_mb=1000,
-        runtime="10m",
     params:
         source=source("forests.commands.inspect"),
     shell:
@@ -58,8 +54,7 @@ rule rate_forests:
         f"{BENCHMARKS}/forests/rate.tsv"
     threads: SOLVER_CORES
     resources:
-        mem_mb=growing(2000),
-        runtime=growing(30),
+        **limits("rate_forests"),
     params:
         source=source("forests.commands.table"),
         blocks=OWN.forests["blocks"],

@@ -17,6 +17,7 @@ use rule describe_forests as describe_studied_forests with:
         f"{FORESTS_STUDY}/model.json",
     log:
         f"{LOGS}/forests_study/describe.log",
+    localrule: True
 
 
 # The rules below take all cores, although some use one, since they time what they do.
@@ -44,8 +45,7 @@ rule benchmark_forests:
         f"{LOGS}/forests_study/benchmark.log",
     threads: SOLVER_CORES
     resources:
-        mem_mb=growing(2000),
-        runtime=growing(30),
+        **limits("benchmark_forests"),
     params:
         source=source("forests.commands.benchmark"),
         blocks=config["forests_study"]["timed_blocks"],
@@ -69,8 +69,7 @@ rule compare_trainings:
         f"{BENCHMARKS}/forests_study/variants.tsv"
     threads: SOLVER_CORES
     resources:
-        mem_mb=growing(8000),
-        runtime=growing(240),
+        **limits("compare_trainings"),
     params:
         source=source("forests.commands.variants"),
         training=STUDY_TRAINING.train_arguments,
@@ -96,8 +95,7 @@ rule follow_learning:
         f"{BENCHMARKS}/forests_study/curve.tsv"
     threads: SOLVER_CORES
     resources:
-        mem_mb=growing(8000),
-        runtime=growing(240),
+        **limits("follow_learning"),
     params:
         source=source("forests.commands.curve"),
         training=STUDY_TRAINING.train_arguments,

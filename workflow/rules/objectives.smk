@@ -18,8 +18,7 @@ rule rate_objectives:
         f"{BENCHMARKS}/objectives/{{solid}}/{{resolution}}-{{material}}.tsv"
     threads: 1
     resources:
-        mem_mb=growing(3000),
-        runtime=growing(60),
+        **limits("rate_objectives"),
     params:
         source=source("solver.commands.objectives"),
         case=case_arguments,

@@ -16,8 +16,7 @@ rule synthesise_clip:
         example=SYNTHESISED,
     threads: 1
     resources:
-        mem_mb=growing(1000),
-        runtime=growing(10),
+        **limits("synthesise_clip"),
     params:
         source=source("sound.commands.clip"),
         how=lambda wildcards: targets_of(wildcards)[wildcards.point].clip.split(),
@@ -36,8 +35,7 @@ rule check_design:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/truth.log",
     threads: SOLVER_CORES
     resources:
-        mem_mb=growing(8000),
-        runtime=growing(60),
+        **limits("check_design"),
     params:
         source=source("solver.commands.modes"),
         solid=lambda wildcards: sound_examples.solid_arguments(EXAMPLES[wildcards.example]),
@@ -55,9 +53,6 @@ rule save_recorded_moduli:
     wildcard_constraints:
         example=RECORDED,
     localrule: True
-    resources:
-        mem_mb=1000,
-        runtime="5m",
     params:
         source=source("workflow.scripts.save_recorded_moduli"),
         example=recording_of,
@@ -86,8 +81,7 @@ rule record_clip:
         example=RECORDED,
     threads: 1
     resources:
-        mem_mb=growing(1000),
-        runtime=growing(10),
+        **limits("record_clip"),
     params:
         source=source("sound.commands.render"),
         how=strike_of_recording,
@@ -102,9 +96,6 @@ rule write_project:
     log:
         f"{LOGS}/{SOUND_FOLDER}/{{part}}/project.log",
     localrule: True
-    resources:
-        mem_mb=500,
-        runtime="5m",
     params:
         source=source("workflow.scripts.write_yaml"),
         content=lambda wildcards: sound_examples.project(
@@ -130,8 +121,7 @@ rule design_sound:
         f"{BENCHMARKS}/{SOUND_FOLDER}/{{part}}/design.tsv"
     threads: SOLVER_CORES
     resources:
-        mem_mb=growing(8000),
-        runtime=growing(60),
+        **limits("design_sound"),
     params:
         source=source("sound.commands.design"),
         start=lambda wildcards, input: options({"initial_design": str(input.before)}),
@@ -153,8 +143,7 @@ rule begin_design:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/start.log",
     threads: SOLVER_CORES
     resources:
-        mem_mb=growing(8000),
-        runtime=growing(30),
+        **limits("begin_design"),
     params:
         source=source("sound.commands.design"),
     shell:
@@ -176,8 +165,7 @@ rule compare_optimisers:
         f"{BENCHMARKS}/{SOUND_FOLDER}/{{example}}/optimisers.tsv"
     threads: SOLVER_CORES
     resources:
-        mem_mb=growing(8000),
-        runtime=growing(60),
+        **limits("compare_optimisers"),
     params:
         source=source("sound.commands.benchmark"),
         seconds=config["sound"]["compare_seconds"],
@@ -195,9 +183,6 @@ rule save_moduli:
     log:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/young.log",
     localrule: True
-    resources:
-        mem_mb=500,
-        runtime="5m",
     params:
         source=source("workflow.scripts.save_moduli"),
     script:
@@ -213,8 +198,7 @@ rule render_before:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/before-{{point}}.log",
     threads: 1
     resources:
-        mem_mb=growing(1000),
-        runtime=growing(10),
+        **limits("render_before"),
     params:
         source=source("sound.commands.render"),
         place=place_arguments,
@@ -242,8 +226,7 @@ rule render_fine:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/fine-{{point}}.log",
     threads: 1
     resources:
-        mem_mb=growing(2000),
-        runtime=growing(10),
+        **limits("render_fine"),
     params:
         source=source("sound.commands.render"),
         place=place_arguments,
@@ -267,9 +250,6 @@ rule build_sound_page:
     log:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/page.log",
     localrule: True
-    resources:
-        mem_mb=2000,
-        runtime="15m",
     params:
         source=made_by("page", *pages_of(catalogue.SOUND)),
         study=told(catalogue.SOUND, "tables", "page"),
@@ -289,9 +269,6 @@ rule build_sounds_index:
     log:
         f"{LOGS}/{SOUND_FOLDER}/index.log",
     localrule: True
-    resources:
-        mem_mb=1000,
-        runtime="10m",
     params:
         source=made_by("page", *pages_of(catalogue.SOUNDS)),
         study=told(catalogue.SOUNDS, "tables", "page"),

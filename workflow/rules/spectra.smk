@@ -13,11 +13,10 @@ rule find_modes:
         f"{BENCHMARKS}/models/{{model}}/{{variant}}.tsv"
     threads: SOLVER_CORES
     resources:
+        **limits("find_modes"),
         mpi=launcher(RANKS),
         tasks=RANKS,
         cpus_per_task=cores_of(RANKS),
-        mem_mb=growing(8000),
-        runtime=growing(120),
     params:
         source=source("solver.commands.modes"),
         ranks=RANKS,
@@ -44,8 +43,7 @@ rule follow_convergence:
         f"{BENCHMARKS}/models/{{model}}/convergence.tsv"
     threads: SOLVER_CORES
     resources:
-        mem_mb=growing(8000),
-        runtime=growing(120),
+        **limits("follow_convergence"),
     params:
         source=source("solver.commands.convergence"),
         model=model_arguments,
@@ -65,10 +63,11 @@ rule compare_with_truth:
         f"{RESULTS}/models/{{model}}/{{variant}}.comparison.json",
     log:
         f"{LOGS}/models/{{model}}/{{variant}}.comparison.log",
+    benchmark:
+        f"{BENCHMARKS}/models/{{model}}/{{variant}}.comparison.tsv"
     threads: 1
     resources:
-        mem_mb=growing(4000),
-        runtime=growing(30),
+        **limits("compare_with_truth"),
     params:
         source=source("solver.commands.compare"),
     shell:
@@ -89,11 +88,10 @@ rule time_methods:
         f"{BENCHMARKS}/models/{{model}}/methods.tsv"
     threads: SOLVER_CORES
     resources:
+        **limits("time_methods"),
         mpi=launcher(RANKS),
         tasks=RANKS,
         cpus_per_task=cores_of(RANKS),
-        mem_mb=growing(8000),
-        runtime=growing(240),
     params:
         source=source("solver.commands.benchmark"),
         ranks=RANKS,

@@ -7,9 +7,6 @@ rule save_config:
     log:
         f"{LOGS}/config.log",
     localrule: True
-    resources:
-        mem_mb=200,
-        runtime="5m",
     params:
         source=source("workflow.scripts.write_yaml"),
         content=settings.resolved(config),
@@ -31,9 +28,6 @@ for study in catalogue.STUDIES:
         log:
             f"{logs_of(study)}/tables.log",
         localrule: True
-        resources:
-            mem_mb=2000,
-            runtime="10m",
         params:
             source=made_by("tabulate", study.results, *study.table_modules),
             study=told(study, "tables"),
@@ -55,9 +49,6 @@ for study in catalogue.STUDIES:
             log:
                 f"{logs_of(study)}/figures/{figure.file}.log",
             localrule: True
-            resources:
-                mem_mb=1000,
-                runtime="10m",
             params:
                 source=made_by("plot", study.results, figure.draw),
                 study=told(study),
@@ -79,9 +70,6 @@ for study in catalogue.STUDIES:
         log:
             f"{logs_of(study)}/report.log",
         localrule: True
-        resources:
-            mem_mb=1000,
-            runtime="10m",
         params:
             source=made_by("page", study.results, study.page),
             study=told(study, "page"),
@@ -108,9 +96,6 @@ rule draw_modes:
     log:
         f"{LOGS}/figures/{{model}}-mode.log",
     localrule: True
-    resources:
-        mem_mb=2000,
-        runtime="15m",
     params:
         source=source("workflow.scripts.draw_modes"),
     script:
@@ -135,9 +120,6 @@ rule draw_overview:
     log:
         f"{LOGS}/figures/{{model}}-overview.log",
     localrule: True
-    resources:
-        mem_mb=1000,
-        runtime="10m",
     params:
         source=made_by("plot", "report.overview:overview_figure"),
         study=told(catalogue.REPORT),

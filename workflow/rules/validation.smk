@@ -14,10 +14,11 @@ rule audit_spectra:
         f"{RESULTS}/models/{{model}}/audit.json",
     log:
         f"{LOGS}/models/{{model}}/audit.log",
+    benchmark:
+        f"{BENCHMARKS}/models/{{model}}/audit.tsv"
     threads: 1
     resources:
-        mem_mb=growing(6000),
-        runtime=growing(30),
+        **limits("audit_spectra"),
     params:
         source=source("solver.commands.audit"),
     shell:
@@ -31,10 +32,11 @@ rule strike_solid:
         f"{RESULTS}/models/{{model}}/response.h5",
     log:
         f"{LOGS}/models/{{model}}/response.log",
+    benchmark:
+        f"{BENCHMARKS}/models/{{model}}/response.tsv"
     threads: 1
     resources:
-        mem_mb=growing(4000),
-        runtime=growing(30),
+        **limits("strike_solid"),
     params:
         source=source("solver.commands.respond"),
         strike=strike_arguments,
@@ -67,9 +69,6 @@ rule validate_model:
     log:
         f"{LOGS}/validation/{{model}}.log",
     localrule: True
-    resources:
-        mem_mb=2000,
-        runtime="15m",
     params:
         source=made_by("page", *pages_of(catalogue.VALIDATION)),
         study=told(catalogue.VALIDATION, "tables", "page"),

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -70,6 +71,7 @@ def tables_of(file: str) -> dict[str, Entry]:
     return {name: _entry(Path(file), name) for name in _read(Path(file))}
 
 
+@cache
 def _read(file: Path) -> dict[str, dict[str, str]]:
     loaded: dict[str, dict[str, str]] = yaml.safe_load((STUDIES / file).read_text("utf-8"))
     return loaded

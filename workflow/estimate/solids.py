@@ -1,0 +1,74 @@
+"""How many unknowns a solid has: counted on coarse voxels, from volume and surface beyond."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from carillon.errors import UserError
+from carillon.fem.geometry import blocks_from_mesh, hexmesh_from_voxels, load_surface, voxelize
+from workflow.settings import BUILTIN
+
+TYPICAL = 0.8, 0.15
+"""Unknowns of a compact solid such as the Stanford bunny on the fine and the coarse mesh, over the
+cube of the voxels along its longest side."""
+
+LARGEST_COUNTED = 20
+"""Resolution up to which voxels are made and counted, which takes longer than the rest."""
+
+
+class Size(NamedTuple):
+    """Unknowns of a solid on its fine mesh and on that of its blocks, and where they are from."""
+
+    fine: int
+    coarse: int
+    basis: str
+
+
+class Solid(NamedTuple):
+    """What decides about the size: mesh argument of the solver, voxels along the longest side."""
+
+    mesh: str
+    resolution: int
+    fill: str = "winding"
+    components: str = "error"
+
+
+@cache
+def size_of(solid: Solid) -> Size:
+    """Unknowns of a solid: counted, scaled up from a coarser count, or guessed without its mesh.
+
+    Raises
+    ------
+    UserError
+        If the mesh cannot be voxelised so.
+    """
+    if not solid.mesh.startswith(BUILTIN) and not Path(solid.mesh).is_file():
+        fine, coarse = (round(share * solid.resolution**3) for share in TYPICAL)
+        return Size(fine, coarse, f"guessed, {solid.mesh} is absent: as compact as the bunny")
+    if solid.resolution > LARGEST_COUNTED:
+        # What is one piece with thick walls may be none on coarse voxels.
+        with suppress(UserError):
+            unknowns, cells = _counted(solid.mesh, LARGEST_COUNTED, solid.fill, "largest")
+            growth = solid.resolution / LARGEST_COUNTED
+            # A node for each cell grows with the volume, further ones with the surface.
+            fine, coarse = np.rint(growth**3 * cells + growth**2 * (unknowns - cells))
+            basis = f"counted on its voxels at resolution {LARGEST_COUNTED}, times "
+            return Size(int(fine), int(coarse), f"{basis}{fine / unknowns[0]:,.1f}")
+    (fine, coarse), _ = _counted(solid.mesh, solid.resolution, solid.fill, solid.components)
+    return Size(int(fine), int(coarse), "counted on its voxels")
+
+
+@cache
+def _counted(
+    mesh: str, resolution: int, fill: str, components: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Unknowns on the fine and the coarse mesh, and what three a cell would be."""
+    voxels = voxelize(load_surface(mesh), resolution, fill, components, mesh)
+    cells = hexmesh_from_voxels(voxels)
+    unknowns = np.array([cells.n_dofs, 3 * blocks_from_mesh(cells).coarse.n_nodes])
+    return unknowns, 3.0 * voxels.n_cells * np.array([1.0, 0.125])
