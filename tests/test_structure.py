@@ -157,3 +157,12 @@ def test_no_arrow_points_back():
 def test_rooms_stand_in_one_chain(package):
     place = ROOMS.index(package.split(".")[0])
     assert {other.split(".")[0] for other in arrows()[package]} <= set(ROOMS[: place + 1])
+
+
+def test_class_names_are_told_apart():
+    named: dict[str, list[str]] = {}
+    for name, path in modules().items():
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ClassDef):
+                named.setdefault(node.name, []).append(name)
+    assert {name: where for name, where in named.items() if len(where) > 1} == {}

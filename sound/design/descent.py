@@ -116,7 +116,7 @@ class CostPoint(NamedTuple):
 
 
 @dataclass
-class DescentState:
+class DesignDescent:
     """How far a descent came.
 
     Attributes
@@ -188,7 +188,7 @@ def descend(
     steps: int,
     damping: tuple[float, ...] | None = None,
     limits: DescentLimits = DescentLimits(),
-) -> DescentState:
+) -> DesignDescent:
     """Up to `steps` steps from z, each of which lowers the whole of Eq. (4).
 
     Parameters
@@ -207,7 +207,7 @@ def descend(
     """
     evaluation = simulation.evaluate(z, start, derivatives=True)
     costs = [CostPoint(time.monotonic(), 1, cost_of(objective, simulation.material, evaluation))]
-    here = DescentState(evaluation, costs, 1, damping or (options.damping,) * len(options.parts))
+    here = DesignDescent(evaluation, costs, 1, damping or (options.damping,) * len(options.parts))
     idle = 0
     for step in range(steps):
         taken = _step(simulation, objective, here, options, step % len(options.parts), limits)
@@ -227,7 +227,7 @@ def descend_by_gradients(
     start: Array | None,
     evaluations: int,
     limits: DescentLimits = DescentLimits(),
-) -> DescentState:
+) -> DesignDescent:
     """Descent by L-BFGS (scipy), with about as many gradients as `evaluations` says.
 
     Parameters and errors are those of `descend`.
@@ -236,7 +236,7 @@ def descend_by_gradients(
 
     evaluation = simulation.evaluate(z, start, derivatives=True)
     costs = [CostPoint(time.monotonic(), 1, cost_of(objective, simulation.material, evaluation))]
-    here = DescentState(evaluation, costs, 1, ())
+    here = DesignDescent(evaluation, costs, 1, ())
 
     def value(point: Array) -> tuple[float, Array]:
         if limits.reached(here.evaluations):
@@ -268,7 +268,7 @@ class _LimitError(Exception):
 def _step(
     simulation: Simulation,
     objective: Objective,
-    here: DescentState,
+    here: DesignDescent,
     options: StepOptions,
     part: int,
     limits: DescentLimits,

@@ -26,7 +26,7 @@ from carillon.threads import one_thread
 from solver.analysis.problem import ProblemOptions
 from sound.design.descent import (
     DescentLimits,
-    DescentState,
+    DesignDescent,
     LimitedMemory,
     StepOptions,
     cost_of,
@@ -110,7 +110,7 @@ class Trial:
     cost: DesignCost
     evaluations: int
     gradient: Array | None = None
-    descent: DescentState | None = None
+    descent: DesignDescent | None = None
     start: Array | None = None
 
 
@@ -206,7 +206,7 @@ def _run(task: Task) -> Trial:
     return Trial(task.z, FAILED, 1)
 
 
-def _descent(task: Task, options: StepOptions | LimitedMemory) -> DescentState:
+def _descent(task: Task, options: StepOptions | LimitedMemory) -> DesignDescent:
     parts = (_simulation, _objective, task.z, task.start)
     if isinstance(options, LimitedMemory):
         return descend_by_gradients(*parts, task.steps * options.evaluations, task.limits)
