@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-import schema_tables
+import schema_keys
 
 from tests.test_workflow_config import every_key
 from tests.workflow_runs import planned, snakemake
@@ -64,18 +64,15 @@ def test_a_shard_of_the_papers_data_is_about_an_hour():
 
 
 def test_the_page_has_every_key():
-    text = schema_tables.of_configuration()
+    text = schema_keys.of_configuration()
     for path, _ in every_key(settings.schema()):
         name = path.replace("*", "NAME")
         assert f"`{name}`" in text or f"## {name}" in text or name.endswith(".NAME"), name
 
 
 def test_the_page_tells_type_default_unit_and_meaning():
-    row = next(
-        line for line in schema_tables.of_configuration().splitlines() if "`dataset.shards`" in line
-    )
-    assert row.split(" | ")[1:4] == ["integer, at least 1, at most 10,000", "`2`", "1"]
-    density = next(
-        line for line in schema_tables.of_configuration().splitlines() if ".density`" in line
-    )
-    assert "kg/m^3" in density and density.endswith("Mass density of the solid |")
+    text = schema_keys.of_configuration()
+    shards = "`dataset.shards` integer, at least 1, at most 10,000; default `2`\n: "
+    assert shards in text
+    density = text[text.index("`models.NAME.density` ") :].split("\n\n")[0]
+    assert " [kg/m^3]; default `1000.0`\n: Mass density of the solid." in density

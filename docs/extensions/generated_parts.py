@@ -8,15 +8,15 @@ from typing import Any
 
 import command_help
 import rooms_picture
-import schema_tables
+import schema_keys
 from sphinx.application import Sphinx
 
 PARTS: dict[str, Callable[..., str]] = {
     "commands": command_help.of_room,
     "rooms": rooms_picture.of_rooms,
     "packages": rooms_picture.of_packages,
-    "configuration": schema_tables.of_configuration,
-    "project": schema_tables.of_project,
+    "configuration": schema_keys.of_configuration,
+    "project": schema_keys.of_project,
 }
 _PLACE = re.compile(r"^<!-- made here: (.+) -->$", re.MULTILINE)
 

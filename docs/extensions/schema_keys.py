@@ -1,4 +1,4 @@
-"""Keys of the configuration and of projects as tables, from their schemas."""
+"""Keys of the configuration and of projects as lists, from their schemas."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import yaml
 from sound.project.schema import SCHEMA as PROJECT_SCHEMA
 from workflow import settings
 
-_TABLE = "| key | type | default | unit | meaning |\n| --- | --- | --- | --- | --- |"
 _BOUNDS = {
     "minimum": "at least {}",
     "exclusiveMinimum": "above {}",
@@ -39,12 +38,12 @@ def of_project() -> str:
 
 def _sections(schema: Schema, plain_title: str) -> str:
     plain = {key: part for key, part in schema["properties"].items() if not _is_section(part)}
-    parts = [f"## {plain_title}\n\n{_table(_rows(plain, '', schema['required']))}"]
+    parts = [f"## {plain_title}", *_entries(plain, "", schema["required"])]
     for key, part in schema["properties"].items():
         if _is_section(part):
             required = _nested(part).get("required", ())
-            rows = _rows(_children(part), f"{_named(key, part)}.", required)
-            parts.append(f"## {key}\n\n{part['description']}.\n\n{_table(rows)}")
+            parts += [f"## {key}", f"{part['description']}."]
+            parts += _entries(_children(part), f"{_named(key, part)}.", required)
     return "\n\n".join(parts) + "\n"
 
 
@@ -74,19 +73,17 @@ def _named(key: str, part: Schema) -> str:
     return f"{key}[]" if part.get("type") == "array" else f"{key}.NAME"
 
 
-def _rows(parts: Mapping[str, Any], prefix: str, required: Any) -> Iterator[tuple[str, ...]]:
+def _entries(parts: Mapping[str, Any], prefix: str, required: Any) -> Iterator[str]:
+    """Each key with its type, unit and default, and what it means."""
     for key, part in parts.items():
+        described = _UNIT.match(part["description"])
+        meaning, unit = described.groups() if described else (part["description"], "1")
         default = "required" if key in required else _default(part)
-        found = _UNIT.match(part["description"])
-        meaning, unit = found.groups() if found else (part["description"], "")
-        yield f"`{prefix}{key}`", _type(part), default, unit, _cell(meaning)
+        facts = [_type(part) + ("" if unit == "1" else f" [{unit}]"), default]
+        yield f"`{prefix}{key}` {'; '.join(filter(None, facts))}\n: {meaning}."
         nested = _nested(part)
         below = f"{prefix}{_named(key, part)}."
-        yield from _rows(_children(part), below, nested.get("required", ()))
-
-
-def _table(rows: Iterator[tuple[str, ...]]) -> str:
-    return "\n".join([_TABLE, *(f"| {' | '.join(row)} |" for row in rows)])
+        yield from _entries(_children(part), below, nested.get("required", ()))
 
 
 def _type(part: Schema) -> str:
@@ -110,8 +107,4 @@ def _default(part: Schema) -> str:
     """Default of a key; that of a section is its keys' own."""
     if "default" not in part or (_children(part) and part["default"] == {}):
         return ""
-    return f"`{_cell(json.dumps(part['default'], ensure_ascii=False))}`"
-
-
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|")
+    return f"default `{json.dumps(part['default'], ensure_ascii=False)}`"
