@@ -42,20 +42,20 @@ def fingerprint(*modules: str) -> str:
 
 def _needed(modules: Iterable[str]) -> set[Path]:
     """Files of the modules, of what they import, and of the data beside them that they name."""
-    found: set[Path] = set()
+    files: set[Path] = set()
     waiting = []
     for name in modules:
         path = _file_of(name)
         if path is None:
             raise ValueError(f"there is no module {name} in {ROOT}")
-        found.add(path)
+        files.add(path)
         waiting.append(path)
     while waiting:
         modules_named, data = _named_in(waiting.pop())
-        new = modules_named - found
-        found |= new | data
+        new = modules_named - files
+        files |= new | data
         waiting.extend(new)
-    return found
+    return files
 
 
 @cache

@@ -76,17 +76,17 @@ def _read(file: Path) -> dict[str, dict[str, str]]:
 
 
 def _entry(file: Path, name: str) -> Entry:
-    told = {"room": file.parent.name, **_read(file)[name]}
-    if "like" in told:
-        other = told.pop("like")
-        told = {**_read(Path(other, "tables.yaml"))[name], **_own(told, other)}
-    module, _, rows = told.pop("rows").rpartition(".")
-    return Entry(name, f"{told.pop('room')}.{module}", rows, **told)
+    entry = {"room": file.parent.name, **_read(file)[name]}
+    if "like" in entry:
+        other = entry.pop("like")
+        entry = {**_read(Path(other, "tables.yaml"))[name], **_own(entry, other)}
+    module, _, rows = entry.pop("rows").rpartition(".")
+    return Entry(name, f"{entry.pop('room')}.{module}", rows, **entry)
 
 
-def _own(told: Mapping[str, str], other: str) -> dict[str, str]:
+def _own(entry: Mapping[str, str], other: str) -> dict[str, str]:
     """What an entry says beside another room's, whose function it is if it names none."""
-    return dict(told) if "rows" in told else {**told, "room": other}
+    return dict(entry) if "rows" in entry else {**entry, "room": other}
 
 
 def _rendered(text: str, names: Mapping[str, Any], results: Any) -> str:
@@ -95,8 +95,8 @@ def _rendered(text: str, names: Mapping[str, Any], results: Any) -> str:
 
 def _picked(row: Row, columns: Iterable[Column]) -> Row:
     """The values of the columns."""
-    found = {column.key: _value(row, column.source or column.key) for column in columns}
-    return {key: value for key, value in found.items() if value is not _ABSENT}
+    values = {column.key: _value(row, column.source or column.key) for column in columns}
+    return {key: value for key, value in values.items() if value is not _ABSENT}
 
 
 def _value(row: Any, source: str) -> Any:

@@ -17,10 +17,10 @@ def rows_of(results: Any) -> list[Row]:
 def _row(file: str, origin: Mapping[str, Any]) -> Row:
     parameters = _unpacked(origin.get("parameters", "{}"))
     versions = _unpacked(origin.get("versions", "{}"))
-    told = ("command", "commit", "config_hash", "blas", "processor", "cores")
+    keys = ("command", "commit", "config_hash", "blas", "processor", "cores")
     return {
         "file": file,
-        **{key: origin.get(key) for key in told},
+        **{key: origin.get(key) for key in keys},
         "seed": parameters.get("seed"),
         "versions": ", ".join(f"{name} {version}" for name, version in versions.items()),
     }

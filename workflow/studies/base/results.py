@@ -89,9 +89,9 @@ class Results:
     def origins(self) -> dict[str, Record]:
         """Provenance of the result files by name."""
         return {
-            f"models/{name}/{file}.json": found["provenance"]
+            f"models/{name}/{file}.json": output["provenance"]
             for file in solids.MEASURED[self.study]
-            for name, found in getattr(self, file).items()
+            for name, output in getattr(self, file).items()
         }
 
     def by_model(self, file: str, names: Iterable[str]) -> dict[str, Any]:

@@ -91,17 +91,18 @@ def verdict(kind: str, before: Value, now: Value) -> str:
         return SAME if math.isnan(old) and math.isnan(new) else CHANGED
     if kind in ("seconds", "times"):
         moved = _time_moved(kind, old, new, before.spread, now.spread)
-        return _told(moved, (new > old) == (kind == "seconds"), SLOWER, FASTER)
+        return _moved(moved, (new > old) == (kind == "seconds"), SLOWER, FASTER)
     if kind in ERRORS:
-        return _told(_error_moved(old, new), abs(new) > abs(old), LESS_ACCURATE, MORE_ACCURATE)
+        return _moved(_error_moved(old, new), abs(new) > abs(old), LESS_ACCURATE, MORE_ACCURATE)
     if kind == "score":
-        return _told(_error_moved(1.0 - old, 1.0 - new), new < old, LESS_ACCURATE, MORE_ACCURATE)
+        moved = _error_moved(1.0 - old, 1.0 - new)
+        return _moved(moved, new < old, LESS_ACCURATE, MORE_ACCURATE)
     if kind == "bytes":
-        return _told(_excess(old, new) > BYTES_TOLERANCE, new > old, LARGER, SMALLER)
+        return _moved(_excess(old, new) > BYTES_TOLERANCE, new > old, LARGER, SMALLER)
     return CHANGED if _excess(old, new) > VALUE_TOLERANCE else SAME
 
 
-def _told(moved: bool, for_the_worse: bool, worse: str, better: str) -> str:
+def _moved(moved: bool, for_the_worse: bool, worse: str, better: str) -> str:
     if not moved:
         return SAME
     return worse if for_the_worse else better

@@ -23,9 +23,9 @@ from workflow.studies.comparison.noise import BETTER, RULES, VERDICTS, WORSE
 NAME = "comparison"
 MACHINE = ("processor", "cores", "memory", "ranks", "threads", "blas")
 """Conditions on which times depend, whatever the code."""
-MOST_MOVED = 25
+MAX_MOVED = 25
 """Moved numbers of a table that people are told; all are in the CSV file."""
-MOST_LISTED = 200
+MAX_LISTED = 200
 """Numbers of a table up to which the page lists all of them."""
 TITLE = "What moved"
 TABLES = tables_of("comparison/tables.yaml")
@@ -61,7 +61,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
     }
 
 
-def as_text(comparison: Comparison, most: int = MOST_MOVED) -> str:
+def as_text(comparison: Comparison, most: int = MAX_MOVED) -> str:
     """The short form, for a terminal."""
     before, now = comparison.before, comparison.now
     lines = [f"{before.path} (baseline) and {now.path} (this run)"]
@@ -85,9 +85,9 @@ def as_markdown(comparison: Comparison) -> str:
     parts += [each.as_markdown() for each in _differing(comparison)] or ["The same."]
     parts += [*_caution(comparison), "## Moved"]
     for path, moved in _by_table(comparison.moved):
-        parts += [f"### {path}", _listed(path, moved.head(MOST_MOVED)).as_markdown()]
-        if len(moved) > MOST_MOVED:
-            parts.append(f"And {len(moved) - MOST_MOVED:,} more, see {NAME}.csv.")
+        parts += [f"### {path}", _listed(path, moved.head(MAX_MOVED)).as_markdown()]
+        if len(moved) > MAX_MOVED:
+            parts.append(f"And {len(moved) - MAX_MOVED:,} more, see {NAME}.csv.")
     if comparison.moved.empty:
         parts.append("Nothing.")
     parts += ["## By table", TABLES["counts"](comparison.cells).as_markdown()]
@@ -108,13 +108,13 @@ def as_page(comparison: Comparison) -> str:
         differing=_differing(comparison),
         cautions=_caution(comparison),
         moved=[
-            (path, _listed(f"{path}-moved", moved.head(MOST_MOVED)), len(moved))
+            (path, _listed(f"{path}-moved", moved.head(MAX_MOVED)), len(moved))
             for path, moved in _by_table(comparison.moved)
         ],
-        most=MOST_MOVED,
+        most=MAX_MOVED,
         counts=TABLES["counts"](comparison.cells),
-        listed=[_listed(path, cells) for path, cells in by_table if len(cells) <= MOST_LISTED],
-        unlisted=[path for path, cells in by_table if len(cells) > MOST_LISTED],
+        listed=[_listed(path, cells) for path, cells in by_table if len(cells) <= MAX_LISTED],
+        unlisted=[path for path, cells in by_table if len(cells) > MAX_LISTED],
         one_sided=_one_sided(comparison),
         rules=RULES,
     )
@@ -122,10 +122,10 @@ def as_page(comparison: Comparison) -> str:
 
 def summary(comparison: Comparison) -> str:
     """What became of the numbers, in one sentence."""
-    found = comparison.moved["verdict"].value_counts()
-    told = [f"{show(found[name], 'count')} {name}" for name in VERDICTS if name in found]
+    verdicts = comparison.moved["verdict"].value_counts()
+    parts = [f"{show(verdicts[name], 'count')} {name}" for name in VERDICTS if name in verdicts]
     numbers = f"{show(len(comparison.cells), 'count')} numbers compared"
-    return f"{numbers}: {', '.join(told) if told else 'none moved beyond noise'}"
+    return f"{numbers}: {', '.join(parts) if parts else 'none moved beyond noise'}"
 
 
 def every_number(cells: pd.DataFrame) -> list[Row]:
@@ -138,10 +138,10 @@ def counts(cells: pd.DataFrame) -> list[Row]:
     """How many numbers of each table were compared, and what became of them."""
     moved = cells["verdict"].isin(VERDICTS)
     worse, better = (cells["verdict"].isin(verdicts) for verdicts in (WORSE, BETTER))
-    found = pd.DataFrame(
+    flags = pd.DataFrame(
         {"compared": 1, "worse": worse, "better": better, "other": moved & ~worse & ~better}
     )
-    summed = found.groupby(cells["table"], sort=False).sum().astype(int)
+    summed = flags.groupby(cells["table"], sort=False).sum().astype(int)
     rows: list[Row] = summed.reset_index().to_dict("records")
     return rows
 
@@ -183,8 +183,8 @@ def _sides(comparison: Comparison) -> str:
 
 def _caution(comparison: Comparison) -> list[str]:
     """A sentence about times where the machine is not the same; none otherwise."""
-    found = {item["what"] for item in comparison.conditions}
-    different = [LABELS[key] for key in MACHINE if LABELS[key] in found]
+    names = {item["what"] for item in comparison.conditions}
+    different = [LABELS[key] for key in MACHINE if LABELS[key] in names]
     if not different:
         return []
     return [f"Not the same: {', '.join(different)}; times that moved may tell about these alone."]

@@ -38,8 +38,8 @@ def shortened(study: Objectives) -> list[str]:
     """Cases whose coarse model has fewer modes than were asked for, in words."""
     return [
         f"{study.label(case)} ({last} modes)"
-        for case, found in study.found.items()
-        if (last := found["rows"][0]["all"]["last"]) < found["modes"]
+        for case, rating in study.ratings.items()
+        if (last := rating["rows"][0]["all"]["last"]) < rating["modes"]
     ]
 
 

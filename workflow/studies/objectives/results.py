@@ -46,14 +46,14 @@ class Objectives(Results):
     section = SECTION
 
     @cached_property
-    def found(self) -> dict[Case, dict[str, Any]]:
+    def ratings(self) -> dict[Case, dict[str, Any]]:
         """Output of `solver objectives` by case."""
         return {case: self.read_json(f"cases/{case.path}") for case in cases_of(self.config)}
 
     @property
     def origins(self) -> dict[str, Record]:
         """Provenance of every case."""
-        return {f"cases/{case.path}": each["provenance"] for case, each in self.found.items()}
+        return {f"cases/{case.path}": each["provenance"] for case, each in self.ratings.items()}
 
     @property
     def solids(self) -> list[str]:
@@ -74,8 +74,8 @@ class Objectives(Results):
     @property
     def forest(self) -> dict[str, str] | None:
         """Which forests are compared: `forest`, `forest_objective`, `forest_sha256`; or None."""
-        found: dict[str, str] | None = self._any.get("forest")
-        return found
+        forest: dict[str, str] | None = self._any.get("forest")
+        return forest
 
     @property
     def without_forest(self) -> str:
@@ -86,11 +86,11 @@ class Objectives(Results):
     @property
     def _any(self) -> dict[str, Any]:
         """The first case, for what is the same in all of them."""
-        return next(iter(self.found.values()))
+        return next(iter(self.ratings.values()))
 
     def last(self, part: str) -> int:
         """Last mode compared: of the `audible` 7..60, or of `all`; earlier if fewer were wanted."""
-        rows = (row for found in self.found.values() for row in found["rows"])
+        rows = (row for rating in self.ratings.values() for row in rating["rows"])
         return max(row[part]["last"] for row in rows)
 
     def identity(self, case: Case) -> dict[str, Any]:
@@ -109,7 +109,7 @@ class Objectives(Results):
 
     def errors(self, case: Case, coarsening: str) -> dict[str, Any]:
         """Row of a case that belongs to a coarsening."""
-        rows: list[dict[str, Any]] = self.found[case]["rows"]
+        rows: list[dict[str, Any]] = self.ratings[case]["rows"]
         return next(row for row in rows if row["coarsening"] == coarsening)
 
     def rms(self, case: Case, coarsening: str) -> float:

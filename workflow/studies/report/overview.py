@@ -23,14 +23,14 @@ COMPARED = (TRUTH, "hcms_ec", FAST)
 def overview_figure(results: Run, model: str) -> Figure:
     """First elastic mode of the truth and of the fast method, and the spectra of both."""
     truth = read_modes(results.modes_path(model, TRUTH))
-    wanted = displacement(truth, RIGID_MODES)
-    view = view_of(truth.mesh, wanted)
+    reference = displacement(truth, RIGID_MODES)
+    view = view_of(truth.mesh, reference)
     with plt.rc_context({"figure.constrained_layout.use": False}):
         figure = plt.figure(figsize=(11.6, 3.9))
         for column, variant in enumerate((TRUTH, FAST)):
             left = 0.01 + 0.3 * column
             file = truth if variant == TRUTH else read_modes(results.modes_path(model, FAST))
-            motion, _ = aligned(file, truth, wanted)
+            motion, _ = aligned(file, truth, reference)
             body = figure.add_axes((left, 0.0, 0.29, 0.84), projection="3d")
             draw(body, file.mesh, motion, **view)
             figure.text(left + 0.01, 0.93, _label(variant), weight="bold", size=10.5)

@@ -84,7 +84,7 @@ class Run(Results):
         origins["forests/table.json"] = self.on_blocks["provenance"]
         for model, spectra in self.spectra.items():
             place = f"models/{model}/"
-            origins |= {f"{place}{name}.h5": found.provenance for name, found in spectra.items()}
+            origins |= {f"{place}{name}.h5": file.provenance for name, file in spectra.items()}
             measured = super().origins.items()
             origins |= {file: record for file, record in measured if file.startswith(place)}
         return origins

@@ -30,7 +30,7 @@ def _identity(run: Run, model: str) -> Row:
 def summary(run: Run) -> Iterator[Row]:
     """One row a model: size, accuracy, time."""
     for model, spectra in run.spectra.items():
-        compared = {variant: found[model] for variant, found in run.comparisons.items()}
+        compared = {variant: by_model[model] for variant, by_model in run.comparisons.items()}
         truth, fast = (solve_seconds(spectra[variant]) for variant in (TRUTH, FAST))
         yield {
             **_identity(run, model),
@@ -65,7 +65,7 @@ def errors(run: Run) -> Iterator[Row]:
 def coarsening(run: Run) -> Iterator[Row]:
     """What the coarsening alone costs in accuracy."""
     for model in run.models:
-        compared = {variant: found[model] for variant, found in run.comparisons.items()}
+        compared = {variant: by_model[model] for variant, by_model in run.comparisons.items()}
         yield {**_identity(run, model), **compared}
 
 
@@ -92,14 +92,16 @@ def phases(run: Run) -> Iterator[Row]:
 def evidence(run: Run) -> Iterator[Row]:
     """Residual, orthogonality, inertia count of every run."""
     for model, variant, spectrum in run.solved:
-        found = spectrum.attributes
-        counted = found.get("inertia_count", -1)
+        attributes = spectrum.attributes
+        counted = attributes.get("inertia_count", -1)
+        uncorrected = 0 if attributes["method"] == "hcms" else None
+        uncorrected = 0 if attributes["method"] == "hcms" else None
         yield {
-            **found,
+            **attributes,
             "model": model,
             "variant": VARIANTS[variant].label,
             "residual_max": float(spectrum.residuals.max()),
-            "inertia": f"{found['inertia_expected']} / {counted}" if counted >= 0 else None,
-            "corrections": found.get("corrections", 0 if found["method"] == "hcms" else None),
-            "estimate": found.get("eigenvalue_error_estimate"),
+            "inertia": f"{attributes['inertia_expected']} / {counted}" if counted >= 0 else None,
+            "corrections": attributes.get("corrections", uncorrected),
+            "estimate": attributes.get("eigenvalue_error_estimate"),
         }

@@ -73,12 +73,12 @@ class Evidence(Run):
     @property
     def origins(self) -> dict[str, Record]:
         """Provenance of every file that the page draws on."""
-        found = {f"{variant}.h5": spectrum.provenance for variant, spectrum in self.shown.items()}
+        records = {f"{variant}.h5": spectrum.provenance for variant, spectrum in self.shown.items()}
         for variant, comparison in self.compared.items():
-            found[f"{variant}.comparison.json"] = comparison.get("provenance", {})
-        found["audit.json"] = self.audit["provenance"]
-        found["response.h5"] = self.response.provenance
-        return {self.file(name): record for name, record in found.items()}
+            records[f"{variant}.comparison.json"] = comparison.get("provenance", {})
+        records["audit.json"] = self.audit["provenance"]
+        records["response.h5"] = self.response.provenance
+        return {self.file(name): record for name, record in records.items()}
 
     def file(self, name: str) -> str:
         """Name of one of the model's files below the folder of the run."""

@@ -119,20 +119,20 @@ def _sounds(evidence: Evidence) -> list[dict[str, Any]]:
 
 def _counted_by_run(evidence: Evidence) -> dict[str, Any] | None:
     """What the run of the ground truth counted itself; None if it could not."""
-    told = evidence.shown[TRUTH].attributes
-    return told if "inertia_count" in told else None
+    attributes = evidence.shown[TRUTH].attributes
+    return attributes if "inertia_count" in attributes else None
 
 
 def _digests(evidence: Evidence) -> list[tuple[str, str]]:
     """Names and first digits of the SHA-256 of the files that everything is made from."""
     given = settings.model_files(evidence.config, evidence.model)
     made = [str(evidence.modes_path(evidence.model, variant)) for variant in SHOWN]
-    found = []
+    digests = []
     for name in given + made:
         with open(name, "rb") as stream:
             digest = hashlib.file_digest(stream, "sha256").hexdigest()[:_DIGITS]
-        found.append((Path(name).name, digest))
-    return found
+        digests.append((Path(name).name, digest))
+    return digests
 
 
 def _configuration(evidence: Evidence) -> str:

@@ -20,8 +20,8 @@ def verdict(criteria: Sequence[Criterion]) -> dict[str, Any]:
         `criteria`.
     """
     parts = [
-        _part(told, [criterion for criterion in criteria if criterion.group == group])
-        for group, told in TEXTS["groups"].items()
+        _part(texts, [criterion for criterion in criteria if criterion.group == group])
+        for group, texts in TEXTS["groups"].items()
     ]
     missed = sum(not criterion.passed for criterion in criteria)
     return {
@@ -32,12 +32,12 @@ def verdict(criteria: Sequence[Criterion]) -> dict[str, Any]:
     }
 
 
-def _part(told: dict[str, Any], criteria: list[Criterion]) -> dict[str, Any]:
+def _part(texts: dict[str, Any], criteria: list[Criterion]) -> dict[str, Any]:
     passed = all(criterion.passed for criterion in criteria)
-    found = {criterion.key: criterion for criterion in criteria}
-    sentence = told["sentence"].format(completeness=_completeness(found["counted"]), **found)
-    judged = {"passed": passed, "word": told["words"][passed], "sentence": sentence}
-    return {**told, **judged, "criteria": criteria}
+    by_key = {criterion.key: criterion for criterion in criteria}
+    sentence = texts["sentence"].format(completeness=_completeness(by_key["counted"]), **by_key)
+    judged = {"passed": passed, "word": texts["words"][passed], "sentence": sentence}
+    return {**texts, **judged, "criteria": criteria}
 
 
 def _completeness(counted: Criterion) -> str:
