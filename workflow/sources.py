@@ -16,8 +16,6 @@ from carillon import ROOMS
 from workflow import source_files
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGES = ROOMS
-"""Of the project; what lies beside them where it is installed is none of its code."""
 
 
 def fingerprint(*modules: str) -> str:
@@ -62,7 +60,7 @@ def _needed(modules: Iterable[str]) -> set[Path]:
 def _file_of(module: str) -> Path | None:
     """File of a module of the project; None if it is another package's, or no module."""
     parts = module.split(".")
-    if parts[0] not in PACKAGES:
+    if parts[0] not in ROOMS:
         return None
     path = ROOT.joinpath(*parts)
     for candidate in (path.with_suffix(".py"), path / "__init__.py"):

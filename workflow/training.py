@@ -133,14 +133,11 @@ def check_study(config: Mapping[str, Any]) -> None:
             f"forests_study.curve_rows: {max(requested['curve_rows']):,} rows, but "
             f"default_forest.dataset.samples gives {8 * data['samples']:,}"
         )
-    if requested["variants"]:
-        _check_variants(requested["variants"])
-
-
-def _check_variants(names: list[str]) -> None:
+    if not requested["variants"]:
+        return
     from forests.studies.training import VARIANTS  # Needs scikit-learn, whose import takes long.
 
-    for name in names:
+    for name in requested["variants"]:
         if name not in VARIANTS:
             raise UserError(
                 f"forests_study.variants: {name!r} is unknown, choose from {', '.join(VARIANTS)}"

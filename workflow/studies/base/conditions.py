@@ -156,16 +156,21 @@ def read_conditions(texts: Mapping[str, str]) -> Conditions | None:
     return replace(Conditions(*[MISSING] * (len(names) - 1)), **known)
 
 
+def versions_of(record: Record) -> str:
+    """Packages and their versions in a line."""
+    versions = json.loads(record.get("versions", "{}"))
+    return ", ".join(f"{name} {version}" for name, version in versions.items())
+
+
 def _texts(record: Record) -> dict[str, str]:
     """What a record tells, in words."""
-    versions = json.loads(record.get("versions", "{}"))
     return {
         **{
             key: str(record.get(key, MISSING))
             for key in ("processor", "cores", "ranks", "threads", "blas", "commit")
         },
         "memory": show(record.get("memory_bytes"), "bytes"),
-        "versions": ", ".join(f"{name} {version}" for name, version in versions.items()) or MISSING,
+        "versions": versions_of(record) or MISSING,
     }
 
 

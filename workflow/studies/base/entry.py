@@ -67,26 +67,22 @@ class Entry:
 
 def tables_of(file: str) -> dict[str, Entry]:
     """All entries of a file below the folder of the studies by name."""
-    return {name: _entry(Path(file), name) for name in _read(Path(file))}
+    room = str(Path(file).parent)
+    return {name: _entry(name, {"room": room, **entry}) for name, entry in _read(file).items()}
 
 
-def _read(file: Path) -> dict[str, dict[str, str]]:
-    loaded: dict[str, dict[str, str]] = yaml.safe_load((STUDIES / file).read_text("utf-8"))
-    return loaded
+def _read(file: str) -> dict[str, dict[str, str]]:
+    return yaml.safe_load((STUDIES / file).read_text("utf-8"))
 
 
-def _entry(file: Path, name: str) -> Entry:
-    entry = {"room": file.parent.name, **_read(file)[name]}
+def _entry(name: str, entry: dict[str, str]) -> Entry:
     if "like" in entry:
         other = entry.pop("like")
-        entry = {**_read(Path(other, "tables.yaml"))[name], **_own(entry, other)}
+        if "rows" not in entry:
+            entry["room"] = other
+        entry = _read(f"{other}/tables.yaml")[name] | entry
     module, _, rows = entry.pop("rows").rpartition(".")
     return Entry(name, f"{entry.pop('room')}.{module}", rows, **entry)
-
-
-def _own(entry: Mapping[str, str], other: str) -> dict[str, str]:
-    """What an entry says beside another room's, whose function it is if it names none."""
-    return dict(entry) if "rows" in entry else {**entry, "room": other}
 
 
 def _rendered(text: str, names: Mapping[str, Any], results: Any) -> str:
@@ -94,7 +90,6 @@ def _rendered(text: str, names: Mapping[str, Any], results: Any) -> str:
 
 
 def _picked(row: Row, columns: Iterable[Column]) -> Row:
-    """The values of the columns."""
     values = {column.key: _value(row, column.source or column.key) for column in columns}
     return {key: value for key, value in values.items() if value is not _ABSENT}
 

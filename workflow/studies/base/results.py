@@ -38,14 +38,12 @@ class Results:
     def config(self) -> dict[str, Any]:
         """The resolved configuration of the run."""
         places = (folder / "config.yaml" for folder in (self.folder, self.folder.parent))
-        loaded: dict[str, Any] = yaml.safe_load(next(filter(Path.exists, places)).read_text())
-        return loaded
+        return yaml.safe_load(next(filter(Path.exists, places)).read_text())
 
     @property
     def part(self) -> dict[str, Any]:
         """The study's own part of the configuration."""
-        part: dict[str, Any] = self.config[self.section] if self.section else self.config
-        return part
+        return self.config[self.section] if self.section else self.config
 
     @property
     def without(self) -> str:
@@ -57,10 +55,6 @@ class Results:
         """Names of the solids for people."""
         models = self.part["models"]
         return {name: models[name]["title"] or spelt(name) for name in models}
-
-    def title(self, name: str) -> str:
-        """Name of a solid for people."""
-        return self.titles[name]
 
     def read_json(self, path: str | Path) -> Any:
         """Content of a JSON file, by its path below the folder."""

@@ -155,8 +155,7 @@ class Table:
 
 def kind_in(row: dict[str, Any], column: Column) -> str:
     """Kind of a column's value in a row."""
-    kind: str = row.get(f"{column.key}{KIND}") or column.kind
-    return kind
+    return row.get(f"{column.key}{KIND}") or column.kind
 
 
 def write_table(table: Table, folder: str | Path) -> None:

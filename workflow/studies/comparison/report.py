@@ -130,8 +130,7 @@ def summary(comparison: Comparison) -> str:
 
 def every_number(cells: pd.DataFrame) -> list[Row]:
     """All numbers of both folders, raw."""
-    rows: list[Row] = cells[RAW].to_dict("records")
-    return rows
+    return cells[RAW].to_dict("records")
 
 
 def counts(cells: pd.DataFrame) -> list[Row]:
@@ -142,16 +141,14 @@ def counts(cells: pd.DataFrame) -> list[Row]:
         {"compared": 1, "worse": worse, "better": better, "other": moved & ~worse & ~better}
     )
     summed = flags.groupby(cells["table"], sort=False).sum().astype(int)
-    rows: list[Row] = summed.reset_index().to_dict("records")
-    return rows
+    return summed.reset_index().to_dict("records")
 
 
 def listed(cells: pd.DataFrame) -> list[Row]:
     """Numbers of a table side by side, for people."""
     shown = {side: cells[f"{side}{SHOWN}"] for side in SIDES}
     marks = cells["verdict"].map(MARKS).fillna("")
-    rows: list[Row] = cells.assign(**shown, verdict_mark=marks).to_dict("records")
-    return rows
+    return cells.assign(**shown, verdict_mark=marks).to_dict("records")
 
 
 def differing(differences: list[Difference]) -> list[Row]:

@@ -48,7 +48,7 @@ def _solid(study: Objectives, errors: Table, solid: str) -> dict[str, Any]:
     sizes = {row["resolution"]: (row["unknowns"], row["coarse_unknowns"]) for row in rows}
     return {
         "name": solid,
-        "title": study.title(solid),
+        "title": study.titles[solid],
         "mesh": study.part["models"][solid]["mesh"],
         "sizes": sizes,
         "rows": rows,

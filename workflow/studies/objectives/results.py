@@ -61,12 +61,6 @@ class Objectives(Results):
         return solids.named(self.config, f"{SECTION}.models")
 
     @property
-    def materials(self) -> list[str]:
-        """Names of the materials studied."""
-        materials: list[str] = self.part["materials"]
-        return materials
-
-    @property
     def coarsenings(self) -> list[str]:
         """Names of the objectives and the baselines."""
         return [row["coarsening"] for row in self._any["rows"]]
@@ -74,14 +68,12 @@ class Objectives(Results):
     @property
     def forest(self) -> dict[str, str] | None:
         """Which forests are compared: `forest`, `forest_objective`, `forest_sha256`; or None."""
-        forest: dict[str, str] | None = self._any.get("forest")
-        return forest
+        return self._any.get("forest")
 
     @property
     def without_forest(self) -> str:
         """One sentence about why no forests are among the coarsenings; empty if they are."""
-        reason: str = self._any.get("without_forest", "")
-        return reason
+        return self._any.get("without_forest", "")
 
     @property
     def _any(self) -> dict[str, Any]:
@@ -95,17 +87,16 @@ class Objectives(Results):
 
     def identity(self, case: Case) -> dict[str, Any]:
         """Values that tell a case from others."""
-        title = self.title(case.solid)
         return {
             "model": case.solid,
-            "title": title,
+            "title": self.titles[case.solid],
             "resolution": case.resolution,
             "material": case.material,
         }
 
     def label(self, case: Case) -> str:
         """A case in a few words."""
-        return f"{self.title(case.solid)} {case.resolution}, {case.material}"
+        return f"{self.titles[case.solid]} {case.resolution}, {case.material}"
 
     def errors(self, case: Case, coarsening: str) -> dict[str, Any]:
         """Row of a case that belongs to a coarsening."""

@@ -74,7 +74,7 @@ def forest(study: Objectives) -> Iterator[Row]:
         return
     for solid in study.solids:
         of_solid = {case: ratio for case, ratio in known.items() if case.solid == solid}
-        yield _forest_row(study, study.title(solid), of_solid)
+        yield _forest_row(study, study.titles[solid], of_solid)
     if len(study.solids) > 1:
         yield _forest_row(study, "All solids", known)
 
@@ -131,7 +131,7 @@ def description(coarsening: str, forest: Mapping[str, str] | None = None) -> str
 
 def materials(study: Objectives) -> Iterable[Row]:
     """What each material is."""
-    functions = {name: name.replace("-", "_") for name in study.materials}
+    functions = {name: name.replace("-", "_") for name in study.part["materials"]}
     return [
         {"material": name, "description": _first_line(getattr(carillon.fem.materials, function))}
         for name, function in functions.items()

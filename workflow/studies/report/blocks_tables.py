@@ -29,8 +29,7 @@ MEASURE = (
 
 def on_blocks(results: Any) -> list[Row]:
     """Rows of `forests table`."""
-    rows: list[Row] = results.on_blocks["result"]
-    return rows
+    return results.on_blocks["result"]
 
 
 MEASURED = measured(

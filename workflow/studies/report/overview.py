@@ -39,7 +39,7 @@ def overview_figure(results: Run, model: str) -> Figure:
             figure.text(left + 0.01, 0.87, text, color=MUTED)
         rows = [row for row in results.table("frequencies").rows if row["model"] == model]
         _plot_spectra(figure.add_axes((0.68, 0.13, 0.305, 0.69)), rows)
-        figure.text(0.68, 0.93, plain(results.title(model)), weight="bold", size=10.5)
+        figure.text(0.68, 0.93, plain(results.titles[model]), weight="bold", size=10.5)
         figure.text(0.68, 0.87, f"{len(rows)} natural frequencies", color=MUTED)
     return figure
 

@@ -66,14 +66,12 @@ class Run(Results):
     @cached_property
     def forests(self) -> dict[str, Any]:
         """Summary of the forests."""
-        loaded: dict[str, Any] = self.read_json("forests/forests.json")
-        return loaded
+        return self.read_json("forests/forests.json")
 
     @cached_property
     def on_blocks(self) -> dict[str, Any]:
         """Output of `forests table`: how the coarsenings do on single blocks."""
-        loaded: dict[str, Any] = self.read_json("forests/table.json")
-        return loaded
+        return self.read_json("forests/table.json")
 
     @property
     def origins(self) -> dict[str, Record]:

@@ -21,7 +21,7 @@ def _identity(run: Run, model: str) -> Row:
     spectra = run.spectra[model]
     return {
         "model": model,
-        "title": run.title(model),
+        "title": run.titles[model],
         "unknowns": spectra[TRUTH].mesh.n_dofs,
         "coarse_unknowns": spectra[FAST].mesh.n_dofs,
     }

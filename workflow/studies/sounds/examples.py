@@ -202,5 +202,4 @@ def _mesh(mesh: str, config: Mapping[str, Any]) -> str:
 
 @cache
 def _described() -> dict[str, Any]:
-    loaded: dict[str, Any] = yaml.safe_load(EXAMPLES.read_text(encoding="utf-8"))
-    return loaded
+    return yaml.safe_load(EXAMPLES.read_text(encoding="utf-8"))

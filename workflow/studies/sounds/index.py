@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -45,32 +44,20 @@ def page(index: Examples, tables: dict[str, Table]) -> str:
     return rendered(
         "sounds/index.html.j2",
         title="Sound design",
-        examples=[_described(results) for results in index.examples],
+        examples=[(results.example, _players(results)) for results in index.examples],
         table=tables["sounds"],
     )
 
 
-def _described(results: SoundResults) -> dict[str, Any]:
-    """What is said of an example, and how it sounds at its targets."""
-    example = results.example
-    return {
-        "name": example.name,
-        "title": example.title,
-        "figure": example.figure,
-        "about": example.about,
-        "sounds": [
-            {"name": target.name, "source": _player(results, target.name)}
-            for target in example.targets
-        ],
-    }
-
-
-def _player(results: SoundResults, name: str) -> str:
-    """The target's clip and then the sound of the design, each as loud as it can be."""
-    parts = []
-    rate = 0
-    for state in ("clips", "after"):
-        sound, rate = results.sound(state, name)
-        part = sound[: round(PLAYED_SECONDS * rate)]
-        parts.append(part / max(float(np.abs(part).max()), 1e-30))
-    return wav_uri(np.concatenate(parts), rate, 1.0)
+def _players(results: SoundResults) -> dict[str, str]:
+    """By target: its clip and then the sound of the design, each as loud as it can be."""
+    players = {}
+    for target in results.example.targets:
+        parts = []
+        rate = 0
+        for state in ("clips", "after"):
+            sound, rate = results.sound(state, target.name)
+            part = sound[: round(PLAYED_SECONDS * rate)]
+            parts.append(part / max(float(np.abs(part).max()), 1e-30))
+        players[target.name] = wav_uri(np.concatenate(parts), rate, 1.0)
+    return players

@@ -60,8 +60,7 @@ class SoundResults(Results):
         """Output of `sound benchmark`; empty if the optimisers are not compared here."""
         if not self.example.compared:
             return {}
-        loaded: dict[str, Any] = self.read_json(f"{self.name}/optimisers.json")
-        return loaded
+        return self.read_json(f"{self.name}/optimisers.json")
 
     @property
     def absent(self) -> tuple[str, ...]:

@@ -31,14 +31,12 @@ class Evidence(Run):
     @property
     def settings(self) -> dict[str, Any]:
         """The model's part of the configuration."""
-        part: dict[str, Any] = self.config["models"][self.model]
-        return part
+        return self.config["models"][self.model]
 
     @property
     def tolerances(self) -> dict[str, float]:
         """Limits by name."""
-        part: dict[str, float] = self.config["validation"]["tolerances"]
-        return part
+        return self.config["validation"]["tolerances"]
 
     @cached_property
     def shown(self) -> dict[str, ModesFile]:
@@ -56,8 +54,7 @@ class Evidence(Run):
     @cached_property
     def audit(self) -> dict[str, Any]:
         """Output of `solver audit`: `spectra` by variant, and `provenance`."""
-        loaded: dict[str, Any] = self.read_json(self.file("audit.json"))
-        return loaded
+        return self.read_json(self.file("audit.json"))
 
     @cached_property
     def response(self) -> ResponseFile:
@@ -67,8 +64,7 @@ class Evidence(Run):
     @cached_property
     def first_mode(self) -> dict[str, dict[str, Any]]:
         """Frequency and likeness of the first elastic mode by variant."""
-        loaded: dict[str, dict[str, Any]] = self.read_json(f"figures/{self.model}-mode.json")
-        return loaded
+        return self.read_json(f"figures/{self.model}-mode.json")
 
     @property
     def origins(self) -> dict[str, Record]:

@@ -31,7 +31,7 @@ def page(evidence: Evidence, tables: dict[str, Table]) -> str:
     """Build the page of a model from its tables and files."""
     return rendered(
         "validation/page.html.j2",
-        title=evidence.title(evidence.model),
+        title=evidence.titles[evidence.model],
         variants=VARIANTS,
         truth=TRUTH,
         config=evidence.config,
