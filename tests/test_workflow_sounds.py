@@ -32,6 +32,7 @@ from workflow.studies.sounds import index, page, tables
 from workflow.studies.sounds.examples import (
     DESIGN,
     ELSEWHERE,
+    EXAMPLES,
     FOLDER,
     PROJECT,
     START,
@@ -39,7 +40,6 @@ from workflow.studies.sounds.examples import (
     Example,
     Target,
     examples,
-    names,
     project,
 )
 from workflow.studies.sounds.pictures import fine_mesh
@@ -219,7 +219,7 @@ def test_a_colour_bar_has_round_ticks_within_its_range(low, high):
 
 def test_the_schema_names_the_examples():
     section = settings.schema()["properties"]["sound"]["properties"]
-    assert section["examples"]["items"]["enum"] == names()
+    assert section["examples"]["items"]["enum"] == list(yaml.safe_load(EXAMPLES.read_text()))
 
 
 def test_projects_of_all_examples_are_valid_and_their_points_on_the_surface(tmp_path):

@@ -131,11 +131,6 @@ class Example:
         return [target for target in self.targets if target.edit <= edit]
 
 
-def names() -> list[str]:
-    """Names of all examples."""
-    return list(_described())
-
-
 def examples(config: Mapping[str, Any]) -> dict[str, Example]:
     """The examples that a configuration asks for, by name."""
     return {name: _example(name, config) for name in config["sound"]["examples"]}

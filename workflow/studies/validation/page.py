@@ -46,7 +46,7 @@ def page(evidence: Evidence, tables: dict[str, Table]) -> str:
         strike_seconds=STRIKE_SECONDS,
         errors=inlined(plots.errors_figure(tables["errors"], evidence.tolerances), "errors"),
         shapes=inlined(plots.shapes_figure(evidence), "shapes"),
-        counted=_counted_by_run(evidence),
+        counted=evidence.shown[TRUTH].attributes,
         files=_digests(evidence),
         configuration=_configuration(evidence),
         page_record=provenance.record({"config": evidence.config}),
@@ -115,12 +115,6 @@ def _sounds(evidence: Evidence) -> list[dict[str, Any]]:
         }
         for variant in SHOWN
     ]
-
-
-def _counted_by_run(evidence: Evidence) -> dict[str, Any] | None:
-    """What the run of the ground truth counted itself; None if it could not."""
-    attributes = evidence.shown[TRUTH].attributes
-    return attributes if "inertia_count" in attributes else None
 
 
 def _digests(evidence: Evidence) -> list[tuple[str, str]]:
