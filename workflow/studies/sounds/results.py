@@ -75,7 +75,7 @@ class SoundResults(Results):
             **{f"{part}/{DESIGN}": each.provenance for part, each in self.designs.items()},
             f"{name}/{START}": self.start.provenance,
             f"{name}/{TRUTH}": self.truth.provenance,
-            **({f"{name}/optimisers.json": compared.get("provenance", {})} if compared else {}),
+            **({f"{name}/optimisers.json": compared["provenance"]} if compared else {}),
         }
 
     def history(self, part: str) -> NDArray[np.void]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from carillon.fem.model import RIGID_MODES
 from sound.design.bark import bark
 from sound.project.design_file import Design
 from sound.rendering.solid import SoundingSolid
-from workflow.studies.base.conditions import ONE_COLD_RUN, Record, measured
+from workflow.studies.base.conditions import ONE_COLD_RUN, measured
 from workflow.studies.base.entry import Row
 from workflow.studies.sounds.results import SoundResults
 
@@ -95,12 +95,7 @@ def shares(amplitudes: Array) -> Array:
     return np.asarray(amplitudes / amplitudes.max(axis=1, keepdims=True))
 
 
-def _record(results: SoundResults) -> Mapping[str, Record]:
-    origin = results.optimisers.get("provenance")
-    return {"all": origin} if origin else {}
-
-
-COMPARED = measured(_record, ONE_COLD_RUN)
+COMPARED = measured(lambda results: {"all": results.optimisers["provenance"]}, ONE_COLD_RUN)
 
 
 def optimisers(results: SoundResults) -> Iterator[Row]:

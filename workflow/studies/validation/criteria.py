@@ -1,8 +1,8 @@
-"""What a spectrum has to satisfy to be trusted, and whether it does."""
+"""What a spectrum has to satisfy to be trusted, whether it does, and what that means in words."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import frequencies
 from solver.studies.comparison import AUDIBLE_FIRST, AUDIBLE_LAST
 from workflow.studies.base.numbers import show
+from workflow.studies.report.findings import headline
 from workflow.studies.validation.evidence import COARSENED, SOLVED, Evidence
 from workflow.variants import TRUTH
 
@@ -146,3 +147,42 @@ def _criteria(
         texts = {name: text.format(**names) for name, text in TEXTS[part][key].items()}
         exact = texts["kind"] == "count"
         yield Criterion(variant, key, found=value, limit=limit, exact=exact, **texts)
+
+
+def verdict(criteria: Sequence[Criterion]) -> dict[str, Any]:
+    """Judgement of a model from all of its criteria.
+
+    Returns
+    -------
+    dict[str, Any]
+        Whether it `passed`; the `headline`; `advice` on what may be relied on; and the `parts`, one
+        for each group: `title`, `question`, whether it `passed`, a `word`, a `sentence` and its
+        `criteria`.
+    """
+    parts = [
+        _part(texts, [criterion for criterion in criteria if criterion.group == group])
+        for group, texts in TEXTS["groups"].items()
+    ]
+    missed = sum(not criterion.passed for criterion in criteria)
+    return {
+        "passed": missed == 0,
+        "headline": headline(len(criteria), missed),
+        "advice": next((part["doubt"] for part in parts if not part["passed"]), TEXTS["trust"]),
+        "parts": parts,
+    }
+
+
+def _part(texts: dict[str, Any], criteria: list[Criterion]) -> dict[str, Any]:
+    passed = all(criterion.passed for criterion in criteria)
+    by_key = {criterion.key: criterion for criterion in criteria}
+    sentence = texts["sentence"].format(completeness=_completeness(by_key["counted"]), **by_key)
+    judged = {"passed": passed, "word": texts["words"][passed], "sentence": sentence}
+    return {**texts, **judged, "criteria": criteria}
+
+
+def _completeness(counted: Criterion) -> str:
+    if counted.found is None:
+        return "whether one is missing was not counted, since PETSc here lacks MUMPS"
+    if counted.passed:
+        return "an independent count finds none missing"
+    return f"an independent count finds {int(counted.limit)} where it has {int(counted.found)}"

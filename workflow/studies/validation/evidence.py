@@ -61,11 +61,6 @@ class Evidence(Run):
         """Output of `solver respond`."""
         return read_response(self.folder / self.file("response.h5"))
 
-    @cached_property
-    def first_mode(self) -> dict[str, dict[str, Any]]:
-        """Frequency and likeness of the first elastic mode by variant."""
-        return self.read_json(f"figures/{self.model}-mode.json")
-
     @property
     def origins(self) -> dict[str, Record]:
         """Provenance of every file that the page draws on."""

@@ -18,10 +18,9 @@ from workflow.studies.base.page import listed_modes, rendered
 from workflow.studies.base.table import Table
 from workflow.studies.report.page import mode_pictures
 from workflow.studies.validation import plots
-from workflow.studies.validation.criteria import judge
+from workflow.studies.validation.criteria import judge, verdict
 from workflow.studies.validation.evidence import Evidence
 from workflow.studies.validation.pictures import solid_pictures, struck_picture
-from workflow.studies.validation.verdict import verdict
 from workflow.variants import SHOWN, TRUTH, VARIANTS
 
 _DIGITS = 16

@@ -35,12 +35,13 @@ def errors(evidence: Evidence) -> Iterator[Row]:
 
 def shapes(evidence: Evidence) -> Iterator[Row]:
     """How far the spaces of modes are turned against the truth's."""
+    first_mode = evidence.read_json(f"figures/{evidence.model}-mode.json")
     for variant in COMPARED:
         clusters = evidence.compared[variant]["clusters"]
         row = {
             "method": VARIANTS[variant].label,
             "clusters": len(clusters),
-            "likeness": evidence.first_mode[variant]["likeness"],
+            "likeness": first_mode[variant]["likeness"],
         }
         if clusters:
             worst = max(clusters, key=lambda cluster: cluster["angle"])
