@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -77,7 +76,7 @@ class Results:
 
     def _measured(self, file: str) -> dict[str, Any]:
         names = solids.named(self.config, solids.MEASURED[self.study][file])
-        return self.by_model(f"{file}.json", names)
+        return {name: self.read_json(f"models/{name}/{file}.json") for name in names}
 
     @property
     def origins(self) -> dict[str, Record]:
@@ -87,10 +86,6 @@ class Results:
             for file in solids.MEASURED[self.study]
             for name, output in getattr(self, file).items()
         }
-
-    def by_model(self, file: str, names: Iterable[str]) -> dict[str, Any]:
-        """Content of the JSON files of that name of some solids."""
-        return {name: self.read_json(f"models/{name}/{file}") for name in names}
 
     def table(self, name: str) -> Table:
         """A table that was written before."""

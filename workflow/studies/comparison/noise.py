@@ -54,6 +54,7 @@ RULES = {
     "speed-ups of one run, modelled times": "are not judged, as the times themselves are",
 }
 """The rules in words."""
+Spread = tuple[float, float] | None
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class Value:
     max: float | None = None
 
     @property
-    def spread(self) -> tuple[float, float] | None:
+    def spread(self) -> Spread:
         """Minimum and maximum of several runs; None if there was one."""
         if self.min is None or self.max is None or self.min == self.max:
             return None
@@ -108,13 +109,7 @@ def _moved(moved: bool, for_the_worse: bool, worse: str, better: str) -> str:
     return worse if for_the_worse else better
 
 
-def _time_moved(
-    kind: str,
-    old: float,
-    new: float,
-    before: tuple[float, float] | None,
-    now: tuple[float, float] | None,
-) -> bool:
+def _time_moved(kind: str, old: float, new: float, before: Spread, now: Spread) -> bool:
     """Whether a time [s] or a speed-up moved, given the spreads of its runs."""
     if before and now:
         apart = before[1] < now[0] or now[1] < before[0]

@@ -51,10 +51,13 @@ class Run(Results):
 
     @cached_property
     def comparisons(self) -> dict[str, dict[str, Any]]:
-        """Output of `solver compare` against the truth, by variant and model."""
+        """Output of `solver compare` against the truth, by model and variant."""
         return {
-            variant: self.by_model(f"{variant}.comparison.json", self.models)
-            for variant in CANDIDATES
+            model: {
+                variant: self.read_json(f"models/{model}/{variant}.comparison.json")
+                for variant in CANDIDATES
+            }
+            for model in self.models
         }
 
     @cached_property

@@ -8,8 +8,8 @@ from carillon.fem.model import RIGID_MODES
 from workflow.studies.base.conditions import NOT_TIMED, ONE_COLD_RUN, measured
 from workflow.studies.base.entry import Row
 from workflow.studies.report.results import Run, precomputation_seconds, records, solve_seconds
-from workflow.variants import CANDIDATES, SHOWN, TRUTH, VARIANTS
 from workflow.variants import COARSENED as COARSENED
+from workflow.variants import SHOWN, TRUTH, VARIANTS
 
 FAST = "ddfem_hcms_ec"
 TIMED = (TRUTH, "ddfem_slepc", "hcms", "hcms_ec", FAST)
@@ -30,7 +30,7 @@ def _identity(run: Run, model: str) -> Row:
 def summary(run: Run) -> Iterator[Row]:
     """One row a model: size, accuracy, time."""
     for model, spectra in run.spectra.items():
-        compared = {variant: by_model[model] for variant, by_model in run.comparisons.items()}
+        compared = run.comparisons[model]
         truth, fast = (solve_seconds(spectra[variant]) for variant in (TRUTH, FAST))
         yield {
             **_identity(run, model),
@@ -56,16 +56,14 @@ def frequencies(run: Run) -> Iterator[Row]:
 
 def errors(run: Run) -> Iterator[Row]:
     """Distances of every variant from the truth."""
-    for model in run.models:
-        for variant in CANDIDATES:
-            label = VARIANTS[variant].label
-            yield {**run.comparisons[variant][model], "model": model, "variant": label}
+    for model, compared in run.comparisons.items():
+        for variant, distances in compared.items():
+            yield {**distances, "model": model, "variant": VARIANTS[variant].label}
 
 
 def coarsening(run: Run) -> Iterator[Row]:
     """What the coarsening alone costs in accuracy."""
-    for model in run.models:
-        compared = {variant: by_model[model] for variant, by_model in run.comparisons.items()}
+    for model, compared in run.comparisons.items():
         yield {**_identity(run, model), **compared}
 
 
