@@ -76,10 +76,10 @@ def truth(results: SoundResults) -> Iterator[Row]:
 def amplitudes(results: SoundResults) -> Iterator[Row]:
     """Balance of the modes' amplitudes at every struck point."""
     targets = results.design.targets
-    start, found = balance(results.start), balance(results.design)
+    start, after = balance(results.start), balance(results.design)
     target = shares(targets.amplitudes)
     for point, name in enumerate(targets.names):
-        for row in _by_mode(target=target[point], start=start[point], found=found[point]):
+        for row in _by_mode(target=target[point], start=start[point], found=after[point]):
             yield {"point": name, **row}
 
 
