@@ -61,9 +61,9 @@ def write(
 ) -> Path:
     """A folder of results with these tables, all measured under the same conditions."""
     (folder / part).mkdir(parents=True)
-    told = conditions({"bell": record}, config, Repeats("5", "in columns"))
+    shared = conditions({"bell": record}, config, Repeats("5", "in columns"))
     for table in tables:
-        write_table(replace(table, conditions=told), folder / part)
+        write_table(replace(table, conditions=shared), folder / part)
     (folder / "config.yaml").write_text(yaml.safe_dump(config))
     return folder
 
@@ -83,9 +83,9 @@ def before(tmp_path):
 
 def test_equal_folders_have_not_moved(before, tmp_path, capsys):
     now = shutil.copytree(before, tmp_path / "now")
-    found = compared(before, now)
-    assert len(found.cells) == 4 and found.moved.empty
-    assert found.only_before == found.only_now == []
+    comparison = compared(before, now)
+    assert len(comparison.cells) == 4 and comparison.moved.empty
+    assert comparison.only_before == comparison.only_now == []
     assert run(before, now, "--fail-on-move", "--out", tmp_path / "out") == 0
     assert "4 numbers compared: none moved" in capsys.readouterr().out
     assert "are the same." in (tmp_path / "out" / "comparison.html").read_text()
@@ -93,13 +93,13 @@ def test_equal_folders_have_not_moved(before, tmp_path, capsys):
 
 def test_a_slowed_method_is_slower_and_a_faster_one_faster(before, tmp_path, capsys):
     now = write(tmp_path / "now", spreads(HCMS=1.5, SLEPc=0.5))
-    found = compared(before, now).moved
-    moved = dict(zip(found["row"], found["verdict"]))
+    cells = compared(before, now).moved
+    moved = dict(zip(cells["row"], cells["verdict"]))
     assert moved == {"bell, SLEPc": "faster", "bell, HCMS": "slower"}
     assert run(before, now) == 0
-    told = capsys.readouterr().out
-    assert "1 slower, 1 faster" in told
-    assert "slower: tables/spreads, bell, HCMS, Time: 1.00 s (0.90 s … 1.20 s) -> " in told
+    output = capsys.readouterr().out
+    assert "1 slower, 1 faster" in output
+    assert "slower: tables/spreads, bell, HCMS, Time: 1.00 s (0.90 s … 1.20 s) -> " in output
     assert run(before, now, "--fail-on-move") == 1
     assert run(now, before, "--fail-on-move") == 1
     assert run(before, write(tmp_path / "better", spreads(HCMS=0.5)), "--fail-on-move") == 0
@@ -144,10 +144,10 @@ def test_rows_columns_and_tables_of_one_side_are_listed(before, tmp_path, capsys
     fewer = replace(table, rows=table.rows[:1], columns=table.columns[:-1])
     other = replace(table, name="other")
     now = write(tmp_path / "now", fewer, other)
-    found = compared(before, now)
-    assert found.only_now == ["table tables/other"]
-    assert "tables/spreads: row bell, HCMS" in found.only_before
-    assert "tables/spreads: column error" in found.only_before
+    comparison = compared(before, now)
+    assert comparison.only_now == ["table tables/other"]
+    assert "tables/spreads: row bell, HCMS" in comparison.only_before
+    assert "tables/spreads: column error" in comparison.only_before
     assert run(before, now) == 0
     assert "Only in this run: 1, such as table tables/other" in capsys.readouterr().out
 
@@ -182,8 +182,8 @@ def test_a_reference_of_text_serves_as_baseline(tmp_path):
     assert not list(reference.rglob("*.json"))
     assert "| models | 2.50 s |" in (reference / "README.md").read_text()
     assert (reference / "tables" / "times.md").is_file()
-    found = compared(reference, results)
-    assert len(found.cells) == 12 and found.moved.empty and not found.only_now
+    comparison = compared(reference, results)
+    assert len(comparison.cells) == 12 and comparison.moved.empty and not comparison.only_now
     slower = write(tmp_path / "slower", spreads(HCMS=1.5))
     assert list(compared(reference, slower).moved["verdict"]) == ["slower"]
     assert list(compared(slower, reference).moved["verdict"]) == ["faster"]
@@ -218,8 +218,8 @@ def test_folders_that_cannot_be_compared_are_answered_in_a_sentence(before, tmp_
         (broken, "is no table of this version"),
     ):
         assert run(before, folder) == 2
-        told = capsys.readouterr().err
-        assert said in told and str(folder) in told and "Traceback" not in told
+        output = capsys.readouterr().err
+        assert said in output and str(folder) in output and "Traceback" not in output
 
 
 def test_the_target_wants_a_baseline_before_anything_runs(tmp_path):

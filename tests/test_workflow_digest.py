@@ -42,7 +42,7 @@ def test_what_was_found_counts(design, tmp_path):
     young[3] = np.nextafter(young[3], np.inf)
     history["evaluations"][-1] += 1
     names = replace(made.targets, names=("corner", "edge"))
-    found = {digest(design)}
+    digests = {digest(design)}
     others = (
         replace(made, young=young),
         replace(made, history=history),
@@ -52,8 +52,8 @@ def test_what_was_found_counts(design, tmp_path):
     for number, other in enumerate(others):
         path = tmp_path / f"{number}.h5"
         write_design(path, other)
-        found.add(digest(path))
-    assert len(found) == 1 + len(others)
+        digests.add(digest(path))
+    assert len(digests) == 1 + len(others)
 
 
 @pytest.mark.parametrize(

@@ -59,14 +59,14 @@ def row(**seconds) -> dict:
     }
 
 
-def found(**methods: dict) -> SimpleNamespace:
+def results(**methods: dict) -> SimpleNamespace:
     """Results of a study with such a bar."""
     titles = dict.fromkeys(methods, "A bar")
     return SimpleNamespace(methods=methods, convergence={}, titles=titles, config={})
 
 
 def test_the_table_of_methods_has_what_was_timed_and_says_how():
-    table = methods(found(bar=row(hcms_ec=2.0)))
+    table = methods(results(bar=row(hcms_ec=2.0)))
     keys = [column.key for column in table.columns]
     assert "hcms_ec" in keys and "arpack" not in keys and "hcms_ec_min" in keys
     assert "CHOLMOD, 1.5 Lanczos vectors a mode, the fastest of 6 tried" in table.caption
@@ -76,20 +76,20 @@ def test_the_table_of_methods_has_what_was_timed_and_says_how():
 
 
 def test_ratios_name_their_base():
-    (ratio,) = ratios(found(bar=row(hcms_ec=2.0))).rows
+    (ratio,) = ratios(results(bar=row(hcms_ec=2.0))).rows
     assert (ratio["method"], ratio["base"], ratio["ratio"]) == ("HCMS + EC", "SLEPc", 2.0)
     assert ratio["with_precompute"] == 1.5
     assert (ratio["ratio_min"], ratio["ratio_max"]) == (0.5 / 5.0, 5.0 / 0.5)
     # What is needed beforehand takes 2/3 s, run by run.
     assert ratio["with_precompute_max"] == pytest.approx(5.0 / (0.5 + 4.0 / 1.5 - 2.0))
     once = row(hcms_ec=2.0) | {"runs": {"slepc": 1, "hcms_ec": 5}}
-    (ratio,) = ratios(found(bar=once)).rows
+    (ratio,) = ratios(results(bar=once)).rows
     assert ratio["ratio"] == 2.0 and "ratio_min" not in ratio
 
 
 def test_tables_of_nothing_have_no_rows():
-    assert methods(found()).rows == ratios(found()).rows == []
-    assert convergence_sentences(convergence(found())) == []
+    assert methods(results()).rows == ratios(results()).rows == []
+    assert convergence_sentences(convergence(results())) == []
 
 
 @pytest.fixture(scope="module")

@@ -65,9 +65,9 @@ def finished(tmp_path_factory):
 
 @pytest.mark.slow
 def test_tiny_default_forests_hold_the_trees_grown_apart(finished):
-    found = json.loads((finished / "default_forest" / "forests.json").read_text())
-    assert found["trees"] == 1
-    assert found["scores"]["r2_log_solid"] > 0.8
+    summary = json.loads((finished / "default_forest" / "forests.json").read_text())
+    assert summary["trees"] == 1
+    assert summary["scores"]["r2_log_solid"] > 0.8
     assert len(list((finished / "default_forest" / "trees").iterdir())) == 2
 
 

@@ -52,8 +52,8 @@ def rated(material: str, resolution: int) -> dict:
     """What `solver objectives` would write: half the error at twice the resolution."""
 
     def part(rms: float, last: int) -> dict:
-        found = {"first": 7, "last": last, "rms": rms, "mean": rms / 2}
-        return {**found, "worst": -1.5 * rms, "worst_mode": 9}
+        errors = {"first": 7, "last": last, "rms": rms, "mean": rms / 2}
+        return {**errors, "worst": -1.5 * rms, "worst_mode": 9}
 
     rows = []
     for name, by_material in RMS.items():
@@ -138,11 +138,11 @@ def test_forests_are_judged_by_the_fit_they_learned_on_every_solid(study):
 
 def test_without_forests_their_table_is_empty_and_the_reason_is_kept(study):
     for path in study.folder.rglob("*.json"):
-        found = json.loads(path.read_text())
-        rows = [row for row in found["rows"] if row["coarsening"] != "ddfem"]
+        rating = json.loads(path.read_text())
+        rows = [row for row in rating["rows"] if row["coarsening"] != "ddfem"]
         reason = "without ddfem: default.h5: no such file"
         path.write_text(
-            json.dumps({**found, "rows": rows, "forest": None, "without_forest": reason})
+            json.dumps({**rating, "rows": rows, "forest": None, "without_forest": reason})
         )
     assert forest(study).rows == []
     assert study.without_forest == "without ddfem: default.h5: no such file"
@@ -221,7 +221,7 @@ def test_a_miniature_study_finds_that_a_fit_beats_galerkin(finished):
     (box,) = read_table(finished / "tables/forest.json").rows
     assert 0.5 < box["median"] <= box["worst"] < 2.0
     for row in read_table(finished / "tables/truths.json").rows:
-        found, counted = row["inertia"].split(" / ")
-        assert found == counted
+        expected, counted = row["inertia"].split(" / ")
+        assert expected == counted
     for row in read_table(finished / "tables/provenance.json").rows:
         assert row["command"] and row["commit"] and row["config_hash"] and row["versions"]

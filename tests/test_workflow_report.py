@@ -87,9 +87,11 @@ def test_modes_are_aligned_whatever_their_sign_scale_and_turn_in_a_cluster():
     turned[:, 7] = np.cos(turn) * modes[:, 7] - np.sin(turn) * modes[:, 6]
     order = generator.permutation(20)
     rows = (3 * order[:, None] + np.arange(3)).ravel()
-    wanted = modes[:, 6].reshape(-1, 3)
-    motion, likeness = aligned(modes_file(frequencies, turned[rows], nodes[order]), truth, wanted)
-    np.testing.assert_allclose(motion, wanted[order], atol=1e-12)
+    reference = modes[:, 6].reshape(-1, 3)
+    motion, likeness = aligned(
+        modes_file(frequencies, turned[rows], nodes[order]), truth, reference
+    )
+    np.testing.assert_allclose(motion, reference[order], atol=1e-12)
     assert likeness == pytest.approx(1.0)
 
 

@@ -26,7 +26,7 @@ pytestmark = pytest.mark.slow
 MODELS = list(yaml.safe_load(TINY.read_text())["models"])
 NOT_SHOWN = ("phases", "frequencies", "scaling")
 """Tables that are not on the page, or not all of them; the smallest run measures no scaling."""
-TOLD_APART = ("provenance", "training", "scaling")
+APART = ("provenance", "training", "scaling")
 """Tables without conditions: of many results with their own origins, or of none."""
 
 
@@ -153,8 +153,8 @@ def test_spectra_satisfy_what_the_page_claims(results):
         assert row["rigid_modes"] == 6
         assert row["orthogonality"] < 1e-8
         if row["inertia"] is not None:
-            found, counted = row["inertia"].split(" / ")
-            assert found == counted
+            expected, counted = row["inertia"].split(" / ")
+            assert expected == counted
 
 
 def test_every_result_tells_its_origin(results):
@@ -166,15 +166,15 @@ def test_every_result_tells_its_origin(results):
         assert row["command"] and row["commit"] and row["config_hash"] and row["versions"]
 
 
-@pytest.mark.parametrize("name", [name for name in REPORT.entries if name not in TOLD_APART])
+@pytest.mark.parametrize("name", [name for name in REPORT.entries if name not in APART])
 def test_every_benchmark_table_tells_its_conditions(page, results, name):
     table = read_table(results / "tables" / f"{name}.json")
-    told = table.conditions.told
+    texts = table.conditions.texts
     # The checkout may be committed to while the run is under way.
-    assert told.pop("differing", "commit") == "commit"
-    assert set(told) == set(LABELS) - {"differing"}
-    assert MISSING not in told.values()
-    assert told["configuration"] == config_hash(
+    assert texts.pop("differing", "commit") == "commit"
+    assert set(texts) == set(LABELS) - {"differing"}
+    assert MISSING not in texts.values()
+    assert texts["configuration"] == config_hash(
         yaml.safe_load((results / "config.yaml").read_text())
     )
     if name not in NOT_SHOWN:

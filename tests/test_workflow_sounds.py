@@ -32,6 +32,7 @@ from workflow.studies.sounds import index, page, tables
 from workflow.studies.sounds.examples import (
     DESIGN,
     ELSEWHERE,
+    EXAMPLES,
     FOLDER,
     PROJECT,
     START,
@@ -39,12 +40,11 @@ from workflow.studies.sounds.examples import (
     Example,
     Target,
     examples,
-    names,
     project,
 )
 from workflow.studies.sounds.pictures import fine_mesh
 from workflow.studies.sounds.plots import _ticks
-from workflow.studies.sounds.results import Found
+from workflow.studies.sounds.results import SoundResults
 
 RATE = 22_050
 EXAMPLE = Example(
@@ -63,6 +63,12 @@ EXAMPLE = Example(
     compared=True,
 )
 CONFIG = load(CONFIGURATIONS / "laptop.yaml")
+
+
+class Box(SoundResults):
+    """Results of an example that is not among those of the workflow."""
+
+    example = EXAMPLE
 
 
 def history(*rows: tuple[float, float]) -> np.ndarray:
@@ -106,22 +112,24 @@ def compared() -> dict:
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory) -> Found:
+def results(tmp_path_factory) -> SoundResults:
     """Results of an example, made without optimisation."""
-    root = tmp_path_factory.mktemp("results") / FOLDER
-    example = Found(root, CONFIG, EXAMPLE)
-    for folder in ("edit-1", "before", "clips", "after", "fine", "tables"):
-        (example.folder / folder).mkdir(parents=True)
+    root = tmp_path_factory.mktemp("results")
+    (root / "config.yaml").write_text(yaml.safe_dump(CONFIG))
+    box = Box(root / FOLDER, EXAMPLE.name)
+    folder = box.file("")
+    for name in ("edit-1", "before", "clips", "after", "fine", "tables"):
+        (folder / name).mkdir(parents=True)
     first = designed(history=history((0.1, 9.0), (1.0, 4.0)))
     final = designed(history=history((0.1, 9.0), (1.0, 4.0), (1.2, 6.0), (3.0, 0.5)))
-    write_design(example.folder / "edit-1" / DESIGN, first)
-    write_design(example.folder / DESIGN, final)
-    write_design(example.folder / START, designed(history=history((0.1, 9.0))))
-    (example.folder / PROJECT).write_text("mesh: builtin:box\n")
-    write_truth(example.folder / TRUTH, final)
-    write_sounds(example.folder, final)
-    (example.folder / "optimisers.json").write_text(json.dumps(compared()))
-    return example
+    write_design(folder / "edit-1" / DESIGN, first)
+    write_design(folder / DESIGN, final)
+    write_design(folder / START, designed(history=history((0.1, 9.0))))
+    (folder / PROJECT).write_text("mesh: builtin:box\n")
+    write_truth(folder / TRUTH, final)
+    write_sounds(folder, final)
+    (folder / "optimisers.json").write_text(json.dumps(compared()))
+    return box
 
 
 def write_truth(path: Path, design: Design) -> None:
@@ -142,58 +150,58 @@ def write_sounds(folder: Path, design: Design) -> None:
 
 
 @pytest.fixture(scope="module")
-def built(found: Found) -> Page:
-    made = {name: make(found) for name, make in SOUND.entries.items()}
+def built(results: SoundResults) -> Page:
+    made = {name: make(results) for name, make in SOUND.entries.items()}
     for table in made.values():
-        write_table(table, found.folder / "tables")
-    html = page.page(found, made)
-    (found.folder / "page.html").write_text(html, encoding="utf-8")
-    return Page(found.folder / "page.html")
+        write_table(table, results.file("tables"))
+    html = page.page(results, made)
+    results.file("page.html").write_text(html, encoding="utf-8")
+    return Page(results.file("page.html"))
 
 
-def test_the_page_needs_nothing_from_elsewhere_and_can_be_heard(found, built):
+def test_the_page_needs_nothing_from_elsewhere_and_can_be_heard(results, built):
     assert_self_contained(built)
     assert built.source.count("data:audio/wav;base64,") == 2 * len(page.STATES) + 1
     assert built.source.count("data:image/png;base64,") >= 2
     assert len(built.source) < 4e6
 
 
-def test_files_that_the_page_leads_to_are_there(found, built):
+def test_files_that_the_page_leads_to_are_there(results, built):
     assert {DESIGN, START, TRUTH, PROJECT, "optimisers.json", "clips/corner.wav"} <= set(built.led)
     assert f"edit-1/{DESIGN}" in built.led
-    assert all((found.folder / name).is_file() for name in built.led if not name.startswith("#"))
+    assert all(results.file(name).is_file() for name in built.led if not name.startswith("#"))
 
 
 @pytest.mark.parametrize(
     "name",
     ["designs", "frequencies", "truth", "amplitudes", "optimisers", "evaluation", "provenance"],
 )
-def test_tables_of_the_page_are_those_of_the_files(found, built, name):
-    assert_same_numbers(built, found.folder / "tables", name)
+def test_tables_of_the_page_are_those_of_the_files(results, built, name):
+    assert_same_numbers(built, results.file("tables"), name)
 
 
-def test_every_edit_counts_its_own_time(found, built):
-    rows = list(tables.designs(found))
+def test_every_edit_counts_its_own_time(results, built):
+    rows = list(tables.designs(results))
     assert [row["cost_before"] for row in rows] == [9.0, 6.0]
     assert [row["cost"] for row in rows] == [4.0, 0.5]
     assert rows[1]["seconds"] == pytest.approx(2.0) and rows[1]["evaluations"] == 20
     assert rows[1]["per_minute"] == pytest.approx(600.0)
 
 
-def test_the_fine_model_is_set_beside_the_coarse_one(found):
-    rows = list(tables.truth(found))
+def test_the_fine_model_is_set_beside_the_coarse_one(results):
+    rows = list(tables.truth(results))
     assert len(rows) == N_MODES
     for row in rows:
         assert row["error"] == pytest.approx(row["found"] / row["truth"] - 1.0)
     assert max(abs(row["error"]) for row in rows) > 0.0
 
 
-def test_the_index_leads_to_the_page(found, built, tmp_path):
+def test_the_index_leads_to_the_page(results, built, tmp_path):
     (tmp_path / "tables").mkdir()
-    results = SimpleNamespace(found=[found])
-    table = SOUNDS.entries["sounds"](results)
+    examples = SimpleNamespace(examples=[results])
+    table = SOUNDS.entries["sounds"](examples)
     write_table(table, tmp_path / "tables")
-    html = index.page(results, {"sounds": table})
+    html = index.page(examples, {"sounds": table})
     (tmp_path / "index.html").write_text(html, encoding="utf-8")
     read = Page(tmp_path / "index.html")
     assert_self_contained(read)
@@ -211,7 +219,7 @@ def test_a_colour_bar_has_round_ticks_within_its_range(low, high):
 
 def test_the_schema_names_the_examples():
     section = settings.schema()["properties"]["sound"]["properties"]
-    assert section["examples"]["items"]["enum"] == names()
+    assert section["examples"]["items"]["enum"] == list(yaml.safe_load(EXAMPLES.read_text()))
 
 
 def test_projects_of_all_examples_are_valid_and_their_points_on_the_surface(tmp_path):

@@ -36,7 +36,7 @@ def project(tmp_path, monkeypatch):
     (folder / "room" / "data.json").write_text("1")
     (folder / "room" / "third.py").write_text("import room.first\n")
     monkeypatch.setattr(sources, "ROOT", folder)
-    monkeypatch.setattr(sources, "PACKAGES", ("room",))
+    monkeypatch.setattr(sources, "ROOMS", ("room",))
     monkeypatch.setattr(source_files, "PROJECT", folder)
     monkeypatch.setattr(source_files, "KEPT", folder / "kept.json")
     return folder / "room"

@@ -28,7 +28,7 @@ def record(**changes) -> dict:
     return measured({"modes": 30}, ranks=2, threads=1) | changes
 
 
-def table(told: Conditions | None) -> Table:
+def table(shared: Conditions | None) -> Table:
     return Table(
         "demo",
         "What it shows.",
@@ -50,17 +50,21 @@ def table(told: Conditions | None) -> Table:
             {"model": "bar", "mode": 8, "seconds": None, "value": "none", "value_kind": "text"},
         ],
         ["model", "mode"],
-        told,
+        shared,
     )
 
 
-TOLD = conditions({"bell": record(), "bar": record()}, CONFIG, ONE_COLD_RUN)
+SHARED = conditions({"bell": record(), "bar": record()}, CONFIG, ONE_COLD_RUN)
 
 
 def test_a_measurement_tells_machine_ranks_threads_and_date():
-    found = record()
-    assert found["memory_bytes"] > 1e8 and found["threads"] == 1 and found["ranks"] == "2"
-    assert found["date"].endswith("+00:00")
+    measurement = record()
+    assert (
+        measurement["memory_bytes"] > 1e8
+        and measurement["threads"] == 1
+        and measurement["ranks"] == "2"
+    )
+    assert measurement["date"].endswith("+00:00")
     assert measured({}, ranks=[1, 2, 4])["ranks"] == "1, 2, 4"
 
 
@@ -73,10 +77,10 @@ def test_memory_is_what_the_control_group_allows(tmp_path):
 
 
 def test_conditions_that_all_rows_share_are_told_once():
-    assert TOLD is not None and not TOLD.differing
-    assert MISSING not in TOLD.told.values()
-    assert set(TOLD.told) == set(LABELS) - {"differing"}
-    assert TOLD.configuration == settings.config_hash(CONFIG)
+    assert SHARED is not None and not SHARED.differing
+    assert MISSING not in SHARED.texts.values()
+    assert set(SHARED.texts) == set(LABELS) - {"differing"}
+    assert SHARED.configuration == settings.config_hash(CONFIG)
 
 
 def test_conditions_that_differ_between_rows_are_said_to():
@@ -84,11 +88,11 @@ def test_conditions_that_differ_between_rows_are_said_to():
         "bell": record(date="2026-01-30T10:00:00+00:00"),
         "bar": record(processor="Another", date="2026-02-01T10:00:00+00:00"),
     }
-    told = conditions(records, CONFIG, ONE_COLD_RUN)
-    assert told.differing == "processor"
-    assert "(bell); Another (bar)" in told.processor
-    assert "not the same for all rows: processor" in told.headline
-    assert told.date == "2026-01-30 to 2026-02-01"
+    differing = conditions(records, CONFIG, ONE_COLD_RUN)
+    assert differing.differing == "processor"
+    assert "(bell); Another (bar)" in differing.processor
+    assert "not the same for all rows: processor" in differing.headline
+    assert differing.date == "2026-01-30 to 2026-02-01"
 
 
 def test_no_results_no_conditions():
@@ -102,27 +106,31 @@ def test_the_hash_of_a_configuration_does_not_depend_on_folders():
     assert "baseline" not in settings.resolved(elsewhere)
 
 
-@pytest.mark.parametrize("told", [TOLD, None])
-def test_a_table_survives_its_files(tmp_path, told):
-    write_table(table(told), tmp_path)
-    assert read_table(tmp_path / "demo.json") == table(told)
-    found = read_csv_table(tmp_path / "demo.csv")
-    assert (found.rows, found.keys, found.conditions) == (table(told).rows, ["model", "mode"], told)
-    assert [column.kind for column in found.columns] == [c.kind for c in table(told).columns]
+@pytest.mark.parametrize("shared", [SHARED, None])
+def test_a_table_survives_its_files(tmp_path, shared):
+    write_table(table(shared), tmp_path)
+    assert read_table(tmp_path / "demo.json") == table(shared)
+    read = read_csv_table(tmp_path / "demo.csv")
+    assert (read.rows, read.keys, read.conditions) == (
+        table(shared).rows,
+        ["model", "mode"],
+        shared,
+    )
+    assert [column.kind for column in read.columns] == [c.kind for c in table(shared).columns]
 
 
 def test_conditions_stand_in_every_form(tmp_path):
-    write_table(table(TOLD), tmp_path)
+    write_table(table(SHARED), tmp_path)
     markdown = (tmp_path / "demo.md").read_text()
-    assert json.loads((tmp_path / "demo.json").read_text())["conditions"]["commit"] == TOLD.commit
+    assert json.loads((tmp_path / "demo.json").read_text())["conditions"]["commit"] == SHARED.commit
     lines = (tmp_path / "demo.csv").read_text().splitlines()
-    for key, text in TOLD.told.items():
+    for key, text in SHARED.texts.items():
         assert f"# {key}: {text}" in lines
         assert f"{LABELS[key]}: {text}" in markdown
 
 
 def test_programs_skip_what_the_csv_file_says_about_itself(tmp_path):
-    write_table(table(TOLD), tmp_path)
+    write_table(table(SHARED), tmp_path)
     with (tmp_path / "demo.csv").open() as stream:
         rows = list(csv.DictReader(line for line in stream if not line.startswith("#")))
     assert [row["seconds [s]"] for row in rows] == ["0.5", ""]
@@ -131,9 +139,9 @@ def test_programs_skip_what_the_csv_file_says_about_itself(tmp_path):
 
 def test_pandas_reads_the_csv_file(tmp_path):
     pandas = pytest.importorskip("pandas")
-    write_table(table(TOLD), tmp_path)
-    found = pandas.read_csv(tmp_path / "demo.csv", comment="#")
-    assert list(found["mode"]) == [7, 8]
+    write_table(table(SHARED), tmp_path)
+    frame = pandas.read_csv(tmp_path / "demo.csv", comment="#")
+    assert list(frame["mode"]) == [7, 8]
 
 
 def test_scaling_keeps_the_slowest_run_beside_the_fastest():
@@ -142,8 +150,8 @@ def test_scaling_keeps_the_slowest_run_beside_the_fastest():
     modelled = {"ranks": 4, "n_dofs": 900, "subdomains": 4, "total": 0.6}
     part = {"runs": [run], "model": {"rows": [modelled]}}
     bell = {"strong": part, "weak": None, "provenance": {}}
-    found = SimpleNamespace(scaling={"bell": bell}, titles={"bell": "A bell"}, config=CONFIG)
-    table = REPORT.entries["scaling"](found)
+    results = SimpleNamespace(scaling={"bell": bell}, titles={"bell": "A bell"}, config=CONFIG)
+    table = REPORT.entries["scaling"](results)
     measured_row, modelled_row = table.rows
     assert (measured_row["measured"], measured_row["measured_max"]) == (1.0, 1.5)
     assert measured_row["peak_memory"] == 7.0 and measured_row["note"] == "measured"

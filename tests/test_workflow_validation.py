@@ -127,7 +127,7 @@ def test_a_mode_that_is_missing_fails_in_words(run, tmp_path):
     paths = {variant: folder / f"{variant}.h5" for variant in SHOWN}
     compared = compare_files(paths["hcms_ec"], paths["truth"]).as_dict()
     (folder / "hcms_ec.comparison.json").write_text(json.dumps(compared))
-    audits = {name: asdict(found) for name, found in audit_files(paths.values()).items()}
+    audits = {name: asdict(audit) for name, audit in audit_files(paths.values()).items()}
     (folder / "audit.json").write_text(json.dumps({"spectra": audits, "provenance": {}}))
     candidates = {variant: paths[variant] for variant in COMPARED}
     write_response(folder / "response.h5", respond(paths["truth"], candidates, StrikeOptions()), {})
@@ -143,8 +143,8 @@ def test_a_mode_that_is_missing_fails_in_words(run, tmp_path):
 
 
 def test_what_was_not_found_or_is_no_number_does_not_pass():
-    for found in (None, float("nan")):
-        assert not Criterion("truth", "key", "label", found, 1.0, "small", "why", "file").passed
+    for value in (None, float("nan")):
+        assert not Criterion("truth", "key", "label", value, 1.0, "small", "why", "file").passed
     six = Criterion("truth", "rigid", "label", 7, 6, "count", "why", "file", exact=True)
     assert not six.passed and six.row["required"] == "6" and six.row["verdict"] == "missed"
 

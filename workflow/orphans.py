@@ -30,13 +30,14 @@ def cancel(folder: Path) -> None:
     """
     if not (shutil.which("squeue") and shutil.which("scancel")):
         return
-    found = jobs(folder)
-    if not found:
+    numbers = jobs(folder)
+    if not numbers:
         return
-    subprocess.run(["scancel", *found], capture_output=True)
+    subprocess.run(["scancel", *numbers], capture_output=True)
     say(
-        f"cancelled {len(found)} jobs of SLURM that a killed run has left ({', '.join(found[:8])}"
-        f"{', ...' if len(found) > 8 else ''}); their work goes on from their journals"
+        f"cancelled {len(numbers)} jobs of SLURM that a killed run has left "
+        f"({', '.join(numbers[:8])}{', ...' if len(numbers) > 8 else ''}); their work goes on from "
+        "their journals"
     )
     until = time.monotonic() + PATIENCE_SECONDS
     while jobs(folder) and time.monotonic() < until:
@@ -48,10 +49,10 @@ def jobs(folder: Path) -> list[str]:
     asked = subprocess.run(
         ["squeue", "--me", "--noheader", f"--format={_FORMAT}"], capture_output=True, text=True
     )
-    found = []
+    numbers = []
     for line in asked.stdout.splitlines():
         number, name, comment, place = line.split("|", 3)
         submitted_here = Path(place.strip()) == folder.resolve()
         if submitted_here and _RUN.fullmatch(name) and comment.startswith("rule_"):
-            found.append(number)
-    return list(dict.fromkeys(found))
+            numbers.append(number)
+    return list(dict.fromkeys(numbers))

@@ -16,8 +16,6 @@ from carillon import ROOMS
 from workflow import source_files
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGES = ROOMS
-"""Of the project; what lies beside them where it is installed is none of its code."""
 
 
 def fingerprint(*modules: str) -> str:
@@ -42,27 +40,27 @@ def fingerprint(*modules: str) -> str:
 
 def _needed(modules: Iterable[str]) -> set[Path]:
     """Files of the modules, of what they import, and of the data beside them that they name."""
-    found: set[Path] = set()
+    files: set[Path] = set()
     waiting = []
     for name in modules:
         path = _file_of(name)
         if path is None:
             raise ValueError(f"there is no module {name} in {ROOT}")
-        found.add(path)
+        files.add(path)
         waiting.append(path)
     while waiting:
         modules_named, data = _named_in(waiting.pop())
-        new = modules_named - found
-        found |= new | data
+        new = modules_named - files
+        files |= new | data
         waiting.extend(new)
-    return found
+    return files
 
 
 @cache
 def _file_of(module: str) -> Path | None:
     """File of a module of the project; None if it is another package's, or no module."""
     parts = module.split(".")
-    if parts[0] not in PACKAGES:
+    if parts[0] not in ROOMS:
         return None
     path = ROOT.joinpath(*parts)
     for candidate in (path.with_suffix(".py"), path / "__init__.py"):

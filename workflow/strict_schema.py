@@ -45,9 +45,9 @@ def _is_number(checker: Any, value: Any) -> bool:
     return _is_integer(checker, value) or (isinstance(value, float) and math.isfinite(value))
 
 
-def _unique(_: Any, wanted: bool, values: Any, schema: Any) -> Iterator[ValidationError]:
+def _unique(_: Any, unique: bool, values: Any, schema: Any) -> Iterator[ValidationError]:
     """As in JSON schema, where the library needs the square of the time."""
-    if wanted and isinstance(values, list) and len(set(map(repr, values))) < len(values):
+    if unique and isinstance(values, list) and len(set(map(repr, values))) < len(values):
         yield ValidationError(f"{values!r} has an entry twice")
 
 

@@ -122,25 +122,22 @@ def check_study(config: Mapping[str, Any]) -> None:
     UserError
         If they do not.
     """
-    wanted, data = config["forests_study"], config["default_forest"]["dataset"]
-    if wanted["shards"] > data["shards"]:
+    requested, data = config["forests_study"], config["default_forest"]["dataset"]
+    if requested["shards"] > data["shards"]:
         raise UserError(
-            f"forests_study.shards: {wanted['shards']} of {data['shards']} shards of a "
+            f"forests_study.shards: {requested['shards']} of {data['shards']} shards of a "
             "distribution, see default_forest.dataset.shards"
         )
-    if max(wanted["curve_rows"]) > 8 * data["samples"]:
+    if max(requested["curve_rows"]) > 8 * data["samples"]:
         raise UserError(
-            f"forests_study.curve_rows: {max(wanted['curve_rows']):,} rows, but "
+            f"forests_study.curve_rows: {max(requested['curve_rows']):,} rows, but "
             f"default_forest.dataset.samples gives {8 * data['samples']:,}"
         )
-    if wanted["variants"]:
-        _check_variants(wanted["variants"])
-
-
-def _check_variants(names: list[str]) -> None:
+    if not requested["variants"]:
+        return
     from forests.studies.training import VARIANTS  # Needs scikit-learn, whose import takes long.
 
-    for name in names:
+    for name in requested["variants"]:
         if name not in VARIANTS:
             raise UserError(
                 f"forests_study.variants: {name!r} is unknown, choose from {', '.join(VARIANTS)}"

@@ -23,7 +23,7 @@ CIRCUMSTANCES = frozenset(
 not what was found."""
 TIMES = "history/seconds"
 """A dataset of wall times among others that are none."""
-TOLD = CIRCUMSTANCES | {"seconds", "evaluations_per_minute", "workers"}
+OMITTED = CIRCUMSTANCES | {"seconds", "evaluations_per_minute", "workers"}
 """The same among attributes, and among the keys of texts in JSON."""
 
 
@@ -51,17 +51,17 @@ def digest(path: Path) -> str:
     UserError
         If the file cannot be read, is no result, or does not match the checksum it begins with.
     """
-    found = hashlib.sha256()
+    checksum = hashlib.sha256()
 
     def add(name: str, entry: h5py.Group | h5py.Dataset) -> None:
         if CIRCUMSTANCES.intersection(name.split("/")) or name == TIMES:
             return
-        found.update(name.encode())
-        for key in sorted(set(entry.attrs) - TOLD):
-            found.update(f"{key}={np.asarray(entry.attrs[key]).tolist()!r}".encode())
+        checksum.update(name.encode())
+        for key in sorted(set(entry.attrs) - OMITTED):
+            checksum.update(f"{key}={np.asarray(entry.attrs[key]).tolist()!r}".encode())
         if isinstance(entry, h5py.Dataset):
-            found.update(f"{entry.dtype}{entry.shape}".encode())
-            found.update(_bytes_of(entry))
+            checksum.update(f"{entry.dtype}{entry.shape}".encode())
+            checksum.update(_bytes_of(entry))
 
     kind, schema = kind_of(path, "a result file (HDF5)")
     if not kind:
@@ -71,7 +71,7 @@ def digest(path: Path) -> str:
         file.visititems(lambda name, entry: entries.append((name, entry)))
         for name, entry in entries:
             add(name, entry)
-    return found.hexdigest()
+    return checksum.hexdigest()
 
 
 def _bytes_of(dataset: h5py.Dataset) -> bytes:
@@ -84,12 +84,12 @@ def _bytes_of(dataset: h5py.Dataset) -> bytes:
 
 def _without_circumstances(text: str) -> str:
     try:
-        told = json.loads(text)
+        values = json.loads(text)
     except ValueError:
         return text
-    if not isinstance(told, dict):
+    if not isinstance(values, dict):
         return text
-    return json.dumps({key: told[key] for key in sorted(set(told) - TOLD)})
+    return json.dumps({key: values[key] for key in sorted(set(values) - OMITTED)})
 
 
 def _files(paths: list[Path]) -> list[Path]:

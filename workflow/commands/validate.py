@@ -97,7 +97,9 @@ def run(arguments: argparse.Namespace) -> int:
     size = _checked_size(arguments)
     name = next(iter(config["models"]))
     folder = Path(arguments.out).resolve()
-    _write(config, folder)
+    make_folder(folder)
+    with atomic_path(folder / CONFIGURATION) as temporary:
+        temporary.write_text(yaml.safe_dump(config, sort_keys=False))
     say(size)
     _run_rules(folder, arguments.cores)
     page = folder / "validation" / f"{name}.html"
@@ -143,12 +145,6 @@ def _checked_size(arguments: argparse.Namespace) -> str:
         if point is not None:
             surface_node(solid.fine, arguments.unit * np.array(point), name)
     return f"{solid.fine.n_cells:,} voxels, {solid.fine.n_dofs:,} unknowns"
-
-
-def _write(config: dict[str, Any], folder: Path) -> None:
-    make_folder(folder)
-    with atomic_path(folder / CONFIGURATION) as temporary:
-        temporary.write_text(yaml.safe_dump(config, sort_keys=False))
 
 
 def _run_rules(folder: Path, cores: int) -> None:

@@ -14,9 +14,10 @@ _DESCRIBED: dict[str, dict[str, Any]] = yaml.safe_load(
 )
 ALL = {
     name: Study(
-        name, **told | {"figures": tuple(Figure(**each) for each in told.get("figures", ()))}
+        name,
+        **described | {"figures": tuple(Figure(**each) for each in described.get("figures", ()))},
     )
-    for name, told in _DESCRIBED.items()
+    for name, described in _DESCRIBED.items()
 }
 REPORT, FIGURES, OBJECTIVES, FORESTS, VALIDATION, SOUND, SOUNDS = ALL.values()
 STUDIES = (REPORT, FIGURES, OBJECTIVES, FORESTS)

@@ -45,10 +45,9 @@ def figure(study: Study, drawn: Figure, folder: str) -> list[str]:
 
 def page(study: Study, path: str, category: str = "Report", **labels: str) -> str:
     """The page of a study."""
-    marked: str = report(
+    return report(
         path,
         caption=f"{CAPTIONS}/{study.caption}.rst",
         category=category,
         labels=labels or {"page": study.title},
     )
-    return marked

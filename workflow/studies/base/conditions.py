@@ -27,7 +27,7 @@ LABELS = {
     "date": "Date",
     "differing": "Not the same for all rows",
 }
-"""Conditions for people, in the order in which they are told."""
+"""Conditions for people, in the order in which they are shown."""
 
 NAMED = 3
 """Rows that are named where conditions differ; the others are counted."""
@@ -67,7 +67,7 @@ class Conditions:
     differing: str = ""
 
     @property
-    def told(self) -> dict[str, str]:
+    def texts(self) -> dict[str, str]:
         """Conditions by key, without `differing` where nothing differs."""
         return {key: text for key, text in asdict(self).items() if text}
 
@@ -82,8 +82,8 @@ class Conditions:
 
     def as_markdown(self) -> str:
         """All conditions as a paragraph."""
-        told = (f"{LABELS[key]}: {text}" for key, text in self.told.items())
-        return f"*Conditions.* {'; '.join(told)}.\n"
+        texts = (f"{LABELS[key]}: {text}" for key, text in self.texts.items())
+        return f"*Conditions.* {'; '.join(texts)}.\n"
 
 
 @dataclass(frozen=True)
@@ -115,9 +115,9 @@ def conditions(
     """
     if not records:
         return None
-    told = {name: _texts(record) for name, record in records.items()}
-    keys = list(next(iter(told.values())))
-    values = {key: {name: texts[key] for name, texts in told.items()} for key in keys}
+    texts_by_row = {name: _texts(record) for name, record in records.items()}
+    keys = list(next(iter(texts_by_row.values())))
+    values = {key: {name: texts[key] for name, texts in texts_by_row.items()} for key in keys}
     differing = [key for key in keys if key not in said and len(set(values[key].values())) > 1]
     joined = {key: _joined(values[key]) for key in keys}
     return Conditions(
@@ -140,32 +140,37 @@ def measured(
 ) -> Callable[[Any], Conditions | None]:
     """The conditions of a table as a function of the results, from which the records come."""
 
-    def told(results: Any) -> Conditions | None:
+    def of_results(results: Any) -> Conditions | None:
         how = repeats(results) if callable(repeats) else repeats
         return conditions(records(results), results.config, how, **said)
 
-    return told
+    return of_results
 
 
-def read_conditions(told: Mapping[str, str]) -> Conditions | None:
+def read_conditions(texts: Mapping[str, str]) -> Conditions | None:
     """Conditions from a table's file; None if it tells none."""
     names = [field.name for field in fields(Conditions)]
-    found = {name: told[name] for name in names if name in told}
-    if not found:
+    known = {name: texts[name] for name in names if name in texts}
+    if not known:
         return None
-    return replace(Conditions(*[MISSING] * (len(names) - 1)), **found)
+    return replace(Conditions(*[MISSING] * (len(names) - 1)), **known)
+
+
+def versions_of(record: Record) -> str:
+    """Packages and their versions in a line."""
+    versions = json.loads(record.get("versions", "{}"))
+    return ", ".join(f"{name} {version}" for name, version in versions.items())
 
 
 def _texts(record: Record) -> dict[str, str]:
     """What a record tells, in words."""
-    versions = json.loads(record.get("versions", "{}"))
     return {
         **{
             key: str(record.get(key, MISSING))
             for key in ("processor", "cores", "ranks", "threads", "blas", "commit")
         },
         "memory": show(record.get("memory_bytes"), "bytes"),
-        "versions": ", ".join(f"{name} {version}" for name, version in versions.items()) or MISSING,
+        "versions": versions_of(record) or MISSING,
     }
 
 

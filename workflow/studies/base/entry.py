@@ -68,27 +68,23 @@ class Entry:
 
 def tables_of(file: str) -> dict[str, Entry]:
     """All entries of a file below the folder of the studies by name."""
-    return {name: _entry(Path(file), name) for name in _read(Path(file))}
+    room = str(Path(file).parent)
+    return {name: _entry(name, {"room": room, **entry}) for name, entry in _read(file).items()}
 
 
 @cache
-def _read(file: Path) -> dict[str, dict[str, str]]:
-    loaded: dict[str, dict[str, str]] = yaml.safe_load((STUDIES / file).read_text("utf-8"))
-    return loaded
+def _read(file: str) -> dict[str, dict[str, str]]:
+    return yaml.safe_load((STUDIES / file).read_text("utf-8"))
 
 
-def _entry(file: Path, name: str) -> Entry:
-    told = {"room": file.parent.name, **_read(file)[name]}
-    if "like" in told:
-        other = told.pop("like")
-        told = {**_read(Path(other, "tables.yaml"))[name], **_own(told, other)}
-    module, _, rows = told.pop("rows").rpartition(".")
-    return Entry(name, f"{told.pop('room')}.{module}", rows, **told)
-
-
-def _own(told: Mapping[str, str], other: str) -> dict[str, str]:
-    """What an entry says beside another room's, whose function it is if it names none."""
-    return dict(told) if "rows" in told else {**told, "room": other}
+def _entry(name: str, entry: dict[str, str]) -> Entry:
+    if "like" in entry:
+        other = entry.pop("like")
+        if "rows" not in entry:
+            entry["room"] = other
+        entry = _read(f"{other}/tables.yaml")[name] | entry
+    module, _, rows = entry.pop("rows").rpartition(".")
+    return Entry(name, f"{entry.pop('room')}.{module}", rows, **entry)
 
 
 def _rendered(text: str, names: Mapping[str, Any], results: Any) -> str:
@@ -96,9 +92,8 @@ def _rendered(text: str, names: Mapping[str, Any], results: Any) -> str:
 
 
 def _picked(row: Row, columns: Iterable[Column]) -> Row:
-    """The values of the columns."""
-    found = {column.key: _value(row, column.source or column.key) for column in columns}
-    return {key: value for key, value in found.items() if value is not _ABSENT}
+    values = {column.key: _value(row, column.source or column.key) for column in columns}
+    return {key: value for key, value in values.items() if value is not _ABSENT}
 
 
 def _value(row: Any, source: str) -> Any:

@@ -15,6 +15,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.io import wavfile
 
+from carillon.fem.geometry import HexMesh
+from carillon.fem.geometry.picture import draw, mark
 from carillon.files import atomic_path
 from solver.response.response import FLOOR_DECIBELS, SAMPLE_RATE_HERTZ, decibels, spectrogram
 from workflow.studies.base.page import data_uri
@@ -53,6 +55,20 @@ def save_pixels(picture: Pixels, path: str | Path) -> None:
     """Write RGBA values (h, w, 4) as PNG."""
     with atomic_path(path) as temporary:
         matplotlib.image.imsave(temporary, np.ascontiguousarray(picture), format="png")
+
+
+def marked_picture(
+    mesh: HexMesh, marks: Iterable[tuple[Array, str, Array | None]], **look: Any
+) -> Pixels:
+    """The mesh, drawn with `look`, and marks on it: position, colour, direction of an arrow."""
+
+    def draw_on(axes: Any) -> None:
+        axes.computed_zorder = False
+        draw(axes, mesh, **look)
+        for position, colour, inward in marks:
+            mark(axes, mesh, position, colour, inward, up=look["up"])
+
+    return solid_picture(draw_on, ROOM_FOR_ARROW)
 
 
 def solid_picture(draw_on: Callable[[Any], Any], border: float = 0.0) -> Pixels:

@@ -83,7 +83,7 @@ def _power(value: float) -> str:
 _FORMATS: dict[str, Callable[[Any], str]] = {
     "text": str,
     "count": lambda value: f"{int(value):,}",
-    "hertz": lambda value: f"{_digits(value, 5)}",
+    "hertz": lambda value: _digits(value, 5),
     "percent": _percent,
     "seconds": _seconds,
     "times": lambda value: f"{_digits(value, 2)}×",

@@ -3,29 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator
 from typing import Any
 
+from workflow.studies.base.conditions import versions_of
 from workflow.studies.base.entry import Row
 
+KEYS = ("command", "commit", "config_hash", "blas", "processor", "cores")
 
-def rows_of(results: Any) -> list[Row]:
+
+def rows_of(results: Any) -> Iterator[Row]:
     """Rows of the table `provenance` from the `origins` of results: records by file."""
-    return [_row(file, origin) for file, origin in results.origins.items()]
-
-
-def _row(file: str, origin: Mapping[str, Any]) -> Row:
-    parameters = _unpacked(origin.get("parameters", "{}"))
-    versions = _unpacked(origin.get("versions", "{}"))
-    told = ("command", "commit", "config_hash", "blas", "processor", "cores")
-    return {
-        "file": file,
-        **{key: origin.get(key) for key in told},
-        "seed": parameters.get("seed"),
-        "versions": ", ".join(f"{name} {version}" for name, version in versions.items()),
-    }
-
-
-def _unpacked(text: Any) -> dict[str, Any]:
-    loaded: dict[str, Any] = json.loads(text) if isinstance(text, str) else text
-    return loaded
+    for file, origin in results.origins.items():
+        yield {
+            "file": file,
+            **{key: origin.get(key) for key in KEYS},
+            "seed": json.loads(origin.get("parameters", "{}")).get("seed"),
+            "versions": versions_of(origin),
+        }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -38,14 +37,12 @@ class Results:
     def config(self) -> dict[str, Any]:
         """The resolved configuration of the run."""
         places = (folder / "config.yaml" for folder in (self.folder, self.folder.parent))
-        loaded: dict[str, Any] = yaml.safe_load(next(filter(Path.exists, places)).read_text())
-        return loaded
+        return yaml.safe_load(next(filter(Path.exists, places)).read_text())
 
     @property
     def part(self) -> dict[str, Any]:
         """The study's own part of the configuration."""
-        part: dict[str, Any] = self.config[self.section] if self.section else self.config
-        return part
+        return self.config[self.section] if self.section else self.config
 
     @property
     def without(self) -> str:
@@ -57,10 +54,6 @@ class Results:
         """Names of the solids for people."""
         models = self.part["models"]
         return {name: models[name]["title"] or spelt(name) for name in models}
-
-    def title(self, name: str) -> str:
-        """Name of a solid for people."""
-        return self.titles[name]
 
     def read_json(self, path: str | Path) -> Any:
         """Content of a JSON file, by its path below the folder."""
@@ -83,20 +76,16 @@ class Results:
 
     def _measured(self, file: str) -> dict[str, Any]:
         names = solids.named(self.config, solids.MEASURED[self.study][file])
-        return self.by_model(f"{file}.json", names)
+        return {name: self.read_json(f"models/{name}/{file}.json") for name in names}
 
     @property
     def origins(self) -> dict[str, Record]:
         """Provenance of the result files by name."""
         return {
-            f"models/{name}/{file}.json": found["provenance"]
+            f"models/{name}/{file}.json": output["provenance"]
             for file in solids.MEASURED[self.study]
-            for name, found in getattr(self, file).items()
+            for name, output in getattr(self, file).items()
         }
-
-    def by_model(self, file: str, names: Iterable[str]) -> dict[str, Any]:
-        """Content of the JSON files of that name of some solids."""
-        return {name: self.read_json(f"models/{name}/{file}") for name in names}
 
     def table(self, name: str) -> Table:
         """A table that was written before."""

@@ -128,7 +128,7 @@ class Table:
         about = {
             "keys": ", ".join(self.keys or [self.columns[0].key]),
             "kinds": ", ".join(column.kind for column in self.columns),
-            **(self.conditions.told if self.conditions else {}),
+            **(self.conditions.texts if self.conditions else {}),
         }
         text = io.StringIO()
         text.writelines(f"{COMMENT}{key}: {value}\n" for key, value in about.items())
@@ -155,8 +155,7 @@ class Table:
 
 def kind_in(row: dict[str, Any], column: Column) -> str:
     """Kind of a column's value in a row."""
-    kind: str = row.get(f"{column.key}{KIND}") or column.kind
-    return kind
+    return row.get(f"{column.key}{KIND}") or column.kind
 
 
 def write_table(table: Table, folder: str | Path) -> None:
@@ -172,10 +171,10 @@ def write_table(table: Table, folder: str | Path) -> None:
 
 
 def _as_json(table: Table) -> dict[str, Any]:
-    told = asdict(table)
-    for column in told["columns"]:
+    content = asdict(table)
+    for column in content["columns"]:
         del column["source"]
-    return told
+    return content
 
 
 def read_table(path: str | Path) -> Table:

@@ -47,15 +47,15 @@ def _cell(row: Row, column: Column) -> Row:
 def _judged(table: Table, keys: list[str]) -> dict[str, str]:
     """Labels by key of columns with values of their own, which are not what names the rows."""
     about = {f"{column.key}{end}" for column in table.columns for end in (MIN, MAX, KIND)}
-    found = [
+    compared = [
         column
         for column in table.columns
         if column.key not in about.union(keys) and column.kind not in UNJUDGED
     ]
-    labels = [column.label for column in found]
+    labels = [column.label for column in compared]
     return {
         column.key: column.label if labels.count(column.label) == 1 else column.key
-        for column in found
+        for column in compared
     }
 
 

@@ -43,10 +43,10 @@ class Comparison:
     @cached_property
     def moved(self) -> pd.DataFrame:
         """Values that are not the same any more, the worst first."""
-        found = self.cells[self.cells["verdict"] != SAME]
-        ratio = pd.to_numeric(found["ratio"]).fillna(1.0).abs().replace(0.0, 1.0)
-        order = found["verdict"].map(VERDICTS.index)
-        return found.iloc[np.lexsort((-np.maximum(ratio, 1.0 / ratio), order))]
+        moved = self.cells[self.cells["verdict"] != SAME]
+        ratio = pd.to_numeric(moved["ratio"]).fillna(1.0).abs().replace(0.0, 1.0)
+        order = moved["verdict"].map(VERDICTS.index)
+        return moved.iloc[np.lexsort((-np.maximum(ratio, 1.0 / ratio), order))]
 
     @cached_property
     def conditions(self) -> list[Difference]:
@@ -65,8 +65,8 @@ def compare(before: Folder, now: Folder) -> Comparison:
     cells = new.merge(old.drop(columns=["label", "kind"]), on=KEYS)
     pairs = list(zip(*(map(Value, *(cells[f"{side}{end}"] for end in ENDS)) for side in SIDES)))
     cells["ratio"] = pd.Series([_ratio(*pair) for pair in pairs], dtype=object)
-    found = [verdict(kind, *pair) for kind, pair in zip(cells["kind"], pairs)]
-    cells["verdict"] = pd.Series(found, dtype=object)
+    verdicts = [verdict(kind, *pair) for kind, pair in zip(cells["kind"], pairs)]
+    cells["verdict"] = pd.Series(verdicts, dtype=object)
     return Comparison(before, now, cells, list(_only(before, now)), list(_only(now, before)))
 
 
@@ -77,8 +77,8 @@ def name_of(path: str) -> str:
 
 def _cells(folder: Folder, side: str) -> pd.DataFrame:
     """All values of a folder, in columns of a side."""
-    told = [cells for path, cells in folder.cells.items() if name_of(path) not in APART]
-    cells = pd.concat(told, ignore_index=True).dropna(subset="label")
+    kept = [cells for path, cells in folder.cells.items() if name_of(path) not in APART]
+    cells = pd.concat(kept, ignore_index=True).dropna(subset="label")
     return cells.rename(columns={end: f"{side}{end}" for end in (*ENDS, SHOWN)})
 
 

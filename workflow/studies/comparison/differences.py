@@ -19,15 +19,15 @@ Difference = dict[str, str]
 
 def of_conditions(before: Folder, now: Folder) -> list[Difference]:
     """Conditions that differ in tables of both folders."""
-    old, new = _told_by_table(before), _told_by_table(now)
+    old, new = _texts_by_table(before), _texts_by_table(now)
     shared = [path for path in new if path in old]
-    found: dict[tuple[str, str, str], list[str]] = {}
+    tables: dict[tuple[str, str, str], list[str]] = {}
     for path in shared:
         for difference in _differing(old[path], new[path]):
-            found.setdefault(difference, []).append(path)
+            tables.setdefault(difference, []).append(path)
     return [
         _difference(*difference, where="" if len(paths) == len(shared) else ", ".join(paths))
-        for difference, paths in found.items()
+        for difference, paths in tables.items()
     ]
 
 
@@ -41,8 +41,8 @@ def of_configurations(before: Folder, now: Folder) -> list[Difference]:
 
 def dates(folder: Folder) -> str:
     """First and last day on which tables of a folder were measured."""
-    told = [table.conditions.date for table in folder.tables.values() if table.conditions]
-    days = sorted({day for text in told for day in text.split(" to ") if day != MISSING})
+    texts = [table.conditions.date for table in folder.tables.values() if table.conditions]
+    days = sorted({day for text in texts for day in text.split(" to ") if day != MISSING})
     return " to ".join(dict.fromkeys([days[0], days[-1]])) if days else MISSING
 
 
@@ -57,22 +57,22 @@ def _differing(old: Mapping[str, str], new: Mapping[str, str]) -> Iterator[tuple
             yield what, before, now
 
 
-def _told_by_table(folder: Folder) -> dict[str, dict[str, str]]:
-    told = {path: table.conditions for path, table in folder.tables.items()}
-    return {path: _told(each.told) for path, each in told.items() if each}
+def _texts_by_table(folder: Folder) -> dict[str, dict[str, str]]:
+    by_table = {path: table.conditions for path, table in folder.tables.items()}
+    return {path: _texts(each.texts) for path, each in by_table.items() if each}
 
 
-def _told(conditions: Mapping[str, str]) -> dict[str, str]:
+def _texts(conditions: Mapping[str, str]) -> dict[str, str]:
     """Conditions by their names for people, each package's version as one of its own."""
-    told: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for key, text in conditions.items():
         if key == "versions":
             pairs = [pair.split(" ") for pair in text.split(", ")]
             plain = all(len(pair) == 2 for pair in pairs)
-            told |= dict(pairs) if plain else {LABELS[key]: text}
+            texts |= dict(pairs) if plain else {LABELS[key]: text}
         elif key not in UNIMPORTANT:
-            told[LABELS[key]] = text
-    return told
+            texts[LABELS[key]] = text
+    return texts
 
 
 def _flat(config: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, str]]:

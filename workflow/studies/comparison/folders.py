@@ -122,6 +122,6 @@ def _read(name: str, file: Path) -> tuple[Table, pd.DataFrame]:
 
 
 def _require_texts(table: Table) -> None:
-    """Join what is told about the values once; what is no text raises."""
-    told = table.conditions.told.values() if table.conditions else ()
-    "".join([table.name, *told, *(column.label for column in table.columns)])
+    """Join what is said about the values once; what is no text raises."""
+    texts = table.conditions.texts.values() if table.conditions else ()
+    "".join([table.name, *texts, *(column.label for column in table.columns)])

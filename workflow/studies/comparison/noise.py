@@ -54,6 +54,7 @@ RULES = {
     "speed-ups of one run, modelled times": "are not judged, as the times themselves are",
 }
 """The rules in words."""
+Spread = tuple[float, float] | None
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class Value:
     max: float | None = None
 
     @property
-    def spread(self) -> tuple[float, float] | None:
+    def spread(self) -> Spread:
         """Minimum and maximum of several runs; None if there was one."""
         if self.min is None or self.max is None or self.min == self.max:
             return None
@@ -91,29 +92,24 @@ def verdict(kind: str, before: Value, now: Value) -> str:
         return SAME if math.isnan(old) and math.isnan(new) else CHANGED
     if kind in ("seconds", "times"):
         moved = _time_moved(kind, old, new, before.spread, now.spread)
-        return _told(moved, (new > old) == (kind == "seconds"), SLOWER, FASTER)
+        return _moved(moved, (new > old) == (kind == "seconds"), SLOWER, FASTER)
     if kind in ERRORS:
-        return _told(_error_moved(old, new), abs(new) > abs(old), LESS_ACCURATE, MORE_ACCURATE)
+        return _moved(_error_moved(old, new), abs(new) > abs(old), LESS_ACCURATE, MORE_ACCURATE)
     if kind == "score":
-        return _told(_error_moved(1.0 - old, 1.0 - new), new < old, LESS_ACCURATE, MORE_ACCURATE)
+        moved = _error_moved(1.0 - old, 1.0 - new)
+        return _moved(moved, new < old, LESS_ACCURATE, MORE_ACCURATE)
     if kind == "bytes":
-        return _told(_excess(old, new) > BYTES_TOLERANCE, new > old, LARGER, SMALLER)
+        return _moved(_excess(old, new) > BYTES_TOLERANCE, new > old, LARGER, SMALLER)
     return CHANGED if _excess(old, new) > VALUE_TOLERANCE else SAME
 
 
-def _told(moved: bool, for_the_worse: bool, worse: str, better: str) -> str:
+def _moved(moved: bool, for_the_worse: bool, worse: str, better: str) -> str:
     if not moved:
         return SAME
     return worse if for_the_worse else better
 
 
-def _time_moved(
-    kind: str,
-    old: float,
-    new: float,
-    before: tuple[float, float] | None,
-    now: tuple[float, float] | None,
-) -> bool:
+def _time_moved(kind: str, old: float, new: float, before: Spread, now: Spread) -> bool:
     """Whether a time [s] or a speed-up moved, given the spreads of its runs."""
     if before and now:
         apart = before[1] < now[0] or now[1] < before[0]

@@ -94,8 +94,8 @@ def _round(value: Any) -> Any:
 def description(folder: Folder) -> str:
     """What the reference is, on which machine it was made, and what that took."""
     conditions = folder.tables[TIMED].conditions
-    told = conditions.told if conditions else {}
-    of_run = {LABELS[key]: text for key, text in told.items() if key not in OF_TABLES}
+    texts = conditions.texts if conditions else {}
+    of_run = {LABELS[key]: text for key, text in texts.items() if key not in OF_TABLES}
     return DESCRIPTION.format(
         title=folder.config["title"],
         place=folder.path / FOLDER,

@@ -23,9 +23,9 @@ from workflow.studies.comparison.noise import BETTER, RULES, VERDICTS, WORSE
 NAME = "comparison"
 MACHINE = ("processor", "cores", "memory", "ranks", "threads", "blas")
 """Conditions on which times depend, whatever the code."""
-MOST_MOVED = 25
+MAX_MOVED = 25
 """Moved numbers of a table that people are told; all are in the CSV file."""
-MOST_LISTED = 200
+MAX_LISTED = 200
 """Numbers of a table up to which the page lists all of them."""
 TITLE = "What moved"
 TABLES = tables_of("comparison/tables.yaml")
@@ -61,7 +61,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
     }
 
 
-def as_text(comparison: Comparison, most: int = MOST_MOVED) -> str:
+def as_text(comparison: Comparison) -> str:
     """The short form, for a terminal."""
     before, now = comparison.before, comparison.now
     lines = [f"{before.path} (baseline) and {now.path} (this run)"]
@@ -69,11 +69,11 @@ def as_text(comparison: Comparison, most: int = MOST_MOVED) -> str:
         where = f" ({_cut(item['where'])})" if item["where"] else ""
         lines.append(f"  {item['what']}: {_cut(item['before'])} -> {_cut(item['now'])}{where}")
     lines += [*_caution(comparison), summary(comparison)]
-    for cell in comparison.moved.head(most).to_dict("records"):
+    for cell in comparison.moved.head(MAX_MOVED).to_dict("records"):
         place = f"{cell['verdict']}: {cell['table']}, {cell['row']}, {cell['label']}"
         lines.append(f"  {place}: {cell['before_shown']} -> {cell['now_shown']}")
-    if len(comparison.moved) > most:
-        lines.append(f"  and {len(comparison.moved) - most:,} more")
+    if len(comparison.moved) > MAX_MOVED:
+        lines.append(f"  and {len(comparison.moved) - MAX_MOVED:,} more")
     sides = _one_sided(comparison).items()
     lines += [f"{side}: {len(only)}, such as {only[0]}" for side, only in sides]
     return "\n".join(lines)
@@ -85,9 +85,9 @@ def as_markdown(comparison: Comparison) -> str:
     parts += [each.as_markdown() for each in _differing(comparison)] or ["The same."]
     parts += [*_caution(comparison), "## Moved"]
     for path, moved in _by_table(comparison.moved):
-        parts += [f"### {path}", _listed(path, moved.head(MOST_MOVED)).as_markdown()]
-        if len(moved) > MOST_MOVED:
-            parts.append(f"And {len(moved) - MOST_MOVED:,} more, see {NAME}.csv.")
+        parts += [f"### {path}", _listed(path, moved.head(MAX_MOVED)).as_markdown()]
+        if len(moved) > MAX_MOVED:
+            parts.append(f"And {len(moved) - MAX_MOVED:,} more, see {NAME}.csv.")
     if comparison.moved.empty:
         parts.append("Nothing.")
     parts += ["## By table", TABLES["counts"](comparison.cells).as_markdown()]
@@ -108,13 +108,13 @@ def as_page(comparison: Comparison) -> str:
         differing=_differing(comparison),
         cautions=_caution(comparison),
         moved=[
-            (path, _listed(f"{path}-moved", moved.head(MOST_MOVED)), len(moved))
+            (path, _listed(f"{path}-moved", moved.head(MAX_MOVED)), len(moved))
             for path, moved in _by_table(comparison.moved)
         ],
-        most=MOST_MOVED,
+        most=MAX_MOVED,
         counts=TABLES["counts"](comparison.cells),
-        listed=[_listed(path, cells) for path, cells in by_table if len(cells) <= MOST_LISTED],
-        unlisted=[path for path, cells in by_table if len(cells) > MOST_LISTED],
+        listed=[_listed(path, cells) for path, cells in by_table if len(cells) <= MAX_LISTED],
+        unlisted=[path for path, cells in by_table if len(cells) > MAX_LISTED],
         one_sided=_one_sided(comparison),
         rules=RULES,
     )
@@ -122,36 +122,33 @@ def as_page(comparison: Comparison) -> str:
 
 def summary(comparison: Comparison) -> str:
     """What became of the numbers, in one sentence."""
-    found = comparison.moved["verdict"].value_counts()
-    told = [f"{show(found[name], 'count')} {name}" for name in VERDICTS if name in found]
+    verdicts = comparison.moved["verdict"].value_counts()
+    parts = [f"{show(verdicts[name], 'count')} {name}" for name in VERDICTS if name in verdicts]
     numbers = f"{show(len(comparison.cells), 'count')} numbers compared"
-    return f"{numbers}: {', '.join(told) if told else 'none moved beyond noise'}"
+    return f"{numbers}: {', '.join(parts) if parts else 'none moved beyond noise'}"
 
 
 def every_number(cells: pd.DataFrame) -> list[Row]:
     """All numbers of both folders, raw."""
-    rows: list[Row] = cells[RAW].to_dict("records")
-    return rows
+    return cells[RAW].to_dict("records")
 
 
 def counts(cells: pd.DataFrame) -> list[Row]:
     """How many numbers of each table were compared, and what became of them."""
     moved = cells["verdict"].isin(VERDICTS)
     worse, better = (cells["verdict"].isin(verdicts) for verdicts in (WORSE, BETTER))
-    found = pd.DataFrame(
+    flags = pd.DataFrame(
         {"compared": 1, "worse": worse, "better": better, "other": moved & ~worse & ~better}
     )
-    summed = found.groupby(cells["table"], sort=False).sum().astype(int)
-    rows: list[Row] = summed.reset_index().to_dict("records")
-    return rows
+    summed = flags.groupby(cells["table"], sort=False).sum().astype(int)
+    return summed.reset_index().to_dict("records")
 
 
 def listed(cells: pd.DataFrame) -> list[Row]:
     """Numbers of a table side by side, for people."""
     shown = {side: cells[f"{side}{SHOWN}"] for side in SIDES}
     marks = cells["verdict"].map(MARKS).fillna("")
-    rows: list[Row] = cells.assign(**shown, verdict_mark=marks).to_dict("records")
-    return rows
+    return cells.assign(**shown, verdict_mark=marks).to_dict("records")
 
 
 def differing(differences: list[Difference]) -> list[Row]:
@@ -183,8 +180,8 @@ def _sides(comparison: Comparison) -> str:
 
 def _caution(comparison: Comparison) -> list[str]:
     """A sentence about times where the machine is not the same; none otherwise."""
-    found = {item["what"] for item in comparison.conditions}
-    different = [LABELS[key] for key in MACHINE if LABELS[key] in found]
+    names = {item["what"] for item in comparison.conditions}
+    different = [LABELS[key] for key in MACHINE if LABELS[key] in names]
     if not different:
         return []
     return [f"Not the same: {', '.join(different)}; times that moved may tell about these alone."]

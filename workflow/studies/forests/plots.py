@@ -135,12 +135,12 @@ def variants_figure(study: ForestsStudy) -> Figure:
 
 def sizes_figure(study: ForestsStudy) -> Figure:
     """Time of a block over the size of forests."""
-    found = study.result("benchmark")["sizes"]
+    sizes = study.result("benchmark")["sizes"]
     ours = study.result("benchmark")["megabytes"]
     figure, axes = plt.subplots(figsize=(7.6, 3.4))
     for (key, label), colour in zip(SIZED.items(), DISTRIBUTIONS):
-        values = [size[key]["median"] for size in found]
-        megabytes = [size["megabytes"] for size in found]
+        values = [size[key]["median"] for size in sizes]
+        megabytes = [size["megabytes"] for size in sizes]
         axes.loglog(megabytes, values, "o-", markersize=4.5, color=colour, label=label)
     axes.axvline(
         ours, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)), label="the forests studied"

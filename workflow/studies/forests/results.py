@@ -18,30 +18,23 @@ class ForestsStudy(Results):
     @cached_property
     def model(self) -> dict[str, Any]:
         """Summary of the forests studied, from `forests inspect`."""
-        loaded: dict[str, Any] = self.read_json("model.json")
-        return loaded
+        return self.read_json("model.json")
 
     @property
     def on_blocks(self) -> dict[str, Any]:
         """Output of `forests table`."""
-        return self._file("blocks")
+        return self.read_json("blocks.json")
 
     def result(self, name: str) -> Any:
-        """What a measurement found."""
-        return self._file(name)["result"]
+        """Numbers of a measurement."""
+        return self.read_json(f"{name}.json")["result"]
 
     def record(self, name: str) -> Record:
         """Provenance of a measurement."""
-        record: Record = self._file(name)["provenance"]
-        return record
+        return self.read_json(f"{name}.json")["provenance"]
 
     @property
     def origins(self) -> dict[str, Record]:
         """Provenance of the forests and of the measurements."""
         measured = {f"forests_study/{name}.json": self.record(name) for name in MEASUREMENTS}
         return {self.model["path"]: self.model["provenance"], **measured}
-
-    def _file(self, name: str) -> dict[str, Any]:
-        """A measurement: `result` and `provenance`."""
-        loaded: dict[str, Any] = self.read_json(f"{name}.json")
-        return loaded

@@ -85,14 +85,14 @@ COST = _measured("benchmark", _repeats, threads="as the row says")
 
 def cost(study: ForestsStudy) -> Iterator[Row]:
     """Time of a block by each evaluation, and by scikit-learn's."""
-    found = study.result("benchmark")
-    rival = found["rival"]
+    benchmark = study.result("benchmark")
+    rival = benchmark["rival"]
     theirs = (
         f"scikit-learn’s predict, features given: 2×{rival['trees']} trees of its own, "
         f"{rival['leaves']:,} leaves"
     )
     timings = {theirs: rival["predict"], "coarsen, the same trees": rival["coarsen"]}
-    for name, timing in {**found["evaluation"], **timings}.items():
+    for name, timing in {**benchmark["evaluation"], **timings}.items():
         yield {"evaluation": name, **_seconds("seconds", timing)}
 
 

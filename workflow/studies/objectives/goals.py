@@ -34,7 +34,7 @@ class Goal:
         """Cases of the study that the limit is for."""
         return [
             case
-            for case in study.found
+            for case in study.ratings
             if self.model in (None, case.solid)
             and (self.resolutions is None or case.resolution in self.resolutions)
             and (self.materials is None or case.material in self.materials)
@@ -86,8 +86,8 @@ def goals_of(study: Objectives) -> list[Goal]:
 
 def judge(study: Objectives, goal: Goal, coarsening: str) -> Verdict:
     """Verdict on one coarsening."""
-    found = ((goal.value(study, case, coarsening), case) for case in goal.cases(study))
-    values = {case: value for value, case in found if value is not None}
+    pairs = ((goal.value(study, case, coarsening), case) for case in goal.cases(study))
+    values = {case: value for value, case in pairs if value is not None}
     if not values:
         return Verdict(None, None, 0, 0)
     worst = max(values, key=values.__getitem__)
@@ -123,5 +123,5 @@ def goal_cases(study: Objectives) -> Iterator[Row]:
     for goal in goals_of(study):
         for case in goal.cases(study):
             values = {name: goal.value(study, case, name) for name in study.coarsenings}
-            told = {"goal": goal.sentence, "limit": goal.limit}
-            yield {**told, **study.identity(case), **values}
+            about = {"goal": goal.sentence, "limit": goal.limit}
+            yield {**about, **study.identity(case), **values}

@@ -38,8 +38,8 @@ def shortened(study: Objectives) -> list[str]:
     """Cases whose coarse model has fewer modes than were asked for, in words."""
     return [
         f"{study.label(case)} ({last} modes)"
-        for case, found in study.found.items()
-        if (last := found["rows"][0]["all"]["last"]) < found["modes"]
+        for case, rating in study.ratings.items()
+        if (last := rating["rows"][0]["all"]["last"]) < rating["modes"]
     ]
 
 
@@ -48,7 +48,7 @@ def _solid(study: Objectives, errors: Table, solid: str) -> dict[str, Any]:
     sizes = {row["resolution"]: (row["unknowns"], row["coarse_unknowns"]) for row in rows}
     return {
         "name": solid,
-        "title": study.title(solid),
+        "title": study.titles[solid],
         "mesh": study.part["models"][solid]["mesh"],
         "sizes": sizes,
         "rows": rows,

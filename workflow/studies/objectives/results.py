@@ -46,25 +46,19 @@ class Objectives(Results):
     section = SECTION
 
     @cached_property
-    def found(self) -> dict[Case, dict[str, Any]]:
+    def ratings(self) -> dict[Case, dict[str, Any]]:
         """Output of `solver objectives` by case."""
         return {case: self.read_json(f"cases/{case.path}") for case in cases_of(self.config)}
 
     @property
     def origins(self) -> dict[str, Record]:
         """Provenance of every case."""
-        return {f"cases/{case.path}": each["provenance"] for case, each in self.found.items()}
+        return {f"cases/{case.path}": each["provenance"] for case, each in self.ratings.items()}
 
     @property
     def solids(self) -> list[str]:
         """Names of the solids studied."""
         return solids.named(self.config, f"{SECTION}.models")
-
-    @property
-    def materials(self) -> list[str]:
-        """Names of the materials studied."""
-        materials: list[str] = self.part["materials"]
-        return materials
 
     @property
     def coarsenings(self) -> list[str]:
@@ -74,42 +68,39 @@ class Objectives(Results):
     @property
     def forest(self) -> dict[str, str] | None:
         """Which forests are compared: `forest`, `forest_objective`, `forest_sha256`; or None."""
-        found: dict[str, str] | None = self._any.get("forest")
-        return found
+        return self._any.get("forest")
 
     @property
     def without_forest(self) -> str:
         """One sentence about why no forests are among the coarsenings; empty if they are."""
-        reason: str = self._any.get("without_forest", "")
-        return reason
+        return self._any.get("without_forest", "")
 
     @property
     def _any(self) -> dict[str, Any]:
         """The first case, for what is the same in all of them."""
-        return next(iter(self.found.values()))
+        return next(iter(self.ratings.values()))
 
     def last(self, part: str) -> int:
         """Last mode compared: of the `audible` 7..60, or of `all`; earlier if fewer were wanted."""
-        rows = (row for found in self.found.values() for row in found["rows"])
+        rows = (row for rating in self.ratings.values() for row in rating["rows"])
         return max(row[part]["last"] for row in rows)
 
     def identity(self, case: Case) -> dict[str, Any]:
         """Values that tell a case from others."""
-        title = self.title(case.solid)
         return {
             "model": case.solid,
-            "title": title,
+            "title": self.titles[case.solid],
             "resolution": case.resolution,
             "material": case.material,
         }
 
     def label(self, case: Case) -> str:
         """A case in a few words."""
-        return f"{self.title(case.solid)} {case.resolution}, {case.material}"
+        return f"{self.titles[case.solid]} {case.resolution}, {case.material}"
 
     def errors(self, case: Case, coarsening: str) -> dict[str, Any]:
         """Row of a case that belongs to a coarsening."""
-        rows: list[dict[str, Any]] = self.found[case]["rows"]
+        rows: list[dict[str, Any]] = self.ratings[case]["rows"]
         return next(row for row in rows if row["coarsening"] == coarsening)
 
     def rms(self, case: Case, coarsening: str) -> float:

@@ -44,15 +44,15 @@ def _pooled(study: Objectives, part: str) -> list[Row]:
             "worst": row[part]["worst"],
             "where": f"{study.label(case)}, mode {row[part]['worst_mode']}",
         }
-        for case, found in study.found.items()
-        for row in found["rows"]
+        for case, rating in study.ratings.items()
+        for row in rating["rows"]
         for material in (case.material, ALL)
     )
     rows: dict[str, Row] = {name: {"coarsening": name} for name in study.coarsenings}
-    for (name, material), found in errors.groupby(["coarsening", "material"], sort=False):
-        worst = found.loc[found["worst"].abs().idxmax()]
+    for (name, material), group in errors.groupby(["coarsening", "material"], sort=False):
+        worst = group.loc[group["worst"].abs().idxmax()]
         rows[name] |= {
-            f"{material}_rms": float(np.sqrt(found["square"].mean())),
+            f"{material}_rms": float(np.sqrt(group["square"].mean())),
             f"{material}_worst": float(worst["worst"]),
             f"{material}_where": worst["where"],
         }
@@ -61,20 +61,20 @@ def _pooled(study: Objectives, part: str) -> list[Row]:
 
 def errors(study: Objectives) -> Iterator[Row]:
     """Every coarsening of every case."""
-    for case, found in study.found.items():
-        for row in found["rows"]:
-            yield {**found, **row, **study.identity(case)}
+    for case, rating in study.ratings.items():
+        for row in rating["rows"]:
+            yield {**rating, **row, **study.identity(case)}
 
 
 def forest(study: Objectives) -> Iterator[Row]:
     """Errors of the forests over those of their fit, by solid; no rows without both."""
-    ratios = {case: study.forest_over_fit(case) for case in study.found}
+    ratios = {case: study.forest_over_fit(case) for case in study.ratings}
     known = {case: ratio for case, ratio in ratios.items() if ratio is not None}
     if not known:
         return
     for solid in study.solids:
         of_solid = {case: ratio for case, ratio in known.items() if case.solid == solid}
-        yield _forest_row(study, study.title(solid), of_solid)
+        yield _forest_row(study, study.titles[solid], of_solid)
     if len(study.solids) > 1:
         yield _forest_row(study, "All solids", known)
 
@@ -99,11 +99,11 @@ def _forest_row(study: Objectives, title: str, ratios: dict[Case, float]) -> Row
 
 def truths(study: Objectives) -> Iterator[Row]:
     """Size and proof of every ground truth."""
-    for case, found in study.found.items():
-        truth = found["truth"]
+    for case, rating in study.ratings.items():
+        truth = rating["truth"]
         counted = "inertia_count" in truth
         proof = f"{truth['inertia_expected']} / {truth['inertia_count']}" if counted else None
-        yield {**found, **truth, **study.identity(case), "inertia": proof}
+        yield {**rating, **truth, **study.identity(case), "inertia": proof}
 
 
 def objectives(study: Objectives) -> Iterable[Row]:
@@ -131,7 +131,7 @@ def description(coarsening: str, forest: Mapping[str, str] | None = None) -> str
 
 def materials(study: Objectives) -> Iterable[Row]:
     """What each material is."""
-    functions = {name: name.replace("-", "_") for name in study.materials}
+    functions = {name: name.replace("-", "_") for name in study.part["materials"]}
     return [
         {"material": name, "description": _first_line(getattr(carillon.fem.materials, function))}
         for name, function in functions.items()

@@ -29,8 +29,7 @@ MEASURE = (
 
 def on_blocks(results: Any) -> list[Row]:
     """Rows of `forests table`."""
-    rows: list[Row] = results.on_blocks["result"]
-    return rows
+    return results.on_blocks["result"]
 
 
 MEASURED = measured(
@@ -73,19 +72,19 @@ def blocks(results: Any) -> Iterator[Row]:
     used = compared(on_blocks(results))
     keys = {kind: f"kind{number}" for number, kind in enumerate(kinds_of(used))}
     frame = pd.DataFrame(used)
-    for method, found in frame.groupby(frame.apply(method_of, axis=1), sort=False):
-        trained = found["training_seconds"].dropna()
+    for method, group in frame.groupby(frame.apply(method_of, axis=1), sort=False):
+        trained = group["training_seconds"].dropna()
         yield {
             "method": method,
             **{
                 f"{keys[kind_of(row)]}_{ending}": row[error]
-                for row in (used[index] for index in found.index)
+                for row in (used[index] for index in group.index)
                 for ending, error in ERRORS.items()
             },
-            "seconds_per_block": found["seconds_per_block"].median(),
-            "seconds_per_block_min": found["seconds_per_block_min"].min(),
-            "seconds_per_block_max": found["seconds_per_block_max"].max(),
-            "storage_bytes": int(found["storage_bytes"].max()),
+            "seconds_per_block": group["seconds_per_block"].median(),
+            "seconds_per_block_min": group["seconds_per_block_min"].min(),
+            "seconds_per_block_max": group["seconds_per_block_max"].max(),
+            "storage_bytes": int(group["storage_bytes"].max()),
             "training_seconds": float(trained.max()) if len(trained) else None,
         }
     least = {"nodal": "min_mean_error", "nodal_median": "min_median_error"}

@@ -58,11 +58,11 @@ def convergence_figure(results: Results, model: str) -> Figure:
 
 def _colours(starts: list[str]) -> dict[str, str]:
     treatments = [start for start in starts if start != RANDOM]
-    found = {
+    colours = {
         start: COLOURS[HCMS_COLOURS[number % len(HCMS_COLOURS)]]
         for number, start in enumerate(treatments)
     }
-    return {**found, RANDOM: COLOURS[RANDOM]}
+    return {**colours, RANDOM: COLOURS[RANDOM]}
 
 
 def _plot_eigenvalues(

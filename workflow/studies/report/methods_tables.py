@@ -30,15 +30,15 @@ MEASURED = measured(
 
 def timed(results: Any) -> list[str]:
     """Methods that were timed on any solid."""
-    found = results.methods.values()
-    return [name for name in METHODS if any(row["seconds"].get(name) for row in found)]
+    rows = results.methods.values()
+    return [name for name in METHODS if any(row["seconds"].get(name) for row in rows)]
 
 
 def caption(results: Any) -> str:
     """What the table of methods shows, and how it was measured."""
-    found = results.methods
+    rows = results.methods
     return (
-        f"Median wall seconds of {_rounds(found, ' rounds')} in which every method runs once, from "
+        f"Median wall seconds of {_rounds(rows, ' rounds')} in which every method runs once, from "
         "moduli to modes: coarsening, assembly and solution. Precomputation is what the meshes "
         "need once for any material, fine and coarse. Checks of the results are not timed. DDFEM* "
         "alone is coarsening and SLEPc on the coarse mesh. The warm run follows moduli that "
@@ -46,19 +46,19 @@ def caption(results: Any) -> str:
         "corrected to an eigenvalue error of 10⁻⁶, coarsened to 10⁻² but where 10⁻⁶ is said. "
         "Errors are against SLEPc on the fine mesh: the largest of an eigenvalue, and the rms of "
         "frequencies 7 to 60. SLEPc: "
-        + ("; ".join(f"{model} {_configuration(row)}" for model, row in found.items()) or "none")
+        + ("; ".join(f"{model} {_configuration(row)}" for model, row in rows.items()) or "none")
         + "."
         + "".join(
             f" {model}, {METHODS[name]}: {reason}."
-            for model, row in found.items()
+            for model, row in rows.items()
             for name, reason in row["failed"].items()
         )
     )
 
 
-def _rounds(found: Mapping[str, Row], counted: str = "") -> str:
-    runs = sorted({row["runs"]["slepc"] for row in found.values()})
-    slow = sorted({row["runs"]["arpack"] for row in found.values() if "arpack" in row["runs"]})
+def _rounds(rows: Mapping[str, Row], counted: str = "") -> str:
+    runs = sorted({row["runs"]["slepc"] for row in rows.values()})
+    slow = sorted({row["runs"]["arpack"] for row in rows.values() if "arpack" in row["runs"]})
     less = f" (ARPACK {' or '.join(map(str, slow))})" if slow and slow != runs else ""
     return f"{' or '.join(map(str, runs))}{counted}{less}"
 
@@ -103,13 +103,13 @@ def ratios(results: Any) -> Iterator[Row]:
     for model, row in results.methods.items():
         for method, bases in row["speedup"].items():
             for base in bases:
-                found = {
+                values = {
                     f"{key}{end}": value
                     for key, part in parts.items()
                     for end, value in _ratio(row, method, base, row[part][method][base]).items()
                 }
                 names = {"method": METHODS[method], "base": METHODS[base]}
-                yield {"model": model, "title": results.titles[model], **names, **found}
+                yield {"model": model, "title": results.titles[model], **names, **values}
 
 
 def _ratio(row: Row, method: str, base: str, ratio: float) -> dict[str, float]:

@@ -30,16 +30,16 @@ def draw_first_elastic_modes(
 ) -> dict[str, dict[str, Any]]:
     """Draw mode 7 of every shown variant to `paths`; return frequency and likeness of each."""
     truth = read_modes(results.modes_path(model, TRUTH))
-    wanted = displacement(truth, RIGID_MODES)
-    view = view_of(truth.mesh, wanted)
+    reference = displacement(truth, RIGID_MODES)
+    view = view_of(truth.mesh, reference)
     description, pictures = {}, []
     for variant in SHOWN:
-        found = read_modes(results.modes_path(model, variant))
-        motion, likeness = aligned(found, truth, wanted)
-        drawn = partial(draw, mesh=found.mesh, displacement=motion, **view)
+        file = read_modes(results.modes_path(model, variant))
+        motion, likeness = aligned(file, truth, reference)
+        drawn = partial(draw, mesh=file.mesh, displacement=motion, **view)
         pictures.append(solid_picture(drawn))
         description[variant] = {
-            "hertz": float(found.frequencies[RIGID_MODES]),
+            "hertz": float(file.frequencies[RIGID_MODES]),
             "likeness": likeness,
             "combined": len(cluster(truth.frequencies)),
         }
@@ -62,7 +62,7 @@ def cluster(frequencies: Array) -> list[int]:
     return [RIGID_MODES + int(index) for index in np.flatnonzero(near)]
 
 
-def aligned(file: ModesFile, truth: ModesFile, wanted: Array) -> tuple[Array, float]:
+def aligned(file: ModesFile, truth: ModesFile, reference: Array) -> tuple[Array, float]:
     """First elastic motion of `file`, signed and turned within its cluster to match the truth's.
 
     Returns
@@ -73,7 +73,7 @@ def aligned(file: ModesFile, truth: ModesFile, wanted: Array) -> tuple[Array, fl
     """
     assert file.modes is not None
     # Nodes of a coarsened mesh lie on those of the fine one, or beside them where cells are void.
-    target = wanted[cKDTree(truth.mesh.nodes).query(file.mesh.nodes)[1]].ravel()
+    target = reference[cKDTree(truth.mesh.nodes).query(file.mesh.nodes)[1]].ravel()
     basis = file.modes[:, cluster(truth.frequencies)]
     motion = basis @ np.linalg.lstsq(basis, target, rcond=None)[0]
     length, target_length = np.linalg.norm(motion), np.linalg.norm(target)

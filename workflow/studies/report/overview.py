@@ -23,14 +23,14 @@ COMPARED = (TRUTH, "hcms_ec", FAST)
 def overview_figure(results: Run, model: str) -> Figure:
     """First elastic mode of the truth and of the fast method, and the spectra of both."""
     truth = read_modes(results.modes_path(model, TRUTH))
-    wanted = displacement(truth, RIGID_MODES)
-    view = view_of(truth.mesh, wanted)
+    reference = displacement(truth, RIGID_MODES)
+    view = view_of(truth.mesh, reference)
     with plt.rc_context({"figure.constrained_layout.use": False}):
         figure = plt.figure(figsize=(11.6, 3.9))
         for column, variant in enumerate((TRUTH, FAST)):
             left = 0.01 + 0.3 * column
             file = truth if variant == TRUTH else read_modes(results.modes_path(model, FAST))
-            motion, _ = aligned(file, truth, wanted)
+            motion, _ = aligned(file, truth, reference)
             body = figure.add_axes((left, 0.0, 0.29, 0.84), projection="3d")
             draw(body, file.mesh, motion, **view)
             figure.text(left + 0.01, 0.93, _label(variant), weight="bold", size=10.5)
@@ -39,7 +39,7 @@ def overview_figure(results: Run, model: str) -> Figure:
             figure.text(left + 0.01, 0.87, text, color=MUTED)
         rows = [row for row in results.table("frequencies").rows if row["model"] == model]
         _plot_spectra(figure.add_axes((0.68, 0.13, 0.305, 0.69)), rows)
-        figure.text(0.68, 0.93, plain(results.title(model)), weight="bold", size=10.5)
+        figure.text(0.68, 0.93, plain(results.titles[model]), weight="bold", size=10.5)
         figure.text(0.68, 0.87, f"{len(rows)} natural frequencies", color=MUTED)
     return figure
 

@@ -43,7 +43,7 @@ def plots(results: Any, part: str, names: Any) -> list[dict[str, Any]]:
     return [
         {
             "name": name,
-            "title": results.title(name),
+            "title": results.titles[name],
             "plot": inline(results.figure(f"{name}-{part}.svg")),
         }
         for name in names
@@ -70,7 +70,7 @@ def _model(run: Run, tables: Tables, model: str) -> dict[str, Any]:
     }
     return {
         "name": model,
-        "title": run.title(model),
+        "title": run.titles[model],
         "settings": run.config["models"][model],
         "summary": of_model["summary"][0],
         "pictures": mode_pictures(run, model),

@@ -51,10 +51,13 @@ class Run(Results):
 
     @cached_property
     def comparisons(self) -> dict[str, dict[str, Any]]:
-        """Output of `solver compare` against the truth, by variant and model."""
+        """Output of `solver compare` against the truth, by model and variant."""
         return {
-            variant: self.by_model(f"{variant}.comparison.json", self.models)
-            for variant in CANDIDATES
+            model: {
+                variant: self.read_json(f"models/{model}/{variant}.comparison.json")
+                for variant in CANDIDATES
+            }
+            for model in self.models
         }
 
     @cached_property
@@ -66,14 +69,12 @@ class Run(Results):
     @cached_property
     def forests(self) -> dict[str, Any]:
         """Summary of the forests."""
-        loaded: dict[str, Any] = self.read_json("forests/forests.json")
-        return loaded
+        return self.read_json("forests/forests.json")
 
     @cached_property
     def on_blocks(self) -> dict[str, Any]:
         """Output of `forests table`: how the coarsenings do on single blocks."""
-        loaded: dict[str, Any] = self.read_json("forests/table.json")
-        return loaded
+        return self.read_json("forests/table.json")
 
     @property
     def origins(self) -> dict[str, Record]:
@@ -84,7 +85,7 @@ class Run(Results):
         origins["forests/table.json"] = self.on_blocks["provenance"]
         for model, spectra in self.spectra.items():
             place = f"models/{model}/"
-            origins |= {f"{place}{name}.h5": found.provenance for name, found in spectra.items()}
+            origins |= {f"{place}{name}.h5": file.provenance for name, file in spectra.items()}
             measured = super().origins.items()
             origins |= {file: record for file, record in measured if file.startswith(place)}
         return origins

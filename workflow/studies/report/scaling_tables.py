@@ -49,10 +49,10 @@ def assumptions(results: Any) -> list[str]:
 
 
 def _parts(results: Any) -> Iterator[tuple[str, str, Row]]:
-    for model, found in results.scaling.items():
+    for model, result in results.scaling.items():
         for kind in KINDS:
-            if found[kind] is not None:
-                yield model, kind, found[kind]
+            if result[kind] is not None:
+                yield model, kind, result[kind]
 
 
 def _note(run: Row | None) -> str:

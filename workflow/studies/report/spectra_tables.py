@@ -8,8 +8,8 @@ from carillon.fem.model import RIGID_MODES
 from workflow.studies.base.conditions import NOT_TIMED, ONE_COLD_RUN, measured
 from workflow.studies.base.entry import Row
 from workflow.studies.report.results import Run, precomputation_seconds, records, solve_seconds
-from workflow.variants import CANDIDATES, SHOWN, TRUTH, VARIANTS
 from workflow.variants import COARSENED as COARSENED
+from workflow.variants import SHOWN, TRUTH, VARIANTS
 
 FAST = "ddfem_hcms_ec"
 TIMED = (TRUTH, "ddfem_slepc", "hcms", "hcms_ec", FAST)
@@ -21,7 +21,7 @@ def _identity(run: Run, model: str) -> Row:
     spectra = run.spectra[model]
     return {
         "model": model,
-        "title": run.title(model),
+        "title": run.titles[model],
         "unknowns": spectra[TRUTH].mesh.n_dofs,
         "coarse_unknowns": spectra[FAST].mesh.n_dofs,
     }
@@ -30,7 +30,7 @@ def _identity(run: Run, model: str) -> Row:
 def summary(run: Run) -> Iterator[Row]:
     """One row a model: size, accuracy, time."""
     for model, spectra in run.spectra.items():
-        compared = {variant: found[model] for variant, found in run.comparisons.items()}
+        compared = run.comparisons[model]
         truth, fast = (solve_seconds(spectra[variant]) for variant in (TRUTH, FAST))
         yield {
             **_identity(run, model),
@@ -56,16 +56,14 @@ def frequencies(run: Run) -> Iterator[Row]:
 
 def errors(run: Run) -> Iterator[Row]:
     """Distances of every variant from the truth."""
-    for model in run.models:
-        for variant in CANDIDATES:
-            label = VARIANTS[variant].label
-            yield {**run.comparisons[variant][model], "model": model, "variant": label}
+    for model, compared in run.comparisons.items():
+        for variant, distances in compared.items():
+            yield {**distances, "model": model, "variant": VARIANTS[variant].label}
 
 
 def coarsening(run: Run) -> Iterator[Row]:
     """What the coarsening alone costs in accuracy."""
-    for model in run.models:
-        compared = {variant: found[model] for variant, found in run.comparisons.items()}
+    for model, compared in run.comparisons.items():
         yield {**_identity(run, model), **compared}
 
 
@@ -92,14 +90,16 @@ def phases(run: Run) -> Iterator[Row]:
 def evidence(run: Run) -> Iterator[Row]:
     """Residual, orthogonality, inertia count of every run."""
     for model, variant, spectrum in run.solved:
-        found = spectrum.attributes
-        counted = found.get("inertia_count", -1)
+        attributes = spectrum.attributes
+        counted = attributes.get("inertia_count", -1)
+        uncorrected = 0 if attributes["method"] == "hcms" else None
+        uncorrected = 0 if attributes["method"] == "hcms" else None
         yield {
-            **found,
+            **attributes,
             "model": model,
             "variant": VARIANTS[variant].label,
             "residual_max": float(spectrum.residuals.max()),
-            "inertia": f"{found['inertia_expected']} / {counted}" if counted >= 0 else None,
-            "corrections": found.get("corrections", 0 if found["method"] == "hcms" else None),
-            "estimate": found.get("eigenvalue_error_estimate"),
+            "inertia": f"{attributes['inertia_expected']} / {counted}" if counted >= 0 else None,
+            "corrections": attributes.get("corrections", uncorrected),
+            "estimate": attributes.get("eigenvalue_error_estimate"),
         }

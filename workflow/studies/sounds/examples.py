@@ -22,7 +22,7 @@ EXAMPLES = Path(__file__).with_name("examples.yaml")
 FOLDER = "sound"
 """Folder of the examples beside the run's configuration."""
 PROJECT, DESIGN, START, TRUTH = "project.yaml", "design.h5", "start.h5", "truth.h5"
-"""What is wanted, what was found, what the search began with, modes of the fine model."""
+"""Targets, design, what the search began with, modes of the fine model."""
 ELSEWHERE = "elsewhere"
 """Name of the sound at a point without a target."""
 BUNNY = "bunny"
@@ -131,11 +131,6 @@ class Example:
         return [target for target in self.targets if target.edit <= edit]
 
 
-def names() -> list[str]:
-    """Names of all examples."""
-    return list(_described())
-
-
 def examples(config: Mapping[str, Any]) -> dict[str, Example]:
     """The examples that a configuration asks for, by name."""
     return {name: _example(name, config) for name in config["sound"]["examples"]}
@@ -174,21 +169,21 @@ def solid_arguments(example: Example) -> list[str]:
 
 
 def _example(name: str, config: Mapping[str, Any]) -> Example:
-    described, wanted = _described()[name], config["sound"]
+    described, sound = _described()[name], config["sound"]
     meshes = [_mesh(solid["mesh"], config) for solid in described["solids"]]
     there = (mesh.startswith(BUILTIN) or Path(mesh).is_file() for mesh in meshes)
     chosen = list(there).index(True)
     solid = described["solids"][chosen]
     places = solid["places"]
     targets = [Target(at=tuple(places[each["name"]]), **each) for each in described["targets"]]
-    told = {key: described[key] for key in ("title", "figure", "about", "density", "dimensions")}
+    texts = {key: described[key] for key in ("title", "figure", "about", "density", "dimensions")}
     return Example(
         name=name,
-        **told,
+        **texts,
         mesh=meshes[chosen],
-        resolution=wanted["resolution"] or solid["resolution"],
-        modes=wanted["modes"] or described["modes"],
-        seconds=wanted["seconds"] or described["seconds"],
+        resolution=sound["resolution"] or solid["resolution"],
+        modes=sound["modes"] or described["modes"],
+        seconds=sound["seconds"] or described["seconds"],
         targets=tuple(targets),
         elsewhere=(solid["elsewhere"]["name"], tuple(solid["elsewhere"]["at"])),
         compared=described.get("compared", False),
@@ -202,5 +197,4 @@ def _mesh(mesh: str, config: Mapping[str, Any]) -> str:
 
 @cache
 def _described() -> dict[str, Any]:
-    loaded: dict[str, Any] = yaml.safe_load(EXAMPLES.read_text(encoding="utf-8"))
-    return loaded
+    return yaml.safe_load(EXAMPLES.read_text(encoding="utf-8"))

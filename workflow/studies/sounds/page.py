@@ -1,4 +1,4 @@
-"""The page of an example: what was wanted, what was found, to see and to hear."""
+"""The page of an example: targets and design, to see and to hear."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from workflow.studies.base.table import Table
 from workflow.studies.sounds import plots
 from workflow.studies.sounds.examples import DESIGN, ELSEWHERE, PROJECT, START, TRUTH
 from workflow.studies.sounds.pictures import ELSEWHERE_CLASS, Mark, marks_of, material_pictures
-from workflow.studies.sounds.results import Found
+from workflow.studies.sounds.results import SoundResults
 
 Array = NDArray[np.float64]
 Sound = tuple[Array, int]
@@ -44,13 +44,13 @@ STATES = {
 """Folders of sounds, and their names for people."""
 
 
-def page(found: Found, tables: dict[str, Table]) -> str:
+def page(results: SoundResults, tables: dict[str, Table]) -> str:
     """Build the page of an example from its tables and files."""
-    example, design = found.example, found.design
+    example, design = results.example, results.design
     marks = marks_of(design)
-    elsewhere = _elsewhere(found)
+    elsewhere = _elsewhere(results)
     frequencies = plots.frequency_figure(tables["frequencies"], tables["truth"])
-    compared = plots.optimisers_figure(found.optimisers) if found.optimisers else None
+    compared = plots.optimisers_figure(results.optimisers) if results.optimisers else None
     return rendered(
         "sounds/page.html.j2",
         title=example.title,
@@ -59,16 +59,16 @@ def page(found: Found, tables: dict[str, Table]) -> str:
         tables=tables,
         edits=tables["designs"].rows,
         worst=_worst(tables["frequencies"]),
-        points=_points(found, marks, tables["amplitudes"]),
+        points=_points(results, marks, tables["amplitudes"]),
         elsewhere=elsewhere,
-        rest=_panel(found, "after", ELSEWHERE, [found.sound("after", ELSEWHERE)]),
-        cost=inlined(plots.cost_figure(found), "cost"),
+        rest=_panel(results, "after", ELSEWHERE, [results.sound("after", ELSEWHERE)]),
+        cost=inlined(plots.cost_figure(results), "cost"),
         frequencies=inlined(frequencies, "frequencies"),
         optimisers=compared and inlined(compared, "optimisers"),
         pictures=[embedded(each) for each in material_pictures(design, [*marks, elsewhere])],
         colour_bar=inlined(plots.colour_bar(design.young), "colours"),
         moduli=(design.young.min(), np.median(design.young), design.young.max()),
-        files=_files(found),
+        files=_files(results),
         project=yaml.safe_dump(design.settings, sort_keys=False),
     )
 
@@ -81,35 +81,35 @@ def _worst(frequencies: Table) -> dict[str, float]:
     }
 
 
-def _points(found: Found, marks: list[Mark], balance: Table) -> list[dict[str, Any]]:
+def _points(results: SoundResults, marks: list[Mark], balance: Table) -> list[dict[str, Any]]:
     """Sounds and balance of every struck point."""
-    names = found.design.targets.names
+    names = results.design.targets.names
     return [
         {
             "name": name,
             "style": mark.style,
-            "position": np.round(mark.position / found.design.settings["unit"], DIGITS).tolist(),
-            "panels": _panels(found, name),
+            "position": np.round(mark.position / results.design.settings["unit"], DIGITS).tolist(),
+            "panels": _panels(results, name),
             "balance": inlined(plots.balance_figure(balance, name), f"balance-{number}"),
         }
         for number, (name, mark) in enumerate(zip(names, marks))
     ]
 
 
-def _panels(found: Found, name: str) -> list[dict[str, Any]]:
-    """Sound before, wanted and after at a point, on the same scales."""
-    sounds = [found.sound(state, name) for state in STATES]
-    return [_panel(found, state, name, sounds) for state in STATES]
+def _panels(results: SoundResults, name: str) -> list[dict[str, Any]]:
+    """Sounds at a point before and after, and its clip, on the same scales."""
+    sounds = [results.sound(state, name) for state in STATES]
+    return [_panel(results, state, name, sounds) for state in STATES]
 
 
-def _panel(found: Found, state: str, name: str, together: list[Sound]) -> dict[str, Any]:
+def _panel(results: SoundResults, state: str, name: str, together: list[Sound]) -> dict[str, Any]:
     """Spectrogram and player of a sound, scaled as those that are shown `together`."""
-    sound, rate = found.sound(state, name)
-    target = found.sound("clips", name) if state in STATES and name != ELSEWHERE else (sound, rate)
+    sound, rate = results.sound(state, name)
+    target = (sound, rate) if name == ELSEWHERE else results.sound("clips", name)
     loudest = float(spectrogram(*target)[2].max())
     seconds = min(SHOWN_SECONDS, max(len(each) / own for each, own in together))
     shown = _first(sound, rate, seconds)
-    highest = min(highest_hertz(together), ROOM_ABOVE * found.design.targets.frequencies[-1])
+    highest = min(highest_hertz(together), ROOM_ABOVE * results.design.targets.frequencies[-1])
     figure = spectrogram_figure(shown, loudest, float(highest), rate)
     peak = max(float(np.abs(each).max()) for each, _ in together)
     return {
@@ -125,18 +125,18 @@ def _first(sound: Array, rate: int, seconds: float) -> Array:
     return np.pad(sound[:count], (0, max(0, count - len(sound))))
 
 
-def _elsewhere(found: Found) -> Mark:
+def _elsewhere(results: SoundResults) -> Mark:
     """The point without a target."""
     surface = trimesh.Trimesh(
-        found.design.surface_vertices, found.design.surface_faces, process=False
+        results.design.surface_vertices, results.design.surface_faces, process=False
     )
-    strike = locate(surface, *found.example.elsewhere)
+    strike = locate(surface, *results.example.elsewhere)
     return Mark(ELSEWHERE_CLASS, strike.position, strike.inward)
 
 
-def _files(found: Found) -> list[dict[str, Any]]:
+def _files(results: SoundResults) -> list[dict[str, Any]]:
     """Files beside the page that are of use elsewhere."""
-    told = {
+    descriptions = {
         PROJECT: "the project, for python -m sound design",
         DESIGN: "the design: material, modes, targets, history",
         START: "the same with the uniform material that the search began with",
@@ -145,14 +145,14 @@ def _files(found: Found) -> list[dict[str, Any]]:
         "optimisers.json": "the optimisers beside each other",
     }
     for state, what in STATES.items():
-        for name in found.design.targets.names:
-            told[f"{state}/{name}.wav"] = f"{name}, {what[0].lower()}{what[1:]}"
-    told[f"after/{ELSEWHERE}.wav"] = f"{found.example.elsewhere[0]}, without a target"
-    for part in found.example.parts[:-1]:
+        for name in results.design.targets.names:
+            descriptions[f"{state}/{name}.wav"] = f"{name}, {what[0].lower()}{what[1:]}"
+    descriptions[f"after/{ELSEWHERE}.wav"] = f"{results.example.elsewhere[0]}, without a target"
+    for part in results.example.parts[:-1]:
         below = Path(part).name
-        told[f"{below}/{DESIGN}"] = f"the design after {below.replace('-', ' ')}"
+        descriptions[f"{below}/{DESIGN}"] = f"the design after {below.replace('-', ' ')}"
     return [
-        {"name": name, "what": what, "bytes": (found.folder / name).stat().st_size}
-        for name, what in told.items()
-        if (found.folder / name).is_file()
+        {"name": name, "what": what, "bytes": results.file(name).stat().st_size}
+        for name, what in descriptions.items()
+        if results.file(name).is_file()
     ]

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.fem.geometry import HexMesh, hexmesh_from_grid
-from carillon.fem.geometry.picture import draw, guess_up, looks_at, mark, view_of
+from carillon.fem.geometry.picture import guess_up, looks_at, view_of
 from sound.project.design_file import Design
-from workflow.studies.base.media import COLOUR_MAP, ROOM_FOR_ARROW, Pixels, cropped, solid_picture
+from workflow.studies.base.media import COLOUR_MAP, Pixels, cropped, marked_picture
 from workflow.studies.base.style import COLOURS
 from workflow.studies.sounds.plots import limits
 
@@ -49,21 +49,14 @@ def material_pictures(design: Design, marks: Sequence[Mark]) -> list[Pixels]:
     outward = -np.array([each.inward for each in marks])
     elevation, azimuth = view_of(mesh, outward, up)
     low, high = np.log10(limits(design.young))
-    views = ((elevation, azimuth), (elevation, azimuth + 180.0))
+    look: Any = {"values": np.log10(design.young), "cmap": COLOUR_MAP, "limits": (low, high)}
 
-    def draw_from(view: tuple[float, float]) -> Any:
-        seen = looks_at(mesh, outward, view, up) > BEHIND
+    def picture(view: tuple[float, float]) -> Pixels:
+        seen = np.flatnonzero(looks_at(mesh, outward, view, up) > BEHIND)
+        arrows = [(marks[i].position, COLOURS[marks[i].style], marks[i].inward) for i in seen]
+        return marked_picture(mesh, arrows, up=up, view=view, **look)
 
-        def drawn(axes: Any) -> None:
-            axes.computed_zorder = False
-            values = np.log10(design.young)
-            draw(axes, mesh, values=values, up=up, view=view, cmap=COLOUR_MAP, limits=(low, high))
-            for each in (marks[index] for index in np.flatnonzero(seen)):
-                mark(axes, mesh, each.position, COLOURS[each.style], each.inward, up=up)
-
-        return drawn
-
-    return cropped([solid_picture(draw_from(view), ROOM_FOR_ARROW) for view in views])
+    return cropped([picture((elevation, azimuth + turn)) for turn in (0.0, 180.0)])
 
 
 def fine_mesh(design: Design) -> HexMesh:

@@ -14,27 +14,27 @@ from numpy.typing import NDArray
 from workflow.studies.base.media import COLOUR_MAP
 from workflow.studies.base.style import COLOURS, INK, MUTED, plain_numbers
 from workflow.studies.base.table import Table
-from workflow.studies.sounds.results import Found
+from workflow.studies.sounds.results import SoundResults
 from workflow.studies.sounds.tables import METHODS
 
 Array = NDArray[np.float64]
 
 STATES = {"start": COLOURS["hcms"], "target": INK, "found": COLOURS["ddfem_hcms_ec"]}
-"""Colours of what was before, wanted and found."""
+"""Colours of what was before, of targets, and of the design."""
 LABELS = {"start": "before", "target": "target", "found": "after"}
-_LEAST = 1e-4
+_MIN_SHARE = 1e-4
 """Part of the largest cost below which nothing is drawn."""
 
 
-def cost_figure(found: Found) -> Figure:
+def cost_figure(results: SoundResults) -> Figure:
     """Cost over the wall time of all edits, and the weighted parts that it is the sum of."""
-    weights = found.design.settings["weights"]
+    weights = results.design.settings["weights"]
     lines = {
         "cost": ("cost", INK, 1.0),
         "frequency_cost": ("of frequencies", COLOURS["hcms_ec"], weights["frequency"]),
         "amplitude_cost": ("of amplitudes", COLOURS["ddfem_hcms_ec"], weights["amplitude"]),
     }
-    histories = [found.history(part) for part in found.example.parts]
+    histories = [results.history(part) for part in results.example.parts]
     begins = np.cumsum([0.0, *(rows["seconds"][-1] for rows in histories)])
     figure, axes = plt.subplots(figsize=(4.7, 3.3))
     for number, (rows, begin) in enumerate(zip(histories, begins)):
@@ -89,8 +89,8 @@ def balance_figure(amplitudes: Table, point: str) -> Figure:
     rows = [row for row in amplitudes.rows if row["point"] == point]
     mode = np.array([row["mode"] for row in rows])
     figure, axes = plt.subplots(figsize=(4.7, 2.1))
-    wanted = [row["target"] for row in rows]
-    axes.bar(mode, wanted, 0.8, color=MUTED, alpha=0.45, label=LABELS["target"])
+    target = [row["target"] for row in rows]
+    axes.bar(mode, target, 0.8, color=MUTED, alpha=0.45, label=LABELS["target"])
     for state, marker, size in (("start", "o", 3.0), ("found", "D", 4.0)):
         values = [row[state] for row in rows]
         style: Any = {"color": STATES[state], "label": LABELS[state]}
@@ -142,4 +142,4 @@ def _ticks(low: float, high: float) -> list[float]:
 
 def _positive(values: Array) -> Array:
     """Values that a logarithmic axis shows."""
-    return np.asarray(np.maximum(values, _LEAST * values.max()))
+    return np.asarray(np.maximum(values, _MIN_SHARE * values.max()))

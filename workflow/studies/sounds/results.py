@@ -1,76 +1,66 @@
-"""What was found for an example, read when asked for."""
+"""Results of an example, read when asked for."""
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from solver.files.modes_file import ModesFile, read_modes
 from sound.clips.wav import read_wav
 from sound.project.design_file import Design, read_design
 from workflow.studies.base.conditions import Record
+from workflow.studies.base.results import Results
 from workflow.studies.sounds.examples import DESIGN, START, TRUTH, Example, examples
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Found:
-    """Results of one example.
+class SoundResults(Results):
+    """Results of one example, below the folder of all of them."""
 
-    Attributes
-    ----------
-    root
-        Folder of the examples, below the one that holds the run's `config.yaml`.
-    config
-        The run's resolved configuration.
-    example
-        What was asked for.
-    """
+    name: str
 
-    root: Path
-    config: dict[str, Any]
-    example: Example
+    @cached_property
+    def example(self) -> Example:
+        """What was asked for."""
+        return examples(self.config)[self.name]
 
-    @property
-    def folder(self) -> Path:
-        """Folder of the example."""
-        return self.root / self.example.name
+    def file(self, name: str) -> Path:
+        """One of the example's files."""
+        return self.folder / self.name / name
 
     @cached_property
     def designs(self) -> dict[str, Design]:
         """Designs of all edits by their folders, the last one at the end."""
-        return {part: read_design(self.root / part / DESIGN) for part in self.example.parts}
+        return {part: read_design(self.folder / part / DESIGN) for part in self.example.parts}
 
     @property
     def design(self) -> Design:
         """The final design."""
-        return self.designs[self.example.name]
+        return self.designs[self.name]
 
     @cached_property
     def start(self) -> Design:
         """The uniform material with the targets of the final design."""
-        return read_design(self.folder / START)
+        return read_design(self.file(START))
 
     @cached_property
     def truth(self) -> ModesFile:
         """Modes of the fine model with the final material."""
-        return read_modes(self.folder / TRUTH, with_modes=False)
+        return read_modes(self.file(TRUTH), with_modes=False)
 
     @cached_property
     def optimisers(self) -> dict[str, Any]:
         """Output of `sound benchmark`; empty if the optimisers are not compared here."""
         if not self.example.compared:
             return {}
-        loaded: dict[str, Any] = json.loads((self.folder / "optimisers.json").read_text())
-        return loaded
+        return self.read_json(f"{self.name}/optimisers.json")
 
     @property
     def absent(self) -> tuple[str, ...]:
@@ -80,12 +70,12 @@ class Found:
     @property
     def origins(self) -> dict[str, Record]:
         """Provenance of every file that the page draws on."""
-        name, compared = self.example.name, self.optimisers
+        name, compared = self.name, self.optimisers
         return {
             **{f"{part}/{DESIGN}": each.provenance for part, each in self.designs.items()},
             f"{name}/{START}": self.start.provenance,
             f"{name}/{TRUTH}": self.truth.provenance,
-            **({f"{name}/optimisers.json": compared.get("provenance", {})} if compared else {}),
+            **({f"{name}/optimisers.json": compared["provenance"]} if compared else {}),
         }
 
     def history(self, part: str) -> NDArray[np.void]:
@@ -101,10 +91,4 @@ class Found:
 
     def sound(self, state: str, name: str) -> tuple[Array, int]:
         """Samples (s,) and rate [Hz] of a rendered sound, or of a clip."""
-        return read_wav(self.folder / state / f"{name}.wav")
-
-
-def found_in(root: Path, name: str) -> Found:
-    """Results of an example below the folder of the examples."""
-    config: dict[str, Any] = yaml.safe_load((root.parent / "config.yaml").read_text())
-    return Found(root, config, examples(config)[name])
+        return read_wav(self.file(f"{state}/{name}.wav"))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +11,9 @@ from carillon.fem.model import RIGID_MODES
 from sound.design.bark import bark
 from sound.project.design_file import Design
 from sound.rendering.solid import SoundingSolid
-from workflow.studies.base.conditions import ONE_COLD_RUN, Record, measured
+from workflow.studies.base.conditions import ONE_COLD_RUN, measured
 from workflow.studies.base.entry import Row
-from workflow.studies.sounds.results import Found
+from workflow.studies.sounds.results import SoundResults
 
 Array = NDArray[np.float64]
 
@@ -22,22 +22,22 @@ METHODS = {"hybrid": "Hybrid", "cma": "CMA-ES alone", "bfgs": "L-BFGS alone"}
 
 
 DESIGNED = measured(
-    lambda found: {
-        f"edit {n}": each.provenance for n, each in enumerate(found.designs.values(), 1)
+    lambda results: {
+        f"edit {n}": each.provenance for n, each in enumerate(results.designs.values(), 1)
     },
     ONE_COLD_RUN,
 )
 
 
-def designs(found: Found) -> Iterator[Row]:
+def designs(results: SoundResults) -> Iterator[Row]:
     """Cost before and after every edit, and how long it took."""
     parts = {"cost": "cost", "frequency": "frequency_cost", "amplitude": "amplitude_cost"}
-    for number, part in enumerate(found.example.parts, 1):
-        rows = found.history(part)
+    for number, part in enumerate(results.example.parts, 1):
+        rows = results.history(part)
         first, last = rows[0], rows[-1]
         yield {
             "edit": number,
-            "points": ", ".join(found.designs[part].targets.names),
+            "points": ", ".join(results.designs[part].targets.names),
             **{f"{key}_before": float(first[name]) for key, name in parts.items()},
             **{key: float(last[name]) for key, name in parts.items()},
             "fall": float(1.0 - last["cost"] / first["cost"]),
@@ -47,39 +47,39 @@ def designs(found: Found) -> Iterator[Row]:
         }
 
 
-def frequencies(found: Found) -> Iterator[Row]:
-    """Frequencies wanted, before and after, mode by mode."""
-    targets = found.design.targets
+def frequencies(results: SoundResults) -> Iterator[Row]:
+    """Target frequencies, and those before and after, mode by mode."""
+    targets = results.design.targets
     return _by_mode(
         target=targets.frequencies,
-        start=found.start.frequencies,
-        start_bark=_bark_difference(found.start.frequencies, targets.frequencies),
-        found=found.design.frequencies,
-        found_bark=_bark_difference(found.design.frequencies, targets.frequencies),
+        start=results.start.frequencies,
+        start_bark=_bark_difference(results.start.frequencies, targets.frequencies),
+        found=results.design.frequencies,
+        found_bark=_bark_difference(results.design.frequencies, targets.frequencies),
         damping=targets.dampings,
     )
 
 
-def truth(found: Found) -> Iterator[Row]:
+def truth(results: SoundResults) -> Iterator[Row]:
     """What the fine model with the same material sounds at."""
-    wanted, design = found.design.targets.frequencies, found.design
-    hertz = found.truth.frequencies[RIGID_MODES : RIGID_MODES + len(wanted)]
+    targets, design = results.design.targets.frequencies, results.design
+    hertz = results.truth.frequencies[RIGID_MODES : RIGID_MODES + len(targets)]
     return _by_mode(
-        target=wanted,
+        target=targets,
         found=design.frequencies,
         truth=hertz,
         error=design.frequencies / hertz - 1.0,
-        bark=_bark_difference(hertz, wanted),
+        bark=_bark_difference(hertz, targets),
     )
 
 
-def amplitudes(found: Found) -> Iterator[Row]:
+def amplitudes(results: SoundResults) -> Iterator[Row]:
     """Balance of the modes' amplitudes at every struck point."""
-    targets = found.design.targets
-    start, after = balance(found.start), balance(found.design)
-    wanted = shares(targets.amplitudes)
+    targets = results.design.targets
+    start, after = balance(results.start), balance(results.design)
+    target = shares(targets.amplitudes)
     for point, name in enumerate(targets.names):
-        for row in _by_mode(target=wanted[point], start=start[point], found=after[point]):
+        for row in _by_mode(target=target[point], start=start[point], found=after[point]):
             yield {"point": name, **row}
 
 
@@ -95,28 +95,23 @@ def shares(amplitudes: Array) -> Array:
     return np.asarray(amplitudes / amplitudes.max(axis=1, keepdims=True))
 
 
-def _record(found: Found) -> Mapping[str, Record]:
-    origin = found.optimisers.get("provenance")
-    return {"all": origin} if origin else {}
+COMPARED = measured(lambda results: {"all": results.optimisers["provenance"]}, ONE_COLD_RUN)
 
 
-COMPARED = measured(_record, ONE_COLD_RUN)
-
-
-def optimisers(found: Found) -> Iterator[Row]:
+def optimisers(results: SoundResults) -> Iterator[Row]:
     """The hybrid optimiser beside its two parts."""
-    for row in found.optimisers["rows"]:
+    for row in results.optimisers["rows"]:
         yield {**row, "method": METHODS[row["method"]], "fall": row["fall_percent"] / 100.0}
 
 
-def evaluation(found: Found) -> list[Row]:
+def evaluation(results: SoundResults) -> list[Row]:
     """How long an evaluation takes."""
-    return [found.optimisers["evaluation"]]
+    return [results.optimisers["evaluation"]]
 
 
-def _bark_difference(found: Array, wanted: Array) -> Array:
+def _bark_difference(hertz: Array, target: Array) -> Array:
     """Differences [bark] of frequencies [Hz], without rounding errors."""
-    return np.round(bark(found) - bark(wanted), 9) + 0.0
+    return np.round(bark(hertz) - bark(target), 9) + 0.0
 
 
 def _by_mode(**columns: Array) -> Iterator[Row]:

@@ -1,8 +1,8 @@
-"""What a spectrum has to satisfy to be trusted, and whether it does."""
+"""What a spectrum has to satisfy to be trusted, whether it does, and what that means in words."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import frequencies
 from solver.studies.comparison import AUDIBLE_FIRST, AUDIBLE_LAST
 from workflow.studies.base.numbers import show
+from workflow.studies.report.findings import headline
 from workflow.studies.validation.evidence import COARSENED, SOLVED, Evidence
 from workflow.variants import TRUTH
 
@@ -78,9 +79,9 @@ class Criterion:
     @property
     def row(self) -> dict[str, Any]:
         """Row of the table of criteria."""
-        told = ("group", "key", "label", "shown", "required", "found", "limit", "why", "source")
+        keys = ("group", "key", "label", "shown", "required", "found", "limit", "why", "source")
         verdict = "met" if self.passed else "missed"
-        return {**{name: getattr(self, name) for name in told}, "verdict": verdict}
+        return {**{name: getattr(self, name) for name in keys}, "verdict": verdict}
 
 
 def judge(evidence: Evidence) -> list[Criterion]:
@@ -96,24 +97,24 @@ def judge(evidence: Evidence) -> list[Criterion]:
 
 
 def _spectrum(evidence: Evidence, variant: str, residual: float) -> Iterator[Criterion]:
-    found = evidence.audit["spectra"][variant]
-    counted, expected = found["counted"], found["expected"]
+    audit = evidence.audit["spectra"][variant]
+    counted, expected = audit["counted"], audit["expected"]
     values = {
-        "residual": (found["residual_max"], residual),
-        "orthogonality": (found["orthogonality"], evidence.tolerances["orthogonality"]),
-        "rigid": (found["rigid_modes"], RIGID_MODES),
+        "residual": (audit["residual_max"], residual),
+        "orthogonality": (audit["orthogonality"], evidence.tolerances["orthogonality"]),
+        "rigid": (audit["rigid_modes"], RIGID_MODES),
         # Without a count there is nothing to find, and what was expected is the limit.
         "counted": (None, expected) if counted is None else (expected, counted),
     }
-    below = show(float(frequencies(np.array(found["counted_below"]))), "hertz")
+    below = show(float(frequencies(np.array(audit["counted_below"]))), "hertz")
     return _criteria(evidence, "spectrum", variant, values, below=below)
 
 
 def _solver(evidence: Evidence) -> Iterator[Criterion]:
-    found, limits = evidence.compared[SOLVED], evidence.tolerances
+    comparison, limits = evidence.compared[SOLVED], evidence.tolerances
     values = {
-        "eigenvalue_error": found["eigenvalue_relative_error"]["max"],
-        "subspace_angle": found["subspace_angle_max"],
+        "eigenvalue_error": comparison["eigenvalue_relative_error"]["max"],
+        "subspace_angle": comparison["subspace_angle_max"],
         "response": evidence.response.responses[SOLVED].difference,
     }
     limited = {key: (value, limits[key]) for key, value in values.items()}
@@ -121,9 +122,9 @@ def _solver(evidence: Evidence) -> Iterator[Criterion]:
 
 
 def _coarsening(evidence: Evidence) -> Iterator[Criterion]:
-    found, limits = evidence.compared[COARSENED], evidence.tolerances
-    last = min(AUDIBLE_LAST, RIGID_MODES + found["modes_compared"])
-    rms, worst = (found[f"frequency_{name}_relative_error_7_60"] for name in ("rms", "max"))
+    comparison, limits = evidence.compared[COARSENED], evidence.tolerances
+    last = min(AUDIBLE_LAST, RIGID_MODES + comparison["modes_compared"])
+    rms, worst = (comparison[f"frequency_{name}_relative_error_7_60"] for name in ("rms", "max"))
     limited = {
         "frequency_rms": (rms, limits["frequency_rms"]),
         "frequency_worst": (worst, limits["frequency_worst"]),
@@ -142,7 +143,46 @@ def _criteria(
         "comparison": evidence.file(f"{variant}.comparison.json"),
         "response": evidence.file("response.h5"),
     }
-    for key, (found, limit) in values.items():
-        told = {name: text.format(**names) for name, text in TEXTS[part][key].items()}
-        exact = told["kind"] == "count"
-        yield Criterion(variant, key, found=found, limit=limit, exact=exact, **told)
+    for key, (value, limit) in values.items():
+        texts = {name: text.format(**names) for name, text in TEXTS[part][key].items()}
+        exact = texts["kind"] == "count"
+        yield Criterion(variant, key, found=value, limit=limit, exact=exact, **texts)
+
+
+def verdict(criteria: Sequence[Criterion]) -> dict[str, Any]:
+    """Judgement of a model from all of its criteria.
+
+    Returns
+    -------
+    dict[str, Any]
+        Whether it `passed`; the `headline`; `advice` on what may be relied on; and the `parts`, one
+        for each group: `title`, `question`, whether it `passed`, a `word`, a `sentence` and its
+        `criteria`.
+    """
+    parts = [
+        _part(texts, [criterion for criterion in criteria if criterion.group == group])
+        for group, texts in TEXTS["groups"].items()
+    ]
+    missed = sum(not criterion.passed for criterion in criteria)
+    return {
+        "passed": missed == 0,
+        "headline": headline(len(criteria), missed),
+        "advice": next((part["doubt"] for part in parts if not part["passed"]), TEXTS["trust"]),
+        "parts": parts,
+    }
+
+
+def _part(texts: dict[str, Any], criteria: list[Criterion]) -> dict[str, Any]:
+    passed = all(criterion.passed for criterion in criteria)
+    by_key = {criterion.key: criterion for criterion in criteria}
+    sentence = texts["sentence"].format(completeness=_completeness(by_key["counted"]), **by_key)
+    judged = {"passed": passed, "word": texts["words"][passed], "sentence": sentence}
+    return {**texts, **judged, "criteria": criteria}
+
+
+def _completeness(counted: Criterion) -> str:
+    if counted.found is None:
+        return "whether one is missing was not counted, since PETSc here lacks MUMPS"
+    if counted.passed:
+        return "an independent count finds none missing"
+    return f"an independent count finds {int(counted.limit)} where it has {int(counted.found)}"

@@ -31,14 +31,12 @@ class Evidence(Run):
     @property
     def settings(self) -> dict[str, Any]:
         """The model's part of the configuration."""
-        part: dict[str, Any] = self.config["models"][self.model]
-        return part
+        return self.config["models"][self.model]
 
     @property
     def tolerances(self) -> dict[str, float]:
         """Limits by name."""
-        part: dict[str, float] = self.config["validation"]["tolerances"]
-        return part
+        return self.config["validation"]["tolerances"]
 
     @cached_property
     def shown(self) -> dict[str, ModesFile]:
@@ -56,29 +54,22 @@ class Evidence(Run):
     @cached_property
     def audit(self) -> dict[str, Any]:
         """Output of `solver audit`: `spectra` by variant, and `provenance`."""
-        loaded: dict[str, Any] = self.read_json(self.file("audit.json"))
-        return loaded
+        return self.read_json(self.file("audit.json"))
 
     @cached_property
     def response(self) -> ResponseFile:
         """Output of `solver respond`."""
         return read_response(self.folder / self.file("response.h5"))
 
-    @cached_property
-    def first_mode(self) -> dict[str, dict[str, Any]]:
-        """Frequency and likeness of the first elastic mode by variant."""
-        loaded: dict[str, dict[str, Any]] = self.read_json(f"figures/{self.model}-mode.json")
-        return loaded
-
     @property
     def origins(self) -> dict[str, Record]:
         """Provenance of every file that the page draws on."""
-        found = {f"{variant}.h5": spectrum.provenance for variant, spectrum in self.shown.items()}
+        records = {f"{variant}.h5": spectrum.provenance for variant, spectrum in self.shown.items()}
         for variant, comparison in self.compared.items():
-            found[f"{variant}.comparison.json"] = comparison.get("provenance", {})
-        found["audit.json"] = self.audit["provenance"]
-        found["response.h5"] = self.response.provenance
-        return {self.file(name): record for name, record in found.items()}
+            records[f"{variant}.comparison.json"] = comparison.get("provenance", {})
+        records["audit.json"] = self.audit["provenance"]
+        records["response.h5"] = self.response.provenance
+        return {self.file(name): record for name, record in records.items()}
 
     def file(self, name: str) -> str:
         """Name of one of the model's files below the folder of the run."""

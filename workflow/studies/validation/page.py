@@ -18,10 +18,9 @@ from workflow.studies.base.page import listed_modes, rendered
 from workflow.studies.base.table import Table
 from workflow.studies.report.page import mode_pictures
 from workflow.studies.validation import plots
-from workflow.studies.validation.criteria import judge
+from workflow.studies.validation.criteria import judge, verdict
 from workflow.studies.validation.evidence import Evidence
 from workflow.studies.validation.pictures import solid_pictures, struck_picture
-from workflow.studies.validation.verdict import verdict
 from workflow.variants import SHOWN, TRUTH, VARIANTS
 
 _DIGITS = 16
@@ -31,7 +30,7 @@ def page(evidence: Evidence, tables: dict[str, Table]) -> str:
     """Build the page of a model from its tables and files."""
     return rendered(
         "validation/page.html.j2",
-        title=evidence.title(evidence.model),
+        title=evidence.titles[evidence.model],
         variants=VARIANTS,
         truth=TRUTH,
         config=evidence.config,
@@ -46,7 +45,7 @@ def page(evidence: Evidence, tables: dict[str, Table]) -> str:
         strike_seconds=STRIKE_SECONDS,
         errors=inlined(plots.errors_figure(tables["errors"], evidence.tolerances), "errors"),
         shapes=inlined(plots.shapes_figure(evidence), "shapes"),
-        counted=_counted_by_run(evidence),
+        counted=evidence.shown[TRUTH].attributes,
         files=_digests(evidence),
         configuration=_configuration(evidence),
         page_record=provenance.record({"config": evidence.config}),
@@ -117,22 +116,16 @@ def _sounds(evidence: Evidence) -> list[dict[str, Any]]:
     ]
 
 
-def _counted_by_run(evidence: Evidence) -> dict[str, Any] | None:
-    """What the run of the ground truth counted itself; None if it could not."""
-    told = evidence.shown[TRUTH].attributes
-    return told if "inertia_count" in told else None
-
-
 def _digests(evidence: Evidence) -> list[tuple[str, str]]:
     """Names and first digits of the SHA-256 of the files that everything is made from."""
     given = settings.model_files(evidence.config, evidence.model)
     made = [str(evidence.modes_path(evidence.model, variant)) for variant in SHOWN]
-    found = []
+    digests = []
     for name in given + made:
         with open(name, "rb") as stream:
             digest = hashlib.file_digest(stream, "sha256").hexdigest()[:_DIGITS]
-        found.append((Path(name).name, digest))
-    return found
+        digests.append((Path(name).name, digest))
+    return digests
 
 
 def _configuration(evidence: Evidence) -> str:

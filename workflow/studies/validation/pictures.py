@@ -11,9 +11,9 @@ import trimesh
 from numpy.typing import NDArray
 
 from carillon.fem.geometry import HexMesh
-from carillon.fem.geometry.picture import draw, draw_surface, guess_up, mark, view_of
+from carillon.fem.geometry.picture import draw, draw_surface, guess_up, view_of
 from solver.response.contact import Contact
-from workflow.studies.base.media import COLOUR_MAP, ROOM_FOR_ARROW, Pixels, cropped, solid_picture
+from workflow.studies.base.media import COLOUR_MAP, Pixels, cropped, marked_picture, solid_picture
 from workflow.studies.base.style import COLOURS
 
 Array = NDArray[np.float64]
@@ -38,11 +38,5 @@ def struck_picture(mesh: HexMesh, strike: Contact, observed: Contact) -> Pixels:
     """The voxels with an arrow where they are struck and a ring where they are watched."""
     up = guess_up(mesh)
     view = view_of(mesh, -np.array([strike.inward, observed.inward]), up)
-
-    def struck(axes: Any) -> None:
-        axes.computed_zorder = False
-        draw(axes, mesh, up=up, view=view)
-        mark(axes, mesh, strike.position, STRUCK, strike.inward, up=up)
-        mark(axes, mesh, observed.position, OBSERVED, up=up)
-
-    return cropped([solid_picture(struck, ROOM_FOR_ARROW)])[0]
+    marks = [(strike.position, STRUCK, strike.inward), (observed.position, OBSERVED, None)]
+    return cropped([marked_picture(mesh, marks, up=up, view=view)])[0]

@@ -93,11 +93,11 @@ def motion_figure(response: ResponseFile) -> Figure:
         2, 1, figsize=(7.6, 4.9), sharex=True, height_ratios=(1.5, 1)
     )
     for variant in SHOWN:
-        found = response.responses[variant].displacement
-        above.plot(milliseconds, factor * found @ direction, **_line(variant))
+        displacement = response.responses[variant].displacement
+        above.plot(milliseconds, factor * displacement @ direction, **_line(variant))
         if variant != TRUTH:
             # At the first instant nothing has moved yet.
-            difference = np.linalg.norm(found - truth, axis=1)[1:] / peak
+            difference = np.linalg.norm(displacement - truth, axis=1)[1:] / peak
             below.semilogy(milliseconds[1:], visible(difference), **_line(variant))
     above.set(ylabel=f"displacement [{unit}]", title="Motion of the observed point")
     below.set(

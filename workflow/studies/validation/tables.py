@@ -25,22 +25,23 @@ def errors(evidence: Evidence) -> Iterator[Row]:
     for index in range(RIGID_MODES, min(len(part.eigenvalues) for part in spectra.values())):
         row = {"mode": index + 1, TRUTH: float(truth.frequencies[index])}
         for variant in COMPARED:
-            found = spectra[variant]
-            row[variant] = float(found.frequencies[index])
+            spectrum = spectra[variant]
+            row[variant] = float(spectrum.frequencies[index])
             row[f"{variant}_frequency"] = row[variant] / row[TRUTH] - 1.0
-            ratio = found.eigenvalues[index] / truth.eigenvalues[index]
+            ratio = spectrum.eigenvalues[index] / truth.eigenvalues[index]
             row[f"{variant}_eigenvalue"] = float(ratio) - 1.0
         yield row
 
 
 def shapes(evidence: Evidence) -> Iterator[Row]:
     """How far the spaces of modes are turned against the truth's."""
+    first_mode = evidence.read_json(f"figures/{evidence.model}-mode.json")
     for variant in COMPARED:
         clusters = evidence.compared[variant]["clusters"]
         row = {
             "method": VARIANTS[variant].label,
             "clusters": len(clusters),
-            "likeness": evidence.first_mode[variant]["likeness"],
+            "likeness": first_mode[variant]["likeness"],
         }
         if clusters:
             worst = max(clusters, key=lambda cluster: cluster["angle"])
@@ -56,19 +57,20 @@ def shapes(evidence: Evidence) -> Iterator[Row]:
 
 def audits(evidence: Evidence) -> list[Row]:
     """What each modes file proves, found anew from the file alone."""
-    found = evidence.audit["spectra"]
-    return [{"method": VARIANTS[name].label, **found[name]} for name in SHOWN if name in found]
+    spectra = evidence.audit["spectra"]
+    return [{"method": VARIANTS[name].label, **spectra[name]} for name in SHOWN if name in spectra]
 
 
 def responses(evidence: Evidence) -> Iterator[Row]:
     """How far motion and sound after a strike are from the truth's."""
     for variant in SHOWN:
-        found = evidence.response.responses[variant]
+        response = evidence.response.responses[variant]
         row = {
             "method": VARIANTS[variant].label,
-            "audible": found.audible,
-            "peak": float(np.linalg.norm(found.displacement, axis=1).max()),
+            "audible": response.audible,
+            "peak": float(np.linalg.norm(response.displacement, axis=1).max()),
         }
         if variant != TRUTH:
-            row |= {"difference": found.difference, "distance_decibels": found.distance_decibels}
+            row["difference"] = response.difference
+            row["distance_decibels"] = response.distance_decibels
         yield row
