@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import pandas as pd
 
-from workflow.studies.comparison.cells import ENDS, KEYS, SHOWN
+from workflow.studies.comparison.cells import ENDS, KEYS, SHOWN, rows_of
 from workflow.studies.comparison.differences import Difference, of_conditions, of_configurations
 from workflow.studies.comparison.folders import Folder
 from workflow.studies.comparison.noise import SAME, VERDICTS, Value, verdict
@@ -30,6 +29,10 @@ class Comparison:
     cells
         Values of both: `KEYS`, `label` for people, `kind`, those of both `SIDES` with their `ENDS`
         and `SHOWN`, the `ratio` of both where that says something, and the `verdict`.
+    moved
+        Values that are not the same any more, the worst first.
+    conditions, configuration
+        What differs of them.
     only_before, only_now
         Tables, rows and columns of one folder alone, in words.
     """
@@ -37,26 +40,11 @@ class Comparison:
     before: Folder
     now: Folder
     cells: pd.DataFrame
+    moved: pd.DataFrame
+    conditions: list[Difference]
+    configuration: list[Difference]
     only_before: list[str]
     only_now: list[str]
-
-    @cached_property
-    def moved(self) -> pd.DataFrame:
-        """Values that are not the same any more, the worst first."""
-        found = self.cells[self.cells["verdict"] != SAME]
-        ratio = pd.to_numeric(found["ratio"]).fillna(1.0).abs().replace(0.0, 1.0)
-        order = found["verdict"].map(VERDICTS.index)
-        return found.iloc[np.lexsort((-np.maximum(ratio, 1.0 / ratio), order))]
-
-    @cached_property
-    def conditions(self) -> list[Difference]:
-        """Conditions that differ."""
-        return of_conditions(self.before, self.now)
-
-    @cached_property
-    def configuration(self) -> list[Difference]:
-        """Keys of the configuration that differ."""
-        return of_configurations(self.before, self.now)
 
 
 def compare(before: Folder, now: Folder) -> Comparison:
@@ -67,7 +55,14 @@ def compare(before: Folder, now: Folder) -> Comparison:
     cells["ratio"] = pd.Series([_ratio(*pair) for pair in pairs], dtype=object)
     found = [verdict(kind, *pair) for kind, pair in zip(cells["kind"], pairs)]
     cells["verdict"] = pd.Series(found, dtype=object)
-    return Comparison(before, now, cells, list(_only(before, now)), list(_only(now, before)))
+    moved = cells[cells["verdict"] != SAME]
+    ratio = pd.to_numeric(moved["ratio"]).fillna(1.0).abs().replace(0.0, 1.0)
+    worst = np.lexsort((-np.maximum(ratio, 1.0 / ratio), moved["verdict"].map(VERDICTS.index)))
+    return Comparison(
+        *(before, now, cells, moved.iloc[worst]),
+        *(of_conditions(before, now), of_configurations(before, now)),
+        *(list(_only(before, now)), list(_only(now, before))),
+    )
 
 
 def name_of(path: str) -> str:
@@ -76,9 +71,8 @@ def name_of(path: str) -> str:
 
 
 def _cells(folder: Folder, side: str) -> pd.DataFrame:
-    """All values of a folder, in columns of a side."""
-    told = [cells for path, cells in folder.cells.items() if name_of(path) not in APART]
-    cells = pd.concat(told, ignore_index=True).dropna(subset="label")
+    """All values of a folder that are compared, in columns of a side."""
+    cells = folder.cells[~folder.cells["table"].map(name_of).isin(APART)].dropna(subset="label")
     return cells.rename(columns={end: f"{side}{end}" for end in (*ENDS, SHOWN)})
 
 
@@ -93,10 +87,10 @@ def _ratio(before: Value, now: Value) -> float | None:
 def _only(here: Folder, there: Folder) -> Iterator[str]:
     """Tables, rows and columns that one folder has and the other has not."""
     yield from (f"table {path}" for path in here.tables if path not in there.tables)
-    for path in here.tables:
+    for path, table in here.tables.items():
         if path in there.tables and name_of(path) not in APART:
-            rows, others = here.cells[path]["row"], there.cells[path]["row"]
-            yield from (f"{path}: row {name}" for name in rows[~rows.isin(others)].unique())
+            rows, others = rows_of(table), rows_of(there.tables[path])
+            yield from (f"{path}: row {name}" for name in rows if name not in others)
             known = {column.key for column in there.tables[path].columns}
-            columns = [column.key for column in here.tables[path].columns]
+            columns = [column.key for column in table.columns]
             yield from (f"{path}: column {key}" for key in columns if key not in known)

@@ -13,8 +13,9 @@ from carillon.documents import read_yaml
 from carillon.errors import UserError
 from carillon.files import cause
 from carillon.places import require_file
+from workflow.studies.base.entry import Row
 from workflow.studies.base.table import Table, read_csv_table, read_table
-from workflow.studies.comparison.cells import cells_of
+from workflow.studies.comparison.cells import COLUMNS, cells_of
 
 PARTS = ("tables", "paper/tables", "forests_study/tables")
 """Folders of tables below a folder of results."""
@@ -38,14 +39,14 @@ class Folder:
     tables
         By their path below the folder, without ending.
     cells
-        Their values by the same path, see `cells_of`.
+        The values of all of them, see `cells_of`.
     config
         The resolved configuration; empty if the folder has none.
     """
 
     path: Path
     tables: dict[str, Table]
-    cells: dict[str, pd.DataFrame]
+    cells: pd.DataFrame
     config: dict[str, Any]
 
 
@@ -60,10 +61,11 @@ def read_folder(path: str | Path) -> Folder:
     path = Path(path)
     read = {name: _read(name, file) for name, file in require_tables(path).items()}
     config = path / "config.yaml"
+    cells = [cell for _, cells in read.values() for cell in cells]
     return Folder(
         path,
         {name: table for name, (table, _) in read.items()},
-        {name: cells for name, (_, cells) in read.items()},
+        pd.DataFrame(cells, columns=COLUMNS, dtype=object),
         read_yaml(config, "the configuration of a run") if config.exists() else {},
     )
 
@@ -107,11 +109,13 @@ def require_apart(out: str | Path, *compared: Folder) -> Path:
     return out
 
 
-def _read(name: str, file: Path) -> tuple[Table, pd.DataFrame]:
+def _read(name: str, file: Path) -> tuple[Table, list[Row]]:
     require_file(file, "a table")
     try:
         table = READERS[file.suffix](file)
-        _require_texts(table)
+        told = table.conditions.told.values() if table.conditions else ()
+        # What is no text cannot be joined.
+        "".join([table.name, *told, *(column.label for column in table.columns)])
         return table, cells_of(name, table)
     except OSError as error:
         raise UserError(f"{file}: cannot be read ({cause(error)})") from None
@@ -119,9 +123,3 @@ def _read(name: str, file: Path) -> tuple[Table, pd.DataFrame]:
         raise UserError(
             f"{file}: is no table of this version, or damaged; run the workflow again"
         ) from None
-
-
-def _require_texts(table: Table) -> None:
-    """Join what is told about the values once; what is no text raises."""
-    told = table.conditions.told.values() if table.conditions else ()
-    "".join([table.name, *told, *(column.label for column in table.columns)])

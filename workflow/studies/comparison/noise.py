@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 from workflow.studies.base.numbers import show
 
@@ -15,7 +15,8 @@ SMALLER, LARGER = "smaller", "larger"
 
 WORSE = (SLOWER, LESS_ACCURATE, LARGER)
 BETTER = (FASTER, MORE_ACCURATE, SMALLER)
-VERDICTS = (*WORSE, *BETTER, CHANGED, GONE, NEW)
+OTHER = (CHANGED, GONE, NEW)
+VERDICTS = (*WORSE, *BETTER, *OTHER)
 """What is said of numbers that moved, the worst first."""
 
 TIME_TOLERANCE = 0.1
@@ -34,6 +35,14 @@ VALUE_TOLERANCE = 1e-4
 """Least relative move of a frequency or a share."""
 
 ERRORS = ("percent", "fraction", "small", "angle")
+SAYINGS = {
+    "seconds": (SLOWER, FASTER),
+    "times": (FASTER, SLOWER),
+    **dict.fromkeys(ERRORS, (LESS_ACCURATE, MORE_ACCURATE)),
+    "score": (MORE_ACCURATE, LESS_ACCURATE),
+    "bytes": (LARGER, SMALLER),
+}
+"""What is said of a number that moved up, and of one that moved down, by its kind."""
 UNJUDGED = ("modelled",)
 """Kinds of numbers that are not compared."""
 
@@ -56,8 +65,7 @@ RULES = {
 """The rules in words."""
 
 
-@dataclass(frozen=True)
-class Value:
+class Value(NamedTuple):
     """A number or text, and the spread of its runs if there were several."""
 
     value: float | str | None
@@ -91,20 +99,15 @@ def verdict(kind: str, before: Value, now: Value) -> str:
         return SAME if math.isnan(old) and math.isnan(new) else CHANGED
     if kind in ("seconds", "times"):
         moved = _time_moved(kind, old, new, before.spread, now.spread)
-        return _told(moved, (new > old) == (kind == "seconds"), SLOWER, FASTER)
-    if kind in ERRORS:
-        return _told(_error_moved(old, new), abs(new) > abs(old), LESS_ACCURATE, MORE_ACCURATE)
-    if kind == "score":
-        return _told(_error_moved(1.0 - old, 1.0 - new), new < old, LESS_ACCURATE, MORE_ACCURATE)
-    if kind == "bytes":
-        return _told(_excess(old, new) > BYTES_TOLERANCE, new > old, LARGER, SMALLER)
-    return CHANGED if _excess(old, new) > VALUE_TOLERANCE else SAME
-
-
-def _told(moved: bool, for_the_worse: bool, worse: str, better: str) -> str:
-    if not moved:
-        return SAME
-    return worse if for_the_worse else better
+    elif kind in ERRORS:
+        old, new = abs(old), abs(new)
+        moved = _error_moved(old, new)
+    elif kind == "score":
+        moved = _error_moved(1.0 - old, 1.0 - new)
+    else:
+        moved = _excess(old, new) > (BYTES_TOLERANCE if kind == "bytes" else VALUE_TOLERANCE)
+    larger, smaller = SAYINGS.get(kind, (CHANGED, CHANGED))
+    return SAME if not moved else larger if new > old else smaller
 
 
 def _time_moved(
@@ -114,7 +117,6 @@ def _time_moved(
     before: tuple[float, float] | None,
     now: tuple[float, float] | None,
 ) -> bool:
-    """Whether a time [s] or a speed-up moved, given the spreads of its runs."""
     if before and now:
         apart = before[1] < now[0] or now[1] < before[0]
         return apart and _excess(old, new) > TIME_TOLERANCE
@@ -124,8 +126,6 @@ def _time_moved(
 
 def _error_moved(old: float, new: float) -> bool:
     small, large = sorted((abs(old), abs(new)))
-    if large < ROUNDING:
-        return False
     if large < TINY_ERROR:
         return large > TINY_FACTOR * max(small, ROUNDING)
     return _excess(small, large) > ERROR_TOLERANCE

@@ -15,10 +15,10 @@ from workflow.studies.base.entry import Row, tables_of
 from workflow.studies.base.numbers import show
 from workflow.studies.base.page import rendered
 from workflow.studies.base.table import Table
-from workflow.studies.comparison.cells import ENDS, KEYS, SHOWN
+from workflow.studies.comparison.cells import ENDS, KEYS
 from workflow.studies.comparison.comparison import SIDES, Comparison
 from workflow.studies.comparison.differences import Difference, dates
-from workflow.studies.comparison.noise import BETTER, RULES, VERDICTS, WORSE
+from workflow.studies.comparison.noise import BETTER, OTHER, RULES, VERDICTS, WORSE
 
 NAME = "comparison"
 MACHINE = ("processor", "cores", "memory", "ranks", "threads", "blas")
@@ -30,6 +30,7 @@ MOST_LISTED = 200
 TITLE = "What moved"
 TABLES = tables_of("comparison/tables.yaml")
 RAW = [*KEYS, "kind", *(f"{side}{end}" for side in SIDES for end in ENDS), "ratio", "verdict"]
+CLASSES = {"worse": WORSE, "better": BETTER, "other": OTHER}
 MARKS = {**dict.fromkeys(WORSE, "worse"), **dict.fromkeys(BETTER, "better")}
 """How verdicts are marked on a page."""
 
@@ -55,7 +56,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
         "conditions": comparison.conditions,
         "configuration": comparison.configuration,
         "compared": len(comparison.cells),
-        "moved": every_number(comparison.moved.sort_index()),
+        "moved": comparison.moved.sort_index()[RAW].to_dict("records"),
         "only_before": comparison.only_before,
         "only_now": comparison.only_now,
     }
@@ -128,40 +129,23 @@ def summary(comparison: Comparison) -> str:
     return f"{numbers}: {', '.join(told) if told else 'none moved beyond noise'}"
 
 
-def every_number(cells: pd.DataFrame) -> list[Row]:
-    """All numbers of both folders, raw."""
-    rows: list[Row] = cells[RAW].to_dict("records")
+def records(cells: pd.DataFrame) -> list[Row]:
+    """Numbers side by side."""
+    rows: list[Row] = cells.assign(mark=cells["verdict"].map(MARKS).fillna("")).to_dict("records")
     return rows
 
 
 def counts(cells: pd.DataFrame) -> list[Row]:
     """How many numbers of each table were compared, and what became of them."""
-    moved = cells["verdict"].isin(VERDICTS)
-    worse, better = (cells["verdict"].isin(verdicts) for verdicts in (WORSE, BETTER))
-    found = pd.DataFrame(
-        {"compared": 1, "worse": worse, "better": better, "other": moved & ~worse & ~better}
-    )
-    summed = found.groupby(cells["table"], sort=False).sum().astype(int)
+    of = {name: cells["verdict"].isin(verdicts) for name, verdicts in CLASSES.items()}
+    summed = pd.DataFrame({"compared": 1, **of}).groupby(cells["table"], sort=False).sum()
     rows: list[Row] = summed.reset_index().to_dict("records")
-    return rows
-
-
-def listed(cells: pd.DataFrame) -> list[Row]:
-    """Numbers of a table side by side, for people."""
-    shown = {side: cells[f"{side}{SHOWN}"] for side in SIDES}
-    marks = cells["verdict"].map(MARKS).fillna("")
-    rows: list[Row] = cells.assign(**shown, verdict_mark=marks).to_dict("records")
     return rows
 
 
 def differing(differences: list[Difference]) -> list[Row]:
     """What is not the same, for people."""
     return [{**each, "where": each["where"] or "all"} for each in differences]
-
-
-def everywhere(differences: list[Difference]) -> bool:
-    """Whether all that differs does so in all tables."""
-    return not any(each["where"] for each in differences)
 
 
 def _listed(name: str, cells: pd.DataFrame) -> Table:
