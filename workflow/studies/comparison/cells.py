@@ -13,7 +13,6 @@ KEYS = ["table", "row", "column"]
 ENDS = ("", MIN, MAX)
 SHOWN = "_shown"
 """Ending of a value with its spread, for people."""
-COLUMNS = [*KEYS, "label", "kind", *ENDS, SHOWN]
 
 
 def rows_of(table: Table) -> dict[str, Row]:
@@ -25,15 +24,15 @@ def rows_of(table: Table) -> dict[str, Row]:
     return {", ".join(_word(row, column) for column in named): row for row in table.rows}
 
 
-def cells_of(path: str, table: Table) -> list[Row]:
-    """All values with what is told about each, by `COLUMNS`.
+def cells_of(path: str, table: Table) -> list[tuple[Any, ...]]:
+    """All values: `KEYS`, label for people, kind, those of `ENDS` and `SHOWN`.
 
-    The `label` for people is None where a value is not compared. Every value is shown and judged
-    once, so that one which is none of its kind raises.
+    The label is None where a value is not compared. Every value is shown and judged once, so that
+    one which is none of its kind raises.
     """
     labels = _labels(table)
     return [
-        dict(zip(COLUMNS, (path, name, column.key, labels.get(column.key), *_cell(row, column))))
+        (path, name, column.key, labels.get(column.key), *_cell(row, column))
         for name, row in rows_of(table).items()
         for column in table.columns
     ]

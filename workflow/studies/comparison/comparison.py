@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from workflow.studies.comparison.cells import ENDS, KEYS, SHOWN, rows_of
+from workflow.studies.comparison.cells import ENDS, KEYS, SHOWN, cells_of, rows_of
 from workflow.studies.comparison.differences import Difference, of_conditions, of_configurations
 from workflow.studies.comparison.folders import Folder
 from workflow.studies.comparison.noise import SAME, VERDICTS, Value, verdict
@@ -72,8 +72,10 @@ def name_of(path: str) -> str:
 
 def _cells(folder: Folder, side: str) -> pd.DataFrame:
     """All values of a folder that are compared, in columns of a side."""
-    cells = folder.cells[~folder.cells["table"].map(name_of).isin(APART)].dropna(subset="label")
-    return cells.rename(columns={end: f"{side}{end}" for end in (*ENDS, SHOWN)})
+    tables = [(path, each) for path, each in folder.tables.items() if name_of(path) not in APART]
+    columns = [*KEYS, "label", "kind", *(f"{side}{end}" for end in (*ENDS, SHOWN))]
+    cells = [cell for each in tables for cell in cells_of(*each)]
+    return pd.DataFrame(cells, columns=columns, dtype=object).dropna(subset="label")
 
 
 def _ratio(before: Value, now: Value) -> float | None:

@@ -7,15 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from carillon.documents import read_yaml
 from carillon.errors import UserError
 from carillon.files import cause
 from carillon.places import require_file
-from workflow.studies.base.entry import Row
 from workflow.studies.base.table import Table, read_csv_table, read_table
-from workflow.studies.comparison.cells import COLUMNS, cells_of
+from workflow.studies.comparison.cells import cells_of
 
 PARTS = ("tables", "paper/tables", "forests_study/tables")
 """Folders of tables below a folder of results."""
@@ -38,15 +35,12 @@ class Folder:
         Of the folder.
     tables
         By their path below the folder, without ending.
-    cells
-        The values of all of them, see `cells_of`.
     config
         The resolved configuration; empty if the folder has none.
     """
 
     path: Path
     tables: dict[str, Table]
-    cells: pd.DataFrame
     config: dict[str, Any]
 
 
@@ -59,15 +53,10 @@ def read_folder(path: str | Path) -> Folder:
         If there is no such folder, if it holds no tables, or if one cannot be read.
     """
     path = Path(path)
-    read = {name: _read(name, file) for name, file in require_tables(path).items()}
+    tables = {name: _read(file) for name, file in require_tables(path).items()}
     config = path / "config.yaml"
-    cells = [cell for _, cells in read.values() for cell in cells]
-    return Folder(
-        path,
-        {name: table for name, (table, _) in read.items()},
-        pd.DataFrame(cells, columns=COLUMNS, dtype=object),
-        read_yaml(config, "the configuration of a run") if config.exists() else {},
-    )
+    told = read_yaml(config, "the configuration of a run") if config.exists() else {}
+    return Folder(path, tables, told)
 
 
 def require_tables(path: str | Path) -> dict[str, Path]:
@@ -109,14 +98,15 @@ def require_apart(out: str | Path, *compared: Folder) -> Path:
     return out
 
 
-def _read(name: str, file: Path) -> tuple[Table, list[Row]]:
+def _read(file: Path) -> Table:
     require_file(file, "a table")
     try:
         table = READERS[file.suffix](file)
         told = table.conditions.told.values() if table.conditions else ()
         # What is no text cannot be joined.
         "".join([table.name, *told, *(column.label for column in table.columns)])
-        return table, cells_of(name, table)
+        cells_of("", table)
+        return table
     except OSError as error:
         raise UserError(f"{file}: cannot be read ({cause(error)})") from None
     except _SENSELESS:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from workflow.studies.base.numbers import show
 
@@ -68,7 +68,7 @@ RULES = {
 class Value(NamedTuple):
     """A number or text, and the spread of its runs if there were several."""
 
-    value: float | str | None
+    value: Any
     min: float | None = None
     max: float | None = None
 
@@ -81,15 +81,7 @@ class Value(NamedTuple):
 
 
 def verdict(kind: str, before: Value, now: Value) -> str:
-    """What became of a number.
-
-    Parameters
-    ----------
-    kind
-        Of the number, see `workflow.studies.base.numbers.show`.
-    before, now
-        The baseline's and the other one.
-    """
+    """What became of the baseline's number of a kind, see `workflow.studies.base.numbers.show`."""
     old, new = before.value, now.value
     if old is None or new is None:
         return SAME if old is new else GONE if new is None else NEW
@@ -98,7 +90,7 @@ def verdict(kind: str, before: Value, now: Value) -> str:
     if math.isnan(old) or math.isnan(new):
         return SAME if math.isnan(old) and math.isnan(new) else CHANGED
     if kind in ("seconds", "times"):
-        moved = _time_moved(kind, old, new, before.spread, now.spread)
+        moved = _time_moved(kind, before, now)
     elif kind in ERRORS:
         old, new = abs(old), abs(new)
         moved = _error_moved(old, new)
@@ -110,18 +102,13 @@ def verdict(kind: str, before: Value, now: Value) -> str:
     return SAME if not moved else larger if new > old else smaller
 
 
-def _time_moved(
-    kind: str,
-    old: float,
-    new: float,
-    before: tuple[float, float] | None,
-    now: tuple[float, float] | None,
-) -> bool:
-    if before and now:
-        apart = before[1] < now[0] or now[1] < before[0]
-        return apart and _excess(old, new) > TIME_TOLERANCE
-    far = kind == "seconds" and abs(new - old) > SINGLE_SECONDS
-    return far and _excess(old, new) > SINGLE_TOLERANCE
+def _time_moved(kind: str, before: Value, now: Value) -> bool:
+    excess = _excess(before.value, now.value)
+    if before.spread and now.spread:
+        apart = before.spread[1] < now.spread[0] or now.spread[1] < before.spread[0]
+        return apart and excess > TIME_TOLERANCE
+    far = kind == "seconds" and abs(now.value - before.value) > SINGLE_SECONDS
+    return far and excess > SINGLE_TOLERANCE
 
 
 def _error_moved(old: float, new: float) -> bool:

@@ -29,7 +29,7 @@ TIMED = "tables/times"
 """Table whose conditions are those of the run."""
 OF_TABLES = ("runs", "spread")
 """Conditions that are not the run's, so that its description does not tell them."""
-LEFT_OUT = (FOLDER, "comparison")
+LEFT_OUT = [FOLDER, "comparison"]
 """Folders that are no results of the run."""
 DESCRIPTION = f"""\
 # Reference: {{title}}

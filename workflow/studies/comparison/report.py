@@ -62,7 +62,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
     }
 
 
-def as_text(comparison: Comparison, most: int = MOST_MOVED) -> str:
+def as_text(comparison: Comparison) -> str:
     """The short form, for a terminal."""
     before, now = comparison.before, comparison.now
     lines = [f"{before.path} (baseline) and {now.path} (this run)"]
@@ -70,11 +70,11 @@ def as_text(comparison: Comparison, most: int = MOST_MOVED) -> str:
         where = f" ({_cut(item['where'])})" if item["where"] else ""
         lines.append(f"  {item['what']}: {_cut(item['before'])} -> {_cut(item['now'])}{where}")
     lines += [*_caution(comparison), summary(comparison)]
-    for cell in comparison.moved.head(most).to_dict("records"):
+    for cell in comparison.moved.head(MOST_MOVED).to_dict("records"):
         place = f"{cell['verdict']}: {cell['table']}, {cell['row']}, {cell['label']}"
         lines.append(f"  {place}: {cell['before_shown']} -> {cell['now_shown']}")
-    if len(comparison.moved) > most:
-        lines.append(f"  and {len(comparison.moved) - most:,} more")
+    if len(comparison.moved) > MOST_MOVED:
+        lines.append(f"  and {len(comparison.moved) - MOST_MOVED:,} more")
     sides = _one_sided(comparison).items()
     lines += [f"{side}: {len(only)}, such as {only[0]}" for side, only in sides]
     return "\n".join(lines)
