@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import pandas as pd
@@ -11,7 +11,6 @@ import pandas as pd
 from workflow.estimate.laws import Rates, amounts, known_of, table
 from workflow.estimate.plan import TARGETS
 from workflow.estimate.sizes import sizes_of
-from workflow.estimate.solids import Size, Solid, size_of
 
 
 class Machine(NamedTuple):
@@ -52,16 +51,14 @@ class Machine(NamedTuple):
         return sum(map(max, free.values()))
 
 
-def costs(
-    jobs: pd.DataFrame, rates: Rates, machine: Machine, count: Callable[[Solid], Size] = size_of
-) -> pd.DataFrame:
+def costs(jobs: pd.DataFrame, rates: Rates, machine: Machine) -> pd.DataFrame:
     """The jobs of `plan` with what they take.
 
     Columns beside theirs are `sizes`, `stage`, `law` (empty if it is not measured), `granted`
     cores, `hours` of wall time, `core_hours`, `memory_gb` (peak), `kept_gb` (files that stay) and
     `journal_gb` (files until the job is done).
     """
-    jobs = jobs.assign(sizes=sizes_of(jobs, rates["fits_per_second"], count))
+    jobs = jobs.assign(sizes=sizes_of(jobs, rates["fits_per_second"]))
     taken = [_cost(job, rates, machine) for job in jobs.itertuples()]
     jobs = jobs.join(pd.DataFrame(taken, index=jobs.index))
     return jobs.assign(core_hours=jobs["hours"] * jobs["granted"])
