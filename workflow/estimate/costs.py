@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from workflow.estimate.laws import Rates, amounts, known_of, table
+from workflow.estimate.laws import KNOWN, Rates, amounts, known_of
 from workflow.estimate.plan import TARGETS
 from workflow.estimate.sizes import sizes_of
 
@@ -74,7 +74,7 @@ def _cost(job: Any, rates: Rates, machine: Machine) -> dict[str, Any]:
         seconds = rate["seconds"]["start"] + (serial + (1.0 - serial) / cores) * seconds
         memory = max(copies, job.ranks) * rate["memory_mb"]["start"] + copies * memory
     elif job.local:
-        short = rates["laws"][table()["short"]]
+        short = rates["laws"][KNOWN["short"]]
         seconds, memory = short["seconds"]["start"], short["memory_mb"]["start"]
     else:
         seconds, memory = 60.0 * (job.minutes or 0.0), job.memory_mb or 0.0
@@ -92,4 +92,4 @@ def _cost(job: Any, rates: Rates, machine: Machine) -> dict[str, Any]:
 def serial_share(rates: Rates) -> float:
     """Share of a solver run on one core that more cores do not shorten."""
     measured = rates["serial_share"]
-    return float(table()["assumed_share"] if measured is None else measured)
+    return float(KNOWN["assumed_share"] if measured is None else measured)

@@ -10,7 +10,7 @@ import pandas as pd
 from jinja2 import Environment, StrictUndefined
 
 from workflow.estimate.costs import Machine, serial_share
-from workflow.estimate.laws import QUANTITIES, Rates, table
+from workflow.estimate.laws import KNOWN, QUANTITIES, Rates
 from workflow.estimate.solids import Size
 
 SUMMED, LARGEST = ["jobs", "core_hours", "wall_hours", "kept_gb"], ["memory_gb", "scratch_gb"]
@@ -20,13 +20,13 @@ def plain(
     jobs: pd.DataFrame, solids: Mapping[str, Size], rates: Rates, machine: Machine
 ) -> dict[str, Any]:
     """The jobs of `costs` by stage; each stage says under `basis` where its numbers come from."""
-    stages = [jobs[jobs["stage"] == name] for name in table()["stages"]]
-    stages = [same for same in stages if len(same)]
+    by_stage = dict(list(jobs.groupby("stage")))
+    stages = [by_stage[name] for name in KNOWN["stages"] if name in by_stage]
     rows = pd.DataFrame([_row(same, rates, machine) for same in stages])
     cautions = [told for same in stages for told in _cautions(same, rates)]
     made, laws = rates["made"], rates["laws"]
     if rates["serial_share"] is None:
-        cautions.append(table()["cautions"]["busy"].format(share=serial_share(rates), **made))
+        cautions.append(KNOWN["cautions"]["busy"].format(share=serial_share(rates), **made))
     return {
         "machine": machine._asdict(),
         "solids": {name: size._asdict() for name, size in solids.items()},
@@ -37,7 +37,7 @@ def plain(
         },
         "cautions": cautions,
         "rates": {
-            "origin": table()["origin"].format(**made),
+            "origin": KNOWN["origin"].format(**made),
             "made": made,
             "how": {name: f"{law['jobs']} jobs of measured runs" for name, law in laws.items()},
             "up_to": {name: law["up_to"] for name, law in laws.items()},
@@ -59,7 +59,7 @@ def _row(jobs: pd.DataFrame, rates: Rates, machine: Machine) -> dict[str, Any]:
         "memory_gb": jobs["memory_gb"].max(),
         "kept_gb": jobs["kept_gb"].sum(),
         "scratch_gb": jobs["journal_gb"].nlargest(at_a_time).sum(),
-        "basis": {name: text.format(**basis) for name, text in table()["basis"].items()},
+        "basis": {name: text.format(**basis) for name, text in KNOWN["basis"].items()},
     }
 
 
@@ -84,7 +84,7 @@ def _basis(jobs: pd.DataFrame, rates: Rates, quantity: str) -> str:
 
 def _cautions(jobs: pd.DataFrame, rates: Rates) -> Iterator[str]:
     """What is not measured, or far beyond what is, in a stage."""
-    stage, texts = jobs["stage"].iloc[0], table()["cautions"]
+    stage, texts = jobs["stage"].iloc[0], KNOWN["cautions"]
     for rule, same in jobs[(jobs["law"] == "") & ~jobs["local"]].groupby("rule"):
         yield texts["unmeasured"].format(rule=rule, minutes=same["minutes"].max())
     beyond: dict[str, tuple[float, ...]] = {}
@@ -93,10 +93,10 @@ def _cautions(jobs: pd.DataFrame, rates: Rates) -> Iterator[str]:
             value = job.granted if size == "cores" else job.sizes[size]
             beyond[size] = max(beyond.get(size, (0.0,)), (value / most, value, most))
     for size, (times, value, most) in beyond.items():
-        if times > table()["far"]:
+        if times > KNOWN["far"]:
             told = {"size": size.replace("_", " "), "value": value, "most": most, "times": times}
             yield texts["cores" if size == "cores" else "beyond"].format(stage=stage, **told)
-    long = jobs[(jobs["rule"] == "generate_shard") & (jobs["hours"] > table()["long"])]
+    long = jobs[(jobs["rule"] == "generate_shard") & (jobs["hours"] > KNOWN["long"])]
     for job in long.head(1).itertuples():
         shards = job.sizes["shards"] * job.hours
         yield texts["shards"].format(stage=stage, hours=job.hours, shards=shards)
@@ -113,7 +113,7 @@ def as_text(found: Mapping[str, Any], name: str) -> str:
 def beside_the_paper(jobs: pd.DataFrame, machine: Machine) -> str:
     """The paper's training times beside those estimated, also on as many nodes as it used."""
     told = []
-    for stage, took in table()["paper"].items():
+    for stage, took in KNOWN["paper"].items():
         same = jobs[jobs["stage"] == stage]
         machines = (machine, Machine(12, machine.cores_per_node))
         here, there = (duration(wall_hours(same, each)) for each in machines)

@@ -13,8 +13,8 @@ from workflow.studies.comparison.differences import Difference, of_conditions, o
 from workflow.studies.comparison.folders import Folder
 from workflow.studies.comparison.noise import SAME, VERDICTS, Value, verdict
 
-APART = ("provenance",)
-"""Tables that are told as conditions instead."""
+APART = "/provenance"
+"""How the paths of tables end that are told as conditions instead."""
 SIDES = ("before", "now")
 
 
@@ -65,14 +65,9 @@ def compare(before: Folder, now: Folder) -> Comparison:
     )
 
 
-def name_of(path: str) -> str:
-    """Name of a table by its path."""
-    return path.rpartition("/")[2]
-
-
 def _cells(folder: Folder, side: str) -> pd.DataFrame:
     """All values of a folder that are compared, in columns of a side."""
-    tables = [(path, each) for path, each in folder.tables.items() if name_of(path) not in APART]
+    tables = [each for each in folder.tables.items() if not each[0].endswith(APART)]
     columns = [*KEYS, "label", "kind", *(f"{side}{end}" for end in (*ENDS, SHOWN))]
     cells = [cell for each in tables for cell in cells_of(*each)]
     return pd.DataFrame(cells, columns=columns, dtype=object).dropna(subset="label")
@@ -90,7 +85,7 @@ def _only(here: Folder, there: Folder) -> Iterator[str]:
     """Tables, rows and columns that one folder has and the other has not."""
     yield from (f"table {path}" for path in here.tables if path not in there.tables)
     for path, table in here.tables.items():
-        if path in there.tables and name_of(path) not in APART:
+        if path in there.tables and not path.endswith(APART):
             rows, others = rows_of(table), rows_of(there.tables[path])
             yield from (f"{path}: row {name}" for name in rows if name not in others)
             known = {column.key for column in there.tables[path].columns}

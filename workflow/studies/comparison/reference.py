@@ -15,7 +15,7 @@ from carillon.progress import say
 from workflow.studies.base.conditions import LABELS
 from workflow.studies.base.numbers import show
 from workflow.studies.base.table import Table
-from workflow.studies.comparison.comparison import APART, name_of
+from workflow.studies.comparison.comparison import APART
 from workflow.studies.comparison.folders import Folder, read_folder
 
 FOLDER = "reference"
@@ -65,7 +65,7 @@ def write_reference(results: str | Path) -> None:
     shutil.rmtree(target, ignore_errors=True)
     for path, table in folder.tables.items():
         _put(target / f"{path}.csv", rounded(table).as_csv())
-        if len(table.rows) < LONG and name_of(path) not in APART:
+        if len(table.rows) < LONG and not path.endswith(APART):
             _put(target / f"{path}.md", table.as_markdown())
     _put(target / "config.yaml", (results / "config.yaml").read_text())
     _put(target / "README.md", description(folder))
