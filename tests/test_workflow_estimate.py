@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,7 @@ from workflow.__main__ import main
 from workflow.commands import estimate as command
 from workflow.commands.estimate import CONFIGURATIONS, estimate, load
 from workflow.estimate import measure, solids, summary
+from workflow.estimate import sizes as reading
 from workflow.estimate.costs import Machine, serial_share
 from workflow.estimate.laws import fit
 from workflow.estimate.plan import plan
@@ -63,15 +64,23 @@ def rated(**changes):
     return {**load_rates(), **changes}
 
 
+def estimated(config, rates, machine):
+    """What every job takes, and the solids, without voxels."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (command, reading):
+            patch.setattr(module, "size_of", sizes)
+        return estimate(config, rates, machine)
+
+
 def jobs_of(config, rule, machine=HERE, rates=None):
     """What the jobs of a rule take."""
-    jobs, _ = estimate(config, rates or load_rates(), machine, sizes)
+    jobs, _ = estimated(config, rates or load_rates(), machine)
     return jobs[jobs["rule"] == rule]
 
 
 def values(config, machine=HERE, rates=None):
     rates = rates or load_rates()
-    return summary.plain(*estimate(config, rates, machine, sizes), rates, machine)
+    return summary.plain(*estimated(config, rates, machine), rates, machine)
 
 
 def found(config, machine=HERE, rates=None):
@@ -205,8 +214,8 @@ def test_jobs_are_those_of_the_rules(configs, tmp_path):
     file = CONFIGURATIONS / "tiny.yaml"
     done = snakemake(tmp_path, "all", "figures", "-n", "--cores", 2, "--configfile", file)
     jobs = planned(done)
-    estimated, _ = estimate(configs["tiny"], load_rates(), HERE, sizes)
-    counts = estimated["rule"].value_counts().to_dict()
+    estimated_jobs, _ = estimated(configs["tiny"], load_rates(), HERE)
+    counts = estimated_jobs["rule"].value_counts().to_dict()
     assert counts | {"all": 1, "figures": 1} == {n: jobs[n] for n in jobs if n != "total"}
     stages = found(configs["tiny"])
     assert stages["data generation"]["jobs"] == jobs["generate_shard"] + jobs["describe_shard"]
@@ -250,7 +259,7 @@ def test_the_command_prints_text_and_json(capsys):
 
 
 def test_the_paper_is_set_beside(capsys, monkeypatch):
-    monkeypatch.setattr(command, "estimate", partial(estimate, count=sizes))
+    monkeypatch.setattr(command, "estimate", estimated)
     name = CONFIGURATIONS / "paper.yaml"
     assert main(["estimate", "--configfile", str(name), "--cores-per-node", "4"]) == 0
     last = capsys.readouterr().out.splitlines()[-1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
+from contextlib import suppress
 from pathlib import Path
 
 import h5py
@@ -13,12 +14,10 @@ import numpy as np
 from carillon.errors import UserError
 from carillon.files import cause, kind_of, open_h5
 
-CIRCUMSTANCES = frozenset(
-    {
-        *("provenance", "timings", "hcms", "peak_memory_bytes", "ranks", "threads"),
-        *("forest_sha256", "settings"),
-    }
-)
+CIRCUMSTANCES = {
+    *("provenance", "timings", "hcms", "peak_memory_bytes", "ranks", "threads"),
+    *("forest_sha256", "settings"),
+}
 """Groups, datasets and attributes that tell where, how fast, from which files and after which wish,
 not what was found."""
 TIMES = "history/seconds"
@@ -60,17 +59,14 @@ def digest(path: Path) -> str:
         for key in sorted(set(entry.attrs) - OMITTED):
             checksum.update(f"{key}={np.asarray(entry.attrs[key]).tolist()!r}".encode())
         if isinstance(entry, h5py.Dataset):
-            checksum.update(f"{entry.dtype}{entry.shape}".encode())
-            checksum.update(_bytes_of(entry))
+            checksum.update(f"{entry.dtype}{entry.shape}".encode() + _bytes_of(entry))
 
     kind, schema = kind_of(path, "a result file (HDF5)")
     if not kind:
         raise UserError(f"{path}: is damaged or no HDF5 file of this project; name a result file")
     with open_h5(path, kind, schema, sealed=True) as file:
-        entries: list[tuple[str, h5py.Group | h5py.Dataset]] = [("/", file)]
-        file.visititems(lambda name, entry: entries.append((name, entry)))
-        for name, entry in entries:
-            add(name, entry)
+        add("/", file)
+        file.visititems(add)
     return checksum.hexdigest()
 
 
@@ -83,13 +79,11 @@ def _bytes_of(dataset: h5py.Dataset) -> bytes:
 
 
 def _without_circumstances(text: str) -> str:
-    try:
+    with suppress(ValueError):
         values = json.loads(text)
-    except ValueError:
-        return text
-    if not isinstance(values, dict):
-        return text
-    return json.dumps({key: values[key] for key in sorted(set(values) - OMITTED)})
+        if isinstance(values, dict):
+            return json.dumps({key: values[key] for key in sorted(set(values) - OMITTED)})
+    return text
 
 
 def _files(paths: list[Path]) -> list[Path]:

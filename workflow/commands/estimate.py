@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ import pandas as pd
 
 from carillon.arguments import whole_number
 from carillon.fem.geometry import surface_name
-from carillon.files import require_writable
+from carillon.files import atomic_path, require_writable
 from carillon.runtime import allowed_cores
 from dataset_gen.objectives import DATASET_OBJECTIVES
 from workflow import settings, training
@@ -20,9 +19,9 @@ from workflow.estimate import summary
 from workflow.estimate.costs import Machine, costs
 from workflow.estimate.laws import Rates
 from workflow.estimate.plan import plan
-from workflow.estimate.rates import PACKAGED, checked, load_rates, save_rates
+from workflow.estimate.rates import PACKAGED, checked, load_rates
 from workflow.estimate.sizes import solid_of
-from workflow.estimate.solids import Size, Solid, size_of
+from workflow.estimate.solids import Size, size_of
 
 CONFIGURATIONS = Path(__file__).parent.parent / "config"
 DEFAULT_PRESET, PAPER = "laptop", "paper"
@@ -71,17 +70,15 @@ def run(arguments: argparse.Namespace) -> int:
     preset = CONFIGURATIONS / f"{arguments.preset or DEFAULT_PRESET}.yaml"
     path = preset if arguments.configfile is None else Path(arguments.configfile)
     config = load(path, arguments.objective)
-    rates = _rates(arguments)
+    rates = _rates(arguments.rates, arguments.measure)
     machine = Machine(arguments.nodes, arguments.cores_per_node)
     jobs, solids = estimate(config, rates, machine)
-    found = {"configuration": str(path), **summary.plain(jobs, solids, rates, machine)}
+    result = {"configuration": str(path), **summary.plain(jobs, solids, rates, machine)}
     if path.stem == PAPER:
-        found["paper"] = summary.beside_the_paper(jobs, machine)
-    if arguments.json:
-        print(json.dumps(found, indent=2))
-    else:
-        objective = config["dataset"]["objective"]
-        print(summary.as_text(found, f"{path.stem}, objective {objective},"))
+        result["paper"] = summary.beside_the_paper(jobs, machine)
+    objective = config["dataset"]["objective"]
+    text = summary.as_text(result, f"{path.stem}, objective {objective},")
+    print(json.dumps(result, indent=2) if arguments.json else text)
     return 0
 
 
@@ -101,10 +98,7 @@ def load(path: Path, objective: str | None = None) -> dict[str, Any]:
 
 
 def estimate(
-    config: dict[str, Any],
-    rates: Rates,
-    machine: Machine,
-    count: Callable[[Solid], Size] = size_of,
+    config: dict[str, Any], rates: Rates, machine: Machine
 ) -> tuple[pd.DataFrame, dict[str, Size]]:
     """What every job takes, see `costs`, and the unknowns of all solids by name and resolution.
 
@@ -115,18 +109,19 @@ def estimate(
     """
     jobs = plan(config, machine.cores_per_node, machine.cores)
     solids = filter(None, dict.fromkeys(map(solid_of, jobs["command"])))
-    named = {f"{surface_name(each.mesh)} {each.resolution}": count(each) for each in solids}
-    return costs(jobs, rates, machine, count), named
+    named = {f"{surface_name(each.mesh)} {each.resolution}": size_of(each) for each in solids}
+    return costs(jobs, rates, machine), named
 
 
-def _rates(arguments: argparse.Namespace) -> Rates:
-    if not arguments.measure:
-        return load_rates(PACKAGED if arguments.rates is None else arguments.rates)
+def _rates(path: str | None, here: bool) -> Rates:
+    if not here:
+        return load_rates(PACKAGED if path is None else path)
     from workflow.estimate.measure import measure
 
-    if arguments.rates is not None:
-        require_writable(arguments.rates)
+    if path is not None:
+        require_writable(path)
     rates = checked(measure(), "the rates measured")
-    if arguments.rates is not None:
-        save_rates(arguments.rates, rates)
+    if path is not None:
+        with atomic_path(path) as temporary:
+            temporary.write_text(json.dumps(rates, indent=2) + "\n")
     return rates

@@ -37,6 +37,24 @@ FAILED = 1
 """Exit status if a criterion is missed."""
 LONGEST_NAME = 64
 """Characters of a model's name; a title may be longer."""
+_SECTION = settings.schema()["properties"]["validation"]["properties"]
+TOLERANCES = tuple(_SECTION["tolerances"]["properties"])
+"""Names of the limits of the criteria."""
+
+
+def _tolerance(text: str) -> tuple[str, float]:
+    """Argument type: NAME=VALUE."""
+    name, _, value = text.partition("=")
+    if name not in TOLERANCES:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} names no tolerance, expected NAME=VALUE with one of {', '.join(TOLERANCES)}"
+        )
+    return name, positive_number(value)
+
+
+def _point(what: str) -> Any:
+    words = f"point of the surface that is {what}, in mesh units (default: chosen)"
+    return option(None, words, type=float, metavar=("X", "Y", "Z"), nargs=3)
 
 
 @dataclass(frozen=True)
@@ -54,6 +72,15 @@ class ValidateOptions:
     )
     forest: str | None = option(None, "forests to coarsen by (default: those of the package)")
     cores: int = option(allowed_cores(), "cores to use (default: all)", type=number_of_workers)
+    strike: list[float] | None = _point("struck")
+    observed: list[float] | None = _point("watched")
+    tolerances: list[tuple[str, float]] | None = option(
+        None,
+        f"limits of the criteria: {', '.join(TOLERANCES)}",
+        type=_tolerance,
+        metavar="NAME=VALUE",
+        nargs="+",
+    )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -66,22 +93,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     own = ("coarsen", "forest", "objective", "lumped")
     add_options(parser, ProblemOptions, leave_out=own, positional=("mesh",))
     add_options(parser, ValidateOptions)
-    for name, what in (("strike", "that is struck"), ("observed", "that is watched")):
-        parser.add_argument(
-            f"--{name}",
-            type=float,
-            nargs=3,
-            metavar=("X", "Y", "Z"),
-            help=f"point of the surface {what}, in mesh units (default: chosen)",
-        )
-    parser.add_argument(
-        "--tolerances",
-        nargs="+",
-        type=_tolerance,
-        default=[],
-        metavar="NAME=VALUE",
-        help=f"limits of the criteria: {', '.join(_tolerance_names())}",
-    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -117,23 +128,30 @@ def configuration(arguments: argparse.Namespace) -> dict[str, Any]:
     given = vars(arguments)
     keys = ("resolution", "unit", "fill", "components", "density", "modes", "seed")
     named = arguments.material in MATERIALS
+    title = arguments.name or surface_name(arguments.mesh)
     model = {
+        "title": title,
         "mesh": arguments.mesh if arguments.mesh.startswith(BUILTIN) else _path(arguments.mesh),
         "material": arguments.material if named else _path(arguments.material),
         **{key: given[key] for key in (*keys, "strike", "observed")},
     }
     damping = {key: given[key] for key in ("mass_damping", "stiffness_damping")}
     validation = {key: value for key, value in damping.items() if value is not None}
-    title = arguments.name or surface_name(arguments.mesh)
+    # Lower-case letters, digits and hyphens.
+    name = re.sub(r"[^a-z0-9]+", "-", title.lower())[:LONGEST_NAME].strip("-") or "solid"
     return {
         "title": f"Validation of {title}",
         "results_dir": _path(arguments.out),
         "mesh_folder": "",
         "poisson": arguments.poisson,
-        "models": {_model_name(title): {"title": title, **model}},
+        "models": {name: model},
         "forests": {"model": _path(arguments.forest) if arguments.forest else DEFAULT_FORESTS},
-        "validation": {"tolerances": dict(arguments.tolerances), **validation},
+        "validation": {"tolerances": dict(arguments.tolerances or []), **validation},
     }
+
+
+def _path(text: str) -> str:
+    return str(Path(text).resolve())
 
 
 def _checked_size(arguments: argparse.Namespace) -> str:
@@ -161,36 +179,6 @@ def _run_rules(folder: Path, cores: int) -> None:
     with open(log, "w") as stream:
         done = subprocess.run(command, env=environment, stdout=stream, stderr=stream)
     if done.returncode:
-        raise UserError(f"the run failed, {_cause(log)}; all that it said is in {log}")
-
-
-def _cause(log: Path) -> str:
-    """The last line that a program of the run addressed to its user, if there is one."""
-    said = re.findall(r"^\s*((?:solver|forests)[ \w]*: .+)$", log.read_text(), re.MULTILINE)
-    return str(said[-1]) if said else "no program said why"
-
-
-def _path(text: str) -> str:
-    return str(Path(text).resolve())
-
-
-def _model_name(title: str) -> str:
-    """A title as the name of a model: lower-case letters, digits and hyphens."""
-    name = re.sub(r"[^a-z0-9]+", "-", title.lower())[:LONGEST_NAME]
-    return name.strip("-") or "solid"
-
-
-def _tolerance(text: str) -> tuple[str, float]:
-    """Argument type: NAME=VALUE."""
-    name, _, value = text.partition("=")
-    if name not in _tolerance_names():
-        raise argparse.ArgumentTypeError(
-            f"{text!r} names no tolerance, expected NAME=VALUE with one of "
-            f"{', '.join(_tolerance_names())}"
-        )
-    return name, positive_number(value)
-
-
-def _tolerance_names() -> list[str]:
-    section = settings.schema()["properties"]["validation"]["properties"]["tolerances"]
-    return list(section["properties"])
+        said = re.findall(r"^\s*((?:solver|forests)[ \w]*: .+)$", log.read_text(), re.MULTILINE)
+        cause = said[-1] if said else "no program said why"
+        raise UserError(f"the run failed, {cause}; all that it said is in {log}")

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import pandas as pd
 
-from workflow.estimate.laws import Rates, amounts, known_of, table
+from workflow.estimate.laws import KNOWN, Rates, amounts, known_of
 from workflow.estimate.plan import TARGETS
 from workflow.estimate.sizes import sizes_of
-from workflow.estimate.solids import Size, Solid, size_of
 
 
 class Machine(NamedTuple):
@@ -52,16 +51,14 @@ class Machine(NamedTuple):
         return sum(map(max, free.values()))
 
 
-def costs(
-    jobs: pd.DataFrame, rates: Rates, machine: Machine, count: Callable[[Solid], Size] = size_of
-) -> pd.DataFrame:
+def costs(jobs: pd.DataFrame, rates: Rates, machine: Machine) -> pd.DataFrame:
     """The jobs of `plan` with what they take.
 
     Columns beside theirs are `sizes`, `stage`, `law` (empty if it is not measured), `granted`
     cores, `hours` of wall time, `core_hours`, `memory_gb` (peak), `kept_gb` (files that stay) and
     `journal_gb` (files until the job is done).
     """
-    jobs = jobs.assign(sizes=sizes_of(jobs, rates["fits_per_second"], count))
+    jobs = jobs.assign(sizes=sizes_of(jobs, rates["fits_per_second"]))
     taken = [_cost(job, rates, machine) for job in jobs.itertuples()]
     jobs = jobs.join(pd.DataFrame(taken, index=jobs.index))
     return jobs.assign(core_hours=jobs["hours"] * jobs["granted"])
@@ -77,7 +74,7 @@ def _cost(job: Any, rates: Rates, machine: Machine) -> dict[str, Any]:
         seconds = rate["seconds"]["start"] + (serial + (1.0 - serial) / cores) * seconds
         memory = max(copies, job.ranks) * rate["memory_mb"]["start"] + copies * memory
     elif job.local:
-        short = rates["laws"][table()["short"]]
+        short = rates["laws"][KNOWN["short"]]
         seconds, memory = short["seconds"]["start"], short["memory_mb"]["start"]
     else:
         seconds, memory = 60.0 * (job.minutes or 0.0), job.memory_mb or 0.0
@@ -95,4 +92,4 @@ def _cost(job: Any, rates: Rates, machine: Machine) -> dict[str, Any]:
 def serial_share(rates: Rates) -> float:
     """Share of a solver run on one core that more cores do not shorten."""
     measured = rates["serial_share"]
-    return float(table()["assumed_share"] if measured is None else measured)
+    return float(KNOWN["assumed_share"] if measured is None else measured)

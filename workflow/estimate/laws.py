@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,9 @@ Rates = Mapping[str, Any]
 """See `workflow/schemas/rates.schema.yaml`."""
 Sizes = Mapping[str, float]
 
+KNOWN: dict[str, Any] = yaml.safe_load(Path(__file__).with_name("rules.yaml").read_text())
+"""The stages, and what is known of the rules."""
+
 QUANTITIES = ["seconds", "memory_mb", "files_mb"]
 """What there are laws of: start + factor x product of size^power."""
 
@@ -25,28 +28,20 @@ HABIT = 0.1
 """Weight of the middle of an exponent's bounds, beside 1 of a job that hardly needs to start."""
 
 
-@cache
-def table() -> dict[str, Any]:
-    """The stages, and what is known of the rules, see `rules.yaml`."""
-    known: dict[str, Any] = yaml.safe_load(Path(__file__).with_name("rules.yaml").read_text())
-    return known
-
-
 def known_of(rule: str, variant: str = "") -> dict[str, Any]:
     """What is known of a rule for a variant: at least its stage, and the name of its law."""
-    rules = table()["rules"]
-    known = {"stage": table()["others"], "law": rule}
-    known |= rules.get(f"{rule} {variant}", rules.get(rule, {}))
+    rules = KNOWN["rules"]
+    own = rules.get(f"{rule} {variant}", rules.get(rule, {}))
+    known = {"stage": KNOWN["others"], "law": rule, **own}
     return known | {"law": known["law"].format(variant=variant)}
 
 
 def amounts(laws: Mapping[str, Any], sizes: Sizes) -> list[float]:
     """What a job takes beyond starting, in the order of `QUANTITIES`."""
-    found = []
-    for law in (laws[name] for name in QUANTITIES):
-        powers = [sizes[size] ** power for size, power in law["powers"].items()]
-        found.append(law["factor"] * float(np.prod(powers)))
-    return found
+    return [
+        law["factor"] * math.prod(sizes[size] ** power for size, power in law["powers"].items())
+        for law in (laws[name] for name in QUANTITIES)
+    ]
 
 
 def fit(

@@ -105,18 +105,18 @@ def finished(
 
 def laws_from(least: pd.DataFrame, jobs: pd.DataFrame) -> dict[str, Any]:
     """Laws of jobs, which start as the least of them do."""
-    found = {}
+    laws = {}
     for (law, rule), same in jobs.groupby(["law", "rule"]):
         bounds = {name: known_of(rule)[name] for name in QUANTITIES}
         starts = least.loc[least["law"] == law, list(QUANTITIES)].min() * [1.0, 1.0, 0.0]
         sizes = {size for each in bounds.values() for size in each} - {"fits"}
-        found[law] = {
+        laws[law] = {
             **{name: fit(bounds[name], same["sizes"], same[name], starts[name]) for name in bounds},
             "up_to": {size: max(job[size] for job in same["sizes"]) for size in sorted(sizes)}
             | ({} if "serial" in known_of(rule) else {"cores": allowed_cores()}),
             "jobs": len(same),
         }
-    return found
+    return laws
 
 
 def measured_share(

@@ -9,7 +9,7 @@ from typing import Any
 import yaml
 
 from carillon.errors import UserError
-from carillon.files import atomic_path, cause
+from carillon.files import cause
 from carillon.places import require_file
 from workflow.estimate.laws import Rates
 from workflow.strict_schema import first_mistake, reason
@@ -54,9 +54,3 @@ def load_rates(path: str | Path = PACKAGED) -> Rates:
     except (ValueError, RecursionError) as error:
         raise UserError(f"{path}: is no JSON ({error}); measure the rates again") from None
     return checked(values, str(path))
-
-
-def save_rates(path: str | Path, rates: Rates) -> None:
-    """Write rates atomically."""
-    with atomic_path(path) as temporary:
-        temporary.write_text(json.dumps(rates, indent=2) + "\n")

@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 import shlex
 from collections import defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import pandas as pd
 
-from workflow.estimate.solids import Size, Solid, size_of
+from workflow.estimate.solids import Solid, size_of
 
 ORIGINS = 8
 """Rows of a sample, one for each corner of the block."""
@@ -26,8 +26,8 @@ def options_of(command: str) -> dict[str, str]:
     >>> options_of("python -m solver scaling --modes 8 --ranks 1,2 --weak > log")
     {'modes': '8', 'ranks': '1,2', 'weak': ''}
     """
-    found = re.findall(r" --([a-z-]+)(?: ([^\s>-]\S*))?", command)
-    return {name.replace("-", "_"): value for name, value in found}
+    pairs = re.findall(r" --([a-z-]+)(?: ([^\s>-]\S*))?", command)
+    return {name.replace("-", "_"): value for name, value in pairs}
 
 
 def solid_of(command: str) -> Solid | None:
@@ -40,14 +40,10 @@ def solid_of(command: str) -> Solid | None:
     return Solid(words[words.index("solver") + 2], int(options["resolution"]), **how)
 
 
-def sizes_of(
-    jobs: pd.DataFrame,
-    fits_per_second: Mapping[str, float],
-    count: Callable[[Solid], Size] = size_of,
-) -> list[dict[str, float]]:
+def sizes_of(jobs: pd.DataFrame, fits_per_second: Mapping[str, float]) -> list[dict[str, float]]:
     """Sizes of every job of `plan` by name, see `rules.yaml`; one that it has not is 1."""
     made: dict[str, dict[str, float]] = {}
-    found = []
+    result = []
     for job in jobs.itertuples():
         options, solid = options_of(job.command), solid_of(job.command)
         read = [made[file] for file in job.inputs if file in made]
@@ -57,7 +53,7 @@ def sizes_of(
         sizes["rows"] = ORIGINS * sum(each["samples"] for each in read if "samples" in each)
         sizes |= {name: _number(value) for name, value in options.items()}
         if solid is not None:
-            sizes["unknowns"] = count(solid).fine
+            sizes["unknowns"] = size_of(solid).fine
         if "samples" in sizes:
             sizes["samples"] /= sizes["shards"]
             sizes["fits"] = sizes["samples"] / fits_per_second[options["objective"]]
@@ -65,9 +61,9 @@ def sizes_of(
             sizes["structure_rows"] = min(sizes["structure_rows"], sizes["rows"])
             enough = sizes["structure_rows"] / (LEAST_LEAF * sizes["min_leaf"])
             sizes["leaves"] = max(2.0, min(sizes["max_leaves"], enough))
-        found.append(sizes)
+        result.append(sizes)
         made |= dict.fromkeys(job.outputs, sizes)
-    return found
+    return result
 
 
 def _number(value: str) -> float:

@@ -10,7 +10,7 @@ import pandas as pd
 from jinja2 import Environment, StrictUndefined
 
 from workflow.estimate.costs import Machine, serial_share
-from workflow.estimate.laws import QUANTITIES, Rates, table
+from workflow.estimate.laws import KNOWN, QUANTITIES, Rates
 from workflow.estimate.solids import Size
 
 SUMMED, LARGEST = ["jobs", "core_hours", "wall_hours", "kept_gb"], ["memory_gb", "scratch_gb"]
@@ -20,13 +20,13 @@ def plain(
     jobs: pd.DataFrame, solids: Mapping[str, Size], rates: Rates, machine: Machine
 ) -> dict[str, Any]:
     """The jobs of `costs` by stage; each stage says under `basis` where its numbers come from."""
-    stages = [jobs[jobs["stage"] == name] for name in table()["stages"]]
-    stages = [same for same in stages if len(same)]
+    by_stage = dict(list(jobs.groupby("stage")))
+    stages = [by_stage[name] for name in KNOWN["stages"] if name in by_stage]
     rows = pd.DataFrame([_row(same, rates, machine) for same in stages])
-    cautions = [told for same in stages for told in _cautions(same, rates)]
+    cautions = [caution for same in stages for caution in _cautions(same, rates)]
     made, laws = rates["made"], rates["laws"]
     if rates["serial_share"] is None:
-        cautions.append(table()["cautions"]["busy"].format(share=serial_share(rates), **made))
+        cautions.append(KNOWN["cautions"]["busy"].format(share=serial_share(rates), **made))
     return {
         "machine": machine._asdict(),
         "solids": {name: size._asdict() for name, size in solids.items()},
@@ -37,7 +37,7 @@ def plain(
         },
         "cautions": cautions,
         "rates": {
-            "origin": table()["origin"].format(**made),
+            "origin": KNOWN["origin"].format(**made),
             "made": made,
             "how": {name: f"{law['jobs']} jobs of measured runs" for name, law in laws.items()},
             "up_to": {name: law["up_to"] for name, law in laws.items()},
@@ -59,7 +59,7 @@ def _row(jobs: pd.DataFrame, rates: Rates, machine: Machine) -> dict[str, Any]:
         "memory_gb": jobs["memory_gb"].max(),
         "kept_gb": jobs["kept_gb"].sum(),
         "scratch_gb": jobs["journal_gb"].nlargest(at_a_time).sum(),
-        "basis": {name: text.format(**basis) for name, text in table()["basis"].items()},
+        "basis": {name: text.format(**basis) for name, text in KNOWN["basis"].items()},
     }
 
 
@@ -70,21 +70,21 @@ def wall_hours(jobs: pd.DataFrame, machine: Machine) -> float:
 
 
 def _basis(jobs: pd.DataFrame, rates: Rates, quantity: str) -> str:
-    told = []
+    parts = []
     for name in sorted(set(jobs["law"]) - {""}):
         law = rates["laws"][name][quantity]
         powers = "".join(f" x {size}^{power:.2f}" for size, power in law["powers"].items())
-        told.append(f"{name} on one core {law['start']:.2g} + {law['factor']:.2g}{powers}")
+        parts.append(f"{name} on one core {law['start']:.2g} + {law['factor']:.2g}{powers}")
     others = jobs.loc[jobs["law"] == "", "local"]
-    told += [f"{serial_share(rates):.0%} of a solver run stays on more cores"] if told else []
-    told += ["others as a solver run without work, files not counted"] if others.any() else []
-    told += ["not measured: the limit of the rule, an upper bound"] if not others.all() else []
-    return "; ".join(told)
+    parts += [f"{serial_share(rates):.0%} of a solver run stays on more cores"] if parts else []
+    parts += ["others as a solver run without work, files not counted"] if others.any() else []
+    parts += ["not measured: the limit of the rule, an upper bound"] if not others.all() else []
+    return "; ".join(parts)
 
 
 def _cautions(jobs: pd.DataFrame, rates: Rates) -> Iterator[str]:
     """What is not measured, or far beyond what is, in a stage."""
-    stage, texts = jobs["stage"].iloc[0], table()["cautions"]
+    stage, texts = jobs["stage"].iloc[0], KNOWN["cautions"]
     for rule, same in jobs[(jobs["law"] == "") & ~jobs["local"]].groupby("rule"):
         yield texts["unmeasured"].format(rule=rule, minutes=same["minutes"].max())
     beyond: dict[str, tuple[float, ...]] = {}
@@ -93,32 +93,32 @@ def _cautions(jobs: pd.DataFrame, rates: Rates) -> Iterator[str]:
             value = job.granted if size == "cores" else job.sizes[size]
             beyond[size] = max(beyond.get(size, (0.0,)), (value / most, value, most))
     for size, (times, value, most) in beyond.items():
-        if times > table()["far"]:
-            told = {"size": size.replace("_", " "), "value": value, "most": most, "times": times}
-            yield texts["cores" if size == "cores" else "beyond"].format(stage=stage, **told)
-    long = jobs[(jobs["rule"] == "generate_shard") & (jobs["hours"] > table()["long"])]
+        if times > KNOWN["far"]:
+            numbers = {"size": size.replace("_", " "), "value": value, "most": most, "times": times}
+            yield texts["cores" if size == "cores" else "beyond"].format(stage=stage, **numbers)
+    long = jobs[(jobs["rule"] == "generate_shard") & (jobs["hours"] > KNOWN["long"])]
     for job in long.head(1).itertuples():
         shards = job.sizes["shards"] * job.hours
         yield texts["shards"].format(stage=stage, hours=job.hours, shards=shards)
 
 
-def as_text(found: Mapping[str, Any], name: str) -> str:
+def as_text(values: Mapping[str, Any], name: str) -> str:
     """The result of `plain` as lines, see `estimate.txt.j2`."""
     environment = Environment(trim_blocks=True, undefined=StrictUndefined)
     environment.filters |= {"number": _number, "duration": duration, "size": _size}
     template = environment.from_string(Path(__file__).with_name("estimate.txt.j2").read_text())
-    return template.render({"name": name, "paper": "", **found}).rstrip()
+    return template.render({"name": name, "paper": "", **values}).rstrip()
 
 
 def beside_the_paper(jobs: pd.DataFrame, machine: Machine) -> str:
     """The paper's training times beside those estimated, also on as many nodes as it used."""
-    told = []
-    for stage, took in table()["paper"].items():
+    parts = []
+    for stage, took in KNOWN["paper"].items():
         same = jobs[jobs["stage"] == stage]
         machines = (machine, Machine(12, machine.cores_per_node))
         here, there = (duration(wall_hours(same, each)) for each in machines)
-        told.append(f"{stage} {here}, on twelve such nodes {there} (the paper: {took})")
-    return f"beside the paper's twelve computers: {'; '.join(told)}"
+        parts.append(f"{stage} {here}, on twelve such nodes {there} (the paper: {took})")
+    return f"beside the paper's twelve computers: {'; '.join(parts)}"
 
 
 def duration(hours: float) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import pandas as pd
+from typing import Any
 
 from workflow.studies.base.entry import Row
 from workflow.studies.base.numbers import MISSING, show
@@ -15,48 +15,49 @@ SHOWN = "_shown"
 """Ending of a value with its spread, for people."""
 
 
-def cells_of(path: str, table: Table) -> pd.DataFrame:
-    """Values: `KEYS`, `kind`, a column for each of `ENDS` and `SHOWN`, and the `label`.
-
-    The label is missing where a value is not compared. Every value is shown and judged once, so
-    that one which is none of its kind raises.
-    """
+def rows_of(table: Table) -> dict[str, Row]:
+    """The rows by their names."""
     keys = table.keys or [table.columns[0].key]
     named = [column for column in table.columns if column.key in keys]
     if len(named) < len(set(keys)):
         raise KeyError(keys)
-    rows = {", ".join(_word(row, column) for column in named): row for row in table.rows}
-    cells = [
-        dict(zip(KEYS, (path, name, column.key))) | _cell(row, column)
-        for name, row in rows.items()
+    return {", ".join(_word(row, column) for column in named): row for row in table.rows}
+
+
+def cells_of(path: str, table: Table) -> list[tuple[Any, ...]]:
+    """All values: `KEYS`, label for people, kind, those of `ENDS` and `SHOWN`.
+
+    The label is None where a value is not compared. Every value is shown and judged once, so that
+    one which is none of its kind raises.
+    """
+    labels = _labels(table)
+    return [
+        (path, name, column.key, labels.get(column.key), *_cell(row, column))
+        for name, row in rows_of(table).items()
         for column in table.columns
     ]
-    frame = pd.DataFrame(cells, columns=[*KEYS, "kind", *ENDS, SHOWN], dtype=object)
-    return frame.assign(label=frame["column"].map(_judged(table, keys)).astype(object))
 
 
-def _cell(row: Row, column: Column) -> Row:
+def _cell(row: Row, column: Column) -> tuple[Any, ...]:
     kind, value = kind_in(row, column), Value(*(row.get(f"{column.key}{end}") for end in ENDS))
     verdict(kind, value, value)
     shown = show(value.value, kind)
     if value.spread is not None:
         shown += f" ({' … '.join(show(end, kind) for end in value.spread)})"
-    return {"kind": kind, "": value.value, MIN: value.min, MAX: value.max, SHOWN: shown}
+    return kind, *value, shown
 
 
-def _judged(table: Table, keys: list[str]) -> dict[str, str]:
+def _labels(table: Table) -> dict[str, str]:
     """Labels by key of columns with values of their own, which are not what names the rows."""
     about = {f"{column.key}{end}" for column in table.columns for end in (MIN, MAX, KIND)}
-    compared = [
-        column
+    about.update(table.keys or [table.columns[0].key])
+    judged = {
+        column.key: column.label
         for column in table.columns
-        if column.key not in about.union(keys) and column.kind not in UNJUDGED
-    ]
-    labels = [column.label for column in compared]
-    return {
-        column.key: column.label if labels.count(column.label) == 1 else column.key
-        for column in compared
+        if column.key not in about and column.kind not in UNJUDGED
     }
+    labels = list(judged.values())
+    return {key: label if labels.count(label) == 1 else key for key, label in judged.items()}
 
 
 def _word(row: Row, column: Column) -> str:

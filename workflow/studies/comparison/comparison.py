@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import pandas as pd
 
-from workflow.studies.comparison.cells import ENDS, KEYS, SHOWN
+from workflow.studies.comparison.cells import ENDS, KEYS, SHOWN, cells_of, rows_of
 from workflow.studies.comparison.differences import Difference, of_conditions, of_configurations
 from workflow.studies.comparison.folders import Folder
 from workflow.studies.comparison.noise import SAME, VERDICTS, Value, verdict
 
-APART = ("provenance",)
-"""Tables that are told as conditions instead."""
+APART = "/provenance"
+"""How the paths of tables end that are told as conditions instead."""
 SIDES = ("before", "now")
 
 
@@ -30,6 +29,10 @@ class Comparison:
     cells
         Values of both: `KEYS`, `label` for people, `kind`, those of both `SIDES` with their `ENDS`
         and `SHOWN`, the `ratio` of both where that says something, and the `verdict`.
+    moved
+        Values that are not the same any more, the worst first.
+    conditions, configuration
+        What differs of them.
     only_before, only_now
         Tables, rows and columns of one folder alone, in words.
     """
@@ -37,26 +40,11 @@ class Comparison:
     before: Folder
     now: Folder
     cells: pd.DataFrame
+    moved: pd.DataFrame
+    conditions: list[Difference]
+    configuration: list[Difference]
     only_before: list[str]
     only_now: list[str]
-
-    @cached_property
-    def moved(self) -> pd.DataFrame:
-        """Values that are not the same any more, the worst first."""
-        moved = self.cells[self.cells["verdict"] != SAME]
-        ratio = pd.to_numeric(moved["ratio"]).fillna(1.0).abs().replace(0.0, 1.0)
-        order = moved["verdict"].map(VERDICTS.index)
-        return moved.iloc[np.lexsort((-np.maximum(ratio, 1.0 / ratio), order))]
-
-    @cached_property
-    def conditions(self) -> list[Difference]:
-        """Conditions that differ."""
-        return of_conditions(self.before, self.now)
-
-    @cached_property
-    def configuration(self) -> list[Difference]:
-        """Keys of the configuration that differ."""
-        return of_configurations(self.before, self.now)
 
 
 def compare(before: Folder, now: Folder) -> Comparison:
@@ -67,19 +55,22 @@ def compare(before: Folder, now: Folder) -> Comparison:
     cells["ratio"] = pd.Series([_ratio(*pair) for pair in pairs], dtype=object)
     verdicts = [verdict(kind, *pair) for kind, pair in zip(cells["kind"], pairs)]
     cells["verdict"] = pd.Series(verdicts, dtype=object)
-    return Comparison(before, now, cells, list(_only(before, now)), list(_only(now, before)))
-
-
-def name_of(path: str) -> str:
-    """Name of a table by its path."""
-    return path.rpartition("/")[2]
+    moved = cells[cells["verdict"] != SAME]
+    ratio = pd.to_numeric(moved["ratio"]).fillna(1.0).abs().replace(0.0, 1.0)
+    worst = np.lexsort((-np.maximum(ratio, 1.0 / ratio), moved["verdict"].map(VERDICTS.index)))
+    return Comparison(
+        *(before, now, cells, moved.iloc[worst]),
+        *(of_conditions(before, now), of_configurations(before, now)),
+        *(list(_only(before, now)), list(_only(now, before))),
+    )
 
 
 def _cells(folder: Folder, side: str) -> pd.DataFrame:
-    """All values of a folder, in columns of a side."""
-    kept = [cells for path, cells in folder.cells.items() if name_of(path) not in APART]
-    cells = pd.concat(kept, ignore_index=True).dropna(subset="label")
-    return cells.rename(columns={end: f"{side}{end}" for end in (*ENDS, SHOWN)})
+    """All values of a folder that are compared, in columns of a side."""
+    tables = [each for each in folder.tables.items() if not each[0].endswith(APART)]
+    columns = [*KEYS, "label", "kind", *(f"{side}{end}" for end in (*ENDS, SHOWN))]
+    cells = [cell for each in tables for cell in cells_of(*each)]
+    return pd.DataFrame(cells, columns=columns, dtype=object).dropna(subset="label")
 
 
 def _ratio(before: Value, now: Value) -> float | None:
@@ -93,10 +84,10 @@ def _ratio(before: Value, now: Value) -> float | None:
 def _only(here: Folder, there: Folder) -> Iterator[str]:
     """Tables, rows and columns that one folder has and the other has not."""
     yield from (f"table {path}" for path in here.tables if path not in there.tables)
-    for path in here.tables:
-        if path in there.tables and name_of(path) not in APART:
-            rows, others = here.cells[path]["row"], there.cells[path]["row"]
-            yield from (f"{path}: row {name}" for name in rows[~rows.isin(others)].unique())
+    for path, table in here.tables.items():
+        if path in there.tables and not path.endswith(APART):
+            rows, others = rows_of(table), rows_of(there.tables[path])
+            yield from (f"{path}: row {name}" for name in rows if name not in others)
             known = {column.key for column in there.tables[path].columns}
-            columns = [column.key for column in here.tables[path].columns]
+            columns = [column.key for column in table.columns]
             yield from (f"{path}: column {key}" for key in columns if key not in known)

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from carillon.documents import read_yaml
 from carillon.errors import UserError
 from carillon.files import cause
@@ -37,15 +35,12 @@ class Folder:
         Of the folder.
     tables
         By their path below the folder, without ending.
-    cells
-        Their values by the same path, see `cells_of`.
     config
         The resolved configuration; empty if the folder has none.
     """
 
     path: Path
     tables: dict[str, Table]
-    cells: dict[str, pd.DataFrame]
     config: dict[str, Any]
 
 
@@ -58,14 +53,10 @@ def read_folder(path: str | Path) -> Folder:
         If there is no such folder, if it holds no tables, or if one cannot be read.
     """
     path = Path(path)
-    read = {name: _read(name, file) for name, file in require_tables(path).items()}
+    tables = {name: _read(file) for name, file in require_tables(path).items()}
     config = path / "config.yaml"
-    return Folder(
-        path,
-        {name: table for name, (table, _) in read.items()},
-        {name: cells for name, (_, cells) in read.items()},
-        read_yaml(config, "the configuration of a run") if config.exists() else {},
-    )
+    values = read_yaml(config, "the configuration of a run") if config.exists() else {}
+    return Folder(path, tables, values)
 
 
 def require_tables(path: str | Path) -> dict[str, Path]:
@@ -107,21 +98,18 @@ def require_apart(out: str | Path, *compared: Folder) -> Path:
     return out
 
 
-def _read(name: str, file: Path) -> tuple[Table, pd.DataFrame]:
+def _read(file: Path) -> Table:
     require_file(file, "a table")
     try:
         table = READERS[file.suffix](file)
-        _require_texts(table)
-        return table, cells_of(name, table)
+        texts = table.conditions.texts.values() if table.conditions else ()
+        # What is no text cannot be joined.
+        "".join([table.name, *texts, *(column.label for column in table.columns)])
+        cells_of("", table)
+        return table
     except OSError as error:
         raise UserError(f"{file}: cannot be read ({cause(error)})") from None
     except _SENSELESS:
         raise UserError(
             f"{file}: is no table of this version, or damaged; run the workflow again"
         ) from None
-
-
-def _require_texts(table: Table) -> None:
-    """Join what is said about the values once; what is no text raises."""
-    texts = table.conditions.texts.values() if table.conditions else ()
-    "".join([table.name, *texts, *(column.label for column in table.columns)])

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import partial
+from typing import Any, NamedTuple
 
 from workflow.studies.base.numbers import show
 
@@ -15,7 +15,8 @@ SMALLER, LARGER = "smaller", "larger"
 
 WORSE = (SLOWER, LESS_ACCURATE, LARGER)
 BETTER = (FASTER, MORE_ACCURATE, SMALLER)
-VERDICTS = (*WORSE, *BETTER, CHANGED, GONE, NEW)
+OTHER = (CHANGED, GONE, NEW)
+VERDICTS = (*WORSE, *BETTER, *OTHER)
 """What is said of numbers that moved, the worst first."""
 
 TIME_TOLERANCE = 0.1
@@ -34,6 +35,14 @@ VALUE_TOLERANCE = 1e-4
 """Least relative move of a frequency or a share."""
 
 ERRORS = ("percent", "fraction", "small", "angle")
+SAYINGS = {
+    "seconds": (SLOWER, FASTER),
+    "times": (FASTER, SLOWER),
+    **dict.fromkeys(ERRORS, (LESS_ACCURATE, MORE_ACCURATE)),
+    "score": (MORE_ACCURATE, LESS_ACCURATE),
+    "bytes": (LARGER, SMALLER),
+}
+"""What is said of a number that moved up, and of one that moved down, by its kind."""
 UNJUDGED = ("modelled",)
 """Kinds of numbers that are not compared."""
 
@@ -54,19 +63,17 @@ RULES = {
     "speed-ups of one run, modelled times": "are not judged, as the times themselves are",
 }
 """The rules in words."""
-Spread = tuple[float, float] | None
 
 
-@dataclass(frozen=True)
-class Value:
+class Value(NamedTuple):
     """A number or text, and the spread of its runs if there were several."""
 
-    value: float | str | None
+    value: Any
     min: float | None = None
     max: float | None = None
 
     @property
-    def spread(self) -> Spread:
+    def spread(self) -> tuple[float, float] | None:
         """Minimum and maximum of several runs; None if there was one."""
         if self.min is None or self.max is None or self.min == self.max:
             return None
@@ -74,15 +81,7 @@ class Value:
 
 
 def verdict(kind: str, before: Value, now: Value) -> str:
-    """What became of a number.
-
-    Parameters
-    ----------
-    kind
-        Of the number, see `workflow.studies.base.numbers.show`.
-    before, now
-        The baseline's and the other one.
-    """
+    """What became of the baseline's number of a kind, see `workflow.studies.base.numbers.show`."""
     old, new = before.value, now.value
     if old is None or new is None:
         return SAME if old is new else GONE if new is None else NEW
@@ -91,37 +90,29 @@ def verdict(kind: str, before: Value, now: Value) -> str:
     if math.isnan(old) or math.isnan(new):
         return SAME if math.isnan(old) and math.isnan(new) else CHANGED
     if kind in ("seconds", "times"):
-        moved = _time_moved(kind, old, new, before.spread, now.spread)
-        return _moved(moved, (new > old) == (kind == "seconds"), SLOWER, FASTER)
-    if kind in ERRORS:
-        return _moved(_error_moved(old, new), abs(new) > abs(old), LESS_ACCURATE, MORE_ACCURATE)
-    if kind == "score":
+        moved = _time_moved(kind, before, now)
+    elif kind in ERRORS:
+        old, new = abs(old), abs(new)
+        moved = _error_moved(old, new)
+    elif kind == "score":
         moved = _error_moved(1.0 - old, 1.0 - new)
-        return _moved(moved, new < old, LESS_ACCURATE, MORE_ACCURATE)
-    if kind == "bytes":
-        return _moved(_excess(old, new) > BYTES_TOLERANCE, new > old, LARGER, SMALLER)
-    return CHANGED if _excess(old, new) > VALUE_TOLERANCE else SAME
+    else:
+        moved = _excess(old, new) > (BYTES_TOLERANCE if kind == "bytes" else VALUE_TOLERANCE)
+    larger, smaller = SAYINGS.get(kind, (CHANGED, CHANGED))
+    return SAME if not moved else larger if new > old else smaller
 
 
-def _moved(moved: bool, for_the_worse: bool, worse: str, better: str) -> str:
-    if not moved:
-        return SAME
-    return worse if for_the_worse else better
-
-
-def _time_moved(kind: str, old: float, new: float, before: Spread, now: Spread) -> bool:
-    """Whether a time [s] or a speed-up moved, given the spreads of its runs."""
-    if before and now:
-        apart = before[1] < now[0] or now[1] < before[0]
-        return apart and _excess(old, new) > TIME_TOLERANCE
-    far = kind == "seconds" and abs(new - old) > SINGLE_SECONDS
-    return far and _excess(old, new) > SINGLE_TOLERANCE
+def _time_moved(kind: str, before: Value, now: Value) -> bool:
+    excess = _excess(before.value, now.value)
+    if before.spread and now.spread:
+        apart = before.spread[1] < now.spread[0] or now.spread[1] < before.spread[0]
+        return apart and excess > TIME_TOLERANCE
+    far = kind == "seconds" and abs(now.value - before.value) > SINGLE_SECONDS
+    return far and excess > SINGLE_TOLERANCE
 
 
 def _error_moved(old: float, new: float) -> bool:
     small, large = sorted((abs(old), abs(new)))
-    if large < ROUNDING:
-        return False
     if large < TINY_ERROR:
         return large > TINY_FACTOR * max(small, ROUNDING)
     return _excess(small, large) > ERROR_TOLERANCE

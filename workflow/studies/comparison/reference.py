@@ -15,7 +15,7 @@ from carillon.progress import say
 from workflow.studies.base.conditions import LABELS
 from workflow.studies.base.numbers import show
 from workflow.studies.base.table import Table
-from workflow.studies.comparison.comparison import APART, name_of
+from workflow.studies.comparison.comparison import APART
 from workflow.studies.comparison.folders import Folder, read_folder
 
 FOLDER = "reference"
@@ -29,7 +29,7 @@ TIMED = "tables/times"
 """Table whose conditions are those of the run."""
 OF_TABLES = ("runs", "spread")
 """Conditions that are not the run's, so that its description does not tell them."""
-LEFT_OUT = (FOLDER, "comparison")
+LEFT_OUT = [FOLDER, "comparison"]
 """Folders that are no results of the run."""
 DESCRIPTION = f"""\
 # Reference: {{title}}
@@ -65,11 +65,11 @@ def write_reference(results: str | Path) -> None:
     shutil.rmtree(target, ignore_errors=True)
     for path, table in folder.tables.items():
         _put(target / f"{path}.csv", rounded(table).as_csv())
-        if len(table.rows) < LONG and name_of(path) not in APART:
+        if len(table.rows) < LONG and not path.endswith(APART):
             _put(target / f"{path}.md", table.as_markdown())
     _put(target / "config.yaml", (results / "config.yaml").read_text())
     _put(target / "README.md", description(folder))
-    size = size_of(target)
+    size = sizes_by_part(target)["all"]
     if size > LARGE:
         say(f"{target}: {size:,} bytes are much to keep with the source, {LARGE:,} would be less")
 
@@ -82,13 +82,11 @@ def _put(path: Path, text: str) -> None:
 
 def rounded(table: Table) -> Table:
     """A table whose numbers have `DIGITS` significant digits."""
-    return replace(
-        table, rows=[{key: _round(value) for key, value in row.items()} for row in table.rows]
-    )
 
+    def kept(value: Any) -> Any:
+        return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
 
-def _round(value: Any) -> Any:
-    return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
+    return replace(table, rows=[{key: kept(row[key]) for key in row} for row in table.rows])
 
 
 def description(folder: Folder) -> str:
@@ -113,23 +111,18 @@ def _table(name: str, value: str, rows: Mapping[str, Any], kind: str = "text") -
 def seconds_by_part(results: Path) -> dict[str, float]:
     """Wall seconds of the benchmarked jobs by the folder of what they made, and in all."""
     folder = results / "benchmarks"
-    files = sorted(folder.rglob("*.tsv"))
-    jobs = [pd.read_csv(file, sep="\t")["s"].sum() for file in files]
-    return _summed([file.relative_to(folder).parts[0] for file in files], jobs)
+    jobs = sorted(folder.rglob("*.tsv"))
+    return _by_part({file: pd.read_csv(file, sep="\t")["s"].sum() for file in jobs}, folder)
 
 
 def sizes_by_part(results: Path) -> dict[str, float]:
     """Bytes of the results by folder, and in all."""
-    parts = [path for path in sorted(results.iterdir()) if path.name not in LEFT_OUT]
-    return _summed([path.name for path in parts], list(map(size_of, parts)))
+    files = [file for file in sorted(results.rglob("*")) if file.is_file()]
+    return _by_part({file: file.stat().st_size for file in files}, results)
 
 
-def size_of(path: Path) -> int:
-    """Bytes of a file, or of all files below a folder."""
-    files = path.rglob("*") if path.is_dir() else [path]
-    return sum(file.stat().st_size for file in files if file.is_file())
-
-
-def _summed(names: list[str], values: list[float]) -> dict[str, float]:
-    by_name = pd.Series(values, names).groupby(level=0, sort=False).sum()
-    return {**by_name.to_dict(), "all": by_name.sum()}
+def _by_part(amounts: Mapping[Path, float], folder: Path) -> dict[str, float]:
+    parts = [file.relative_to(folder).parts[0] for file in amounts]
+    by_part = pd.Series(list(amounts.values()), parts).groupby(level=0, sort=False).sum()
+    by_part = by_part.drop(LEFT_OUT, errors="ignore")
+    return {**by_part.to_dict(), "all": by_part.sum()}

@@ -15,21 +15,22 @@ from workflow.studies.base.entry import Row, tables_of
 from workflow.studies.base.numbers import show
 from workflow.studies.base.page import rendered
 from workflow.studies.base.table import Table
-from workflow.studies.comparison.cells import ENDS, KEYS, SHOWN
+from workflow.studies.comparison.cells import ENDS, KEYS
 from workflow.studies.comparison.comparison import SIDES, Comparison
 from workflow.studies.comparison.differences import Difference, dates
-from workflow.studies.comparison.noise import BETTER, RULES, VERDICTS, WORSE
+from workflow.studies.comparison.noise import BETTER, OTHER, RULES, VERDICTS, WORSE
 
 NAME = "comparison"
 MACHINE = ("processor", "cores", "memory", "ranks", "threads", "blas")
 """Conditions on which times depend, whatever the code."""
-MAX_MOVED = 25
+MOST_MOVED = 25
 """Moved numbers of a table that people are told; all are in the CSV file."""
-MAX_LISTED = 200
+MOST_LISTED = 200
 """Numbers of a table up to which the page lists all of them."""
 TITLE = "What moved"
 TABLES = tables_of("comparison/tables.yaml")
 RAW = [*KEYS, "kind", *(f"{side}{end}" for side in SIDES for end in ENDS), "ratio", "verdict"]
+CLASSES = {"worse": WORSE, "better": BETTER, "other": OTHER}
 MARKS = {**dict.fromkeys(WORSE, "worse"), **dict.fromkeys(BETTER, "better")}
 """How verdicts are marked on a page."""
 
@@ -55,7 +56,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
         "conditions": comparison.conditions,
         "configuration": comparison.configuration,
         "compared": len(comparison.cells),
-        "moved": every_number(comparison.moved.sort_index()),
+        "moved": comparison.moved.sort_index()[RAW].to_dict("records"),
         "only_before": comparison.only_before,
         "only_now": comparison.only_now,
     }
@@ -69,11 +70,11 @@ def as_text(comparison: Comparison) -> str:
         where = f" ({_cut(item['where'])})" if item["where"] else ""
         lines.append(f"  {item['what']}: {_cut(item['before'])} -> {_cut(item['now'])}{where}")
     lines += [*_caution(comparison), summary(comparison)]
-    for cell in comparison.moved.head(MAX_MOVED).to_dict("records"):
+    for cell in comparison.moved.head(MOST_MOVED).to_dict("records"):
         place = f"{cell['verdict']}: {cell['table']}, {cell['row']}, {cell['label']}"
         lines.append(f"  {place}: {cell['before_shown']} -> {cell['now_shown']}")
-    if len(comparison.moved) > MAX_MOVED:
-        lines.append(f"  and {len(comparison.moved) - MAX_MOVED:,} more")
+    if len(comparison.moved) > MOST_MOVED:
+        lines.append(f"  and {len(comparison.moved) - MOST_MOVED:,} more")
     sides = _one_sided(comparison).items()
     lines += [f"{side}: {len(only)}, such as {only[0]}" for side, only in sides]
     return "\n".join(lines)
@@ -85,9 +86,9 @@ def as_markdown(comparison: Comparison) -> str:
     parts += [each.as_markdown() for each in _differing(comparison)] or ["The same."]
     parts += [*_caution(comparison), "## Moved"]
     for path, moved in _by_table(comparison.moved):
-        parts += [f"### {path}", _listed(path, moved.head(MAX_MOVED)).as_markdown()]
-        if len(moved) > MAX_MOVED:
-            parts.append(f"And {len(moved) - MAX_MOVED:,} more, see {NAME}.csv.")
+        parts += [f"### {path}", _listed(path, moved.head(MOST_MOVED)).as_markdown()]
+        if len(moved) > MOST_MOVED:
+            parts.append(f"And {len(moved) - MOST_MOVED:,} more, see {NAME}.csv.")
     if comparison.moved.empty:
         parts.append("Nothing.")
     parts += ["## By table", TABLES["counts"](comparison.cells).as_markdown()]
@@ -108,13 +109,13 @@ def as_page(comparison: Comparison) -> str:
         differing=_differing(comparison),
         cautions=_caution(comparison),
         moved=[
-            (path, _listed(f"{path}-moved", moved.head(MAX_MOVED)), len(moved))
+            (path, _listed(f"{path}-moved", moved.head(MOST_MOVED)), len(moved))
             for path, moved in _by_table(comparison.moved)
         ],
-        most=MAX_MOVED,
+        most=MOST_MOVED,
         counts=TABLES["counts"](comparison.cells),
-        listed=[_listed(path, cells) for path, cells in by_table if len(cells) <= MAX_LISTED],
-        unlisted=[path for path, cells in by_table if len(cells) > MAX_LISTED],
+        listed=[_listed(path, cells) for path, cells in by_table if len(cells) <= MOST_LISTED],
+        unlisted=[path for path, cells in by_table if len(cells) > MOST_LISTED],
         one_sided=_one_sided(comparison),
         rules=RULES,
     )
@@ -122,43 +123,29 @@ def as_page(comparison: Comparison) -> str:
 
 def summary(comparison: Comparison) -> str:
     """What became of the numbers, in one sentence."""
-    verdicts = comparison.moved["verdict"].value_counts()
-    parts = [f"{show(verdicts[name], 'count')} {name}" for name in VERDICTS if name in verdicts]
+    counted = comparison.moved["verdict"].value_counts()
+    parts = [f"{show(counted[name], 'count')} {name}" for name in VERDICTS if name in counted]
     numbers = f"{show(len(comparison.cells), 'count')} numbers compared"
     return f"{numbers}: {', '.join(parts) if parts else 'none moved beyond noise'}"
 
 
-def every_number(cells: pd.DataFrame) -> list[Row]:
-    """All numbers of both folders, raw."""
-    return cells[RAW].to_dict("records")
+def records(cells: pd.DataFrame) -> list[Row]:
+    """Numbers side by side."""
+    rows: list[Row] = cells.assign(mark=cells["verdict"].map(MARKS).fillna("")).to_dict("records")
+    return rows
 
 
 def counts(cells: pd.DataFrame) -> list[Row]:
     """How many numbers of each table were compared, and what became of them."""
-    moved = cells["verdict"].isin(VERDICTS)
-    worse, better = (cells["verdict"].isin(verdicts) for verdicts in (WORSE, BETTER))
-    flags = pd.DataFrame(
-        {"compared": 1, "worse": worse, "better": better, "other": moved & ~worse & ~better}
-    )
-    summed = flags.groupby(cells["table"], sort=False).sum().astype(int)
-    return summed.reset_index().to_dict("records")
-
-
-def listed(cells: pd.DataFrame) -> list[Row]:
-    """Numbers of a table side by side, for people."""
-    shown = {side: cells[f"{side}{SHOWN}"] for side in SIDES}
-    marks = cells["verdict"].map(MARKS).fillna("")
-    return cells.assign(**shown, verdict_mark=marks).to_dict("records")
+    of = {name: cells["verdict"].isin(verdicts) for name, verdicts in CLASSES.items()}
+    summed = pd.DataFrame({"compared": 1, **of}).groupby(cells["table"], sort=False).sum()
+    rows: list[Row] = summed.reset_index().to_dict("records")
+    return rows
 
 
 def differing(differences: list[Difference]) -> list[Row]:
     """What is not the same, for people."""
     return [{**each, "where": each["where"] or "all"} for each in differences]
-
-
-def everywhere(differences: list[Difference]) -> bool:
-    """Whether all that differs does so in all tables."""
-    return not any(each["where"] for each in differences)
 
 
 def _listed(name: str, cells: pd.DataFrame) -> Table:
@@ -180,8 +167,8 @@ def _sides(comparison: Comparison) -> str:
 
 def _caution(comparison: Comparison) -> list[str]:
     """A sentence about times where the machine is not the same; none otherwise."""
-    names = {item["what"] for item in comparison.conditions}
-    different = [LABELS[key] for key in MACHINE if LABELS[key] in names]
+    differing_labels = {item["what"] for item in comparison.conditions}
+    different = [LABELS[key] for key in MACHINE if LABELS[key] in differing_labels]
     if not different:
         return []
     return [f"Not the same: {', '.join(different)}; times that moved may tell about these alone."]
