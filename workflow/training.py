@@ -19,8 +19,6 @@ class Training:
     ----------
     section
         Where it stands in the configuration, for messages; empty for the run's own.
-    folder
-        Where its files are, below the folder of the results.
     dataset, forests
         Its sections of the configuration.
     poisson
@@ -28,7 +26,6 @@ class Training:
     """
 
     section: str
-    folder: str
     dataset: Mapping[str, Any]
     forests: Mapping[str, Any]
     poisson: float
@@ -104,7 +101,7 @@ class Training:
 
 def own(config: Mapping[str, Any]) -> Training:
     """The forests of the run."""
-    return Training("", "", config["dataset"], config["forests"], config["poisson"])
+    return Training("", config["dataset"], config["forests"], config["poisson"])
 
 
 def study(config: Mapping[str, Any]) -> Training:
@@ -150,6 +147,4 @@ def _check_variants(names: list[str]) -> None:
 def default(config: Mapping[str, Any]) -> Training:
     """The forests that come with the package."""
     part = config["default_forest"]
-    return Training(
-        "default_forest.", "default_forest/", part["dataset"], part["forests"], config["poisson"]
-    )
+    return Training("default_forest.", part["dataset"], part["forests"], config["poisson"])
