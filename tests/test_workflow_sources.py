@@ -37,7 +37,6 @@ def project(tmp_path, monkeypatch):
     (folder / "room" / "third.py").write_text("import room.first\n")
     monkeypatch.setattr(sources, "ROOT", folder)
     monkeypatch.setattr(sources, "PACKAGES", ("room",))
-    monkeypatch.setattr(source_files, "PROJECT", folder)
     monkeypatch.setattr(source_files, "KEPT", folder / "kept.json")
     return folder / "room"
 

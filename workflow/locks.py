@@ -84,8 +84,4 @@ def _sign(file: TextIO) -> None:
     file.truncate(0)
     json.dump({"host": socket.gethostname(), "process": os.getpid()}, file)
     file.flush()
-    atexit.register(_strike_out, file)
-
-
-def _strike_out(file: TextIO) -> None:
-    file.truncate(0)
+    atexit.register(file.truncate, 0)

@@ -131,14 +131,9 @@ def check_study(config: Mapping[str, Any]) -> None:
             f"default_forest.dataset.samples gives {8 * data['samples']:,}"
         )
     if wanted["variants"]:
-        _check_variants(wanted["variants"])
+        from forests.studies.training import VARIANTS  # Needs scikit-learn: a long import.
 
-
-def _check_variants(names: list[str]) -> None:
-    from forests.studies.training import VARIANTS  # Needs scikit-learn, whose import takes long.
-
-    for name in names:
-        if name not in VARIANTS:
+        for name in set(wanted["variants"]) - set(VARIANTS):
             raise UserError(
                 f"forests_study.variants: {name!r} is unknown, choose from {', '.join(VARIANTS)}"
             )

@@ -79,4 +79,3 @@ use rule describe_forests as describe_default_forest with:
         f"{DEFAULT_FOLDER}/forests.json",
     log:
         f"{LOGS}/default_forest/describe.log",
-    localrule: True

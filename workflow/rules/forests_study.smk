@@ -19,7 +19,6 @@ use rule describe_forests as describe_studied_forests with:
         f"{FORESTS_STUDY}/model.json",
     log:
         f"{LOGS}/forests_study/describe.log",
-    localrule: True
 
 
 # The rules below take all cores, although some use one, since they time what they do.
