@@ -133,10 +133,10 @@ def check_study(config: Mapping[str, Any]) -> None:
     if wanted["variants"]:
         from forests.studies.training import VARIANTS  # Needs scikit-learn: a long import.
 
-        for name in set(wanted["variants"]) - set(VARIANTS):
-            raise UserError(
-                f"forests_study.variants: {name!r} is unknown, choose from {', '.join(VARIANTS)}"
-            )
+        for name in wanted["variants"]:
+            if name not in VARIANTS:
+                known = ", ".join(VARIANTS)
+                raise UserError(f"forests_study.variants: {name!r} is unknown, choose from {known}")
 
 
 def default(config: Mapping[str, Any]) -> Training:
