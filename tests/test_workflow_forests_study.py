@@ -34,7 +34,8 @@ def test_the_study_takes_forests_that_are_named_or_the_default_ones(tmp_path, mo
     config = yaml.safe_load((CHECKOUT / "workflow" / "config" / "laptop.yaml").read_text())
     monkeypatch.setattr(forest_model, "default_path", lambda: tmp_path / "default.h5")
     config["forests_study"]["model"] = "own.h5" if named else None
-    assert settings.studied_model(config) == ("own.h5" if named else str(tmp_path / "default.h5"))
+    files = settings.forest_files(config["forests_study"]["model"])
+    assert files == ["own.h5" if named else str(tmp_path / "default.h5")]
 
 
 @pytest.mark.parametrize(

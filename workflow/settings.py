@@ -9,6 +9,7 @@ from typing import Any
 
 import yaml
 from jsonschema.exceptions import ValidationError
+from snakemake.utils import update_config, validate
 
 from carillon import provenance
 from carillon.documents import read_yaml
@@ -63,18 +64,8 @@ def read(files: Iterable[str | Path], given: Mapping[str, Any]) -> dict[str, Any
     """
     config: dict[str, Any] = {}
     for values in (*(read_yaml(file, CONFIGURATION) for file in files), given):
-        _update(config, values)
+        update_config(config, values)
     return config
-
-
-def _update(config: dict[str, Any], values: Mapping[str, Any]) -> None:
-    for key, value in values.items():
-        if isinstance(value, Mapping):
-            below = config.get(key)
-            config[key] = dict(below) if isinstance(below, Mapping) else {}
-            _update(config[key], value)
-        else:
-            config[key] = value
 
 
 def check(config: Mapping[str, Any]) -> None:
@@ -98,8 +89,6 @@ def complete(files: Iterable[str | Path]) -> dict[str, Any]:
     UserError
         If it cannot be read, or holds anything that does not fit.
     """
-    from snakemake.utils import validate  # Takes long to import, and --help should not.
-
     config = read(files, {})
     check(config)
     validate(config, str(SCHEMA))
@@ -162,9 +151,13 @@ def check_links(config: Mapping[str, Any]) -> None:
             raise UserError(f"objectives.objectives: {error}") from None
 
 
-def mesh_of(config: Mapping[str, Any], model: str) -> str:
-    """Mesh argument of the solver: `builtin:NAME` or the path of a file."""
-    return located(config, config["models"][model]["mesh"])
+def mesh_of(config: Mapping[str, Any], model: str, section: str | None = None) -> str:
+    """Mesh argument of the solver: `builtin:NAME` or the path of a file.
+
+    Of a model of the run, or of one that a section of the configuration has of its own.
+    """
+    models = (config[section] if section else config)["models"]
+    return located(config, models[model]["mesh"])
 
 
 def material_of(config: Mapping[str, Any], model: str) -> str:
@@ -199,50 +192,17 @@ def own_shards(config: Mapping[str, Any]) -> list[str]:
     return [] if config["forests"]["model"] else training.own(config).shards
 
 
-def modes_of(config: Mapping[str, Any], model: str) -> int:
-    """Number of modes computed for a model, rigid ones included."""
-    own = config["models"][model]["modes"]
-    return int(own if own is not None else config["solver"]["modes"])
-
-
-def figured_mesh(config: Mapping[str, Any], solid: str) -> str:
-    """Mesh argument of the solver for a solid of the figures."""
-    return located(config, config["figures"]["models"][solid]["mesh"])
-
-
 def studied_objectives(config: Mapping[str, Any]) -> list[str]:
     """Names of the objectives that the study compares."""
     return list(config["objectives"]["objectives"] or OBJECTIVES)
 
 
-def named_forest(config: Mapping[str, Any]) -> str | None:
-    """Forests that are named to be set beside the fits; None for those of the package."""
-    named = config["objectives"]["forest"]
-    return None if named is None else path_word(named)
-
-
-def studied_forest_files(config: Mapping[str, Any]) -> list[str]:
-    """Forests that the study sets beside the fits; none if there are no default ones either."""
-    found = _named_or_default(config["objectives"]["forest"])
-    return [] if found is None else [found]
-
-
-def default_forest_files() -> list[str]:
-    """Forests that come with the package; none if there are none."""
-    found = _named_or_default(None)
-    return [] if found is None else [found]
-
-
-def studied_model(config: Mapping[str, Any]) -> str | None:
-    """Forests that are studied block by block; None if there are no default ones either."""
-    return _named_or_default(config["forests_study"]["model"])
-
-
-def _named_or_default(named: str | None) -> str | None:
+def forest_files(named: str | None = None) -> list[str]:
+    """File of the forests that are named, or else of those of the package; none without either."""
     try:
-        return path_word(named) if named else str(forest_model.default_path())
+        return [path_word(named) if named else str(forest_model.default_path())]
     except UserError:
-        return None
+        return []
 
 
 def _require_models(where: str, names: Iterable[str], models: Iterable[str]) -> None:

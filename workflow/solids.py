@@ -26,14 +26,9 @@ MEASURED = {
 """Where the configuration names the solids that a study measures, by the file of what is found."""
 
 
-def mesh_of(config: Config, section: str, solid: str) -> str:
-    """Mesh argument of the solver for a solid of a section of the configuration."""
-    return settings.located(config, config[section]["models"][solid]["mesh"])
-
-
 def mesh_files(config: Config, section: str, solid: str) -> list[str]:
     """Mesh file of a solid; none for a built-in object."""
-    mesh = mesh_of(config, section, solid)
+    mesh = settings.mesh_of(config, solid, section)
     return [] if mesh.startswith(settings.BUILTIN) else [mesh]
 
 

@@ -11,23 +11,21 @@ import atexit
 import hashlib
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import astuple, dataclass
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 from carillon.errors import UserError
 from carillon.files import atomic_path
 
-PROJECT = Path(__file__).resolve().parent.parent
 KEPT = Path(__file__).parent / "__pycache__" / f"{Path(__file__).stem}-{sys.hexversion:x}.json"
 _TEXTS = frozenset({"help", "description", "metavar"})
 _DATA = (".json", ".css", ".j2", ".yaml")
 
 
-@dataclass(frozen=True)
-class Source:
+class Source(NamedTuple):
     """A source file.
 
     Attributes
@@ -40,9 +38,12 @@ class Source:
         SHA-256 of its syntax tree without docstrings and help texts.
     """
 
-    names: tuple[str, ...]
-    data: tuple[str, ...]
+    names: Sequence[str]
+    data: Sequence[str]
     digest: str
+
+
+_asked: set[str] = set()
 
 
 def read(path: Path) -> Source:
@@ -55,21 +56,20 @@ def read(path: Path) -> Source:
     """
     content = path.read_bytes()
     version = hashlib.sha256(content).hexdigest()
+    _asked.add(version)
     known = _known()
-    if str(path) not in known or known[str(path)][0] != version:
-        known[str(path)] = (version, _parsed(content))
+    if version not in known:
+        known[version] = _parsed(content)
         _keep_at_exit()
-    return known[str(path)][1]
+    return known[version]
 
 
 @cache
-def _known() -> dict[str, tuple[str, Source]]:
-    """What earlier runs have read, by path: the digest of the file's bytes, and what they say."""
+def _known() -> dict[str, Source]:
+    """What earlier runs have read, by the digest of the file's bytes."""
     with suppress(OSError, ValueError, TypeError, AttributeError):
-        return {
-            path: (version, Source(tuple(names), tuple(data), digest))
-            for path, (version, (names, data, digest)) in json.loads(KEPT.read_bytes()).items()
-        }
+        kept = json.loads(KEPT.read_bytes())
+        return {version: Source(*source) for version, source in kept.items()}
     return {}
 
 
@@ -79,18 +79,12 @@ def _keep_at_exit() -> None:
 
 
 def _keep() -> None:
-    """Write down what was read of this project; where that is impossible, it is read again."""
-    known = {path: (version, astuple(source)) for path, (version, source) in _known().items()}
+    """Write down what this run has asked for; where that is impossible, it is read again."""
+    known = {version: source for version, source in _known().items() if version in _asked}
     with suppress(OSError, UserError):
         KEPT.parent.mkdir(exist_ok=True)
         with atomic_path(KEPT) as temporary:
-            temporary.write_text(
-                json.dumps({path: each for path, each in known.items() if _is_own(path)})
-            )
-
-
-def _is_own(path: str) -> bool:
-    return Path(path).is_relative_to(PROJECT) and Path(path).is_file()
+            temporary.write_text(json.dumps(known))
 
 
 def _parsed(content: bytes) -> Source:
@@ -114,7 +108,7 @@ def _parsed(content: bytes) -> Source:
             data.add(node.value)
     names.update({parent for name in names for parent in _parents(name)})
     digest = hashlib.sha256(ast.dump(tree).encode()).hexdigest()
-    return Source(tuple(sorted(names)), tuple(sorted(data)), digest)
+    return Source(sorted(names), sorted(data), digest)
 
 
 def _parents(name: str) -> Iterator[str]:

@@ -41,18 +41,16 @@ def fingerprint(*modules: str) -> str:
 def _needed(modules: Iterable[str]) -> set[Path]:
     """Files of the modules, of what they import, and of the data beside them that they name."""
     files: set[Path] = set()
-    waiting = []
     for name in modules:
         path = _file_of(name)
         if path is None:
             raise ValueError(f"there is no module {name} in {ROOT}")
         files.add(path)
-        waiting.append(path)
+    waiting = list(files)
     while waiting:
-        modules_named, data = _named_in(waiting.pop())
-        new = modules_named - files
-        files |= new | data
-        waiting.extend(new)
+        imported, data = _named_in(waiting.pop())
+        waiting.extend(imported - files)
+        files |= imported | data
     return files
 
 

@@ -63,9 +63,9 @@ _Validator = extend(
 @_FORMATS.checks("line", raises=ValueError)
 def _is_line(value: Any) -> bool:
     """Text that pages, tables, logs and terminals can show in one line."""
-    for character in value if isinstance(value, str) else "":
-        if unicodedata.category(character) in ("Cc", "Cs", "Zl", "Zp"):
-            raise ValueError("has a line break, a control character or half a character")
+    kinds = set(map(unicodedata.category, value)) if isinstance(value, str) else set()
+    if kinds & {"Cc", "Cs", "Zl", "Zp"}:
+        raise ValueError("has a line break, a control character or half a character")
     return True
 
 

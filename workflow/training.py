@@ -19,8 +19,6 @@ class Training:
     ----------
     section
         Where it stands in the configuration, for messages; empty for the run's own.
-    folder
-        Where its files are, below the folder of the results.
     dataset, forests
         Its sections of the configuration.
     poisson
@@ -28,7 +26,6 @@ class Training:
     """
 
     section: str
-    folder: str
     dataset: Mapping[str, Any]
     forests: Mapping[str, Any]
     poisson: float
@@ -104,7 +101,7 @@ class Training:
 
 def own(config: Mapping[str, Any]) -> Training:
     """The forests of the run."""
-    return Training("", "", config["dataset"], config["forests"], config["poisson"])
+    return Training("", config["dataset"], config["forests"], config["poisson"])
 
 
 def study(config: Mapping[str, Any]) -> Training:
@@ -133,20 +130,16 @@ def check_study(config: Mapping[str, Any]) -> None:
             f"forests_study.curve_rows: {max(requested['curve_rows']):,} rows, but "
             f"default_forest.dataset.samples gives {8 * data['samples']:,}"
         )
-    if not requested["variants"]:
-        return
-    from forests.studies.training import VARIANTS  # Needs scikit-learn, whose import takes long.
+    if requested["variants"]:
+        from forests.studies.training import VARIANTS  # Needs scikit-learn: a long import.
 
-    for name in requested["variants"]:
-        if name not in VARIANTS:
-            raise UserError(
-                f"forests_study.variants: {name!r} is unknown, choose from {', '.join(VARIANTS)}"
-            )
+        for name in requested["variants"]:
+            if name not in VARIANTS:
+                known = ", ".join(VARIANTS)
+                raise UserError(f"forests_study.variants: {name!r} is unknown, choose from {known}")
 
 
 def default(config: Mapping[str, Any]) -> Training:
     """The forests that come with the package."""
     part = config["default_forest"]
-    return Training(
-        "default_forest.", "default_forest/", part["dataset"], part["forests"], config["poisson"]
-    )
+    return Training("default_forest.", part["dataset"], part["forests"], config["poisson"])

@@ -4,8 +4,6 @@ from workflow.studies import catalogue, marks
 from workflow.studies.base.study import modules_of
 from workflow.studies.objectives.results import cases_of
 
-FOREST_ARGUMENT = options({"forest": settings.named_forest(config)})
-
 
 wildcard_constraints:
     solid="|".join(config["objectives"]["models"]),
@@ -105,7 +103,18 @@ def case_arguments(wildcards):
         "poisson": config["poisson"],
         "components": config["objectives"]["models"][wildcards.solid]["components"],
     }
-    return [solids.mesh_of(config, "objectives", wildcards.solid), *options(how)]
+    return [settings.mesh_of(config, wildcards.solid, "objectives"), *options(how)]
+
+
+def objectives_arguments():
+    """What is compared in every case."""
+    part = config["objectives"]
+    how = {
+        "forest": part["forest"] and path_word(part["forest"]),
+        "modes": part["modes"],
+        "objectives": ",".join(settings.studied_objectives(config)),
+    }
+    return options(how)
 
 
 def shape_mesh(wildcards):
@@ -117,7 +126,7 @@ def shape_arguments(wildcards):
     """What the solid of a figure is: mesh, resolution, material."""
     model = config["figures"]["models"][wildcards.shape]
     how = {key: model[key] for key in ("resolution", "material", "components")}
-    mesh = solids.mesh_of(config, "figures", wildcards.shape)
+    mesh = settings.mesh_of(config, wildcards.shape, "figures")
     return [mesh, *options(how | {"poisson": config["poisson"]})]
 
 

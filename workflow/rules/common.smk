@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 from workflow import locks, training, variants
-from workflow.arguments import options, quoted
+from workflow.arguments import options, path_word, quoted
 from workflow.sources import fingerprint as source
 
 RESULTS = str(Path(config["results_dir"]))
@@ -20,27 +20,37 @@ RANKS = config["solver"]["ranks"]
 ANY_LAUNCHER = "srun --mpi=pmix" if "SLURM_JOB_ID" in os.environ else "mpiexec"
 
 
-def launcher(ranks):
-    """Resource mpi: what goes in front of a program on several ranks; nothing before a single one.
+def resources_of(ranks):
+    """Ranks, cores of each, and as `mpi` what goes in front of a program on several ranks.
 
-    Its words are quoted here, as it is the one thing that goes to a shell as it is.
+    The words of `mpi` are quoted here, as it is the one thing that goes to a shell as it is.
     """
-    return quoted(config["solver"]["launcher"] or ANY_LAUNCHER) if ranks > 1 else ""
+    launcher = quoted(config["solver"]["launcher"] or ANY_LAUNCHER) if ranks > 1 else ""
+    return {"mpi": launcher, "tasks": ranks, "cpus_per_task": max(1, SOLVER_CORES // ranks)}
 
 
-def on_ranks(ranks):
-    """What follows: with -m mpi4py one rank's failure ends them all."""
-    return ["-n", ranks, "python", "-m", "mpi4py"] if ranks > 1 else ["python"]
+def python_on(ranks):
+    """Python in a shell command; on several ranks one's failure ends them all with -m mpi4py."""
+    return "{resources.mpi} -n {resources.tasks:q} python -m mpi4py" if ranks > 1 else "python"
 
 
-def cores_of(ranks):
-    """Cores of every rank."""
-    return max(1, SOLVER_CORES // ranks)
+def solver_command(how):
+    """Shell command of the solver on ranks that share the threads of the rule."""
+    threads = "$(( {threads} > {resources.tasks:q} ? {threads} / {resources.tasks:q} : 1 ))"
+    python = f"OMP_NUM_THREADS={threads} {python_on(RANKS)}"
+    return f"{python} -m solver {how} --out {{output:q}} > {{log:q}} 2>&1"
 
 
-def workers(plan):
-    """Argument for the processes that fit leaves on one rank; several ranks are one process each."""
-    return " --workers {threads}" if plan.forests["ranks"] == 1 else ""
+def train_command(plan, how):
+    """Shell command that trains forests: on one rank with several processes, else with one each."""
+    workers = " --workers {threads}" if plan.forests["ranks"] == 1 else ""
+    python = python_on(plan.forests["ranks"])
+    return f"{python} -m forests train {how}{workers} --out {{output:q}} > {{log:q}} 2>&1"
+
+
+def block_arguments(part):
+    """Blocks that forests are rated on, from a part of the configuration."""
+    return options({key: part[key] for key in ("blocks", "materials")})
 
 
 def shard_memory(plan):
@@ -71,13 +81,14 @@ def growing(first):
     return lambda wildcards, attempt: first * 2 ** (attempt - 1)
 
 
-def limits(rule, memory=None):
-    """Memory and time of a rule from the configuration; `memory` [MB] is taken if it names none."""
+def limits(rule, memory=None, ranks=None):
+    """Memory and time of a rule from the configuration, and what its ranks need if it has any.
+
+    `memory` [MB] is taken if the configuration names none.
+    """
     asked = config["resources"][rule]
-    return {
-        "mem_mb": growing(asked["memory_mb"] or memory),
-        "runtime": growing(asked["minutes"]),
-    }
+    megabytes, minutes = growing(asked["memory_mb"] or memory), growing(asked["minutes"])
+    return {"mem_mb": megabytes, "runtime": minutes, **(resources_of(ranks) if ranks else {})}
 
 
 wildcard_constraints:

@@ -18,8 +18,8 @@ rule generate_shard:
         source=source("dataset_gen.commands.generate"),
         samples=lambda wildcards: OWN.generate_arguments(wildcards.distribution, wildcards.shard),
     shell:
-        "python -m dataset_gen generate {params.samples:q} --workers {threads} --out {output:q}"
-        " > {log:q} 2>&1"
+        "python -m dataset_gen generate {params.samples:q} --workers {threads}"
+        " --out {output:q} > {log:q} 2>&1"
 
 
 rule describe_shard:

@@ -42,7 +42,6 @@ rule grow_tree:
         f"{LOGS}/default_forest/trees/{{tree}}.log",
     benchmark:
         f"{BENCHMARKS}/default_forest/trees/{{tree}}.tsv"
-    threads: 1
     resources:
         **limits("grow_tree", tree_memory(DEFAULT)),
     params:
@@ -65,17 +64,12 @@ rule train_default_forest:
         f"{BENCHMARKS}/default_forest/train.tsv"
     threads: SOLVER_CORES
     resources:
-        **limits("train_default_forest", training_memory(DEFAULT)),
-        mpi=launcher(DEFAULT.forests["ranks"]),
-        tasks=DEFAULT.forests["ranks"],
-        cpus_per_task=cores_of(DEFAULT.forests["ranks"]),
+        **limits("train_default_forest", training_memory(DEFAULT), DEFAULT.forests["ranks"]),
     params:
         source=source("forests.commands.train"),
-        on_ranks=on_ranks(DEFAULT.forests["ranks"]),
         training=DEFAULT.train_arguments,
     shell:
-        "{resources.mpi} {params.on_ranks:q} -m forests train {input.shards:q} {params.training:q}"
-        f" --structure {{input.trees:q}}{workers(DEFAULT)} --out {{output:q}} > {{log:q}} 2>&1"
+        train_command(DEFAULT, "{input.shards:q} {params.training:q} --structure {input.trees:q}")
 
 
 use rule describe_forests as describe_default_forest with:
@@ -85,4 +79,3 @@ use rule describe_forests as describe_default_forest with:
         f"{DEFAULT_FOLDER}/forests.json",
     log:
         f"{LOGS}/default_forest/describe.log",
-    localrule: True

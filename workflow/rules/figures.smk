@@ -12,7 +12,7 @@ rule figures:
 use rule time_methods as time_methods_in_full with:
     input:
         model=shape_mesh,
-        forests=settings.default_forest_files(),
+        forests=settings.forest_files(),
     output:
         f"{place(catalogue.FIGURES)}/models/{{shape}}/methods.json",
     log:
@@ -21,14 +21,12 @@ use rule time_methods as time_methods_in_full with:
         f"{BENCHMARKS}/{catalogue.FIGURES.folder}/{{shape}}/methods.tsv"
     params:
         source=source("solver.commands.benchmark"),
-        ranks=RANKS,
-        on_ranks=on_ranks(RANKS),
         model=shape_arguments,
         how=times_arguments(config["figures"]),
         forest=forest_argument,
 
 
-rule follow_convergence_in_full:
+use rule follow_convergence as follow_convergence_in_full with:
     input:
         shape_mesh,
     output:
@@ -37,17 +35,12 @@ rule follow_convergence_in_full:
         f"{LOGS}/{catalogue.FIGURES.folder}/{{shape}}/convergence.log",
     benchmark:
         f"{BENCHMARKS}/{catalogue.FIGURES.folder}/{{shape}}/convergence.tsv"
-    threads: SOLVER_CORES
     resources:
         **limits("follow_convergence_in_full"),
     params:
         source=source("solver.commands.convergence"),
-        shape=shape_arguments,
-        modes=config["figures"]["modes"],
-        steps=config["figures"]["steps"],
-    shell:
-        "OMP_NUM_THREADS={threads} python -m solver convergence {params.shape:q}"
-        " --modes {params.modes:q} --steps {params.steps:q} --out {output:q} > {log:q} 2>&1"
+        model=shape_arguments,
+        how=options({key: config["figures"][key] for key in ("modes", "steps")}),
 
 
 # It starts the ranks itself, one thread each.
@@ -65,10 +58,7 @@ rule measure_scaling:
         **limits("measure_scaling"),
     params:
         source=source("solver.commands.scaling"),
-        shape=shape_arguments,
-        modes=config["figures"]["modes"],
-        ranks=",".join(map(str, config["figures"]["ranks"])),
-        weak=options({"weak": config["figures"]["weak"]}),
+        model=shape_arguments,
+        how=scaling_arguments(config["figures"]),
     shell:
-        "python -m solver scaling {params.shape:q} --modes {params.modes:q}"
-        " --ranks {params.ranks:q} {params.weak:q} --out {output:q} > {log:q} 2>&1"
+        "python -m solver scaling {params.model:q} {params.how:q} --out {output:q} > {log:q} 2>&1"

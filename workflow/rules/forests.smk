@@ -14,17 +14,12 @@ rule train_forests:
         f"{BENCHMARKS}/forests/train.tsv"
     threads: SOLVER_CORES
     resources:
-        **limits("train_forests", training_memory(OWN)),
-        mpi=launcher(OWN.forests["ranks"]),
-        tasks=OWN.forests["ranks"],
-        cpus_per_task=cores_of(OWN.forests["ranks"]),
+        **limits("train_forests", training_memory(OWN), OWN.forests["ranks"]),
     params:
         source=source("forests.commands.train"),
-        on_ranks=on_ranks(OWN.forests["ranks"]),
         training=OWN.train_arguments,
     shell:
-        "{resources.mpi} {params.on_ranks:q} -m forests train {input:q} {params.training:q}"
-        f"{workers(OWN)} --out {{output:q}} > {{log:q}} 2>&1"
+        train_command(OWN, "{input:q} {params.training:q}")
 
 
 rule describe_forests:
@@ -57,8 +52,7 @@ rule rate_forests:
         **limits("rate_forests"),
     params:
         source=source("forests.commands.table"),
-        blocks=OWN.forests["blocks"],
-        materials=OWN.forests["materials"],
+        blocks=block_arguments(OWN.forests),
     shell:
-        "python -m forests table --model {input:q} --blocks {params.blocks:q}"
-        " --materials {params.materials:q} --out {output:q} > {log:q} 2>&1"
+        "python -m forests table --model {input:q} {params.blocks:q}"
+        " --out {output:q} > {log:q} 2>&1"

@@ -1,7 +1,9 @@
 # What the default forests are worth, block by block: `snakemake forests_study`, no part of the
 # default run.
 FORESTS_STUDY = place(catalogue.FORESTS)
-STUDIED_FORESTS = settings.studied_model(config) or f"{DEFAULT_FOLDER}/forests.h5"
+STUDIED_FORESTS = (
+    settings.forest_files(config["forests_study"]["model"]) or f"{DEFAULT_FOLDER}/forests.h5"
+)
 STUDY_TRAINING = training.study(config)
 
 
@@ -17,7 +19,6 @@ use rule describe_forests as describe_studied_forests with:
         f"{FORESTS_STUDY}/model.json",
     log:
         f"{LOGS}/forests_study/describe.log",
-    localrule: True
 
 
 # The rules below take all cores, although some use one, since they time what they do.
@@ -32,8 +33,7 @@ use rule rate_forests as compare_on_blocks with:
         f"{BENCHMARKS}/forests_study/blocks.tsv"
     params:
         source=source("forests.commands.table"),
-        blocks=config["forests_study"]["blocks"],
-        materials=config["forests_study"]["materials"],
+        blocks=block_arguments(config["forests_study"]),
 
 
 rule benchmark_forests:

@@ -43,11 +43,8 @@ def hcms_arguments(corrected):
     """Parameters of component mode synthesis and its correction."""
     solver = config["solver"]
     how = {key: solver[key] for key in ("interface", "retained_modes", "subdomains")}
-    if corrected:
-        how |= {"tol": solver["tolerance"], "corrections": solver["corrections"]}
-    else:
-        how["corrections"] = 0
-    return options(how)
+    corrections = {"tol": solver["tolerance"], "corrections": solver["corrections"]}
+    return options(how | (corrections if corrected else {"corrections": 0}))
 
 
 def times_arguments(part):
@@ -56,9 +53,22 @@ def times_arguments(part):
     return options({key: part.get(key) for key in keys})
 
 
+def scaling_arguments(part):
+    """How the scaling is measured, from a part of the configuration."""
+    ranks = ",".join(map(str, part["ranks"]))
+    return options({"modes": part["modes"], "ranks": ranks, "weak": part.get("weak")})
+
+
+def convergence_arguments(wildcards, input):
+    """How the convergence of a model is followed; of no more modes than it has."""
+    part = config["convergence"]
+    modes = min(part["modes"], model_modes(wildcards))
+    return options({"modes": modes, "steps": part["steps"], "truth": input.truth})
+
+
 def model_modes(wildcards):
     """Number of modes of a model, rigid ones included."""
-    return settings.modes_of(config, wildcards.model)
+    return config["models"][wildcards.model]["modes"] or config["solver"]["modes"]
 
 
 def strike_arguments(wildcards):

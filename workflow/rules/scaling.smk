@@ -13,7 +13,5 @@ use rule measure_scaling as measure_scaling_of_run with:
         f"{BENCHMARKS}/models/{{model}}/scaling.tsv"
     params:
         source=source("solver.commands.scaling"),
-        shape=lambda wildcards: model_arguments(wildcards, config["scaling"]["resolution"]),
-        modes=config["scaling"]["modes"],
-        ranks=",".join(map(str, config["scaling"]["ranks"])),
-        weak=[],
+        model=lambda wildcards: model_arguments(wildcards, config["scaling"]["resolution"]),
+        how=scaling_arguments(config["scaling"]),

@@ -14,15 +14,13 @@ rule synthesise_clip:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/clip-{{point}}.log",
     wildcard_constraints:
         example=SYNTHESISED,
-    threads: 1
     resources:
         **limits("synthesise_clip"),
     params:
         source=source("sound.commands.clip"),
         how=lambda wildcards: targets_of(wildcards)[wildcards.point].clip.split(),
     shell:
-        "OMP_NUM_THREADS={threads} python -m sound clip {params.how:q} --out {output:q}"
-        " > {log:q} 2>&1"
+        "python -m sound clip {params.how:q} --out {output:q} > {log:q} 2>&1"
 
 
 rule check_design:
@@ -40,9 +38,8 @@ rule check_design:
         source=source("solver.commands.modes"),
         solid=lambda wildcards: sound_examples.solid_arguments(EXAMPLES[wildcards.example]),
     shell:
-        "OMP_NUM_THREADS={threads} python -m solver modes {params.solid:q}"
-        " --material {input.young:q} --coarsen none --method slepc --out {output:q}"
-        " > {log:q} 2>&1"
+        "python -m solver modes {params.solid:q} --material {input.young:q} --coarsen none"
+        " --method slepc --out {output:q} > {log:q} 2>&1"
 
 
 rule save_recorded_moduli:
@@ -70,26 +67,6 @@ use rule check_design as find_recorded_modes with:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/recorded.log",
 
 
-rule record_clip:
-    input:
-        f"{SOUND}/{{example}}/recorded.h5",
-    output:
-        f"{SOUND}/{{example}}/clips/{{point}}.wav",
-    log:
-        f"{LOGS}/{SOUND_FOLDER}/{{example}}/clip-{{point}}.log",
-    wildcard_constraints:
-        example=RECORDED,
-    threads: 1
-    resources:
-        **limits("record_clip"),
-    params:
-        source=source("sound.commands.render"),
-        how=strike_of_recording,
-    shell:
-        "OMP_NUM_THREADS={threads} python -m sound render {input:q} {params.how:q}"
-        " --out {output:q} > {log:q} 2>&1"
-
-
 rule write_project:
     output:
         f"{SOUND}/{{part}}/{PROJECT}",
@@ -105,38 +82,13 @@ rule write_project:
         "../scripts/write_yaml.py"
 
 
-# The search takes all cores, since what it finds depends on how much it evaluates in its time.
-rule design_sound:
-    input:
-        project=f"{SOUND}/{{part}}/{PROJECT}",
-        mesh=lambda wildcards: example_of(wildcards).mesh_files,
-        clips=part_clips,
-        before=design_before,
-        forests=settings.default_forest_files(),
-    output:
-        f"{SOUND}/{{part}}/{DESIGN}",
-    log:
-        f"{LOGS}/{SOUND_FOLDER}/{{part}}/design.log",
-    benchmark:
-        f"{BENCHMARKS}/{SOUND_FOLDER}/{{part}}/design.tsv"
-    threads: SOLVER_CORES
-    resources:
-        **limits("design_sound"),
-    params:
-        source=source("sound.commands.design"),
-        start=lambda wildcards, input: options({"initial_design": str(input.before)}),
-    shell:
-        "OMP_NUM_THREADS={threads} python -m sound design {input.project:q} {params.start:q}"
-        " --out {output:q} > {log:q} 2>&1"
-
-
 # A single evaluation is that of the uniform material.
 rule begin_design:
     input:
         project=f"{SOUND}/{{example}}/{PROJECT}",
         mesh=mesh_files,
         clips=example_clips,
-        forests=settings.default_forest_files(),
+        forests=settings.forest_files(),
     output:
         f"{SOUND}/{{example}}/{START}",
     log:
@@ -146,9 +98,30 @@ rule begin_design:
         **limits("begin_design"),
     params:
         source=source("sound.commands.design"),
+        how=options({"evaluations": 1}),
     shell:
-        "OMP_NUM_THREADS={threads} python -m sound design {input.project:q} --evaluations 1"
-        " --out {output:q} > {log:q} 2>&1"
+        "python -m sound design {input.project:q} {params.how:q} --out {output:q} > {log:q} 2>&1"
+
+
+# The search takes all cores, since what it finds depends on how much it evaluates in its time.
+use rule begin_design as design_sound with:
+    input:
+        project=f"{SOUND}/{{part}}/{PROJECT}",
+        mesh=lambda wildcards: example_of(wildcards).mesh_files,
+        clips=part_clips,
+        before=design_before,
+        forests=settings.forest_files(),
+    output:
+        f"{SOUND}/{{part}}/{DESIGN}",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/{{part}}/design.log",
+    benchmark:
+        f"{BENCHMARKS}/{SOUND_FOLDER}/{{part}}/design.tsv"
+    resources:
+        **limits("design_sound"),
+    params:
+        source=source("sound.commands.design"),
+        how=lambda wildcards, input: options({"initial_design": str(input.before)}),
 
 
 rule compare_optimisers:
@@ -156,7 +129,7 @@ rule compare_optimisers:
         project=f"{SOUND}/{{example}}/{PROJECT}",
         mesh=mesh_files,
         clips=example_clips,
-        forests=settings.default_forest_files(),
+        forests=settings.forest_files(),
     output:
         f"{SOUND}/{{example}}/optimisers.json",
     log:
@@ -170,9 +143,8 @@ rule compare_optimisers:
         source=source("sound.commands.benchmark"),
         seconds=config["sound"]["compare_seconds"],
     shell:
-        "OMP_NUM_THREADS={threads} python -m sound benchmark {input.project:q}"
-        " --seconds {params.seconds:q} --json > {output:q}.partial 2> {log:q}"
-        " && mv {output:q}.partial {output:q}"
+        "python -m sound benchmark {input.project:q} --seconds {params.seconds:q}"
+        " --json > {output:q}.partial 2> {log:q} && mv {output:q}.partial {output:q}"
 
 
 rule save_moduli:
@@ -196,15 +168,29 @@ rule render_before:
         f"{SOUND}/{{example}}/before/{{point}}.wav",
     log:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/before-{{point}}.log",
-    threads: 1
     resources:
         **limits("render_before"),
     params:
         source=source("sound.commands.render"),
         place=place_arguments,
     shell:
-        "OMP_NUM_THREADS={threads} python -m sound render {input:q} {params.place:q}"
-        " --out {output:q} > {log:q} 2>&1"
+        "python -m sound render {input:q} {params.place:q} --out {output:q} > {log:q} 2>&1"
+
+
+use rule render_before as record_clip with:
+    input:
+        f"{SOUND}/{{example}}/recorded.h5",
+    output:
+        f"{SOUND}/{{example}}/clips/{{point}}.wav",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/{{example}}/clip-{{point}}.log",
+    wildcard_constraints:
+        example=RECORDED,
+    resources:
+        **limits("record_clip"),
+    params:
+        source=source("sound.commands.render"),
+        place=strike_of_recording,
 
 
 use rule render_before as render_after with:
@@ -224,15 +210,14 @@ rule render_fine:
         f"{SOUND}/{{example}}/fine/{{point}}.wav",
     log:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/fine-{{point}}.log",
-    threads: 1
     resources:
         **limits("render_fine"),
     params:
         source=source("sound.commands.render"),
         place=place_arguments,
     shell:
-        "OMP_NUM_THREADS={threads} python -m sound render {input.truth:q} --like {input.design:q}"
-        " {params.place:q} --out {output:q} > {log:q} 2>&1"
+        "python -m sound render {input.truth:q} --like {input.design:q} {params.place:q}"
+        " --out {output:q} > {log:q} 2>&1"
 
 
 rule build_sound_page:

@@ -13,22 +13,14 @@ rule find_modes:
         f"{BENCHMARKS}/models/{{model}}/{{variant}}.tsv"
     threads: SOLVER_CORES
     resources:
-        **limits("find_modes"),
-        mpi=launcher(RANKS),
-        tasks=RANKS,
-        cpus_per_task=cores_of(RANKS),
+        **limits("find_modes", ranks=RANKS),
     params:
         source=source("solver.commands.modes"),
-        ranks=RANKS,
-        on_ranks=on_ranks(RANKS),
         model=model_arguments,
         variant=variant_arguments,
         modes=model_modes,
     shell:
-        "OMP_NUM_THREADS=$(( {threads} > {params.ranks:q} ? {threads} / {params.ranks:q} : 1 ))"
-        " {resources.mpi} {params.on_ranks:q} -m solver modes"
-        " {params.model:q} {params.variant:q}"
-        " --modes {params.modes:q} --out {output:q} > {log:q} 2>&1"
+        solver_command("modes {params.model:q} {params.variant:q} --modes {params.modes:q}")
 
 
 rule follow_convergence:
@@ -47,11 +39,9 @@ rule follow_convergence:
     params:
         source=source("solver.commands.convergence"),
         model=model_arguments,
-        modes=lambda wildcards: min(config["convergence"]["modes"], model_modes(wildcards)),
-        steps=config["convergence"]["steps"],
+        how=convergence_arguments,
     shell:
-        "OMP_NUM_THREADS={threads} python -m solver convergence {params.model:q}"
-        " --modes {params.modes:q} --steps {params.steps:q} --truth {input.truth:q}"
+        "python -m solver convergence {params.model:q} {params.how:q}"
         " --out {output:q} > {log:q} 2>&1"
 
 
@@ -65,13 +55,12 @@ rule compare_with_truth:
         f"{LOGS}/models/{{model}}/{{variant}}.comparison.log",
     benchmark:
         f"{BENCHMARKS}/models/{{model}}/{{variant}}.comparison.tsv"
-    threads: 1
     resources:
         **limits("compare_with_truth"),
     params:
         source=source("solver.commands.compare"),
     shell:
-        "OMP_NUM_THREADS={threads} python -m solver compare {input.candidate:q} {input.truth:q}"
+        "python -m solver compare {input.candidate:q} {input.truth:q}"
         " --json > {output:q}.partial 2> {log:q} && mv {output:q}.partial {output:q}"
 
 
@@ -88,18 +77,11 @@ rule time_methods:
         f"{BENCHMARKS}/models/{{model}}/methods.tsv"
     threads: SOLVER_CORES
     resources:
-        **limits("time_methods"),
-        mpi=launcher(RANKS),
-        tasks=RANKS,
-        cpus_per_task=cores_of(RANKS),
+        **limits("time_methods", ranks=RANKS),
     params:
         source=source("solver.commands.benchmark"),
-        ranks=RANKS,
-        on_ranks=on_ranks(RANKS),
         model=lambda wildcards: model_arguments(wildcards, config["times"]["resolution"]),
         how=times_arguments(config["times"]),
         forest=forest_argument,
     shell:
-        "OMP_NUM_THREADS=$(( {threads} > {params.ranks:q} ? {threads} / {params.ranks:q} : 1 ))"
-        " {resources.mpi} {params.on_ranks:q} -m solver benchmark"
-        " {params.model:q} {params.how:q} {params.forest:q} --out {output:q} > {log:q} 2>&1"
+        solver_command("benchmark {params.model:q} {params.how:q} {params.forest:q}")

@@ -16,13 +16,12 @@ rule audit_spectra:
         f"{LOGS}/models/{{model}}/audit.log",
     benchmark:
         f"{BENCHMARKS}/models/{{model}}/audit.tsv"
-    threads: 1
     resources:
         **limits("audit_spectra"),
     params:
         source=source("solver.commands.audit"),
     shell:
-        "OMP_NUM_THREADS={threads} python -m solver audit {input:q} --out {output:q} > {log:q} 2>&1"
+        "python -m solver audit {input:q} --out {output:q} > {log:q} 2>&1"
 
 
 rule strike_solid:
@@ -34,15 +33,13 @@ rule strike_solid:
         f"{LOGS}/models/{{model}}/response.log",
     benchmark:
         f"{BENCHMARKS}/models/{{model}}/response.tsv"
-    threads: 1
     resources:
         **limits("strike_solid"),
     params:
         source=source("solver.commands.respond"),
         strike=strike_arguments,
     shell:
-        "OMP_NUM_THREADS={threads} python -m solver respond {input:q} {params.strike:q}"
-        " --out {output:q} > {log:q} 2>&1"
+        "python -m solver respond {input:q} {params.strike:q} --out {output:q} > {log:q} 2>&1"
 
 
 rule validate_model:
