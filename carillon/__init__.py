@@ -12,6 +12,7 @@ from carillon import step as _step
 # Before anything loads numpy, and with it OpenBLAS, or MPI.
 _openblas.configure(_os.environ)
 _step.leave_lone_step(_os.environ)
+_step.start_without_daemon(_os.environ)
 
 __version__ = "0.1.0"
 

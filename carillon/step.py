@@ -1,4 +1,7 @@
-"""What a process in a job of SLURM has to forget before MPI is loaded.
+"""What a process that is no rank of several has to do before MPI is loaded.
+
+Open MPI starts a daemon for a process that no launcher started, in case it should spawn ranks,
+which nothing here does; to leave it out saves a tenth of a second or more.
 
 `srun` without `--mpi` starts a process as the only task of a step and hands it no way to find other
 ranks. Open MPI sees the step, looks for the way, and aborts; without the step's number it starts as
@@ -13,6 +16,20 @@ _STEP = ("SLURM_STEP_ID", "SLURM_STEPID")
 _LAUNCHERS = ("PMIX_", "PMI_", "OMPI_COMM_WORLD_")
 
 
+def start_without_daemon(environment: MutableMapping[str, str]) -> None:
+    """Have Open MPI start no daemon for a process that was not started as an MPI rank.
+
+    Examples
+    --------
+    >>> environment = {}
+    >>> start_without_daemon(environment)
+    >>> environment
+    {'OMPI_MCA_ess_singleton_isolated': '1'}
+    """
+    if not _launched(environment):
+        environment.setdefault("OMPI_MCA_ess_singleton_isolated", "1")
+
+
 def leave_lone_step(environment: MutableMapping[str, str]) -> None:
     """Forget the step of a process that is its only task and was not started as an MPI rank.
 
@@ -25,6 +42,10 @@ def leave_lone_step(environment: MutableMapping[str, str]) -> None:
     """
     if environment.get("SLURM_STEP_NUM_TASKS") != "1":
         return
-    if not any(name.startswith(_LAUNCHERS) for name in environment):
+    if not _launched(environment):
         for name in _STEP:
             environment.pop(name, None)
+
+
+def _launched(environment: MutableMapping[str, str]) -> bool:
+    return any(name.startswith(_LAUNCHERS) for name in environment)
