@@ -110,7 +110,9 @@ def tell(sentence: str) -> None:
     """Print a sentence to standard error, if that takes it."""
     if sys.stderr is not None:
         with suppress(OSError, ValueError):  # nobody can be told that nobody can be told
-            print(sentence, file=sys.stderr, flush=True)
+            # In one piece, so that lines of several ranks do not mix.
+            sys.stderr.write(f"{sentence}\n")
+            sys.stderr.flush()
 
 
 def _flush() -> None:

@@ -97,4 +97,6 @@ def say(text: str, visible: bool = True, end: str = "\n") -> None:
     """
     if visible:
         with suppress(OSError, ValueError):
-            print(text, file=sys.stderr, flush=True, end=end)
+            # In one piece, so that lines of several ranks do not mix.
+            sys.stderr.write(f"{text}{end}")
+            sys.stderr.flush()

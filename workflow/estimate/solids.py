@@ -17,7 +17,7 @@ TYPICAL = 0.8, 0.15
 """Unknowns of a compact solid such as the Stanford bunny on the fine and the coarse mesh, over the
 cube of the voxels along its longest side."""
 
-LARGEST_COUNTED = 20
+LARGEST_COUNTED = 32
 """Resolution up to which voxels are made and counted, which takes longer than the rest."""
 
 
