@@ -13,6 +13,7 @@ from typing import Any
 from carillon import logs
 from carillon.errors import ConvergenceError, UserError, one_line
 from carillon.places import cause
+from carillon.progress import say
 
 EXIT_BAD_INPUT = 2
 EXIT_NOT_CONVERGED = 3
@@ -59,7 +60,7 @@ def run(program: str, main: Callable[[], int | None], comm: Comm = None) -> int:
             traceback.print_exc()
         collective = getattr(error, "collective", False)
         if sentence is not None and (comm is None or comm.rank == 0 or not collective):
-            tell(f"{program}: {sentence}")
+            say(f"{program}: {sentence}")
     _drop_unwritten()
     if comm is not None and comm.size > 1 and not collective:
         comm.Abort(status)
@@ -104,15 +105,6 @@ def _require_streams() -> None:
             os.open(os.devnull, os.O_RDWR)
     if sys.stdout is not None and hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="backslashreplace")
-
-
-def tell(sentence: str) -> None:
-    """Print a sentence to standard error, if that takes it."""
-    if sys.stderr is not None:
-        with suppress(OSError, ValueError):  # nobody can be told that nobody can be told
-            # In one piece, so that lines of several ranks do not mix.
-            sys.stderr.write(f"{sentence}\n")
-            sys.stderr.flush()
 
 
 def _flush() -> None:

@@ -12,6 +12,7 @@ from importlib import import_module
 from carillon import cli
 from carillon.arguments import Parser
 from carillon.errors import UserError
+from carillon.progress import say
 from carillon.ranks import world
 
 
@@ -52,7 +53,7 @@ def run_program(
     try:
         comm = world()
     except UserError as error:
-        cli.tell(f"{name}: {error}")
+        say(f"{name}: {error}")
         return cli.EXIT_BAD_INPUT
 
     def parse() -> None:

@@ -95,7 +95,7 @@ def say(text: str, visible: bool = True, end: str = "\n") -> None:
 
     With `end="\\r"` the next line takes its place.  Work goes on if standard error is gone or full.
     """
-    if visible:
+    if visible and sys.stderr is not None:
         with suppress(OSError, ValueError):
             # In one piece, so that lines of several ranks do not mix.
             sys.stderr.write(f"{text}{end}")
