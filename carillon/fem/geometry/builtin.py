@@ -7,19 +7,13 @@ one voxel does not bend as a wall does. Parts overlap without being united; voxe
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import cast
 
 import numpy as np
 import trimesh
-from trimesh.creation import revolve
 
 from carillon.errors import UserError
-
-#: Segments of a full turn.
-SECTIONS = 96
-
-#: Points of a curve that a part is swept along.
-SPLINE_POINTS = 41
+from carillon.fem.geometry.sweep import SECTIONS, joined, spline, sweep, tube, turned
+from carillon.fem.geometry.trials import TRIALS
 
 
 def bar() -> trimesh.Trimesh:
@@ -30,7 +24,7 @@ def bar() -> trimesh.Trimesh:
     low, high = np.full_like(x, -width), np.full_like(x, width)
     ceiling = np.full_like(x, top)
     corners = [(x, low, arch), (x, high, arch), (x, high, ceiling), (x, low, ceiling)]
-    return _sweep(np.stack([np.stack(corner, axis=1) for corner in corners], axis=1))
+    return sweep(np.stack([np.stack(corner, axis=1) for corner in corners], axis=1))
 
 
 def box() -> trimesh.Trimesh:
@@ -43,7 +37,7 @@ def bowl() -> trimesh.Trimesh:
     angle = np.linspace(0.0, np.pi / 2, 25)
     outside = np.stack([0.080 * np.sin(angle) ** 0.8, 0.084 * (1 - np.cos(angle))], axis=1)
     inside = np.stack([0.069 * np.sin(angle) ** 0.8, 0.012 + 0.072 * (1 - np.cos(angle))], axis=1)
-    return _turn([*outside, *inside[::-1]])
+    return turned([*outside, *inside[::-1]])
 
 
 def bell() -> trimesh.Trimesh:
@@ -73,7 +67,7 @@ def bell() -> trimesh.Trimesh:
     ]
     turn = np.linspace(-np.pi / 6, np.pi + np.pi / 6, 33)
     ring = np.stack([0.021 * np.cos(turn), np.zeros_like(turn), 0.174 + 0.021 * np.sin(turn)], 1)
-    return _together(_turn([*outside, *inside]), _tube(ring, 0.0075))
+    return joined(turned([*outside, *inside]), tube(ring, 0.0075))
 
 
 def frying_pan() -> trimesh.Trimesh:
@@ -94,7 +88,7 @@ def frying_pan() -> trimesh.Trimesh:
     # A rounded end, an eighth of the handle long.
     width = width * np.sqrt(np.clip(1 - np.clip((along - 0.87) / 0.14, 0, 1) ** 2, 0, None))
     centre = np.stack([x, np.zeros_like(x), rise], axis=1)
-    return _together(_turn(pan), _tube(centre, width, flatten=0.0125))
+    return joined(turned(pan), tube(centre, width, flatten=0.0125))
 
 
 def pitcher() -> trimesh.Trimesh:
@@ -120,16 +114,16 @@ def pitcher() -> trimesh.Trimesh:
         (0.050, 0.018),
         (0.000, 0.018),
     ]
-    body = _turn([*outside, *inside])
+    body = turned([*outside, *inside])
     _pull_lip(body, start=0.185, top=0.240, reach=0.034)
-    handle = _spline([(-0.052, 0.212), (-0.100, 0.222), (-0.126, 0.165), (-0.070, 0.085)])
-    return _together(body, _tube(handle, 0.0100))
+    handle = spline([(-0.052, 0.212), (-0.100, 0.222), (-0.126, 0.165), (-0.070, 0.085)])
+    return joined(body, tube(handle, 0.0100))
 
 
 def snare_drum() -> trimesh.Trimesh:
     """Snare drum of 14 inches as one solid: shell, two heads, hoops and eight lugs."""
     radius, height, wall = 0.178, 0.150, 0.025
-    shell = _turn(
+    shell = turned(
         [(radius - wall, 0.0), (radius, 0.0), (radius, height), (radius - wall, height)], ring=True
     )
     parts = [shell]
@@ -138,17 +132,17 @@ def snare_drum() -> trimesh.Trimesh:
         parts.append(head.apply_translation((0.0, 0.0, z)))
         hoop = [(radius - wall, -0.017), (radius + 0.014, -0.017)]
         hoop += [(radius + 0.014, 0.017), (radius - wall, 0.017)]
-        parts.append(_turn(hoop, ring=True).apply_translation((0.0, 0.0, z)))
+        parts.append(turned(hoop, ring=True).apply_translation((0.0, 0.0, z)))
     for angle in np.arange(8) * np.pi / 4 + np.pi / 8:
         lug = trimesh.creation.box(extents=(0.034, 0.026, height))
         lug.apply_translation((radius, 0.0, height / 2))
         parts.append(lug.apply_transform(trimesh.transformations.rotation_matrix(angle, (0, 0, 1))))
-    return _together(*parts)
+    return joined(*parts)
 
 
 def plate() -> trimesh.Trimesh:
     """Stoneware plate, 240 mm wide, 15 mm thick, with a raised rim."""
-    return _turn(
+    return turned(
         [
             (0.000, 0.000),
             (0.072, 0.000),
@@ -175,7 +169,7 @@ BUILTINS: dict[str, Callable[[], trimesh.Trimesh]] = {
 
 
 def builtin_surface(name: str) -> trimesh.Trimesh:
-    """Surface of the built-in object `name` in metres, z up, of closed shells facing outwards.
+    """Surface of the built-in object or trial solid `name` in metres, of closed shells.
 
     Raises
     ------
@@ -187,61 +181,12 @@ def builtin_surface(name: str) -> trimesh.Trimesh:
     >>> builtin_surface("bar").is_watertight
     True
     """
-    if name not in BUILTINS:
+    known = {**BUILTINS, **TRIALS}
+    if name not in known:
         raise UserError(
-            f"builtin:{name}: no such built-in object, expected one of {', '.join(BUILTINS)}"
+            f"builtin:{name}: no such built-in object, expected one of {', '.join(known)}"
         )
-    return BUILTINS[name]()
-
-
-def _together(*parts: trimesh.Trimesh) -> trimesh.Trimesh:
-    return cast(trimesh.Trimesh, trimesh.util.concatenate(parts))
-
-
-def _turn(profile: list, ring: bool = False) -> trimesh.Trimesh:
-    """Turn a profile of (radius, z) about z; a `ring` closes on itself instead of on the axis."""
-    points = np.array([*profile, profile[0]] if ring else profile, dtype=float)
-    return _outward(revolve(points, sections=SECTIONS))
-
-
-def _tube(
-    centre: np.ndarray, radius: float | np.ndarray, flatten: float | None = None
-) -> trimesh.Trimesh:
-    """Tube around a curve (k, 3) in the plane y = 0; `flatten` is its half height if elliptic."""
-    across = np.broadcast_to(np.asarray(radius, dtype=float), len(centre))
-    height = across if flatten is None else np.minimum(flatten, across)
-    tangent = np.gradient(centre, axis=0)
-    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-    side = np.array([0.0, 1.0, 0.0])
-    normal = np.cross(tangent, side)
-    turn = np.linspace(0, 2 * np.pi, 24, endpoint=False)[None, :, None]
-    return _sweep(
-        centre[:, None, :]
-        + across[:, None, None] * np.cos(turn) * side
-        + height[:, None, None] * np.sin(turn) * normal[:, None, :]
-    )
-
-
-def _sweep(sections: np.ndarray) -> trimesh.Trimesh:
-    """Closed surface through cross-sections (k, p, 3), with a fan over the first and the last."""
-    k, p = sections.shape[:2]
-    ends = sections[[0, -1]].mean(axis=1)
-    index = np.arange(k * p).reshape(k, p)
-    after = np.roll(index, -1, axis=1)
-    a, b, c, d = (part.ravel() for part in (index[:-1], after[:-1], after[1:], index[1:]))
-    first = np.stack([np.full(p, k * p), after[0], index[0]], axis=1)
-    last = np.stack([np.full(p, k * p + 1), index[-1], after[-1]], axis=1)
-    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1), first, last])
-    return _outward(trimesh.Trimesh(np.concatenate([sections.reshape(-1, 3), ends]), faces))
-
-
-def _spline(points: list[tuple[float, float]]) -> np.ndarray:
-    """Bezier curve of (x, z) control points in the plane y = 0, (SPLINE_POINTS, 3)."""
-    curve = np.array(points, dtype=float)[None]
-    t = np.linspace(0, 1, SPLINE_POINTS)[:, None, None]
-    while curve.shape[1] > 1:
-        curve = (1 - t) * curve[:, :-1] + t * curve[:, 1:]
-    return np.stack([curve[:, 0, 0], np.zeros(SPLINE_POINTS), curve[:, 0, 1]], axis=1)
+    return known[name]()
 
 
 def _pull_lip(body: trimesh.Trimesh, start: float, top: float, reach: float) -> None:
@@ -250,10 +195,3 @@ def _pull_lip(body: trimesh.Trimesh, start: float, top: float, reach: float) -> 
     rise = np.clip((z - start) / (top - start), 0, 1) ** 2
     facing = np.clip(x / np.maximum(np.hypot(x, y), 1e-9), 0, 1) ** 4
     body.vertices = np.stack([x + reach * rise * facing, y, z + 0.3 * reach * rise * facing], 1)
-
-
-def _outward(surface: trimesh.Trimesh) -> trimesh.Trimesh:
-    surface.merge_vertices()
-    if surface.volume < 0:
-        surface.invert()
-    return surface
