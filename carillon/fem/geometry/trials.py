@@ -78,7 +78,7 @@ def fork() -> trimesh.Trimesh:
 
 def slit_ring() -> trimesh.Trimesh:
     """Ring of square section, cut through by a slit of one voxel."""
-    turn = np.linspace(0.03 * np.pi, 1.97 * np.pi, 97)
+    turn = np.linspace(0.04 * np.pi, 1.96 * np.pi, 97)
     centre = np.stack([np.cos(turn), np.sin(turn)], axis=1)
     corners = [(0.085, -0.02), (0.120, -0.02), (0.120, 0.02), (0.085, 0.02)]
     sections = [np.column_stack([r * centre, np.full(len(turn), z)]) for r, z in corners]
