@@ -11,9 +11,10 @@ import scipy.linalg as la
 
 from carillon.errors import UserError
 from carillon.fem.geometry import blocks_from_mesh, prolongation
-from carillon.fem.model import RIGID_MODES, ElasticModel
+from carillon.fem.model import RIGID_MODES, ElasticModel, fine_model
 from solver.__main__ import main
 from solver.assembly.sparse import assembled
+from solver.coarsening.model import coarse_model
 from solver.files.modes_file import ModesFile, frequencies, read_modes, write_modes
 from solver.response.contact import Contact, choose_contacts, interpolation, surface_normals
 from solver.response.response import (
@@ -64,7 +65,7 @@ def integrated(file: ModesFile, contacts: list[Contact], seconds: np.ndarray) ->
     """
     K, M = (part.toarray() for part in assembled(file.model))
     values = interpolation(
-        file.mesh, np.array([contact.position for contact in contacts])
+        file.model, np.array([contact.position for contact in contacts])
     ).toarray()
     force = np.outer(values[0], contacts[0].inward).ravel()
     rigid = la.null_space(K, rcond=1e-10)
@@ -139,8 +140,9 @@ def test_a_mode_that_hardly_oscillates_is_continued_through_critical_damping():
 
 
 def test_interpolation_is_exact_for_trilinear_fields_and_agrees_with_the_prolongation():
-    fine = box_mesh(5, 4, 3)
-    coarse = blocks_from_mesh(fine).coarse
+    blocks = blocks_from_mesh(box_mesh(5, 4, 3))
+    fine = fine_model(blocks.fine, np.ones(blocks.fine.n_cells))
+    coarse = coarse_model(blocks, np.ones((blocks.coarse.n_cells, 8)))
     weights = np.random.default_rng(1).standard_normal(8)
 
     def field(points):
@@ -148,10 +150,12 @@ def test_interpolation_is_exact_for_trilinear_fields_and_agrees_with_the_prolong
         return np.stack([x**0, x, y, z, x * y, y * z, x * z, x * y * z], axis=1) @ weights
 
     points = np.random.default_rng(2).uniform(0.0, 0.03, (50, 3))
-    for mesh in (fine, coarse):
-        np.testing.assert_allclose(interpolation(mesh, points) @ field(mesh.nodes), field(points))
-    at_nodes = interpolation(coarse, fine.nodes)
-    assert abs(at_nodes - prolongation(fine, coarse)).max() < 1e-12
+    for model in (fine, coarse):
+        np.testing.assert_allclose(
+            interpolation(model, points) @ field(model.mesh.nodes), field(points)
+        )
+    at_nodes = interpolation(coarse, blocks.fine.nodes)
+    assert abs(at_nodes - prolongation(blocks)).max() < 1e-12
 
 
 def test_normals_of_a_box_point_outwards():

@@ -112,7 +112,7 @@ def test_the_embedding_carries_modes_to_the_surface(folder: Path) -> None:
         np.testing.assert_array_equal(file["surface/vertices"], design.surface_vertices)
         np.testing.assert_array_equal(file["dampings"], design.targets.dampings)
         assert "kg" in file.attrs["normalisation"]
-    values = interpolation(design.model.mesh, design.surface_vertices)
+    values = interpolation(design.model, design.surface_vertices)
     expected = (values @ modes.reshape(len(modes), -1)).reshape(motion.shape)
     np.testing.assert_allclose(motion, expected, atol=1e-12)
 

@@ -92,7 +92,7 @@ def test_amplitude_is_the_push_on_each_mode() -> None:
     design = small_design()
     solid, _ = design_solid()
     strike = design.strikes[1]
-    motion = interpolation(design.model.mesh, strike.position) @ design.elastic_modes.reshape(
+    motion = interpolation(design.model, strike.position) @ design.elastic_modes.reshape(
         design.model.mesh.n_nodes, -1
     )
     pushed = motion.reshape(3, N_MODES).T @ (2.5 * strike.inward)

@@ -14,27 +14,12 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import eigsh
 
+from carillon.fem.geometry.faces import face_neighbours
+
 if TYPE_CHECKING:
     from carillon.fem.geometry import HexMesh
 
 Array = NDArray[np.float64]
-
-
-def face_neighbours(mesh: HexMesh) -> NDArray[np.int64]:
-    """Pairs (p, 2) of cells that share a face."""
-    grid = mesh.grid.astype(np.int64)
-    extent = grid.max(axis=0) + 2
-    strides = np.array([1, extent[0], extent[0] * extent[1]])
-    keys = grid @ strides
-    order = np.argsort(keys)
-    pairs = []
-    for stride in strides:
-        position = np.searchsorted(keys, keys + stride, sorter=order)
-        position = np.minimum(position, len(keys) - 1)
-        neighbour = order[position]
-        adjacent = keys[neighbour] == keys + stride
-        pairs.append(np.column_stack([np.flatnonzero(adjacent), neighbour[adjacent]]))
-    return np.concatenate(pairs)
 
 
 def cell_laplacian(mesh: HexMesh) -> sp.csr_matrix:

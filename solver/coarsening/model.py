@@ -67,5 +67,6 @@ def coarse_model(
     The consistent part of the mass is P^T M P over the filled cells; `lumped_fraction` is that of
     the coarsening.
     """
-    pattern = np.packbits(blocks.mask, axis=1, bitorder="little").ravel()
-    return ElasticModel(blocks.coarse, moduli, pattern, lumped_share=lumped_fraction, **constants)
+    return ElasticModel(
+        blocks.coarse, moduli, blocks.pattern, lumped_share=lumped_fraction, **constants
+    )

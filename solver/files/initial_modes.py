@@ -50,11 +50,13 @@ def modes_from_file(
         assert model is not None
         with open_h5(path, KIND, SCHEMA, sealed=True) as file:
             grid = read(file, "node_grid", (None, 3), INTEGER)
+            cells = read(file, "cells", (None, 8), INTEGER)
             modes_there = find(file, "modes", (3 * len(grid), None))
             count = int(modes_there.shape[1])
             for first in range(0, count, COLUMNS):
                 finite(file, "modes", modes_there[:, first : first + COLUMNS])
-        if not np.array_equal(grid, model.mesh.node_grid):
+        mesh = model.mesh
+        if not (np.array_equal(grid, mesh.node_grid) and np.array_equal(cells, mesh.cells)):
             raise UserError(
                 f"{path}: modes of another mesh ({len(grid):,} nodes), expected the one to solve "
                 f"({model.mesh.n_nodes:,} nodes) with any material"

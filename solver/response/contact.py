@@ -12,8 +12,8 @@ from scipy.spatial import cKDTree
 
 from carillon.errors import UserError
 from carillon.fem.geometry import CORNER_OFFSETS, HexMesh
-from carillon.fem.geometry.boundary import surface_quads
-from carillon.fem.model import RIGID_MODES
+from carillon.fem.geometry.faces import surface_quads
+from carillon.fem.model import RIGID_MODES, ElasticModel
 from solver.files.modes_file import ModesFile
 
 Array = NDArray[np.float64]
@@ -117,7 +117,7 @@ def surface_normals(mesh: HexMesh) -> tuple[NDArray[np.int64], Array]:
     return nodes, _unit(_at_nodes(mesh, quads, faces), plain)[nodes]
 
 
-def interpolation(mesh: HexMesh, points: Array) -> sp.csr_matrix:
+def interpolation(model: ElasticModel, points: Array) -> sp.csr_matrix:
     """Trilinear interpolation from the nodes to `points` (p, 3) [m], as a matrix (p, n).
 
     A point outside all cells takes the value of the nearest point of a nearest cell.
@@ -125,31 +125,51 @@ def interpolation(mesh: HexMesh, points: Array) -> sp.csr_matrix:
     Examples
     --------
     >>> from carillon.fem.geometry import hexmesh_from_grid
+    >>> from carillon.fem.model import fine_model
     >>> mesh = hexmesh_from_grid(np.array([[0, 0, 0], [1, 0, 0]]), np.zeros(3), 0.5)
-    >>> interpolation(mesh, np.array([[0.25, 0.0, 0.0], [1.0, 0.5, 0.0]])).toarray()[:, :6]
+    >>> model = fine_model(mesh, np.ones(2))
+    >>> interpolation(model, np.array([[0.25, 0.0, 0.0], [1.0, 0.5, 0.0]])).toarray()[:, :6]
     array([[0.5, 0.5, 0. , 0. , 0. , 0. ],
            [0. , 0. , 0. , 0. , 0. , 1. ]])
     """
-    cells, weights = embedding(mesh, points)
+    cells, weights = embedding(model, points)
     rows = np.repeat(np.arange(len(cells)), 8)
-    shape = (len(cells), mesh.n_nodes)
-    matrix = sp.csr_matrix((weights.ravel(), (rows, mesh.cells[cells].ravel())), shape=shape)
+    shape = (len(cells), model.mesh.n_nodes)
+    corners = model.mesh.cells[cells]
+    matrix = sp.csr_matrix((weights.ravel(), (rows, corners.ravel())), shape=shape)
     matrix.eliminate_zeros()
     return matrix
 
 
-def embedding(mesh: HexMesh, points: Array) -> tuple[NDArray[np.int64], Array]:
+def embedding(model: ElasticModel, points: Array) -> tuple[NDArray[np.int64], Array]:
     """Cells (p,) that `points` (p, 3) [m] lie in, and trilinear weights (p, 8) of their corners.
 
-    A point outside all cells belongs to a nearest cell, with the weights of its nearest point.
+    A point outside all cells belongs to a nearest cell, with the weights of its nearest point. Of
+    several elements in one place, parts of a block, it belongs to that with the nearest material.
     """
-    points = np.atleast_2d(points)
-    centres = mesh.grid + 0.5
-    position = (points - mesh.origin) / mesh.edge
+    mesh = model.mesh
+    position = (np.atleast_2d(points) - mesh.origin) / mesh.edge
+    places, first, count = np.unique(mesh.grid, axis=0, return_index=True, return_counts=True)
     # In the largest norm a cell is the ball around its centre.
-    cells = cKDTree(centres).query(position, p=np.inf)[1]
+    place = cKDTree(places + 0.5).query(position, p=np.inf)[1]
+    cells = first[place]
+    shared = np.flatnonzero(count[place] > 1)
+    if len(shared):
+        candidates = cells[shared, None] + np.arange(count.max())
+        there = np.arange(count.max()) < count[place[shared], None]
+        candidates = np.where(there, candidates, cells[shared, None])
+        distance = _from_material(model, candidates, position[shared])
+        cells[shared] = candidates[np.arange(len(shared)), distance.argmin(axis=1)]
     local = np.clip(position - mesh.grid[cells], 0.0, 1.0)[:, None, :]
     return cells, np.where(CORNER_OFFSETS, local, 1.0 - local).prod(axis=2)
+
+
+def _from_material(model: ElasticModel, cells: NDArray[np.int64], position: Array) -> Array:
+    """Distance (p, c) of positions (p, 3) from the nearest filled octant's centre of cells (p, c)."""
+    octants = np.unpackbits(model.fill[cells, None], axis=2, bitorder="little").astype(bool)
+    centres = model.mesh.grid[cells][:, :, None] + (CORNER_OFFSETS + 0.5) / 2.0
+    distance = np.linalg.norm(centres - position[:, None, None], axis=3)
+    return np.asarray(np.where(octants, distance, np.inf).min(axis=2))
 
 
 def _ruling_modes(truth: ModesFile, nodes: NDArray[np.int64]) -> tuple[Array, Array]:

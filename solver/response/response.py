@@ -70,7 +70,7 @@ def at_contacts(file: ModesFile, contacts: list[Contact]) -> Contacts:
     The mesh may be another one than that which the points were chosen on.
     """
     assert file.modes is not None
-    values = interpolation(file.mesh, np.array([contact.position for contact in contacts]))
+    values = interpolation(file.model, np.array([contact.position for contact in contacts]))
     elastic = file.modes[:, RIGID_MODES:]
     motion = (values @ elastic.reshape(file.mesh.n_nodes, -1)).reshape(len(contacts), 3, -1)
     inward = np.array([contact.inward for contact in contacts])

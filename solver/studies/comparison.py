@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from carillon.fem.geometry import prolongation
+from carillon.fem.geometry import blocks_from_mesh, prolongation
 from carillon.fem.model import RIGID_MODES
 from solver.assembly.sparse import assembled
 from solver.files.modes_file import ModesFile, read_elastic, require_same_solid
@@ -180,7 +180,7 @@ def _cluster_angles(a: ModesFile, b: ModesFile, count: int) -> list[dict[str, An
     assert a.modes is not None and b.modes is not None
     elastic = slice(RIGID_MODES, count)
     groups = clusters(b.eigenvalues[elastic])[:-1]
-    modes = _on_mesh_of(b, a)
+    modes = on_mesh_of(b, a)
     if modes is None or not groups:
         return []
     _, M = assembled(b.model)
@@ -195,16 +195,14 @@ def _cluster_angles(a: ModesFile, b: ModesFile, count: int) -> list[dict[str, An
     ]
 
 
-def _on_mesh_of(fine: ModesFile, file: ModesFile) -> Array | None:
+def on_mesh_of(fine: ModesFile, file: ModesFile) -> Array | None:
     """Modes of `file` on the nodes of `fine`, whose coarsening it may be; else None."""
     assert file.modes is not None
-    if np.array_equal(file.mesh.node_grid, fine.mesh.node_grid):
-        return file.modes
+    if np.array_equal(file.mesh.cells, fine.mesh.cells):
+        return file.modes if np.array_equal(file.mesh.node_grid, fine.mesh.node_grid) else None
     if not np.isclose(file.mesh.edge, 2.0 * fine.mesh.edge):
         return None
-    try:
-        return np.asarray(
-            sp.kron(prolongation(fine.mesh, file.mesh), sp.identity(3), format="csr") @ file.modes
-        )
-    except ValueError:
+    blocks = blocks_from_mesh(fine.mesh)
+    if not np.array_equal(blocks.coarse.cells, file.mesh.cells):
         return None
+    return np.asarray(sp.kron(prolongation(blocks), sp.identity(3), format="csr") @ file.modes)

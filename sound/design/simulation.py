@@ -96,7 +96,7 @@ class Simulation:
         self.solver = ModalSolver(self.model, analysis, MPI.COMM_SELF)
         # Rows of the analysis are in the order of its partition.
         self._order = degrees_of_freedom(self.solver.local_mesh.nodes)
-        self._pushes = pushes(self.model.mesh, strikes)[self._order]
+        self._pushes = pushes(self.model, strikes)[self._order]
         self._strains = np.sqrt(self.model.mesh.edge) * strain_factors(self.model.poisson)
 
     @property
@@ -149,8 +149,8 @@ class Simulation:
         return rows
 
 
-def pushes(mesh: HexMesh, strikes: Sequence[Strike]) -> Array:
+def pushes(model: ElasticModel, strikes: Sequence[Strike]) -> Array:
     """Forces (n_dofs, T) of unit impulses [N s] along the inward normals of struck points."""
-    weights = interpolation(mesh, np.array([strike.position for strike in strikes])).toarray()
+    weights = interpolation(model, np.array([strike.position for strike in strikes])).toarray()
     inward = np.array([strike.inward for strike in strikes])
     return np.asarray((weights[:, :, None] * inward[:, None, :]).reshape(len(strikes), -1).T)

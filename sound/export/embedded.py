@@ -60,7 +60,7 @@ def write_embedded(path: str | Path, design: Design, parameters: dict[str, Any])
 
 
 def _put_more(file: h5py.File, design: Design) -> None:
-    cells, weights = embedding(design.model.mesh, design.surface_vertices)
+    cells, weights = embedding(design.model, design.surface_vertices)
     listening = Listening.of_design(design, SoundingSolid.of_design(design))
     put_object(file, design)
     put(file, "surface/cell", cells, "1", "row of `cells` that the vertex lies in or next to")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
-from carillon.fem.model import RIGID_MODES
+from carillon.fem.model import RIGID_MODES, ElasticModel
 from solver.files.modes_file import ModesFile
 from solver.response.contact import interpolation
 from solver.response.response import Damping
@@ -29,23 +29,21 @@ class SoundingSolid:
         Of the sound, as in Eq. 3 of the appendix.
     dampings : (k,) [1/s]
         The same.
-    mesh
-        Mesh that the modes are given on.
+    model
+        The solid whose nodes the modes are given on.
     modes : (n_dofs, k) [kg^-1/2]
         Mass-normalised.
     """
 
     frequencies: Array
     dampings: Array
-    mesh: HexMesh
+    model: ElasticModel
     modes: Array
 
     @classmethod
     def of_design(cls, design: Design) -> SoundingSolid:
         """The coarse solid of a design, its modes damped as the clips' (§5)."""
-        return cls(
-            design.frequencies, design.targets.dampings, design.model.mesh, design.elastic_modes
-        )
+        return cls(design.frequencies, design.targets.dampings, design.model, design.elastic_modes)
 
     @classmethod
     def of_modes(cls, file: ModesFile, damping: Damping) -> SoundingSolid:
@@ -67,7 +65,7 @@ class SoundingSolid:
                 "sound; compute more or lower the damping"
             )
         hertz = np.sqrt(square[kept]) / (2.0 * np.pi)
-        return cls(hertz, decay[kept], file.mesh, file.modes[:, RIGID_MODES + kept])
+        return cls(hertz, decay[kept], file.model, file.modes[:, RIGID_MODES + kept])
 
     @classmethod
     def of_truth(cls, file: ModesFile, design: Design) -> SoundingSolid:
@@ -88,12 +86,12 @@ class SoundingSolid:
         _require_same_object(file.mesh, design.model.mesh)
         kept = slice(RIGID_MODES, RIGID_MODES + count)
         dampings = design.targets.dampings
-        return cls(file.frequencies[kept], dampings, file.mesh, file.modes[:, kept])
+        return cls(file.frequencies[kept], dampings, file.model, file.modes[:, kept])
 
     def motion(self, positions: Array) -> Array:
         """Displacement (p, 3, k) [kg^-1/2] of points (p, 3) [m] of the surface in each mode."""
-        values = interpolation(self.mesh, positions)
-        modes = self.modes.reshape(self.mesh.n_nodes, -1)
+        values = interpolation(self.model, positions)
+        modes = self.modes.reshape(self.model.mesh.n_nodes, -1)
         return np.asarray(values @ modes).reshape(len(positions), 3, -1)
 
     def amplitudes(self, positions: Array, impulses: Array) -> Array:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from carillon.fem.geometry.boundary import boundary_faces, surface_quads
+from carillon.fem.geometry.faces import boundary_faces, surface_quads
 from carillon.fem.geometry.hexmesh import HexMesh
 
 if TYPE_CHECKING:

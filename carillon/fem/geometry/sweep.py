@@ -16,6 +16,7 @@ SPLINE_POINTS = 41
 
 
 def joined(*parts: trimesh.Trimesh) -> trimesh.Trimesh:
+    """The parts as one surface; they may overlap."""
     return cast(trimesh.Trimesh, trimesh.util.concatenate(parts))
 
 
@@ -66,6 +67,7 @@ def spline(points: list[tuple[float, float]]) -> np.ndarray:
 
 
 def outward(surface: trimesh.Trimesh) -> trimesh.Trimesh:
+    """The surface with its vertices merged and its faces turned outwards."""
     surface.merge_vertices()
     if surface.volume < 0:
         surface.invert()

@@ -25,8 +25,7 @@ VOXEL = SIDE / 24
 def comb() -> trimesh.Trimesh:
     """Back with six teeth of two voxels, one voxel apart."""
     teeth = [
-        _block((x, 0.0, 0.05), (x + 2 * VOXEL, 3 * VOXEL, SIDE))
-        for x in 3 * VOXEL * np.arange(6)
+        _block((x, 0.0, 0.05), (x + 2 * VOXEL, 3 * VOXEL, SIDE)) for x in 3 * VOXEL * np.arange(6)
     ]
     return joined(_block((0.0, 0.0, 0.0), (17 * VOXEL, 3 * VOXEL, 0.05)), *teeth)
 
@@ -45,7 +44,9 @@ def cup() -> trimesh.Trimesh:
         ]
     )
     turn = np.linspace(0.62 * np.pi, -0.42 * np.pi, 33)
-    path = np.stack([0.072 + 0.055 * np.cos(turn), 0.0 * turn, 0.090 + 0.055 * np.sin(turn)], axis=1)
+    path = np.stack(
+        [0.072 + 0.055 * np.cos(turn), 0.0 * turn, 0.090 + 0.055 * np.sin(turn)], axis=1
+    )
     path[-6:, 0] = np.maximum(path[-6:, 0], 0.0975)
     return joined(wall, tube(path, 0.0115))
 

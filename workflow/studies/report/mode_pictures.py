@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from carillon.fem.geometry import HexMesh
-from carillon.fem.geometry.boundary import surface_quads
+from carillon.fem.geometry.faces import surface_quads
 from carillon.fem.geometry.picture import DRAWN_AMPLITUDE, draw, guess_up
 from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import ModesFile, read_modes
