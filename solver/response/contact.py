@@ -165,7 +165,7 @@ def embedding(model: ElasticModel, points: Array) -> tuple[NDArray[np.int64], Ar
 
 
 def _from_material(model: ElasticModel, cells: NDArray[np.int64], position: Array) -> Array:
-    """Distance (p, c) of positions (p, 3) from the nearest filled octant's centre of cells (p, c)."""
+    """Distance (p, c) of positions (p, 3) from the nearest filled octant of cells (p, c)."""
     octants = np.unpackbits(model.fill[cells, None], axis=2, bitorder="little").astype(bool)
     centres = model.mesh.grid[cells][:, :, None] + (CORNER_OFFSETS + 0.5) / 2.0
     distance = np.linalg.norm(centres - position[:, None, None], axis=3)

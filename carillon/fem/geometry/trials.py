@@ -44,9 +44,8 @@ def cup() -> trimesh.Trimesh:
         ]
     )
     turn = np.linspace(0.62 * np.pi, -0.42 * np.pi, 33)
-    path = np.stack(
-        [0.072 + 0.055 * np.cos(turn), 0.0 * turn, 0.090 + 0.055 * np.sin(turn)], axis=1
-    )
+    x, z = 0.072 + 0.055 * np.cos(turn), 0.090 + 0.055 * np.sin(turn)
+    path = np.stack([x, np.zeros_like(x), z], axis=1)
     path[-6:, 0] = np.maximum(path[-6:, 0], 0.0975)
     return joined(wall, tube(path, 0.0115))
 
