@@ -38,17 +38,13 @@ class Cells:
 
     def take(self, chosen: Chosen) -> Cells:
         """The chosen cells."""
-        elements = self.elements.with_material(
-            self.elements.young[chosen], self.elements.fill[chosen]
-        )
+        elements = self.elements.of(*(values[chosen] for values in self.elements.arrays()))
         return Cells(self.corners[chosen], elements)
 
     def join(self, others: Cells) -> Cells:
         """These cells, then the others."""
-        young = np.concatenate([self.elements.young, others.elements.young])
-        fill = np.concatenate([self.elements.fill, others.elements.fill])
-        corners = np.concatenate([self.corners, others.corners])
-        return Cells(corners, self.elements.with_material(young, fill))
+        pairs = zip(self.arrays(), others.arrays(), strict=True)
+        return self.from_arrays([np.concatenate(pair) for pair in pairs])
 
     def inside(self, start: int, stop: int) -> NDArray[np.bool_]:
         """Whether each corner (c, 8) is one of the rows [start, stop)."""
@@ -56,12 +52,12 @@ class Cells:
 
     def arrays(self) -> list[AnyArray]:
         """What differs from cell to cell, for a message; the inverse of `from_arrays`."""
-        return [self.corners, self.elements.young, self.elements.fill]
+        return [self.corners, *self.elements.arrays()]
 
     def from_arrays(self, arrays: list[AnyArray]) -> Cells:
         """Cells of the same solid from the arrays of a message."""
-        corners, young, fill = arrays
-        return Cells(corners, self.elements.with_material(young, fill))
+        corners, *elements = arrays
+        return Cells(corners, self.elements.of(*elements))
 
 
 @dataclass(frozen=True)
@@ -82,6 +78,8 @@ class LocalMesh:
         (stop - start, 3) their positions [m].
     numbers
         (c,) numbers of `cells` in the mesh.
+    origin
+        (3,) position of lattice coordinate (0, 0, 0) [m].
     """
 
     decomposition: Decomposition
@@ -91,16 +89,24 @@ class LocalMesh:
     nodes: NDArray[np.int64]
     positions: Array
     numbers: NDArray[np.int64]
+    origin: Array
 
     @property
     def n_dofs(self) -> int:
         """Number of unknowns of the whole solid."""
         return 3 * self.decomposition.n_nodes
 
-    def planes(self) -> NDArray[np.int64]:
+    def lattice(self) -> NDArray[np.int64]:
         """Integer coordinates (stop - start, 3) of this rank's nodes, in elements' edges."""
-        positions = self.positions / self.cells.elements.edge
-        return np.rint(positions - positions.min(axis=0)).astype(np.int64)
+        positions = (self.positions - self.origin) / self.cells.elements.edge
+        return np.rint(positions).astype(np.int64)
+
+    def planes(self) -> NDArray[np.int64]:
+        """The same, two steps of a mixed mesh together, so that no element reaches past the next.
+
+        Blocks of a mixed mesh start at even coordinates, and an element lies in one block.
+        """
+        return self.lattice() // self.cells.elements.steps
 
     def cells_by_subdomain(self, parts: range) -> dict[int, NDArray[np.int64]]:
         """Positions in `cells` of those that touch each subdomain in `parts`, ascending."""
@@ -134,14 +140,14 @@ def distribute(
     """
     order = np.empty(0, dtype=np.int64)
 
-    def cut() -> tuple[Decomposition, Elements]:
+    def cut() -> tuple[Decomposition, Elements, Array]:
         nonlocal order
         assert model is not None
         decomposition, order = decompose(model.mesh, subdomains, seed, comm.size)
-        nothing = model.elements.with_material(np.empty((0, 8)), np.empty(0, dtype=np.uint8))
-        return decomposition, nothing
+        nothing = model.elements.of(*(values[:0] for values in model.elements.arrays()))
+        return decomposition, nothing, model.mesh.origin
 
-    decomposition, constants = bcast_from_root(comm, cut)
+    decomposition, constants, origin = bcast_from_root(comm, cut)
     if comm.rank == 0:
         assert model is not None
         nodes, positions, numbers, cells = _scatter(model, decomposition, order, comm)
@@ -149,7 +155,7 @@ def distribute(
         nodes, positions, numbers, *arrays = receive_arrays(comm, 0, _LOCAL_MESH)
         cells = Cells(np.empty((0, 8), dtype=np.int64), constants).from_arrays(arrays)
     start, stop = decomposition.local_range(comm.rank)
-    return LocalMesh(decomposition, start, stop, cells, nodes, positions, numbers)
+    return LocalMesh(decomposition, start, stop, cells, nodes, positions, numbers, origin)
 
 
 def scatter_moduli(local_mesh: LocalMesh, young: Array | None, comm: MPI.Comm) -> LocalMesh:
@@ -168,8 +174,7 @@ def scatter_moduli(local_mesh: LocalMesh, young: Array | None, comm: MPI.Comm) -
         mine = young[local_mesh.numbers]
     else:
         (mine,) = receive_arrays(comm, 0, _MODULI)
-    elements = local_mesh.cells.elements
-    cells = replace(local_mesh.cells, elements=elements.with_material(mine, elements.fill))
+    cells = replace(local_mesh.cells, elements=local_mesh.cells.elements.with_young(mine))
     return replace(local_mesh, cells=cells)
 
 

@@ -14,6 +14,8 @@ Every interface treatment is a restriction of the elements that straddle a group
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,10 +29,16 @@ _RANK_TOLERANCE = 1e-12
 _NON_COLLINEAR = 3
 
 
-def restrict_stiffness(stiffness: Array, inside: NDArray[np.bool_], interface: str) -> Array:
+def restrict_stiffness(
+    stiffness: Array,
+    inside: NDArray[np.bool_],
+    interface: str,
+    hangs: NDArray[np.bool_] | None = None,
+) -> Array:
     """Element stiffness (c, 24, 24) restricted to the corners `inside` (c, 8); other rows are zero.
 
-    Restricting to all corners returns the element itself; to none, zero.
+    Restricting to all corners returns the element itself; to none, zero. Elements with corners that
+    hang (c,) may have three nodes on a line.
     """
     if interface not in INTERFACES:
         raise ValueError(f"interface {interface!r}, expected one of {INTERFACES}")
@@ -40,28 +48,33 @@ def restrict_stiffness(stiffness: Array, inside: NDArray[np.bool_], interface: s
     restricted = np.zeros_like(stiffness)
     corners = inside.sum(axis=1)
     restricted[corners == 8] = stiffness[corners == 8]
+    # Nodes on a line leave the element free to turn about it.
+    turns = corners < _NON_COLLINEAR
+    if hangs is not None:
+        turns |= hangs & (corners == _NON_COLLINEAR)
     # One corner alone has no stiffness of its own.
-    for count in range(2, 8):
-        chosen = np.flatnonzero(corners == count)
+    for count, turning in product(range(2, 8), (False, True)):
+        chosen = np.flatnonzero((corners == count) & (turns == turning))
         if len(chosen):
             # Unknowns to keep first, each cell in its own order.
             order = np.argsort(~keep[chosen], axis=1, kind="stable")
             kept, relaxed = order[:, : 3 * count], order[:, 3 * count :]
-            schur = _schur(stiffness, chosen, kept, relaxed)
+            schur = _schur(stiffness, chosen, kept, relaxed, turning)
             restricted[chosen[:, None, None], kept[:, :, None], kept[:, None, :]] = schur
     return restricted
 
 
-def _schur(matrices: Array, chosen: Indices, kept: Indices, relaxed: Indices) -> Array:
+def _schur(
+    matrices: Array, chosen: Indices, kept: Indices, relaxed: Indices, turning: bool
+) -> Array:
     """Schur complements (c, k, k) of the `chosen` matrices onto the unknowns `kept` (c, k)."""
     cell = chosen[:, None, None]
     inner = matrices[cell, relaxed[:, :, None], relaxed[:, None, :]]
     coupling = matrices[cell, relaxed[:, :, None], kept[:, None, :]]
-    if kept.shape[1] >= 3 * _NON_COLLINEAR:
-        relaxation = np.linalg.solve(inner, coupling)
-    else:
-        # Two nodes leave the element free to turn about the line through them.
+    if turning:
         relaxation = np.linalg.pinv(inner, rcond=_RANK_TOLERANCE, hermitian=True) @ coupling
+    else:
+        relaxation = np.linalg.solve(inner, coupling)
     schur = matrices[cell, kept[:, :, None], kept[:, None, :]]
     schur -= coupling.transpose(0, 2, 1) @ relaxation
     return np.asarray(0.5 * (schur + schur.transpose(0, 2, 1)))

@@ -18,6 +18,7 @@ from scipy.sparse.csgraph import connected_components
 
 from carillon.fem.model import RIGID_MODES, Elements
 from solver.assembly.node_rows import NodeRows, Pattern
+from solver.distribution.local_mesh import Cells
 from solver.hcms.condense import restrict_mass, restrict_stiffness
 from solver.hcms.lowest import STEPS, all_modes, lowest_modes, ritz_pairs
 from solver.linear.multifrontal import Plan
@@ -27,7 +28,6 @@ Index = NDArray[np.int64]
 
 ZERO_FRACTION = 1e-10
 """A local eigenvalue below this fraction of the ratio of the diagonals is a rigid motion's."""
-_CORNERS = np.arange(8)[:, None] >> np.arange(3) & 1
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Region:
     ----------
     pattern, plan
         Node graph and elimination plan.
-    planes
+    lattice
         (n, 3) integer coordinates of the nodes.
     pieces
         (n,) number of the piece that each node belongs to, if there are several.
@@ -46,17 +46,20 @@ class Region:
 
     pattern: Pattern
     plan: Plan
-    planes: Index
+    lattice: Index
     pieces: Index | None
 
     @classmethod
-    def of_cells(cls, corners: Index, planes: Index) -> Region:
-        """Region of the nodes 0..n-1 at `planes` (n, 3) among the corners of cells."""
-        pattern = Pattern.of_cells(corners, 0, len(planes), ghosts=False)
+    def of_cells(cls, corners: Index, lattice: Index, steps: int) -> Region:
+        """Region of the nodes 0..n-1 at `lattice` (n, 3) among the corners of cells.
+
+        Cells span `steps` of the lattice at most, see `LocalMesh.planes`.
+        """
+        pattern = Pattern.of_cells(corners, 0, len(lattice), ghosts=False)
         graph = (np.ones(len(pattern.columns)), pattern.columns, pattern.indptr)
-        count, label = connected_components(csr_matrix(graph, shape=(len(planes),) * 2))
-        plan = Plan(planes, pattern.indptr, pattern.columns)
-        return cls(pattern, plan, planes, label if count > 1 else None)
+        count, label = connected_components(csr_matrix(graph, shape=(len(lattice),) * 2))
+        plan = Plan(lattice // steps, pattern.indptr, pattern.columns)
+        return cls(pattern, plan, lattice, label if count > 1 else None)
 
 
 class Subdomain:
@@ -64,32 +67,32 @@ class Subdomain:
 
     Parameters
     ----------
-    corners
-        (c, 8) rows of the corners of the cells that touch the subdomain.
+    cells
+        The cells that touch the subdomain.
     start, stop
         Half-open range of the subdomain's rows.
-    planes
+    lattice
         (stop - start, 3) integer coordinates of its nodes.
     treatment
         Interface treatment.
     """
 
-    def __init__(
-        self, corners: Index, start: int, stop: int, planes: Index, treatment: str
-    ) -> None:
+    def __init__(self, cells: Cells, start: int, stop: int, lattice: Index, treatment: str) -> None:
         self.treatment = treatment
+        corners, steps = cells.corners, cells.elements.steps
         self.inside = (corners >= start) & (corners < stop)
         nodes = np.unique(corners)
         numbers = np.searchsorted(nodes, corners)
         first = int(np.searchsorted(nodes, start))
         count = stop - start
         if treatment == "overlapping":
-            around = _planes_around(numbers, self.inside, first, planes, len(nodes))
-            self.region = Region.of_cells(numbers, around)
+            places = cells.elements.node_places
+            around = _lattice_around(numbers, self.inside, places, first, lattice, len(nodes))
+            self.region = Region.of_cells(numbers, around, steps)
             self.own = slice(3 * first, 3 * (first + count))
             self.pattern = Pattern.of_cells(corners - start, 0, count, ghosts=False)
         else:
-            self.region = Region.of_cells(corners - start, planes)
+            self.region = Region.of_cells(corners - start, lattice, steps)
             self.own = slice(0, 3 * count)
             self.pattern = self.region.pattern
 
@@ -124,7 +127,7 @@ class Subdomain:
         alone = NodeRows(self.pattern)
         alone.add(
             slice(None),
-            restrict_stiffness(stiffness, self.inside, self.treatment),
+            restrict_stiffness(stiffness, self.inside, self.treatment, elements.hangs),
             restrict_mass(mass, self.inside),
         )
         size = 3 * self.pattern.stop
@@ -142,12 +145,12 @@ class Subdomain:
         self, rows: NodeRows, count: int, cutoff: float | None, steps: int
     ) -> tuple[Array, Array]:
         """Lowest modes: `count`, or all motions without strain, or all up to the cutoff."""
-        size = 3 * len(self.region.planes)
+        size = 3 * len(self.region.lattice)
         last = max(ZERO_FRACTION * _ratio_of_diagonals(rows), cutoff or 0.0)
         while True:
             region = self.region
             values, vectors = lowest_modes(
-                rows, region.plan, region.planes, count, region.pieces, steps
+                rows, region.plan, region.lattice, count, region.pieces, steps
             )
             if count == size or values[-1] > last:
                 return _up_to(cutoff, values, vectors)
@@ -162,14 +165,17 @@ def _up_to(cutoff: float | None, values: Array, vectors: Array) -> tuple[Array, 
     return values[:count], np.ascontiguousarray(vectors[:, :count])
 
 
-def _planes_around(
-    numbers: Index, inside: NDArray[np.bool_], first: int, planes: Index, nodes: int
+def _lattice_around(
+    numbers: Index, inside: NDArray[np.bool_], places: Index, first: int, lattice: Index, nodes: int
 ) -> Index:
-    """Integer coordinates (nodes, 3) of all corners, from those of the corners inside."""
-    corner = inside.argmax(axis=1)
-    origin = planes[numbers[np.arange(len(numbers)), corner] - first] - _CORNERS[corner]
+    """Integer coordinates (nodes, 3) of all corners, from those of the corners inside.
+
+    `places` (c, 8, 3) are the coordinates of the cells' corners about a point of each cell.
+    """
+    cell, corner = np.arange(len(numbers)), inside.argmax(axis=1)
+    origin = lattice[numbers[cell, corner] - first] - places[cell, corner]
     corners = np.empty((nodes, 3), dtype=np.int64)
-    corners[numbers] = origin[:, None, :] + _CORNERS
+    corners[numbers] = origin[:, None, :] + places
     return corners
 
 

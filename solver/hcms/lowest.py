@@ -42,7 +42,7 @@ LEAST_BLOCK = 24
 def lowest_modes(
     rows: NodeRows,
     plan: Plan,
-    planes: Index,
+    lattice: Index,
     count: int,
     pieces: Index | None = None,
     steps: int = STEPS,
@@ -55,7 +55,7 @@ def lowest_modes(
         All of K and M, M positive definite.
     plan
         Of their node graph.
-    planes
+    lattice
         (n, 3) integer coordinates of the nodes.
     pieces
         (n,) number of the piece that each node belongs to, if there are several.
@@ -68,11 +68,11 @@ def lowest_modes(
         Values (count,) ascending and M-orthonormal vectors (3 n, count), Ritz pairs of each other:
         the values are upper bounds, and close for all but the last ones.
     """
-    size = 3 * len(planes)
+    size = 3 * len(lattice)
     if size <= DENSE_UNKNOWNS or count > DENSE_FRACTION * size:
         return all_modes(rows, count)
     width = max(LEAST_BLOCK, int(BLOCK_FRACTION * count))
-    values, start = ritz_pairs(rows, smooth_motions(planes, width, pieces))
+    values, start = ritz_pairs(rows, smooth_motions(lattice, width, pieces))
     shift = FIRST_SHIFT_FRACTION * _extrapolated(values, count)
     basis = _krylov(rows, Factor(plan, rows.stiffness, rows.mass, shift), start, 1)
     # Smooth motions tell little about a material of high contrast, once corrected they do.
@@ -145,24 +145,24 @@ def _independent(rows: NodeRows, block: Array, gram: Array | None = None) -> tup
     return block, whitening
 
 
-def smooth_motions(planes: Index, count: int, pieces: Index | None = None) -> Array:
+def smooth_motions(lattice: Index, count: int, pieces: Index | None = None) -> Array:
     """Products of Legendre polynomials along the axes (3 n, count), longest wavelengths first.
 
     The first twelve span the affine motions, and so the rigid ones.  Where there are `pieces`, the
     affine motions of each by itself come in addition.
     """
-    low = planes.min(axis=0)
-    extent = np.maximum(np.ptp(planes, axis=0), 1).astype(float)
+    low = lattice.min(axis=0)
+    extent = np.maximum(np.ptp(lattice, axis=0), 1).astype(float)
     functions = -(-count // 3)
     degrees = np.array(_degrees(tuple(extent.tolist()), functions))
-    scaled = 2.0 * (planes - low) / extent - 1.0
+    scaled = 2.0 * (lattice - low) / extent - 1.0
     most = int(degrees.max())
     values = [legendre.legvander(scaled[:, axis], most)[:, degrees[:, axis]] for axis in range(3)]
     fields = values[0] * values[1] * values[2]
-    block = np.zeros((len(planes), 3, functions, 3))
+    block = np.zeros((len(lattice), 3, functions, 3))
     for axis in range(3):
         block[:, axis, :, axis] = fields
-    motions = block.reshape(3 * len(planes), -1)[:, :count]
+    motions = block.reshape(3 * len(lattice), -1)[:, :count]
     if pieces is None:
         return motions
     inside = pieces[:, None] == np.arange(pieces.max() + 1)

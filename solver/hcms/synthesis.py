@@ -81,15 +81,15 @@ def local_steps(parts: int) -> int:
 
 def make_subdomains(local_mesh: LocalMesh, treatment: str, comm: MPI.Comm) -> dict[int, Subdomain]:
     """Geometry of this rank's subdomains, by number; `treatment` is that of the interfaces."""
-    planes = local_mesh.planes()
+    lattice = local_mesh.lattice()
     ranges = local_mesh.decomposition.row_ranges()
     subdomains = {}
     for part, cells in local_mesh.cells_by_subdomain(
         local_mesh.decomposition.subdomains_of(comm.rank)
     ).items():
         start, stop = ranges[part]
-        own = planes[start - local_mesh.start : stop - local_mesh.start]
-        subdomains[part] = Subdomain(local_mesh.cells.corners[cells], start, stop, own, treatment)
+        own = lattice[start - local_mesh.start : stop - local_mesh.start]
+        subdomains[part] = Subdomain(local_mesh.cells.take(cells), start, stop, own, treatment)
     return subdomains
 
 

@@ -3,7 +3,7 @@
 Every face-connected part of a block's cells is an element of its own, and elements share a coarse
 node only where cells of different blocks meet. So parts that touch nowhere in the fine mesh stay
 apart in the coarse one (Nesme, Kry, Jerabkova and Faure 2009; virtual nodes of Molino, Bao and
-Fedkiw 2004).
+Fedkiw 2004). Some blocks may be divided: their cells stay elements, of half the edge.
 """
 
 from __future__ import annotations
@@ -16,7 +16,9 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from carillon.fem.geometry.faces import face_neighbours
+from carillon.fem.geometry.hanging import node_weights
 from carillon.fem.geometry.hexmesh import CORNER_OFFSETS, HexMesh
+from carillon.fem.geometry.joining import Parts, coarse_mesh, corner_weights
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +30,8 @@ class Blocks:
     fine
         The fine mesh.
     coarse
-        Mesh of the elements, edge twice the fine one, the same origin. Elements of one block, and
-        nodes of one place, follow each other.
+        Mesh of the elements, edge twice the fine one, the same origin; a mixed mesh if some blocks
+        are divided. Elements of one block, and nodes of one place, follow each other.
     fine_of_block : (mc, 8) int32
         Index of the fine cell at position ``x + 2*y + 4*z`` of an element, -1 where it holds none.
     contacts : (mc,) uint8
@@ -46,6 +48,12 @@ class Blocks:
     def mask(self) -> np.ndarray:
         """Which of an element's eight cells are filled, (mc, 8) bool."""
         return self.fine_of_block >= 0
+
+    @property
+    def is_fine(self) -> np.ndarray:
+        """Which elements are fine cells of a divided block, (mc,) bool."""
+        span = self.coarse.span
+        return np.zeros(len(self.contacts), dtype=bool) if span is None else span == 1
 
     @property
     def pattern(self) -> np.ndarray:
@@ -68,15 +76,14 @@ def parts_of_patterns() -> np.ndarray:
     return numbers
 
 
-@cache
-def corner_weights() -> np.ndarray:
-    """Trilinear weights (8, 8, 8) of a block's corners at each corner of each fine cell."""
-    halves = (CORNER_OFFSETS[:, None] + CORNER_OFFSETS)[:, :, None] / 2.0
-    return np.asarray(np.where(CORNER_OFFSETS, halves, 1.0 - halves).prod(axis=3))
-
-
-def blocks_from_mesh(fine: HexMesh) -> Blocks:
+def blocks_from_mesh(fine: HexMesh, refined: np.ndarray | None = None) -> Blocks:
     """Pair `fine` with its coarse mesh; a block starts at every even cell coordinate.
+
+    Parameters
+    ----------
+    refined : (mc,) bool
+        Elements of the coarse mesh, as it is without this, that shall be fine; the other parts of
+        their blocks become so as well. With any, `coarse` is a mixed mesh.
 
     Examples
     --------
@@ -85,65 +92,30 @@ def blocks_from_mesh(fine: HexMesh) -> Blocks:
     >>> blocks = blocks_from_mesh(fine)
     >>> blocks.coarse.n_cells, blocks.fine_of_block[:, :2].tolist(), blocks.contacts.tolist()
     (2, [[0, 1], [2, -1]], [2, 1])
+    >>> mixed = blocks_from_mesh(fine, np.array([False, True])).coarse
+    >>> mixed.span.tolist(), mixed.edge, mixed.n_nodes
+    ([2, 1], 0.5, 12)
     """
     grid, block = np.unique((fine.grid >> 1)[:, ::-1], axis=0, return_inverse=True)
     grid, block = grid[:, ::-1], block.ravel()  # Ordered by (z, y, x).
     position = (fine.grid & 1) @ np.array([1, 2, 4])
     pattern = np.bincount(block, 1 << position).astype(np.int64)
     part = parts_of_patterns()[pattern[block], position]
-    places, element = np.unique(8 * block + part, return_inverse=True)
-    fine_of_block = np.full((len(places), 8), -1, dtype=np.int32)
-    fine_of_block[element, position] = np.arange(fine.n_cells, dtype=np.int32)
+    places, part = np.unique(8 * block + part, return_inverse=True)
     owner = places // 8
-    cells, node_grid = _joined_corners(fine, element, position, owner, grid[owner])
-    coarse = HexMesh(
-        cells=cells.astype(np.int32),
-        grid=grid[owner].astype(np.int32),
-        node_grid=node_grid.astype(np.int32),
-        origin=fine.origin,
-        edge=2 * fine.edge,
-    )
-    return Blocks(fine, coarse, fine_of_block, _contacts(fine, element, len(places)))
-
-
-def _joined_corners(
-    fine: HexMesh, element: np.ndarray, position: np.ndarray, owner: np.ndarray, grid: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes (mc, 8) of the elements and their places (n, 3), ordered by (z, y, x).
-
-    What a fine node that cells of two blocks share is interpolated from, both blocks have in
-    common. Cells of one block that share an edge only are not joined by it.
-    """
-    # A block's cells meet other blocks at nodes that lie on a plane between blocks.
-    cell, corner = np.nonzero((fine.node_grid[fine.cells] & 1 == 0).any(axis=2))
-    node = fine.cells[cell, corner]
-    spread = corner_weights()[position[cell], corner] > 0.0
-    at, coarse_corner = np.nonzero(spread)
-    lower = fine.node_grid[node[at]] & 1 == 1
-    # The place of the coarse corner, seen from the fine node, is the same in every block.
-    offset = (CORNER_OFFSETS[coarse_corner] * lower) @ np.array([1, 2, 4])
-    keys = 8 * node[at].astype(np.int64) + offset
-    ends = 8 * element[cell[at]] + coarse_corner
-    shared, key = np.unique(keys, return_inverse=True)
-    key = key.ravel()
-    # Only keys with elements of two blocks join anything.
-    blocks = owner[element[cell[at]]]
-    low, high = np.full(len(shared), len(owner)), np.full(len(shared), -1)
-    np.minimum.at(low, key, blocks)
-    np.maximum.at(high, key, blocks)
-    joins = (low != high)[key]
-    corners = 8 * len(owner)
-    graph = sp.coo_matrix(
-        (np.ones(joins.sum()), (ends[joins], corners + key[joins])),
-        shape=(corners + len(shared),) * 2,
-    )
-    label = connected_components(graph, directed=False)[1][:corners]
-    _, first, number = np.unique(label, return_index=True, return_inverse=True)
-    places = (grid[:, None, :] + CORNER_OFFSETS).reshape(-1, 3)[first]
-    order = np.lexsort((first, *places.T))
-    rank = np.empty(len(order), dtype=np.int64)
-    rank[order] = np.arange(len(order))
-    return rank[number].reshape(-1, 8), places[order]
+    divided = np.zeros(len(grid), dtype=bool)
+    if refined is not None:
+        if refined.shape != owner.shape:
+            raise ValueError(f"refined has shape {refined.shape}, expected {owner.shape}")
+        divided[owner[refined]] = True
+    is_fine = divided[block]
+    # The elements: parts of blocks, and cells of divided ones.
+    numbers, element = np.unique(8 * part + np.where(is_fine, position, 0), return_inverse=True)
+    fine_of_block = np.full((len(numbers), 8), -1, dtype=np.int32)
+    fine_of_block[element, position] = np.arange(fine.n_cells, dtype=np.int32)
+    parts = Parts(fine, position, part, owner, grid)
+    coarse = coarse_mesh(parts, numbers // 8, element, is_fine)
+    return Blocks(fine, coarse, fine_of_block, _contacts(fine, element, len(numbers)))
 
 
 def _contacts(fine: HexMesh, element: np.ndarray, count: int) -> np.ndarray:
@@ -169,12 +141,16 @@ def prolongation(blocks: Blocks) -> sp.csr_matrix:
     fine, coarse = blocks.fine, blocks.coarse
     element, position = np.nonzero(blocks.mask)
     nodes = fine.cells[blocks.fine_of_block[element, position]]
-    # Each fine node once for every element that has it.
-    pairs = (nodes.astype(np.int64) * coarse.n_cells + element[:, None]).ravel()
+    # Each fine node once for every element that has it, but once for all fine cells, which agree.
+    who = np.where(blocks.is_fine, coarse.n_cells, np.arange(coarse.n_cells))
+    pairs = (nodes.astype(np.int64) * (coarse.n_cells + 1) + who[element, None]).ravel()
     pairs, first = np.unique(pairs, return_index=True)
     cell, corner = np.divmod(first, 8)
-    node, element = np.divmod(pairs, coarse.n_cells)
+    node, element = pairs // (coarse.n_cells + 1), element[cell]
     weights = corner_weights()[position[cell], corner]
+    if coarse.kinds is not None:
+        cells = np.flatnonzero(blocks.is_fine[element])
+        weights[cells] = node_weights()[coarse.kinds[element[cells]], corner[cells]]
     weights = weights / np.bincount(node)[node][:, None]
     rows = np.repeat(node, 8)
     shape = (fine.n_nodes, coarse.n_nodes)

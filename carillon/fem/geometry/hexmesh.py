@@ -1,4 +1,4 @@
-"""Uniform hexahedral mesh of the filled voxels."""
+"""Hexahedral mesh of the filled voxels: uniform, or with elements of two sizes."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from carillon.fem.geometry.hanging import kinds_of_cells
 from carillon.fem.geometry.voxels import VoxelModel
 
 #: Offset of local corner c = x + 2*y + 4*z from the cell's lowest corner, shape (8, 3).
@@ -15,7 +16,10 @@ CORNER_OFFSETS = np.array([[c & 1, (c >> 1) & 1, (c >> 2) & 1] for c in range(8)
 
 @dataclass(frozen=True, eq=False)
 class HexMesh:
-    """Cubes of one edge length on an integer grid, and the nodes at their corners.
+    """Cubes on an integer grid, and their nodes: of one edge length, with the nodes at the corners.
+
+    In a mixed mesh, see `carillon.fem.geometry.blocks`, some cubes have twice the edge and start at
+    even coordinates, and the others may have hanging corners, see `carillon.fem.geometry.hanging`.
 
     Attributes
     ----------
@@ -23,13 +27,17 @@ class HexMesh:
         Node indices of each cell; local corner ``c`` has the offset
         ``(c & 1, c >> 1 & 1, c >> 2 & 1)``, so x runs fastest.
     grid : (m, 3) int32
-        Integer coordinates of the cells, ordered by (z, y, x).
+        Integer coordinates of the cells, ordered by (z, y, x); in a mixed mesh by blocks.
     node_grid : (n, 3) int32
         Integer coordinates of the nodes, ordered by (z, y, x).
     origin : (3,)
         Position of node coordinate (0, 0, 0) [m].
     edge
-        Edge of a cell [m].
+        Edge of a cell [m], of the smaller ones in a mixed mesh.
+    span : (m,) uint8
+        Edge of each cell in steps of the grid, 1 or 2; None in a mesh of one edge length.
+    hanging : (m,) uint8
+        Bit c tells whether local corner c hangs; None likewise.
     """
 
     cells: np.ndarray
@@ -37,11 +45,20 @@ class HexMesh:
     node_grid: np.ndarray
     origin: np.ndarray
     edge: float
+    span: np.ndarray | None = None
+    hanging: np.ndarray | None = None
 
     @cached_property
     def nodes(self) -> np.ndarray:
         """Positions of the nodes (n, 3) [m]."""
         return self.origin + self.edge * self.node_grid
+
+    @cached_property
+    def kinds(self) -> np.ndarray | None:
+        """Kinds (m,) of the cells of a mixed mesh, see `carillon.fem.geometry.hanging`."""
+        if self.span is None or self.hanging is None:
+            return None
+        return kinds_of_cells(self.grid, self.span, self.hanging)
 
     @property
     def n_nodes(self) -> int:
@@ -59,7 +76,8 @@ class HexMesh:
     @property
     def volume(self) -> float:
         """Volume of all cells [m^3]."""
-        return self.n_cells * self.edge**3
+        cubes = self.n_cells if self.span is None else int((self.span.astype(int) ** 3).sum())
+        return cubes * self.edge**3
 
 
 def hexmesh_from_grid(grid: np.ndarray, origin: np.ndarray, edge: float) -> HexMesh:
