@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import Unpack
 
 import numpy as np
+from numpy.typing import NDArray
 
 from carillon.errors import UserError
+from carillon.fem.block import ALL_FILLED
 from carillon.fem.geometry import Blocks, HexMesh, blocks_from_mesh
 from carillon.fem.model import Constants, ElasticModel, fine_model
-from carillon.fem.moduli import require_moduli
+from carillon.fem.moduli import at_points, require_moduli
 from solver.coarsening.coarsening import Array, Coarsening
 
 
@@ -18,10 +20,24 @@ def block_moduli(blocks: Blocks, young: Array) -> Array:
     return np.where(blocks.mask, young[blocks.fine_of_block], 0.0)
 
 
+def element_moduli(blocks: Blocks, young: Array, coarsening: Coarsening) -> Array:
+    """Moduli (mc, 8) [Pa] of the elements from `young` (m,) [Pa]: coarsened, or fine cells' own."""
+    e = block_moduli(blocks, young)
+    whole = ~blocks.is_fine
+    if whole.all():
+        return coarsening.moduli(e)
+    # A fine cell is the only one of its element.
+    moduli = at_points(e.sum(axis=1))
+    if whole.any():
+        moduli[whole] = coarsening.moduli(e[whole])
+    return moduli
+
+
 def build_model(
     mesh: HexMesh,
     young: Array,
     coarsening: Coarsening | None = None,
+    refined: NDArray[np.bool_] | None = None,
     **constants: Unpack[Constants],
 ) -> ElasticModel:
     """Model of the fine mesh, or of its blocks if there is a coarsening.
@@ -32,6 +48,8 @@ def build_model(
         Fine mesh.
     young
         (m,) modulus [Pa] of each fine cell; without a coarsening also (m, 8).
+    refined
+        Coarse elements that shall stay fine, see `blocks_from_mesh`.
     constants
         `poisson`, `density` [kg/m^3], `lumped`, see `ElasticModel`.
 
@@ -54,19 +72,18 @@ def build_model(
     given = require_moduli(young, mesh.n_cells)
     if given.ndim > 1:
         raise UserError(f"moduli: an array of shape {given.shape}, expected ({mesh.n_cells},)")
-    blocks = blocks_from_mesh(mesh)
-    moduli = coarsening.moduli(block_moduli(blocks, given))
+    blocks = blocks_from_mesh(mesh, refined)
+    moduli = element_moduli(blocks, given, coarsening)
     return coarse_model(blocks, moduli, coarsening.lumped_fraction, **constants)
 
 
 def coarse_model(
     blocks: Blocks, moduli: Array, lumped_fraction: float = 0.0, **constants: Unpack[Constants]
 ) -> ElasticModel:
-    """Model of the blocks with moduli (mc, 8) [Pa] that a coarsening made.
+    """Model of the blocks with moduli (mc, 8) [Pa] that a coarsening made, or of their fine cells.
 
     The consistent part of the mass is P^T M P over the filled cells; `lumped_fraction` is that of
     the coarsening.
     """
-    return ElasticModel(
-        blocks.coarse, moduli, blocks.pattern, lumped_share=lumped_fraction, **constants
-    )
+    fill = np.where(blocks.is_fine, np.uint8(ALL_FILLED), blocks.pattern)
+    return ElasticModel(blocks.coarse, moduli, fill, lumped_share=lumped_fraction, **constants)

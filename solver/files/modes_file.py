@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from carillon import provenance
 from carillon.datasets import INTEGER, find, finite, number, read, refused
 from carillon.errors import UserError
+from carillon.fem.block import ALL_FILLED
 from carillon.fem.geometry import CORNER_OFFSETS, HexMesh
+from carillon.fem.geometry.hanging import kinds_of_cells, makes_sense, node_places
 from carillon.fem.model import RIGID_MODES, ElasticModel
 from carillon.files import create_h5, open_h5
 from carillon.limits import DENSITIES, EDGES, POISSON
@@ -152,6 +154,9 @@ def put_model(group: h5py.Group, model: ElasticModel) -> None:
     put(group, "grid", mesh.grid, "1", "integer coordinates of the cells")
     put(group, "young", young, "Pa", "Young's modulus per cell or per quadrature point")
     put(group, "fill", model.fill, "1", "bit pattern of the cell's octants that hold mass")
+    if mesh.span is not None and mesh.hanging is not None:
+        put(group, "span", mesh.span, "1", "edge of each cell in steps of the grid")
+        put(group, "hanging", mesh.hanging, "1", "bit pattern of the cell's corners that hang")
     group.attrs["poisson"] = model.poisson
     group.attrs["density"] = model.density
     group.attrs["lumped"] = model.lumped
@@ -171,15 +176,19 @@ def get_model(group: h5py.Group) -> ElasticModel:
     grid = read(group, "grid", (None, 3), INTEGER).astype(np.int32)
     node_grid = read(group, "node_grid", (None, 3), INTEGER).astype(np.int32)
     cells = read(group, "cells", (len(grid), 8), INTEGER)
-    if not _are_corners(cells, grid, node_grid):
-        raise refused(group, "cells, nodes and their places on the grid do not fit each other")
     mesh = HexMesh(
-        cells=cells.astype(np.int32),
-        grid=grid,
-        node_grid=node_grid,
-        origin=_origin(group),
-        edge=number(group, "cell_edge", *EDGES),
+        cells.astype(np.int32),
+        grid,
+        node_grid,
+        _origin(group),
+        number(group, "cell_edge", *EDGES),
+        *_sizes(group, grid),
     )
+    if not _are_corners(mesh):
+        raise refused(group, "cells, nodes and their places on the grid do not fit each other")
+    fill = read(group, "fill", (len(grid),), INTEGER).astype(np.uint8)
+    if mesh.span is not None and (fill[mesh.span == 1] != ALL_FILLED).any():
+        raise refused(group, "dataset 'fill' has void octants in fine cells of a mixed mesh")
     whole = getattr(group.get("young"), "ndim", 0) == 2
     young = read(group, "young", (len(grid), 8) if whole else (len(grid),))
     if (young < 0.0).any():
@@ -189,7 +198,7 @@ def get_model(group: h5py.Group) -> ElasticModel:
     return ElasticModel(
         mesh,
         young.astype(float, copy=False),
-        read(group, "fill", (len(grid),), INTEGER).astype(np.uint8),
+        fill,
         number(group, "poisson", *POISSON),
         number(group, "density", *DENSITIES),
         bool(number(group, "lumped", 0.0, 1.0)),
@@ -197,16 +206,35 @@ def get_model(group: h5py.Group) -> ElasticModel:
     )
 
 
-def _are_corners(
-    cells: NDArray[np.integer], grid: NDArray[np.int32], node_grid: NDArray[np.int32]
-) -> bool:
-    """Whether every cell has the nodes at its corners, and every node a cell."""
-    n_nodes = len(node_grid)
+def _sizes(group: h5py.Group, grid: NDArray[np.int32]) -> tuple[NDArray[np.uint8], ...]:
+    """`span` and `hanging` of the cells of a mixed mesh; nothing of one with cells of one size."""
+    if not {"span", "hanging"} & set(group):
+        return ()
+    span = read(group, "span", (len(grid),), INTEGER)
+    hanging = read(group, "hanging", (len(grid),), INTEGER)
+    is_whole = span == 2
+    if not (is_whole | (span == 1)).all() or (grid[is_whole] & 1).any():
+        raise refused(group, "dataset 'span' holds other cells than fine ones and whole blocks")
+    possible = (hanging >= 0) & (hanging <= ALL_FILLED) & ~(is_whole & (hanging != 0))
+    if not possible.all() or not makes_sense()[kinds_of_cells(grid, span, hanging)].all():
+        raise refused(group, "dataset 'hanging' names corners that cannot hang")
+    block = np.unique(grid >> 1, axis=0, return_inverse=True)[1].ravel()
+    if np.isin(block[is_whole], block[~is_whole]).any():
+        raise refused(group, "dataset 'span' has blocks that are both whole and divided")
+    return span.astype(np.uint8), hanging.astype(np.uint8)
+
+
+def _are_corners(mesh: HexMesh) -> bool:
+    """Whether every cell has the nodes at their places, and every node a cell."""
+    cells, n_nodes = mesh.cells, mesh.n_nodes
     if not len(cells) or cells.min() < 0 or cells.max() >= n_nodes:
         return False
     if not (np.bincount(cells.ravel(), minlength=n_nodes) > 0).all():
         return False
-    return np.array_equal(node_grid[cells], grid[:, None, :] + CORNER_OFFSETS)
+    places = mesh.grid[:, None, :] + CORNER_OFFSETS
+    if mesh.kinds is not None:
+        places = 2 * (mesh.grid[:, None, :] >> 1) + node_places()[mesh.kinds]
+    return np.array_equal(mesh.node_grid[cells], places)
 
 
 def _origin(group: h5py.Group) -> Array:

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from carillon.errors import UserError
 from carillon.fem.geometry import CORNER_OFFSETS, HexMesh
 from carillon.fem.geometry.faces import surface_quads
+from carillon.fem.geometry.hanging import node_weights
 from carillon.fem.model import RIGID_MODES, ElasticModel
 from solver.files.modes_file import ModesFile
 
@@ -142,7 +143,7 @@ def interpolation(model: ElasticModel, points: Array) -> sp.csr_matrix:
 
 
 def embedding(model: ElasticModel, points: Array) -> tuple[NDArray[np.int64], Array]:
-    """Cells (p,) that `points` (p, 3) [m] lie in, and trilinear weights (p, 8) of their corners.
+    """Cells (p,) that `points` (p, 3) [m] lie in, and trilinear weights (p, 8) of their nodes.
 
     A point outside all cells belongs to a nearest cell, with the weights of its nearest point. Of
     several elements in one place, parts of a block, it belongs to that with the nearest material.
@@ -150,24 +151,45 @@ def embedding(model: ElasticModel, points: Array) -> tuple[NDArray[np.int64], Ar
     mesh = model.mesh
     position = (np.atleast_2d(points) - mesh.origin) / mesh.edge
     places, first, count = np.unique(mesh.grid, axis=0, return_index=True, return_counts=True)
-    # In the largest norm a cell is the ball around its centre.
-    place = cKDTree(places + 0.5).query(position, p=np.inf)[1]
+    spans = np.ones(mesh.n_cells) if mesh.span is None else mesh.span.astype(float)
+    place = _nearest_place(places, spans[first], position)
     cells = first[place]
     shared = np.flatnonzero(count[place] > 1)
     if len(shared):
         candidates = cells[shared, None] + np.arange(count.max())
         there = np.arange(count.max()) < count[place[shared], None]
         candidates = np.where(there, candidates, cells[shared, None])
-        distance = _from_material(model, candidates, position[shared])
+        distance = _from_material(model, candidates, spans, position[shared])
         cells[shared] = candidates[np.arange(len(shared)), distance.argmin(axis=1)]
-    local = np.clip(position - mesh.grid[cells], 0.0, 1.0)[:, None, :]
-    return cells, np.where(CORNER_OFFSETS, local, 1.0 - local).prod(axis=2)
+    local = (position - mesh.grid[cells]) / spans[cells, None]
+    local = np.clip(local, 0.0, 1.0)[:, None, :]
+    weights = np.where(CORNER_OFFSETS, local, 1.0 - local).prod(axis=2)
+    if mesh.kinds is not None:
+        weights = np.einsum("pk,pkj->pj", weights, node_weights()[mesh.kinds[cells]])
+    return cells, weights
 
 
-def _from_material(model: ElasticModel, cells: NDArray[np.int64], position: Array) -> Array:
+def _nearest_place(places: NDArray[np.int32], spans: Array, position: Array) -> NDArray[np.int64]:
+    """Number (p,) of the place whose cube, of edge `spans`, positions (p, 3) lie in or nearest."""
+    nearest = np.zeros(len(position), dtype=np.int64)
+    least = np.full(len(position), np.inf)
+    for span in np.unique(spans):
+        there = np.flatnonzero(spans == span)
+        # In the largest norm a cube is the ball around its centre.
+        distance, number = cKDTree(places[there] + span / 2.0).query(position, p=np.inf)
+        closer = distance - span / 2.0 < least
+        least[closer] = (distance - span / 2.0)[closer]
+        nearest[closer] = there[number[closer]]
+    return nearest
+
+
+def _from_material(
+    model: ElasticModel, cells: NDArray[np.int64], spans: Array, position: Array
+) -> Array:
     """Distance (p, c) of positions (p, 3) from the nearest filled octant of cells (p, c)."""
     octants = np.unpackbits(model.fill[cells, None], axis=2, bitorder="little").astype(bool)
-    centres = model.mesh.grid[cells][:, :, None] + (CORNER_OFFSETS + 0.5) / 2.0
+    middles = spans[cells][:, :, None, None] * (CORNER_OFFSETS + 0.5) / 2.0
+    centres = model.mesh.grid[cells][:, :, None] + middles
     distance = np.linalg.norm(centres - position[:, None, None], axis=3)
     return np.asarray(np.where(octants, distance, np.inf).min(axis=2))
 

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from carillon.fem.geometry import blocks_from_mesh, prolongation
+from carillon.fem.geometry import blocks_with_coarse, prolongation
 from carillon.fem.model import RIGID_MODES
 from solver.assembly.sparse import assembled
 from solver.files.modes_file import ModesFile, read_elastic, require_same_solid
@@ -200,9 +200,7 @@ def on_mesh_of(fine: ModesFile, file: ModesFile) -> Array | None:
     assert file.modes is not None
     if np.array_equal(file.mesh.cells, fine.mesh.cells):
         return file.modes if np.array_equal(file.mesh.node_grid, fine.mesh.node_grid) else None
-    if not np.isclose(file.mesh.edge, 2.0 * fine.mesh.edge):
-        return None
-    blocks = blocks_from_mesh(fine.mesh)
-    if not np.array_equal(blocks.coarse.cells, file.mesh.cells):
+    blocks = blocks_with_coarse(fine.mesh, file.mesh)
+    if blocks is None:
         return None
     return np.asarray(sp.kron(prolongation(blocks), sp.identity(3), format="csr") @ file.modes)

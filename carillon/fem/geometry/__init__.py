@@ -3,7 +3,12 @@
 from typing import TYPE_CHECKING
 
 from carillon import lazily
-from carillon.fem.geometry.blocks import Blocks, blocks_from_mesh, prolongation
+from carillon.fem.geometry.blocks import (
+    Blocks,
+    blocks_from_mesh,
+    blocks_with_coarse,
+    prolongation,
+)
 from carillon.fem.geometry.hexmesh import (
     CORNER_OFFSETS,
     HexMesh,
@@ -25,6 +30,7 @@ __all__ = [
     "HexMesh",
     "VoxelModel",
     "blocks_from_mesh",
+    "blocks_with_coarse",
     "builtin_surface",
     "hexmesh_from_grid",
     "hexmesh_from_voxels",

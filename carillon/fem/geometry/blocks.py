@@ -118,6 +118,23 @@ def blocks_from_mesh(fine: HexMesh, refined: np.ndarray | None = None) -> Blocks
     return Blocks(fine, coarse, fine_of_block, _contacts(fine, element, len(numbers)))
 
 
+def blocks_with_coarse(fine: HexMesh, coarse: HexMesh) -> Blocks | None:
+    """The blocks of `fine` whose mesh is `coarse`, plain or mixed; None if they are not related."""
+    steps = 2 if coarse.span is None else 1
+    if fine.span is not None or not np.isclose(coarse.edge, steps * fine.edge):
+        return None
+    blocks = blocks_from_mesh(fine)
+    if coarse.span is not None:
+        divided = coarse.grid[coarse.span == 1] >> 1
+        everywhere = np.concatenate([blocks.coarse.grid, divided])
+        place = np.unique(everywhere, axis=0, return_inverse=True)[1].ravel()
+        count = blocks.coarse.n_cells
+        blocks = blocks_from_mesh(fine, np.isin(place[:count], place[count:]))
+    same = np.array_equal(blocks.coarse.cells, coarse.cells)
+    same = same and np.array_equal(blocks.coarse.node_grid, coarse.node_grid)
+    return blocks if same else None
+
+
 def _contacts(fine: HexMesh, element: np.ndarray, count: int) -> np.ndarray:
     pairs = face_neighbours(fine)
     lower, upper = element[pairs].T

@@ -18,10 +18,14 @@ FACE_CORNERS = np.array(
 
 
 def face_neighbours(mesh: HexMesh) -> np.ndarray:
-    """Pairs (p, 2) of cells that have the four nodes of a face in common, the lower one first."""
+    """Pairs (p, 2) of cells that have the four nodes of a face in common, the lower one first.
+
+    In a mixed mesh these include fine cells at the face of an element of twice the edge, whose
+    corners they have for nodes there, and cells of one block that share a face, whatever hangs.
+    """
     pairs = []
-    for below, above in FACE_CORNERS.reshape(3, 2, 4):
-        upper_side, lower_side = _face_numbers(mesh, above, below)
+    for axis in range(3):
+        upper_side, lower_side = _face_numbers(mesh, 2 * axis + 1, 2 * axis)
         order = np.argsort(lower_side, kind="stable")
         begin = np.searchsorted(lower_side[order], upper_side, side="left")
         count = np.searchsorted(lower_side[order], upper_side, side="right") - begin
@@ -35,7 +39,7 @@ def boundary_faces(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray]:
     """Quads (q, 4) int32 that no other cell shares, and the cell (q,) that each belongs to."""
     quads, cells = [], []
     for face, corners in enumerate(FACE_CORNERS):
-        own, opposite = _face_numbers(mesh, corners, FACE_CORNERS[face ^ 1])
+        own, opposite = _face_numbers(mesh, face, face ^ 1)
         is_open = np.flatnonzero(~np.isin(own, opposite))
         quads.append(mesh.cells[is_open][:, corners])
         cells.append(is_open)
@@ -47,12 +51,30 @@ def surface_quads(mesh: HexMesh) -> np.ndarray:
     return boundary_faces(mesh)[0]
 
 
-def _face_numbers(mesh: HexMesh, *faces: np.ndarray) -> np.ndarray:
-    """Numbers (len(faces), m) of the cells' faces with these local corners: equal if one face."""
-    nodes = np.concatenate([np.sort(mesh.cells[:, corners], axis=1) for corners in faces])
+def _face_numbers(mesh: HexMesh, *faces: int) -> np.ndarray:
+    """Numbers (len(faces), m) of the cells' faces in these directions: equal if one face."""
+    nodes = np.concatenate([_face_nodes(mesh, face) for face in faces])
     first, second, third, fourth = nodes.astype(np.int64).T
     numbers = _paired(_paired(first, second), _paired(third, fourth))
     return numbers.reshape(len(faces), mesh.n_cells)
+
+
+def _face_nodes(mesh: HexMesh, face: int) -> np.ndarray:
+    """Four ascending numbers (m, 4) that belong to each cell's face in a direction: its nodes.
+
+    Where the ends of a face inside a block hang, cells on its two sides have other nodes for them;
+    so there it is the node in the middle of the block and the quadrant about it.
+    """
+    nodes = np.sort(mesh.cells[:, FACE_CORNERS[face]], axis=1)
+    if mesh.span is None:
+        return nodes
+    axis, side = divmod(face, 2)
+    inner = np.flatnonzero((mesh.span == 1) & (mesh.grid[:, axis] & 1 != side))
+    position = (mesh.grid[inner] & 1) @ np.array([1, 2, 4])
+    nodes[inner] = mesh.n_nodes
+    nodes[inner, 0] = mesh.cells[inner, position ^ 7]
+    nodes[inner, 3] += position & ~(1 << axis)
+    return nodes
 
 
 def _paired(left: np.ndarray, right: np.ndarray) -> np.ndarray:

@@ -1,0 +1,363 @@
+"""Coarse meshes of which some blocks stay fine: the fine model, the coarse one, or between both."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+import scipy.linalg as la
+import scipy.sparse as sp
+from mpi4py import MPI
+from scipy.sparse.csgraph import connected_components
+
+from carillon.errors import UserError
+from carillon.fem.element import rigid_motions
+from carillon.fem.geometry import HexMesh, blocks_from_mesh, hexmesh_from_grid, prolongation
+from carillon.fem.geometry.faces import boundary_faces, face_neighbours
+from carillon.fem.geometry.hanging import makes_sense, node_places, node_weights
+from carillon.fem.laplacian import cell_laplacian
+from carillon.fem.model import Elements
+from solver.analysis.modal_solver import modal_analysis
+from solver.analysis.options import SolverOptions
+from solver.assembly.sparse import assembled
+from solver.coarsening.choice import make_coarsening
+from solver.coarsening.model import build_model
+from solver.distribution.local_mesh import distribute
+from solver.files.initial_modes import modes_from_file
+from solver.files.modes_file import read_modes, write_modes
+from solver.hcms.condense import INTERFACES, restrict_stiffness
+from solver.hcms.synthesis import synthesize
+from solver.response.contact import interpolation
+from solver.studies.comparison import compare_files
+from tests import solids
+
+COMM = MPI.COMM_SELF
+SEEDS = range(12)
+
+
+def random_solid(seed: int) -> HexMesh:
+    """Voxels with holes, touching by faces, edges, corners or not at all."""
+    rng = np.random.default_rng(seed)
+    filled = rng.random(rng.integers(3, 7, 3)) < rng.choice([0.4, 0.6, 0.85])
+    return hexmesh_from_grid(np.argwhere(filled), rng.standard_normal(3), 0.25)
+
+
+def random_blocks(seed: int, share: float = 0.4, whole_hinges: bool = True):
+    """Fine mesh and its blocks, some of them divided; all that are in parts without hinges."""
+    fine, rng = random_solid(seed), np.random.default_rng(1000 + seed)
+    coarse = blocks_from_mesh(fine).coarse
+    refined = rng.random(coarse.n_cells) < share
+    refined[rng.integers(len(refined))] = True
+    if not whole_hinges:
+        _, block, parts = np.unique(coarse.grid, axis=0, return_inverse=True, return_counts=True)
+        refined |= parts[block.ravel()] > 1
+    return fine, refined, blocks_from_mesh(fine, refined)
+
+
+def random_moduli(mesh: HexMesh, seed: int) -> np.ndarray:
+    return 1e9 * 10.0 ** np.random.default_rng(2000 + seed).uniform(-1.0, 1.0, mesh.n_cells)
+
+
+def mixed_model(seed: int, method: str = "galerkin", **constants):
+    fine, refined, blocks = random_blocks(seed, whole_hinges=False)
+    young = random_moduli(fine, seed)
+    return (
+        build_model(fine, young, **constants),
+        build_model(fine, young, make_coarsening(method), refined, **constants),
+        sp.kron(prolongation(blocks), sp.identity(3), format="csr"),
+    )
+
+
+def assert_equal(left, right) -> None:
+    assert np.abs(left - right).max() <= 1e-13 * np.abs(right).max()
+
+
+# Meshes
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_nothing_refined_is_the_coarse_mesh(seed):
+    fine = random_solid(seed)
+    plain = blocks_from_mesh(fine)
+    none = blocks_from_mesh(fine, np.zeros(plain.coarse.n_cells, dtype=bool))
+    for field in ("cells", "grid", "node_grid", "edge"):
+        assert np.array_equal(getattr(plain.coarse, field), getattr(none.coarse, field))
+    assert none.coarse.span is None and none.coarse.hanging is None
+    assert np.array_equal(plain.fine_of_block, none.fine_of_block)
+    assert np.array_equal(plain.contacts, none.contacts)
+    young, coarsening = random_moduli(fine, seed), make_coarsening("galerkin")
+    models = (
+        build_model(fine, young, coarsening),
+        build_model(fine, young, coarsening, np.zeros(plain.coarse.n_cells, dtype=bool)),
+    )
+    for left, right in zip(*map(assembled, models), strict=True):
+        assert (left != right).nnz == 0
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_everything_refined_is_the_fine_model(seed):
+    fine = random_solid(seed)
+    everything = np.ones(blocks_from_mesh(fine).coarse.n_cells, dtype=bool)
+    order = prolongation(blocks_from_mesh(fine, everything))
+    assert order.nnz == fine.n_nodes == order.shape[1] and (order.data == 1.0).all()
+    P = sp.kron(order, sp.identity(3))
+    young = random_moduli(fine, seed)
+    for lumped in (False, True):
+        models = [
+            build_model(fine, young, *coarse, lumped=lumped)
+            for coarse in ((), (make_coarsening("fit"), everything))
+        ]
+        for exact, found in zip(*map(assembled, models), strict=True):
+            assert_equal(P @ found @ P.T, exact)
+    mesh = blocks_from_mesh(fine, everything).coarse
+    assert mesh.volume == pytest.approx(fine.volume)
+    assert len(boundary_faces(mesh)[0]) == len(boundary_faces(fine)[0])
+    assert len(face_neighbours(mesh)) == len(face_neighbours(fine))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_mixed_meshes_are_consistent(seed):
+    fine, refined, blocks = random_blocks(seed)
+    mesh, plain = blocks.coarse, blocks_from_mesh(fine)
+    element, position = np.nonzero(blocks.mask)
+    assert np.array_equal(np.sort(blocks.fine_of_block[blocks.mask]), np.arange(fine.n_cells))
+    assert (blocks.mask.sum(axis=1)[blocks.is_fine] == 1).all()
+    divided = {tuple(place) for place in plain.coarse.grid[refined].tolist()}
+    assert all(
+        (tuple(place) in divided) == fine
+        for place, fine in zip((mesh.grid >> 1).tolist(), blocks.is_fine)
+    )
+    assert makes_sense()[mesh.kinds].all()
+    places = 2 * (mesh.grid >> 1)[:, None] + node_places()[mesh.kinds]
+    assert np.array_equal(mesh.node_grid[mesh.cells], places)
+    assert np.array_equal(np.unique(mesh.cells), np.arange(mesh.n_nodes))
+    keys = mesh.node_grid @ np.array([1, 100, 10_000])
+    assert (np.diff(keys) >= 0).all()
+    # Parts that stay whole are those of the coarse mesh, with the same contacts.
+    part = {tuple(cells): bits for cells, bits in zip(plain.fine_of_block.tolist(), plain.contacts)}
+    for cells, bits, own in zip(blocks.fine_of_block.tolist(), blocks.contacts, blocks.is_fine):
+        assert own or part[tuple(cells)] == bits
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_linear_fields_are_reproduced(seed):
+    fine, _, blocks = random_blocks(seed)
+    P = prolongation(blocks)
+    assert np.abs(P @ blocks.coarse.nodes - fine.nodes).max() < 1e-14
+    assert np.abs(P.sum(axis=1) - 1.0).max() < 1e-15
+    corners = node_weights()[blocks.coarse.kinds] @ blocks.coarse.nodes[blocks.coarse.cells]
+    expected = (
+        node_places()[-1] / 2 * blocks.coarse.span[:, None, None] + blocks.coarse.grid[:, None]
+    )
+    assert np.abs(corners - blocks.coarse.origin - blocks.coarse.edge * expected).max() < 1e-14
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_elements_that_touch_by_a_face_are_neighbours(seed):
+    fine, _, blocks = random_blocks(seed)
+    element = np.empty(fine.n_cells, dtype=int)
+    element[blocks.fine_of_block[blocks.mask]] = np.nonzero(blocks.mask)[0]
+    touching = np.sort(element[face_neighbours(fine)], axis=1)
+    touching = touching[touching[:, 0] != touching[:, 1]]
+    pairs = {tuple(pair) for pair in np.sort(face_neighbours(blocks.coarse), axis=1).tolist()}
+    assert len(pairs) == len(face_neighbours(blocks.coarse))
+    assert {tuple(pair) for pair in touching.tolist()} <= pairs
+    # Others have all corners of a face in common nevertheless.
+    cells = blocks.coarse.cells
+    for left, right in pairs - {tuple(pair) for pair in touching.tolist()}:
+        assert len(np.intersect1d(cells[left], cells[right])) >= 4
+
+
+def test_pieces_of_a_mixed_mesh_are_those_of_the_fine_one():
+    fine = carved_bar()
+    blocks = blocks_from_mesh(fine, np.arange(blocks_from_mesh(fine).coarse.n_cells) % 3 == 0)
+    assert connected_components(cell_laplacian(blocks.coarse))[0] == 1
+
+
+# Matrices
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_mixed_galerkin_matrices_are_projections_of_the_fine_ones(seed):
+    fine, mixed, P = mixed_model(seed)
+    for exact, found in zip(assembled(fine), assembled(mixed), strict=True):
+        assert_equal(found, P.T @ exact @ P)
+    assert mixed.mass == pytest.approx(fine.mass, rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_patch_of_constant_strain(seed):
+    fine, refined, blocks = random_blocks(seed)
+    young = np.full(fine.n_cells, 2e9)
+    model = build_model(fine, young, make_coarsening("galerkin"), refined, poisson=0.3)
+    K, M = assembled(model)
+    nodes = blocks.coarse.nodes
+    rigid = rigid_motions(nodes, nodes.mean(axis=0))
+    scale = np.abs(K).max() * np.abs(rigid).max()
+    assert np.abs(K @ rigid).max() < 1e-13 * scale
+    gradient = np.random.default_rng(seed).standard_normal((3, 3))
+    strain = 0.5 * (gradient + gradient.T)
+    mu, lam = 2e9 / 2.6, 2e9 * 0.3 / (1.3 * 0.4)
+    density = 2.0 * mu * (strain**2).sum() + lam * np.trace(strain) ** 2
+    field = (nodes @ gradient.T).ravel()
+    assert field @ (K @ field) == pytest.approx(density * fine.volume, rel=1e-12)
+    translation = np.tile([0.0, 1.0, 0.0], len(nodes))
+    assert translation @ (M @ translation) == pytest.approx(model.mass, rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_lumped_masses(seed):
+    _, whole, _ = mixed_model(seed)
+    lumped = assembled(replace(whole, lumped=True))[1]
+    consistent = assembled(whole)[1]
+    assert (lumped != sp.diags(lumped.diagonal())).nnz == 0 and lumped.diagonal().min() > 0.0
+    assert_equal(lumped.diagonal(), np.asarray(consistent.sum(axis=1)).ravel())
+    shared = replace(whole, lumped_share=0.3)
+    same = (shared.nodal_mass() == whole.nodal_mass()).all(axis=(1, 2))
+    assert np.array_equal(same, (whole.mesh.span == 1) | (whole.fill != 255))
+
+
+def test_fine_cells_by_themselves_know_that_they_are():
+    _, mixed, _ = mixed_model(3)
+    mixed = replace(mixed, lumped_share=0.5)
+    cells = np.flatnonzero(mixed.mesh.span == 1)
+    alone: Elements = mixed.elements.of(*(values[cells] for values in mixed.elements.arrays()))
+    assert (alone.nodal_mass() == mixed.nodal_mass(cells)).all()
+    assert (alone.stiffness() == mixed.stiffness(cells)).all()
+
+
+@pytest.mark.parametrize("interface", ["free", "overlapping"])
+def test_relaxed_elements_with_hanging_corners_are_free(interface):
+    kinds = np.flatnonzero(makes_sense()[:-1])
+    kinds = kinds[np.random.default_rng(0).permutation(len(kinds))[:60]].astype(np.int32)
+    young = np.random.default_rng(1).uniform(0.1, 10.0, (len(kinds), 8))
+    fill = np.full(len(kinds), 255, dtype=np.uint8)
+    elements = Elements(young, fill, 1.0, 0.25, 1.0, False, 0.0, kinds)
+    stiffness, places = elements.stiffness(), elements.node_places.astype(float)
+    for corners in combinations(range(8), 3):
+        inside = np.broadcast_to(np.isin(np.arange(8), corners), (len(kinds), 8))
+        relaxed = restrict_stiffness(stiffness, inside, interface, elements.hangs)
+        for matrix, nodes in zip(relaxed, places):
+            motions = rigid_motions(nodes, nodes.mean(axis=0)) * np.repeat(inside[0], 3)[:, None]
+            assert np.abs(matrix @ motions).max() < 1e-11
+            assert la.eigvalsh(matrix)[0] > -1e-11
+
+
+# Spectra
+
+
+def carved_bar() -> HexMesh:
+    """A bar with a corner and a groove cut away, in one piece."""
+    grid = solids.box_mesh(12, 5, 4).grid
+    corner = (grid >= np.array([9, 2, 2])).all(axis=1)
+    groove = (grid[:, 0] == 4) & (grid[:, 2] == 3)
+    return hexmesh_from_grid(grid[~(corner | groove)], np.zeros(3), 0.01)
+
+
+def bar_models(method: str = "galerkin", share: float = 0.4):
+    mesh = carved_bar()
+    young = random_moduli(mesh, 0)
+    coarsening = make_coarsening(method)
+    refined = np.random.default_rng(5).random(blocks_from_mesh(mesh).coarse.n_cells) < share
+    return (
+        build_model(mesh, young),
+        build_model(mesh, young, coarsening, refined),
+        build_model(mesh, young, coarsening),
+    )
+
+
+def test_mixed_spectra_lie_between_the_fine_and_the_coarse_one():
+    fine, mixed, coarse = (solids.dense_eigenvalues(model) for model in bar_models())
+    count, slack = len(coarse), 1e-9 * coarse[20]
+    assert (fine[:count] <= mixed[:count] + slack).all()
+    assert (mixed[:count] <= coarse + slack).all()
+    assert mixed[10] < 0.99 * coarse[10]
+
+
+@pytest.mark.parametrize("interface", INTERFACES)
+def test_synthesis_bounds_a_mixed_spectrum_from_above(interface):
+    _, mixed, _ = bar_models("fit")
+    exact = solids.dense_eigenvalues(mixed)
+    values = synthesize(distribute(mixed, 5, comm=COMM), 120, interface, COMM).values
+    assert (values[:60] >= exact[:60] - 1e-9 * exact[60]).all()
+    assert np.abs(values[:6]).max() < 1e-9 * values[-1]
+    assert values[6] < 1.5 * exact[6]
+
+
+@pytest.mark.parametrize("method", ["hcms", "slepc", "arpack"])
+def test_every_method_finds_the_modes_of_a_mixed_model(method):
+    _, mixed, _ = bar_models("fit")
+    exact = solids.dense_eigenvalues(mixed)
+    options = SolverOptions(modes=30, method=method, subdomains=5, tolerance=1e-11)
+    values = modal_analysis(mixed, options, COMM).values
+    assert np.abs(values[6:] / exact[6:30] - 1.0).max() < 1e-9
+
+
+def test_no_element_reaches_past_a_plane():
+    _, mixed, _ = bar_models()
+    local_mesh = distribute(mixed, 5, comm=COMM)
+    planes = local_mesh.planes()[local_mesh.cells.corners]
+    assert np.ptp(planes, axis=1).max() == 1
+    lattice = mixed.mesh.node_grid[local_mesh.nodes]
+    assert np.array_equal(local_mesh.lattice(), lattice)
+
+
+# Points and files
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_points_move_as_on_the_fine_mesh(seed):
+    fine, refined, blocks = random_blocks(seed, whole_hinges=False)
+    young = np.ones(fine.n_cells)
+    rng = np.random.default_rng(seed)
+    local = rng.uniform(0.01, 0.99, (fine.n_cells, 3))
+    points = fine.origin + fine.edge * (fine.grid + local)
+    mixed = build_model(fine, young, make_coarsening("average"), refined)
+    found = interpolation(mixed, points)
+    expected = interpolation(build_model(fine, young), points) @ prolongation(blocks)
+    assert np.abs(found - expected).max() < 1e-13
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """Modes files of the fine, the mixed and the coarse bar."""
+    folder, paths = tmp_path_factory.mktemp("mixed"), {}
+    for name, model in zip(("fine", "mixed", "coarse"), bar_models(), strict=True):
+        K, M = (matrix.toarray() for matrix in assembled(model))
+        values, modes = la.eigh(K, M, subset_by_index=[0, 19])
+        paths[name] = folder / f"{name}.h5"
+        write_modes(paths[name], model, values, [modes], np.zeros(20), {}, {})
+    return paths
+
+
+def test_a_mixed_model_is_read_as_it_was_written(files):
+    _, mixed, _ = bar_models()
+    again = read_modes(files["mixed"]).model
+    for field in ("cells", "grid", "node_grid", "span", "hanging"):
+        left, right = getattr(again.mesh, field), getattr(mixed.mesh, field)
+        assert np.array_equal(left, right) and left.dtype == right.dtype
+    for left, right in zip(assembled(again), assembled(mixed), strict=True):
+        assert_equal(left, right)
+
+
+def test_mixed_modes_are_compared_on_the_fine_mesh(files):
+    angles = {
+        name: compare_files(files[name], files["fine"]).subspace_angle_max
+        for name in ("mixed", "coarse")
+    }
+    assert 0.0 < angles["mixed"] < angles["coarse"] < 0.5 * np.pi
+    assert compare_files(files["mixed"], files["mixed"]).subspace_angle_max < 1e-6
+    assert np.isnan(compare_files(files["coarse"], files["mixed"]).subspace_angle_max)
+
+
+def test_modes_of_another_mixed_mesh_start_nothing(files):
+    _, mixed, coarse = bar_models()
+    other = bar_models(share=0.6)[1]
+    rows = modes_from_file(files["mixed"], mixed, 20, distribute(mixed, 4, comm=COMM), COMM)
+    assert rows.shape == (mixed.n_dofs, 20)
+    for model in (coarse, other):
+        local_mesh = distribute(model, 4, comm=COMM)
+        with pytest.raises(UserError, match="modes of another mesh"):
+            modes_from_file(files["mixed"], model, 20, local_mesh, COMM)
