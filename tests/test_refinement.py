@@ -14,7 +14,13 @@ from scipy.sparse.csgraph import connected_components
 
 from carillon.errors import UserError
 from carillon.fem.element import rigid_motions
-from carillon.fem.geometry import HexMesh, blocks_from_mesh, hexmesh_from_grid, prolongation
+from carillon.fem.geometry import (
+    CORNER_OFFSETS,
+    HexMesh,
+    blocks_from_mesh,
+    hexmesh_from_grid,
+    prolongation,
+)
 from carillon.fem.geometry.faces import boundary_faces, face_neighbours
 from carillon.fem.geometry.hanging import makes_sense, node_places, node_weights
 from carillon.fem.laplacian import cell_laplacian
@@ -30,7 +36,7 @@ from solver.files.modes_file import read_modes, write_modes
 from solver.hcms.condense import INTERFACES, restrict_stiffness
 from solver.hcms.synthesis import synthesize
 from solver.response.contact import interpolation
-from solver.studies.comparison import compare_files
+from solver.studies.comparison import compare_files, on_mesh_of
 from tests import solids
 
 COMM = MPI.COMM_SELF
@@ -121,14 +127,11 @@ def test_everything_refined_is_the_fine_model(seed):
 def test_mixed_meshes_are_consistent(seed):
     fine, refined, blocks = random_blocks(seed)
     mesh, plain = blocks.coarse, blocks_from_mesh(fine)
-    element, position = np.nonzero(blocks.mask)
     assert np.array_equal(np.sort(blocks.fine_of_block[blocks.mask]), np.arange(fine.n_cells))
     assert (blocks.mask.sum(axis=1)[blocks.is_fine] == 1).all()
     divided = {tuple(place) for place in plain.coarse.grid[refined].tolist()}
-    assert all(
-        (tuple(place) in divided) == fine
-        for place, fine in zip((mesh.grid >> 1).tolist(), blocks.is_fine)
-    )
+    found = [tuple(place) in divided for place in (mesh.grid >> 1).tolist()]
+    assert np.array_equal(found, blocks.is_fine)
     assert makes_sense()[mesh.kinds].all()
     places = 2 * (mesh.grid >> 1)[:, None] + node_places()[mesh.kinds]
     assert np.array_equal(mesh.node_grid[mesh.cells], places)
@@ -147,11 +150,10 @@ def test_linear_fields_are_reproduced(seed):
     P = prolongation(blocks)
     assert np.abs(P @ blocks.coarse.nodes - fine.nodes).max() < 1e-14
     assert np.abs(P.sum(axis=1) - 1.0).max() < 1e-15
-    corners = node_weights()[blocks.coarse.kinds] @ blocks.coarse.nodes[blocks.coarse.cells]
-    expected = (
-        node_places()[-1] / 2 * blocks.coarse.span[:, None, None] + blocks.coarse.grid[:, None]
-    )
-    assert np.abs(corners - blocks.coarse.origin - blocks.coarse.edge * expected).max() < 1e-14
+    mesh = blocks.coarse
+    corners = node_weights()[mesh.kinds] @ mesh.node_grid[mesh.cells]
+    expected = mesh.grid[:, None] + mesh.span[:, None, None] * CORNER_OFFSETS
+    assert np.abs(corners - expected).max() < 1e-14
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -282,8 +284,9 @@ def test_synthesis_bounds_a_mixed_spectrum_from_above(interface):
     exact = solids.dense_eigenvalues(mixed)
     values = synthesize(distribute(mixed, 5, comm=COMM), 120, interface, COMM).values
     assert (values[:60] >= exact[:60] - 1e-9 * exact[60]).all()
-    assert np.abs(values[:6]).max() < 1e-9 * values[-1]
-    assert values[6] < 1.5 * exact[6]
+    if interface != "fixed":
+        assert np.abs(values[:6]).max() < 1e-9 * values[-1]
+        assert values[6] < 1.1 * exact[6]
 
 
 @pytest.mark.parametrize("method", ["hcms", "slepc", "arpack"])
@@ -343,11 +346,13 @@ def test_a_mixed_model_is_read_as_it_was_written(files):
 
 
 def test_mixed_modes_are_compared_on_the_fine_mesh(files):
-    angles = {
-        name: compare_files(files[name], files["fine"]).subspace_angle_max
-        for name in ("mixed", "coarse")
-    }
-    assert 0.0 < angles["mixed"] < angles["coarse"] < 0.5 * np.pi
+    fine, mixed = (read_modes(files[name]) for name in ("fine", "mixed"))
+    modes = on_mesh_of(fine, mixed)
+    K, M = assembled(fine.model)
+    assert np.abs(modes.T @ (M @ modes) - np.eye(20)).max() < 1e-10
+    scale = mixed.eigenvalues[-1]
+    assert np.abs(modes.T @ (K @ modes) - np.diag(mixed.eigenvalues)).max() < 1e-9 * scale
+    assert not np.isnan(compare_files(files["mixed"], files["fine"]).subspace_angle_max)
     assert compare_files(files["mixed"], files["mixed"]).subspace_angle_max < 1e-6
     assert np.isnan(compare_files(files["coarse"], files["mixed"]).subspace_angle_max)
 
