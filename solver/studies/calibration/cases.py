@@ -16,20 +16,21 @@ from scipy.sparse.linalg import eigsh
 
 from carillon.fem.block import ALL_FILLED, degrees_of_freedom
 from carillon.fem.element import quadrature_stiffness
-from carillon.fem.geometry.hexmesh import hexmesh_from_grid
+from carillon.fem.geometry import HexMesh, blocks_from_mesh, hexmesh_from_grid
 from carillon.fem.model import RIGID_MODES, ElasticModel
 from carillon.files import create_h5, open_h5
 from dataset_gen.objectives import fit, orientations
 from dataset_gen.objectives.calibrated import contrast_logs
 from dataset_gen.objectives.calibration import octant_orbits
 from solver.assembly.sparse import assembled
+from solver.coarsening.model import block_moduli, coarse_model
 from solver.studies.calibration.constants import FILLED, LUMPED, VOID, CalibrationConstants
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 KIND = "calibration case"
-SCHEMA = 1
+SCHEMA = 2
 
 SHIFT = -0.05
 """Of the inverse iteration, in units of the lowest elastic eigenvalue."""
@@ -57,18 +58,29 @@ class SpectrumCase:
     ----------
     name
         Of the shape and of the material, with a colon between.
+    fine, young
+        Fine mesh and its moduli (m,) [Pa].
     model
         Coarse model; its moduli are placeholders.
     blocks : (mc, 8)
-        Fine moduli [Pa], 0 where void.
+        Fine moduli [Pa] of its elements, 0 where void.
     exact : (k,)
         Elastic angular frequencies [rad/s] of the fine model.
     """
 
     name: str
+    fine: HexMesh
+    young: Array
     model: ElasticModel
     blocks: Array
     exact: Array
+
+    @classmethod
+    def of_solid(cls, name: str, fine: HexMesh, young: Array, exact: Array) -> SpectrumCase:
+        """Case of a fine mesh with moduli (m,) [Pa]."""
+        blocks = blocks_from_mesh(fine)
+        e = block_moduli(blocks, young)
+        return cls(name, fine, young, coarse_model(blocks, np.ones_like(e)), e, exact)
 
     @cached_property
     def dofs(self) -> Integers:
@@ -167,9 +179,9 @@ def write_case(path: Path, case: SpectrumCase) -> None:
     """Write a case atomically."""
     with create_h5(path, KIND, SCHEMA, sealed=True) as file:
         file.attrs["name"] = case.name
-        file.attrs["cell_edge"] = case.model.mesh.edge
-        file["grid"] = case.model.mesh.grid
-        for name, unit in (("blocks", "Pa"), ("exact", "rad/s")):
+        file.attrs["cell_edge"] = case.fine.edge
+        file["grid"] = case.fine.grid
+        for name, unit in (("young", "Pa"), ("exact", "rad/s")):
             file.create_dataset(name, data=getattr(case, name), fletcher32=True)
             file[name].attrs["units"] = unit
 
@@ -184,7 +196,6 @@ def read_case(path: Path) -> SpectrumCase:
     """
     with open_h5(path, KIND, SCHEMA, sealed=True) as file:
         grid, edge = file["grid"][()], float(file.attrs["cell_edge"])
-        blocks, exact, name = file["blocks"][()], file["exact"][()], str(file.attrs["name"])
-    mesh = hexmesh_from_grid(grid, np.zeros(3), edge)
-    fill = np.packbits(blocks > 0.0, axis=1, bitorder="little").ravel()
-    return SpectrumCase(name, ElasticModel(mesh, np.ones_like(blocks), fill), blocks, exact)
+        young, exact, name = file["young"][()], file["exact"][()], str(file.attrs["name"])
+    fine = hexmesh_from_grid(grid, np.zeros(3), edge)
+    return SpectrumCase.of_solid(name, fine, young, exact)

@@ -25,7 +25,6 @@ from carillon.fem.model import RIGID_MODES, fine_model
 from carillon.progress import track
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
-from solver.coarsening.model import block_moduli, coarse_model
 from solver.studies.calibration.cases import SpectrumCase, write_case
 from solver.studies.calibration.solids import random_solid
 
@@ -46,15 +45,14 @@ OBJECT_RESOLUTIONS = (20, 27)
 
 def _case(name: str, mesh: HexMesh, young: Array) -> SpectrumCase | None:
     """Case of a solid, None if it is too large or too small."""
-    blocks = blocks_from_mesh(mesh)
-    e = block_moduli(blocks, young)
-    coarse = coarse_model(blocks, np.ones_like(e))
+    coarse = blocks_from_mesh(mesh).coarse
     if coarse.n_dofs > LARGEST or coarse.n_dofs < 3 * MODES:
         return None
     options = SolverOptions(method="slepc", modes=MODES)
     result = modal_analysis(fine_model(mesh, young), options, MPI.COMM_SELF)
     result.system.destroy()
-    return SpectrumCase(name, coarse, e, np.sqrt(result.values[RIGID_MODES:]))
+    exact = np.sqrt(result.values[RIGID_MODES:])
+    return SpectrumCase.of_solid(name, mesh, young, exact)
 
 
 def _object(name: str, resolution: int, material: str) -> SpectrumCase | None:

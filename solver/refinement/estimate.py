@@ -1,0 +1,117 @@
+"""How far off a coarse model's frequencies are, and through which elements.
+
+`TwoGrid` gives the frequencies of the fine solid to a few tenths of what the coarse ones miss. The
+coarse eigenvalue and the fine one differ by what the elements make of the same motion: with a fine
+mode v and the coarse displacements u that are nearest to it (in the norm of the mass) the strain
+energy of an element, u^T K_c u, ought to be that of its fine cells, v^T K v. How far it is from
+that, relative to the mode's, is the element's share of the error. It tells which elements to keep
+fine; the sum of the shares is not the error, since u is no coarse mode.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.linalg import splu
+
+from carillon.fem.geometry import Blocks, prolongation
+from carillon.fem.model import RIGID_MODES, ElasticModel
+from solver.assembly.sparse import sum_blocks
+from solver.refinement.energies import element_energies, fine_energies
+from solver.refinement.two_grid import TwoGrid
+
+Array = NDArray[np.float64]
+
+LAST = 60
+"""Number of the last mode whose error is estimated; the first is 7."""
+
+GUARD = 12
+"""Modes beyond it that are corrected with them, since modes may change places."""
+
+WORST = 3.0
+"""The worst frequency may be off by so many times what their root mean square may."""
+
+
+@dataclass(frozen=True)
+class ErrorEstimate:
+    """Expected errors of a coarse model's frequencies.
+
+    Attributes
+    ----------
+    errors : (k,)
+        Relative errors of the frequencies of modes 7, 8, ... in the order of their numbers.
+    shares : (mc,)
+        Root mean square over these modes, worse ones counting more, of each element's share of the
+        eigenvalues' error.
+    """
+
+    errors: Array
+    shares: Array
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the errors."""
+        return float(np.sqrt(np.mean(self.errors**2)))
+
+    @property
+    def worst(self) -> float:
+        """Error of largest magnitude, with its sign."""
+        return float(self.errors[np.abs(self.errors).argmax()])
+
+    @property
+    def worst_mode(self) -> int:
+        """Number of the mode that has it, from 1."""
+        return RIGID_MODES + 1 + int(np.abs(self.errors).argmax())
+
+    def excess(self, tolerance: float) -> float:
+        """How many times as large as allowed the errors are: their rms, or a third of the worst."""
+        return max(self.rms, abs(self.worst) / WORST) / tolerance
+
+
+def estimate_errors(
+    two_grid: TwoGrid, blocks: Blocks, coarse: ElasticModel, values: Array, modes: Array
+) -> ErrorEstimate:
+    """Expected errors of the frequencies of a coarse model, up to mode `LAST`.
+
+    Parameters
+    ----------
+    two_grid
+        Of the fine solid.
+    blocks, coarse
+        The coarse mesh, plain or mixed, and the model on it.
+    values, modes
+        (k,) eigenvalues [rad^2/s^2] and (coarse n_dofs, k) modes, the six rigid ones included.
+    """
+    used = slice(RIGID_MODES, min(len(values), LAST + GUARD))
+    exact, vectors = two_grid.lowest(blocks, np.ascontiguousarray(modes[:, used]))
+    count = min(len(exact), LAST - RIGID_MODES)
+    exact, vectors = exact[:count], vectors[:, :count]
+    ratio = np.maximum(values[RIGID_MODES : RIGID_MODES + count], 0.0) / exact
+    errors = np.sqrt(ratio) - 1.0
+    nearest = _nearest(blocks, coarse, two_grid.fine, vectors)
+    missed = element_energies(coarse, nearest) - fine_energies(blocks, two_grid.fine, vectors)
+    weight = np.abs(errors) + np.sqrt(np.mean(errors**2))
+    weight = np.ones_like(errors)
+    shares = np.sqrt(np.mean((missed / exact * weight) ** 2, axis=1))
+    return ErrorEstimate(errors, np.where(blocks.is_fine, 0.0, shares))
+
+
+def _nearest(blocks: Blocks, coarse: ElasticModel, fine: ElasticModel, vectors: Array) -> Array:
+    """Displacements (coarse n_dofs, k) whose interpolation is nearest in the norm of the mass."""
+    interpolation = prolongation(blocks)
+    projected = interpolation.T @ (_nodal_mass(fine) @ vectors.reshape(fine.mesh.n_nodes, -1))
+    # Summed over elements: hinges, which the interpolation closes, can leave P^T M P singular.
+    consistent = _nodal_mass(replace(coarse, lumped=False, lumped_share=0.0))
+    solved = splu(consistent.tocsc()).solve(projected)
+    return np.ascontiguousarray(solved.reshape(coarse.n_dofs, -1))
+
+
+def _nodal_mass(model: ElasticModel) -> sp.csr_matrix:
+    """Mass matrix (n, n) [kg], the same for each displacement component."""
+    cells = model.mesh.cells
+    rows, columns = np.repeat(cells, 8, axis=1).ravel(), np.tile(cells, (1, 8)).ravel()
+    blocks = model.nodal_mass().reshape(-1, 1, 1)
+    return sum_blocks(rows, columns, blocks, (model.mesh.n_nodes,) * 2)
