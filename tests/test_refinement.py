@@ -24,7 +24,7 @@ from carillon.fem.geometry import (
     hexmesh_from_grid,
     prolongation,
 )
-from carillon.fem.geometry.faces import boundary_faces, face_neighbours
+from carillon.fem.geometry.faces import boundary_faces, corner_values, face_neighbours
 from carillon.fem.geometry.hanging import makes_sense, node_places, node_weights
 from carillon.fem.laplacian import cell_laplacian
 from carillon.fem.model import Elements
@@ -146,6 +146,17 @@ def test_mixed_meshes_are_consistent(seed):
     part = {tuple(cells): bits for cells, bits in zip(plain.fine_of_block.tolist(), plain.contacts)}
     for cells, bits, own in zip(blocks.fine_of_block.tolist(), blocks.contacts, blocks.is_fine):
         assert own or part[tuple(cells)] == bits
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_open_faces_of_a_mixed_mesh_are_squares(seed):
+    _, _, blocks = random_blocks(seed)
+    mesh = blocks.coarse
+    quads, cells = boundary_faces(mesh)
+    corners = corner_values(mesh, mesh.node_grid.astype(float), quads, cells)
+    diagonals = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
+    area = np.cross(*diagonals) / 2
+    assert np.array_equal(np.abs(area).sum(axis=1), mesh.span[cells].astype(float) ** 2)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
