@@ -18,6 +18,7 @@ from mpi4py import MPI
 from carillon.errors import UserError
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.geometry import hexmesh_from_grid
+from carillon.fem.geometry.hanging import WHOLE
 from carillon.fem.model import ElasticModel
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
@@ -64,7 +65,18 @@ def shares_make_up_the_solid() -> None:
 
 
 def products_are_those_of_the_whole_matrices() -> None:
-    model = solids.random_box(9, 6, 5)
+    _check_products(solids.random_box(9, 6, 5))
+
+
+def products_of_a_mixed_model() -> None:
+    _, model, _ = solids.bar_models("fit")
+    _check_products(model)
+    kinds = distribute(on_first(model), PARTS, comm=COMM).cells.elements.kinds
+    # So a share without elements of twice the edge is among those of three ranks.
+    assert (COMM.allreduce(int((kinds < WHOLE).all())) > 0) == (COMM.size > 2)
+
+
+def _check_products(model: ElasticModel) -> None:
     system = assemble(distribute(on_first(model), PARTS, comm=COMM), COMM)
     block = np.random.default_rng(0).standard_normal((model.n_dofs, 3))
     for whole, product in zip(assembled(model), (system.times_stiffness, system.times_mass)):
@@ -236,6 +248,19 @@ def synthesis_bounds_the_spectrum() -> None:
     assert np.abs(gram - np.eye(len(gram))).max() < 1e-9
     stiff = system.inner(vectors, system.times_stiffness(vectors))
     assert np.abs(stiff - np.diag(result.values)).max() < 1e-7 * result.values[-1]
+
+
+def mixed_models_are_solved_by_every_method() -> None:
+    _, model, _ = solids.bar_models("fit")
+    exact = solids.dense_eigenvalues(model)[:40]
+    local_mesh = distribute(on_first(model), PARTS, comm=COMM)
+    for interface in INTERFACES:
+        values = synthesize(local_mesh, 80, interface, COMM).values[:40]
+        assert (values >= exact - 1e-9 * exact[-1]).all()
+    for method in ("hcms", "slepc"):
+        options = SolverOptions(modes=40, method=method, subdomains=PARTS, tolerance=1e-11)
+        values = modal_analysis(on_first(model), options, COMM).values
+        assert np.abs(values[6:] / exact[6:] - 1.0).max() < 1e-9, method
 
 
 def synthesis_with_every_interface(path: Path) -> None:

@@ -11,10 +11,12 @@ from numpy.polynomial import legendre
 
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.element import elasticity_matrix
-from carillon.fem.geometry import HexMesh, hexmesh_from_grid
+from carillon.fem.geometry import HexMesh, blocks_from_mesh, hexmesh_from_grid
 from carillon.fem.model import ElasticModel, fine_model
 from solver.assembly.sparse import assembled
 from solver.assembly.system import System
+from solver.coarsening.choice import make_coarsening
+from solver.coarsening.model import build_model
 
 
 def box_mesh(nx: int, ny: int, nz: int, edge: float = 0.01) -> HexMesh:
@@ -34,6 +36,29 @@ def uniform_box(nx: int, ny: int, nz: int, edge: float, young: float = 1e9) -> E
     """Homogeneous box."""
     mesh = box_mesh(nx, ny, nz, edge)
     return fine_model(mesh, np.full(mesh.n_cells, young))
+
+
+def bar_models(
+    method: str = "galerkin", share: float = 0.3
+) -> tuple[ElasticModel, ElasticModel, ElasticModel]:
+    """A bar with a corner and a groove cut away: fine, mixed, and coarse by `method`.
+
+    One end of the mixed one is fine, and `share` of the other blocks.
+    """
+    grid = box_mesh(16, 5, 4).grid
+    corner = (grid >= np.array([13, 2, 2])).all(axis=1)
+    groove = (grid[:, 0] == 8) & (grid[:, 2] == 3)
+    mesh = hexmesh_from_grid(grid[~(corner | groove)], np.zeros(3), 0.01)
+    rng = np.random.default_rng(5)
+    young = 1e9 * 10.0 ** rng.uniform(-1.0, 1.0, mesh.n_cells)
+    blocks = blocks_from_mesh(mesh).coarse.grid
+    refined = (rng.random(len(blocks)) < share) | (blocks[:, 0] < 3)
+    coarsening = make_coarsening(method)
+    return (
+        fine_model(mesh, young),
+        build_model(mesh, young, coarsening, refined),
+        build_model(mesh, young, coarsening),
+    )
 
 
 def symmetric_solid(inside: Callable[[np.ndarray], np.ndarray], cells: int) -> ElasticModel:

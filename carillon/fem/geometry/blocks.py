@@ -151,9 +151,9 @@ def prolongation(blocks: Blocks) -> sp.csr_matrix:
     """Trilinear interpolation from coarse to fine nodes, (n_fine_nodes, n_coarse_nodes).
 
     A fine node on a coarse node takes its value; on an edge, face or in the middle of an element,
-    the mean of the 2, 4 or 8 coarse nodes around it. Where parts of one block meet at an edge only,
-    it is the mean of what they say. Displacements use
-    ``scipy.sparse.kron(prolongation(blocks), scipy.sparse.identity(3))``.
+    the mean of the 2, 4 or 8 coarse nodes around it, which is what a hanging node takes as well.
+    Where parts of one block meet at an edge only, it is the mean of what they say. Displacements
+    use ``scipy.sparse.kron(prolongation(blocks), scipy.sparse.identity(3))``.
     """
     fine, coarse = blocks.fine, blocks.coarse
     element, position = np.nonzero(blocks.mask)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from carillon.fem.geometry.hanging import node_weights
 from carillon.fem.geometry.hexmesh import HexMesh
 
 DIRECTIONS = np.array(
@@ -36,14 +37,31 @@ def face_neighbours(mesh: HexMesh) -> np.ndarray:
 
 
 def boundary_faces(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray]:
-    """Quads (q, 4) int32 that no other cell shares, and the cell (q,) that each belongs to."""
+    """Quads (q, 4) int32 that no other cell shares, and the cell (q,) that each belongs to.
+
+    Those of a large cell are among them if fine cells cover them in part.
+    """
     quads, cells = [], []
+    size = np.ones(mesh.n_cells) if mesh.span is None else mesh.span.astype(float) ** 2
     for face, corners in enumerate(FACE_CORNERS):
         own, opposite = _face_numbers(mesh, face, face ^ 1)
-        is_open = np.flatnonzero(~np.isin(own, opposite))
+        covered = np.bincount(opposite, size, minlength=own.max(initial=0) + 1)[own]
+        is_open = np.flatnonzero(covered < size)
         quads.append(mesh.cells[is_open][:, corners])
         cells.append(is_open)
     return np.concatenate(quads), np.concatenate(cells)
+
+
+def corner_values(
+    mesh: HexMesh, values: np.ndarray, quads: np.ndarray, cells: np.ndarray
+) -> np.ndarray:
+    """Values (q, 4, d) at the corners of the `boundary_faces`, from those (n, d) of the nodes."""
+    if mesh.kinds is None:
+        return np.asarray(values[quads])
+    nodes = mesh.cells[cells]
+    corner = (nodes[:, None, :] == quads[:, :, None]).argmax(axis=2)
+    weights = node_weights()[mesh.kinds[cells][:, None], corner]
+    return np.asarray(np.einsum("qck,qkd->qcd", weights, values[nodes]))
 
 
 def surface_quads(mesh: HexMesh) -> np.ndarray:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from carillon.fem.geometry.faces import boundary_faces, surface_quads
+from carillon.fem.geometry.faces import boundary_faces, corner_values, surface_quads
 from carillon.fem.geometry.hexmesh import HexMesh
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ def draw(
         if values is None:
             values = np.linalg.norm(displacement, axis=1)
     points = (mesh.nodes + _drawn_motion(mesh, displacement, scale)) @ turn.T
-    corners = points[quads]
+    corners = corner_values(mesh, points, quads, cell)
 
     if values is None:
         face_values = None
@@ -96,7 +96,7 @@ def draw(
         low, high = limits or (float(face_values.min()), float(face_values.max()))
         mapping = ScalarMappable(Normalize(low, high if high > low else low + 1.0), cmap)
         colours = mapping.to_rgba(face_values)[:, :3]
-    colours = np.clip(colours * _light(points, quads, view)[:, None], 0, 1)
+    colours = np.clip(colours * _light(corners, quads, view)[:, None], 0, 1)
 
     polygons = Poly3DCollection(corners, facecolors=colours, edgecolors=colours * 0.86)
     polygons.set_linewidth(0.25)
@@ -236,18 +236,17 @@ def _on_faces(mesh: HexMesh, values: np.ndarray, quads: np.ndarray, cell: np.nda
     )
 
 
-def _light(points: np.ndarray, quads: np.ndarray, view: tuple[float, float]) -> np.ndarray:
+def _light(corners: np.ndarray, quads: np.ndarray, view: tuple[float, float]) -> np.ndarray:
     """Brightness of each face (q,): ambient, key and fill light.
 
     The face's own normal shows the voxels; the normal averaged over `SMOOTHING_RINGS` rings of
     neighbours shows the shape that they approximate. Their sum shows both.
     """
-    corners = points[quads]
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     normal = _unit(normal)
     smooth = normal
     for _ in range(SMOOTHING_RINGS):
-        at_nodes = np.zeros_like(points)
+        at_nodes = np.zeros((quads.max() + 1, 3))
         np.add.at(at_nodes, quads, smooth[:, None, :])
         smooth = _unit(_unit(at_nodes)[quads].mean(axis=1))
     return _brightness(_unit(normal + 1.2 * smooth), view)
