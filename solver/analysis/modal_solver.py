@@ -85,6 +85,12 @@ class Modes:
         blocks = [self.vectors[:, RIGID_MODES:], *([] if self.guard is None else [self.guard])]
         return np.concatenate(blocks, axis=1)
 
+    def destroy(self) -> None:
+        """Free what numpy does not; collective."""
+        if self.inverse is not None:
+            self.inverse.destroy()
+        self.system.destroy()
+
 
 @dataclass
 class _Solution:

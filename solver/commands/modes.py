@@ -9,12 +9,14 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import time
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.fem.model import RIGID_MODES, ElasticModel
 from carillon.options import add_options, collect
 from carillon.progress import say
 from solver.analysis.modal_solver import ModalSolver, Modes
@@ -23,8 +25,10 @@ from solver.analysis.problem import Problem, ProblemOptions, build_problem
 from solver.commands.running import add_solid, on_ranks, parameters, require_outputs
 from solver.distribution.collective import compute_on_root
 from solver.files.initial_modes import modes_from_file
-from solver.files.modes_file import frequencies, write_modes
+from solver.files.modes_file import frequencies, read_modes, write_modes
 from solver.linear import petsc_options
+from solver.refinement.options import RefinementOptions
+from solver.refinement.refine import RefinedModel, Step, evidence_of, solve_refined
 
 EXAMPLES = """examples:
   modes builtin:bell --resolution 32 --out bell.h5
@@ -36,6 +40,7 @@ EXAMPLES = """examples:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     add_solid(parser)
+    add_options(parser, RefinementOptions)
     add_options(parser, SolverOptions, leave_out=("seed",))
     parser.add_argument("--out", required=True, help="modes file to write (HDF5)")
     parser.add_argument(
@@ -55,18 +60,35 @@ def run(arguments: argparse.Namespace) -> None:
         require_outputs(arguments, comm)
         described = collect(ProblemOptions, arguments)
         options = collect(SolverOptions, arguments)
+        tolerance = collect(RefinementOptions, arguments).tolerance(described.coarsen)
+        if options.modes <= RIGID_MODES:
+            tolerance = None
         problem = compute_on_root(comm, lambda: build_problem(described))
-        model = None if problem is None else problem.model
         petsc_options.insert_options(arguments.petsc, options.method)
-        prepared = ModalSolver(model, options, comm, verbose=sys.stderr.isatty())
-        initial_modes = None
-        if arguments.initial_modes is not None:
-            initial_modes = modes_from_file(
-                arguments.initial_modes, model, options.modes, prepared.local_mesh, comm
-            )
-        result = prepared.solve(initial_modes=initial_modes)
-        result.seconds = {**prepared.seconds, **result.seconds}
-        attributes = {} if problem is None else _attributes(arguments, problem, result)
+        initial = arguments.initial_modes
+
+        def solve(model: ElasticModel | None) -> Modes:
+            nonlocal initial
+            prepared = ModalSolver(model, options, comm, verbose=sys.stderr.isatty())
+            start = None
+            if initial is not None:
+                start = modes_from_file(initial, model, options.modes, prepared.local_mesh, comm)
+                initial = None
+            result = prepared.solve(initial_modes=start)
+            result.seconds = {**prepared.seconds, **result.seconds}
+            return result
+
+        begin = time.perf_counter()
+        if tolerance is None:
+            model = None if problem is None else problem.model
+            result, achieved = solve(model), {}
+        else:
+            refined = compute_on_root(comm, lambda: _refined(problem, described, initial))
+            model, result, steps = solve_refined(solve, refined, tolerance, comm, _report)
+            achieved = evidence_of(steps)
+            spent = time.perf_counter() - begin - sum(result.seconds.values())
+            result.seconds = {"refinement": spent, **result.seconds}
+        attributes = {} if problem is None else _attributes(arguments, problem, result, achieved)
 
         def write(blocks: Iterator[NDArray[np.float64]]) -> None:
             assert model is not None
@@ -86,13 +108,34 @@ def run(arguments: argparse.Namespace) -> None:
             _print_summary(attributes, result.values, arguments)
 
 
+def _refined(
+    problem: Problem | None, described: ProblemOptions, initial: str | None
+) -> RefinedModel:
+    """The coarse model, with those blocks fine that are so in the file to start from."""
+    assert problem is not None
+    coarsening = described.coarsening()
+    assert coarsening is not None
+    mesh = None if initial is None else read_modes(initial, with_modes=False).mesh
+    return RefinedModel(problem, coarsening, mesh)
+
+
+def _report(step: Step) -> None:
+    say(
+        f"{step.unknowns:,} unknowns, {step.fine_blocks:,} blocks fine: frequencies are expected "
+        f"to be {step.rms:.1%} off, mode {step.worst_mode} {step.worst:+.1%}",
+        visible=sys.stderr.isatty(),
+    )
+
+
 def _warn_about_options() -> None:
     unused = petsc_options.unused_options()
     if unused:
         say(f"warning: PETSc had no use for {', '.join(unused)}; see whether the names are right")
 
 
-def _attributes(arguments: argparse.Namespace, problem: Problem, result: Modes) -> dict[str, Any]:
+def _attributes(
+    arguments: argparse.Namespace, problem: Problem, result: Modes, achieved: dict[str, Any]
+) -> dict[str, Any]:
     attributes: dict[str, Any] = {
         "method": arguments.method,
         "coarsen": arguments.coarsen,
@@ -104,6 +147,7 @@ def _attributes(arguments: argparse.Namespace, problem: Problem, result: Modes) 
         "fine_n_dofs": problem.fine.n_dofs,
         **problem.coarsening,
         **result.evidence,
+        **achieved,
         "timings": {**problem.seconds, **result.seconds},
     }
     if arguments.tolerance is not None:
@@ -130,3 +174,13 @@ def _print_summary(
         f"orthogonal to {attributes['orthogonality']:.1e}, {total:.1f} s on {attributes['ranks']} "
         f"rank{'s' if attributes['ranks'] > 1 else ''}"
     )
+    if "expected_frequency_error_rms" in attributes:
+        first, last = attributes["expected_frequency_error_modes"]
+        kept = attributes["fine_blocks"]
+        print(
+            f"expected error of frequencies {first} to {last}: "
+            f"{attributes['expected_frequency_error_rms']:.1%} rms, worst "
+            f"{attributes['expected_frequency_error_worst']:+.1%} (mode "
+            f"{attributes['expected_frequency_error_worst_mode']}); "
+            f"{kept:,} block{'s' if kept != 1 else ''} kept fine"
+        )

@@ -28,8 +28,8 @@ Array = NDArray[np.float64]
 LAST = 60
 """Number of the last mode whose error is estimated; the first is 7."""
 
-GUARD = 12
-"""Modes beyond it that are corrected with them, since modes may change places."""
+MODES_USED = LAST + 12
+"""Modes that are corrected, since modes may change places."""
 
 WORST = 3.0
 """The worst frequency may be off by so many times what their root mean square may."""
@@ -44,8 +44,8 @@ class ErrorEstimate:
     errors : (k,)
         Relative errors of the frequencies of modes 7, 8, ... in the order of their numbers.
     shares : (mc,)
-        Root mean square over these modes, worse ones counting more, of each element's share of the
-        eigenvalues' error.
+        Root mean square over these modes of each element's share of the eigenvalues' error; 0 for
+        fine cells.
     """
 
     errors: Array
@@ -85,17 +85,15 @@ def estimate_errors(
     values, modes
         (k,) eigenvalues [rad^2/s^2] and (coarse n_dofs, k) modes, the six rigid ones included.
     """
-    used = slice(RIGID_MODES, min(len(values), LAST + GUARD))
-    exact, vectors = two_grid.lowest(blocks, np.ascontiguousarray(modes[:, used]))
+    elastic = np.ascontiguousarray(modes[:, RIGID_MODES:MODES_USED])
+    exact, vectors = two_grid.lowest(blocks, elastic)
     count = min(len(exact), LAST - RIGID_MODES)
     exact, vectors = exact[:count], vectors[:, :count]
     ratio = np.maximum(values[RIGID_MODES : RIGID_MODES + count], 0.0) / exact
     errors = np.sqrt(ratio) - 1.0
     nearest = _nearest(blocks, coarse, two_grid.fine, vectors)
     missed = element_energies(coarse, nearest) - fine_energies(blocks, two_grid.fine, vectors)
-    weight = np.abs(errors) + np.sqrt(np.mean(errors**2))
-    weight = np.ones_like(errors)
-    shares = np.sqrt(np.mean((missed / exact * weight) ** 2, axis=1))
+    shares = np.sqrt(np.mean((missed / exact) ** 2, axis=1))
     return ErrorEstimate(errors, np.where(blocks.is_fine, 0.0, shares))
 
 

@@ -1,0 +1,46 @@
+"""How near the frequencies of a coarse model shall be to those of the fine one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from carillon.arguments import number_between
+from carillon.errors import UserError
+from carillon.options import option
+from solver.coarsening.forest import FOREST
+
+ALLOWED_ERROR = 0.05
+"""Expected error of frequencies that blocks are kept fine for if nothing is said."""
+
+
+@dataclass(frozen=True)
+class RefinementOptions:
+    """Which error a coarse model may have."""
+
+    refine_to: float | None = option(
+        None,
+        "keep blocks fine until the expected error of the frequencies of modes 7 to 60 is at most "
+        "so large: its root mean square, and a third of the worst (default "
+        f"{ALLOWED_ERROR:g} with --coarsen {FOREST}; 0 keeps none fine and expects nothing)",
+        type=number_between(0.0, 10.0),
+        metavar="ERROR",
+    )
+
+    def tolerance(self, coarsen: str) -> float | None:
+        """The allowed error; None if nothing is to be estimated.
+
+        Raises
+        ------
+        UserError
+            If it was given and there is no coarse mesh.
+        """
+        if coarsen == "none":
+            if self.refine_to is not None:
+                raise UserError(
+                    "--refine-to keeps blocks of a coarse mesh fine, and there is none: add "
+                    f"--coarsen {FOREST} or leave it out"
+                )
+            return None
+        if self.refine_to is None:
+            return ALLOWED_ERROR if coarsen == FOREST else None
+        return self.refine_to or None

@@ -1,0 +1,204 @@
+"""Coarse models whose worst blocks stay fine, until the expected error is small enough."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from carillon.fem.geometry import Blocks, HexMesh, blocks_from_mesh, blocks_with_coarse
+from carillon.fem.model import RIGID_MODES, Constants, ElasticModel, fine_model
+from solver.analysis.modal_solver import Modes
+from solver.analysis.problem import Problem
+from solver.coarsening.coarsening import Coarsening
+from solver.coarsening.model import coarse_model, element_moduli
+from solver.distribution.collective import bcast_from_root
+from solver.refinement.estimate import MODES_USED, ErrorEstimate, estimate_errors
+from solver.refinement.two_grid import TwoGrid
+
+Array = NDArray[np.float64]
+
+REMAINING = 0.6
+"""Share of the allowed error that elements are refined to in a step, if shares were errors."""
+
+HASTE = 0.85
+"""What that is multiplied by from step to step, so that they end."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A coarse mesh that was tried.
+
+    Attributes
+    ----------
+    unknowns
+        Of its model.
+    fine_blocks
+        Number of blocks that stay fine.
+    rms, worst, worst_mode
+        Expected relative errors of the frequencies of modes 7 to `last`.
+    """
+
+    unknowns: int
+    fine_blocks: int
+    rms: float
+    worst: float
+    worst_mode: int
+    last: int
+
+
+class RefinedModel:
+    """A coarse model and which of its blocks stay fine.
+
+    Parameters
+    ----------
+    problem
+        The fine mesh with its moduli, and a coarse model, whose constants count.
+    coarsening
+        Of the other blocks.
+    mesh
+        Coarse mesh to begin with, perhaps mixed; the plain one if it is none of this fine mesh.
+    threads
+        Threads for products with blocks of vectors.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        coarsening: Coarsening,
+        mesh: HexMesh | None = None,
+        threads: int = 1,
+    ) -> None:
+        model = problem.model
+        self._young = problem.young
+        self._coarsening = coarsening
+        self._constants: Constants = {
+            "poisson": model.poisson,
+            "density": model.density,
+            "lumped": model.lumped,
+        }
+        self._plain = blocks_from_mesh(problem.fine)
+        given = None if mesh is None else blocks_with_coarse(problem.fine, mesh)
+        self.blocks = self._plain if given is None else given
+        fine = fine_model(problem.fine, problem.young, **self._constants)
+        self._two_grid = TwoGrid(fine, threads)
+        self._steps = 0
+
+    @property
+    def model(self) -> ElasticModel:
+        """The model as it is now."""
+        moduli = element_moduli(self.blocks, self._young, self._coarsening)
+        fraction = self._coarsening.lumped_fraction
+        return coarse_model(self.blocks, moduli, fraction, **self._constants)
+
+    @property
+    def fine_blocks(self) -> int:
+        """Number of blocks that stay fine."""
+        cells = self.blocks.coarse.grid[self.blocks.is_fine] >> 1
+        return len(np.unique(cells, axis=0))
+
+    def advance(self, values: Array, modes: Array, tolerance: float) -> tuple[Step, bool]:
+        """Rate the model by its eigenvalues (k,) and modes (n_dofs, k), and refine it.
+
+        Returns
+        -------
+        tuple[Step, bool]
+            What was rated, and whether its errors are within `tolerance`: then it stays as it is.
+        """
+        estimate = estimate_errors(self._two_grid, self.blocks, self.model, values, modes)
+        step = Step(
+            self.blocks.coarse.n_dofs,
+            self.fine_blocks,
+            estimate.rms,
+            estimate.worst,
+            estimate.worst_mode,
+            RIGID_MODES + len(estimate.errors),
+        )
+        done = estimate.excess(tolerance) <= 1.0
+        if not done:
+            self._refine(estimate, tolerance)
+        return step, done
+
+    def _refine(self, estimate: ErrorEstimate, tolerance: float) -> None:
+        """Keep fine the elements with the largest shares of an error above `tolerance`."""
+        order = np.argsort(-estimate.shares, kind="stable")
+        left = REMAINING * HASTE**self._steps / estimate.excess(tolerance)
+        reached = np.cumsum(estimate.shares[order])
+        count = 1 + int(np.searchsorted(reached, (1.0 - left) * reached[-1]))
+        self.blocks = self._with_fine(order[:count])
+        self._steps += 1
+
+    def _with_fine(self, chosen: NDArray[np.int64]) -> Blocks:
+        """The blocks with other elements fine beside those that are."""
+        now, plain = self.blocks, self._plain
+        fine = now.is_fine.copy()
+        fine[chosen] = True
+        cells = np.zeros(now.fine.n_cells, dtype=bool)
+        cells[now.fine_of_block[fine][now.mask[fine]]] = True
+        return blocks_from_mesh(now.fine, (cells[plain.fine_of_block] & plain.mask).any(axis=1))
+
+
+def solve_refined(
+    solve: Callable[[ElasticModel | None], Modes],
+    refined: RefinedModel | None,
+    tolerance: float,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    report: Callable[[Step], None] | None = None,
+) -> tuple[ElasticModel | None, Modes, list[Step]]:
+    """Solve, estimate and refine until the expected error is at most `tolerance`; collective.
+
+    Parameters
+    ----------
+    solve
+        Finds the modes of a model, which is None but on rank 0.
+    refined
+        On rank 0, which estimates; None on the others.
+    tolerance
+        For the root mean square of the relative errors of frequencies 7 to 60; the worst may be
+        three times as large.
+    report
+        Called on rank 0 after each step.
+
+    Returns
+    -------
+    tuple[ElasticModel | None, Modes, list[Step]]
+        The last model, on rank 0; its modes, and the steps.
+    """
+    steps: list[Step] = []
+    while True:
+        model = None if refined is None else refined.model
+        modes = solve(model)
+        gathered = modes.system.gather(np.ascontiguousarray(modes.vectors[:, :MODES_USED]))
+
+        step, done = bcast_from_root(comm, partial(_advance, refined, modes, gathered, tolerance))
+        steps.append(step)
+        if report is not None and comm.rank == 0:
+            report(step)
+        if done:
+            return model, modes, steps
+        modes.destroy()
+
+
+def _advance(
+    refined: RefinedModel | None, modes: Modes, gathered: Array | None, tolerance: float
+) -> tuple[Step, bool]:
+    assert refined is not None and gathered is not None
+    return refined.advance(modes.values[:MODES_USED], gathered, tolerance)
+
+
+def evidence_of(steps: list[Step]) -> dict[str, Any]:
+    """What the last step achieved, as plain values for a file."""
+    last = steps[-1]
+    return {
+        "expected_frequency_error_rms": last.rms,
+        "expected_frequency_error_worst": last.worst,
+        "expected_frequency_error_worst_mode": last.worst_mode,
+        "expected_frequency_error_modes": [RIGID_MODES + 1, last.last],
+        "fine_blocks": last.fine_blocks,
+        "refinement_steps": len(steps) - 1,
+    }
