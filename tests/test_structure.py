@@ -44,6 +44,8 @@ ARROWS = {
     "solver.analysis": """dataset_gen.objectives solver.coarsening solver.distribution solver.files
         solver.assembly solver.linear solver.subspace solver.hcms solver.correction
         solver.reference""",
+    "solver.refinement": """solver.coarsening solver.distribution solver.assembly solver.linear
+        solver.subspace solver.analysis""",
     "solver": "solver.analysis",
     "solver.studies": """solver.coarsening solver.distribution solver.files solver.assembly
         solver.linear solver.subspace solver.hcms solver.correction
@@ -56,7 +58,7 @@ ARROWS = {
     "solver.studies.scaling": """solver.distribution solver.assembly solver.linear solver.hcms
         solver.correction solver.analysis""",
     "solver.commands": """dataset_gen.objectives solver.distribution solver.files solver.response
-        solver.linear solver.analysis solver.studies solver.studies.benchmark
+        solver.linear solver.analysis solver.refinement solver.studies solver.studies.benchmark
         solver.studies.calibration solver.studies.scaling""",
     #
     "sound": "",
