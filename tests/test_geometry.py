@@ -19,7 +19,8 @@ from carillon.fem.geometry import (
     surface_name,
     voxelize,
 )
-from carillon.fem.geometry.faces import surface_quads
+from carillon.fem.geometry.blocks import parts_of_patterns
+from carillon.fem.geometry.faces import face_neighbours, surface_quads
 from carillon.fem.geometry.picture import draw, guess_up
 from carillon.fem.geometry.topology import is_simple, thin_to
 
@@ -319,6 +320,73 @@ def test_every_cell_has_its_place_in_a_block():
     )
     assert blocks.mask.any(axis=1).all()
     assert blocks.coarse.edge == 2 * mesh.edge
+
+
+def mesh_of(*cells):
+    return hexmesh_from_grid(np.array(cells), np.zeros(3), 0.5)
+
+
+def test_parts_of_a_block_are_numbered():
+    parts = parts_of_patterns()
+    assert parts.shape == (256, 8)
+    assert parts[0b10000001, [0, 7]].tolist() == [0, 1]
+    assert parts[0b01101001, [0, 3, 5, 6]].tolist() == [0, 1, 2, 3]
+    assert (parts[0b11111111] == 0).all() and (parts[0b00001111] == 0).all()
+
+
+def test_parts_that_touch_nowhere_share_no_node():
+    """Two rows of cells that end in opposite corners of one block."""
+    rows = [(x, 0, 0) for x in (0, 1, 2)] + [(x, 1, 1) for x in (3, 4, 5)]
+    blocks = blocks_from_mesh(mesh_of(*rows))
+    assert blocks.coarse.grid[:, 0].tolist() == [0, 1, 1, 2]
+    first, second = blocks.coarse.cells[:2].ravel(), blocks.coarse.cells[2:].ravel()
+    assert len(np.intersect1d(first, second)) == 0
+    assert blocks.contacts.tolist() == [2, 1, 2, 1]
+
+
+def test_parts_that_meet_elsewhere_share_the_nodes_there():
+    """The same columns on a plate: each has the plate's nodes, and above it its own."""
+    columns = [(0, 0, z) for z in (2, 3)] + [(1, 1, z) for z in (2, 3)]
+    plate = [(x, y, z) for x in range(2) for y in range(2) for z in range(2)]
+    blocks = blocks_from_mesh(mesh_of(*plate, *columns))
+    foot, first, second = blocks.coarse.cells
+    assert np.array_equal(first[:4], foot[4:]) and np.array_equal(second[:4], foot[4:])
+    assert len(np.intersect1d(first[4:], second[4:])) == 0
+
+
+def test_a_gap_between_blocks_stays_open():
+    """Two walls, a void layer apart, in neighbouring blocks, joined at one end only."""
+    walls = [(x, y, z) for x in (0, 3) for y in range(4) for z in range(6)]
+    bridge = [(x, y, z) for x in (1, 2) for y in range(4) for z in (0, 1)]
+    coarse = blocks_from_mesh(mesh_of(*walls, *bridge)).coarse
+    left = coarse.cells[(coarse.grid[:, 0] == 0) & (coarse.grid[:, 2] == 2)]
+    right = coarse.cells[(coarse.grid[:, 0] == 1) & (coarse.grid[:, 2] == 2)]
+    assert len(left) and len(right) and len(np.intersect1d(left, right)) == 0
+    in_a_wall, across = 3 + 4, 2
+    assert len(face_neighbours(coarse)) == 2 * in_a_wall + across
+
+
+def test_blocks_hinge_where_their_cells_do():
+    """Cells of two blocks that share an edge share the coarse nodes of that edge."""
+    hinge = [(1, 1, 0), (2, 2, 0), (1, 1, 1), (2, 2, 1)]
+    coarse = blocks_from_mesh(mesh_of(*hinge)).coarse
+    assert coarse.n_cells == 2
+    shared = np.intersect1d(*coarse.cells)
+    assert coarse.node_grid[shared].tolist() == [[1, 1, 0], [1, 1, 1]]
+
+
+def test_blocks_without_parts_are_an_ordinary_mesh():
+    mesh = ball()
+    coarse = blocks_from_mesh(mesh).coarse
+    plain = hexmesh_from_grid(np.unique(mesh.grid >> 1, axis=0), mesh.origin, 2 * mesh.edge)
+    for name in ("cells", "grid", "node_grid"):
+        np.testing.assert_array_equal(getattr(coarse, name), getattr(plain, name))
+
+
+def ball():
+    """A ball: no block falls apart."""
+    lattice = np.stack(np.meshgrid(*[np.arange(9) - 4.0] * 3, indexing="ij"), axis=-1)
+    return hexmesh_from_grid(np.argwhere((lattice**2).sum(axis=-1) < 18.0), np.zeros(3), 0.5)
 
 
 def test_prolongation_reproduces_linear_fields():

@@ -10,13 +10,19 @@ import pytest
 import scipy.linalg as la
 
 from carillon.errors import UserError
-from carillon.fem.geometry import blocks_from_mesh, prolongation
+from carillon.fem.geometry import blocks_from_mesh, hexmesh_from_grid, prolongation
 from carillon.fem.model import RIGID_MODES, ElasticModel, fine_model
 from solver.__main__ import main
 from solver.assembly.sparse import assembled
 from solver.coarsening.model import coarse_model
 from solver.files.modes_file import ModesFile, frequencies, read_modes, write_modes
-from solver.response.contact import Contact, choose_contacts, interpolation, surface_normals
+from solver.response.contact import (
+    Contact,
+    choose_contacts,
+    embedding,
+    interpolation,
+    surface_normals,
+)
 from solver.response.response import (
     SAMPLE_RATE_HERTZ,
     Contacts,
@@ -156,6 +162,18 @@ def test_interpolation_is_exact_for_trilinear_fields_and_agrees_with_the_prolong
         )
     at_nodes = interpolation(coarse, blocks.fine.nodes)
     assert abs(at_nodes - prolongation(blocks)).max() < 1e-12
+
+
+def test_points_near_parts_of_a_block_belong_to_the_part():
+    """Two columns in opposite corners of one row of blocks, on a plate that joins them."""
+    columns = [(0, 0, z) for z in (2, 3)] + [(1, 1, z) for z in (2, 3)]
+    plate = [(x, y, z) for x in range(2) for y in range(2) for z in range(2)]
+    blocks = blocks_from_mesh(hexmesh_from_grid(np.array(plate + columns), np.zeros(3), 1.0))
+    model = coarse_model(blocks, np.ones((blocks.coarse.n_cells, 8)))
+    cells, weights = embedding(model, np.array([[0.2, 0.9, 3.0], [1.8, 1.1, 3.0], [1.0, 1.0, 0.5]]))
+    first, second = np.flatnonzero(model.mesh.grid[:, 2] == 1)
+    assert cells.tolist() == [first, second, 0]
+    np.testing.assert_allclose(weights.sum(axis=1), 1.0)
 
 
 def test_normals_of_a_box_point_outwards():
