@@ -14,7 +14,7 @@ from carillon.arguments import poisson_ratio, whole_number
 from carillon.fem.element import DEFAULT_POISSON, Array
 from carillon.options import option
 from carillon.progress import track
-from carillon.provenance import processor
+from carillon.provenance import compiled_for, processor
 from carillon.serial import serial_blas
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, OBJECTIVES, fit, flops, sampled_energy
 from dataset_gen.objectives.lanes import (
@@ -25,7 +25,7 @@ from dataset_gen.objectives.lanes import (
     load_tile,
     store_tile,
 )
-from dataset_gen.objectives.registers import PANEL, compiled_for
+from dataset_gen.objectives.registers import PANEL
 from dataset_gen.sampling import samples
 
 RUNS = 7

@@ -18,7 +18,7 @@ class Registers(NamedTuple):
     """Vector registers: doubles in each, and how many of them."""
 
     doubles: int
-    count: int
+    number: int
 
 
 X86 = {"zmm": Registers(8, 32), "ymm": Registers(4, 16), "xmm": Registers(2, 16)}
@@ -34,7 +34,7 @@ def registers_in(assembly: str) -> Registers:
     Examples
     --------
     >>> registers_in("vaddpd %ymm0, %ymm1, %ymm0")
-    Registers(doubles=4, count=16)
+    Registers(doubles=4, number=16)
     """
     names = set(re.findall(r"\b[xyz]mm", assembly))
     return next((registers for name, registers in X86.items() if name in names), OTHERS)
@@ -54,11 +54,6 @@ def assembly_of_a_sum() -> str:
     return str(library.get_asm_str())
 
 
-def compiled_for() -> str:
-    """Name of the processor that numba compiles for, as LLVM calls it."""
-    return str(cpu_target.target_context.codegen().magic_tuple()[1])
-
-
 def panel_of(registers: Registers) -> int:
     """Columns of the largest product of three rows whose sums stay in registers.
 
@@ -70,7 +65,7 @@ def panel_of(registers: Registers) -> int:
     >>> panel_of(X86["zmm"]), panel_of(X86["ymm"])
     (6, 3)
     """
-    return 6 if 3 * 6 + 3 + 1 <= registers.count else 3
+    return 6 if 3 * 6 + 3 + 1 <= registers.number else 3
 
 
 REGISTERS = registers_in(assembly_of_a_sum())
