@@ -72,6 +72,13 @@ def processor() -> str:
     return platform.processor() or platform.machine()
 
 
+def compiled_for() -> str:
+    """Processor that numba compiles for, as LLVM calls it: this one or that of NUMBA_CPU_NAME."""
+    from numba.core.registry import cpu_target  # whose import takes a second
+
+    return str(cpu_target.target_context.codegen().magic_tuple()[1])
+
+
 def config_hash(parameters: dict[str, Any]) -> str:
     """Short SHA-256 of a parameter dictionary, independent of key order."""
     text = json.dumps(parameters, sort_keys=True, default=str)

@@ -14,10 +14,18 @@ from carillon.arguments import poisson_ratio, whole_number
 from carillon.fem.element import DEFAULT_POISSON, Array
 from carillon.options import option
 from carillon.progress import track
-from carillon.provenance import processor
+from carillon.provenance import compiled_for, processor
 from carillon.serial import serial_blas
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, OBJECTIVES, fit, flops, sampled_energy
-from dataset_gen.objectives.lanes import LANES, add_product, compiled, empty, store_tile, zeros
+from dataset_gen.objectives.lanes import (
+    LANES,
+    add_product,
+    compiled,
+    empty,
+    load_tile,
+    store_tile,
+)
+from dataset_gen.objectives.registers import PANEL
 from dataset_gen.sampling import samples
 
 RUNS = 7
@@ -32,6 +40,12 @@ MOST_TIMED = 1_000_000
 MATRIX = 768
 """Size of the matrices of the BLAS product that the arithmetic is compared with."""
 
+SUMS, DEPTH, REPETITIONS = 12, 64, 4000
+"""Sums that the core's peak is measured with, terms added to each at a time, and how often.
+
+Enough to keep two units busy that take four cycles each, and few enough for 16 registers.
+"""
+
 
 class Rate(NamedTuple):
     """Items per second: median, minimum and maximum of the runs."""
@@ -41,15 +55,23 @@ class Rate(NamedTuple):
     maximum: float
 
 
-def _rate(work: Callable[[], Any], items: float) -> Rate:
-    """Items per second of `work`, which does so many at a time."""
-    work()
-    rates = []
-    for _ in range(RUNS):
-        start = time.perf_counter()
-        work()
-        rates.append(items / (time.perf_counter() - start))
-    return Rate(float(np.median(rates)), min(rates), max(rates))
+def _runs(*works: tuple[Callable[[], Any], float]) -> list[list[float]]:
+    """Items per second in each run of works that do so many at a time.
+
+    They take turns, so that a clock that drifts favours none.
+    """
+    rates: list[list[float]] = [[] for _ in works]
+    for run in range(1 + RUNS):
+        for (work, items), found in zip(works, rates):
+            start = time.perf_counter()
+            work()
+            if run:
+                found.append(items / (time.perf_counter() - start))
+    return rates
+
+
+def _rate(runs: list[float]) -> Rate:
+    return Rate(float(np.median(runs)), min(runs), max(runs))
 
 
 def _sampled_rate(young: Array, poisson: float) -> Rate:
@@ -58,32 +80,48 @@ def _sampled_rate(young: Array, poisson: float) -> Rate:
         for block in young:
             sampled_energy.fit_block(block, generator, poisson)
 
-    return _rate(work, len(young))
+    return _rate(*_runs((work, len(young))))
 
 
 @serial_blas
-def _blas_gflops() -> float:
-    """Billions of operations per second of a product of full matrices by BLAS on one core."""
-    left = np.random.default_rng(0).random((MATRIX, MATRIX))
-    return _rate(lambda: left @ left, 2e-9 * MATRIX**3).maximum
+def _multiply_by_blas(matrix: Array) -> None:
+    matrix @ matrix
 
 
 @compiled
 def _multiply_in_registers(repetitions: int) -> Array:
-    numbers = empty(27)
-    numbers[:] = 1e-9
-    tile = zeros(3, 6)
+    numbers = empty(2 + SUMS)
+    for n in range(2 + SUMS):
+        numbers[n] = 1e-9 * n
+    sums = (numbers, 2, SUMS, 1)
+    tile = load_tile(sums, 1, SUMS)
     for _ in range(repetitions):
-        tile = add_product(tile, (numbers, 0, 1, 0), (numbers, 3, 1, 0), 8)
-    store_tile((numbers, 9, 6, 1), tile)
+        tile = add_product(tile, (numbers, 0, 1, 0), (numbers, 1, 0, 0), DEPTH)
+    store_tile(sums, tile)
     return numbers
 
 
-def _peak_gflops() -> float:
-    """Billions of operations per second of multiplications and additions within registers."""
-    repetitions = 20_000
-    operations = 2e-9 * LANES * 18 * 8 * repetitions
-    return _rate(lambda: _multiply_in_registers(repetitions), operations).maximum
+class Arithmetic(NamedTuple):
+    """Operations of a fit, billions of them per second, and how near that comes to the limits."""
+
+    flops_per_fit: float | None
+    gflops: float | None
+    gflops_dgemm: float
+    gflops_peak: float
+    peak_fraction: float | None
+    dgemm_fraction: float | None
+
+
+def _arithmetic(
+    per_fit: float | None, fits: list[float], dgemm: list[float], peak: list[float]
+) -> Arithmetic:
+    """From the rates of runs that took turns; of fits whose operations are unknown, the limits."""
+    product, highest = float(np.median(dgemm)), max(peak)
+    if per_fit is None:
+        return Arithmetic(None, None, product, highest, None, None)
+    gflops = 1e-9 * per_fit * float(np.median(fits))
+    share = float(np.median([1e-9 * per_fit * one / other for one, other in zip(fits, dgemm)]))
+    return Arithmetic(per_fit, gflops, product, highest, gflops / highest, share)
 
 
 def _flops_per_fit(objective: str, young: Array, poisson: float) -> float | None:
@@ -118,21 +156,28 @@ def benchmark(options: FitBenchmarkOptions) -> dict[str, Any]:
         Fits per second by name.
     flops_per_fit, gflops
         Operations of the closed form and billions of them per second, null for an iterative one.
-        `gflops_dgemm` is what BLAS reaches on the same core, `gflops_peak` the processor without
-        loads and stores, `peak_fraction` the share of the latter.
+        `gflops_dgemm` is what BLAS reaches on the same core in turn with the fits, `gflops_peak`
+        the core without loads and stores; `peak_fraction` and `dgemm_fraction` are the shares of
+        them, `dgemm_fractions` the latter by objective.
+    lanes, panel, compiled_for
+        Blocks side by side, columns of a product at a time, and the processor that numba compiles
+        for, from which they follow.
     """
     count, poisson = options.samples, options.poisson
     young = samples(0, 0, count)
     chosen = options.objective or DEFAULT_OBJECTIVE
     names = list(OBJECTIVES) if options.objective is None else [options.objective]
+    matrix = np.random.default_rng(0).random((MATRIX, MATRIX))
+    dgemm = partial(_multiply_by_blas, matrix), 2e-9 * MATRIX**3
+    peak = partial(_multiply_in_registers, REPETITIONS), 2e-9 * LANES * SUMS * DEPTH * REPETITIONS
     rates: dict[str, Rate] = {}
+    arithmetic: dict[str, Arithmetic] = {}
     for name in track(names, "timing", total=len(names), unit="objective"):
-        rates[name] = _rate(partial(fit, name, young, poisson), count)
+        runs = _runs((partial(fit, name, young, poisson), count), dgemm, peak)
+        rates[name] = _rate(runs[0])
+        arithmetic[name] = _arithmetic(_flops_per_fit(name, young, poisson), *runs)
     few = young[: max(1, count // SAMPLED_SHARE)]
     closed, sampled = rates[chosen], _sampled_rate(few, poisson)
-    per_fit = _flops_per_fit(chosen, young, poisson)
-    gflops = None if per_fit is None else 1e-9 * per_fit * closed.median
-    peak = _peak_gflops()
     return {
         "objective": chosen,
         "fits_per_second": {"closed_form": closed.median, "sampled": sampled.median},
@@ -145,19 +190,22 @@ def benchmark(options: FitBenchmarkOptions) -> dict[str, Any]:
         "samples_of_sampled": len(few),
         "forces_of_sampled": sampled_energy.DIRECTIONS * len(sampled_energy.MAGNITUDES),
         "objectives": {name: rate.median for name, rate in rates.items()},
-        "flops_per_fit": per_fit,
-        "gflops": gflops,
-        "gflops_dgemm": _blas_gflops(),
-        "gflops_peak": peak,
-        "peak_fraction": None if gflops is None else gflops / peak,
+        **arithmetic[chosen]._asdict(),
+        "dgemm_fractions": {name: each.dgemm_fraction for name, each in arithmetic.items()},
+        "lanes": LANES,
+        "panel": PANEL,
+        "compiled_for": compiled_for(),
         "processor": processor(),
     }
 
 
 def as_text(result: dict[str, Any]) -> str:
     """The result of `benchmark` as a table."""
-    lines = [f"{'objective':<24}{'fits/s, one core':>18}"]
-    lines += [f"{name:<24}{rate:>18,.1f}" for name, rate in result["objectives"].items()]
+    lines = [f"{'objective':<24}{'fits/s, one core':>18}{'of BLAS':>10}"]
+    for name, rate in result["objectives"].items():
+        fraction = result["dgemm_fractions"][name]
+        share = "" if fraction is None else f"{fraction:>10.0%}"
+        lines.append(f"{name:<24}{rate:>18,.1f}{share}")
     sampled = result["fits_per_second"]["sampled"]
     lines.append(f"{'energy, sampled forces':<24}{sampled:>18,.1f}")
     lines.append(
@@ -167,7 +215,12 @@ def as_text(result: dict[str, Any]) -> str:
     if result["gflops"] is not None:
         lines.append(
             f"{result['flops_per_fit']:,.0f} operations per fit, {result['gflops']:.0f} billion "
-            f"per second: {result['peak_fraction']:.0%} of the core's peak; "
-            f"BLAS {result['gflops_dgemm']:.0f}"
+            f"per second: {result['peak_fraction']:.0%} of the core's peak of "
+            f"{result['gflops_peak']:.0f}, {result['dgemm_fraction']:.0%} of the "
+            f"{result['gflops_dgemm']:.0f} of BLAS"
         )
+    lines.append(
+        f"compiled for {result['compiled_for']}: {result['lanes']} blocks side by side, "
+        f"{result['panel']} columns at a time"
+    )
     return "\n".join(lines)

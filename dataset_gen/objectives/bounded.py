@@ -119,7 +119,7 @@ def _grow(matrix: Array, vector: Array, work: tuple[Array, Array, Array], lane: 
 
 @compiled
 def _minimise(matrix: Array, vector: Array, x: Array, settled: NDArray[np.bool_]) -> None:
-    """Non-negative minimisers x (8) of eight problems in lanes."""
+    """Non-negative minimisers x (8) of the problems in the lanes."""
     free, factor, other, changes = empty(8), empty(64), empty(8), empty(1)
     largest = spread(0.0)
     for i in range(8):

@@ -23,8 +23,8 @@ from dataset_gen.objectives.elimination import (
     sum_of,
 )
 from dataset_gen.objectives.kernel import (
+    COLUMNS,
     MEAN,
-    PANEL,
     copy_in,
     multiply,
     solve_lower,
@@ -65,7 +65,7 @@ def free_block_of(mask: int, poisson: float) -> FreeBlock:
     springs[0, held, held] = 1.0
     matrices = np.concatenate([cell_stiffness(poisson)[np.ix_(cells, dofs, dofs)], springs])
     tiles = lower_tiles_of(matrices, elimination.filled)
-    padded = np.pad(null, ((0, 0), (0, -null.shape[1] % PANEL)))
+    padded = np.pad(null, ((0, 0), (0, -null.shape[1] % COLUMNS)))
     return FreeBlock(elimination.factor, sum_of([*cells, MEAN], tiles), padded.ravel())
 
 
@@ -99,18 +99,18 @@ def flexibility_norms(block: FreeBlock, tiles: Array) -> tuple[Vector, Vector]:
     count = len(block.factor.diagonal)
     size = 3 * count
     width = len(block.null) // size
-    x, moved, share = empty(PANEL * size), empty(width * size), empty(width * width)
+    x, moved, share = empty(COLUMNS * size), empty(width * size), empty(width * width)
     trace, square = spread(0.0), spread(0.0)
-    for node in range(0, count, 2):
-        top, bottom = PANEL * 3 * node, PANEL * size
-        below = min(top + PANEL * PANEL, bottom)
+    for node in range(0, count, COLUMNS // 3):
+        top, bottom = COLUMNS * 3 * node, COLUMNS * size
+        below = min(top + COLUMNS * COLUMNS, bottom)
         for n in range(top, bottom):
             store(x, n, spread(0.0))
-        for n in range(top, below, PANEL + 1):
+        for n in range(top, below, COLUMNS + 1):
             store(x, n, spread(1.0))
-        solve_lower(block.factor, tiles, x, PANEL, node)
-        solve_upper(block.factor, tiles, x, PANEL, node)
-        for n in range(top, below, PANEL + 1):
+        solve_lower(block.factor, tiles, x, COLUMNS, node)
+        solve_upper(block.factor, tiles, x, COLUMNS, node)
+        for n in range(top, below, COLUMNS + 1):
             trace = trace + load(x, n)
         square = square + squares(x, top, below) + spread(2.0) * squares(x, below, bottom)
     copy_in(block.null, moved)

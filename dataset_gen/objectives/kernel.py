@@ -28,6 +28,7 @@ from dataset_gen.objectives.lanes import (
     subtract_product,
     zeros,
 )
+from dataset_gen.objectives.registers import PANEL
 
 Operand = tuple[Array, int, int, int]
 """Array, first entry, stride along the rows or columns, stride along the sum."""
@@ -38,8 +39,8 @@ MOTIONS = 18
 STRAINS = 48
 """Strain components of the coarse element: six at each of eight quadrature points."""
 
-PANEL = 6
-"""Columns of right-hand sides worked on together: with three rows, 18 numbers in registers."""
+COLUMNS = 6
+"""Columns of right-hand sides come in multiples of so many, which panels divide evenly."""
 
 MEAN, WEIGHTS = 8, 9
 """Weights of a block: the moduli 0..7, the mean of the filled cells'; how many there are."""
@@ -127,7 +128,7 @@ def solve_lower(
     for panel in range(0, columns, PANEL):
         for i in range(first, len(factor.diagonal)):
             at = 3 * i * columns + panel
-            tile = load_tile((x, at, columns, 1), 3, 6)
+            tile = load_tile((x, at, columns, 1), 3, PANEL)
             for link in range(rows.start[i], rows.start[i + 1]):
                 if rows.node[link] < first:
                     continue
@@ -136,7 +137,7 @@ def solve_lower(
                 tile = subtract_product(tile, left, right, 3)
             store_tile((x, at, columns, 1), tile)
             inverse = (tiles, TILE * factor.diagonal[i], 3, 1)
-            tile = add_product(zeros(3, 6), inverse, (x, at, 1, columns), 3)
+            tile = add_product(zeros(3, PANEL), inverse, (x, at, 1, columns), 3)
             store_tile((x, at, columns, 1), tile)
 
 
@@ -149,14 +150,14 @@ def solve_upper(
     for panel in range(0, columns, PANEL):
         for i in range(len(factor.diagonal) - 1, first - 1, -1):
             at = 3 * i * columns + panel
-            tile = load_tile((x, at, columns, 1), 3, 6)
+            tile = load_tile((x, at, columns, 1), 3, PANEL)
             for link in range(below.start[i], below.start[i + 1]):
                 left = (tiles, TILE * below.tile[link], 1, 3)
                 right = (x, 3 * below.node[link] * columns + panel, 1, columns)
                 tile = subtract_product(tile, left, right, 3)
             store_tile((x, at, columns, 1), tile)
             inverse = (tiles, TILE * factor.diagonal[i], 1, 3)
-            tile = add_product(zeros(3, 6), inverse, (x, at, 1, columns), 3)
+            tile = add_product(zeros(3, PANEL), inverse, (x, at, 1, columns), 3)
             store_tile((x, at, columns, 1), tile)
 
 
@@ -165,7 +166,7 @@ def multiply_sparse(rows: Links, tiles: Array, x: Array, out: Array, columns: in
     """Product of a matrix of linked tiles and x (3 n, columns)."""
     for panel in range(0, columns, PANEL):
         for i in range(len(rows.start) - 1):
-            tile = zeros(3, 6)
+            tile = zeros(3, PANEL)
             for link in range(rows.start[i], rows.start[i + 1]):
                 left = (tiles, TILE * rows.tile[link], 3, 1)
                 right = (x, 3 * rows.node[link] * columns + panel, 1, columns)
@@ -179,12 +180,12 @@ def multiply(
 ) -> None:
     """Matrix `out` (rows, columns) = A B; strides of A: rows, depth; of B: columns, depth.
 
-    Rows come in threes and columns in sixes. A flat array is the same for all lanes.
+    Rows come in threes. A flat array is the same for all lanes.
     """
     for i in range(0, rows, 3):
         for j in range(0, columns, PANEL):
             tile = add_product(
-                zeros(3, 6),
+                zeros(3, PANEL),
                 (left[0], left[1] + i * left[2], left[2], left[3]),
                 (right[0], right[1] + j * right[2], right[2], right[3]),
                 depth,
@@ -201,7 +202,7 @@ def subtract_multiply(
         for j in range(0, columns, PANEL):
             here = (out, i * columns + j, columns, 1)
             tile = subtract_product(
-                load_tile(here, 3, 6),
+                load_tile(here, 3, PANEL),
                 (left[0], left[1] + i * left[2], left[2], left[3]),
                 (right[0], right[1] + j * right[2], right[2], right[3]),
                 depth,

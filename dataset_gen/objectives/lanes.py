@@ -1,9 +1,10 @@
-"""Eight blocks side by side: a numba type for a vector of `LANES` doubles, and tiles of such.
+"""Blocks side by side: a numba type for a vector of `LANES` doubles, and tiles of such.
 
 All blocks of one void pattern take the same steps, so a step is done for `LANES` of them by one
 machine instruction. Arrays of lanes are (entries, `LANES`), one row per number of the block. Inside
 compiled functions a `Lanes` value adds and multiplies like a float; a tile is a small matrix of
-them that stays in registers. On processors with shorter vectors LLVM splits the lanes.
+them that stays in registers. How many lanes there are is the processor's, see
+`dataset_gen.objectives.registers`; what a lane computes does not depend on it.
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ from numba.extending import intrinsic as numba_intrinsic
 from numba.extending import models, overload, register_model
 
 from carillon.fem.element import Array
+from dataset_gen.objectives.registers import LANES, PANEL
 
-LANES = 8
 BYTES = 8 * LANES
 
 _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
@@ -31,8 +32,8 @@ _INDEX = ir.IntType(64)
 
 
 def _sources() -> str:
-    """Digest of the modules whose compiled functions call each other."""
-    digest = hashlib.sha256()
+    """Digest of the modules whose compiled functions call each other, and of their width."""
+    digest = hashlib.sha256(f"{LANES} {PANEL}".encode())
     for name in ("lanes", "kernel", "bounded", "descent", "free_block", "coarse_response"):
         path = Path(__file__).parent / f"{name}.py"
         digest.update(path.read_bytes() if path.exists() else b"")

@@ -35,8 +35,8 @@ from dataset_gen.objectives.elimination import TILE, elimination_of
 from dataset_gen.objectives.energy import MODULUS_CEILING
 from dataset_gen.objectives.free_block import squares
 from dataset_gen.objectives.kernel import (
+    COLUMNS,
     MOTIONS,
-    PANEL,
     STRAINS,
     WEIGHTS,
     assemble,
@@ -118,26 +118,26 @@ def _load_block(
     size, columns = 3 * len(factor.diagonal), len(loaded.energies)
     directions = unit.shape[1]
     weights, tiles = empty(WEIGHTS), empty(TILE * (len(stiffness.start) - 1))
-    x, felt = empty(size * PANEL), empty(MOTIONS * PANEL)
+    x, felt = empty(size * COLUMNS), empty(MOTIONS * COLUMNS)
     weigh(young, 0, weights)
     assemble(stiffness, weights, tiles)
     factorise(factor, tiles)
-    for panel in range(0, columns, PANEL):
+    for panel in range(0, columns, COLUMNS):
         for dof in range(size):
-            for column in range(PANEL):
+            for column in range(COLUMNS):
                 magnitude, direction = divmod(panel + column, directions)
                 for lane in range(LANES):
                     force = magnitudes[magnitude] * unit[dof, direction, lane]
-                    x[dof * PANEL + column, lane] = force
-        multiply(felt, (coarse.basis, 0, 1, MOTIONS), (x, 0, 1, PANEL), MOTIONS, PANEL, size)
-        solve_lower(factor, tiles, x, PANEL)
-        for column in range(PANEL):
+                    x[dof * COLUMNS + column, lane] = force
+        multiply(felt, (coarse.basis, 0, 1, MOTIONS), (x, 0, 1, COLUMNS), MOTIONS, COLUMNS, size)
+        solve_lower(factor, tiles, x, COLUMNS)
+        for column in range(COLUMNS):
             energy = spread(0.0)
-            for n in range(column, PANEL * size, PANEL):
+            for n in range(column, COLUMNS * size, COLUMNS):
                 energy = energy + load(x, n) * load(x, n)
             store(loaded.energies, panel + column, energy)
             for i in range(MOTIONS):
-                value = load(felt, i * PANEL + column)
+                value = load(felt, i * COLUMNS + column)
                 store(loaded.felt, i * columns + panel + column, value)
 
 
@@ -163,17 +163,17 @@ def _evaluate(
     respond(coarse, logs, response)
     rows, bent = room
     columns = len(loaded.energies)
-    strains, gram, slope = empty(STRAINS * PANEL), empty(81), empty(MOTIONS**2)
-    for panel in range(0, columns, PANEL):
+    strains, gram, slope = empty(STRAINS * COLUMNS), empty(81), empty(MOTIONS**2)
+    for panel in range(0, columns, COLUMNS):
         felt = (loaded.felt, panel, 1, columns)
-        multiply(strains, (response.strained, 0, 1, STRAINS), felt, STRAINS, PANEL, MOTIONS)
-        for column in range(PANEL):
+        multiply(strains, (response.strained, 0, 1, STRAINS), felt, STRAINS, COLUMNS, MOTIONS)
+        for column in range(COLUMNS):
             energy = spread(0.0)
             at = panel + column
             for q in range(8):
                 part = spread(0.0)
                 for n in range(6 * q, 6 * q + 6):
-                    strain = load(strains, n * PANEL + column)
+                    strain = load(strains, n * COLUMNS + column)
                     part = part + strain * strain
                 store(rows, q * columns + at, part)
                 energy = energy + part
@@ -244,7 +244,7 @@ def fit_block(
     scaled = (young / largest)[None]
     order = pattern_of(mask, poisson).positions(elimination_of(mask).dofs)
     forces = draw_forces(young, directions, generator)
-    unit = np.zeros((len(forces), directions + -directions % (LANES * PANEL)))
+    unit = np.zeros((len(forces), directions + -directions % (LANES * COLUMNS)))
     unit[:, :directions] = forces[order]
     logs, residual, settled = _fit(
         coarse_of(mask, poisson),

@@ -117,6 +117,8 @@ class Result:
         Timings by name and threads.
     load_ms : float
         Median time of loading the model [ms], checks included.
+    compiled_for : str
+        Processor that numba compiles for.
     """
 
     model: str
@@ -130,6 +132,7 @@ class Result:
     sizes: list[SizeTiming]
     caches: dict[str, str]
     processor: str
+    compiled_for: str
 
 
 def _warm_seconds(function: Callable[[], object]) -> list[float]:
@@ -275,6 +278,7 @@ def benchmark(options: ForestBenchmarkOptions) -> Result:
         sizes=over_size(sizes, young, mesh),
         caches=caches(),
         processor=provenance.processor(),
+        compiled_for=provenance.compiled_for(),
     )
 
 
@@ -291,7 +295,8 @@ def as_text(result: Result) -> str:
     """The result in columns."""
     rival = result.rival
     lines = [
-        f"{result.processor}, caches {', '.join(f'{k} {v}' for k, v in result.caches.items())}",
+        f"{result.processor}, compiled for {result.compiled_for}, caches "
+        + ", ".join(f"{level} {size}" for level, size in result.caches.items()),
         f"{result.model}: 2 x {result.trees} trees, {result.leaves:,} leaves, "
         f"{result.megabytes:.1f} MB, loaded in {result.load_ms:.1f} ms",
         f"{result.blocks:,} random blocks, {RUNS} warm runs",

@@ -1,0 +1,80 @@
+"""How many blocks go side by side, and how large a matrix of their numbers stays in registers.
+
+Both follow from the vector registers of the processor that numba compiles for: this one, or the one
+that the variables NUMBA_CPU_NAME and NUMBA_CPU_FEATURES name. No list of processors could tell; the
+compiler can, by the registers that its code puts eight doubles into.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+from llvmlite import ir
+from numba.core.registry import cpu_target
+
+
+class Registers(NamedTuple):
+    """Vector registers: doubles in each, and how many of them."""
+
+    doubles: int
+    number: int
+
+
+X86 = {"zmm": Registers(8, 32), "ymm": Registers(4, 16), "xmm": Registers(2, 16)}
+"""AVX-512, AVX and SSE2, by the names of the registers."""
+
+OTHERS = Registers(2, 32)
+"""Of processors without these names, such as those with NEON."""
+
+
+def registers_in(assembly: str) -> Registers:
+    """The widest registers that the code works with.
+
+    Examples
+    --------
+    >>> registers_in("vaddpd %ymm0, %ymm1, %ymm0")
+    Registers(doubles=4, number=16)
+    """
+    names = set(re.findall(r"\b[xyz]mm", assembly))
+    return next((registers for name, registers in X86.items() if name in names), OTHERS)
+
+
+def assembly_of_a_sum() -> str:
+    """What numba's compiler makes of a sum of eight doubles."""
+    doubles = ir.VectorType(ir.DoubleType(), 8)
+    module = ir.Module(name="sum")
+    function = ir.Function(module, ir.FunctionType(ir.VoidType(), [doubles.as_pointer()]), "sum")
+    builder = ir.IRBuilder(function.append_basic_block())
+    numbers = builder.load(function.args[0])
+    builder.store(builder.fadd(numbers, numbers), function.args[0])
+    builder.ret_void()
+    library = cpu_target.target_context.codegen().create_library("sum")
+    library.add_ir_module(module)
+    return str(library.get_asm_str())
+
+
+def panel_of(registers: Registers) -> int:
+    """Columns of the largest product of three rows whose sums stay in registers.
+
+    Beside the sums there must be room for the rows and for one column. Six or three, which divide
+    the columns that occur: 6, 18, 24 and 48.
+
+    Examples
+    --------
+    >>> panel_of(X86["zmm"]), panel_of(X86["ymm"])
+    (6, 3)
+    """
+    return 6 if 3 * 6 + 3 + 1 <= registers.number else 3
+
+
+REGISTERS = registers_in(assembly_of_a_sum())
+
+LANES = REGISTERS.doubles
+"""Blocks side by side: as many as a register holds, so that a number of each takes one register.
+
+With more the compiler splits every number over several registers, and tiles no longer fit.
+"""
+
+PANEL = panel_of(REGISTERS)
+"""Columns of right-hand sides worked on together."""

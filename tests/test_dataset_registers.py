@@ -1,0 +1,70 @@
+"""Lanes and tiles follow the registers of the processor compiled for, and results do not."""
+
+import numpy as np
+import pytest
+from llvmlite import binding
+
+from dataset_gen.objectives import lanes, registers
+from dataset_gen.objectives.kernel import COLUMNS
+from dataset_gen.objectives.oversampled import RIGID_SHARE
+from dataset_gen.objectives.registers import LANES, OTHERS, PANEL, X86, panel_of, registers_in
+from tests.fits_of_target import OBJECTIVES, fits
+
+ROUNDING = np.finfo(float).eps / RIGID_SHARE
+"""What rounding may change: energies that are that share of the largest count in the whitening."""
+
+TARGETS = {"generic": 2, "haswell": 4}
+"""Doubles of a register."""
+
+
+@pytest.mark.parametrize(
+    ("assembly", "found"),
+    [
+        ("vaddpd %zmm0, %zmm1, %zmm0\nvmovapd %ymm2, (%rdi)", X86["zmm"]),
+        ("vaddpd %ymm0, %ymm1, %ymm0\nvmovsd %xmm2, (%rdi)", X86["ymm"]),
+        ("addpd %xmm1, %xmm0", X86["xmm"]),
+        ("fadd v0.2d, v0.2d, v1.2d", OTHERS),
+    ],
+)
+def test_registers_are_told_from_the_code(assembly, found):
+    assert registers_in(assembly) == found
+
+
+@pytest.mark.parametrize("kind", [*X86.values(), OTHERS])
+def test_a_tile_fits_the_registers_and_panels_divide_the_columns(kind):
+    panel = panel_of(kind)
+    assert 3 * panel + 3 + 1 <= kind.number and COLUMNS % panel == 0
+
+
+def test_a_lane_takes_one_register():
+    assert LANES == registers.REGISTERS.doubles and PANEL == panel_of(registers.REGISTERS)
+
+
+def test_another_width_is_compiled_under_another_name(monkeypatch):
+    name = lanes._sources()
+    monkeypatch.setattr(lanes, "LANES", 2 * LANES)
+    assert lanes._sources() != name
+
+
+@pytest.fixture(scope="module")
+def here():
+    return fits()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("target", TARGETS)
+def test_fits_differ_by_rounding_between_widths_and_not_with_their_company(
+    target, here, start_cli, tmp_path
+):
+    features = binding.get_host_cpu_features()
+    if target == "haswell" and not (features.get("avx2") and features.get("fma")):
+        pytest.skip("the processor has no AVX2")
+    path = tmp_path / "fits.npz"
+    forced = {"NUMBA_CPU_NAME": target, "NUMBA_CPU_FEATURES": ""}
+    start_cli("tests.fits_of_target", path, env=forced, check=True)
+    found = np.load(path)
+    assert found["lanes"] == TARGETS[target] and found["panel"] in (3, 6)
+    for objective in OBJECTIVES:
+        np.testing.assert_array_equal(found[objective], found[f"{objective}, alone"])
+        np.testing.assert_array_equal(here[objective], here[f"{objective}, alone"])
+        np.testing.assert_allclose(found[objective], here[objective], rtol=ROUNDING)
