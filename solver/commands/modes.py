@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.model import RIGID_MODES, ElasticModel
+from carillon.fem.model import ElasticModel
 from carillon.options import add_options, collect
 from carillon.progress import say
 from solver.analysis.modal_solver import ModalSolver, Modes
@@ -61,8 +61,6 @@ def run(arguments: argparse.Namespace) -> None:
         described = collect(ProblemOptions, arguments)
         options = collect(SolverOptions, arguments)
         tolerance = collect(RefinementOptions, arguments).tolerance(described.coarsen)
-        if options.modes <= RIGID_MODES:
-            tolerance = None
         problem = compute_on_root(comm, lambda: build_problem(described))
         petsc_options.insert_options(arguments.petsc, options.method)
         initial = arguments.initial_modes

@@ -13,8 +13,10 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from carillon.errors import UserError
 from carillon.fem.geometry import Blocks, prolongation
 from carillon.fem.model import ElasticModel
+from carillon.runtime import available_memory
 from solver.assembly.system import Layout, System, assemble
 from solver.coarsening.linear import LinearCoarsening
 from solver.coarsening.model import coarse_model, element_moduli
@@ -26,6 +28,12 @@ Array = NDArray[np.float64]
 
 STEPS = 3
 """Steps; each takes about nine tenths of the error of the eigenvalues that is left."""
+
+MOST_VECTORS = 66
+"""Elastic modes that are usually corrected; see `solver.refinement.estimate.MODES_USED`."""
+
+BLOCKS, NODES_AROUND = 18, 27
+"""Blocks of so many vectors that exist together, and nodes that share an element with one."""
 
 DAMPING = 0.6
 """Of the sweeps: below two over the largest eigenvalue of D^-1 K, which is less than three."""
@@ -40,9 +48,15 @@ class TwoGrid:
         The fine model, with one modulus a cell. It is assembled once, on this rank alone.
     threads
         Threads for products with blocks of vectors.
+
+    Raises
+    ------
+    UserError
+        If its matrices and vectors would not fit in memory.
     """
 
     def __init__(self, fine: ElasticModel, threads: int = 1) -> None:
+        _require_memory(fine)
         self.fine = fine
         self._threads = threads
         layout = _layout(fine)
@@ -101,6 +115,18 @@ class _CoarseSolve:
     def solve(self, block: Array) -> Array:
         """Solutions for a block of right-hand sides (coarse n_dofs, k)."""
         return self._inverse.solve(np.ascontiguousarray(block))
+
+
+def _require_memory(fine: ElasticModel) -> None:
+    entries = NODES_AROUND * fine.mesh.n_nodes * (9 + 1) + 64 * fine.mesh.n_cells
+    needed = 8 * (entries + BLOCKS * MOST_VECTORS * fine.n_dofs)
+    free = available_memory()
+    if free is not None and needed > free:
+        raise UserError(
+            f"the error of a coarse model of {fine.n_dofs:,} fine unknowns takes about "
+            f"{needed / 1e9:,.1f} GB to estimate, {free / 1e9:,.1f} GB are free; leave it out with "
+            "--refine-to 0 or lower --resolution"
+        )
 
 
 def _layout(model: ElasticModel) -> Layout:
