@@ -8,6 +8,8 @@ coarse mesh, and the sweep again. All it takes of the fine matrices are products
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
@@ -22,7 +24,7 @@ from solver.coarsening.linear import LinearCoarsening
 from solver.coarsening.model import coarse_model, element_moduli
 from solver.distribution.local_mesh import distribute
 from solver.linear import LinearSolver
-from solver.subspace.rayleigh_ritz import rayleigh_ritz, safe_shift
+from solver.subspace.rayleigh_ritz import remove_rigid, ritz_pairs, safe_shift
 
 Array = NDArray[np.float64]
 
@@ -82,23 +84,57 @@ class TwoGrid:
         interpolation = sp.kron(prolongation(blocks), sp.identity(3), format="csr")
         restriction = interpolation.T.tocsr()
         coarse = _CoarseSolve(blocks, self.fine, self._threads)
-        values, vectors = rayleigh_ritz(system, interpolation @ coarse_modes, count)
-        before = vectors[:, :0]
+        start = self._with_products(interpolation @ coarse_modes)
+        values, vectors, origin = self._ritz(start, None, count)
         for _ in range(steps):
-            residual = system.times_mass(vectors) * values - system.times_stiffness(vectors)
+            residual = vectors.mass * values - vectors.stiff
             step = self._sweep(residual)
             left = restriction @ (residual - system.times_stiffness(step))
             step += interpolation @ coarse.solve(left)
             step += self._sweep(residual - system.times_stiffness(step))
-            old = vectors
-            values, vectors = rayleigh_ritz(system, np.hstack([old, step, before]), count)
-            # Where it came from: what the next step conjugates against.
-            before = vectors - old @ system.inner(old, system.times_mass(vectors))
-        return values, vectors
+            values, vectors, origin = self._ritz(
+                vectors, _joined(self._with_products(step), origin), count
+            )
+        return values, vectors.block
+
+    def _with_products(self, block: Array) -> _Products:
+        block, mass = remove_rigid(self.system, np.ascontiguousarray(block))
+        return _Products(block, self.system.times_stiffness(block), mass)
+
+    def _ritz(
+        self, vectors: _Products, others: _Products | None, count: int
+    ) -> tuple[Array, _Products, _Products | None]:
+        """Ritz values, vectors, and the vectors' part in the span of `others`."""
+        values, weights = ritz_pairs(self.system, *_joined(vectors, others))
+        values, weights = values[:count], np.ascontiguousarray(weights[:, :count])
+        kept = vectors.block.shape[1]
+        ritz = vectors.combined(weights[:kept])
+        if others is None:
+            return values, ritz, None
+        origin = others.combined(weights[kept:])
+        return values, _Products(*(a + b for a, b in zip(ritz, origin))), origin
 
     def _sweep(self, residual: Array) -> Array:
         nodes = residual.reshape(len(self._inverse), 3, -1)
         return np.asarray(DAMPING * (self._inverse @ nodes).reshape(residual.shape))
+
+
+class _Products(NamedTuple):
+    """A block of vectors (n_dofs, m) and its products with K and M."""
+
+    block: Array
+    stiff: Array
+    mass: Array
+
+    def combined(self, weights: Array) -> _Products:
+        """The same of combinations (m, k) of the vectors."""
+        return _Products(*(each @ weights for each in self))
+
+
+def _joined(first: _Products, second: _Products | None) -> _Products:
+    if second is None:
+        return first
+    return _Products(*(np.hstack(pair) for pair in zip(first, second)))
 
 
 class _CoarseSolve:

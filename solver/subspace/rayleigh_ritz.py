@@ -34,12 +34,22 @@ def rayleigh_ritz(system: System, block: Array, count: int | None = None) -> tup
     Linearly dependent directions are dropped, so fewer than `count` pairs may come back.
     """
     block, mass_block = remove_rigid(system, np.ascontiguousarray(block))
-    stiff = system.inner(block, system.times_stiffness(block))
-    gram = None if is_orthonormal(system, block, mass_block) else system.inner(block, mass_block)
-    # Solved once: two processors may round apart, and an eigenvector's sign hangs on rounding.
-    values, weights = bcast_from_root(system.comm, lambda: _reduced_eigenpairs(stiff, gram))
+    values, weights = ritz_pairs(system, block, system.times_stiffness(block), mass_block)
     count = len(values) if count is None else min(count, len(values))
     return values[:count], block @ weights[:, :count]
+
+
+def ritz_pairs(
+    system: System, block: Array, stiff_block: Array, mass_block: Array
+) -> tuple[Array, Array]:
+    """Ritz values (k,) of the span of `block` (local, m), and its weights (m, k) in the vectors.
+
+    `stiff_block` and `mass_block` are its products with K and M.
+    """
+    stiff = system.inner(block, stiff_block)
+    gram = None if is_orthonormal(system, block, mass_block) else system.inner(block, mass_block)
+    # Solved once: two processors may round apart, and an eigenvector's sign hangs on rounding.
+    return bcast_from_root(system.comm, lambda: _reduced_eigenpairs(stiff, gram))
 
 
 def is_orthonormal(system: System, block: Array, mass_block: Array) -> bool:
