@@ -44,6 +44,8 @@ ARROWS = {
     "solver.analysis": """dataset_gen.objectives solver.coarsening solver.distribution solver.files
         solver.assembly solver.linear solver.subspace solver.hcms solver.correction
         solver.reference""",
+    "solver.refinement": """solver.coarsening solver.distribution solver.assembly solver.linear
+        solver.subspace solver.analysis""",
     "solver": "solver.analysis",
     "solver.studies": """solver.coarsening solver.distribution solver.files solver.assembly
         solver.linear solver.subspace solver.hcms solver.correction
@@ -53,11 +55,14 @@ ARROWS = {
         solver.studies""",
     "solver.studies.calibration": """dataset_gen.objectives solver.coarsening solver.assembly
         solver.analysis""",
+    "solver.studies.coarsening": """solver.coarsening solver.files solver.analysis
+        solver.refinement solver.studies""",
     "solver.studies.scaling": """solver.distribution solver.assembly solver.linear solver.hcms
         solver.correction solver.analysis""",
     "solver.commands": """dataset_gen.objectives solver.distribution solver.files solver.response
-        solver.linear solver.analysis solver.studies solver.studies.benchmark
-        solver.studies.calibration solver.studies.scaling""",
+        solver.linear solver.analysis solver.refinement solver.studies solver.studies.benchmark
+        solver.studies.calibration solver.studies.scaling solver.coarsening
+        solver.studies.coarsening""",
     #
     "sound": "",
     "sound.clips": "sound",

@@ -28,7 +28,7 @@ from solver.files.initial_modes import modes_from_file
 from solver.files.modes_file import frequencies, read_modes, write_modes
 from solver.linear import petsc_options
 from solver.refinement.options import RefinementOptions
-from solver.refinement.refine import RefinedModel, Step, evidence_of, solve_refined
+from solver.refinement.refine import RefinedModel, RefinementStep, evidence_of, solve_refined
 
 EXAMPLES = """examples:
   modes builtin:bell --resolution 32 --out bell.h5
@@ -119,7 +119,7 @@ def _refined(
     return RefinedModel(problem, coarsening, mesh)
 
 
-def _report(step: Step) -> None:
+def _report(step: RefinementStep) -> None:
     say(
         f"{step.unknowns:,} unknowns, {step.fine_blocks:,} blocks fine: frequencies are expected "
         f"to be {step.rms:.1%} off, mode {step.worst_mode} {step.worst:+.1%}",

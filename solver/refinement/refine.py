@@ -31,7 +31,7 @@ HASTE = 0.85
 
 
 @dataclass(frozen=True)
-class Step:
+class RefinementStep:
     """A coarse mesh that was tried.
 
     Attributes
@@ -42,6 +42,8 @@ class Step:
         Number of blocks that stay fine.
     rms, worst, worst_mode
         Expected relative errors of the frequencies of modes 7 to `last`.
+    errors : (k,)
+        All of them.
     """
 
     unknowns: int
@@ -50,6 +52,7 @@ class Step:
     worst: float
     worst_mode: int
     last: int
+    errors: Array
 
 
 class RefinedModel:
@@ -102,22 +105,23 @@ class RefinedModel:
         cells = self.blocks.coarse.grid[self.blocks.is_fine] >> 1
         return len(np.unique(cells, axis=0))
 
-    def advance(self, values: Array, modes: Array, tolerance: float) -> tuple[Step, bool]:
+    def advance(self, values: Array, modes: Array, tolerance: float) -> tuple[RefinementStep, bool]:
         """Rate the model by its eigenvalues (k,) and modes (n_dofs, k), and refine it.
 
         Returns
         -------
-        tuple[Step, bool]
+        tuple[RefinementStep, bool]
             What was rated, and whether its errors are within `tolerance`: then it stays as it is.
         """
         estimate = estimate_errors(self._two_grid, self.blocks, self.model, values, modes)
-        step = Step(
+        step = RefinementStep(
             self.blocks.coarse.n_dofs,
             self.fine_blocks,
             estimate.rms,
             estimate.worst,
             estimate.worst_mode,
             RIGID_MODES + len(estimate.errors),
+            estimate.errors,
         )
         done = estimate.excess(tolerance) <= 1.0
         if not done:
@@ -148,8 +152,8 @@ def solve_refined(
     refined: RefinedModel | None,
     tolerance: float,
     comm: MPI.Comm = MPI.COMM_WORLD,
-    report: Callable[[Step], None] | None = None,
-) -> tuple[ElasticModel | None, Modes, list[Step]]:
+    report: Callable[[RefinementStep], None] | None = None,
+) -> tuple[ElasticModel | None, Modes, list[RefinementStep]]:
     """Solve, estimate and refine until the expected error is at most `tolerance`; collective.
 
     Parameters
@@ -166,10 +170,10 @@ def solve_refined(
 
     Returns
     -------
-    tuple[ElasticModel | None, Modes, list[Step]]
+    tuple[ElasticModel | None, Modes, list[RefinementStep]]
         The last model, on rank 0; its modes, and the steps.
     """
-    steps: list[Step] = []
+    steps: list[RefinementStep] = []
     while True:
         model = None if refined is None else refined.model
         modes = solve(model)
@@ -186,12 +190,12 @@ def solve_refined(
 
 def _advance(
     refined: RefinedModel | None, modes: Modes, gathered: Array | None, tolerance: float
-) -> tuple[Step, bool]:
+) -> tuple[RefinementStep, bool]:
     assert refined is not None and gathered is not None
     return refined.advance(modes.values[:MODES_USED], gathered, tolerance)
 
 
-def evidence_of(steps: list[Step]) -> dict[str, Any]:
+def evidence_of(steps: list[RefinementStep]) -> dict[str, Any]:
     """What the last step achieved, as plain values for a file."""
     last = steps[-1]
     return {
