@@ -10,8 +10,8 @@ from typing import Any
 from carillon.arguments import positive_number, whole_number
 from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES
+from carillon.measurement import measured
 from carillon.options import collect
-from carillon.provenance import record
 from solver.analysis.problem import ProblemOptions
 from solver.coarsening.choice import METHODS
 from solver.coarsening.forest import FOREST
@@ -69,7 +69,7 @@ def run(arguments: argparse.Namespace) -> None:
         _require_two_files(arguments)
         described = collect(ProblemOptions, arguments)
         case = rate_coarsening(described, arguments.modes, arguments.refine_to)
-        case.values["provenance"] = record(parameters(arguments))
+        case.values["provenance"] = measured(parameters(arguments))
         if arguments.pictures is not None:
             write_pictures(arguments.pictures, case.problem.fine, case.pictures)
         write_json(arguments, case.values)

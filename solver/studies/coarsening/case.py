@@ -17,8 +17,9 @@ from solver.analysis.options import SolverOptions
 from solver.analysis.problem import Problem, ProblemOptions, build_problem
 from solver.coarsening.coarsening import Coarsening
 from solver.files.modes_file import CHECKS, frequencies
-from solver.refinement.estimate import LAST, MODES_USED
+from solver.refinement.estimate import LAST, MODES_USED, WORST
 from solver.refinement.refine import RefinedModel, RefinementStep, solve_refined
+from solver.studies.coarsening.matching import FAR_OFF
 from solver.studies.coarsening.pictures import ModePicture
 from solver.studies.coarsening.rating import CoarseRating, SolvedModel
 
@@ -130,7 +131,7 @@ def rate_coarsening(options: ProblemOptions, modes: int, tolerance: float) -> Ra
         "modes": modes,
         "coarsen": options.coarsen,
         **coarsening.record(),
-        "refine_to": tolerance,
+        "goals": {"rms": tolerance, "worst": WORST * tolerance, "far_off": FAR_OFF},
         "n_dofs": problem.model.n_dofs,
         "cells": problem.fine.n_cells,
         "truth": {
