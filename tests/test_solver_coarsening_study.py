@@ -23,6 +23,7 @@ from tests import solids
 
 LAST, FOUND = 24, 30
 NONE_EXPECTED = np.zeros(LAST)
+ORIGIN = {"commit": "none"}
 
 
 def solved(model: ElasticModel) -> SolvedModel:
@@ -126,7 +127,7 @@ def test_pictures_are_of_the_modes_farthest_off_and_read_as_written(coarse_bar, 
     errors = {mode["mode"]: abs(mode["error"]) for mode in coarse_bar.as_dict()["far_off"]}
     of_picture = [errors[picture.mode] for picture in pictures]
     assert of_picture == sorted(errors.values(), reverse=True)[:3]
-    write_pictures(tmp_path / "modes.h5", mesh, pictures)
+    write_pictures(tmp_path / "modes.h5", mesh, pictures, ORIGIN)
     again, read = read_pictures(tmp_path / "modes.h5")
     assert np.array_equal(again.cells, mesh.cells) and np.allclose(again.nodes, mesh.nodes)
     for left, right in zip(read, pictures, strict=True):
@@ -137,10 +138,10 @@ def test_pictures_are_of_the_modes_farthest_off_and_read_as_written(coarse_bar, 
 
 def test_a_file_of_pictures_may_hold_none_and_another_is_refused(bar, tmp_path):
     mesh = bar[0].model.mesh
-    write_pictures(tmp_path / "none.h5", mesh, [])
+    write_pictures(tmp_path / "none.h5", mesh, [], ORIGIN)
     assert read_pictures(tmp_path / "none.h5")[1] == []
     short = ModePicture(7, np.zeros((3, 3)), np.zeros(2), np.zeros(2))
-    write_pictures(tmp_path / "short.h5", mesh, [short])
+    write_pictures(tmp_path / "short.h5", mesh, [short], ORIGIN)
     with pytest.raises(UserError, match=r"short\.h5: is not what it should be"):
         read_pictures(tmp_path / "short.h5")
 

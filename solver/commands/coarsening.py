@@ -69,9 +69,10 @@ def run(arguments: argparse.Namespace) -> None:
         _require_two_files(arguments)
         described = collect(ProblemOptions, arguments)
         case = rate_coarsening(described, arguments.modes, arguments.refine_to)
-        case.values["provenance"] = measured(parameters(arguments))
+        origin = measured(parameters(arguments))
+        case.values["provenance"] = origin
         if arguments.pictures is not None:
-            write_pictures(arguments.pictures, case.problem.fine, case.pictures)
+            write_pictures(arguments.pictures, case.problem.fine, case.pictures, origin)
         write_json(arguments, case.values)
     if arguments.json:
         print(json.dumps(case.values, indent=2))

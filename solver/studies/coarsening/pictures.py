@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,20 +40,23 @@ class ModePicture:
     blame: Array
 
 
-def write_pictures(path: str | Path, mesh: HexMesh, pictures: Sequence[ModePicture]) -> None:
-    """Write modes on a fine mesh, of which there may be none.
+def write_pictures(
+    path: str | Path, mesh: HexMesh, pictures: Sequence[ModePicture], origin: Mapping[str, Any]
+) -> None:
+    """Write modes on a fine mesh, of which there may be none, with where they come from.
 
     Raises
     ------
     UserError
         If the file cannot be written.
     """
-    with create_h5(path, KIND, SCHEMA) as file:
+    with create_h5(path, KIND, SCHEMA, sealed=True) as file:
         put(file, "grid", mesh.grid, "1", "integer coordinates of the cells")
         file.attrs["origin"] = mesh.origin
         file.attrs["cell_edge"] = mesh.edge
+        file.create_group("provenance").attrs.update(origin)
         for index, picture in enumerate(pictures):
-            group = file.create_group(f"{index}")
+            group = file.create_group(f"modes/{index}")
             group.attrs["mode"] = picture.mode
             put(group, "displacement", picture.displacement, "kg^-1/2", "mode, node by node")
             put(group, "energy", picture.energy, "1", "share of the strain energy of each cell")
@@ -67,16 +71,16 @@ def read_pictures(path: str | Path) -> tuple[HexMesh, list[ModePicture]]:
     UserError
         If it is no such file, or damaged.
     """
-    with open_h5(path, KIND, SCHEMA) as file:
+    with open_h5(path, KIND, SCHEMA, sealed=True) as file:
         mesh = hexmesh_from_grid(file["grid"][:], file.attrs["origin"], file.attrs["cell_edge"])
-        names = sorted((name for name in file if name != "grid"), key=int)
+        groups = file.get("modes", {})
         pictures = [
             ModePicture(
-                int(file[name].attrs["mode"]),
-                file[name]["displacement"][:].reshape(mesh.n_nodes, 3),
-                file[name]["energy"][:].reshape(mesh.n_cells),
-                file[name]["blame"][:].reshape(mesh.n_cells),
+                int(groups[name].attrs["mode"]),
+                groups[name]["displacement"][:].reshape(mesh.n_nodes, 3),
+                groups[name]["energy"][:].reshape(mesh.n_cells),
+                groups[name]["blame"][:].reshape(mesh.n_cells),
             )
-            for name in names
+            for name in sorted(groups, key=int)
         ]
     return mesh, pictures
