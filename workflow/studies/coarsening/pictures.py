@@ -19,7 +19,9 @@ Array = NDArray[np.float64]
 
 DECADES = 3.0
 """Powers of ten that colours stand for, below the largest share."""
-BLAME_COLOURS = "magma"
+BLAME_COLOURS = "plasma"
+BORDER = 0.08
+"""Share of the picture that its border takes, since solids near the eye reach beyond the frame."""
 
 
 def mode_pictures(study: CoarseningStudy, case: Case, mode: int) -> list[dict[str, Any]]:
@@ -32,7 +34,9 @@ def mode_pictures(study: CoarseningStudy, case: Case, mode: int) -> list[dict[st
         "view": _view(mesh, picture.energy),
     }
     drawn = [
-        solid_picture(partial(_draw, mesh=mesh, picture=picture, values=values, cmap=cmap, **look))
+        solid_picture(
+            partial(_draw, mesh=mesh, picture=picture, values=values, cmap=cmap, **look), BORDER
+        )
         for values, cmap in ((picture.energy, COLOUR_MAP), (picture.blame, BLAME_COLOURS))
     ]
     shown = ("strain energy", "blame")
