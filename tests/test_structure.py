@@ -84,8 +84,9 @@ ARROWS = {
     "workflow.studies.figures": "workflow.studies.base workflow.studies.report",
     "workflow.studies.forests": """dataset_gen.objectives workflow.studies.base
         workflow.studies.report""",
-    "workflow.studies.objectives": """dataset_gen.objectives solver.coarsening workflow
+    "workflow.studies.objectives": """dataset_gen.objectives solver.coarsening
         workflow.studies.base""",
+    "workflow.studies.coarsening": "solver.studies.coarsening workflow.studies.base",
     "workflow.studies.sounds": """solver.files solver.response sound sound.clips sound.project
         sound.design sound.rendering workflow workflow.studies.base""",
     "workflow.studies.validation": """solver.files solver.response solver.studies workflow
