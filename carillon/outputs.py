@@ -1,4 +1,4 @@
-"""What all commands with `--out` and `--plot` check before they begin."""
+"""What all commands with `--out`, `--plot` and `--pictures` check before they begin."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ def require_outputs(arguments: argparse.Namespace, inputs: Sequence[str | Path] 
     Parameters
     ----------
     arguments
-        With `out`, `plot`, both or neither: names of files, None if none is to be written.
+        With `out`, `plot`, `pictures`, some or none of them: names of files, None if none is to be
+        written.
     inputs
         Names of the files that are read.
 
@@ -28,6 +29,6 @@ def require_outputs(arguments: argparse.Namespace, inputs: Sequence[str | Path] 
     given = vars(arguments)
     if given.get("plot") is not None:
         require_plottable(given["plot"])
-    for name in ("out", "plot"):
+    for name in ("out", "plot", "pictures"):
         if given.get(name) is not None:
             require_writable(given[name], inputs)

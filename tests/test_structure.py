@@ -55,11 +55,14 @@ ARROWS = {
         solver.studies""",
     "solver.studies.calibration": """dataset_gen.objectives solver.coarsening solver.assembly
         solver.analysis""",
+    "solver.studies.coarsening": """solver.coarsening solver.files solver.analysis
+        solver.refinement solver.studies""",
     "solver.studies.scaling": """solver.distribution solver.assembly solver.linear solver.hcms
         solver.correction solver.analysis""",
     "solver.commands": """dataset_gen.objectives solver.distribution solver.files solver.response
         solver.linear solver.analysis solver.refinement solver.studies solver.studies.benchmark
-        solver.studies.calibration solver.studies.scaling""",
+        solver.studies.calibration solver.studies.scaling solver.coarsening
+        solver.studies.coarsening""",
     #
     "sound": "",
     "sound.clips": "sound",
@@ -81,8 +84,9 @@ ARROWS = {
     "workflow.studies.figures": "workflow.studies.base workflow.studies.report",
     "workflow.studies.forests": """dataset_gen.objectives workflow.studies.base
         workflow.studies.report""",
-    "workflow.studies.objectives": """dataset_gen.objectives solver.coarsening workflow
+    "workflow.studies.objectives": """dataset_gen.objectives solver.coarsening
         workflow.studies.base""",
+    "workflow.studies.coarsening": "solver.studies.coarsening workflow.studies.base",
     "workflow.studies.sounds": """solver.files solver.response sound sound.clips sound.project
         sound.design sound.rendering workflow workflow.studies.base""",
     "workflow.studies.validation": """solver.files solver.response solver.studies workflow

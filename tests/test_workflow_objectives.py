@@ -14,10 +14,11 @@ from tests.small_forests import train_small_forests
 from tests.workflow_runs import CHECKOUT, PROFILE, TINY, planned, snakemake
 from workflow import settings, solids
 from workflow.studies import catalogue
+from workflow.studies.base.cases import cases_of
 from workflow.studies.base.table import read_table
 from workflow.studies.objectives.goals import goals_of, judge
 from workflow.studies.objectives.page import shortened
-from workflow.studies.objectives.results import Objectives, cases_of
+from workflow.studies.objectives.results import Objectives
 from workflow.studies.objectives.tables import description
 
 summary, errors, forest, goals, goal_cases = (
@@ -80,7 +81,7 @@ def study(tmp_path) -> Objectives:
     config = {"mesh_folder": str(tmp_path), "objectives": {**STUDY, "goals": goals}}
     (tmp_path / "config.yaml").write_text(yaml.safe_dump(config))
     study = Objectives(tmp_path / "objectives")
-    for case in cases_of(config):
+    for case in cases_of(config, "objectives"):
         path = study.folder / "cases" / case.path
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(rated(case.material, case.resolution)))
@@ -155,7 +156,7 @@ def test_a_solid_without_its_mesh_is_left_out_and_named(study, tmp_path):
     assert study.without.startswith(f"Without bust: there is no {tmp_path}/bust.obj")
     (tmp_path / "bust.obj").touch()
     assert study.without == ""
-    assert len(cases_of(study.config)) == 6
+    assert len(cases_of(study.config, "objectives")) == 6
 
 
 def test_coarse_models_with_fewer_modes_are_named(study):

@@ -30,6 +30,10 @@ COMMANDS = {
         "spectra of one solid coarsened by every fit objective, and by forests",
         ranks=True,
     ),
+    "coarsening": Command(
+        "solver.commands.coarsening",
+        "errors of a coarse model's single modes, true and expected, and what they are due to",
+    ),
     "calibrate": Command(
         "solver.commands.calibrate",
         "constants of the objective `calibrated` from spectra of random solids",

@@ -21,7 +21,7 @@ from solver.linear import petsc_options
 
 INPUTS = ("mesh", "material", "forest", "truth", "initial_modes", "files", "candidates")
 """Arguments that name files which a command reads."""
-HIDDEN = ("out", "json")
+HIDDEN = ("out", "pictures", "json")
 """Arguments on which a result does not depend."""
 
 

@@ -91,23 +91,40 @@ def estimate_errors(
     exact, vectors = exact[:count], vectors[:, :count]
     ratio = np.maximum(values[RIGID_MODES : RIGID_MODES + count], 0.0) / exact
     errors = np.sqrt(ratio) - 1.0
-    nearest = _nearest(blocks, coarse, two_grid.fine, vectors)
-    missed = element_energies(coarse, nearest) - fine_energies(blocks, two_grid.fine, vectors)
-    shares = np.sqrt(np.mean((missed / exact) ** 2, axis=1))
-    return ErrorEstimate(errors, np.where(blocks.is_fine, 0.0, shares))
+    shares = error_shares(blocks, coarse, two_grid.fine, exact, vectors)
+    return ErrorEstimate(errors, np.sqrt(np.mean(shares**2, axis=1)))
+
+
+def error_shares(
+    blocks: Blocks, coarse: ElasticModel, fine: ElasticModel, values: Array, vectors: Array
+) -> Array:
+    """Share (mc, k) that each element has in the relative errors of each mode's eigenvalue.
+
+    Positive where the element is too stiff, 0 for fine cells.
+
+    Parameters
+    ----------
+    blocks, coarse, fine
+        The coarse mesh, plain or mixed, the model on it, and the fine one.
+    values, vectors
+        (k,) eigenvalues and (n_dofs, k) mass-normalised modes of the fine solid.
+    """
+    nearest = _nearest(blocks, coarse, fine, vectors)
+    missed = element_energies(coarse, nearest) - fine_energies(blocks, fine, vectors)
+    return np.where(blocks.is_fine[:, None], 0.0, missed / values)
 
 
 def _nearest(blocks: Blocks, coarse: ElasticModel, fine: ElasticModel, vectors: Array) -> Array:
     """Displacements (coarse n_dofs, k) whose interpolation is nearest in the norm of the mass."""
     interpolation = prolongation(blocks)
-    projected = interpolation.T @ (_nodal_mass(fine) @ vectors.reshape(fine.mesh.n_nodes, -1))
+    projected = interpolation.T @ (nodal_mass_matrix(fine) @ vectors.reshape(fine.mesh.n_nodes, -1))
     # Summed over elements: hinges, which the interpolation closes, can leave P^T M P singular.
-    consistent = _nodal_mass(replace(coarse, lumped=False, lumped_share=0.0))
+    consistent = nodal_mass_matrix(replace(coarse, lumped=False, lumped_share=0.0))
     solved = splu(consistent.tocsc()).solve(projected)
     return np.ascontiguousarray(solved.reshape(coarse.n_dofs, -1))
 
 
-def _nodal_mass(model: ElasticModel) -> sp.csr_matrix:
+def nodal_mass_matrix(model: ElasticModel) -> sp.csr_matrix:
     """Mass matrix (n, n) [kg], the same for each displacement component."""
     cells = model.mesh.cells
     rows, columns = np.repeat(cells, 8, axis=1).ravel(), np.tile(cells, (1, 8)).ravel()

@@ -42,6 +42,8 @@ class RefinementStep:
         Number of blocks that stay fine.
     rms, worst, worst_mode
         Expected relative errors of the frequencies of modes 7 to `last`.
+    errors : (k,)
+        All of them.
     """
 
     unknowns: int
@@ -50,6 +52,7 @@ class RefinementStep:
     worst: float
     worst_mode: int
     last: int
+    errors: Array
 
 
 class RefinedModel:
@@ -118,6 +121,7 @@ class RefinedModel:
             estimate.worst,
             estimate.worst_mode,
             RIGID_MODES + len(estimate.errors),
+            estimate.errors,
         )
         done = estimate.excess(tolerance) <= 1.0
         if not done:

@@ -102,6 +102,18 @@ each(
     "modes",
 )
 each(
+    "modes rated",
+    "coarsening builtin:box --resolution 4 --modes VALUE",
+    ["0", "-5", "6", "61", str(2**64), "1e1"],
+    "modes",
+)
+each(
+    "error refined to",
+    "coarsening builtin:box --resolution 4 --refine-to VALUE",
+    ["0", "-0.1", "nan", "inf"],
+    "--refine-to",
+)
+each(
     "modes followed",
     "convergence builtin:box --resolution 4 --modes VALUE --out out.json",
     ["0", "-5", "6", str(2**64)],
@@ -295,6 +307,9 @@ hostile("audit onto a device", "audit ZOO/modes.h5 --out null", files={"null": P
 hostile("audit on a full disk", "audit ZOO/modes.h5 --out a.json", "make room", file_size=100)
 hostile("benchmark into nowhere", "benchmark builtin:box --resolution 4 --out nowhere/row.json")
 hostile("objectives into nowhere", "objectives builtin:box --resolution 4 --out nowhere/o.json")
+hostile("rating into nowhere", "coarsening builtin:box --resolution 4 --out nowhere/case.json")
+hostile("pictures into nowhere", "coarsening builtin:box --resolution 4 --pictures nowhere/case.h5")
+hostile("nothing coarsened", "coarsening builtin:box --resolution 4 --coarsen none", "none")
 hostile("scaling into nowhere", "scaling builtin:box --resolution 4 --out nowhere/s.json")
 hostile("plot of no format", "scaling builtin:box --resolution 4 --plot scaling.mp3", "scaling.mp3")
 hostile("plot into nowhere", "scaling builtin:box --resolution 4 --plot nowhere/scaling.png")

@@ -17,7 +17,7 @@ from typing import Any
 import pandas as pd
 
 from carillon.errors import UserError, one_line
-from workflow import settings
+from workflow import settings, solids
 
 TARGETS = ("all", "figures")
 """Targets of Snakemake that are estimated; what both need belongs to the first."""
@@ -59,7 +59,7 @@ def _placeless(config: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any],
     """The same configuration on files that are there, with the meshes by what stands for them."""
     values = copy.deepcopy(dict(config)) | {"results_dir": "results", "baseline": None}
     meshes: dict[str, str] = {}
-    for part in (values, values["figures"], values["objectives"]):
+    for part in (values, *(values[section] for section in solids.STUDIED)):
         for model in part["models"].values():
             if "material" in model:
                 model["material"] = "smooth"

@@ -1,14 +1,16 @@
 # What the studies are made from, and where they lie.
 from workflow import solids
 from workflow.studies import catalogue, marks
+from workflow.studies.base.cases import cases_of
 from workflow.studies.base.study import modules_of
-from workflow.studies.objectives.results import cases_of
+
+CASES = [config["objectives"], config["coarsening"]]
 
 
 wildcard_constraints:
-    solid="|".join(config["objectives"]["models"]),
+    solid="|".join(sorted({solid for part in CASES for solid in part["models"]})),
     resolution=r"\d+",
-    material="|".join(config["objectives"]["materials"]),
+    material="|".join(sorted({name for part in CASES for name in part["materials"]})),
     shape="|".join(config["figures"]["models"]),
 
 
@@ -77,14 +79,17 @@ def measured_for(study):
         ]
     if study is catalogue.FIGURES:
         return measured
-    if study is catalogue.OBJECTIVES:
-        return [f"{folder}/cases/{case.path}" for case in cases_of(config)]
+    if study in (catalogue.OBJECTIVES, catalogue.COARSENING):
+        return [f"{folder}/cases/{case.path}" for case in cases_of(config, study.name)]
     parts = ("model", "blocks", "benchmark", "variants", "curve")
     return [f"{folder}/{part}.json" for part in parts]
 
 
 def shown_beside(study):
     """What a page shows beside its tables and figures."""
+    if study is catalogue.COARSENING:
+        cases = cases_of(config, study.name)
+        return [f"{place(study)}/cases/{case.path}".replace(".json", ".h5") for case in cases]
     if study is not catalogue.REPORT:
         return []
     modes = expand("{model}-mode-{variant}.png", model=MODELS, variant=variants.SHOWN)
@@ -95,15 +100,19 @@ def shown_beside(study):
     ]
 
 
-def case_arguments(wildcards):
-    """What the solid of a case is: mesh, resolution, material."""
-    how = {
-        "resolution": wildcards.resolution,
-        "material": wildcards.material,
-        "poisson": config["poisson"],
-        "components": config["objectives"]["models"][wildcards.solid]["components"],
-    }
-    return [settings.mesh_of(config, wildcards.solid, "objectives"), *options(how)]
+def case_arguments(section):
+    """What the solid of a case of a study is: mesh, resolution, material."""
+
+    def arguments(wildcards):
+        how = {
+            "resolution": wildcards.resolution,
+            "material": wildcards.material,
+            "poisson": config["poisson"],
+            "components": config[section]["models"][wildcards.solid]["components"],
+        }
+        return [settings.mesh_of(config, wildcards.solid, section), *options(how)]
+
+    return arguments
 
 
 def objectives_arguments():
@@ -113,6 +122,17 @@ def objectives_arguments():
         "forest": part["forest"] and path_word(part["forest"]),
         "modes": part["modes"],
         "objectives": ",".join(settings.studied_objectives(config)),
+    }
+    return options(how)
+
+
+def coarsening_arguments():
+    """How every case is coarsened and refined."""
+    part = config["coarsening"]
+    how = {
+        "forest": part["forest"] and path_word(part["forest"]),
+        "modes": part["modes"],
+        "refine_to": part["refine_to"],
     }
     return options(how)
 

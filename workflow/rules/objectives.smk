@@ -20,7 +20,7 @@ rule rate_objectives:
         **limits("rate_objectives"),
     params:
         source=source("solver.commands.objectives"),
-        case=case_arguments,
+        case=case_arguments("objectives"),
         how=objectives_arguments(),
     shell:
         "python -m solver objectives {params.case:q} {params.how:q} --out {output:q} > {log:q} 2>&1"

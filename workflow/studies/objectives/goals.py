@@ -6,9 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from solver.coarsening.forest import FOREST
+from workflow.studies.base.cases import Case
 from workflow.studies.base.entry import Row
 from workflow.studies.base.results import spelt
-from workflow.studies.objectives.results import Case, Objectives
+from workflow.studies.objectives.results import Objectives
 from workflow.studies.objectives.tables import FIRST as FIRST
 
 NBSP = "\N{NO-BREAK SPACE}"

@@ -1,64 +1,17 @@
-"""Which solids, resolutions and materials the objectives are compared on, and the results there."""
+"""What the study of the objectives has found."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 from solver.coarsening.forest import FOREST
-from workflow import solids
-from workflow.studies.base.conditions import Record
-from workflow.studies.base.results import Results
-
-SECTION = "objectives"
+from workflow.studies.base.cases import Case, CaseResults
 
 
-@dataclass(frozen=True)
-class Case:
-    """One solid at one resolution with one material."""
-
-    solid: str
-    resolution: int
-    material: str
-
-    @property
-    def path(self) -> str:
-        """Name of the result file below the folder of the cases."""
-        return f"{self.solid}/{self.resolution}-{self.material}.json"
-
-
-def cases_of(config: Mapping[str, Any]) -> list[Case]:
-    """All cases whose mesh exists, in the order of the configuration."""
-    study = config[SECTION]
-    return [
-        Case(solid, resolution, material)
-        for solid in solids.named(config, f"{SECTION}.models")
-        for resolution in study["models"][solid]["resolutions"]
-        for material in study["materials"]
-    ]
-
-
-class Objectives(Results):
+class Objectives(CaseResults):
     """The folder of the objectives' study."""
 
-    section = SECTION
-
-    @cached_property
-    def ratings(self) -> dict[Case, dict[str, Any]]:
-        """Output of `solver objectives` by case."""
-        return {case: self.read_json(f"cases/{case.path}") for case in cases_of(self.config)}
-
-    @property
-    def origins(self) -> dict[str, Record]:
-        """Provenance of every case."""
-        return {f"cases/{case.path}": each["provenance"] for case, each in self.ratings.items()}
-
-    @property
-    def solids(self) -> list[str]:
-        """Names of the solids studied."""
-        return solids.named(self.config, f"{SECTION}.models")
+    section = "objectives"
 
     @property
     def coarsenings(self) -> list[str]:
@@ -84,19 +37,6 @@ class Objectives(Results):
         """Last mode compared: of the `audible` 7..60, or of `all`; earlier if fewer were wanted."""
         rows = (row for rating in self.ratings.values() for row in rating["rows"])
         return max(row[part]["last"] for row in rows)
-
-    def identity(self, case: Case) -> dict[str, Any]:
-        """Values that tell a case from others."""
-        return {
-            "model": case.solid,
-            "title": self.titles[case.solid],
-            "resolution": case.resolution,
-            "material": case.material,
-        }
-
-    def label(self, case: Case) -> str:
-        """A case in a few words."""
-        return f"{self.titles[case.solid]} {case.resolution}, {case.material}"
 
     def errors(self, case: Case, coarsening: str) -> dict[str, Any]:
         """Row of a case that belongs to a coarsening."""

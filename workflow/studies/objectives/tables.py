@@ -13,8 +13,9 @@ import carillon.fem.materials
 from carillon.fem.model import RIGID_MODES
 from dataset_gen.objectives import OBJECTIVES
 from solver.coarsening.forest import FOREST
+from workflow.studies.base.cases import Case
 from workflow.studies.base.entry import Row
-from workflow.studies.objectives.results import Case, Objectives
+from workflow.studies.objectives.results import Objectives
 
 FIRST = RIGID_MODES + 1
 ALL = "all"
