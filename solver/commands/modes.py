@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.model import ElasticModel
+from carillon.fem.model import ElasticModel, fine_model
 from carillon.options import add_options, collect
 from carillon.progress import say
 from solver.analysis.modal_solver import ModalSolver, Modes
@@ -114,7 +114,15 @@ def _refined(
     coarsening = described.coarsening()
     assert coarsening is not None
     mesh = None if initial is None else read_modes(initial, with_modes=False).mesh
-    return RefinedModel(problem, coarsening, mesh)
+    coarse = problem.model
+    fine = fine_model(
+        problem.fine,
+        problem.young,
+        poisson=coarse.poisson,
+        density=coarse.density,
+        lumped=coarse.lumped,
+    )
+    return RefinedModel(fine, coarsening, mesh)
 
 
 def _report(step: RefinementStep) -> None:

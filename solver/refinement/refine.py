@@ -12,9 +12,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.fem.geometry import Blocks, HexMesh, blocks_from_mesh, blocks_with_coarse
-from carillon.fem.model import RIGID_MODES, Constants, ElasticModel, fine_model
+from carillon.fem.model import RIGID_MODES, Constants, ElasticModel
 from solver.analysis.modal_solver import Modes
-from solver.analysis.problem import Problem
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.model import coarse_model, element_moduli
 from solver.distribution.collective import bcast_from_root
@@ -60,10 +59,10 @@ class RefinedModel:
 
     Parameters
     ----------
-    problem
-        The fine mesh with its moduli, and a coarse model, whose constants count.
+    fine
+        The fine model, with one modulus a cell.
     coarsening
-        Of the other blocks.
+        Of the blocks that do not stay fine.
     mesh
         Coarse mesh to begin with, perhaps mixed; the plain one if it is none of this fine mesh.
     threads
@@ -72,23 +71,21 @@ class RefinedModel:
 
     def __init__(
         self,
-        problem: Problem,
+        fine: ElasticModel,
         coarsening: Coarsening,
         mesh: HexMesh | None = None,
         threads: int = 1,
     ) -> None:
-        model = problem.model
-        self._young = problem.young
+        self._young = fine.young[:, 0]
         self._coarsening = coarsening
         self._constants: Constants = {
-            "poisson": model.poisson,
-            "density": model.density,
-            "lumped": model.lumped,
+            "poisson": fine.poisson,
+            "density": fine.density,
+            "lumped": fine.lumped,
         }
-        self._plain = blocks_from_mesh(problem.fine)
-        given = None if mesh is None else blocks_with_coarse(problem.fine, mesh)
+        self._plain = blocks_from_mesh(fine.mesh)
+        given = None if mesh is None else blocks_with_coarse(fine.mesh, mesh)
         self.blocks = self._plain if given is None else given
-        fine = fine_model(problem.fine, problem.young, **self._constants)
         self._two_grid = TwoGrid(fine, threads)
         self._steps = 0
 

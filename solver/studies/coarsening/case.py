@@ -52,7 +52,7 @@ class _Attempts:
     def __init__(self, problem: Problem, coarsening: Coarsening, modes: int) -> None:
         self._modes = modes
         self._mark = time.perf_counter()
-        self._refined = RefinedModel(problem, coarsening)
+        self._refined = RefinedModel(problem.model, coarsening)
         # The fine matrices are what the estimate needs beforehand.
         self._before_estimate = self._lap()
         self.made: list[_Attempt] = []
