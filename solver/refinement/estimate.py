@@ -84,6 +84,25 @@ def estimate_errors(
         The coarse mesh, plain or mixed, and the model on it.
     values, modes
         (k,) eigenvalues [rad^2/s^2] and (coarse n_dofs, k) modes, the six rigid ones included.
+
+    Examples
+    --------
+    >>> import solver
+    >>> from carillon.fem.geometry import (
+    ...     blocks_from_mesh, builtin_surface, hexmesh_from_voxels, voxelize
+    ... )
+    >>> from carillon.fem.model import fine_model
+    >>> from solver.coarsening.choice import make_coarsening
+    >>> from solver.coarsening.model import build_model
+    >>> mesh = hexmesh_from_voxels(voxelize(builtin_surface("bar"), 16))
+    >>> young = np.full(mesh.n_cells, 1e9)
+    >>> coarse = build_model(mesh, young, make_coarsening("average"))
+    >>> found = solver.solve(coarse, modes=30, method="slepc")
+    >>> two_grid = TwoGrid(fine_model(mesh, young))
+    >>> blocks = blocks_from_mesh(mesh)
+    >>> estimate = estimate_errors(two_grid, blocks, coarse, found.eigenvalues, found.modes)
+    >>> estimate.errors.shape, bool(estimate.rms > 0.1)
+    ((24,), True)
     """
     elastic = np.ascontiguousarray(modes[:, RIGID_MODES:MODES_USED])
     exact, vectors = two_grid.lowest(blocks, elastic)

@@ -169,6 +169,21 @@ def solve_refined(
     -------
     tuple[ElasticModel | None, Modes, list[RefinementStep]]
         The last model, on rank 0; its modes, and the steps.
+
+    Examples
+    --------
+    >>> from carillon.fem.geometry import builtin_surface, hexmesh_from_voxels, voxelize
+    >>> from carillon.fem.model import fine_model
+    >>> from solver import SolverOptions
+    >>> from solver.analysis.modal_solver import modal_analysis
+    >>> from solver.coarsening.choice import make_coarsening
+    >>> mesh = hexmesh_from_voxels(voxelize(builtin_surface("fork"), 24))
+    >>> fine = fine_model(mesh, np.full(mesh.n_cells, 1e9))
+    >>> start = RefinedModel(fine, make_coarsening("ddfem"))
+    >>> how = SolverOptions(method="slepc", modes=30)
+    >>> model, modes, steps = solve_refined(lambda model: modal_analysis(model, how), start, 0.03)
+    >>> steps[0].rms > 0.03 >= steps[-1].rms, model.n_dofs < fine.n_dofs
+    (True, True)
     """
     steps: list[RefinementStep] = []
     while True:
