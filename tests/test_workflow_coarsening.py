@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 import yaml
 
+from carillon.fem.geometry.picture import looks_at
+from tests import solids
 from tests.pages import Page, assert_same_numbers, assert_self_contained
 from tests.workflow_runs import CHECKOUT, PROFILE, TINY, planned, snakemake
 from workflow.studies import catalogue
 from workflow.studies.base.cases import Case, cases_of
 from workflow.studies.base.table import read_table
+from workflow.studies.coarsening.pictures import best_view
 from workflow.studies.coarsening.results import CoarseningStudy
 from workflow.studies.coarsening.tables import filled_cells, rank_correlation
 
@@ -134,6 +138,16 @@ def test_the_trial_solids_are_all_studied():
     config = yaml.safe_load((CHECKOUT / "workflow" / "config" / "laptop.yaml").read_text())
     meshes = [model["mesh"] for model in config["coarsening"]["models"].values()]
     assert {f"builtin:{name}" for name in TRIALS} <= set(meshes)
+
+
+@pytest.mark.parametrize("side", [(0, 1), (0, -1), (1, 1), (1, -1), (2, -1)])
+def test_a_mode_is_seen_from_where_its_energy_is(side):
+    axis, sign = side
+    mesh = solids.box_mesh(8, 8, 8)
+    lit = mesh.grid[:, axis] == (7 if sign > 0 else 0)
+    outward = sign * np.eye(3)[[axis]]
+    view = best_view(mesh, lit.astype(float), "z")
+    assert looks_at(mesh, outward, view, "z")[0] > 0.3
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.fem.geometry import HexMesh
-from carillon.fem.geometry.picture import VIEW, draw, guess_up, view_of
+from carillon.fem.geometry.picture import VIEW, draw, guess_up, looks_at
 from solver.studies.coarsening.pictures import ModePicture, read_pictures
 from workflow.studies.base.cases import Case
 from workflow.studies.base.media import COLOUR_MAP, cropped, embedded, solid_picture
@@ -28,11 +28,9 @@ def mode_pictures(study: CoarseningStudy, case: Case, mode: int) -> list[dict[st
     """The deformed solid, coloured by shares of strain energy and of blame, for a page."""
     mesh, pictures = read_pictures(study.pictures_of(case))
     picture = next(each for each in pictures if each.mode == mode)
-    look: dict[str, Any] = {
-        "up": guess_up(mesh),
-        "limits": (-DECADES, 0.0),
-        "view": _view(mesh, picture.energy),
-    }
+    up = guess_up(mesh)
+    view = best_view(mesh, picture.energy, up)
+    look: dict[str, Any] = {"up": up, "view": view, "limits": (-DECADES, 0.0)}
     drawn = [
         solid_picture(
             partial(_draw, mesh=mesh, picture=picture, values=values, cmap=cmap, **look), BORDER
@@ -49,11 +47,20 @@ def _draw(axes: Any, mesh: HexMesh, picture: ModePicture, values: Array, **look:
     draw(axes, mesh, displacement=picture.displacement, values=scaled, **look)
 
 
-def _view(mesh: HexMesh, energy: Array) -> tuple[float, float]:
-    """From the side on which the energy is."""
-    middles = mesh.grid + 0.5
-    outward = (energy[:, None] * middles).sum(axis=0) / energy.sum() - middles.mean(axis=0)
-    length = float(np.linalg.norm(outward))
-    if length < 1.0:
-        return VIEW
-    return view_of(mesh, outward[None] / length)
+def best_view(mesh: HexMesh, energy: Array, up: str) -> tuple[float, float]:
+    """Elevation and azimuth [degrees] from where most of the energy (m,) of the cells is seen."""
+    views = [
+        (elevation, VIEW[1] + turn)
+        for elevation in (VIEW[0], -VIEW[0])
+        for turn in np.arange(0.0, 360.0, 15.0)
+    ]
+    return max(views, key=lambda view: energy[_seen(mesh, view, up)].sum())
+
+
+def _seen(mesh: HexMesh, view: tuple[float, float], up: str) -> NDArray[np.int64]:
+    """Cells that no other one hides, told by their middles."""
+    eye = looks_at(mesh, np.eye(3), view, up)
+    across = np.linalg.svd(eye[None])[2][1:]
+    nearest_first = np.argsort(-(mesh.grid @ eye), kind="stable")
+    places = np.round(mesh.grid[nearest_first] @ across.T)
+    return nearest_first[np.unique(places, axis=0, return_index=True)[1]]
