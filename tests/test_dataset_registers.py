@@ -8,7 +8,7 @@ from dataset_gen.objectives import lanes, registers
 from dataset_gen.objectives.kernel import COLUMNS
 from dataset_gen.objectives.oversampled import RIGID_SHARE
 from dataset_gen.objectives.registers import LANES, OTHERS, PANEL, X86, panel_of, registers_in
-from tests.fits_of_target import OBJECTIVES, fits
+from tests.fits_of_target import fits
 
 ROUNDING = np.finfo(float).eps / RIGID_SHARE
 """What rounding may change: energies that are that share of the largest count in the whitening."""
@@ -46,25 +46,27 @@ def test_another_width_is_compiled_under_another_name(monkeypatch):
     assert lanes._sources() != name
 
 
-@pytest.fixture(scope="module")
-def here():
-    return fits()
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize(
+    ("target", "objectives"),
+    [
+        ("haswell", ["calibrated"]),
+        pytest.param("haswell", ["inertial", "chen2015", "energy"], marks=pytest.mark.torture),
+        pytest.param("generic", ["calibrated", "inertial"], marks=pytest.mark.torture),
+    ],
+)
 def test_fits_differ_by_rounding_between_widths_and_not_with_their_company(
-    target, here, start_cli, tmp_path
+    target, objectives, start_cli, tmp_path
 ):
     features = binding.get_host_cpu_features()
     if target == "haswell" and not (features.get("avx2") and features.get("fma")):
         pytest.skip("the processor has no AVX2")
     path = tmp_path / "fits.npz"
     forced = {"NUMBA_CPU_NAME": target, "NUMBA_CPU_FEATURES": ""}
-    start_cli("tests.fits_of_target", path, env=forced, check=True)
-    found = np.load(path)
+    start_cli("tests.fits_of_target", path, *objectives, env=forced, check=True)
+    found, here = np.load(path), fits(*objectives)
     assert found["lanes"] == TARGETS[target] and found["panel"] in (3, 6)
-    for objective in OBJECTIVES:
+    for objective in objectives:
         np.testing.assert_array_equal(found[objective], found[f"{objective}, alone"])
         np.testing.assert_array_equal(here[objective], here[f"{objective}, alone"])
         np.testing.assert_allclose(found[objective], here[objective], rtol=ROUNDING)

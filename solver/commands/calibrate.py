@@ -26,7 +26,7 @@ EXAMPLES = """example:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     parser.add_argument(
-        "--solids", type=whole_number(1, 100_000), default=250, help="random solids (default 250)"
+        "--solids", type=whole_number(1, 100_000), default=150, help="random solids (default 150)"
     )
     parser.add_argument("--random-only", action="store_true", help="leave the built-in objects out")
     parser.add_argument("--seed", type=whole_number(0), default=0, help="of the solids")

@@ -29,12 +29,6 @@ CELLS = (150, 6500)
 HALF_THICKNESS = (0.6, 3.0)
 """Of plates, rods and shells, in voxels."""
 
-CUT_FRACTION = 0.4
-"""Share of the others that slots are cut into, which leaves parts close to each other."""
-
-HALF_SLOT = (0.5, 1.2)
-"""Half the width of a slot, in voxels."""
-
 BOX_FRACTION = 0.15
 """Share of solids that are boxes of whole blocks, where nothing is void."""
 
@@ -111,22 +105,9 @@ def _joined(rng: Generator) -> Filled:
         turn = Rotation.random(random_state=rng).as_matrix() if rng.random() < 0.75 else np.eye(3)
         local = (lattice - rng.uniform(0.3, 0.7, 3) * n) @ turn
         filled |= PRIMITIVES[int(rng.integers(len(PRIMITIVES)))](local, n, rng)
-    if rng.random() < CUT_FRACTION:
-        for _ in range(int(rng.integers(1, 4))):
-            filled &= ~_slot(lattice, n, rng)
     labels, count = ndimage.label(filled)
     sizes = np.bincount(labels.ravel(), minlength=count + 1)
     return np.asarray(labels == 1 + sizes[1:].argmax()) if count else filled
-
-
-def _slot(lattice: Array, n: int, rng: Generator) -> Filled:
-    """Half of a layer about as thick as a voxel, along an axis or turned."""
-    turn = Rotation.random(random_state=rng).as_matrix()
-    if rng.random() < 0.6:
-        turn = np.eye(3)[rng.permutation(3)]
-    local = (lattice - rng.uniform(0.3, 0.7, 3) * n) @ turn
-    width = rng.uniform(*HALF_SLOT)
-    return np.asarray((np.abs(local[..., 0]) < width) & (local[..., 1] > 0.0))
 
 
 def _box(rng: Generator) -> Filled:
