@@ -140,6 +140,46 @@ def test_a_refined_model_is_started_from(tmp_path):
     np.testing.assert_allclose(before.eigenvalues[6:], after.eigenvalues[6:], rtol=1e-5)
 
 
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    """A fork refined in this process: the command's arguments and the file."""
+    out = str(tmp_path_factory.mktemp("alone") / "modes.h5")
+    arguments = ["modes", "builtin:fork", "--resolution", "24", "--modes", "30"]
+    arguments += ["--coarsen", "ddfem", "--refine-to", "0.03"]
+    main([*arguments, "--out", out])
+    return arguments, read_modes(out)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("ranks", [1, 2, 3])
+def test_any_number_of_ranks_keeps_the_same_blocks_fine(ranks, alone, mpiexec, tmp_path):
+    arguments, expected = alone
+    out = tmp_path / "modes.h5"
+    mpiexec(ranks, "solver", *arguments, "--out", out, check=True)
+    found = read_modes(out)
+    assert found.attributes["fine_blocks"] == expected.attributes["fine_blocks"] > 0
+    np.testing.assert_array_equal(found.mesh.cells, expected.mesh.cells)
+    np.testing.assert_allclose(found.eigenvalues[6:], expected.eigenvalues[6:], rtol=1e-5)
+
+
+@pytest.mark.mpi
+def test_memory_that_is_missing_for_the_estimate_ends_all_ranks(mpiexec, tmp_path):
+    script = tmp_path / "little_memory.py"
+    script.write_text(
+        "import sys\n"
+        "from solver.__main__ import main\n"
+        "from solver.refinement import two_grid\n"
+        "two_grid.available_memory = lambda: 1000\n"
+        "sys.exit(main(sys.argv[1:]))\n"
+    )
+    out = tmp_path / "modes.h5"
+    arguments = ["modes", "builtin:fork", "--resolution", "24", "--modes", "30", "--out", out]
+    done = mpiexec(2, script, *arguments, "--coarsen", "ddfem")
+    assert done.returncode == 2
+    assert "--refine-to 0" in done.stderr and "Traceback" not in done.stderr
+    assert not out.exists()
+
+
 def test_the_summary_says_what_is_expected(tmp_path, capsys):
     out = str(tmp_path / "modes.h5")
     command = ["modes", "builtin:fork", "--resolution", "24", "--modes", "30", "--out", out]
