@@ -76,7 +76,7 @@ def winding_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.n
         Corner of the grid [m].
     """
     # The hierarchy behind fast winding numbers suffers from long triangles.
-    surface = _cut(surface, 2 * grid.edge)
+    surface = cut(surface, 2 * grid.edge)
     touched = touched_voxels(surface, grid)
     fraction = filled_fraction(surface, grid, touched)
     half_full = fraction >= 0.5
@@ -101,7 +101,7 @@ def _length(voxels: np.ndarray) -> int:
 def centre_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
     """Voxels whose centre is inside the surface by its winding number; thin parts may break off."""
     index = np.indices(grid.shape).reshape(3, -1).T
-    return _inside(surface, grid, index + 0.5).reshape(grid.shape), grid.origin
+    return inside_points(surface, grid, index + 0.5).reshape(grid.shape), grid.origin
 
 
 def orthographic_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
@@ -130,14 +130,14 @@ def filled_fraction(surface: trimesh.Trimesh, grid: Grid, touched: np.ndarray) -
     step = (np.arange(SAMPLES) + 0.5) / SAMPLES
     offsets = np.stack(np.meshgrid(step, step, step, indexing="ij"), axis=-1).reshape(-1, 3)
     points = (near[:, None, :] + offsets).reshape(-1, 3)
-    inside = _inside(surface, grid, points).reshape(len(near), -1)
+    inside = inside_points(surface, grid, points).reshape(len(near), -1)
     fraction[tuple(near.T)] = inside.mean(axis=1)
     return fraction
 
 
 def touched_voxels(surface: trimesh.Trimesh, grid: Grid) -> np.ndarray:
     """Voxels that hold a vertex of the surface after its edges are cut to half a voxel or less."""
-    vertices = np.asarray(_cut(surface, grid.edge / 2).vertices)
+    vertices = np.asarray(cut(surface, grid.edge / 2).vertices)
     index = np.floor((vertices - grid.origin) / grid.edge).astype(int)
     touched = np.zeros(grid.shape, dtype=bool)
     touched[tuple(np.clip(index, 0, np.array(grid.shape) - 1).T)] = True
@@ -145,7 +145,7 @@ def touched_voxels(surface: trimesh.Trimesh, grid: Grid) -> np.ndarray:
 
 
 def cut_triangles(surface: trimesh.Trimesh, max_edge: float) -> float:
-    """Number of triangles once every edge is cut to at most `max_edge` [m], see `_cut`.
+    """Number of triangles once every edge is cut to at most `max_edge` [m], see `cut`.
 
     Cutting halves all edges of a triangle until the longest one is short enough.
     """
@@ -154,7 +154,7 @@ def cut_triangles(surface: trimesh.Trimesh, max_edge: float) -> float:
     return float((4.0**halvings).sum())
 
 
-def _cut(surface: trimesh.Trimesh, max_edge: float) -> trimesh.Trimesh:
+def cut(surface: trimesh.Trimesh, max_edge: float) -> trimesh.Trimesh:
     """The same surface in triangles with edges of at most `max_edge` [m]."""
     import trimesh
 
@@ -164,7 +164,7 @@ def _cut(surface: trimesh.Trimesh, max_edge: float) -> trimesh.Trimesh:
     return trimesh.Trimesh(vertices, faces, process=False)
 
 
-def _inside(surface: trimesh.Trimesh, grid: Grid, points: np.ndarray) -> np.ndarray:
+def inside_points(surface: trimesh.Trimesh, grid: Grid, points: np.ndarray) -> np.ndarray:
     """Whether `points` (p, 3), in voxels from the grid's corner, are inside the surface."""
     import igl
 

@@ -117,7 +117,7 @@ def voxelize(
     >>> max(voxels.shape), voxels.n_cells == voxels.filled.sum()
     (8, True)
     """
-    resolution = _checked_resolution(surface, resolution, name)
+    resolution = checked_resolution(surface, resolution, name)
     if fill not in FILLS:
         raise UserError(f"fill {fill!r} is unknown, expected one of {', '.join(FILLS)}")
     if components not in COMPONENTS:
@@ -137,7 +137,7 @@ def voxelize(
     return replace(model, filled=labels == 1)
 
 
-def _checked_resolution(surface: trimesh.Trimesh, resolution: int, name: str) -> int:
+def checked_resolution(surface: trimesh.Trimesh, resolution: int, name: str) -> int:
     try:
         checked = operator.index(resolution)
     except TypeError:

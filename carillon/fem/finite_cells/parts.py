@@ -1,0 +1,195 @@
+"""Parts of a cell's inside that touch nowhere in it, and where those of neighbours meet.
+
+A cell is looked at through the small boxes that its lines stand for: a box is taken where a line
+along any axis is inside there. So a wall of any thickness and direction takes boxes that hang
+together, through corners at least, and walls two boxes apart are told from each other.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.fem.finite_cells.inside import Pieces
+from carillon.fem.finite_cells.lines import BOUNDS, LINES
+
+Index = NDArray[np.int64]
+Labels = NDArray[np.int16]
+
+SLIVER = 1e-4
+"""Length [voxels] of a line's piece in a voxel below which it is taken to miss it."""
+BOXES = 2 * LINES
+"""Boxes along each edge of a cell."""
+
+
+def find_parts(
+    cells: Index, state: NDArray[np.int8], pieces: tuple[Pieces, ...]
+) -> tuple[Labels, Index]:
+    """Number the parts of each cell.
+
+    Parameters
+    ----------
+    cells : (k, 3)
+        Lowest voxels of the cells.
+    state : (k, 8)
+        States of their octants, see `carillon.fem.finite_cells.inside`.
+    pieces
+        Of the lines along x, y and z.
+
+    Returns
+    -------
+    labels : (k, BOXES, BOXES, BOXES)
+        Part of each box, numbered from 1 in each cell; 0 outside.
+    counts : (k,)
+        Number of parts.
+    """
+    labels = np.zeros((len(cells), BOXES, BOXES, BOXES), dtype=np.int16)
+    for each in pieces:
+        _take_along(
+            cells, state, each.axis, each.start, each.low, each.high, each.columns, BOUNDS, labels
+        )
+    counts = np.zeros(len(cells), dtype=np.int64)
+    _take_full(state, labels)
+    _number(labels, counts)
+    return labels, counts
+
+
+def meetings(lower: Index, upper: Index, labels: Labels, axis: int) -> Index:
+    """Parts that meet at the faces between cells: rows (pair, part below, part above).
+
+    Parameters
+    ----------
+    lower, upper : (p,)
+        Cells of `labels` on the two sides along the axis; -1 is one that is all inside.
+    """
+    found = _meetings(lower, upper, labels, axis)
+    return np.array(found, dtype=np.int64).reshape(-1, 3)
+
+
+@numba.njit(cache=True, nogil=True)
+def _take_along(  # type: ignore[no-untyped-def]
+    cells, state, axis, start, low, high, columns, bounds, labels
+):
+    n = len(bounds) + 1
+    b, c = (axis + 1) % 3, (axis + 2) % 3
+    at = np.empty(3, dtype=np.int64)
+    for k in range(len(cells)):
+        for octant in range(8):
+            if state[k, octant] != 1:
+                continue
+            half_a, half_b, half_c = octant >> axis & 1, octant >> b & 1, octant >> c & 1
+            voxel = cells[k, axis] + half_a
+            for i in range(n):
+                for j in range(n):
+                    row, column = (cells[k, b] + half_b) * n + i, (cells[k, c] + half_c) * n + j
+                    line = row * columns + column
+                    at[b], at[c] = half_b * n + i, half_c * n + j
+                    for number in range(start[line], start[line + 1]):
+                        begin = max(low[number] - voxel, 0.0)
+                        end = min(high[number] - voxel, 1.0)
+                        if end - begin < SLIVER:
+                            continue
+                        first, last = 0, 0
+                        while first < n - 1 and bounds[first] <= begin:
+                            first += 1
+                        while last < n - 1 and bounds[last] < end:
+                            last += 1
+                        for box in range(first, last + 1):
+                            at[axis] = half_a * n + box
+                            labels[k, at[0], at[1], at[2]] = -1
+
+
+@numba.njit(cache=True, nogil=True)
+def _take_full(state, labels):  # type: ignore[no-untyped-def]
+    n = labels.shape[1] // 2
+    for k in range(len(state)):
+        for octant in range(8):
+            if state[k, octant] == 2:
+                x, y, z = (octant & 1) * n, (octant >> 1 & 1) * n, (octant >> 2) * n
+                labels[k, x : x + n, y : y + n, z : z + n] = -1
+
+
+@numba.njit(cache=True, nogil=True)
+def _number(labels, counts):  # type: ignore[no-untyped-def]
+    """Number what hangs together among the boxes that are -1."""
+    size = labels.shape[1]
+    stack = np.empty((size**3, 3), dtype=np.int16)
+    for k in range(len(labels)):
+        boxes = labels[k]
+        for x in range(size):
+            for y in range(size):
+                for z in range(size):
+                    if boxes[x, y, z] != -1:
+                        continue
+                    counts[k] += 1
+                    boxes[x, y, z] = counts[k]
+                    stack[0, 0], stack[0, 1], stack[0, 2] = x, y, z
+                    top = 1
+                    while top:
+                        top -= 1
+                        p, q, r = stack[top, 0], stack[top, 1], stack[top, 2]
+                        for i in range(max(p - 1, 0), min(p + 2, size)):
+                            for j in range(max(q - 1, 0), min(q + 2, size)):
+                                for m in range(max(r - 1, 0), min(r + 2, size)):
+                                    if boxes[i, j, m] == -1:
+                                        boxes[i, j, m] = counts[k]
+                                        stack[top, 0], stack[top, 1], stack[top, 2] = i, j, m
+                                        top += 1
+
+
+@numba.njit(cache=True, nogil=True)
+def _meetings(lower, upper, labels, axis):  # type: ignore[no-untyped-def]
+    size = labels.shape[1]
+    found = [(0, 0, 0)][:0]
+    below = np.empty((size, size), dtype=np.int64)
+    above = np.empty((size, size), dtype=np.int64)
+    for pair in range(len(lower)):
+        _face(labels, lower[pair], axis, size - 1, below)
+        _face(labels, upper[pair], axis, 0, above)
+        begin = len(found)
+        for i in range(size):
+            for j in range(size):
+                if below[i, j] and above[i, j]:
+                    _note(found, begin, pair, below[i, j], above[i, j])
+        # A thin wall askew may take boxes on the two sides that meet at edges only.
+        straight = len(found)
+        for i in range(size):
+            for j in range(size):
+                if not below[i, j]:
+                    continue
+                for m in range(max(i - 1, 0), min(i + 2, size)):
+                    for q in range(max(j - 1, 0), min(j + 2, size)):
+                        if not above[m, q]:
+                            continue
+                        alone_below, alone_above = True, True
+                        for number in range(begin, straight):
+                            alone_below = alone_below and found[number][1] != below[i, j]
+                            alone_above = alone_above and found[number][2] != above[m, q]
+                        if alone_below or alone_above:
+                            _note(found, begin, pair, below[i, j], above[m, q])
+    return found
+
+
+@numba.njit(cache=True, nogil=True)
+def _face(labels, cell, axis, layer, face):  # type: ignore[no-untyped-def]
+    """Parts at a face of a cell; 1 all over it where the cell is all inside."""
+    size = len(face)
+    for i in range(size):
+        for j in range(size):
+            if cell < 0:
+                face[i, j] = 1
+            elif axis == 0:
+                face[i, j] = labels[cell, layer, i, j]
+            elif axis == 1:
+                face[i, j] = labels[cell, i, layer, j]
+            else:
+                face[i, j] = labels[cell, i, j, layer]
+
+
+@numba.njit(cache=True, nogil=True)
+def _note(found, begin, pair, lower, upper):  # type: ignore[no-untyped-def]
+    for number in range(begin, len(found)):
+        if found[number][1] == lower and found[number][2] == upper:
+            return
+    found.append((pair, lower, upper))
