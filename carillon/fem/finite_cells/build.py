@@ -98,9 +98,7 @@ def _holds(inside: Inside) -> bool:
     return 0.0 < min(volumes) and max(volumes) <= LOST * min(volumes)
 
 
-def _lost(
-    surface: trimesh.Trimesh, inside: Inside, resolution: int, grid: Grid, name: str
-) -> str:
+def _lost(surface: trimesh.Trimesh, inside: Inside, resolution: int, grid: Grid, name: str) -> str:
     start = f"mesh {name!r} at resolution {resolution}"
     for factor in TRIAL_FACTORS:
         better = int(np.ceil(factor * resolution))

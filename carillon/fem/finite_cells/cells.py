@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from carillon.fem.block import CELL_NODES, NODES
+from carillon.fem.block import CELL_NODES
 from carillon.fem.finite_cells.shapes import octant_weights
 from carillon.fem.geometry.hexmesh import CORNER_OFFSETS, HexMesh
 
@@ -72,7 +72,9 @@ class FiniteCells:
         mesh = self.mesh
         return HexMesh(corners, self.grid // 2, mesh.node_grid, mesh.origin, 2 * mesh.edge)
 
-    def point_values(self, values: np.ndarray, chosen: np.ndarray | slice = slice(None)) -> np.ndarray:
+    def point_values(
+        self, values: np.ndarray, chosen: np.ndarray | slice = slice(None)
+    ) -> np.ndarray:
         """Weighted values (c, 125) at the points of cells, from those (m,) of the voxels.
 
         A part of a cell that is empty has `FLOOR` of the mean over what is not.
@@ -81,7 +83,6 @@ class FiniteCells:
         of_octants = np.where(voxels >= 0, values[voxels], 0.0)
         whole = octant_weights().sum(axis=0)
         inside = self.weights[rows]
-        # One product for the weights of cells all inside, which are alike.
         weighted = np.einsum("co,cop->cp", of_octants, inside)
         share = 8.0 * inside.sum(axis=2)
         mean = (of_octants * share).sum(axis=1) / share.sum(axis=1)
@@ -89,7 +90,12 @@ class FiniteCells:
 
 
 def assemble_cells(
-    nodes: np.ndarray, node_grid: np.ndarray, row: np.ndarray, weights: np.ndarray, origin: np.ndarray, edge: float
+    nodes: np.ndarray,
+    node_grid: np.ndarray,
+    row: np.ndarray,
+    weights: np.ndarray,
+    origin: np.ndarray,
+    edge: float,
 ) -> FiniteCells:
     """Finite cells with the voxels that follow from their weights."""
     filled = (weights.sum(axis=2) > 0.0)[row]
@@ -100,6 +106,10 @@ def assemble_cells(
     voxels[cell[order], octant[order]] = np.arange(len(order))
     corners = nodes[cell[order, None], CELL_NODES[octant[order]]]
     mesh = HexMesh(
-        corners.astype(np.int32), grid[order].astype(np.int32), node_grid.astype(np.int32), origin, edge
+        corners.astype(np.int32),
+        grid[order].astype(np.int32),
+        node_grid.astype(np.int32),
+        origin,
+        edge,
     )
     return FiniteCells(nodes.astype(np.int32), voxels, row.astype(np.int32), weights, mesh)

@@ -7,7 +7,6 @@ between crossings, in voxels that are not inside or outside as a whole.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numba
@@ -15,6 +14,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from carillon.fem.element import CORNERS
 from carillon.fem.finite_cells.lines import (
     LINE_PLACES,
     LINE_SHARES,
@@ -24,7 +24,7 @@ from carillon.fem.finite_cells.lines import (
     crossings,
     crossings_of_voxels,
 )
-from carillon.fem.geometry.fill import Grid, cut, inside_points
+from carillon.fem.geometry.fill import INSIDE, Grid, cut, winding_numbers
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -33,8 +33,12 @@ EMPTY, CUT, FULL = 0, 1, 2
 """States of a voxel."""
 ENDS = 0.02
 """Share of a piece of a line by which its ends are moved inwards to see whether they are inside."""
-HALVINGS = 10
-"""Of a piece with one end inside, which the rim of a hole cuts."""
+RIM_POINTS = 9
+"""Of a piece with one end inside, which the rim of a hole cuts, where winding numbers are found."""
+VAGUENESS = 0.25
+"""Distance of a winding number from a whole one beyond which holes are near."""
+VAGUE = 127
+"""Level of a voxel near a hole."""
 TOUCHING = 1e-9
 """Gap [voxels] between two pieces that are one."""
 
@@ -90,37 +94,40 @@ def find_inside(surface: trimesh.Trimesh, grid: Grid) -> Inside:
     counts = np.stack([crossings_of_voxels(each, grid.shape) for each in crossed], axis=3)
     state = np.where(counts.any(axis=3), CUT, EMPTY).astype(np.int8)
     facing = counts.argmax(axis=3).astype(np.int8)
-    test = _Test(surface, grid)
+    wind = _Winding(surface, grid)
     if merged.is_watertight and merged.is_winding_consistent:
-        pieces = [_of_closed_surface(each, test) for each in crossed]
+        pieces = [_of_closed_surface(each, wind) for each in crossed]
         state[(state == EMPTY) & _middles(pieces[0], grid.shape)] = FULL
     else:
-        _classify(state, test)
-        pieces = [_of_open_surface(each, state, test) for each in crossed]
+        levels = _classify(state, wind)
+        pieces = [_of_open_surface(each, state, levels, wind) for each in crossed]
     return Inside(state, facing, (pieces[0], pieces[1], pieces[2]))
 
 
-class _Test:
-    """Whether points in lattice units are inside the surface, by winding numbers."""
+class _Winding:
+    """Winding numbers about points in lattice units."""
 
     def __init__(self, surface: trimesh.Trimesh, grid: Grid) -> None:
         self._surface, self._grid = surface, grid
         self._cut: trimesh.Trimesh | None = None
 
-    def __call__(self, points: Array) -> NDArray[np.bool_]:
+    def __call__(self, points: Array) -> Array:
         if self._cut is None:
-            # The hierarchy behind fast winding numbers suffers from long triangles.
             self._cut = cut(self._surface, 2 * self._grid.edge)
-        return inside_points(self._cut, self._grid, points)
+        return winding_numbers(self._cut, self._grid, points)
+
+    def inside(self, points: Array) -> NDArray[np.bool_]:
+        """Whether they are inside."""
+        return np.asarray(np.abs(self(points)) > INSIDE)
 
 
-def _of_closed_surface(lines: Crossings, test: Callable[[Array], NDArray[np.bool_]]) -> Pieces:
+def _of_closed_surface(lines: Crossings, wind: _Winding) -> Pieces:
     low, high, line, certain = _between_crossings(lines.start, lines.place, lines.step)
     unsure = np.flatnonzero(certain < 0)
     inside = certain > 0
     if len(unsure):
         # Lines that rounding let slip through an edge.
-        inside[unsure] = test(_points(lines, line[unsure], 0.5 * (low + high)[unsure]))
+        inside[unsure] = wind.inside(_points(lines, line[unsure], 0.5 * (low + high)[unsure]))
     return _joined(lines, line[inside], low[inside], high[inside])
 
 
@@ -147,74 +154,115 @@ def _between_crossings(start, place, step):  # type: ignore[no-untyped-def]
     return low, high, owner, certain
 
 
-def _classify(state: NDArray[np.int8], test: Callable[[Array], NDArray[np.bool_]]) -> None:
-    """Tell voxels inside from those outside where no line crosses the surface."""
+def _classify(state: NDArray[np.int8], wind: _Winding) -> NDArray[np.int8]:
+    """Tell voxels inside from those outside where no line crosses the surface.
+
+    Returns
+    -------
+    NDArray[np.int8]
+        (nx, ny, nz) the winding number in the middle of each voxel, rounded; `VAGUE` where it is
+        far from whole somewhere in the voxel, as about holes.
+    """
     shape = state.shape
-    corners = np.indices([size + 1 for size in shape]).reshape(3, -1).T.astype(float)
-    at_corners = test(corners).reshape([size + 1 for size in shape])
-    middle = test(np.indices(shape).reshape(3, -1).T + 0.5).reshape(shape)
+    ends = [size + 1 for size in shape]
+    at_corners = wind(np.indices(ends).reshape(3, -1).T.astype(float)).reshape(ends)
+    middle = wind(np.indices(shape).reshape(3, -1).T + 0.5).reshape(shape)
     agree = np.ones(shape, dtype=bool)
-    for x in range(2):
-        for y in range(2):
-            for z in range(2):
-                corner = at_corners[
-                    x : x + shape[0], y : y + shape[1], z : z + shape[2]
-                ]
-                agree &= corner == middle
-    plain = (state == EMPTY) & agree
-    state[plain & middle] = FULL
-    state[(state == EMPTY) & ~agree] = CUT
+    vague = np.abs(middle - np.rint(middle)) > VAGUENESS
+    for x, y, z in CORNERS:
+        corner = at_corners[x : x + shape[0], y : y + shape[1], z : z + shape[2]]
+        agree &= (np.abs(corner) > INSIDE) == (np.abs(middle) > INSIDE)
+        vague |= np.abs(corner - np.rint(corner)) > VAGUENESS
+    plain = state == EMPTY
+    state[plain & agree & (np.abs(middle) > INSIDE)] = FULL
+    state[plain & ~agree] = CUT
+    return np.where(vague, VAGUE, np.rint(middle)).astype(np.int8)
 
 
 def _of_open_surface(
-    lines: Crossings, state: NDArray[np.int8], test: Callable[[Array], NDArray[np.bool_]]
+    lines: Crossings, state: NDArray[np.int8], levels: NDArray[np.int8], wind: _Winding
 ) -> Pieces:
-    turned = np.ascontiguousarray(
-        state.transpose((lines.axis + 1) % 3, (lines.axis + 2) % 3, lines.axis)
+    axes = (lines.axis + 1) % 3, (lines.axis + 2) % 3, lines.axis
+    turned = [np.ascontiguousarray(each.transpose(axes)) for each in (state, levels)]
+    low, high, line, inside, unsure = _in_voxels(
+        lines.start, lines.place, lines.step, lines.columns, *turned, LINES
     )
-    low, high, line, whole = _in_voxels(lines.start, lines.place, lines.columns, turned, LINES)
-    inside = whole.copy()
-    asked = np.flatnonzero(~whole)
-    length = high[asked] - low[asked]
-    first = test(_points(lines, line[asked], low[asked] + ENDS * length))
-    last = test(_points(lines, line[asked], high[asked] - ENDS * length))
-    inside[asked] = first | last
-    mixed = first != last
-    split, begins = asked[mixed], first[mixed]
-    left, right = low[split].copy(), high[split].copy()
-    for _ in range(HALVINGS):
-        middle = 0.5 * (left + right)
-        onwards = test(_points(lines, line[split], middle)) == begins
-        left, right = np.where(onwards, middle, left), np.where(onwards, right, middle)
-    high[split[begins]], low[split[~begins]] = left[begins], right[~begins]
+    asked = np.flatnonzero(unsure)
+    if len(asked):
+        length = high[asked] - low[asked]
+        ends = np.stack([low[asked] + ENDS * length, high[asked] - ENDS * length])
+        first, last = wind.inside(_points(lines, line[asked], ends).reshape(-1, 3)).reshape(2, -1)
+        inside[asked] = first | last
+        split, begins = asked[first != last], first[first != last]
+        if len(split):
+            at = _rim(lines, line[split], low[split], high[split], begins, wind)
+            high[split[begins]], low[split[~begins]] = at[begins], at[~begins]
     return _joined(lines, line[inside], low[inside], high[inside])
 
 
+def _rim(
+    lines: Lines, line: Index, low: Array, high: Array, begins: NDArray[np.bool_], wind: _Winding
+) -> Array:
+    """Places (p,) where pieces that begin inside, or end there, pass the rim of a hole."""
+    share = np.linspace(0.0, 1.0, RIM_POINTS)[:, None]
+    places = low + (ENDS + (1.0 - 2.0 * ENDS) * share) * (high - low)
+    numbers = np.abs(wind(_points(lines, line, places).reshape(-1, 3))).reshape(places.shape)
+    after = np.argmax((numbers > INSIDE) != begins, axis=0)
+    own = np.arange(len(line))
+    one, other = numbers[after - 1, own], numbers[after, own]
+    weight = np.clip((INSIDE - one) / np.where(one == other, 1.0, other - one), 0.0, 1.0)
+    return places[after - 1, own] * (1.0 - weight) + places[after, own] * weight
+
+
 @numba.njit(cache=True, nogil=True)
-def _in_voxels(start, place, columns, state, n):  # type: ignore[no-untyped-def]
-    """Pieces of lines in full voxels, and between crossings in cut ones; and whether the former."""
-    low, high, owner, whole = [0.0][:0], [0.0][:0], [0][:0], [False][:0]
+def _in_voxels(start, place, step, columns, state, levels, n):  # type: ignore[no-untyped-def]
+    """Pieces of lines in voxels that are not empty: ends, line, whether inside, and whether unsure.
+
+    The winding number is followed from crossing to crossing through voxels that are cut. Where it
+    then is not that of the next voxel, or a voxel is vague, crossings do not tell.
+    """
+    low, high, owner = [0.0][:0], [0.0][:0], [0][:0]
+    inside, unsure = [False][:0], [False][:0]
     for line in range(len(start) - 1):
-        row, column = line // columns, line % columns
+        row, column = line // columns // n, line % columns // n
         number = start[line]
-        for voxel in range(state.shape[2]):
-            kind = state[row // n, column // n, voxel]
-            begin = float(voxel)
-            while number < start[line + 1] and place[number] < voxel + 1.0:
-                at = min(max(place[number], begin), voxel + 1.0)
-                if kind == 1 and at > begin:
-                    low.append(begin)
-                    high.append(at)
+        winding, run, vague = 0, len(low), False
+        for voxel in range(state.shape[2] + 1):
+            kind, level = 0, 0
+            if voxel < state.shape[2]:
+                kind, level = state[row, column, voxel], levels[row, column, voxel]
+            if kind != 1:
+                if vague or winding != level:
+                    for piece in range(run, len(low)):
+                        unsure[piece] = True
+                winding, vague = level, level == 127
+                if kind == 2:
+                    low.append(float(voxel))
+                    high.append(voxel + 1.0)
                     owner.append(line)
-                    whole.append(False)
-                begin = at
+                    inside.append(True)
+                    unsure.append(False)
+                while number < start[line + 1] and place[number] < voxel + 1.0:
+                    number += 1
+                run = len(low)
+                continue
+            vague = vague or level == 127
+            begin = float(voxel)
+            while True:
+                crossed = number < start[line + 1] and place[number] < voxel + 1.0
+                end = min(max(place[number], begin), voxel + 1.0) if crossed else voxel + 1.0
+                if end > begin:
+                    low.append(begin)
+                    high.append(end)
+                    owner.append(line)
+                    inside.append(winding != 0)
+                    unsure.append(False)
+                begin = end
+                if not crossed:
+                    break
+                winding += step[number]
                 number += 1
-            if kind != 0 and begin < voxel + 1.0:
-                low.append(begin)
-                high.append(voxel + 1.0)
-                owner.append(line)
-                whole.append(kind == 2)
-    return np.array(low), np.array(high), np.array(owner), np.array(whole)
+    return np.array(low), np.array(high), np.array(owner), np.array(inside), np.array(unsure)
 
 
 def _joined(lines: Lines, line: Index, low: Array, high: Array) -> Pieces:
@@ -228,12 +276,12 @@ def _joined(lines: Lines, line: Index, low: Array, high: Array) -> Pieces:
 
 
 def _points(lines: Lines, line: Index, place: Array) -> Array:
-    """Points (p, 3) in lattice units at places on lines."""
+    """Points (..., p, 3) in lattice units at places (..., p) on lines (p,)."""
     row, column = np.divmod(line, lines.columns)
-    points = np.empty((len(line), 3))
-    points[:, lines.axis] = place
-    points[:, (lines.axis + 1) % 3] = row // LINES + LINE_PLACES[row % LINES]
-    points[:, (lines.axis + 2) % 3] = column // LINES + LINE_PLACES[column % LINES]
+    points = np.empty((*place.shape, 3))
+    points[..., lines.axis] = place
+    points[..., (lines.axis + 1) % 3] = row // LINES + LINE_PLACES[row % LINES]
+    points[..., (lines.axis + 2) % 3] = column // LINES + LINE_PLACES[column % LINES]
     return points
 
 

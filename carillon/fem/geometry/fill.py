@@ -75,7 +75,6 @@ def winding_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.n
     origin : (3,)
         Corner of the grid [m].
     """
-    # The hierarchy behind fast winding numbers suffers from long triangles.
     surface = cut(surface, 2 * grid.edge)
     touched = touched_voxels(surface, grid)
     fraction = filled_fraction(surface, grid, touched)
@@ -166,14 +165,21 @@ def cut(surface: trimesh.Trimesh, max_edge: float) -> trimesh.Trimesh:
 
 def inside_points(surface: trimesh.Trimesh, grid: Grid, points: np.ndarray) -> np.ndarray:
     """Whether `points` (p, 3), in voxels from the grid's corner, are inside the surface."""
+    return np.asarray(np.abs(winding_numbers(surface, grid, points)) > INSIDE)
+
+
+def winding_numbers(surface: trimesh.Trimesh, grid: Grid, points: np.ndarray) -> np.ndarray:
+    """Winding numbers (p,) of the surface about `points` (p, 3), in voxels from the grid's corner.
+
+    The hierarchy behind them suffers from long triangles, see `cut`.
+    """
     import igl
 
     # In voxel units, so that the result does not depend on the unit of length.
     vertices = np.ascontiguousarray((surface.vertices - grid.origin) / grid.edge)
     faces = np.ascontiguousarray(surface.faces, dtype=np.int64)
-    inside = np.empty(len(points), dtype=bool)
+    numbers = np.empty(len(points))
     for start in range(0, len(points), CHUNK):
         part = slice(start, start + CHUNK)
-        number = igl.fast_winding_number(vertices, faces, np.ascontiguousarray(points[part]))
-        inside[part] = np.abs(number) > INSIDE
-    return inside
+        numbers[part] = igl.fast_winding_number(vertices, faces, np.ascontiguousarray(points[part]))
+    return numbers

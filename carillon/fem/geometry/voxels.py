@@ -138,6 +138,13 @@ def voxelize(
 
 
 def checked_resolution(surface: trimesh.Trimesh, resolution: int, name: str) -> int:
+    """The resolution as an int.
+
+    Raises
+    ------
+    UserError
+        If it is none of at least 2, or needs too large a grid or too many triangles.
+    """
     try:
         checked = operator.index(resolution)
     except TypeError:
