@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Any, TypedDict, Unpack
+from typing import Self, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.block import ALL_FILLED, coarse_cell_mass
-from carillon.fem.element import CORNERS, DEFAULT_POISSON, quadrature_stiffness
+from carillon.fem.block import ALL_FILLED
+from carillon.fem.element import DEFAULT_POISSON
+from carillon.fem.elements import Chosen, Elements, HexElements
 from carillon.fem.geometry import HexMesh
-from carillon.fem.geometry.hanging import WHOLE, node_places, node_weights
 from carillon.fem.moduli import at_points, require_moduli
 
 Array = NDArray[np.float64]
-Chosen = NDArray[np.integer] | NDArray[np.bool_] | slice
 
 RIGID_MODES = 6
 """Motions without strain of a connected free body."""
@@ -24,115 +24,75 @@ DEFAULT_DENSITY = 1000.0
 """Mass density [kg/m^3] where none is given."""
 
 
-@dataclass(frozen=True)
-class Elements:
-    """Cubic elements with material, wherever their nodes may be.
+class Model(ABC):
+    """A solid with material in one discretisation.
 
     Attributes
     ----------
-    young : (c, 8)
-        See `ElasticModel` [Pa].
-    fill : (c,)
-        See `ElasticModel`.
-    edge
-        Edge of an element [m], of the smaller ones in a mixed mesh.
-    poisson, density, lumped, lumped_share
-        See `ElasticModel`.
-    kinds : (c,) int32
-        Of the elements of a mixed mesh, see `carillon.fem.geometry.hanging`; else None.
+    mesh
+        Voxels that carry the material, or the elements that replace them, and all nodes.
+    young
+        Young's moduli [Pa] that belong to them.
+    poisson, density
+        Poisson's ratio and mass density [kg/m^3].
     """
 
+    mesh: HexMesh
     young: Array
-    fill: NDArray[np.uint8]
-    edge: float
     poisson: float
     density: float
-    lumped: bool
-    lumped_share: float
-    kinds: NDArray[np.int32] | None = None
-
-    def __len__(self) -> int:
-        return len(self.fill)
-
-    def of(self, young: Array, fill: NDArray[np.uint8], *kinds: NDArray[np.int32]) -> Elements:
-        """Other elements of the same solid; with kinds if these have kinds."""
-        return replace(self, young=young, fill=fill, kinds=kinds[0] if kinds else None)
-
-    def arrays(self) -> list[NDArray[Any]]:
-        """What differs from element to element: the arguments of `of`."""
-        kinds = [] if self.kinds is None else [self.kinds]
-        return [self.young, self.fill, *kinds]
-
-    def with_young(self, young: Array) -> Elements:
-        """The same elements with other moduli."""
-        return replace(self, young=young)
 
     @property
-    def steps(self) -> int:
-        """Edges along the largest element."""
-        return 1 if self.kinds is None else 2
+    def n_dofs(self) -> int:
+        """Number of displacement unknowns."""
+        return 3 * self.mesh.n_nodes
 
     @property
-    def node_places(self) -> NDArray[np.int64]:
-        """Places (c, 8, 3) of the nodes about a point of each element, in edges."""
-        if self.kinds is None:
-            return np.broadcast_to(CORNERS, (len(self), 8, 3))
-        return node_places()[self.kinds]
+    @abstractmethod
+    def elements(self) -> Elements:
+        """All elements, in the order of `connectivity`."""
 
     @property
-    def hangs(self) -> NDArray[np.bool_] | None:
-        """Which elements (c,) of a mixed mesh have hanging corners; else None."""
-        return None if self.kinds is None else (self.kinds != WHOLE) & (self.kinds % 256 != 0)
+    @abstractmethod
+    def connectivity(self) -> NDArray[np.int32]:
+        """Nodes (c, k) of each element."""
+
+    @property
+    @abstractmethod
+    def hexmesh(self) -> HexMesh:
+        """The elements as cubes with nodes at their corners, by which neighbours are found."""
+
+    @abstractmethod
+    def element_moduli(self, young: Array) -> Array:
+        """Moduli (c, p) [Pa] at the elements' points from those that a user gives.
+
+        Raises
+        ------
+        UserError
+            For what `carillon.fem.moduli.require_moduli` refuses.
+        """
+
+    @abstractmethod
+    def with_young(self, young: Array) -> Self:
+        """The same solid with other moduli [Pa], likewise."""
+
+    @property
+    @abstractmethod
+    def mass(self) -> float:
+        """Mass of the solid [kg]."""
 
     def stiffness(self, chosen: Chosen = slice(None)) -> Array:
-        """Element stiffness matrices (c, 24, 24) [N/m] of the chosen elements."""
-        kernels = quadrature_stiffness(self.poisson).reshape(8, 576)
-        stiffness = (self.edge * (self.young[chosen] @ kernels)).reshape(-1, 24, 24)
-        if self.kinds is None:
-            return stiffness
-        kinds = self.kinds[chosen]
-        stiffness *= np.where(kinds == WHOLE, 2.0, 1.0)[:, None, None]
-        hangs, weights = _at_hanging_corners(kinds)
-        if len(hangs):
-            weights = np.einsum("cka,ij->ckiaj", weights, np.eye(3)).reshape(-1, 24, 24)
-            stiffness[hangs] = weights.transpose(0, 2, 1) @ stiffness[hangs] @ weights
-        return stiffness
+        """Element stiffness matrices (c, 3 k, 3 k) [N/m] of the chosen elements."""
+        return self.elements.stiffness(chosen)
 
     def nodal_mass(self, chosen: Chosen = slice(None)) -> Array:
-        """Element masses (c, 8, 8) [kg] between corners, the same for each displacement component.
-
-        The trilinear shape functions are integrated over the filled octants: P^T M P of the fine
-        cells that a coarse cell stands for, and the consistent mass of a fine cell. Nodes of cells
-        with hanging corners take what is theirs of it.
-        """
-        octants = np.unpackbits(self.fill[chosen][:, None], axis=1, bitorder="little")
-        scale = self.density * (self.edge / 2.0) ** 3
-        mass = (scale * octants @ coarse_cell_mass().reshape(8, 64)).reshape(-1, 8, 8)
-        filled = self.fill[chosen] == ALL_FILLED
-        if self.kinds is not None:
-            kinds = self.kinds[chosen]
-            filled &= kinds == WHOLE
-            mass *= np.where(kinds == WHOLE, 8.0, 1.0)[:, None, None]
-            hangs, weights = _at_hanging_corners(kinds)
-            mass[hangs] = weights.transpose(0, 2, 1) @ mass[hangs] @ weights
-        if not (self.lumped or self.lumped_share):
-            return np.asarray(mass)
-        share = np.where(filled, self.lumped_share, 0.0)
-        if self.lumped:
-            share[:] = 1.0
-        lumped = mass.sum(axis=2)[:, :, None] * np.eye(8)
-        return np.asarray(mass + share[:, None, None] * (lumped - mass))
-
-
-def _at_hanging_corners(kinds: NDArray[np.int32]) -> tuple[NDArray[np.int64], Array]:
-    """Elements (h,) with hanging corners, and the weights (h, 8, 8) of their nodes there."""
-    hangs = np.flatnonzero((kinds != WHOLE) & (kinds % 256 != 0))
-    return hangs, node_weights()[kinds[hangs]]
+        """Element masses (c, k, k) [kg] of the chosen elements, see `Elements.nodal_mass`."""
+        return self.elements.nodal_mass(chosen)
 
 
 @dataclass(frozen=True)
-class ElasticModel:
-    """A hexahedral mesh with material.
+class ElasticModel(Model):
+    """A hexahedral mesh with material, an element for each of its cells.
 
     Parameters
     ----------
@@ -164,14 +124,9 @@ class ElasticModel:
     lumped_share: float = 0.0
 
     @property
-    def n_dofs(self) -> int:
-        """Number of displacement unknowns."""
-        return 3 * self.mesh.n_nodes
-
-    @property
-    def elements(self) -> Elements:
+    def elements(self) -> HexElements:
         """The elements of all cells."""
-        return Elements(
+        return HexElements(
             self.young,
             self.fill,
             self.mesh.edge,
@@ -182,23 +137,23 @@ class ElasticModel:
             self.mesh.kinds,
         )
 
-    def with_young(self, young: Array) -> ElasticModel:
-        """The same solid with other moduli, (m,) or (m, 8) [Pa].
+    @property
+    def connectivity(self) -> NDArray[np.int32]:
+        """Nodes (m, 8) of each cell."""
+        return np.asarray(self.mesh.cells)
 
-        Raises
-        ------
-        UserError
-            For what `carillon.fem.moduli.require_moduli` refuses.
-        """
-        return replace(self, young=at_points(require_moduli(young, self.mesh.n_cells)))
+    @property
+    def hexmesh(self) -> HexMesh:
+        """The mesh itself."""
+        return self.mesh
 
-    def stiffness(self, cells: Chosen = slice(None)) -> Array:
-        """Element stiffness matrices (c, 24, 24) [N/m] of the chosen cells."""
-        return self.elements.stiffness(cells)
+    def element_moduli(self, young: Array) -> Array:
+        """Moduli (m, 8) [Pa] at the quadrature points, from (m,) or (m, 8); see `Model`."""
+        return at_points(require_moduli(young, self.mesh.n_cells))
 
-    def nodal_mass(self, cells: Chosen = slice(None)) -> Array:
-        """Element masses (c, 8, 8) [kg] of the chosen cells, see `Elements.nodal_mass`."""
-        return self.elements.nodal_mass(cells)
+    def with_young(self, young: Array) -> Self:
+        """The same solid with other moduli, (m,) or (m, 8) [Pa]; see `Model`."""
+        return replace(self, young=self.element_moduli(young))
 
     @property
     def mass(self) -> float:

@@ -15,8 +15,12 @@ POINTS = 8
 _REAL = "fiu"
 
 
-def require_moduli(young: ArrayLike, cells: int, source: str = "moduli") -> Array:
+def require_moduli(
+    young: ArrayLike, cells: int, source: str = "moduli", points: bool = True
+) -> Array:
     """Moduli [Pa] that a user gives, (cells,) or (cells, 8), as floats of the same shape.
+
+    Without `points` those of quadrature points are refused.
 
     Raises
     ------
@@ -33,7 +37,8 @@ def require_moduli(young: ArrayLike, cells: int, source: str = "moduli") -> Arra
     carillon.errors.UserError: moduli: 1 values are negative (the first at index 1: -2e+09); \
 expected Young's moduli [Pa]
     """
-    values = _not_negative(young, ((cells,), (cells, POINTS)), source)
+    shapes = ((cells,), (cells, POINTS)) if points else ((cells,),)
+    values = _not_negative(young, shapes, source)
     bad = np.argwhere(values == 0.0)
     if len(bad):
         raise UserError(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
 from carillon.fem.materials import young_modulus
-from carillon.fem.model import ElasticModel, fine_model
+from carillon.fem.model import Model, fine_model
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
 from solver.distribution.collective import compute_on_root
@@ -50,7 +50,7 @@ class Solution:
 
 
 def solve(
-    model: HexMesh | ElasticModel | None,
+    model: HexMesh | Model | None,
     material: str | Array | None = None,
     modes: int = 256,
     initial_modes: Solution | Array | None = None,
@@ -62,9 +62,10 @@ def solve(
     Parameters
     ----------
     model
-        Hexahedral mesh, or a model with material; ranks other than 0 may pass None.
+        Hexahedral mesh, or a model with material of either discretisation; ranks other than 0 may
+        pass None.
     material
-        Young's modulus [Pa], (m,) of the cells or (m, 8) at their quadrature points, or the name
+        Young's modulus [Pa], (m,) of the voxels or (m, 8) at their quadrature points, or the name
         of a material (`carillon.fem.materials.NAMES`).  None keeps that of the model.
     modes
         Number of modes, rigid ones included.
@@ -116,8 +117,8 @@ def solve(
 
 
 def _with_material(
-    model: HexMesh | ElasticModel | None, material: str | Array | None
-) -> ElasticModel:
+    model: HexMesh | Model | None, material: str | Array | None
+) -> Model:
     if model is None:
         raise UserError("no model on rank 0, expected a mesh or an elastic model")
     if material is None:

@@ -11,8 +11,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from carillon.fem.model import RIGID_MODES, ElasticModel
-from carillon.fem.moduli import at_points, require_coarse_moduli, require_moduli
+from carillon.fem.model import RIGID_MODES, Model
+from carillon.fem.moduli import require_coarse_moduli
 from carillon.progress import say
 from carillon.runtime import limit_threads, reuse_freed_memory
 from solver.analysis.bounds import FEWEST_SPARE, check_mode_count, default_keep, require_memory
@@ -140,12 +140,13 @@ class ModalSolver:
 
     def __init__(
         self,
-        model: ElasticModel | None,
+        model: Model | None,
         options: SolverOptions,
         comm: MPI.Comm = MPI.COMM_WORLD,
         verbose: bool = False,
     ) -> None:
-        self._n_cells = bcast_from_root(comm, lambda: _checked_cells(model, options.modes))
+        bcast_from_root(comm, lambda: check_mode_count(options.modes, cast(Model, model).n_dofs))
+        self._model = model if comm.rank == 0 else None
         require_memory(model, options, comm)
         self.options = options
         self.comm = comm
@@ -173,8 +174,8 @@ class ModalSolver:
         Parameters
         ----------
         young
-            Young's modulus [Pa], (m,) of the cells or (m, 8) at their quadrature points, on rank
-            0; that of the model if not given.
+            Young's modulus [Pa] as `Model.with_young` takes it, (m,) of the voxels for example, on
+            rank 0; that of the model if not given.
         initial_modes
             Modes of a similar material on the same mesh, or this rank's rows (local, k) of such:
             they are corrected instead of those of HCMS.
@@ -182,12 +183,12 @@ class ModalSolver:
         Raises
         ------
         UserError
-            For what `carillon.fem.moduli.require_moduli` refuses.
+            For what `Model.element_moduli` refuses.
         ConvergenceError
             If a tolerance was missed, the modes are not orthonormal, or the body does not have six
             zero-frequency modes.
         """
-        return self._solve(young, initial_modes, require_moduli)
+        return self._solve(young, initial_modes, lambda model, given: model.element_moduli(given))
 
     def solve_coarse(
         self, moduli: Array | None, initial_modes: Modes | Array | None = None
@@ -203,20 +204,24 @@ class ModalSolver:
         ConvergenceError
             See `solve`.
         """
-        return self._solve(moduli, initial_modes, require_coarse_moduli)
+        return self._solve(
+            moduli,
+            initial_modes,
+            lambda model, given: require_coarse_moduli(given, model.mesh.n_cells),
+        )
 
     def _solve(
         self,
         young: Array | None,
         initial_modes: Modes | Array | None,
-        require: Callable[[Array, int], Array],
+        moduli_of: Callable[[Model, Array], Array],
     ) -> Modes:
         phases = Phases(self.comm, self._verbose)
         with phases("assembly"):
             local_mesh = self.local_mesh
             if self.comm.bcast(young is not None):
                 moduli = compute_on_root(
-                    self.comm, lambda: at_points(require(cast(Array, young), self._n_cells))
+                    self.comm, lambda: moduli_of(cast(Model, self._model), cast(Array, young))
                 )
                 local_mesh = scatter_moduli(local_mesh, moduli, self.comm)
             elements = local_mesh.cells.elements
@@ -403,7 +408,7 @@ class ModalSolver:
 
 
 def modal_analysis(
-    model: ElasticModel | None,
+    model: Model | None,
     options: SolverOptions,
     comm: MPI.Comm = MPI.COMM_WORLD,
 ) -> Modes:
@@ -414,13 +419,6 @@ def modal_analysis(
     prepared = ModalSolver(model, options, comm)
     modes = prepared.solve()
     return replace(modes, seconds={**prepared.seconds, **modes.seconds})
-
-
-def _checked_cells(model: ElasticModel | None, modes: int) -> int:
-    """Number of cells of a model that has so many modes."""
-    assert model is not None
-    check_mode_count(modes, model.n_dofs)
-    return model.mesh.n_cells
 
 
 def elastic_part(system: System, synthesis: Synthesis) -> tuple[Array | None, Array]:

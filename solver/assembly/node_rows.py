@@ -16,14 +16,14 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.fem.model import Elements
+from carillon.fem.elements import Elements
 from carillon.threads import in_parallel, split
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-CELLS_AT_ONCE = 4096
-"""Cells whose element matrices exist together while K is assembled."""
+ENTRIES_AT_ONCE = 4096 * 576
+"""Entries of the element matrices that exist together while K is assembled."""
 _HALO = 21
 
 
@@ -37,7 +37,7 @@ class Pattern:
         Compressed rows of the node graph.  Columns are this rank's nodes, counted from 0, then the
         ghosts, ascending within a row.
     entry
-        (c, 8, 8) entry of every pair of corners of every cell, -1 if the row is another rank's.
+        (c, k, k) entry of every pair of nodes of every cell, -1 if the row is another rank's.
     ghosts
         (g,) distributed numbers of the columns that other ranks own, ascending.
     start, stop
@@ -53,7 +53,7 @@ class Pattern:
 
     @classmethod
     def of_cells(cls, corners: Index, start: int, stop: int, ghosts: bool = True) -> Pattern:
-        """Pattern of the cells `corners` (c, 8), which touch the rows [start, stop).
+        """Pattern of cells with nodes `corners` (c, k), which touch the rows [start, stop).
 
         Without `ghosts` the columns outside are left out as the rows are.
         """
@@ -143,13 +143,14 @@ class NodeRows:
         self.mass = np.zeros(len(pattern.columns))
 
     def add(self, cells: slice, stiffness: Array, mass: Array) -> None:
-        """Add element matrices (c, 24, 24) and (c, 8, 8) of some of the pattern's cells."""
+        """Add element matrices (c, 3 k, 3 k) and (c, k, k) of some of the pattern's cells."""
         _add_cells(self.pattern.entry[cells], stiffness, mass, self.stiffness, self.mass)
 
     def add_elements(self, elements: Elements) -> None:
         """Add the matrices of the pattern's cells, a few at a time."""
-        for first in range(0, len(elements), CELLS_AT_ONCE):
-            chosen = slice(first, first + CELLS_AT_ONCE)
+        count = ENTRIES_AT_ONCE // (9 * self.pattern.entry.shape[1] ** 2)
+        for first in range(0, len(elements), count):
+            chosen = slice(first, first + count)
             self.add(chosen, elements.stiffness(chosen), elements.nodal_mass(chosen))
 
     @cached_property
@@ -209,8 +210,8 @@ def _sorted(matrix: sp.csr_matrix) -> sp.csr_matrix:
 @numba.njit(cache=True, nogil=True)
 def _add_cells(entry, stiffness, mass, K, M):  # type: ignore[no-untyped-def]
     for cell in range(len(entry)):
-        for a in range(8):
-            for b in range(8):
+        for a in range(entry.shape[1]):
+            for b in range(entry.shape[1]):
                 number = entry[cell, a, b]
                 if number >= 0:
                     M[number] += mass[cell, a, b]

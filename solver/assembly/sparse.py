@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from carillon.fem.model import ElasticModel
+from carillon.fem.model import Model
 
 Array = NDArray[np.float64]
 
@@ -35,8 +35,9 @@ def sum_blocks(
 
 
 def node_blocks(matrices: Array) -> Array:
-    """Element stiffness (c, 24, 24) as blocks (c, 8, 8, 3, 3) between corners."""
-    return matrices.reshape(-1, 8, 3, 8, 3).transpose(0, 1, 3, 2, 4)
+    """Element stiffness (c, 3 k, 3 k) as blocks (c, k, k, 3, 3) between nodes."""
+    nodes = matrices.shape[1] // 3
+    return matrices.reshape(-1, nodes, 3, nodes, 3).transpose(0, 1, 3, 2, 4)
 
 
 def assemble_elements(
@@ -50,22 +51,23 @@ def assemble_elements(
     Parameters
     ----------
     cells
-        (c, 8) node number of each corner.
+        (c, k) nodes of each element.
     stiffness, mass
-        (c, 24, 24) and (c, 8, 8) element matrices.
+        (c, 3 k, 3 k) and (c, k, k) element matrices.
     n_nodes
         Number of nodes.
     """
-    rows = np.repeat(cells, 8, axis=1).ravel()
-    columns = np.tile(cells, (1, 8)).ravel()
+    nodes = cells.shape[1]
+    rows = np.repeat(cells, nodes, axis=1).ravel()
+    columns = np.tile(cells, (1, nodes)).ravel()
     shape = (n_nodes, n_nodes)
     stiff = sum_blocks(rows, columns, node_blocks(stiffness).reshape(-1, 3, 3), shape)
     nodal = sum_blocks(rows, columns, mass.reshape(-1, 1, 1), shape)
     return stiff, sp.kron(nodal, sp.identity(3), format="csr")
 
 
-def assembled(model: ElasticModel) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+def assembled(model: Model) -> tuple[sp.csr_matrix, sp.csr_matrix]:
     """Stiffness and mass of the whole model on one rank."""
     return assemble_elements(
-        model.mesh.cells, model.stiffness(), model.nodal_mass(), model.mesh.n_nodes
+        model.connectivity, model.stiffness(), model.nodal_mass(), model.mesh.n_nodes
     )

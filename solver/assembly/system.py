@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.element import rigid_motions
-from carillon.fem.model import Elements
+from carillon.fem.elements import Elements
 from solver.assembly.node_rows import Halo, NodeRows, Pattern
 from solver.assembly.petsc_matrix import distributed_matrix
 from solver.distribution.collective import compute_on_root

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.geometry import HexMesh
-from solver.distribution.partition import default_subdomains, partition_mesh
+from carillon.fem.model import Model
+from solver.distribution.partition import default_subdomains, partition_model
 from solver.distribution.tree import MergeTree, assign_ranks, build_tree
 
 COST_EXPONENT = 1.5
@@ -63,9 +63,9 @@ class Decomposition:
 
 
 def decompose(
-    mesh: HexMesh, subdomains: int | None = None, seed: int = 0, ranks: int = 1
+    model: Model, subdomains: int | None = None, seed: int = 0, ranks: int = 1
 ) -> tuple[Decomposition, NDArray[np.int64]]:
-    """Cut `mesh` into subdomains, build the merge tree and deal subdomains to the ranks.
+    """Cut a solid into subdomains, build the merge tree and deal subdomains to the ranks.
 
     The cut and the tree depend on the number of ranks only where there are more ranks than
     subdomains by default.
@@ -80,8 +80,8 @@ def decompose(
     UserError
         If there are more subdomains than cells, or more ranks than subdomains.
     """
-    node_part = _partition(mesh, subdomains, seed, ranks)
-    tree, renumbered = build_tree(node_part[mesh.cells], np.bincount(node_part))
+    node_part = _partition(model, subdomains, seed, ranks)
+    tree, renumbered = build_tree(node_part[model.connectivity], np.bincount(node_part))
     node_part = renumbered[node_part]
     order = np.argsort(node_part, kind="stable").astype(np.int64)
     sizes = np.bincount(node_part, minlength=tree.parts)
@@ -90,15 +90,16 @@ def decompose(
     return Decomposition(tree, owner, offsets), order
 
 
-def _partition(mesh: HexMesh, subdomains: int | None, seed: int, ranks: int) -> NDArray[np.int32]:
+def _partition(model: Model, subdomains: int | None, seed: int, ranks: int) -> NDArray[np.int32]:
     """Subdomain (n,) of each node; as many as the ranks at least, unless told how many."""
     if subdomains is not None:
-        return partition_mesh(mesh, subdomains, seed)
-    asked = min(max(default_subdomains(3 * mesh.n_nodes), ranks), mesh.n_cells)
+        return partition_model(model, subdomains, seed)
+    elements = len(model.connectivity)
+    asked = min(max(default_subdomains(model.n_dofs), ranks), elements)
     while True:
-        node_part = partition_mesh(mesh, asked, seed)
+        node_part = partition_model(model, asked, seed)
         # Parts of a few cells may lose all their nodes to their neighbours.
         missing = ranks - int(node_part.max()) - 1
-        if missing <= 0 or asked == mesh.n_cells:
+        if missing <= 0 or asked == elements:
             return node_part
-        asked = min(asked + missing, mesh.n_cells)
+        asked = min(asked + missing, elements)

@@ -8,7 +8,8 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.fem.model import Chosen, ElasticModel, Elements
+from carillon.fem.elements import Chosen, Elements
+from carillon.fem.model import Model
 from solver.distribution.collective import bcast_from_root
 from solver.distribution.decomposition import Decomposition, decompose
 from solver.distribution.messages import AnyArray, receive_arrays, send_arrays
@@ -25,7 +26,7 @@ class Cells:
     Attributes
     ----------
     corners
-        (c, 8) rows of the corners, see `Decomposition`.
+        (c, k) rows of the nodes, see `Decomposition`.
     elements
         Size and material of the cells.
     """
@@ -47,7 +48,7 @@ class Cells:
         return self.from_arrays([np.concatenate(pair) for pair in pairs])
 
     def inside(self, start: int, stop: int) -> NDArray[np.bool_]:
-        """Whether each corner (c, 8) is one of the rows [start, stop)."""
+        """Whether each node (c, k) is one of the rows [start, stop)."""
         return (self.corners >= start) & (self.corners < stop)
 
     def arrays(self) -> list[AnyArray]:
@@ -97,16 +98,9 @@ class LocalMesh:
         return 3 * self.decomposition.n_nodes
 
     def lattice(self) -> NDArray[np.int64]:
-        """Integer coordinates (stop - start, 3) of this rank's nodes, in elements' edges."""
+        """Integer coordinates (stop - start, 3) of this rank's nodes, in `Elements.edge`."""
         positions = (self.positions - self.origin) / self.cells.elements.edge
         return np.rint(positions).astype(np.int64)
-
-    def planes(self) -> NDArray[np.int64]:
-        """The same, two steps of a mixed mesh together, so that no element reaches past the next.
-
-        Blocks of a mixed mesh start at even coordinates, and an element lies in one block.
-        """
-        return self.lattice() // self.cells.elements.steps
 
     def cells_by_subdomain(self, parts: range) -> dict[int, NDArray[np.int64]]:
         """Positions in `cells` of those that touch each subdomain in `parts`, ascending."""
@@ -117,7 +111,7 @@ class LocalMesh:
 
 
 def distribute(
-    model: ElasticModel | None,
+    model: Model | None,
     subdomains: int | None = None,
     seed: int = 0,
     comm: MPI.Comm = MPI.COMM_WORLD,
@@ -143,7 +137,7 @@ def distribute(
     def cut() -> tuple[Decomposition, Elements, Array]:
         nonlocal order
         assert model is not None
-        decomposition, order = decompose(model.mesh, subdomains, seed, comm.size)
+        decomposition, order = decompose(model, subdomains, seed, comm.size)
         nothing = model.elements.of(*(values[:0] for values in model.elements.arrays()))
         return decomposition, nothing, model.mesh.origin
 
@@ -153,7 +147,7 @@ def distribute(
         nodes, positions, numbers, cells = _scatter(model, decomposition, order, comm)
     else:
         nodes, positions, numbers, *arrays = receive_arrays(comm, 0, _LOCAL_MESH)
-        cells = Cells(np.empty((0, 8), dtype=np.int64), constants).from_arrays(arrays)
+        cells = Cells(np.empty((0, 0), dtype=np.int64), constants).from_arrays(arrays)
     start, stop = decomposition.local_range(comm.rank)
     return LocalMesh(decomposition, start, stop, cells, nodes, positions, numbers, origin)
 
@@ -164,7 +158,7 @@ def scatter_moduli(local_mesh: LocalMesh, young: Array | None, comm: MPI.Comm) -
     Parameters
     ----------
     young
-        (m, 8) moduli [Pa] of all cells of the mesh; only rank 0's are looked at.
+        (c, p) moduli [Pa] of all elements, see `Model.element_moduli`; only rank 0's are looked at.
     """
     everyone = comm.gather(local_mesh.numbers)
     if comm.rank == 0:
@@ -179,12 +173,12 @@ def scatter_moduli(local_mesh: LocalMesh, young: Array | None, comm: MPI.Comm) -
 
 
 def _scatter(
-    model: ElasticModel, decomposition: Decomposition, order: NDArray[np.int64], comm: MPI.Comm
+    model: Model, decomposition: Decomposition, order: NDArray[np.int64], comm: MPI.Comm
 ) -> tuple[NDArray[np.int64], Array, NDArray[np.int64], Cells]:
     """Send every rank its nodes, their positions, its cells' numbers and cells; return rank 0's."""
     row = np.empty(len(order), dtype=np.int64)
     row[order] = np.arange(len(order))
-    corners = row[model.mesh.cells]
+    corners = row[model.connectivity]
     whole = Cells(corners, model.elements)
     ends = [decomposition.local_range(rank)[1] for rank in range(comm.size)]
     rank_of, cell = _incidences(np.searchsorted(ends, corners, side="right"))
@@ -205,7 +199,7 @@ def _scatter(
 def _incidences(
     corner_owner: NDArray[np.integer],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs (owner, cell) from the owner (c, 8) of each corner, each once, sorted."""
+    """Pairs (owner, cell) from the owner (c, k) of each node, each once, sorted."""
     count = max(len(corner_owner), 1)
     cell = np.arange(len(corner_owner), dtype=np.int64)[:, None]
     owner, cells = np.divmod(np.unique(corner_owner.astype(np.int64) * count + cell), count)

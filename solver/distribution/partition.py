@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
 from carillon.fem.laplacian import laplacian_modes
+from carillon.fem.model import Model
 
 EMBEDDING_MODES = 12
 """Laplacian eigenvectors that span the clustering space, the constant left out."""
@@ -70,21 +71,25 @@ def _clusters(points: NDArray[np.float64], count: int, seed: int) -> NDArray[np.
     return np.asarray(kmeans.fit_predict(points))
 
 
-def partition_nodes(mesh: HexMesh, cell_part: NDArray[np.int32]) -> NDArray[np.int32]:
+def partition_nodes(
+    cells: NDArray[np.integer], n_nodes: int, cell_part: NDArray[np.int32]
+) -> NDArray[np.int32]:
     """Subdomain (n,) of each node: the part that most of its cells belong to, ties to the lower.
+
+    `cells` (c, k) are the nodes of each cell.
 
     Parts that get no node vanish, and the others are numbered without gaps.
     """
     parts = int(cell_part.max()) + 1
-    node = mesh.cells.ravel().astype(np.int64)
-    pair, votes = np.unique(node * parts + np.repeat(cell_part, 8), return_counts=True)
+    node = cells.ravel().astype(np.int64)
+    pair, votes = np.unique(node * parts + np.repeat(cell_part, cells.shape[1]), return_counts=True)
     voter, part = np.divmod(pair, parts)
     order = np.lexsort([part, -votes, voter])
-    first = np.searchsorted(voter[order], np.arange(mesh.n_nodes))
+    first = np.searchsorted(voter[order], np.arange(n_nodes))
     return _without_gaps(part[order][first])
 
 
-def partition_mesh(mesh: HexMesh, parts: int, seed: int = 0) -> NDArray[np.int32]:
+def partition_model(model: Model, parts: int, seed: int = 0) -> NDArray[np.int32]:
     """Subdomain (n,) of each node: about `parts` connected sets, numbered without gaps, none empty.
 
     Raises
@@ -92,8 +97,9 @@ def partition_mesh(mesh: HexMesh, parts: int, seed: int = 0) -> NDArray[np.int32
     UserError
         If there are more parts than cells.
     """
-    node_part = partition_nodes(mesh, partition_cells(mesh, parts, seed))
-    return connect_subdomains(mesh.cells, node_part, mesh.n_nodes / (2.0 * parts))
+    cells, n_nodes = model.connectivity, model.mesh.n_nodes
+    node_part = partition_nodes(cells, n_nodes, partition_cells(model.hexmesh, parts, seed))
+    return connect_subdomains(cells, node_part, n_nodes / (2.0 * parts))
 
 
 def connect_subdomains(
@@ -135,7 +141,7 @@ def subdomain_pieces(cells: NDArray[np.integer], node_part: NDArray[np.int32]) -
     each other by a spring at most.
     """
     n_nodes, parts = len(node_part), int(node_part.max()) + 1
-    cell = np.repeat(np.arange(len(cells), dtype=np.int64), 8)
+    cell = np.repeat(np.arange(len(cells), dtype=np.int64), cells.shape[1])
     node = cells.ravel()
     _, patch, corners = np.unique(
         cell * parts + node_part[node], return_inverse=True, return_counts=True
@@ -160,8 +166,9 @@ def _closest_neighbours(
     part = node_part[cells]
     mixed = np.flatnonzero((part != part[:, :1]).any(axis=1))
     ours, theirs = part[mixed][:, :, None], part[mixed][:, None, :]
-    seen = np.broadcast_to(piece[cells[mixed]][:, :, None], (len(mixed), 8, 8))[ours != theirs]
-    other = np.broadcast_to(theirs, (len(mixed), 8, 8))[ours != theirs].astype(np.int64)
+    pairs = (len(mixed), cells.shape[1], cells.shape[1])
+    seen = np.broadcast_to(piece[cells[mixed]][:, :, None], pairs)[ours != theirs]
+    other = np.broadcast_to(theirs, pairs)[ours != theirs].astype(np.int64)
     parts = int(node_part.max()) + 1
     pair, votes = np.unique(seen * parts + other, return_counts=True)
     voter, candidate = np.divmod(pair, parts)

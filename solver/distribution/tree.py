@@ -66,7 +66,7 @@ def build_tree(
     Parameters
     ----------
     corner_part
-        (m, 8) subdomain of every corner of every cell.
+        (m, k) subdomain of every node of every cell.
     sizes
         (parts,) nodes of every subdomain.
 

@@ -33,12 +33,12 @@ def restrict_stiffness(
     stiffness: Array,
     inside: NDArray[np.bool_],
     interface: str,
-    hangs: NDArray[np.bool_] | None = None,
+    collinear: NDArray[np.bool_] | None = None,
 ) -> Array:
-    """Element stiffness (c, 24, 24) restricted to the corners `inside` (c, 8); other rows are zero.
+    """Element stiffness (c, 3 k, 3 k) restricted to the nodes `inside` (c, k); others are zero.
 
-    Restricting to all corners returns the element itself; to none, zero. Elements with corners that
-    hang (c,) may have three nodes on a line.
+    Restricting to all nodes returns the element itself; to none, zero. `collinear` (c,) elements
+    may have three nodes on a line.
     """
     if interface not in INTERFACES:
         raise ValueError(f"interface {interface!r}, expected one of {INTERFACES}")
@@ -46,14 +46,14 @@ def restrict_stiffness(
     if interface == "fixed":
         return np.asarray(stiffness * keep[:, :, None] * keep[:, None, :])
     restricted = np.zeros_like(stiffness)
-    corners = inside.sum(axis=1)
-    restricted[corners == 8] = stiffness[corners == 8]
+    corners, every = inside.sum(axis=1), inside.shape[1]
+    restricted[corners == every] = stiffness[corners == every]
     # Nodes on a line leave the element free to turn about it.
     turns = corners < _NON_COLLINEAR
-    if hangs is not None:
-        turns |= hangs & (corners == _NON_COLLINEAR)
-    # One corner alone has no stiffness of its own.
-    for count, turning in product(range(2, 8), (False, True)):
+    if collinear is not None:
+        turns |= collinear & (corners == _NON_COLLINEAR)
+    # One node alone has no stiffness of its own.
+    for count, turning in product(range(2, every), (False, True)):
         chosen = np.flatnonzero((corners == count) & (turns == turning))
         if len(chosen):
             # Unknowns to keep first, each cell in its own order.
@@ -81,5 +81,5 @@ def _schur(
 
 
 def restrict_mass(mass: Array, inside: NDArray[np.bool_]) -> Array:
-    """Nodal element mass (c, 8, 8) restricted to the corners `inside`: the principal sub-matrix."""
+    """Nodal element mass (c, k, k) restricted to the nodes `inside`: the principal sub-matrix."""
     return np.asarray(mass * inside[:, :, None] * inside[:, None, :])

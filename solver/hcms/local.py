@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
-from carillon.fem.model import RIGID_MODES, Elements
+from carillon.fem.elements import Elements
+from carillon.fem.model import RIGID_MODES
 from solver.assembly.node_rows import NodeRows, Pattern
 from solver.distribution.local_mesh import Cells
 from solver.hcms.condense import restrict_mass, restrict_stiffness
@@ -53,12 +54,12 @@ class Region:
     def of_cells(cls, corners: Index, lattice: Index, steps: int) -> Region:
         """Region of the nodes 0..n-1 at `lattice` (n, 3) among the corners of cells.
 
-        Cells span `steps` of the lattice at most, see `LocalMesh.planes`.
+        Cells span `steps` of the lattice, see `Elements`.
         """
         pattern = Pattern.of_cells(corners, 0, len(lattice), ghosts=False)
         graph = (np.ones(len(pattern.columns)), pattern.columns, pattern.indptr)
         count, label = connected_components(csr_matrix(graph, shape=(len(lattice),) * 2))
-        plan = Plan(lattice // steps, pattern.indptr, pattern.columns)
+        plan = Plan(lattice, pattern.indptr, pattern.columns, steps=steps)
         return cls(pattern, plan, lattice, label if count > 1 else None)
 
 
@@ -127,7 +128,7 @@ class Subdomain:
         alone = NodeRows(self.pattern)
         alone.add(
             slice(None),
-            restrict_stiffness(stiffness, self.inside, self.treatment, elements.hangs),
+            restrict_stiffness(stiffness, self.inside, self.treatment, elements.collinear),
             restrict_mass(mass, self.inside),
         )
         size = 3 * self.pattern.stop
@@ -168,9 +169,9 @@ def _up_to(cutoff: float | None, values: Array, vectors: Array) -> tuple[Array, 
 def _lattice_around(
     numbers: Index, inside: NDArray[np.bool_], places: Index, first: int, lattice: Index, nodes: int
 ) -> Index:
-    """Integer coordinates (nodes, 3) of all corners, from those of the corners inside.
+    """Integer coordinates (nodes, 3) of all nodes, from those of the nodes inside.
 
-    `places` (c, 8, 3) are the coordinates of the cells' corners about a point of each cell.
+    `places` (c, k, 3) are the coordinates of the cells' nodes about a point of each cell.
     """
     cell, corner = np.arange(len(numbers)), inside.argmax(axis=1)
     origin = lattice[numbers[cell, corner] - first] - places[cell, corner]

@@ -134,15 +134,15 @@ def interface(cells: Cells, start: int, middle: int, stop: int, treatment: str) 
     """
     left, right = cells.inside(start, middle), cells.inside(middle, stop)
     straddling = np.flatnonzero(left.any(axis=1) & right.any(axis=1))
-    # No two cells have the same corners and octants: the sums do not depend on where they are made.
-    order = np.lexsort((cells.elements.fill[straddling], *cells.corners[straddling].T[::-1]))
+    # No two cells have the same corners and key: the sums do not depend on where they are made.
+    order = np.lexsort((cells.elements.sort_key[straddling], *cells.corners[straddling].T[::-1]))
     straddling = straddling[order]
     left, right, cells = left[straddling], right[straddling], cells.take(straddling)
-    element, hangs = cells.elements.stiffness(), cells.elements.hangs
+    element, collinear = cells.elements.stiffness(), cells.elements.collinear
     stiffness = (
-        restrict_stiffness(element, left | right, treatment, hangs)
-        - restrict_stiffness(element, left, treatment, hangs)
-        - restrict_stiffness(element, right, treatment, hangs)
+        restrict_stiffness(element, left | right, treatment, collinear)
+        - restrict_stiffness(element, left, treatment, collinear)
+        - restrict_stiffness(element, right, treatment, collinear)
     )
     across = left[:, :, None] & right[:, None, :]
     mass = cells.elements.nodal_mass() * (across | across.transpose(0, 2, 1))

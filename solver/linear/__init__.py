@@ -98,9 +98,9 @@ class LinearSolver:
         if method == "multifrontal":
             from solver.linear.multifrontal import Plan
 
-            self._plan = Plan(
-                layout.local_mesh.planes(), layout.pattern.indptr, layout.pattern.columns
-            )
+            local_mesh, pattern = layout.local_mesh, layout.pattern
+            steps = local_mesh.cells.elements.steps
+            self._plan = Plan(local_mesh.lattice(), pattern.indptr, pattern.columns, steps=steps)
 
     @property
     def indefinite(self) -> bool:

@@ -1,8 +1,7 @@
 """Nested dissection of the nodes of a voxel mesh by planes (George 1973), and its symbolic fronts.
 
-A plane of nodes separates the elements on its two sides, since an element spans two neighbouring
-planes only.  Cutting recursively gives a tree of fronts: the nodes of a plane are eliminated after
-everything that they separate.
+A plane of nodes between elements separates those on its two sides.  Cutting recursively gives a
+tree of fronts: the nodes of a plane are eliminated after everything that they separate.
 """
 
 from __future__ import annotations
@@ -60,21 +59,25 @@ class Fronts:
         return int((2 * own**2 + 4 * own * outside).sum())
 
 
-def dissect(planes: Index, indptr: Index, indices: Index, leaf_nodes: int = LEAF_NODES) -> Fronts:
+def dissect(
+    lattice: Index, indptr: Index, indices: Index, steps: int = 1, leaf_nodes: int = LEAF_NODES
+) -> Fronts:
     """Order the nodes and find the fronts.
 
     Parameters
     ----------
-    planes
+    lattice
         (n, 3) integer coordinates of the nodes.
     indptr, indices
         Graph of the nodes in compressed rows: which nodes share an element.
+    steps
+        Planes of the lattice that far apart, from zero on, separate the elements between them.
     leaf_nodes
         Sets of at most this many nodes are not cut.
     """
     owns: list[Index] = []
     parent: list[int] = []
-    _cut(planes, np.arange(len(planes)), leaf_nodes, owns, parent)
+    _cut(lattice, np.arange(len(lattice)), steps, leaf_nodes, owns, parent)
     order = np.concatenate(owns)
     first = np.concatenate([[0], np.cumsum([len(own) for own in owns])])
     position = np.empty(len(order), dtype=np.int64)
@@ -83,17 +86,24 @@ def dissect(planes: Index, indptr: Index, indices: Index, leaf_nodes: int = LEAF
     return Fronts(order, first, np.array(parent, dtype=np.int64), boundary)
 
 
-def _cut(planes: Index, nodes: Index, leaf_nodes: int, owns: list[Index], parent: list[int]) -> int:
+def _cut(
+    lattice: Index,
+    nodes: Index,
+    steps: int,
+    leaf_nodes: int,
+    owns: list[Index],
+    parent: list[int],
+) -> int:
     """Append the fronts of `nodes`, children first; returns the number of the last, their root."""
-    plane = _best_plane(planes[nodes]) if len(nodes) > leaf_nodes else None
+    plane = _best_plane(lattice[nodes], steps) if len(nodes) > leaf_nodes else None
     children = []
     own = nodes
     if plane is not None:
         axis, value = plane
-        coordinate = planes[nodes, axis]
+        coordinate = lattice[nodes, axis]
         own = nodes[coordinate == value]
         for side in (coordinate < value, coordinate > value):
-            children.append(_cut(planes, nodes[side], leaf_nodes, owns, parent))
+            children.append(_cut(lattice, nodes[side], steps, leaf_nodes, owns, parent))
     owns.append(own)
     parent.append(-1)
     for child in children:
@@ -101,18 +111,19 @@ def _cut(planes: Index, nodes: Index, leaf_nodes: int, owns: list[Index], parent
     return len(owns) - 1
 
 
-def _best_plane(planes: Index) -> tuple[int, int] | None:
+def _best_plane(lattice: Index, steps: int) -> tuple[int, int] | None:
     """Axis and coordinate of the plane with few nodes that leaves two sides of similar size."""
     best = None
     lowest = np.inf
     for axis in range(3):
-        start = planes[:, axis].min()
-        count = np.bincount(planes[:, axis] - start)
+        start = lattice[:, axis].min()
+        count = np.bincount(lattice[:, axis] - start)
         below = np.cumsum(count) - count
-        above = len(planes) - below - count
+        above = len(lattice) - below - count
         smaller = np.minimum(below, above)
-        fair = smaller >= SHORTEST_SIDE * len(planes)
-        allowed = fair if fair.any() else smaller > 0
+        separates = (start + np.arange(len(count))) % steps == 0
+        fair = separates & (smaller >= SHORTEST_SIDE * len(lattice))
+        allowed = fair if fair.any() else separates & (smaller > 0)
         if not allowed.any():
             continue
         cost = np.where(allowed, count / np.maximum(below * above, 1) ** 0.5, np.inf)

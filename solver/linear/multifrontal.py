@@ -93,14 +93,16 @@ class Plan:
 
     Parameters
     ----------
-    planes
+    lattice
         (n, 3) integer coordinates of the nodes.
     indptr, indices
         Node graph in compressed rows; the data of `Factor` follow it.
+    options
+        Others of `solver.linear.dissection.dissect`.
     """
 
-    def __init__(self, planes: Index, indptr: Index, indices: Index, **options: Any) -> None:
-        self.fronts: Fronts = dissect(planes, indptr, indices, **options)
+    def __init__(self, lattice: Index, indptr: Index, indices: Index, **options: Any) -> None:
+        self.fronts: Fronts = dissect(lattice, indptr, indices, **options)
         fronts = self.fronts
         self.position = np.empty(len(fronts.order), dtype=np.int64)
         self.position[fronts.order] = np.arange(len(fronts.order))

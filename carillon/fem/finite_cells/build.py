@@ -58,7 +58,7 @@ def finite_cells(
     --------
     >>> from carillon.fem.geometry.builtin import builtin_surface
     >>> cells = finite_cells(builtin_surface("bell"), 12)
-    >>> bool(abs(cells.volume / 1.0e-3 - 1.0) < 0.01), len(cells) > 100
+    >>> bool(abs(cells.volume / 8.79e-4 - 1.0) < 0.01), len(cells) > 100
     (True, True)
     """
     resolution = checked_resolution(surface, resolution, name)

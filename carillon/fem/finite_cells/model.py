@@ -1,0 +1,168 @@
+"""A solid of finite cells with material."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.fem.block import NODES
+from carillon.fem.element import DEFAULT_POISSON
+from carillon.fem.elements import Chosen, Elements
+from carillon.fem.finite_cells.cells import FiniteCells
+from carillon.fem.finite_cells.shapes import point_mass, point_stiffness
+from carillon.fem.geometry import HexMesh
+from carillon.fem.model import DEFAULT_DENSITY, Model
+from carillon.fem.moduli import require_moduli
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CellElements(Elements):
+    """Quadratic cells of twice the lattice's spacing, integrated over what of them is inside.
+
+    Attributes
+    ----------
+    young : (c, 125)
+        Moduli [Pa] times the points' weights, see `carillon.fem.finite_cells.shapes`.
+    share : (c, 125)
+        The same of the density over that of the solid.
+    edge
+        Spacing [m].
+    poisson, density
+        See `Model`.
+    """
+
+    young: Array
+    share: Array
+    edge: float
+    poisson: float
+    density: float
+
+    def of(self, *arrays: NDArray[Any]) -> Self:
+        """See `Elements.of`."""
+        young, share = arrays
+        return replace(self, young=young, share=share)
+
+    def arrays(self) -> list[NDArray[Any]]:
+        """See `Elements.arrays`."""
+        return [self.young, self.share]
+
+    @property
+    def steps(self) -> int:
+        """See `Elements.steps`."""
+        return 2
+
+    @property
+    def node_places(self) -> NDArray[np.int64]:
+        """Places (c, 27, 3) of the nodes in each cell, in spacings."""
+        return np.broadcast_to(NODES, (len(self), *NODES.shape))
+
+    @property
+    def collinear(self) -> NDArray[np.bool_]:
+        """All: there are three nodes on an edge."""
+        return np.ones(len(self), dtype=bool)
+
+    @property
+    def sort_key(self) -> NDArray[np.int64]:
+        """None is needed: parts in one place have a node of their own in their middle."""
+        return np.zeros(len(self), dtype=np.int64)
+
+    def stiffness(self, chosen: Chosen = slice(None)) -> Array:
+        """Stiffness matrices (c, 81, 81) [N/m] of the chosen cells."""
+        matrices = (2.0 * self.edge * self.young[chosen]) @ point_stiffness(self.poisson)
+        return np.asarray(matrices.reshape(-1, 81, 81))
+
+    def nodal_mass(self, chosen: Chosen = slice(None)) -> Array:
+        """Masses (c, 27, 27) [kg] of the chosen cells."""
+        scale = self.density * (2.0 * self.edge) ** 3
+        return np.asarray(((scale * self.share[chosen]) @ point_mass()).reshape(-1, 27, 27))
+
+
+@dataclass(frozen=True)
+class FiniteCellModel(Model):
+    """Finite cells with a modulus for every voxel that holds material.
+
+    Parameters
+    ----------
+    cells
+        The mesh.
+    young : (m,)
+        Young's modulus [Pa] of each voxel, taken as it is: what users give goes through
+        `finite_cell_model` and `with_young`.
+    poisson, density
+        See `Model`.
+    """
+
+    cells: FiniteCells
+    young: Array
+    poisson: float = DEFAULT_POISSON
+    density: float = DEFAULT_DENSITY
+
+    @property
+    def mesh(self) -> HexMesh:  # type: ignore[override]
+        """The voxels that hold material, and all nodes."""
+        return self.cells.mesh
+
+    @property
+    def elements(self) -> CellElements:
+        """See `Model.elements`."""
+        return CellElements(
+            self.cells.point_values(self.young),
+            self.cells.point_values(np.ones(self.mesh.n_cells)),
+            self.mesh.edge,
+            self.poisson,
+            self.density,
+        )
+
+    @property
+    def connectivity(self) -> NDArray[np.int32]:
+        """Nodes (c, 27) of each cell."""
+        return np.asarray(self.cells.nodes)
+
+    @property
+    def hexmesh(self) -> HexMesh:
+        """See `Model.hexmesh`."""
+        return self.cells.hexmesh()
+
+    def element_moduli(self, young: Array) -> Array:
+        """Weighted moduli (c, 125) [Pa] of the cells from those (m,) of the voxels; see `Model`."""
+        return self.cells.point_values(require_moduli(young, self.mesh.n_cells, points=False))
+
+    def with_young(self, young: Array) -> Self:
+        """The same solid with other moduli (m,) [Pa]; see `Model`."""
+        return replace(self, young=require_moduli(young, self.mesh.n_cells, points=False))
+
+    @property
+    def mass(self) -> float:
+        """Mass of the solid [kg]."""
+        return self.density * self.cells.volume
+
+
+def finite_cell_model(
+    cells: FiniteCells,
+    young: Array,
+    poisson: float = DEFAULT_POISSON,
+    density: float = DEFAULT_DENSITY,
+) -> FiniteCellModel:
+    """Model of finite cells with moduli `young` (m,) [Pa] of the voxels.
+
+    Raises
+    ------
+    UserError
+        For what `carillon.fem.moduli.require_moduli` refuses.
+
+    Examples
+    --------
+    >>> from carillon.fem.finite_cells.build import finite_cells
+    >>> from carillon.fem.geometry import builtin_surface
+    >>> cells = finite_cells(builtin_surface("box"), 8)
+    >>> model = finite_cell_model(cells, np.full(cells.mesh.n_cells, 1e9))
+    >>> model.n_dofs, round(model.mass, 9)
+    (945, 3.0)
+    """
+    given = require_moduli(young, cells.mesh.n_cells, points=False)
+    return FiniteCellModel(cells, given, poisson, density)
