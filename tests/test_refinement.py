@@ -27,7 +27,7 @@ from carillon.fem.geometry import (
 from carillon.fem.geometry.faces import boundary_faces, corner_values, face_neighbours
 from carillon.fem.geometry.hanging import makes_sense, node_places, node_weights
 from carillon.fem.laplacian import cell_laplacian
-from carillon.fem.model import Elements
+from carillon.fem.elements import HexElements
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.assembly.sparse import assembled
@@ -239,7 +239,7 @@ def test_fine_cells_by_themselves_know_that_they_are():
     _, mixed, _ = mixed_model(3)
     mixed = replace(mixed, lumped_share=0.5)
     cells = np.flatnonzero(mixed.mesh.span == 1)
-    alone: Elements = mixed.elements.of(*(values[cells] for values in mixed.elements.arrays()))
+    alone: HexElements = mixed.elements.of(*(values[cells] for values in mixed.elements.arrays()))
     assert (alone.nodal_mass() == mixed.nodal_mass(cells)).all()
     assert (alone.stiffness() == mixed.stiffness(cells)).all()
 
@@ -250,11 +250,11 @@ def test_relaxed_elements_with_hanging_corners_are_free(interface):
     kinds = kinds[np.random.default_rng(0).permutation(len(kinds))[:60]].astype(np.int32)
     young = np.random.default_rng(1).uniform(0.1, 10.0, (len(kinds), 8))
     fill = np.full(len(kinds), 255, dtype=np.uint8)
-    elements = Elements(young, fill, 1.0, 0.25, 1.0, False, 0.0, kinds)
+    elements = HexElements(young, fill, 1.0, 0.25, 1.0, False, 0.0, kinds)
     stiffness, places = elements.stiffness(), elements.node_places.astype(float)
     for corners in combinations(range(8), 3):
         inside = np.broadcast_to(np.isin(np.arange(8), corners), (len(kinds), 8))
-        relaxed = restrict_stiffness(stiffness, inside, interface, elements.hangs)
+        relaxed = restrict_stiffness(stiffness, inside, interface, elements.collinear)
         for matrix, nodes in zip(relaxed, places):
             motions = rigid_motions(nodes, nodes.mean(axis=0)) * np.repeat(inside[0], 3)[:, None]
             assert np.abs(matrix @ motions).max() < 1e-11
@@ -295,8 +295,9 @@ def test_every_method_finds_the_modes_of_a_mixed_model(method):
 def test_no_element_reaches_past_a_plane():
     _, mixed, _ = solids.bar_models()
     local_mesh = distribute(mixed, 5, comm=COMM)
-    planes = local_mesh.planes()[local_mesh.cells.corners]
-    assert np.ptp(planes, axis=1).max() == 1
+    places = local_mesh.lattice()[local_mesh.cells.corners]
+    steps = local_mesh.cells.elements.steps
+    assert (-(-places.max(axis=1) // steps) - places.min(axis=1) // steps <= 1).all()
     lattice = mixed.mesh.node_grid[local_mesh.nodes]
     assert np.array_equal(local_mesh.lattice(), lattice)
 

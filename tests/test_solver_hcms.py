@@ -97,7 +97,7 @@ def test_part_that_gets_no_node_vanishes():
     # One cell in the middle of another part is outvoted at each of its corners.
     cell_part[inner] = 1
     cell_part[mesh.grid[:, 2] == 3] = 2
-    node_part = partition_nodes(mesh, cell_part)
+    node_part = partition_nodes(mesh.cells, mesh.n_nodes, cell_part)
     assert sorted(np.unique(node_part)) == [0, 1]
 
 
@@ -136,16 +136,16 @@ def test_piece_that_hangs_by_two_nodes_is_apart():
 
 def test_default_partition_hangs_together():
     model = solids.uniform_box(14, 11, 9, 0.01)
-    node_part = decomposition.partition_mesh(model.mesh, 9)
+    node_part = decomposition.partition_model(model, 9)
     pieces = subdomain_pieces(model.mesh.cells, node_part)
     assert pieces.max() == node_part.max()
 
 
 def test_default_partition_has_a_subdomain_for_every_rank():
-    mesh = solids.box_mesh(3, 3, 2)
-    found, order = decomposition.decompose(mesh, ranks=13)
+    model = solids.uniform_box(3, 3, 2, 0.01)
+    found, order = decomposition.decompose(model, ranks=13)
     assert sorted(set(found.owner)) == list(range(13))
-    assert sorted(order) == list(range(mesh.n_nodes))
+    assert sorted(order) == list(range(model.mesh.n_nodes))
     assert (np.diff(found.offsets) > 0).all()
 
 
@@ -153,7 +153,7 @@ def test_default_partition_has_a_subdomain_for_every_rank():
 def in_pieces(monkeypatch):
     """A bar with a subdomain in two pieces, left as it is."""
     mesh, node_part = ends_and_middle(12, 3)
-    monkeypatch.setattr(decomposition, "partition_mesh", lambda *arguments: node_part)
+    monkeypatch.setattr(decomposition, "partition_model", lambda *arguments: node_part)
     return solids.fine_model(mesh, 1e9 * 10.0 ** np.linspace(-1.0, 1.0, mesh.n_cells))
 
 

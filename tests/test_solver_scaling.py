@@ -44,7 +44,7 @@ model = build_problem(ProblemOptions("builtin:bar", 24, "smooth")).model
 local_mesh = distribute(model, 6, 0, comm)
 found = synthesize(local_mesh, keep, "free", comm).counts.per_rank(comm)
 if comm.rank == 0:
-    decomposition, order = decompose(model.mesh, 6, 0, comm.size)
+    decomposition, order = decompose(model, 6, 0, comm.size)
     sizes = sizes_of_mesh(model.mesh, decomposition, order)
     planned = [each.phases() for each in planned_counts(sizes, decomposition.owner, keep)]
     assert list(planned[0]) == list(found)
@@ -84,7 +84,7 @@ def test_a_box_of_cubes_is_as_large_as_it_should_be():
 
 def test_more_ranks_have_less_to_do_each_and_more_to_say():
     mesh = bar()
-    decomposition, order = decompose(mesh, 8, 0, 1)
+    decomposition, order = decompose(fine_model(mesh, np.ones(mesh.n_cells)), 8, 0, 1)
     sizes = sizes_of_mesh(mesh, decomposition, order)
     work = elimination(mesh)
     correction = CorrectionWork(blocks=2, solves=100, width=70)

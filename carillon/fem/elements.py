@@ -1,4 +1,4 @@
-"""What the matrices of a solid are summed from: elements with material, wherever their nodes are."""
+"""Elements with material, wherever their nodes are: what the matrices of a solid are summed from."""
 
 from __future__ import annotations
 

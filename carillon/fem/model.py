@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.fem.block import ALL_FILLED
-from carillon.fem.element import DEFAULT_POISSON
+from carillon.fem.element import DEFAULT_POISSON, shape_functions
 from carillon.fem.elements import Chosen, Elements, HexElements
 from carillon.fem.geometry import HexMesh
+from carillon.fem.geometry.hanging import node_weights
 from carillon.fem.moduli import at_points, require_moduli
 
 Array = NDArray[np.float64]
@@ -61,6 +62,15 @@ class Model(ABC):
     @abstractmethod
     def hexmesh(self) -> HexMesh:
         """The elements as cubes with nodes at their corners, by which neighbours are found."""
+
+    @property
+    @abstractmethod
+    def filled(self) -> NDArray[np.bool_]:
+        """Which octants (c, 8) of the elements hold material."""
+
+    @abstractmethod
+    def shape_values(self, elements: NDArray[np.integer], places: Array) -> Array:
+        """Weights (p, k) of the nodes of `elements` (p,) at places (p, 3) in them, from 0 to 1."""
 
     @abstractmethod
     def element_moduli(self, young: Array) -> Array:
@@ -146,6 +156,18 @@ class ElasticModel(Model):
     def hexmesh(self) -> HexMesh:
         """The mesh itself."""
         return self.mesh
+
+    @property
+    def filled(self) -> NDArray[np.bool_]:
+        """See `Model.filled`."""
+        return np.unpackbits(self.fill[:, None], axis=1, bitorder="little").astype(bool)
+
+    def shape_values(self, elements: NDArray[np.integer], places: Array) -> Array:
+        """Trilinear weights (p, 8); what a hanging corner says is the nodes' that it hangs from."""
+        weights = shape_functions(places)
+        if self.mesh.kinds is None:
+            return weights
+        return np.einsum("pk,pkj->pj", weights, node_weights()[self.mesh.kinds[elements]])
 
     def element_moduli(self, young: Array) -> Array:
         """Moduli (m, 8) [Pa] at the quadrature points, from (m,) or (m, 8); see `Model`."""

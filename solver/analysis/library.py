@@ -116,9 +116,7 @@ def solve(
     )
 
 
-def _with_material(
-    model: HexMesh | Model | None, material: str | Array | None
-) -> Model:
+def _with_material(model: HexMesh | Model | None, material: str | Array | None) -> Model:
     if model is None:
         raise UserError("no model on rank 0, expected a mesh or an elastic model")
     if material is None:

@@ -10,11 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arguments import whole_number
+from carillon.errors import UserError
 from carillon.fem import geometry, materials
 from carillon.fem.element import DEFAULT_POISSON
+from carillon.fem.finite_cells.build import finite_cells
+from carillon.fem.finite_cells.model import finite_cell_model
 from carillon.fem.geometry import COMPONENTS, FILLS, HexMesh, hexmesh_from_voxels, voxelize
 from carillon.fem.materials import young_modulus
-from carillon.fem.model import DEFAULT_DENSITY, ElasticModel
+from carillon.fem.model import DEFAULT_DENSITY, ElasticModel, Model
 from carillon.limits import require_constants
 from carillon.options import REQUIRED, option
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, OBJECTIVES
@@ -25,13 +28,23 @@ from solver.coarsening.model import build_model
 
 Array = NDArray[np.float64]
 
+DISCRETISATIONS = ("voxel", "finite-cell")
+
 
 @dataclass(frozen=True)
 class ProblemOptions:
     """The solid to analyse."""
 
     mesh: str = option(REQUIRED, "surface mesh file, or builtin:NAME")
-    resolution: int = option(REQUIRED, "voxels along the longest side", type=whole_number(2))
+    resolution: int = option(
+        REQUIRED, "voxels, or lattice spacings, along the longest side", type=whole_number(2)
+    )
+    discretisation: str = option(
+        "voxel",
+        "voxel: cubes that are full or empty; finite-cell: quadratic cells of twice their edge, "
+        "of which only what is inside counts",
+        choices=DISCRETISATIONS,
+    )
     material: str = option(
         "uniform",
         f"{', '.join(materials.NAMES)}, or a file with one Young's modulus [Pa] per voxel",
@@ -73,20 +86,26 @@ class ProblemOptions:
 
 @dataclass(frozen=True)
 class Problem:
-    """Fine mesh, its moduli (m,) [Pa], the model to solve, and how long making them took.
+    """Voxels, their moduli (m,) [Pa], the model to solve, and how long making them took.
 
     `coarsening` tells what the coarse elements rest on, see `Coarsening.record`.
     """
 
     fine: HexMesh
     young: Array
-    model: ElasticModel
+    model: Model
     seconds: dict[str, float]
     coarsening: dict[str, str] = field(default_factory=dict)
 
+    @property
+    def hexahedra(self) -> ElasticModel:
+        """The model, which is one of hexahedra."""
+        assert isinstance(self.model, ElasticModel)
+        return self.model
+
 
 def build_problem(options: ProblemOptions) -> Problem:
-    """Voxelise the mesh, assign the material and coarsen.
+    """Discretise the solid, assign the material and coarsen.
 
     Raises
     ------
@@ -94,14 +113,20 @@ def build_problem(options: ProblemOptions) -> Problem:
         For anything wrong with the mesh, the material or the parameters.
     """
     require_constants(options.poisson, options.density)
+    if options.discretisation == "finite-cell":
+        return _finite_cell_problem(options)
+    if options.discretisation not in DISCRETISATIONS:
+        raise UserError(
+            f"discretisation {options.discretisation!r} is unknown, expected one of "
+            f"{', '.join(DISCRETISATIONS)}"
+        )
     begin = time.perf_counter()
     surface = geometry.load_surface(options.mesh, options.unit)
     name = geometry.surface_name(options.mesh)
     voxels = voxelize(surface, options.resolution, options.fill, options.components, name)
     fine = hexmesh_from_voxels(voxels)
     meshed = time.perf_counter()
-    label = f"mesh '{name}', resolution {options.resolution}"
-    young = young_modulus(options.material, fine, options.seed, label)
+    young = young_modulus(options.material, fine, options.seed, _label(options))
     assigned = time.perf_counter()
     coarsening = options.coarsening()
     model = build_model(
@@ -117,3 +142,26 @@ def build_problem(options: ProblemOptions) -> Problem:
         return Problem(fine, young, model, seconds)
     seconds["coarsening"] = time.perf_counter() - assigned
     return Problem(fine, young, model, seconds, coarsening.record())
+
+
+def _finite_cell_problem(options: ProblemOptions) -> Problem:
+    for given, what in (
+        (options.coarsen != "none", f"--coarsen {options.coarsen}"),
+        (options.lumped, "--lumped"),
+        (options.fill != "winding", f"--fill {options.fill}"),
+    ):
+        if given:
+            raise UserError(f"{what} is for voxels; leave it out with --discretisation finite-cell")
+    begin = time.perf_counter()
+    surface = geometry.load_surface(options.mesh, options.unit)
+    name = geometry.surface_name(options.mesh)
+    cells = finite_cells(surface, options.resolution, options.components, name)
+    meshed = time.perf_counter()
+    young = young_modulus(options.material, cells.mesh, options.seed, _label(options))
+    model = finite_cell_model(cells, young, options.poisson, options.density)
+    seconds = {"mesh": meshed - begin, "material": time.perf_counter() - meshed}
+    return Problem(cells.mesh, young, model, seconds)
+
+
+def _label(options: ProblemOptions) -> str:
+    return f"mesh '{geometry.surface_name(options.mesh)}', resolution {options.resolution}"

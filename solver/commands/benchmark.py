@@ -19,7 +19,7 @@ EXAMPLES = """examples:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    add_solid(parser, "coarsen", "objective")
+    add_solid(parser, "coarsen", "objective", "discretisation")
     add_options(parser, BenchmarkOptions)
     parser.add_argument("--out", help="also write the row to this JSON file")
     parser.add_argument("--json", action="store_true", help="print JSON")

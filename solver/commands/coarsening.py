@@ -32,7 +32,7 @@ SHOWN = ("by_index", "recognised", "expected")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    add_solid(parser, "coarsen")
+    add_solid(parser, "coarsen", "discretisation")
     parser.add_argument(
         "--coarsen",
         choices=[name for name in METHODS if name != "none"],

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.model import ElasticModel, fine_model
+from carillon.fem.model import ElasticModel, Model, fine_model
 from carillon.options import add_options, collect
 from carillon.progress import say
 from solver.analysis.modal_solver import ModalSolver, Modes
@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> None:
         petsc_options.insert_options(arguments.petsc, options.method)
         initial = arguments.initial_modes
 
-        def solve(model: ElasticModel | None) -> Modes:
+        def solve(model: Model | None) -> Modes:
             nonlocal initial
             prepared = ModalSolver(model, options, comm, verbose=sys.stderr.isatty())
             start = None
@@ -115,6 +115,7 @@ def _refined(
     assert coarsening is not None
     mesh = None if initial is None else read_modes(initial, with_modes=False).mesh
     coarse = problem.model
+    assert isinstance(coarse, ElasticModel)
     fine = fine_model(
         problem.fine,
         problem.young,
@@ -144,6 +145,7 @@ def _attributes(
 ) -> dict[str, Any]:
     attributes: dict[str, Any] = {
         "method": arguments.method,
+        "discretisation": arguments.discretisation,
         "coarsen": arguments.coarsen,
         "mesh": arguments.mesh,
         "resolution": arguments.resolution,

@@ -22,7 +22,7 @@ EXAMPLES = """example:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    add_solid(parser, "coarsen", "objective")
+    add_solid(parser, "coarsen", "objective", "discretisation")
     parser.add_argument(
         "--modes", type=number_of_modes, default=256, help="rigid included (default 256)"
     )

@@ -27,7 +27,7 @@ EXAMPLES = """example:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    add_solid(parser)
+    add_solid(parser, "discretisation")
     add_options(parser, ScalingOptions)
     parser.add_argument("--here", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--out", help="also write the result to this JSON file")

@@ -13,15 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon import provenance
-from carillon.datasets import INTEGER, find, finite, number, read, refused
+from carillon.datasets import find, finite, read, refused
 from carillon.errors import UserError
-from carillon.fem.block import ALL_FILLED
-from carillon.fem.geometry import CORNER_OFFSETS, HexMesh
-from carillon.fem.geometry.hanging import kinds_of_cells, makes_sense, node_places
-from carillon.fem.model import RIGID_MODES, ElasticModel
+from carillon.fem.geometry import HexMesh
+from carillon.fem.model import RIGID_MODES, Model
 from carillon.files import create_h5, open_h5
-from carillon.limits import DENSITIES, EDGES, POISSON
 from carillon.measurement import measured
+from solver.files.model_group import get_model, put, put_model
 
 Array = NDArray[np.float64]
 
@@ -59,7 +57,7 @@ class ModesFile:
     frequencies: Array
     modes: Array | None
     residuals: Array
-    model: ElasticModel
+    model: Model
     attributes: dict[str, Any]
     provenance: dict[str, Any]
 
@@ -71,7 +69,7 @@ class ModesFile:
 
 def write_modes(
     path: str | Path,
-    model: ElasticModel,
+    model: Model,
     eigenvalues: Array,
     modes: Iterable[Array],
     residuals: Array,
@@ -141,108 +139,6 @@ def put_modes(group: h5py.Group, blocks: Iterable[Array], shape: tuple[int, int]
         first += block.shape[1]
     if first != shape[1]:
         raise ValueError(f"{first} modes for {shape[1]} eigenvalues")
-
-
-def put_model(group: h5py.Group, model: ElasticModel) -> None:
-    """Write a solid, from which K and M can be assembled again."""
-    mesh = model.mesh
-    uniform = bool((model.young == model.young[:, :1]).all())
-    young = model.young[:, 0] if uniform else model.young
-    put(group, "nodes", mesh.nodes, "m", "positions of the nodes")
-    put(group, "node_grid", mesh.node_grid, "1", "integer coordinates of the nodes")
-    put(group, "cells", mesh.cells, "1", "node numbers of the cells, corners in bit order")
-    put(group, "grid", mesh.grid, "1", "integer coordinates of the cells")
-    put(group, "young", young, "Pa", "Young's modulus per cell or per quadrature point")
-    put(group, "fill", model.fill, "1", "bit pattern of the cell's octants that hold mass")
-    if mesh.span is not None and mesh.hanging is not None:
-        put(group, "span", mesh.span, "1", "edge of each cell in steps of the grid")
-        put(group, "hanging", mesh.hanging, "1", "bit pattern of the cell's corners that hang")
-    group.attrs["poisson"] = model.poisson
-    group.attrs["density"] = model.density
-    group.attrs["lumped"] = model.lumped
-    group.attrs["lumped_share"] = model.lumped_share
-    group.attrs["cell_edge"] = mesh.edge
-    group.attrs["origin"] = mesh.origin
-
-
-def get_model(group: h5py.Group) -> ElasticModel:
-    """Read a solid written by `put_model`.
-
-    Raises
-    ------
-    UserError
-        If it is incomplete or its parts do not fit each other.
-    """
-    grid = read(group, "grid", (None, 3), INTEGER).astype(np.int32)
-    node_grid = read(group, "node_grid", (None, 3), INTEGER).astype(np.int32)
-    cells = read(group, "cells", (len(grid), 8), INTEGER)
-    mesh = HexMesh(
-        cells.astype(np.int32),
-        grid,
-        node_grid,
-        _origin(group),
-        number(group, "cell_edge", *EDGES),
-        *_sizes(group, grid),
-    )
-    if not _are_corners(mesh):
-        raise refused(group, "cells, nodes and their places on the grid do not fit each other")
-    fill = read(group, "fill", (len(grid),), INTEGER).astype(np.uint8)
-    if mesh.span is not None and (fill[mesh.span == 1] != ALL_FILLED).any():
-        raise refused(group, "dataset 'fill' has void octants in fine cells of a mixed mesh")
-    whole = getattr(group.get("young"), "ndim", 0) == 2
-    young = read(group, "young", (len(grid), 8) if whole else (len(grid),))
-    if (young < 0.0).any():
-        raise refused(group, "dataset 'young' holds negative moduli")
-    if not whole:
-        young = np.repeat(young[:, None], 8, axis=1)
-    return ElasticModel(
-        mesh,
-        young.astype(float, copy=False),
-        fill,
-        number(group, "poisson", *POISSON),
-        number(group, "density", *DENSITIES),
-        bool(number(group, "lumped", 0.0, 1.0)),
-        number(group, "lumped_share", 0.0, 1.0) if "lumped_share" in group.attrs else 0.0,
-    )
-
-
-def _sizes(group: h5py.Group, grid: NDArray[np.int32]) -> tuple[NDArray[np.uint8], ...]:
-    """`span` and `hanging` of the cells of a mixed mesh; nothing of one with cells of one size."""
-    if not {"span", "hanging"} & set(group):
-        return ()
-    span = read(group, "span", (len(grid),), INTEGER)
-    hanging = read(group, "hanging", (len(grid),), INTEGER)
-    is_whole = span == 2
-    if not (is_whole | (span == 1)).all() or (grid[is_whole] & 1).any():
-        raise refused(group, "dataset 'span' holds other cells than fine ones and whole blocks")
-    possible = (hanging >= 0) & (hanging <= ALL_FILLED) & ~(is_whole & (hanging != 0))
-    if not possible.all() or not makes_sense()[kinds_of_cells(grid, span, hanging)].all():
-        raise refused(group, "dataset 'hanging' names corners that cannot hang")
-    block = np.unique(grid >> 1, axis=0, return_inverse=True)[1].ravel()
-    if np.isin(block[is_whole], block[~is_whole]).any():
-        raise refused(group, "dataset 'span' has blocks that are both whole and divided")
-    return span.astype(np.uint8), hanging.astype(np.uint8)
-
-
-def _are_corners(mesh: HexMesh) -> bool:
-    """Whether every cell has the nodes at their places, and every node a cell."""
-    cells, n_nodes = mesh.cells, mesh.n_nodes
-    if not len(cells) or cells.min() < 0 or cells.max() >= n_nodes:
-        return False
-    if not (np.bincount(cells.ravel(), minlength=n_nodes) > 0).all():
-        return False
-    places = mesh.grid[:, None, :] + CORNER_OFFSETS
-    if mesh.kinds is not None:
-        places = 2 * (mesh.grid[:, None, :] >> 1) + node_places()[mesh.kinds]
-    return np.array_equal(mesh.node_grid[cells], places)
-
-
-def _origin(group: h5py.Group) -> Array:
-    # Attributes come with an explicit byte order, which MPI does not know.
-    origin = np.asarray(group.attrs["origin"]).astype(float)
-    if origin.shape != (3,) or not np.isfinite(origin).all():
-        raise refused(group, f"'origin' is {origin.tolist()}, expected a point")
-    return origin
 
 
 def read_modes(path: str | Path, with_modes: bool = True) -> ModesFile:
@@ -350,13 +246,6 @@ def get_eigenvalues(group: h5py.Group) -> Array:
 def frequencies(eigenvalues: Array) -> Array:
     """Natural frequencies [Hz] of eigenvalues [rad^2/s^2]; rounding below zero counts as zero."""
     return np.asarray(np.sqrt(np.maximum(eigenvalues, 0.0)) / (2.0 * np.pi))
-
-
-def put(group: h5py.Group, name: str, data: NDArray[Any], units: str, long_name: str) -> None:
-    """Write one dataset with a checksum, its unit and what it is."""
-    dataset = group.create_dataset(name, data=data, fletcher32=True, chunks=True)
-    dataset.attrs["units"] = units
-    dataset.attrs["long_name"] = long_name
 
 
 def _plain(value: Any) -> Any:

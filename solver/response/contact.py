@@ -13,8 +13,7 @@ from scipy.spatial import cKDTree
 from carillon.errors import UserError
 from carillon.fem.geometry import CORNER_OFFSETS, HexMesh
 from carillon.fem.geometry.faces import surface_quads
-from carillon.fem.geometry.hanging import node_weights
-from carillon.fem.model import RIGID_MODES, ElasticModel
+from carillon.fem.model import RIGID_MODES, Model
 from solver.files.modes_file import ModesFile
 
 Array = NDArray[np.float64]
@@ -118,10 +117,10 @@ def surface_normals(mesh: HexMesh) -> tuple[NDArray[np.int64], Array]:
     return nodes, _unit(_at_nodes(mesh, quads, faces), plain)[nodes]
 
 
-def interpolation(model: ElasticModel, points: Array) -> sp.csr_matrix:
-    """Trilinear interpolation from the nodes to `points` (p, 3) [m], as a matrix (p, n).
+def interpolation(model: Model, points: Array) -> sp.csr_matrix:
+    """Interpolation from the nodes to `points` (p, 3) [m], as a matrix (p, n).
 
-    A point outside all cells takes the value of the nearest point of a nearest cell.
+    A point outside all elements takes the value of the nearest point of a nearest one.
 
     Examples
     --------
@@ -133,22 +132,22 @@ def interpolation(model: ElasticModel, points: Array) -> sp.csr_matrix:
     array([[0.5, 0.5, 0. , 0. , 0. , 0. ],
            [0. , 0. , 0. , 0. , 0. , 1. ]])
     """
-    cells, weights = embedding(model, points)
-    rows = np.repeat(np.arange(len(cells)), 8)
-    shape = (len(cells), model.mesh.n_nodes)
-    corners = model.mesh.cells[cells]
-    matrix = sp.csr_matrix((weights.ravel(), (rows, corners.ravel())), shape=shape)
+    elements, weights = embedding(model, points)
+    rows = np.repeat(np.arange(len(elements)), weights.shape[1])
+    shape = (len(elements), model.mesh.n_nodes)
+    nodes = model.connectivity[elements]
+    matrix = sp.csr_matrix((weights.ravel(), (rows, nodes.ravel())), shape=shape)
     matrix.eliminate_zeros()
     return matrix
 
 
-def embedding(model: ElasticModel, points: Array) -> tuple[NDArray[np.int64], Array]:
-    """Cells (p,) that `points` (p, 3) [m] lie in, and trilinear weights (p, 8) of their nodes.
+def embedding(model: Model, points: Array) -> tuple[NDArray[np.int64], Array]:
+    """Elements (p,) that `points` (p, 3) [m] lie in, and weights (p, k) of their nodes.
 
-    A point outside all cells belongs to a nearest cell, with the weights of its nearest point. Of
+    A point outside all elements belongs to a nearest one, with the weights of its nearest point. Of
     several elements in one place, parts of a block, it belongs to that with the nearest material.
     """
-    mesh = model.mesh
+    mesh = model.hexmesh
     position = (np.atleast_2d(points) - mesh.origin) / mesh.edge
     places, first, count = np.unique(mesh.grid, axis=0, return_index=True, return_counts=True)
     spans = np.ones(mesh.n_cells) if mesh.span is None else mesh.span.astype(float)
@@ -159,14 +158,10 @@ def embedding(model: ElasticModel, points: Array) -> tuple[NDArray[np.int64], Ar
         candidates = cells[shared, None] + np.arange(count.max())
         there = np.arange(count.max()) < count[place[shared], None]
         candidates = np.where(there, candidates, cells[shared, None])
-        distance = _from_material(model, candidates, spans, position[shared])
+        distance = _from_material(model, mesh, candidates, spans, position[shared])
         cells[shared] = candidates[np.arange(len(shared)), distance.argmin(axis=1)]
     local = (position - mesh.grid[cells]) / spans[cells, None]
-    local = np.clip(local, 0.0, 1.0)[:, None, :]
-    weights = np.where(CORNER_OFFSETS, local, 1.0 - local).prod(axis=2)
-    if mesh.kinds is not None:
-        weights = np.einsum("pk,pkj->pj", weights, node_weights()[mesh.kinds[cells]])
-    return cells, weights
+    return cells, model.shape_values(cells, np.clip(local, 0.0, 1.0))
 
 
 def _nearest_place(places: NDArray[np.int32], spans: Array, position: Array) -> NDArray[np.int64]:
@@ -184,12 +179,12 @@ def _nearest_place(places: NDArray[np.int32], spans: Array, position: Array) -> 
 
 
 def _from_material(
-    model: ElasticModel, cells: NDArray[np.int64], spans: Array, position: Array
+    model: Model, mesh: HexMesh, cells: NDArray[np.int64], spans: Array, position: Array
 ) -> Array:
     """Distance (p, c) of positions (p, 3) from the nearest filled octant of cells (p, c)."""
-    octants = np.unpackbits(model.fill[cells, None], axis=2, bitorder="little").astype(bool)
+    octants = model.filled[cells]
     middles = spans[cells][:, :, None, None] * (CORNER_OFFSETS + 0.5) / 2.0
-    centres = model.mesh.grid[cells][:, :, None] + middles
+    centres = mesh.grid[cells][:, :, None] + middles
     distance = np.linalg.norm(centres - position[:, None, None], axis=3)
     return np.asarray(np.where(octants, distance, np.inf).min(axis=2))
 

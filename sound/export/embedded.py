@@ -8,7 +8,8 @@ from typing import Any
 import h5py
 
 from solver.assembly.sparse import assembled
-from solver.files.modes_file import ModesFile, frequencies, put, write_modes
+from solver.files.model_group import put
+from solver.files.modes_file import ModesFile, frequencies, write_modes
 from solver.response.contact import embedding
 from solver.studies.comparison import recomputed_residuals
 from sound.project.design_file import Design, put_object

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.model import ElasticModel
+from carillon.fem.model import Model
 
 Array = NDArray[np.float64]
 
@@ -34,9 +34,9 @@ class MassProperties:
     axes: Array
 
 
-def mass_properties(model: ElasticModel) -> MassProperties:
-    """Integrals of the density over the solid; exact, as positions are trilinear in every cell."""
-    corners = model.mesh.nodes[model.mesh.cells]
+def mass_properties(model: Model) -> MassProperties:
+    """Integrals of the density over the solid; exact, as elements have all linear functions."""
+    corners = model.mesh.nodes[model.connectivity]
     nodal = model.nodal_mass()
     mass = float(nodal.sum())
     centre = np.einsum("cab,cbi->i", nodal, corners) / mass

@@ -14,17 +14,11 @@ from numpy.typing import NDArray
 
 from carillon import provenance
 from carillon.errors import UserError
-from carillon.fem.model import RIGID_MODES, ElasticModel
+from carillon.fem.model import RIGID_MODES, Model
 from carillon.files import create_h5, open_h5
 from carillon.measurement import measured
-from solver.files.modes_file import (
-    frequencies,
-    get_model,
-    put,
-    put_eigenvalues,
-    put_model,
-    put_modes,
-)
+from solver.files.model_group import get_model, put, put_model
+from solver.files.modes_file import frequencies, put_eigenvalues, put_modes
 from sound.clips.targets import Targets
 from sound.strikes import Strike
 
@@ -90,7 +84,7 @@ class Design:
     targets: Targets
     coordinates: Array
     young: Array
-    model: ElasticModel
+    model: Model
     eigenvalues: Array
     modes: Array
     surface_vertices: Array

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from carillon.fem.block import CELL_NODES
+from carillon.fem.block import CELL_NODES, NODES
 from carillon.fem.finite_cells.shapes import octant_weights
 from carillon.fem.geometry.hexmesh import CORNER_OFFSETS, HexMesh
 
@@ -65,6 +65,24 @@ class FiniteCells:
     def volume(self) -> float:
         """Volume inside [m^3]."""
         return float(self.fractions.sum() * self.mesh.edge**3)
+
+    def is_consistent(self) -> bool:
+        """Whether nodes lie at their places, voxels in their octants, and each is of some cell."""
+        mesh = self.mesh
+        cell, octant = np.nonzero(self.voxels >= 0)
+        voxel = self.voxels[cell, octant]
+        if not np.array_equal(np.sort(voxel), np.arange(mesh.n_cells)):
+            return False
+        if not np.array_equal(np.unique(self.nodes), np.arange(mesh.n_nodes)):
+            return False
+        grid, octants = self.grid, self.nodes[:, CELL_NODES]
+        return (
+            not (grid & 1).any()
+            and np.array_equal(mesh.node_grid[self.nodes], grid[:, None] + NODES)
+            and np.array_equal(mesh.cells[voxel], octants[cell, octant])
+            and np.array_equal(mesh.grid[voxel], grid[cell] + CORNER_OFFSETS[octant])
+            and bool((self.fractions[self.voxels >= 0] > 0.0).all())
+        )
 
     def hexmesh(self) -> HexMesh:
         """The cells as cubes with nodes at their corners, by which neighbours are found."""

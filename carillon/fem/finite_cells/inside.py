@@ -185,7 +185,7 @@ def _of_open_surface(
     axes = (lines.axis + 1) % 3, (lines.axis + 2) % 3, lines.axis
     turned = [np.ascontiguousarray(each.transpose(axes)) for each in (state, levels)]
     low, high, line, inside, unsure = _in_voxels(
-        lines.start, lines.place, lines.step, lines.columns, *turned, LINES
+        lines.start, lines.place, lines.step, lines.columns, turned[0], turned[1], LINES
     )
     asked = np.flatnonzero(unsure)
     if len(asked):

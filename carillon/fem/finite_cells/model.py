@@ -12,7 +12,7 @@ from carillon.fem.block import NODES
 from carillon.fem.element import DEFAULT_POISSON
 from carillon.fem.elements import Chosen, Elements
 from carillon.fem.finite_cells.cells import FiniteCells
-from carillon.fem.finite_cells.shapes import point_mass, point_stiffness
+from carillon.fem.finite_cells.shapes import point_mass, point_stiffness, shape_functions
 from carillon.fem.geometry import HexMesh
 from carillon.fem.model import DEFAULT_DENSITY, Model
 from carillon.fem.moduli import require_moduli
@@ -127,6 +127,15 @@ class FiniteCellModel(Model):
     def hexmesh(self) -> HexMesh:
         """See `Model.hexmesh`."""
         return self.cells.hexmesh()
+
+    @property
+    def filled(self) -> NDArray[np.bool_]:
+        """See `Model.filled`."""
+        return np.asarray(self.cells.voxels >= 0)
+
+    def shape_values(self, elements: NDArray[np.integer], places: Array) -> Array:
+        """Quadratic weights (p, 27), see `Model.shape_values`."""
+        return shape_functions(places)
 
     def element_moduli(self, young: Array) -> Array:
         """Weighted moduli (c, 125) [Pa] of the cells from those (m,) of the voxels; see `Model`."""

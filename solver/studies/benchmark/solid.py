@@ -53,7 +53,7 @@ class BenchmarkSolid:
     @property
     def fine(self) -> ElasticModel:
         """The fine model."""
-        return self.problem.model
+        return self.problem.hexahedra
 
     def coarsened(self, method: str, changed: bool = False) -> tuple[ElasticModel, float]:
         """Model of the blocks by `average` or `ddfem`, and the seconds from fine moduli to it."""

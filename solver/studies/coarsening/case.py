@@ -52,7 +52,7 @@ class _Attempts:
     def __init__(self, problem: Problem, coarsening: Coarsening, modes: int) -> None:
         self._modes = modes
         self._mark = time.perf_counter()
-        self._refined = RefinedModel(problem.model, coarsening)
+        self._refined = RefinedModel(problem.hexahedra, coarsening)
         # The fine matrices are what the estimate needs beforehand.
         self._before_estimate = self._lap()
         self.made: list[_Attempt] = []
@@ -113,8 +113,8 @@ def rate_coarsening(options: ProblemOptions, modes: int, tolerance: float) -> Ra
     if coarsening is None:
         raise UserError("nothing is coarsened: choose a coarsening other than none")
     problem = build_problem(replace(options, coarsen="none"))
-    exact = _solve(problem.model, min(modes + SPARE, problem.model.n_dofs))
-    truth = SolvedModel(problem.model, exact.values, _gathered(exact))
+    exact = _solve(problem.hexahedra, min(modes + SPARE, problem.hexahedra.n_dofs))
+    truth = SolvedModel(problem.hexahedra, exact.values, _gathered(exact))
     attempts = _Attempts(problem, coarsening, modes + SPARE)
     attempts.run(tolerance)
     count = len(attempts.made)
@@ -132,7 +132,7 @@ def rate_coarsening(options: ProblemOptions, modes: int, tolerance: float) -> Ra
         "coarsen": options.coarsen,
         **coarsening.record(),
         "goals": {"rms": tolerance, "worst": WORST * tolerance, "far_off": FAR_OFF},
-        "n_dofs": problem.model.n_dofs,
+        "n_dofs": problem.hexahedra.n_dofs,
         "cells": problem.fine.n_cells,
         "truth": {
             **exact.evidence,

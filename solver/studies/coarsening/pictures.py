@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from carillon.fem.geometry import HexMesh, hexmesh_from_grid
 from carillon.files import create_h5, open_h5
-from solver.files.modes_file import put
+from solver.files.model_group import put
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from carillon.arguments import number_between, whole_number
-from carillon.fem.model import ElasticModel
+from carillon.fem.model import Model
 from carillon.options import option
 from solver import linear
 from solver.analysis.options import number_of_modes, positive_tolerance
@@ -164,7 +164,7 @@ def study_lines(result: Result) -> list[str]:
 
 
 def _strong(
-    model: ElasticModel,
+    model: Model,
     seed: int,
     machine: MachineRates,
     work: Factorisation,
@@ -179,7 +179,7 @@ def _strong(
         if ranks > most:
             break
         if sizes is None or ranks > sizes.tree.parts:
-            sizes = sizes_of_mesh(model.mesh, *decompose(model.mesh, None, seed, ranks))
+            sizes = sizes_of_mesh(model.mesh, *decompose(model, None, seed, ranks))
         busiest = work_of_busiest(sizes, work, runs[0]["keep"], correction, ranks)
         rows.append(_row(ranks, model.n_dofs, sizes, predict(machine, busiest)))
     return rows

@@ -1,0 +1,176 @@
+"""Solids in files: the mesh and its material, from which K and M can be assembled again."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.datasets import INTEGER, number, read, refused
+from carillon.fem.block import ALL_FILLED, NODES
+from carillon.fem.finite_cells.cells import FiniteCells
+from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
+from carillon.fem.finite_cells.shapes import OCTANTS, POINTS, octant_weights
+from carillon.fem.geometry import CORNER_OFFSETS, HexMesh
+from carillon.fem.geometry.hanging import kinds_of_cells, makes_sense, node_places
+from carillon.fem.model import ElasticModel, Model
+from carillon.limits import DENSITIES, EDGES, POISSON
+
+Array = NDArray[np.float64]
+
+FINITE_CELLS = "finite_cells"
+"""Group that a solid of finite cells has."""
+
+
+def put(group: h5py.Group, name: str, data: NDArray[Any], units: str, long_name: str) -> None:
+    """Write one dataset with a checksum, its unit and what it is."""
+    dataset = group.create_dataset(name, data=data, fletcher32=True, chunks=True)
+    dataset.attrs["units"] = units
+    dataset.attrs["long_name"] = long_name
+
+
+def put_model(group: h5py.Group, model: Model) -> None:
+    """Write a solid, from which K and M can be assembled again."""
+    mesh = model.mesh
+    put(group, "nodes", mesh.nodes, "m", "positions of the nodes")
+    put(group, "node_grid", mesh.node_grid, "1", "integer coordinates of the nodes")
+    put(group, "cells", mesh.cells, "1", "node numbers of the cells, corners in bit order")
+    put(group, "grid", mesh.grid, "1", "integer coordinates of the cells")
+    group.attrs["poisson"] = model.poisson
+    group.attrs["density"] = model.density
+    group.attrs["cell_edge"] = mesh.edge
+    group.attrs["origin"] = mesh.origin
+    if isinstance(model, FiniteCellModel):
+        put(group, "young", model.young, "Pa", "Young's modulus per voxel")
+        _put_cells(group.create_group(FINITE_CELLS), model.cells)
+    else:
+        assert isinstance(model, ElasticModel)
+        _put_elements(group, model)
+
+
+def _put_cells(group: h5py.Group, cells: FiniteCells) -> None:
+    put(group, "nodes", cells.nodes, "1", "node numbers of the finite cells, x fastest")
+    put(group, "voxels", cells.voxels, "1", "voxels of their octants, -1 where empty")
+    put(group, "row", cells.row, "1", "row of the weights of each finite cell")
+    put(group, "weights", cells.weights, "1", "integrals of the points' Lagrange polynomials")
+
+
+def _put_elements(group: h5py.Group, model: ElasticModel) -> None:
+    mesh = model.mesh
+    uniform = bool((model.young == model.young[:, :1]).all())
+    young = model.young[:, 0] if uniform else model.young
+    put(group, "young", young, "Pa", "Young's modulus per cell or per quadrature point")
+    put(group, "fill", model.fill, "1", "bit pattern of the cell's octants that hold mass")
+    if mesh.span is not None and mesh.hanging is not None:
+        put(group, "span", mesh.span, "1", "edge of each cell in steps of the grid")
+        put(group, "hanging", mesh.hanging, "1", "bit pattern of the cell's corners that hang")
+    group.attrs["lumped"] = model.lumped
+    group.attrs["lumped_share"] = model.lumped_share
+
+
+def get_model(group: h5py.Group) -> Model:
+    """Read a solid written by `put_model`.
+
+    Raises
+    ------
+    UserError
+        If it is incomplete or its parts do not fit each other.
+    """
+    if FINITE_CELLS in group:
+        return _finite_cell_model(group)
+    mesh = _mesh(group, *_sizes(group))
+    if not _are_corners(mesh):
+        raise refused(group, "cells, nodes and their places on the grid do not fit each other")
+    fill = read(group, "fill", (mesh.n_cells,), INTEGER).astype(np.uint8)
+    if mesh.span is not None and (fill[mesh.span == 1] != ALL_FILLED).any():
+        raise refused(group, "dataset 'fill' has void octants in fine cells of a mixed mesh")
+    whole = getattr(group.get("young"), "ndim", 0) == 2
+    young = read(group, "young", (mesh.n_cells, 8) if whole else (mesh.n_cells,))
+    if (young < 0.0).any():
+        raise refused(group, "dataset 'young' holds negative moduli")
+    if not whole:
+        young = np.repeat(young[:, None], 8, axis=1)
+    return ElasticModel(
+        mesh,
+        young.astype(float, copy=False),
+        fill,
+        number(group, "poisson", *POISSON),
+        number(group, "density", *DENSITIES),
+        bool(number(group, "lumped", 0.0, 1.0)),
+        number(group, "lumped_share", 0.0, 1.0) if "lumped_share" in group.attrs else 0.0,
+    )
+
+
+def _mesh(group: h5py.Group, *sizes: NDArray[np.uint8]) -> HexMesh:
+    grid = read(group, "grid", (None, 3), INTEGER).astype(np.int32)
+    return HexMesh(
+        read(group, "cells", (len(grid), 8), INTEGER).astype(np.int32),
+        grid,
+        read(group, "node_grid", (None, 3), INTEGER).astype(np.int32),
+        _origin(group),
+        number(group, "cell_edge", *EDGES),
+        *sizes,
+    )
+
+
+def _finite_cell_model(group: h5py.Group) -> FiniteCellModel:
+    mesh, inner = _mesh(group), group[FINITE_CELLS]
+    nodes = read(inner, "nodes", (None, len(NODES)), INTEGER).astype(np.int32)
+    row = read(inner, "row", (len(nodes),), INTEGER).astype(np.int32)
+    voxels = read(inner, "voxels", (len(nodes), OCTANTS), INTEGER).astype(np.int32)
+    weights = read(inner, "weights", (None, OCTANTS, POINTS))
+    if not len(weights) or not np.allclose(weights[0], octant_weights()):
+        raise refused(inner, "row 0 of 'weights' is not that of a cell all inside")
+    if row.min(initial=0) < 0 or row.max(initial=0) >= len(weights):
+        raise refused(inner, "dataset 'row' names weights that are not there")
+    cells = FiniteCells(nodes, voxels, row, weights, mesh)
+    if not cells.is_consistent():
+        raise refused(inner, "cells, voxels, nodes and their places do not fit each other")
+    return finite_cell_model(
+        cells,
+        read(group, "young", (mesh.n_cells,)),
+        number(group, "poisson", *POISSON),
+        number(group, "density", *DENSITIES),
+    )
+
+
+def _sizes(group: h5py.Group) -> tuple[NDArray[np.uint8], ...]:
+    """`span` and `hanging` of the cells of a mixed mesh; nothing of one with cells of one size."""
+    if not {"span", "hanging"} & set(group):
+        return ()
+    grid = read(group, "grid", (None, 3), INTEGER).astype(np.int32)
+    span = read(group, "span", (len(grid),), INTEGER)
+    hanging = read(group, "hanging", (len(grid),), INTEGER)
+    is_whole = span == 2
+    if not (is_whole | (span == 1)).all() or (grid[is_whole] & 1).any():
+        raise refused(group, "dataset 'span' holds other cells than fine ones and whole blocks")
+    possible = (hanging >= 0) & (hanging <= ALL_FILLED) & ~(is_whole & (hanging != 0))
+    if not possible.all() or not makes_sense()[kinds_of_cells(grid, span, hanging)].all():
+        raise refused(group, "dataset 'hanging' names corners that cannot hang")
+    block = np.unique(grid >> 1, axis=0, return_inverse=True)[1].ravel()
+    if np.isin(block[is_whole], block[~is_whole]).any():
+        raise refused(group, "dataset 'span' has blocks that are both whole and divided")
+    return span.astype(np.uint8), hanging.astype(np.uint8)
+
+
+def _are_corners(mesh: HexMesh) -> bool:
+    """Whether every cell has the nodes at their places, and every node a cell."""
+    cells, n_nodes = mesh.cells, mesh.n_nodes
+    if not len(cells) or cells.min() < 0 or cells.max() >= n_nodes:
+        return False
+    if not (np.bincount(cells.ravel(), minlength=n_nodes) > 0).all():
+        return False
+    places = mesh.grid[:, None, :] + CORNER_OFFSETS
+    if mesh.kinds is not None:
+        places = 2 * (mesh.grid[:, None, :] >> 1) + node_places()[mesh.kinds]
+    return np.array_equal(mesh.node_grid[cells], places)
+
+
+def _origin(group: h5py.Group) -> Array:
+    # Attributes come with an explicit byte order, which MPI does not know.
+    origin = np.asarray(group.attrs["origin"]).astype(float)
+    if origin.shape != (3,) or not np.isfinite(origin).all():
+        raise refused(group, f"'origin' is {origin.tolist()}, expected a point")
+    return origin
