@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import connected_components
 
 from carillon.errors import UserError
 from carillon.fem.element import rigid_motions
+from carillon.fem.elements import HexElements
 from carillon.fem.geometry import (
     CORNER_OFFSETS,
     HexMesh,
@@ -27,7 +28,6 @@ from carillon.fem.geometry import (
 from carillon.fem.geometry.faces import boundary_faces, corner_values, face_neighbours
 from carillon.fem.geometry.hanging import makes_sense, node_places, node_weights
 from carillon.fem.laplacian import cell_laplacian
-from carillon.fem.elements import HexElements
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.assembly.sparse import assembled

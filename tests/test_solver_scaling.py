@@ -10,6 +10,7 @@ import pytest
 
 from carillon.errors import UserError
 from carillon.fem.geometry import hexmesh_from_voxels, load_surface, voxelize
+from carillon.fem.model import fine_model
 from solver.distribution.decomposition import decompose
 from solver.hcms.counts import Tally
 from solver.studies.scaling import launch

@@ -13,13 +13,14 @@ import pytest
 CHECKOUT = Path(__file__).resolve().parent.parent
 ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "workflow")
 
-EVERYBODY = ("carillon", "carillon.fem", "carillon.fem.geometry")
+EVERYBODY = ("carillon", "carillon.fem", "carillon.fem.geometry", "carillon.fem.finite_cells")
 """Packages that all others may import."""
 
 ARROWS = {
     "carillon": "",
     "carillon.fem.geometry": "carillon",
     "carillon.fem": "carillon carillon.fem.geometry",
+    "carillon.fem.finite_cells": "carillon carillon.fem carillon.fem.geometry",
     #
     "dataset_gen.objectives": "",
     "dataset_gen": "dataset_gen.objectives",

@@ -25,7 +25,7 @@ DEFAULT_DENSITY = 1000.0
 """Mass density [kg/m^3] where none is given."""
 
 
-class Model(ABC):
+class Solid(ABC):
     """A solid with material in one discretisation.
 
     Attributes
@@ -101,7 +101,7 @@ class Model(ABC):
 
 
 @dataclass(frozen=True)
-class ElasticModel(Model):
+class ElasticModel(Solid):
     """A hexahedral mesh with material, an element for each of its cells.
 
     Parameters
@@ -159,7 +159,7 @@ class ElasticModel(Model):
 
     @property
     def filled(self) -> NDArray[np.bool_]:
-        """See `Model.filled`."""
+        """See `Solid.filled`."""
         return np.unpackbits(self.fill[:, None], axis=1, bitorder="little").astype(bool)
 
     def shape_values(self, elements: NDArray[np.integer], places: Array) -> Array:
@@ -170,11 +170,11 @@ class ElasticModel(Model):
         return np.einsum("pk,pkj->pj", weights, node_weights()[self.mesh.kinds[elements]])
 
     def element_moduli(self, young: Array) -> Array:
-        """Moduli (m, 8) [Pa] at the quadrature points, from (m,) or (m, 8); see `Model`."""
+        """Moduli (m, 8) [Pa] at the quadrature points, from (m,) or (m, 8); see `Solid`."""
         return at_points(require_moduli(young, self.mesh.n_cells))
 
     def with_young(self, young: Array) -> Self:
-        """The same solid with other moduli, (m,) or (m, 8) [Pa]; see `Model`."""
+        """The same solid with other moduli, (m,) or (m, 8) [Pa]; see `Solid`."""
         return replace(self, young=self.element_moduli(young))
 
     @property
@@ -195,7 +195,7 @@ class Constants(TypedDict, total=False):
 
 
 def fine_model(mesh: HexMesh, young: Array, **constants: Unpack[Constants]) -> ElasticModel:
-    """Model of a fine mesh with moduli `young`, (m,) or (m, 8) [Pa].
+    """Solid of a fine mesh with moduli `young`, (m,) or (m, 8) [Pa].
 
     Raises
     ------

@@ -7,7 +7,7 @@ from typing import cast
 from mpi4py import MPI
 
 from carillon.errors import UserError
-from carillon.fem.model import RIGID_MODES, Model
+from carillon.fem.model import RIGID_MODES, Solid
 from carillon.runtime import available_memory
 from solver.analysis.options import SolverOptions
 from solver.correction.correct import FEWEST_GUARDS, default_guard
@@ -39,14 +39,14 @@ def check_mode_count(modes: int, n_dofs: int) -> None:
         )
 
 
-def require_memory(model: Model | None, options: SolverOptions, comm: MPI.Comm) -> None:
+def require_memory(model: Solid | None, options: SolverOptions, comm: MPI.Comm) -> None:
     """Raise UserError if the vectors of this rank's machine alone are more than its free memory."""
     node = comm.Split_type(MPI.COMM_TYPE_SHARED)
     share = node.size / comm.size
     node.Free()
 
     def check() -> None:
-        n_dofs = cast(Model, model).n_dofs
+        n_dofs = cast(Solid, model).n_dofs
         vectors = min(max(options.modes, options.retained_modes or 0), n_dofs)
         needed = 8 * vectors * (FEWEST_BLOCKS * n_dofs * share + FEWEST_SQUARES * vectors)
         free = available_memory()

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
 from carillon.fem.materials import young_modulus
-from carillon.fem.model import Model, fine_model
+from carillon.fem.model import Solid, fine_model
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
 from solver.distribution.collective import compute_on_root
@@ -50,7 +50,7 @@ class Solution:
 
 
 def solve(
-    model: HexMesh | Model | None,
+    model: HexMesh | Solid | None,
     material: str | Array | None = None,
     modes: int = 256,
     initial_modes: Solution | Array | None = None,
@@ -116,7 +116,7 @@ def solve(
     )
 
 
-def _with_material(model: HexMesh | Model | None, material: str | Array | None) -> Model:
+def _with_material(model: HexMesh | Solid | None, material: str | Array | None) -> Solid:
     if model is None:
         raise UserError("no model on rank 0, expected a mesh or an elastic model")
     if material is None:

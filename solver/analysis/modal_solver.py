@@ -11,7 +11,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from carillon.fem.model import RIGID_MODES, Model
+from carillon.fem.model import RIGID_MODES, Solid
 from carillon.fem.moduli import require_coarse_moduli
 from carillon.progress import say
 from carillon.runtime import limit_threads, reuse_freed_memory
@@ -140,12 +140,12 @@ class ModalSolver:
 
     def __init__(
         self,
-        model: Model | None,
+        model: Solid | None,
         options: SolverOptions,
         comm: MPI.Comm = MPI.COMM_WORLD,
         verbose: bool = False,
     ) -> None:
-        bcast_from_root(comm, lambda: check_mode_count(options.modes, cast(Model, model).n_dofs))
+        bcast_from_root(comm, lambda: check_mode_count(options.modes, cast(Solid, model).n_dofs))
         self._model = model if comm.rank == 0 else None
         require_memory(model, options, comm)
         self.options = options
@@ -174,7 +174,7 @@ class ModalSolver:
         Parameters
         ----------
         young
-            Young's modulus [Pa] as `Model.with_young` takes it, (m,) of the voxels for example, on
+            Young's modulus [Pa] as `Solid.with_young` takes it, (m,) of the voxels for example, on
             rank 0; that of the model if not given.
         initial_modes
             Modes of a similar material on the same mesh, or this rank's rows (local, k) of such:
@@ -183,7 +183,7 @@ class ModalSolver:
         Raises
         ------
         UserError
-            For what `Model.element_moduli` refuses.
+            For what `Solid.element_moduli` refuses.
         ConvergenceError
             If a tolerance was missed, the modes are not orthonormal, or the body does not have six
             zero-frequency modes.
@@ -214,14 +214,14 @@ class ModalSolver:
         self,
         young: Array | None,
         initial_modes: Modes | Array | None,
-        moduli_of: Callable[[Model, Array], Array],
+        moduli_of: Callable[[Solid, Array], Array],
     ) -> Modes:
         phases = Phases(self.comm, self._verbose)
         with phases("assembly"):
             local_mesh = self.local_mesh
             if self.comm.bcast(young is not None):
                 moduli = compute_on_root(
-                    self.comm, lambda: moduli_of(cast(Model, self._model), cast(Array, young))
+                    self.comm, lambda: moduli_of(cast(Solid, self._model), cast(Array, young))
                 )
                 local_mesh = scatter_moduli(local_mesh, moduli, self.comm)
             elements = local_mesh.cells.elements
@@ -408,7 +408,7 @@ class ModalSolver:
 
 
 def modal_analysis(
-    model: Model | None,
+    model: Solid | None,
     options: SolverOptions,
     comm: MPI.Comm = MPI.COMM_WORLD,
 ) -> Modes:

@@ -17,7 +17,7 @@ from carillon.fem.finite_cells.build import finite_cells
 from carillon.fem.finite_cells.model import finite_cell_model
 from carillon.fem.geometry import COMPONENTS, FILLS, HexMesh, hexmesh_from_voxels, voxelize
 from carillon.fem.materials import young_modulus
-from carillon.fem.model import DEFAULT_DENSITY, ElasticModel, Model
+from carillon.fem.model import DEFAULT_DENSITY, ElasticModel, Solid
 from carillon.limits import require_constants
 from carillon.options import REQUIRED, option
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, OBJECTIVES
@@ -39,12 +39,6 @@ class ProblemOptions:
     resolution: int = option(
         REQUIRED, "voxels, or lattice spacings, along the longest side", type=whole_number(2)
     )
-    discretisation: str = option(
-        "voxel",
-        "voxel: cubes that are full or empty; finite-cell: quadratic cells of twice their edge, "
-        "of which only what is inside counts",
-        choices=DISCRETISATIONS,
-    )
     material: str = option(
         "uniform",
         f"{', '.join(materials.NAMES)}, or a file with one Young's modulus [Pa] per voxel",
@@ -56,6 +50,12 @@ class ProblemOptions:
     )
     objective: str = option(
         DEFAULT_OBJECTIVE, "fit objective for --coarsen fit", choices=tuple(OBJECTIVES)
+    )
+    discretisation: str = option(
+        "voxel",
+        "voxel: cubes that are full or empty; finite-cell: quadratic cells of twice their edge, "
+        "of which only what is inside counts",
+        choices=DISCRETISATIONS,
     )
     unit: float = option(1.0, "metres per unit of the mesh", type=float)
     fill: str = option("winding", "which voxels are inside", choices=sorted(FILLS))
@@ -93,7 +93,7 @@ class Problem:
 
     fine: HexMesh
     young: Array
-    model: Model
+    model: Solid
     seconds: dict[str, float]
     coarsening: dict[str, str] = field(default_factory=dict)
 

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from carillon.fem.model import Model
+from carillon.fem.model import Solid
 
 Array = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ def assemble_elements(
     return stiff, sp.kron(nodal, sp.identity(3), format="csr")
 
 
-def assembled(model: Model) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+def assembled(model: Solid) -> tuple[sp.csr_matrix, sp.csr_matrix]:
     """Stiffness and mass of the whole model on one rank."""
     return assemble_elements(
         model.connectivity, model.stiffness(), model.nodal_mass(), model.mesh.n_nodes

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.model import ElasticModel, Model, fine_model
+from carillon.fem.model import ElasticModel, Solid, fine_model
 from carillon.options import add_options, collect
 from carillon.progress import say
 from solver.analysis.modal_solver import ModalSolver, Modes
@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> None:
         petsc_options.insert_options(arguments.petsc, options.method)
         initial = arguments.initial_modes
 
-        def solve(model: Model | None) -> Modes:
+        def solve(model: Solid | None) -> Modes:
             nonlocal initial
             prepared = ModalSolver(model, options, comm, verbose=sys.stderr.isatty())
             start = None

@@ -73,7 +73,7 @@ def _measured_here(
 def _repeated(arguments: argparse.Namespace) -> list[str]:
     """Arguments with which the same solid is solved again, but for mesh and resolution."""
     fields = [field.name for field in dataclasses.fields(ProblemOptions)]
-    names = [name for name in fields if name not in ("mesh", "resolution")]
+    names = [name for name in fields if name not in ("mesh", "resolution", "discretisation")]
     words: list[str] = []
     for name in (*names, "modes", "tolerance", "linear_solver"):
         value, flag = getattr(arguments, name), f"--{name.replace('_', '-')}"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.model import Model
+from carillon.fem.model import Solid
 from solver.distribution.partition import default_subdomains, partition_model
 from solver.distribution.tree import MergeTree, assign_ranks, build_tree
 
@@ -63,7 +63,7 @@ class Decomposition:
 
 
 def decompose(
-    model: Model, subdomains: int | None = None, seed: int = 0, ranks: int = 1
+    model: Solid, subdomains: int | None = None, seed: int = 0, ranks: int = 1
 ) -> tuple[Decomposition, NDArray[np.int64]]:
     """Cut a solid into subdomains, build the merge tree and deal subdomains to the ranks.
 
@@ -90,7 +90,7 @@ def decompose(
     return Decomposition(tree, owner, offsets), order
 
 
-def _partition(model: Model, subdomains: int | None, seed: int, ranks: int) -> NDArray[np.int32]:
+def _partition(model: Solid, subdomains: int | None, seed: int, ranks: int) -> NDArray[np.int32]:
     """Subdomain (n,) of each node; as many as the ranks at least, unless told how many."""
     if subdomains is not None:
         return partition_model(model, subdomains, seed)

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.fem.elements import Chosen, Elements
-from carillon.fem.model import Model
+from carillon.fem.model import Solid
 from solver.distribution.collective import bcast_from_root
 from solver.distribution.decomposition import Decomposition, decompose
 from solver.distribution.messages import AnyArray, receive_arrays, send_arrays
@@ -111,7 +111,7 @@ class LocalMesh:
 
 
 def distribute(
-    model: Model | None,
+    model: Solid | None,
     subdomains: int | None = None,
     seed: int = 0,
     comm: MPI.Comm = MPI.COMM_WORLD,
@@ -158,7 +158,7 @@ def scatter_moduli(local_mesh: LocalMesh, young: Array | None, comm: MPI.Comm) -
     Parameters
     ----------
     young
-        (c, p) moduli [Pa] of all elements, see `Model.element_moduli`; only rank 0's are looked at.
+        (c, p) moduli [Pa] of all elements, see `Solid.element_moduli`; only rank 0's are looked at.
     """
     everyone = comm.gather(local_mesh.numbers)
     if comm.rank == 0:
@@ -173,7 +173,7 @@ def scatter_moduli(local_mesh: LocalMesh, young: Array | None, comm: MPI.Comm) -
 
 
 def _scatter(
-    model: Model, decomposition: Decomposition, order: NDArray[np.int64], comm: MPI.Comm
+    model: Solid, decomposition: Decomposition, order: NDArray[np.int64], comm: MPI.Comm
 ) -> tuple[NDArray[np.int64], Array, NDArray[np.int64], Cells]:
     """Send every rank its nodes, their positions, its cells' numbers and cells; return rank 0's."""
     row = np.empty(len(order), dtype=np.int64)

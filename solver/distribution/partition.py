@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
 from carillon.fem.laplacian import laplacian_modes
-from carillon.fem.model import Model
+from carillon.fem.model import Solid
 
 EMBEDDING_MODES = 12
 """Laplacian eigenvectors that span the clustering space, the constant left out."""
@@ -89,7 +89,7 @@ def partition_nodes(
     return _without_gaps(part[order][first])
 
 
-def partition_model(model: Model, parts: int, seed: int = 0) -> NDArray[np.int32]:
+def partition_model(model: Solid, parts: int, seed: int = 0) -> NDArray[np.int32]:
     """Subdomain (n,) of each node: about `parts` connected sets, numbered without gaps, none empty.
 
     Raises

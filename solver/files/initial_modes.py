@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from carillon.datasets import INTEGER, find, finite, read
 from carillon.errors import LocalUserError, UserError
 from carillon.fem.block import degrees_of_freedom
-from carillon.fem.model import Model
+from carillon.fem.model import Solid
 from carillon.files import open_h5
 from solver.distribution.collective import bcast_from_root
 from solver.distribution.local_mesh import LocalMesh
@@ -27,7 +27,7 @@ _ROWS = 13
 
 
 def modes_from_file(
-    path: str | Path, model: Model | None, modes: int, local_mesh: LocalMesh, comm: MPI.Comm
+    path: str | Path, model: Solid | None, modes: int, local_mesh: LocalMesh, comm: MPI.Comm
 ) -> Array:
     """This rank's rows (local unknowns, k) of the modes in a file.
 

@@ -15,7 +15,7 @@ from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.finite_cells.shapes import OCTANTS, POINTS, octant_weights
 from carillon.fem.geometry import CORNER_OFFSETS, HexMesh
 from carillon.fem.geometry.hanging import kinds_of_cells, makes_sense, node_places
-from carillon.fem.model import ElasticModel, Model
+from carillon.fem.model import ElasticModel, Solid
 from carillon.limits import DENSITIES, EDGES, POISSON
 
 Array = NDArray[np.float64]
@@ -31,7 +31,7 @@ def put(group: h5py.Group, name: str, data: NDArray[Any], units: str, long_name:
     dataset.attrs["long_name"] = long_name
 
 
-def put_model(group: h5py.Group, model: Model) -> None:
+def put_model(group: h5py.Group, model: Solid) -> None:
     """Write a solid, from which K and M can be assembled again."""
     mesh = model.mesh
     put(group, "nodes", mesh.nodes, "m", "positions of the nodes")
@@ -70,7 +70,7 @@ def _put_elements(group: h5py.Group, model: ElasticModel) -> None:
     group.attrs["lumped_share"] = model.lumped_share
 
 
-def get_model(group: h5py.Group) -> Model:
+def get_model(group: h5py.Group) -> Solid:
     """Read a solid written by `put_model`.
 
     Raises

@@ -16,7 +16,7 @@ from carillon import provenance
 from carillon.datasets import find, finite, read, refused
 from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
-from carillon.fem.model import RIGID_MODES, Model
+from carillon.fem.model import RIGID_MODES, Solid
 from carillon.files import create_h5, open_h5
 from carillon.measurement import measured
 from solver.files.model_group import get_model, put, put_model
@@ -57,7 +57,7 @@ class ModesFile:
     frequencies: Array
     modes: Array | None
     residuals: Array
-    model: Model
+    model: Solid
     attributes: dict[str, Any]
     provenance: dict[str, Any]
 
@@ -69,7 +69,7 @@ class ModesFile:
 
 def write_modes(
     path: str | Path,
-    model: Model,
+    model: Solid,
     eigenvalues: Array,
     modes: Iterable[Array],
     residuals: Array,

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from carillon.errors import UserError
 from carillon.fem.geometry import CORNER_OFFSETS, HexMesh
 from carillon.fem.geometry.faces import surface_quads
-from carillon.fem.model import RIGID_MODES, Model
+from carillon.fem.model import RIGID_MODES, Solid
 from solver.files.modes_file import ModesFile
 
 Array = NDArray[np.float64]
@@ -117,7 +117,7 @@ def surface_normals(mesh: HexMesh) -> tuple[NDArray[np.int64], Array]:
     return nodes, _unit(_at_nodes(mesh, quads, faces), plain)[nodes]
 
 
-def interpolation(model: Model, points: Array) -> sp.csr_matrix:
+def interpolation(model: Solid, points: Array) -> sp.csr_matrix:
     """Interpolation from the nodes to `points` (p, 3) [m], as a matrix (p, n).
 
     A point outside all elements takes the value of the nearest point of a nearest one.
@@ -141,7 +141,7 @@ def interpolation(model: Model, points: Array) -> sp.csr_matrix:
     return matrix
 
 
-def embedding(model: Model, points: Array) -> tuple[NDArray[np.int64], Array]:
+def embedding(model: Solid, points: Array) -> tuple[NDArray[np.int64], Array]:
     """Elements (p,) that `points` (p, 3) [m] lie in, and weights (p, k) of their nodes.
 
     A point outside all elements belongs to a nearest one, with the weights of its nearest point. Of
@@ -179,7 +179,7 @@ def _nearest_place(places: NDArray[np.int32], spans: Array, position: Array) -> 
 
 
 def _from_material(
-    model: Model, mesh: HexMesh, cells: NDArray[np.int64], spans: Array, position: Array
+    model: Solid, mesh: HexMesh, cells: NDArray[np.int64], spans: Array, position: Array
 ) -> Array:
     """Distance (p, c) of positions (p, 3) from the nearest filled octant of cells (p, c)."""
     octants = model.filled[cells]

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from carillon.fem.model import RIGID_MODES, Model
+from carillon.fem.model import RIGID_MODES, Solid
 from carillon.progress import track
 from solver.analysis.bounds import check_mode_count, default_keep
 from solver.analysis.modal_solver import modal_analysis
@@ -33,7 +33,7 @@ STARTS = (*(f"hcms-{interface}" for interface in INTERFACES), RANDOM)
 
 
 def correction_history(
-    model: Model | None,
+    model: Solid | None,
     modes: int,
     steps: int,
     seed: int = 0,
@@ -67,7 +67,7 @@ def correction_history(
     UserError
         If there are too few unknowns for so many modes, or `truth` is not of this solid.
     """
-    bcast_from_root(comm, lambda: check_mode_count(modes, cast(Model, model).n_dofs))
+    bcast_from_root(comm, lambda: check_mode_count(modes, cast(Solid, model).n_dofs))
     exact = _exact(model, modes, truth, comm)[RIGID_MODES:]
     local_mesh = distribute(model, None, seed, comm)
     layout = Layout.of_local_mesh(local_mesh, comm)
@@ -96,18 +96,16 @@ def correction_history(
     }
 
 
-def _exact(
-    model: Model | None, modes: int, truth: str | Path | None, comm: MPI.Comm
-) -> Array:
+def _exact(model: Solid | None, modes: int, truth: str | Path | None, comm: MPI.Comm) -> Array:
     """The lowest eigenvalues (modes,) from the file `truth` or by SLEPc."""
     if truth is not None:
-        return bcast_from_root(comm, lambda: _read_exact(cast(Model, model), modes, truth))
+        return bcast_from_root(comm, lambda: _read_exact(cast(Solid, model), modes, truth))
     result = modal_analysis(model, SolverOptions(method="slepc", modes=modes), comm)
     result.system.destroy()
     return result.values
 
 
-def _read_exact(model: Model, modes: int, truth: str | Path) -> Array:
+def _read_exact(model: Solid, modes: int, truth: str | Path) -> Array:
     file = read_modes(truth, with_modes=False)
     available, unknowns = len(file.eigenvalues), file.mesh.n_dofs
     if available < modes or unknowns != model.n_dofs:

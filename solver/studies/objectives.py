@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
 from carillon.fem.geometry import Blocks, blocks_from_mesh
-from carillon.fem.model import RIGID_MODES, ElasticModel, Model
+from carillon.fem.model import RIGID_MODES, ElasticModel, Solid
 from carillon.progress import track
 from solver.analysis.modal_solver import Modes, modal_analysis
 from solver.analysis.options import SolverOptions
@@ -138,7 +138,7 @@ def solve_seconds(result: Modes) -> float:
     return sum(seconds for phase, seconds in result.seconds.items() if phase not in CHECKS)
 
 
-def _solve(model: Model | None, modes: int, comm: MPI.Comm) -> Modes:
+def _solve(model: Solid | None, modes: int, comm: MPI.Comm) -> Modes:
     result = modal_analysis(model, SolverOptions(method="slepc", modes=modes), comm)
     result.system.destroy()
     return result

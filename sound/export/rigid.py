@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.model import Model
+from carillon.fem.model import Solid
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ class MassProperties:
     axes: Array
 
 
-def mass_properties(model: Model) -> MassProperties:
+def mass_properties(model: Solid) -> MassProperties:
     """Integrals of the density over the solid; exact, as elements have all linear functions."""
     corners = model.mesh.nodes[model.connectivity]
     nodal = model.nodal_mass()

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from carillon import provenance
 from carillon.errors import UserError
-from carillon.fem.model import RIGID_MODES, Model
+from carillon.fem.model import RIGID_MODES, Solid
 from carillon.files import create_h5, open_h5
 from carillon.measurement import measured
 from solver.files.model_group import get_model, put, put_model
@@ -84,7 +84,7 @@ class Design:
     targets: Targets
     coordinates: Array
     young: Array
-    model: Model
+    model: Solid
     eigenvalues: Array
     modes: Array
     surface_vertices: Array

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
-from carillon.fem.model import RIGID_MODES, Model
+from carillon.fem.model import RIGID_MODES, Solid
 from solver.files.modes_file import ModesFile
 from solver.response.contact import interpolation
 from solver.response.response import Damping
@@ -37,7 +37,7 @@ class SoundingSolid:
 
     frequencies: Array
     dampings: Array
-    model: Model
+    model: Solid
     modes: Array
 
     @classmethod

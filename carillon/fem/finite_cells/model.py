@@ -14,7 +14,7 @@ from carillon.fem.elements import Chosen, Elements
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.shapes import point_mass, point_stiffness, shape_functions
 from carillon.fem.geometry import HexMesh
-from carillon.fem.model import DEFAULT_DENSITY, Model
+from carillon.fem.model import DEFAULT_DENSITY, Solid
 from carillon.fem.moduli import require_moduli
 
 Array = NDArray[np.float64]
@@ -33,7 +33,7 @@ class CellElements(Elements):
     edge
         Spacing [m].
     poisson, density
-        See `Model`.
+        See `Solid`.
     """
 
     young: Array
@@ -83,7 +83,7 @@ class CellElements(Elements):
 
 
 @dataclass(frozen=True)
-class FiniteCellModel(Model):
+class FiniteCellModel(Solid):
     """Finite cells with a modulus for every voxel that holds material.
 
     Parameters
@@ -94,7 +94,7 @@ class FiniteCellModel(Model):
         Young's modulus [Pa] of each voxel, taken as it is: what users give goes through
         `finite_cell_model` and `with_young`.
     poisson, density
-        See `Model`.
+        See `Solid`.
     """
 
     cells: FiniteCells
@@ -109,7 +109,7 @@ class FiniteCellModel(Model):
 
     @property
     def elements(self) -> CellElements:
-        """See `Model.elements`."""
+        """See `Solid.elements`."""
         return CellElements(
             self.cells.point_values(self.young),
             self.cells.point_values(np.ones(self.mesh.n_cells)),
@@ -125,24 +125,24 @@ class FiniteCellModel(Model):
 
     @property
     def hexmesh(self) -> HexMesh:
-        """See `Model.hexmesh`."""
+        """See `Solid.hexmesh`."""
         return self.cells.hexmesh()
 
     @property
     def filled(self) -> NDArray[np.bool_]:
-        """See `Model.filled`."""
+        """See `Solid.filled`."""
         return np.asarray(self.cells.voxels >= 0)
 
     def shape_values(self, elements: NDArray[np.integer], places: Array) -> Array:
-        """Quadratic weights (p, 27), see `Model.shape_values`."""
+        """Quadratic weights (p, 27), see `Solid.shape_values`."""
         return shape_functions(places)
 
     def element_moduli(self, young: Array) -> Array:
-        """Weighted moduli (c, 125) [Pa] of the cells from those (m,) of the voxels; see `Model`."""
+        """Weighted moduli (c, 125) [Pa] of the cells from those (m,) of the voxels; see `Solid`."""
         return self.cells.point_values(require_moduli(young, self.mesh.n_cells, points=False))
 
     def with_young(self, young: Array) -> Self:
-        """The same solid with other moduli (m,) [Pa]; see `Model`."""
+        """The same solid with other moduli (m,) [Pa]; see `Solid`."""
         return replace(self, young=require_moduli(young, self.mesh.n_cells, points=False))
 
     @property
@@ -157,7 +157,7 @@ def finite_cell_model(
     poisson: float = DEFAULT_POISSON,
     density: float = DEFAULT_DENSITY,
 ) -> FiniteCellModel:
-    """Model of finite cells with moduli `young` (m,) [Pa] of the voxels.
+    """Solid of finite cells with moduli `young` (m,) [Pa] of the voxels.
 
     Raises
     ------

@@ -12,7 +12,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.fem.model import RIGID_MODES, Model
+from carillon.fem.model import RIGID_MODES, Solid
 from solver.analysis.bounds import check_mode_count, default_keep
 from solver.analysis.modal_solver import elastic_part
 from solver.analysis.options import SolverOptions
@@ -37,7 +37,7 @@ PING_SIZES = (8, 1 << 20)
 
 
 def measure(
-    model: Model | None, options: SolverOptions, comm: MPI.Comm = MPI.COMM_WORLD
+    model: Solid | None, options: SolverOptions, comm: MPI.Comm = MPI.COMM_WORLD
 ) -> dict[str, Any]:
     """Time and count HCMS with error correction on the ranks of `comm`.
 
@@ -55,7 +55,7 @@ def measure(
     UserError
         If there are too few unknowns for so many modes, or more ranks than subdomains.
     """
-    bcast_from_root(comm, lambda: check_mode_count(options.modes, cast(Model, model).n_dofs))
+    bcast_from_root(comm, lambda: check_mode_count(options.modes, cast(Solid, model).n_dofs))
     _Run(model, replace(options, modes=min(20, options.modes), tolerance=0.0, corrections=1), comm)
     runs = [_Run(model, options, comm) for _ in range(REPEATS)]
     seconds = comm.bcast([run.seconds for run in runs])
@@ -88,7 +88,7 @@ def measure(
 class _Run:
     """HCMS and error correction with a tally for every phase."""
 
-    def __init__(self, model: Model | None, options: SolverOptions, comm: MPI.Comm) -> None:
+    def __init__(self, model: Solid | None, options: SolverOptions, comm: MPI.Comm) -> None:
         self.comm = CountingComm.of(comm)
         requested = options.modes - RIGID_MODES
         self.width = requested + default_guard(requested)
@@ -136,7 +136,7 @@ class _Run:
         self.comm.barrier()
         return self.comm.phase()
 
-    def phases(self, model: Model | None) -> Phases:
+    def phases(self, model: Solid | None) -> Phases:
         """Every phase's quantities, one a rank; collective."""
         factor, solving = self.linear.factor, self.linear.solving
         dense = self.correction
@@ -159,9 +159,9 @@ class _Run:
             for row, phase in enumerate(tallies)
         }
 
-    def _count_flops(self, model: Model | None) -> None:
+    def _count_flops(self, model: Solid | None) -> None:
         ranks = self.comm.size
-        work = bcast_from_root(self.comm, lambda: elimination(cast(Model, model).mesh))
+        work = bcast_from_root(self.comm, lambda: elimination(cast(Solid, model).mesh))
         shared, alone = dense_flops(
             self.local_mesh.n_dofs, self.result.blocks, self.result.solves, self.width
         )

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from carillon.arguments import number_between, whole_number
-from carillon.fem.model import Model
+from carillon.fem.model import Solid
 from carillon.options import option
 from solver import linear
 from solver.analysis.options import number_of_modes, positive_tolerance
@@ -164,7 +164,7 @@ def study_lines(result: Result) -> list[str]:
 
 
 def _strong(
-    model: Model,
+    model: Solid,
     seed: int,
     machine: MachineRates,
     work: Factorisation,
