@@ -23,7 +23,7 @@ from workflow.estimate.costs import Machine, serial_share
 from workflow.estimate.laws import fit
 from workflow.estimate.plan import plan
 from workflow.estimate.rates import PACKAGED, checked, load_rates
-from workflow.estimate.solids import Size, Solid, size_of
+from workflow.estimate.solids import NamedSolid, Size, size_of
 
 NUMBERS = {"jobs", "core_hours", "wall_hours", "longest_job_hours", "memory_gb"}
 NUMBERS |= {"kept_gb", "scratch_gb"}
@@ -237,8 +237,8 @@ def test_jobs_wait_for_a_place():
 
 
 def test_an_absent_mesh_is_guessed_and_a_built_in_one_counted():
-    assert "guessed" in size_of(Solid("nowhere.obj", 32)).basis
-    box = size_of(Solid("builtin:box", 8))
+    assert "guessed" in size_of(NamedSolid("nowhere.obj", 32)).basis
+    box = size_of(NamedSolid("builtin:box", 8))
     assert box.fine == 3 * 9 * 7 * 5 and box.coarse == 3 * 5 * 4 * 3 and "counted" in box.basis
 
 
@@ -371,7 +371,7 @@ def test_a_run_is_measured_by_its_benchmark_files(tmp_path):
     jobs = measure.finished(tmp_path / "run", SMALL_RUN, load_rates()["fits_per_second"], law=TRUTH)
     assert list(jobs["law"]) == [TRUTH] and 0.1 < jobs["seconds"].item() < 300.0
     assert jobs["memory_mb"].item() > 50.0 and jobs["files_mb"].item() > 0.01
-    unknowns = size_of(Solid("builtin:bar", 12)).fine
+    unknowns = size_of(NamedSolid("builtin:bar", 12)).fine
     assert jobs["sizes"].item()["unknowns"] == unknowns and jobs["sizes"].item()["modes"] == 12.0
 
 
@@ -427,10 +427,10 @@ def test_packaged_rates_name_no_machine_but_its_processor():
 
 
 def test_voxels_are_counted_no_finer_than_is_quick(monkeypatch):
-    exact = size_of(Solid("builtin:bell", 32, "centre"))
+    exact = size_of(NamedSolid("builtin:bell", 32, "centre"))
     monkeypatch.setattr(solids, "LARGEST_COUNTED", 20)
     size_of.cache_clear()
-    scaled = size_of(Solid("builtin:bell", 32, "centre"))
+    scaled = size_of(NamedSolid("builtin:bell", 32, "centre"))
     size_of.cache_clear()
     assert "at resolution 20, times" in scaled.basis and exact.basis == "counted on its voxels"
     assert scaled.fine == pytest.approx(exact.fine, rel=0.15)

@@ -1,4 +1,4 @@
-"""Elements with material, wherever their nodes are: what the matrices of a solid are summed from."""
+"""Elements with material, wherever their nodes are: what the matrices are summed from."""
 
 from __future__ import annotations
 

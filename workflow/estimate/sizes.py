@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from workflow.estimate.solids import Solid, size_of
+from workflow.estimate.solids import NamedSolid, size_of
 
 ORIGINS = 8
 """Rows of a sample, one for each corner of the block."""
@@ -30,14 +30,14 @@ def options_of(command: str) -> dict[str, str]:
     return {name.replace("-", "_"): value for name, value in pairs}
 
 
-def solid_of(command: str) -> Solid | None:
+def solid_of(command: str) -> NamedSolid | None:
     """The solid that a command makes voxels of, if it does."""
     options = options_of(command)
     if "resolution" not in options:
         return None
     words = shlex.split(command)
     how = {name: options[name] for name in ("fill", "components") if name in options}
-    return Solid(words[words.index("solver") + 2], int(options["resolution"]), **how)
+    return NamedSolid(words[words.index("solver") + 2], int(options["resolution"]), **how)
 
 
 def sizes_of(jobs: pd.DataFrame, fits_per_second: Mapping[str, float]) -> list[dict[str, float]]:

@@ -29,7 +29,7 @@ class Size(NamedTuple):
     basis: str
 
 
-class Solid(NamedTuple):
+class NamedSolid(NamedTuple):
     """What decides about the size: mesh argument of the solver, voxels along the longest side."""
 
     mesh: str
@@ -39,7 +39,7 @@ class Solid(NamedTuple):
 
 
 @cache
-def size_of(solid: Solid) -> Size:
+def size_of(solid: NamedSolid) -> Size:
     """Unknowns of a solid: counted, scaled up from a coarser count, or guessed without its mesh.
 
     Raises
