@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from carillon.errors import UserError
 from carillon.fem.block import NODES
 from carillon.fem.finite_cells.cells import FiniteCells, assemble_cells
-from carillon.fem.finite_cells.inside import EMPTY, FULL, Inside, find_inside
+from carillon.fem.finite_cells.inside import CUT, EMPTY, FULL, Inside, find_inside
 from carillon.fem.finite_cells.parts import find_parts, meetings
 from carillon.fem.finite_cells.shapes import octant_weights
 from carillon.fem.finite_cells.weights import weights_of_parts
@@ -24,7 +24,7 @@ SMALLEST_OCTANT = 1e-6
 SMALLEST_PIECE = 0.5
 """Volume [voxels] below which a loose piece is a crumb, and left out."""
 LOST = 1.1
-"""Ratio of the volumes by lines along different axes beyond which walls slip between the lines."""
+"""Ratio of the volumes by two halves of the lines beyond which parts slip between the lines."""
 TRIAL_FACTORS = (1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 """Factors by which a resolution is raised in search of one at which nothing is lost."""
 TRIAL_GRID = 4_000_000
@@ -94,7 +94,9 @@ def even_grid(surface: trimesh.Trimesh, resolution: int) -> Grid:
 
 
 def _holds(inside: Inside) -> bool:
-    volumes = [each.volume for each in inside.pieces]
+    if not (inside.state == CUT).any():
+        return bool((inside.state == FULL).any())
+    volumes = inside.volumes()
     return 0.0 < min(volumes) and max(volumes) <= LOST * min(volumes)
 
 
@@ -107,12 +109,12 @@ def _lost(surface: trimesh.Trimesh, inside: Inside, resolution: int, grid: Grid,
             break
         if _holds(find_inside(surface, trial)):
             return (
-                f"{start} has walls far thinner than the lattice spacing of {grid.edge:.3g} m, "
+                f"{start} has parts far thinner than the lattice spacing of {grid.edge:.3g} m, "
                 f"which are lost between its lines; raise --resolution to {better}"
             )
-    if any(each.volume for each in inside.pieces):
+    if any(len(each.low) for each in inside.pieces):
         return (
-            f"{start} has walls far thinner than the lattice spacing of {grid.edge:.3g} m, which "
+            f"{start} has parts far thinner than the lattice spacing of {grid.edge:.3g} m, which "
             "are lost between its lines; raise --resolution or make them thicker"
         )
     return f"{start} encloses nothing; expected a surface around a solid, repair the mesh"

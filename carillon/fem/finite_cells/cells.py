@@ -10,9 +10,11 @@ from carillon.fem.block import CELL_NODES, NODES
 from carillon.fem.finite_cells.shapes import octant_weights
 from carillon.fem.geometry.hexmesh import CORNER_OFFSETS, HexMesh
 
-FLOOR = 1e-7
+FLOOR = 1e-9
 """Share of a cell's stiffness and mass that it has where it is empty, which keeps both matrices
-definite wherever a surface may cut a cell (fictitious material; Duester et al. 2008)."""
+definite wherever a surface may cut a cell (fictitious material; Duester et al. 2008). A wall of a
+twentieth of the spacing is 2.5 % too stiff with 1e-7 and 0.03 % with 1e-9; with 1e-11 eigensolvers
+lose digits."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -56,14 +56,6 @@ class Pieces(Lines):
     low: Array
     high: Array
 
-    @property
-    def volume(self) -> float:
-        """Volume of the solid by these lines alone, in voxels."""
-        line = np.repeat(np.arange(len(self.start) - 1), np.diff(self.start))
-        row, column = np.divmod(line, self.columns)
-        share = LINE_SHARES[row % LINES] * LINE_SHARES[column % LINES]
-        return float(share @ (self.high - self.low))
-
 
 @dataclass(frozen=True)
 class Inside:
@@ -82,6 +74,16 @@ class Inside:
     state: NDArray[np.int8]
     facing: NDArray[np.int8]
     pieces: tuple[Pieces, Pieces, Pieces]
+
+    def volumes(self) -> tuple[float, float]:
+        """Volume [voxels] in the voxels that are cut, by one half of the lines and by the other."""
+        halves = np.zeros(2)
+        for each in self.pieces:
+            chosen = (self.state == CUT) & (self.facing == each.axis)
+            axes = (each.axis + 1) % 3, (each.axis + 2) % 3, each.axis
+            turned = np.ascontiguousarray(chosen.transpose(axes))
+            _add_volumes(each.start, each.low, each.high, each.columns, turned, LINE_SHARES, halves)
+        return 2.0 * float(halves[0]), 2.0 * float(halves[1])
 
 
 def find_inside(surface: trimesh.Trimesh, grid: Grid) -> Inside:
@@ -304,3 +306,19 @@ def _middles_inside(start, low, high, columns, n, shape):  # type: ignore[no-unt
                         break
                     result[x, y, z] = True
     return result
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_volumes(start, low, high, columns, chosen, shares, halves):  # type: ignore[no-untyped-def]
+    """Add lengths in chosen voxels, times the lines' shares, by whether i + j is odd."""
+    n = len(shares)
+    for line in range(len(start) - 1):
+        row, column = line // columns, line % columns
+        i, j = row % n, column % n
+        for number in range(start[line], start[line + 1]):
+            for voxel in range(max(int(low[number]), 0), chosen.shape[2]):
+                if voxel >= high[number]:
+                    break
+                if chosen[row // n, column // n, voxel]:
+                    length = min(high[number], voxel + 1.0) - max(low[number], float(voxel))
+                    halves[(i + j) & 1] += shares[i] * shares[j] * length
