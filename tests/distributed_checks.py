@@ -17,9 +17,10 @@ from mpi4py import MPI
 
 from carillon.errors import UserError
 from carillon.fem.block import degrees_of_freedom
+from carillon.fem.finite_cells.model import finite_cell_model
 from carillon.fem.geometry import hexmesh_from_grid
 from carillon.fem.geometry.hanging import WHOLE
-from carillon.fem.model import ElasticModel
+from carillon.fem.model import ElasticModel, Solid
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem
@@ -32,7 +33,7 @@ from solver.hcms.condense import INTERFACES
 from solver.hcms.synthesis import synthesize
 from solver.linear.multigrid import Multigrid
 from solver.reference.truth import complete, count_beyond, solve_truth, start_vector
-from tests import solids
+from tests import cut_solids, solids
 
 ROOMS = ("/solver/", "/carillon/fem/")
 COMM = MPI.COMM_WORLD
@@ -40,7 +41,7 @@ PARTS = 8
 REPETITIONS = 3
 
 
-def on_first(model: ElasticModel) -> ElasticModel | None:
+def on_first(model: Solid) -> Solid | None:
     """The model on rank 0 alone."""
     return model if COMM.rank == 0 else None
 
@@ -340,6 +341,17 @@ def repetitions_with_mumps_agree_to_the_tolerance() -> None:
         first, *others = (modal_analysis(model, options, COMM) for _ in range(REPETITIONS))
         for other in others:
             assert np.abs(other.values[6:] / first.values[6:] - 1.0).max() < bound, options
+
+
+def finite_cells_on_ranks() -> None:
+    cells = cut_solids.spaced(cut_solids.turned(cut_solids.box(0.2, 0.05, 0.03)), 0.02)
+    young = 1e9 * 10.0 ** np.random.default_rng(1).uniform(-1.0, 1.0, cells.mesh.n_cells)
+    model = finite_cell_model(cells, young)
+    exact = cut_solids.dense_eigenvalues(model)
+    for method in ("hcms", "slepc"):
+        options = SolverOptions(modes=24, method=method, subdomains=5, tolerance=1e-10)
+        values = modal_analysis(on_first(model), options, COMM).values
+        assert np.abs(values[6:] / exact[6:24] - 1.0).max() < 1e-7, method
 
 
 if __name__ == "__main__":

@@ -62,14 +62,7 @@ class Pattern:
         n_own = stop - start
         local = np.where(own, corners - start, n_own + np.searchsorted(ghosts_there, corners))
         width = n_own + len(ghosts_there)
-        key = local[:, :, None] * width + local[:, None, :]
-        kept = own[:, :, None] if ghosts else own[:, :, None] & own[:, None, :]
-        key = np.where(kept, key, -1)
-        present = np.unique(key)
-        present = present[np.searchsorted(present, 0) :]
-        row, columns = np.divmod(present, width)
-        indptr = np.searchsorted(row, np.arange(n_own + 1))
-        entry = np.where(key >= 0, np.searchsorted(present, key), -1).astype(np.int32)
+        indptr, columns, entry = _graph(local, n_own, width)
         return cls(indptr, columns, entry, ghosts_there, start, stop)
 
     @property
@@ -139,8 +132,11 @@ class NodeRows:
         self.pattern = pattern
         self.halo = halo
         self.threads = threads
-        self.stiffness = np.zeros((len(pattern.columns), 3, 3))
-        self.mass = np.zeros(len(pattern.columns))
+        self.stiffness = np.empty((len(pattern.columns), 3, 3))
+        self.mass = np.empty(len(pattern.columns))
+        # Written in order: pages that the sums are first to touch cost several times as much.
+        self.stiffness.fill(0.0)
+        self.mass.fill(0.0)
 
     def add(self, cells: slice, stiffness: Array, mass: Array) -> None:
         """Add element matrices (c, 3 k, 3 k) and (c, k, k) of some of the pattern's cells."""
@@ -205,6 +201,55 @@ class NodeRows:
 def _sorted(matrix: sp.csr_matrix) -> sp.csr_matrix:
     matrix.sort_indices()
     return matrix
+
+
+@numba.njit(cache=True, nogil=True)
+def _graph(cells, rows, width):  # type: ignore[no-untyped-def]
+    """Compressed rows of which numbers below `width` share a cell, and the entries of the pairs."""
+    count, nodes = cells.shape
+    first = np.zeros(rows + 1, dtype=np.int64)
+    for cell in range(count):
+        for a in range(nodes):
+            if cells[cell, a] < rows:
+                first[cells[cell, a] + 1] += 1
+    first = np.cumsum(first)
+    place = np.empty(first[-1], dtype=np.int64)
+    filled = first[:-1].copy()
+    for cell in range(count):
+        for a in range(nodes):
+            row = cells[cell, a]
+            if row < rows:
+                place[filled[row]] = cell * nodes + a
+                filled[row] += 1
+    indptr = np.zeros(rows + 1, dtype=np.int64)
+    seen = np.full(width, -1, dtype=np.int64)
+    for row in range(rows):
+        indptr[row + 1] = indptr[row]
+        for number in range(first[row], first[row + 1]):
+            for column in cells[place[number] // nodes]:
+                if column < width and seen[column] != row:
+                    seen[column] = row
+                    indptr[row + 1] += 1
+    columns, at = np.empty(indptr[-1], dtype=np.int64), np.empty(width, dtype=np.int64)
+    entry = np.full((count, nodes, nodes), -1, dtype=np.int32)
+    seen[:] = -1
+    for row in range(rows):
+        end = indptr[row]
+        for number in range(first[row], first[row + 1]):
+            for column in cells[place[number] // nodes]:
+                if column < width and seen[column] != row:
+                    seen[column] = row
+                    columns[end] = column
+                    end += 1
+        columns[indptr[row] : end].sort()
+        for number in range(indptr[row], end):
+            at[columns[number]] = number
+        for number in range(first[row], first[row + 1]):
+            cell, a = divmod(place[number], nodes)
+            for b in range(nodes):
+                if cells[cell, b] < width:
+                    entry[cell, a, b] = at[cells[cell, b]]
+    return indptr, columns, entry
 
 
 @numba.njit(cache=True, nogil=True)

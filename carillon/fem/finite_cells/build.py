@@ -160,7 +160,9 @@ class _Parts:
         parts[cut] = counts
         owner = np.repeat(np.arange(len(cells)), parts)
         row = np.zeros(len(owner), dtype=np.int64)
-        row[~whole[owner]] = 1 + np.arange(len(weights))
+        # Faces in planes of the lattice touch cells that they do not cut.
+        is_cut = np.abs(weights - octant_weights()).max(axis=(1, 2)) > SMALLEST_OCTANT
+        row[~whole[owner]] = np.where(is_cut, 1 + np.arange(len(weights)), 0)
         table = np.concatenate([octant_weights()[None], weights])
         first_part = np.cumsum(parts) - parts
         among_cut = np.full(len(cells), -1)

@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 
 from carillon.fem.element import CORNERS
 from carillon.fem.finite_cells.lines import (
-    LINE_PLACES,
-    LINE_SHARES,
     LINES,
     Crossings,
     Lines,
     crossings,
     crossings_of_voxels,
+    spread_lines,
 )
 from carillon.fem.geometry.fill import INSIDE, Grid, cut, winding_numbers
 
@@ -82,8 +81,9 @@ class Inside:
             chosen = (self.state == CUT) & (self.facing == each.axis)
             axes = (each.axis + 1) % 3, (each.axis + 2) % 3, each.axis
             turned = np.ascontiguousarray(chosen.transpose(axes))
-            _add_volumes(each.start, each.low, each.high, each.columns, turned, LINE_SHARES, halves)
-        return 2.0 * float(halves[0]), 2.0 * float(halves[1])
+            shares = [spread.shares for spread in each.across]
+            _add_volumes(each.start, each.low, each.high, turned, shares[0], shares[1], halves)
+        return float(halves[0]), float(halves[1])
 
 
 def find_inside(surface: trimesh.Trimesh, grid: Grid) -> Inside:
@@ -92,7 +92,8 @@ def find_inside(surface: trimesh.Trimesh, grid: Grid) -> Inside:
     merged.merge_vertices()
     vertices = np.ascontiguousarray((merged.vertices - grid.origin) / grid.edge)
     faces = np.ascontiguousarray(merged.faces, dtype=np.int64)
-    crossed = [crossings(vertices, faces, grid.shape, axis) for axis in range(3)]
+    x, y, z = (spread_lines(vertices, faces, grid.shape[axis], axis) for axis in range(3))
+    crossed = [crossings(vertices, faces, (x, y, z), axis) for axis in range(3)]
     counts = np.stack([crossings_of_voxels(each, grid.shape) for each in crossed], axis=3)
     state = np.where(counts.any(axis=3), CUT, EMPTY).astype(np.int8)
     facing = counts.argmax(axis=3).astype(np.int8)
@@ -274,7 +275,7 @@ def _joined(lines: Lines, line: Index, low: Array, high: Array) -> Pieces:
     first = np.flatnonzero(~follows)
     last = np.append(first[1:], len(line)) - 1
     start = np.searchsorted(line[first], np.arange(len(lines.start)))
-    return Pieces(lines.axis, lines.columns, start, low[first], high[last])
+    return Pieces(lines.axis, lines.across, start, low[first], high[last])
 
 
 def _points(lines: Lines, line: Index, place: Array) -> Array:
@@ -282,8 +283,8 @@ def _points(lines: Lines, line: Index, place: Array) -> Array:
     row, column = np.divmod(line, lines.columns)
     points = np.empty((*place.shape, 3))
     points[..., lines.axis] = place
-    points[..., (lines.axis + 1) % 3] = row // LINES + LINE_PLACES[row % LINES]
-    points[..., (lines.axis + 2) % 3] = column // LINES + LINE_PLACES[column % LINES]
+    for more, number in enumerate((row, column)):
+        points[..., (lines.axis + 1 + more) % 3] = lines.across[more].coordinates[number]
     return points
 
 
@@ -309,16 +310,20 @@ def _middles_inside(start, low, high, columns, n, shape):  # type: ignore[no-unt
 
 
 @numba.njit(cache=True, nogil=True)
-def _add_volumes(start, low, high, columns, chosen, shares, halves):  # type: ignore[no-untyped-def]
-    """Add lengths in chosen voxels, times the lines' shares, by whether i + j is odd."""
-    n = len(shares)
+def _add_volumes(start, low, high, chosen, rows, columns, halves):  # type: ignore[no-untyped-def]
+    """Add the volume in chosen voxels, by the lines for which i + j is even and by the others."""
+    n = rows.shape[1]
     for line in range(len(start) - 1):
-        row, column = line // columns, line % columns
-        i, j = row % n, column % n
+        b, i = divmod(line // columns.size, n)
+        c, j = divmod(line % columns.size, n)
+        half = (i + j) & 1
+        even_b, even_c = rows[b, ::2].sum(), columns[c, ::2].sum()
+        share = even_b * even_c + (1.0 - even_b) * (1.0 - even_c)
+        area = rows[b, i] * columns[c, j] / (1.0 - share if half else share)
         for number in range(start[line], start[line + 1]):
             for voxel in range(max(int(low[number]), 0), chosen.shape[2]):
                 if voxel >= high[number]:
                     break
-                if chosen[row // n, column // n, voxel]:
+                if chosen[b, c, voxel]:
                     length = min(high[number], voxel + 1.0) - max(low[number], float(voxel))
-                    halves[(i + j) & 1] += shares[i] * shares[j] * length
+                    halves[half] += area * length

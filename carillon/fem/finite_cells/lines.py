@@ -2,12 +2,14 @@
 
 Lines run along each axis through Gauss points of the voxels' sides. Where a line enters and leaves
 the solid is found exactly and nothing is sampled along it, so that integrals over the inside are
-sharp.
+sharp. Across the lines they are so too where walls lie in planes of the axes: such planes split the
+edges that the points are spread on.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numba
 import numpy as np
@@ -19,12 +21,83 @@ Index = NDArray[np.int64]
 LINES = 8
 """Lines along each side of a voxel. Even, so that none lies in its plane of symmetry."""
 
-LINE_PLACES: Array = 0.5 + 0.5 * np.polynomial.legendre.leggauss(LINES)[0]
-"""(LINES,) places of the lines on a voxel's edge, from 0 to 1."""
-LINE_SHARES: Array = 0.5 * np.polynomial.legendre.leggauss(LINES)[1]
-"""(LINES,) their weights, of sum one."""
-BOUNDS: Array = 0.5 * (LINE_PLACES[1:] + LINE_PLACES[:-1])
-"""(LINES - 1,) bounds between the pieces of an edge that the lines stand for."""
+ALONG_AXIS = 1e-6
+"""Sine of the angle between a triangle's normal and an axis up to which it counts as in a plane."""
+BESIDE = 1e-4
+"""Distance [voxels] from the end of an edge, or from another plane, below which none splits it."""
+MOST_PLANES = 2
+"""Planes that split an edge at most, those with most area."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Places of the lines on the edges of the voxels along one axis.
+
+    Attributes
+    ----------
+    places : (n, LINES)
+        In each voxel, from 0 to 1.
+    shares : (n, LINES)
+        Their weights, of sum one.
+    bounds : (n, LINES - 1)
+        Bounds between the pieces of an edge that the lines stand for.
+    """
+
+    places: Array
+    shares: Array
+    bounds: Array
+
+    @property
+    def coordinates(self) -> Array:
+        """Coordinates (n * LINES,) of the lines in lattice units."""
+        return (np.arange(len(self.places))[:, None] + self.places).ravel()
+
+
+def spread_lines(vertices: Array, faces: Index, count: int, axis: int) -> Spread:
+    """Places of the lines along an axis with `count` voxels, which planes across it split."""
+    corners = vertices[faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    along = np.abs(normal[:, axis])
+    flat = along >= np.sqrt(1.0 - ALONG_AXIS**2) * np.linalg.norm(normal, axis=1)
+    flat &= along > 0.0
+    heights, area = corners[flat, 0, axis], along[flat]
+    places, shares, bounds = (np.empty((count, LINES + more)) for more in (0, 0, -1))
+    voxels = np.floor(heights).astype(np.int64)
+    for voxel in range(count):
+        here = voxels == voxel
+        ends = _split(heights[here] - voxel, area[here])
+        places[voxel], shares[voxel], bounds[voxel] = _points_between(tuple(ends))
+    return Spread(places, shares, bounds)
+
+
+def _split(heights: Array, area: Array) -> list[float]:
+    """Ends of the pieces of an edge from 0 to 1 that is split at the heights of most area."""
+    ends = [0.0, 1.0]
+    for height in np.unique(heights)[np.argsort(-_sums(heights, area), kind="stable")]:
+        if len(ends) < MOST_PLANES + 2 and min(abs(height - end) for end in ends) > BESIDE:
+            ends.append(float(height))
+    return sorted(ends)
+
+
+def _sums(heights: Array, area: Array) -> Array:
+    """Area at each of the distinct heights, ascending."""
+    return np.bincount(np.unique(heights, return_inverse=True)[1], area)
+
+
+@cache
+def _points_between(ends: tuple[float, ...]) -> tuple[Array, Array, Array]:
+    """Places, shares and bounds of Gauss points on the pieces of an edge, more on longer ones."""
+    low, high = np.array(ends[:-1]), np.array(ends[1:])
+    counts = np.full(len(low), LINES // len(low))
+    counts[np.argsort(low - high, kind="stable")[: LINES % len(low)]] += 1
+    rules = [np.polynomial.legendre.leggauss(count) for count in counts]
+    places = [a + (b - a) * (1.0 + at) / 2.0 for a, b, (at, _) in zip(low, high, rules)]
+    shares = [(b - a) * weights / 2.0 for a, b, (_, weights) in zip(low, high, rules)]
+    between = [0.5 * (at[1:] + at[:-1]) for at in places]
+    bounds = [between[0]]
+    for end, rest in zip(low[1:], between[1:]):
+        bounds += [np.array([end]), rest]
+    return np.concatenate(places), np.concatenate(shares), np.concatenate(bounds)
 
 
 @dataclass(frozen=True)
@@ -35,15 +108,20 @@ class Lines:
     ----------
     axis
         That the lines run along; across it are b = axis + 1 and c = axis + 2, modulo 3.
-    columns
-        Lines along c: line (i, j) across b and c has the number ``i * columns + j``.
+    across
+        Spread of the lines across b and c: line (i, j) has the number ``i * columns + j``.
     start : (lines + 1,)
         Range of each line's entries.
     """
 
     axis: int
-    columns: int
+    across: tuple[Spread, Spread]
     start: Index
+
+    @property
+    def columns(self) -> int:
+        """Lines across c."""
+        return self.across[1].places.size
 
 
 @dataclass(frozen=True)
@@ -63,7 +141,9 @@ class Crossings(Lines):
     step: NDArray[np.int8]
 
 
-def crossings(vertices: Array, faces: Index, shape: tuple[int, int, int], axis: int) -> Crossings:
+def crossings(
+    vertices: Array, faces: Index, spreads: tuple[Spread, Spread, Spread], axis: int
+) -> Crossings:
     """Crossings of the lines along an axis through a lattice of voxels.
 
     Triangles that share an edge agree on which side of it a line passes, so that a line through an
@@ -75,20 +155,20 @@ def crossings(vertices: Array, faces: Index, shape: tuple[int, int, int], axis: 
         In lattice units.
     faces : (f, 3)
         Triangles; two that meet have the same vertices there.
-    shape
-        Voxels along the axes, all of which hold the surface.
+    spreads
+        Of the lines across x, y and z.
     """
-    b, c = (axis + 1) % 3, (axis + 2) % 3
-    rows, columns = LINES * shape[b], LINES * shape[c]
-    points = np.ascontiguousarray(vertices[:, [b, c, axis]])
-    counts = np.zeros(rows * columns + 1, dtype=np.int64)
+    across = spreads[(axis + 1) % 3], spreads[(axis + 2) % 3]
+    points = np.ascontiguousarray(vertices[:, [(axis + 1) % 3, (axis + 2) % 3, axis]])
+    rows, columns = (each.coordinates for each in across)
+    counts = np.zeros(len(rows) * len(columns) + 1, dtype=np.int64)
     nothing = np.empty(0), np.empty(0, dtype=np.int8)
-    _cross(points, faces, LINE_PLACES, rows, columns, counts[1:], *nothing, False)
+    _cross(points, faces, rows, columns, counts[1:], *nothing, False)
     start = np.cumsum(counts)
     place, step = np.empty(start[-1]), np.empty(start[-1], dtype=np.int8)
-    _cross(points, faces, LINE_PLACES, rows, columns, start[:-1].copy(), place, step, True)
+    _cross(points, faces, rows, columns, start[:-1].copy(), place, step, True)
     _sort(start, place, step)
-    return Crossings(axis, columns, start, place, step)
+    return Crossings(axis, across, start, place, step)
 
 
 def crossings_of_voxels(lines: Crossings, shape: tuple[int, int, int]) -> NDArray[np.int32]:
@@ -104,16 +184,6 @@ def crossings_of_voxels(lines: Crossings, shape: tuple[int, int, int]) -> NDArra
 
 
 @numba.njit(cache=True, nogil=True)
-def _first_line(places, at):  # type: ignore[no-untyped-def]
-    """Number of the first line at or above a coordinate, 0 at least."""
-    voxel = int(np.floor(at))
-    number = 0
-    while number < len(places) and places[number] < at - voxel:
-        number += 1
-    return max(voxel * len(places) + number, 0)
-
-
-@numba.njit(cache=True, nogil=True)
 def _left(points, i, j, x, y):  # type: ignore[no-untyped-def]
     """Whether (x, y) is left of the edge from i to j; the opposite for that from j to i."""
     a, b = (i, j) if i < j else (j, i)
@@ -124,27 +194,26 @@ def _left(points, i, j, x, y):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _cross(  # type: ignore[no-untyped-def]
-    points, faces, places, rows, columns, fill, place, step, write
+    points, faces, rows, columns, fill, place, step, write
 ):
     """Count the crossings of every line in `fill`, or write them to where `fill` says."""
-    n = len(places)
     for face in range(len(faces)):
         i, j, k = faces[face]
         p, q, r = points[i], points[j], points[k]
         highest_x, highest_y = max(p[0], q[0], r[0]), max(p[1], q[1], r[1])
-        first_y = _first_line(places, min(p[1], q[1], r[1]))
-        for row in range(_first_line(places, min(p[0], q[0], r[0])), rows):
-            x = row // n + places[row % n]
+        first_y = np.searchsorted(columns, min(p[1], q[1], r[1]))
+        for row in range(np.searchsorted(rows, min(p[0], q[0], r[0])), len(rows)):
+            x = rows[row]
             if x > highest_x:
                 break
-            for column in range(first_y, columns):
-                y = column // n + places[column % n]
+            for column in range(first_y, len(columns)):
+                y = columns[column]
                 if y > highest_y:
                     break
                 left = _left(points, i, j, x, y)
                 if _left(points, j, k, x, y) != left or _left(points, k, i, x, y) != left:
                     continue
-                line = row * columns + column
+                line = row * len(columns) + column
                 if write:
                     place[fill[line]] = _height(p, q, r, x, y)
                     step[fill[line]] = -1 if left else 1

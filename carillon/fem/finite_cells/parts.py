@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.fem.finite_cells.inside import Pieces
-from carillon.fem.finite_cells.lines import BOUNDS, LINES
+from carillon.fem.finite_cells.lines import LINES
 
+Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Labels = NDArray[np.int16]
 
@@ -45,9 +46,9 @@ def find_parts(
         Number of parts.
     """
     labels = np.zeros((len(cells), BOXES, BOXES, BOXES), dtype=np.int16)
-    for each in pieces:
+    for each, bounds in zip(pieces, box_bounds(pieces)):
         _take_along(
-            cells, state, each.axis, each.start, each.low, each.high, each.columns, BOUNDS, labels
+            cells, state, each.axis, each.start, each.low, each.high, each.columns, bounds, labels
         )
     counts = np.zeros(len(cells), dtype=np.int64)
     _take_full(state, labels)
@@ -67,11 +68,17 @@ def meetings(lower: Index, upper: Index, labels: Labels, axis: int) -> Index:
     return np.array(found, dtype=np.int64).reshape(-1, 3)
 
 
+def box_bounds(pieces: tuple[Pieces, ...]) -> list[Array]:
+    """Bounds (n, LINES - 1) of the boxes in each voxel along x, y and z."""
+    x, y, z = pieces
+    return [z.across[0].bounds, x.across[0].bounds, y.across[0].bounds]
+
+
 @numba.njit(cache=True, nogil=True)
 def _take_along(  # type: ignore[no-untyped-def]
     cells, state, axis, start, low, high, columns, bounds, labels
 ):
-    n = len(bounds) + 1
+    n = bounds.shape[1] + 1
     b, c = (axis + 1) % 3, (axis + 2) % 3
     at = np.empty(3, dtype=np.int64)
     for k in range(len(cells)):
@@ -91,9 +98,9 @@ def _take_along(  # type: ignore[no-untyped-def]
                         if end - begin < SLIVER:
                             continue
                         first, last = 0, 0
-                        while first < n - 1 and bounds[first] <= begin:
+                        while first < n - 1 and bounds[voxel, first] <= begin:
                             first += 1
-                        while last < n - 1 and bounds[last] < end:
+                        while last < n - 1 and bounds[voxel, last] < end:
                             last += 1
                         for box in range(first, last + 1):
                             at[axis] = half_a * n + box

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.fem.finite_cells.inside import CUT, FULL, Pieces
-from carillon.fem.finite_cells.lines import BOUNDS, LINE_PLACES, LINE_SHARES, LINES
-from carillon.fem.finite_cells.parts import Labels
+from carillon.fem.finite_cells.lines import LINES, Spread
+from carillon.fem.finite_cells.parts import Labels, box_bounds
 from carillon.fem.finite_cells.shapes import (
     OCTANTS,
     POINT_PLACES,
@@ -48,9 +48,7 @@ def weights_of_parts(
         Number of each cell's first part.
     """
     weights = np.zeros((count, OCTANTS, POINTS))
-    halves = (np.arange(2)[:, None] / 2.0 + LINE_PLACES / 2.0).ravel()
-    across = lagrange(POINT_PLACES, halves).reshape(2, LINES, -1)
-    for each in pieces:
+    for each, bounds in zip(pieces, box_bounds(pieces)):
         chosen = (state == CUT) & (facing == each.axis)
         _integrate(
             cells,
@@ -59,9 +57,9 @@ def weights_of_parts(
             labels,
             first,
             (each.start, each.low, each.high, each.columns),
-            across,
-            LINE_SHARES,
-            BOUNDS,
+            _across(each.across[0]),
+            _across(each.across[1]),
+            bounds,
             POINT_PLACES,
             weights,
         )
@@ -72,12 +70,20 @@ def weights_of_parts(
     return weights
 
 
+def _across(spread: Spread) -> Array:
+    """Lagrange polynomials (n, LINES, 5) at the lines in their cells, times half their shares."""
+    voxel = np.arange(len(spread.places))
+    places = (voxel[:, None] % 2 + spread.places) / 2.0
+    values = lagrange(POINT_PLACES, places.ravel()).reshape(*places.shape, -1)
+    return 0.5 * spread.shares[:, :, None] * values
+
+
 @numba.njit(cache=True, nogil=True)
 def _integrate(  # type: ignore[no-untyped-def]
-    cells, chosen, axis, labels, first, pieces, across, shares, bounds, points, weights
+    cells, chosen, axis, labels, first, pieces, lines_b, lines_c, bounds, points, weights
 ):
     start, low, high, columns = pieces
-    n = len(shares)
+    n = lines_b.shape[1]
     b, c = (axis + 1) % 3, (axis + 2) % 3
     stride = np.array([1, 5, 25])
     along, at = np.empty(5), np.empty(3, dtype=np.int64)
@@ -87,11 +93,10 @@ def _integrate(  # type: ignore[no-untyped-def]
                 continue
             half_a, half_b, half_c = octant >> axis & 1, octant >> b & 1, octant >> c & 1
             voxel = cells[k, axis] + half_a
+            voxel_b, voxel_c = cells[k, b] + half_b, cells[k, c] + half_c
             for i in range(n):
                 for j in range(n):
-                    row, column = (cells[k, b] + half_b) * n + i, (cells[k, c] + half_c) * n + j
-                    line = row * columns + column
-                    area = 0.25 * shares[i] * shares[j]
+                    line = (voxel_b * n + i) * columns + voxel_c * n + j
                     at[b], at[c] = half_b * n + i, half_c * n + j
                     for number in range(start[line], start[line + 1]):
                         begin = max(low[number] - voxel, 0.0)
@@ -99,7 +104,7 @@ def _integrate(  # type: ignore[no-untyped-def]
                         if end <= begin:
                             continue
                         box = 0
-                        while box < n - 1 and bounds[box] <= 0.5 * (begin + end):
+                        while box < n - 1 and bounds[voxel, box] <= 0.5 * (begin + end):
                             box += 1
                         at[axis] = half_a * n + box
                         part = labels[k, at[0], at[1], at[2]]
@@ -109,7 +114,7 @@ def _integrate(  # type: ignore[no-untyped-def]
                         to = weights[first[k] + part - 1, octant]
                         for mb in range(5):
                             for mc in range(5):
-                                factor = area * across[half_b, i, mb] * across[half_c, j, mc]
+                                factor = lines_b[voxel_b, i, mb] * lines_c[voxel_c, j, mc]
                                 place = stride[b] * mb + stride[c] * mc
                                 for ma in range(5):
                                     to[place + stride[axis] * ma] += factor * along[ma]

@@ -1,0 +1,51 @@
+"""Solids that stand askew in their lattice (test support)."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+from trimesh.transformations import euler_matrix
+
+from carillon.fem.finite_cells.build import finite_cells
+from carillon.fem.finite_cells.cells import FiniteCells
+from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
+from solver.analysis.modal_solver import modal_analysis
+from solver.analysis.options import SolverOptions
+from solver.assembly.sparse import assembled
+
+ANGLES = np.radians([25.0, 35.0, 15.0])
+"""About x, y and z, by which solids are turned against the lattice."""
+YOUNG, POISSON, DENSITY = 1e9, 0.25, 1000.0
+
+
+def box(*sides: float, at: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> trimesh.Trimesh:
+    """A box about the origin, or about another point."""
+    return trimesh.creation.box(extents=sides).apply_translation(at)
+
+
+def turned(surface: trimesh.Trimesh) -> trimesh.Trimesh:
+    """The surface turned by `ANGLES`."""
+    return surface.copy().apply_transform(euler_matrix(*ANGLES))
+
+
+def spaced(surface: trimesh.Trimesh, spacing: float) -> FiniteCells:
+    """Finite cells with about this spacing."""
+    return finite_cells(surface, round(float(np.ptp(surface.bounds, axis=0).max()) / spacing))
+
+
+def uniform(cells: FiniteCells) -> FiniteCellModel:
+    """Of one modulus."""
+    return finite_cell_model(cells, np.full(cells.mesh.n_cells, YOUNG), POISSON, DENSITY)
+
+
+def eigenvalues(model: FiniteCellModel, count: int) -> NDArray[np.float64]:
+    """The lowest ones by SLEPc."""
+    return modal_analysis(model, SolverOptions(modes=count, method="slepc")).values
+
+
+def dense_eigenvalues(model: FiniteCellModel) -> NDArray[np.float64]:
+    """All of them by LAPACK."""
+    K, M = assembled(model)
+    return np.asarray(eigh(K.toarray(), M.toarray(), eigvals_only=True))

@@ -1,0 +1,204 @@
+"""Modes of finite cells are those of the real solid, by every method and on any number of ranks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from carillon.errors import UserError
+from carillon.fem.finite_cells.build import finite_cells
+from carillon.fem.finite_cells.model import finite_cell_model
+from carillon.fem.geometry import builtin_surface
+from carillon.fem.materials import young_modulus
+from solver.__main__ import main
+from solver.analysis.modal_solver import ModalSolver, modal_analysis
+from solver.analysis.options import SolverOptions
+from solver.analysis.problem import ProblemOptions, build_problem
+from solver.files.modes_file import read_modes, write_modes
+from solver.response.contact import interpolation
+from solver.studies.comparison import compare_files
+from tests import cut_solids, solids
+from tests.cut_solids import box, spaced, turned, uniform
+from tests.edited_files import edited
+
+PROGRAM = Path(__file__).with_name("distributed_checks.py")
+
+
+@pytest.fixture(scope="module")
+def material():
+    """A tilted bar of random moduli, small enough for LAPACK."""
+    cells = spaced(turned(box(0.2, 0.05, 0.03)), 0.025)
+    young = 1e9 * 10.0 ** np.random.default_rng(3).uniform(-1.5, 1.5, cells.mesh.n_cells)
+    return finite_cell_model(cells, young)
+
+
+@pytest.mark.parametrize(
+    ("sides", "spacing", "goal"),
+    [((0.24, 0.24, 0.012), 0.024, 0.06), ((0.24, 0.16, 0.12), 0.02, 0.003)],
+    ids=["plate half as thick as the spacing", "block"],
+)
+def test_solids_turned_against_the_lattice(sides, spacing, goal):
+    exact = solids.parallelepiped_eigenvalues(
+        sides, cut_solids.YOUNG, cut_solids.POISSON, cut_solids.DENSITY, 11
+    )[6:36]
+    found = cut_solids.eigenvalues(uniform(spaced(turned(box(*sides)), spacing)), 36)[6:]
+    errors = np.sqrt(found / exact) - 1.0
+    assert np.sqrt(np.mean(errors**2)) < goal
+
+
+def test_the_bells_equal_pairs_stay_pairs():
+    values = cut_solids.eigenvalues(uniform(finite_cells(builtin_surface("bell"), 16)), 10)
+    pairs = np.sqrt(values[6:10].reshape(2, 2))
+    assert (pairs[:, 1] / pairs[:, 0] - 1.0 < 0.005).all()
+
+
+def test_frequencies_fall_towards_those_of_the_solid():
+    sides = (0.2, 0.1, 0.05)
+    exact = solids.parallelepiped_eigenvalues(sides, 1e9, 0.25, 1000.0, 10)[6:12]
+    errors = [
+        np.abs(
+            cut_solids.eigenvalues(uniform(spaced(turned(box(*sides)), spacing)), 12)[6:] / exact
+            - 1
+        )
+        for spacing in (0.05, 0.025, 0.0125)
+    ]
+    assert (errors[1] < errors[0]).all() and (errors[2] < errors[1]).all()
+    # Fourth order in the spacing where modes are smooth; edges take a part of it.
+    rates = np.log2(errors[0] / errors[2]) / 2.0
+    assert rates.min() > 2.0 and np.median(rates) > 2.5
+
+
+@pytest.mark.parametrize("method", ["hcms", "slepc", "arpack"])
+@pytest.mark.parametrize("interface", ["overlapping", "free", "fixed"])
+def test_every_method_finds_the_modes(material, method, interface):
+    if method != "hcms" and interface != "overlapping":
+        pytest.skip("interfaces are of hcms alone")
+    exact = cut_solids.dense_eigenvalues(material)
+    options = SolverOptions(
+        modes=24, method=method, subdomains=4, tolerance=1e-10, interface=interface
+    )
+    values = modal_analysis(material, options).values
+    assert np.abs(values[6:] / exact[6:24] - 1.0).max() < 1e-7
+
+
+def test_a_millionfold_contrast_where_the_surface_cuts(material):
+    young = 1e9 * 10.0 ** np.random.default_rng(4).uniform(-3.0, 3.0, len(material.young))
+    model = material.with_young(young)
+    exact = cut_solids.dense_eigenvalues(model)
+    for method in ("hcms", "slepc"):
+        values = modal_analysis(model, SolverOptions(modes=16, method=method)).values
+        assert np.abs(values[6:] / exact[6:16] - 1.0).max() < 1e-5
+
+
+def test_other_moduli_without_another_analysis(material):
+    solver = ModalSolver(material, SolverOptions(modes=12, tolerance=1e-10))
+    first = solver.solve()
+    young = material.young * np.linspace(0.9, 1.1, len(material.young))
+    warm = solver.solve(young, initial_modes=first)
+    cold = modal_analysis(material.with_young(young), SolverOptions(modes=12, tolerance=1e-10))
+    assert np.abs(warm.values[6:] / cold.values[6:] - 1.0).max() < 1e-8
+    with pytest.raises(UserError, match="moduli: an array of shape"):
+        solver.solve(young[:-1])
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("ranks", [1, 2, 3])
+def test_ranks_agree(mpiexec, ranks):
+    mpiexec(ranks, PROGRAM, "finite_cells_on_ranks", check=True)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory, material):
+    path = tmp_path_factory.mktemp("cells") / "modes.h5"
+    modes = modal_analysis(material, SolverOptions(modes=12, method="slepc"))
+    block = modes.system.gather(modes.vectors)
+    write_modes(path, material, modes.values, [block], modes.residuals, {"method": "slepc"}, {})
+    return path
+
+
+def test_files_hold_the_solid(written, material):
+    file = read_modes(written)
+    assert np.array_equal(file.model.young, material.young)
+    assert np.allclose(file.model.stiffness(), material.stiffness(), rtol=1e-12)
+    assert compare_files(written, written).residual_max < 1e-6
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        ("finite_cells/row", lambda values: values + 10**6),
+        ("finite_cells/nodes", lambda values: values[:, ::-1]),
+        ("finite_cells/voxels", lambda values: values[::-1]),
+        ("finite_cells/weights", lambda values: values[1:]),
+        ("finite_cells/weights", lambda values: np.where(np.arange(125) == 3, np.nan, values)),
+        ("young", lambda values: values[:-1]),
+    ],
+    ids=["rows", "nodes", "voxels", "first weights", "not finite", "moduli"],
+)
+def test_files_that_do_not_fit_are_refused(written, tmp_path, change):
+    name, new = change
+    path = tmp_path / "other.h5"
+    path.write_bytes(written.read_bytes())
+    with edited(path) as file:
+        values = file[name][()]
+        del file[name]
+        file[name] = new(values)
+    with pytest.raises(UserError):
+        read_modes(path)
+
+
+def test_the_command_writes_what_it_found(tmp_path, run_cli):
+    out = tmp_path / "bell.h5"
+    words = ["builtin:bell", "--resolution", "10", "--discretisation", "finite-cell"]
+    done = run_cli("solver", "modes", *words, "--modes", "9", "--out", out, check=True)
+    assert "9 modes of" in done.stdout
+    with h5py.File(out) as file:
+        assert file.attrs["discretisation"] == "finite-cell"
+
+
+@pytest.mark.parametrize(
+    "words", [["--coarsen", "average"], ["--lumped"], ["--fill", "centre"]], ids=lambda w: w[0]
+)
+def test_what_is_for_voxels_is_refused(words):
+    given = {words[0][2:]: words[1] if len(words) > 1 else True}
+    options = ProblemOptions("builtin:bar", 8, discretisation="finite-cell", **given)
+    with pytest.raises(UserError, match="is for voxels; leave it out"):
+        build_problem(options)
+
+
+@pytest.mark.parametrize("name", ["smooth", "two-region", "noise"])
+def test_named_materials(name):
+    problem = build_problem(ProblemOptions("builtin:bar", 12, name, discretisation="finite-cell"))
+    assert problem.young.shape == (problem.fine.n_cells,)
+    assert np.array_equal(problem.young, young_modulus(name, problem.fine))
+
+
+def test_a_material_of_voxels_is_refused(tmp_path):
+    voxels = build_problem(ProblemOptions("builtin:bar", 12))
+    np.save(tmp_path / "young.npy", voxels.young)
+    with pytest.raises(UserError, match="young.npy"):
+        build_problem(
+            ProblemOptions(
+                "builtin:bar", 12, str(tmp_path / "young.npy"), discretisation="finite-cell"
+            )
+        )
+
+
+def test_points_of_the_surface_move_with_it():
+    """Quadratic displacements are found exactly wherever a point of the solid lies."""
+    surface = turned(box(0.2, 0.12, 0.05))
+    model = uniform(spaced(surface, 0.02))
+    points = np.asarray(surface.subdivide().vertices)
+    nodes = model.mesh.nodes
+    found = interpolation(model, points) @ (nodes[:, 0] * nodes[:, 1] - nodes[:, 2] ** 2)
+    assert np.allclose(found, points[:, 0] * points[:, 1] - points[:, 2] ** 2, atol=1e-12)
+
+
+def test_bad_words_get_one_sentence(refuses):
+    sentence = refuses(
+        main, "modes", "builtin:bar", "--resolution", "8", "--discretisation", "cubes"
+    )
+    assert "finite-cell" in sentence

@@ -1,0 +1,199 @@
+"""Finite cells hold what is inside the surface, whatever the surface and wherever it lies."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from carillon.errors import UserError
+from carillon.fem.block import NODES
+from carillon.fem.element import elasticity_matrix
+from carillon.fem.finite_cells import shapes
+from carillon.fem.finite_cells.build import finite_cells
+from carillon.fem.finite_cells.cells import FLOOR
+from carillon.fem.finite_cells.lines import crossings, spread_lines
+from carillon.fem.geometry import builtin_surface
+from carillon.fem.laplacian import laplacian_modes
+from solver.assembly.sparse import assembled
+from tests import cut_solids
+from tests.cut_solids import box, spaced, turned, uniform
+
+SIDES = (0.24, 0.16, 0.12)
+
+
+def moments(cells):
+    """Volume, first and second moments about the origin, from the weights of the points."""
+    mesh = cells.mesh
+    edge = 2.0 * mesh.edge
+    places = mesh.origin + mesh.edge * cells.grid[:, None] + edge * shapes.points()
+    weights = edge**3 * cells.weights.sum(axis=1)[cells.row]
+    second = np.einsum("cp,cpi,cpj->ij", weights, places, places)
+    return weights.sum(), np.einsum("cp,cpi->i", weights, places), second
+
+
+def moments_of_box(surface, sides):
+    volume = float(np.prod(sides))
+    turn = trimesh.transformations.euler_matrix(*cut_solids.ANGLES)[:3, :3]
+    second = turn @ np.diag(volume * np.square(sides) / 12.0) @ turn.T
+    return volume, np.zeros(3), second
+
+
+@pytest.mark.parametrize("sides", [SIDES, (0.24, 0.24, 0.012), (0.24, 0.24, 0.004)])
+@pytest.mark.parametrize("spacing", [0.02, 0.03])
+def test_moments_are_those_of_the_solid(sides, spacing):
+    surface = turned(box(*sides))
+    exact, found = moments_of_box(surface, sides), moments(spaced(surface, spacing))
+    assert found[0] == pytest.approx(exact[0], rel=5e-3)
+    scale = np.abs(exact[2]).max()
+    assert np.abs(found[2] - exact[2]).max() < 1e-2 * scale
+    assert np.abs(found[1]).max() < 1e-3 * np.sqrt(exact[0] * scale)
+
+
+def test_a_box_on_the_lattice_is_integrated_exactly():
+    cells = finite_cells(box(0.2, 0.15, 0.1), 8)
+    assert cells.is_whole.all() and len(cells) == 24 and cells.mesh.n_cells == 192
+    assert moments(cells)[0] == pytest.approx(0.003, rel=1e-12)
+    # Between the planes too, along every axis.
+    for moved in (0.004, 0.0123):
+        cells = spaced(box(0.2, 0.15, 0.01 + moved), 0.025)
+        assert moments(cells)[0] == pytest.approx(0.03 * (0.01 + moved), rel=1e-10)
+
+
+def test_lines_cross_a_closed_surface_as_often_in_as_out():
+    surface = trimesh.creation.icosphere(subdivisions=3, radius=3.7)
+    vertices = np.ascontiguousarray(surface.vertices + 4.0)
+    # Vertices, edges and faces on lines are the hard case.
+    for corners in (vertices, np.round(vertices * 8.0) / 8.0 + 0.0198550717512319):
+        faces = surface.faces.astype(np.int64)
+        x, y, z = (spread_lines(corners, faces, 8, axis) for axis in range(3))
+        for axis in range(3):
+            lines = crossings(corners, faces, (x, y, z), axis)
+            line = np.repeat(np.arange(len(lines.start) - 1), np.diff(lines.start))
+            assert (np.bincount(line, lines.step) == 0).all()
+            assert (np.diff(lines.place)[np.diff(line) == 0] >= 0.0).all()
+
+
+def inverted(surface):
+    surface.invert()
+    return surface
+
+
+def open_sphere():
+    sphere = trimesh.creation.icosphere(subdivisions=3, radius=0.1)
+    sphere.update_faces(np.arange(len(sphere.faces)) != 7)
+    return sphere
+
+
+def unmerged(surface):
+    return trimesh.Trimesh(
+        surface.triangles.reshape(-1, 3),
+        np.arange(3 * len(surface.faces)).reshape(-1, 3),
+        process=False,
+    )
+
+
+def one_flipped(surface):
+    faces = surface.faces.copy()
+    faces[0] = faces[0][::-1]
+    return trimesh.Trimesh(surface.vertices, faces, process=False)
+
+
+@pytest.mark.parametrize(
+    ("surface", "volume", "tolerance"),
+    [
+        (inverted(turned(box(*SIDES))), 0.004608, 1e-3),
+        (unmerged(turned(box(*SIDES))), 0.004608, 1e-3),
+        (trimesh.util.concatenate([box(0.2, 0.05, 0.05), box(0.05, 0.2, 0.05)]), 8.75e-4, 1e-3),
+        (open_sphere(), 4.0 / 3.0 * np.pi * 1e-3, 0.01),
+        (one_flipped(box(0.2, 0.2, 0.05)), 0.002, 0.1),
+        (builtin_surface("bell"), 8.794e-4, 2e-3),
+    ],
+    ids=["inverted", "unmerged", "overlapping", "open", "one face flipped", "bell"],
+)
+def test_volume_of_surfaces_as_they_come(surface, volume, tolerance):
+    assert finite_cells(surface, 14).volume == pytest.approx(volume, rel=tolerance)
+
+
+def test_rigid_motions_and_a_constant_strain():
+    """The patch test on a cut solid: linear displacements have the energy of the real solid."""
+    cells = spaced(turned(box(0.2, 0.12, 0.05)), 0.02)
+    K, M = assembled(uniform(cells))
+    nodes = cells.mesh.nodes
+    gradient = np.array([[1.0, 0.3, -0.2], [0.1, -0.5, 0.4], [0.0, 0.2, 0.7]])
+    motion = (nodes @ gradient.T).ravel()
+    strain = 0.5 * (gradient + gradient.T)
+    voigt = np.append(np.diag(strain), 2.0 * strain[[0, 1, 2], [1, 2, 0]])
+    density = cut_solids.YOUNG * voigt @ elasticity_matrix(cut_solids.POISSON) @ voigt
+    assert motion @ K @ motion == pytest.approx(density * cells.volume, rel=1e-6)
+    spin = gradient - gradient.T
+    turn = (nodes @ spin.T).ravel()
+    assert np.abs(K @ turn).max() < 1e-12 * np.abs(K @ motion).max()
+    along = np.tile([1.0, 0.0, 0.0], len(nodes))
+    mass = cut_solids.DENSITY * cells.volume
+    assert along @ M @ along == pytest.approx(mass, rel=10 * FLOOR * len(cells))
+    assert uniform(cells).mass == pytest.approx(mass)
+
+
+def test_stiffness_is_linear_in_the_moduli_of_the_voxels():
+    cells = spaced(turned(box(0.2, 0.12, 0.05)), 0.03)
+    rng = np.random.default_rng(0)
+    one, other = rng.uniform(1e8, 1e9, (2, cells.mesh.n_cells))
+    model = uniform(cells)
+    sums = [model.with_young(young).stiffness() for young in (one, other, one + 2.0 * other)]
+    assert np.allclose(sums[0] + 2.0 * sums[1], sums[2], rtol=1e-12, atol=1e-9)
+
+
+def test_two_plates_in_one_cell_are_apart():
+    """A gap of a quarter of the spacing: copies of the cells, and two pieces."""
+    plates = trimesh.util.concatenate([box(0.2, 0.2, 0.02), box(0.2, 0.2, 0.02, at=(0, 0, 0.0245))])
+    with pytest.raises(UserError, match="is in 2 pieces .* --components largest"):
+        finite_cells(plates, 16)
+    cells = finite_cells(plates, 16, "largest")
+    assert cells.volume == pytest.approx(0.2 * 0.2 * 0.02, rel=1e-9)
+
+
+def test_prongs_of_a_fork_are_copies_of_cells():
+    """The two prongs meet at one end only, however close they are."""
+    prongs = [box(0.2, 0.013, 0.02, at=(0.02, side * 0.0085, 0.0)) for side in (-1, 1)]
+    handle = box(0.04, 0.03, 0.02, at=(-0.1, 0.0, 0.0))
+    fork = trimesh.util.concatenate([*prongs, handle])
+    cells = finite_cells(fork, 12)
+    last = np.flatnonzero(cells.grid[:, 0] == cells.grid[:, 0].max())
+    weights = cells.weights.sum(axis=1)[cells.row[last]]
+    places = cells.grid[last, 1, None] + 2.0 * shapes.points()[:, 1]
+    centre = cells.mesh.origin[1] + cells.mesh.edge * (weights * places).sum(1) / weights.sum(1)
+    above, below = (set(cells.nodes[last[side]].ravel()) for side in (centre > 0.0, centre < 0.0))
+    assert above and below and not above & below
+    assert len(np.unique(cells.grid[last], axis=0)) < len(last)
+
+
+def test_voxels_carry_the_material():
+    cells = spaced(turned(box(0.24, 0.24, 0.012)), 0.02)
+    mesh = cells.mesh
+    cell, octant = np.nonzero(cells.voxels >= 0)
+    assert sorted(cells.voxels[cell, octant]) == list(range(mesh.n_cells))
+    assert (cells.fractions[cell, octant] > 0.0).all() and cells.is_consistent()
+    assert np.array_equal(mesh.node_grid[cells.nodes], cells.grid[:, None] + NODES)
+    values, _ = laplacian_modes(mesh, 3)
+    # One piece through faces, but for voxels that a corner of the plate just reaches.
+    assert values[0] < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("surface", "resolution", "sentence"),
+    [
+        (turned(box(0.24, 5e-4, 5e-4)), 16, "parts far thinner than the lattice.*--resolution to"),
+        (box(0.2, 0.1, 0.1), 1, "expected a whole number of at least 2"),
+        (box(0.2, 0.1, 0.1), 4000, "use a resolution of about"),
+    ],
+    ids=["needle", "resolution 1", "too many"],
+)
+def test_what_is_refused(surface, resolution, sentence):
+    with pytest.raises(UserError, match=sentence):
+        finite_cells(surface, resolution)
+
+
+def test_a_surface_that_just_reaches_into_cells_has_none_there():
+    cells = finite_cells(box(0.2, 0.15, 0.1 * (1.0 + 1e-9)), 8)
+    assert len(cells) == 24
