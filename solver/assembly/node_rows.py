@@ -132,8 +132,8 @@ class NodeRows:
         self.pattern = pattern
         self.halo = halo
         self.threads = threads
-        self.stiffness = np.empty((len(pattern.columns), 3, 3))
-        self.mass = np.empty(len(pattern.columns))
+        self.stiffness = np.zeros((len(pattern.columns), 3, 3))
+        self.mass = np.zeros(len(pattern.columns))
         # Written in order: pages that the sums are first to touch cost several times as much.
         self.stiffness.fill(0.0)
         self.mass.fill(0.0)
@@ -153,6 +153,12 @@ class NodeRows:
     def lumped_mass(self) -> Array:
         """Row sums of M (local nodes,) [kg]."""
         return np.add.reduceat(self.mass, self.pattern.indptr[:-1])
+
+    @cached_property
+    def mass_diagonal(self) -> Array:
+        """Diagonal of M (local nodes,) [kg]."""
+        row = np.repeat(np.arange(self._own), np.diff(self.pattern.indptr))
+        return self.mass[self.pattern.columns == row]
 
     def stiffness_csr(self, n_dofs: int) -> sp.csr_matrix:
         """This rank's rows of K (local unknowns, n_dofs), columns in the distributed order."""

@@ -365,7 +365,11 @@ class _Iteration:
         values = self.ritz.values[candidates]
         last = self._first_beyond()
         rows = self.system.rows
-        mass = rows.lumped_mass if rows.has_diagonal_mass else ROUGH_MASS * rows.lumped_mass
+        mass = rows.lumped_mass
+        if not rows.has_diagonal_mass:
+            # Row sums of cells that a surface cuts may be small or negative.
+            diagonal = rows.mass_diagonal
+            mass = np.where(mass >= diagonal, ROUGH_MASS * mass, diagonal)
         weighted = residual / np.repeat(mass, 3)[:, None]
         square = self.system.column_products(residual, weighted)
         distance = np.maximum(last - values, np.finfo(float).eps * last)
