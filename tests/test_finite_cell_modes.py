@@ -18,6 +18,7 @@ from solver.analysis.modal_solver import ModalSolver, modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.files.modes_file import read_modes, write_modes
+from solver.hcms.condense import INTERFACES
 from solver.response.contact import interpolation
 from solver.studies.comparison import compare_files
 from tests import cut_solids, solids
@@ -71,11 +72,11 @@ def test_frequencies_fall_towards_those_of_the_solid():
     assert rates.min() > 2.0 and np.median(rates) > 2.5
 
 
-@pytest.mark.parametrize("method", ["hcms", "slepc", "arpack"])
-@pytest.mark.parametrize("interface", ["overlapping", "free", "fixed"])
+@pytest.mark.parametrize(
+    ("method", "interface"),
+    [("hcms", name) for name in INTERFACES] + [("slepc", "overlapping"), ("arpack", "overlapping")],
+)
 def test_every_method_finds_the_modes(material, method, interface):
-    if method != "hcms" and interface != "overlapping":
-        pytest.skip("interfaces are of hcms alone")
     exact = cut_solids.dense_eigenvalues(material)
     options = SolverOptions(
         modes=24, method=method, subdomains=4, tolerance=1e-10, interface=interface

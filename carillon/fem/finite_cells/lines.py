@@ -81,7 +81,7 @@ def _split(heights: Array, area: Array) -> list[float]:
 
 def _sums(heights: Array, area: Array) -> Array:
     """Area at each of the distinct heights, ascending."""
-    return np.bincount(np.unique(heights, return_inverse=True)[1], area)
+    return np.asarray(np.bincount(np.unique(heights, return_inverse=True)[1], area), dtype=float)
 
 
 @cache
