@@ -127,6 +127,22 @@ def test_files_hold_the_solid(written, material):
     assert compare_files(written, written).residual_max < 1e-6
 
 
+def test_modes_of_voxels_are_told_on_finite_cells_and_back(tmp_path):
+    """A box in the lattice: both discretisations have the same solid, and its modes one by one."""
+    for name, options in (
+        ("voxels", ProblemOptions("builtin:box", 16)),
+        ("cells", ProblemOptions("builtin:box", 8, discretisation="finite-cell")),
+    ):
+        model = build_problem(options).model
+        modes = modal_analysis(model, SolverOptions(modes=12, method="slepc"))
+        block = modes.system.gather(modes.vectors)
+        write_modes(tmp_path / name, model, modes.values, [block], modes.residuals, {}, {})
+    for one, other in (("voxels", "cells"), ("cells", "voxels")):
+        compared = compare_files(tmp_path / one, tmp_path / other)
+        assert compared.subspace_angle_max < 0.05
+        assert compared.frequency_max_relative_error_7_60 < 0.03
+
+
 @pytest.mark.parametrize(
     "change",
     [

@@ -69,6 +69,15 @@ def test_hybrid_finds_a_material_that_sounds_alike(designed):
     assert designed.young.min() > 0.0
 
 
+def test_a_design_of_finite_cells(tmp_path):
+    """Modes and their derivatives of the solid as it is lead to a material as well."""
+    made = small_project.project(tmp_path, evaluations=60)
+    made = replace(made, solid=replace(made.solid, resolution=12, discretisation="finite-cell"))
+    designed = optimise(prepare(made, small_project.targets(made)))
+    assert designed.evidence["cost"] < 0.1 * designed.evidence["cost_start"]
+    test_written_modes_are_those_of_the_written_model(designed, tmp_path)
+
+
 def test_written_modes_are_those_of_the_written_model(designed, tmp_path):
     """An independent solver finds the same frequencies from what the file says."""
     from solver import solve

@@ -13,7 +13,7 @@ from jsonschema import Draft202012Validator
 
 from carillon.errors import UserError
 from carillon.fem.geometry import COMPONENTS, FILLS
-from solver.analysis.problem import ProblemOptions
+from solver.analysis.problem import DISCRETISATIONS, ProblemOptions
 from solver.coarsening.choice import METHODS as COARSENINGS
 from sound.commands.search_options import SearchOptions
 from sound.design.material import LAWS
@@ -54,8 +54,11 @@ def test_what_a_project_leaves_out_takes_the_defaults_of_the_schema(folder):
     for key, part in SCHEMA["properties"].items():
         for inner, each in part.get("properties", {}).items():
             assert described[key][inner] == each["default"]
-        if "default" in part and "properties" not in part:
+        if "default" in part and "properties" not in part and key != "coarsen":
             assert described[key] == part["default"]
+    assert described["coarsen"] == "ddfem"
+    cells = load(folder, discretisation="finite-cell")
+    assert cells.solid.coarsen == "none"
 
 
 def test_defaults_of_the_solid_are_those_of_the_solver():
@@ -73,7 +76,8 @@ def test_choices_of_the_schema_are_those_of_the_code():
     assert methods == list(OPTIMISERS)
     choices = {each.name: each.metadata["choices"] for each in dataclasses.fields(SearchOptions)}
     assert methods == list(choices["method"])
-    assert set(SCHEMA["properties"]["coarsen"]["enum"]) < set(COARSENINGS)
+    assert set(SCHEMA["properties"]["coarsen"]["enum"]) - {None} < set(COARSENINGS)
+    assert SCHEMA["properties"]["discretisation"]["enum"] == list(DISCRETISATIONS)
 
 
 def test_everything_that_is_written_is_read(folder):

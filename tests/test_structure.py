@@ -48,8 +48,8 @@ ARROWS = {
     "solver.refinement": """solver.coarsening solver.distribution solver.assembly solver.linear
         solver.subspace solver.analysis""",
     "solver": "solver.analysis",
-    "solver.studies": """solver.coarsening solver.distribution solver.files solver.assembly
-        solver.linear solver.subspace solver.hcms solver.correction
+    "solver.studies": """solver.coarsening solver.distribution solver.files solver.response
+        solver.assembly solver.linear solver.subspace solver.hcms solver.correction
         solver.reference solver.analysis""",
     "solver.studies.benchmark": """solver.coarsening solver.distribution solver.files
         solver.assembly solver.linear solver.subspace solver.correction solver.analysis
@@ -67,7 +67,7 @@ ARROWS = {
     #
     "sound": "",
     "sound.clips": "sound",
-    "sound.project": "solver.files solver.analysis sound sound.clips",
+    "sound.project": "solver.coarsening solver.files solver.analysis sound sound.clips",
     "sound.design": """solver.coarsening solver.files solver.response solver.linear solver.subspace
         solver.analysis sound sound.clips sound.project""",
     "sound.rendering": "solver.files solver.response solver.subspace sound.project",

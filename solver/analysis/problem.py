@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from carillon.errors import UserError
 from carillon.fem import geometry, materials
 from carillon.fem.element import DEFAULT_POISSON
 from carillon.fem.finite_cells.build import finite_cells
+from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.model import finite_cell_model
 from carillon.fem.geometry import COMPONENTS, FILLS, HexMesh, hexmesh_from_voxels, voxelize
 from carillon.fem.materials import young_modulus
@@ -25,6 +26,9 @@ from solver.coarsening.choice import METHODS as COARSENINGS
 from solver.coarsening.choice import make_coarsening
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.model import build_model
+
+if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
+    import trimesh
 
 Array = NDArray[np.float64]
 
@@ -113,38 +117,58 @@ def build_problem(options: ProblemOptions) -> Problem:
         For anything wrong with the mesh, the material or the parameters.
     """
     require_constants(options.poisson, options.density)
-    if options.discretisation == "finite-cell":
-        return _finite_cell_problem(options)
-    if options.discretisation not in DISCRETISATIONS:
-        raise UserError(
-            f"discretisation {options.discretisation!r} is unknown, expected one of "
-            f"{', '.join(DISCRETISATIONS)}"
-        )
     begin = time.perf_counter()
     surface = geometry.load_surface(options.mesh, options.unit)
     name = geometry.surface_name(options.mesh)
-    voxels = voxelize(surface, options.resolution, options.fill, options.components, name)
-    fine = hexmesh_from_voxels(voxels)
+    mesh, cells = discretised(surface, options, name)
     meshed = time.perf_counter()
-    young = young_modulus(options.material, fine, options.seed, _label(options))
+    label = f"mesh '{name}', resolution {options.resolution}"
+    young = young_modulus(options.material, mesh, options.seed, label)
     assigned = time.perf_counter()
+    seconds = {"mesh": meshed - begin, "material": assigned - meshed}
+    if cells is not None:
+        model = finite_cell_model(cells, young, options.poisson, options.density)
+        return Problem(mesh, young, model, seconds)
     coarsening = options.coarsening()
-    model = build_model(
-        fine,
+    elements = build_model(
+        mesh,
         young,
         coarsening,
         poisson=options.poisson,
         density=options.density,
         lumped=options.lumped,
     )
-    seconds = {"mesh": meshed - begin, "material": assigned - meshed}
     if coarsening is None:
-        return Problem(fine, young, model, seconds)
+        return Problem(mesh, young, elements, seconds)
     seconds["coarsening"] = time.perf_counter() - assigned
-    return Problem(fine, young, model, seconds, coarsening.record())
+    return Problem(mesh, young, elements, seconds, coarsening.record())
 
 
-def _finite_cell_problem(options: ProblemOptions) -> Problem:
+def discretised(
+    surface: trimesh.Trimesh, options: ProblemOptions, name: str
+) -> tuple[HexMesh, FiniteCells | None]:
+    """Voxels of a surface in metres, and the finite cells that they belong to, if it shall be such.
+
+    Raises
+    ------
+    UserError
+        If the surface or the options are of no use.
+    """
+    match options.discretisation:
+        case "voxel":
+            voxels = voxelize(surface, options.resolution, options.fill, options.components, name)
+            return hexmesh_from_voxels(voxels), None
+        case "finite-cell":
+            _require_nothing_for_voxels(options)
+            cells = finite_cells(surface, options.resolution, options.components, name)
+            return cells.mesh, cells
+        case other:
+            raise UserError(
+                f"discretisation {other!r} is unknown, expected one of {', '.join(DISCRETISATIONS)}"
+            )
+
+
+def _require_nothing_for_voxels(options: ProblemOptions) -> None:
     for given, what in (
         (options.coarsen != "none", f"--coarsen {options.coarsen}"),
         (options.lumped, "--lumped"),
@@ -152,16 +176,3 @@ def _finite_cell_problem(options: ProblemOptions) -> Problem:
     ):
         if given:
             raise UserError(f"{what} is for voxels; leave it out with --discretisation finite-cell")
-    begin = time.perf_counter()
-    surface = geometry.load_surface(options.mesh, options.unit)
-    name = geometry.surface_name(options.mesh)
-    cells = finite_cells(surface, options.resolution, options.components, name)
-    meshed = time.perf_counter()
-    young = young_modulus(options.material, cells.mesh, options.seed, _label(options))
-    model = finite_cell_model(cells, young, options.poisson, options.density)
-    seconds = {"mesh": meshed - begin, "material": time.perf_counter() - meshed}
-    return Problem(cells.mesh, young, model, seconds)
-
-
-def _label(options: ProblemOptions) -> str:
-    return f"mesh '{geometry.surface_name(options.mesh)}', resolution {options.resolution}"

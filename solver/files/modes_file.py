@@ -209,9 +209,7 @@ def require_same_solid(paths: Sequence[str | Path], files: Sequence[ModesFile]) 
     UserError
         If one differs from the first.
     """
-    corners = [
-        np.array([file.mesh.nodes.min(axis=0), file.mesh.nodes.max(axis=0)]) for file in files
-    ]
+    corners = [file.mesh.bounds for file in files]
     for path, file, box in zip(paths, files, corners, strict=True):
         cell = max(file.mesh.edge, files[0].mesh.edge)
         if np.abs(box - corners[0]).max() > SAME_SOLID * cell:

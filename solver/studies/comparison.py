@@ -11,9 +11,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from carillon.fem.geometry import blocks_with_coarse, prolongation
-from carillon.fem.model import RIGID_MODES
+from carillon.fem.model import RIGID_MODES, ElasticModel
 from solver.assembly.sparse import assembled
 from solver.files.modes_file import ModesFile, read_elastic, require_same_solid
+from solver.response.contact import interpolation
 from solver.subspace.spectrum import clusters
 from solver.subspace.verification import residual_scale
 
@@ -37,15 +38,14 @@ class SpectrumComparison:
         The same and the maximum over modes 7..60, or as many as there are.
     subspace_angle_max
         Largest M-weighted principal angle [rad] between a cluster of the truth and the same modes
-        of the candidate; the last cluster, which the end of the spectrum may cut, is left out.  NaN
-        if the meshes are not related.
+        of the candidate, on the truth's mesh; the last cluster, which the end of the spectrum may
+        cut, is left out.  NaN if there is no other.
     residual_max
         Largest residual ratio of the candidate, recomputed from the K and M in its file.
     modes_compared
         Number of elastic modes compared.
     clusters
-        First and last mode number of every cluster of the truth but the last, and its angle [rad];
-        empty if the meshes are not related.
+        First and last mode number of every cluster of the truth but the last, and its angle [rad].
     """
 
     candidate: str
@@ -122,7 +122,7 @@ def eigenvalue_errors(values: Array, exact: Array) -> dict[str, float]:
 
 
 def compare_files(candidate: str | Path, truth: str | Path) -> SpectrumComparison:
-    """Compare two modes files, of the same mesh or of a mesh and its coarsening.
+    """Compare two modes files of one solid, of any meshes and discretisations.
 
     Raises
     ------
@@ -163,12 +163,15 @@ def recomputed_residuals(file: ModesFile, K: sp.csr_matrix, M: sp.csr_matrix) ->
 def subspace_angles(modes: Array, truth: Array, M: sp.csr_matrix, groups: list[slice]) -> Array:
     """Largest M-weighted principal angle [rad] of each group of columns.
 
-    Both blocks are M-orthonormal (n, k).  The sine is taken from the part of the truth outside the
-    candidate's span, which is accurate for small angles too.
+    The truth's block (n, k) is M-orthonormal; the candidate's, which may come from another mesh, is
+    made so group by group.  The sine is taken from the part of the truth outside the candidate's
+    span, which is accurate for small angles too.
     """
     angles = np.empty(len(groups))
     for index, group in enumerate(groups):
         inside, exact = modes[:, group], truth[:, group]
+        factor = np.linalg.cholesky(inside.T @ (M @ inside))
+        inside = np.linalg.solve(factor, inside.T).T
         outside = exact - inside @ (inside.T @ (M @ exact))
         square = np.linalg.eigvalsh(outside.T @ (M @ outside))[-1]
         angles[index] = np.arcsin(min(1.0, np.sqrt(max(square, 0.0))))
@@ -176,13 +179,13 @@ def subspace_angles(modes: Array, truth: Array, M: sp.csr_matrix, groups: list[s
 
 
 def _cluster_angles(a: ModesFile, b: ModesFile, count: int) -> list[dict[str, Any]]:
-    """Angle of every cluster of `b` but the last; nothing if the meshes are not related."""
+    """Angle of every cluster of `b` but the last."""
     assert a.modes is not None and b.modes is not None
     elastic = slice(RIGID_MODES, count)
     groups = clusters(b.eigenvalues[elastic])[:-1]
-    modes = on_mesh_of(b, a)
-    if modes is None or not groups:
+    if not groups:
         return []
+    modes = on_mesh_of(b, a)
     _, M = assembled(b.model)
     angles = subspace_angles(modes[:, elastic], b.modes[:, elastic], M, groups)
     return [
@@ -195,12 +198,20 @@ def _cluster_angles(a: ModesFile, b: ModesFile, count: int) -> list[dict[str, An
     ]
 
 
-def on_mesh_of(fine: ModesFile, file: ModesFile) -> Array | None:
-    """Modes of `file` on the nodes of `fine`, whose coarsening it may be; else None."""
+def on_mesh_of(fine: ModesFile, file: ModesFile) -> Array:
+    """Modes of `file` on the nodes of `fine`, as far as that mesh can tell them.
+
+    Those of a coarsening are prolonged, and those of any other mesh or discretisation interpolated.
+    """
     assert file.modes is not None
-    if np.array_equal(file.mesh.cells, fine.mesh.cells):
-        return file.modes if np.array_equal(file.mesh.node_grid, fine.mesh.node_grid) else None
-    blocks = blocks_with_coarse(fine.mesh, file.mesh)
+    same = np.array_equal(file.model.connectivity, fine.model.connectivity)
+    if same and np.array_equal(file.mesh.node_grid, fine.mesh.node_grid):
+        return file.modes
+    blocks = None
+    if isinstance(fine.model, ElasticModel) and isinstance(file.model, ElasticModel):
+        blocks = blocks_with_coarse(fine.mesh, file.mesh)
     if blocks is None:
-        return None
-    return np.asarray(sp.kron(prolongation(blocks), sp.identity(3), format="csr") @ file.modes)
+        nodal = interpolation(file.model, fine.mesh.nodes)
+    else:
+        nodal = prolongation(blocks)
+    return np.asarray(sp.kron(nodal, sp.identity(3), format="csr") @ file.modes)

@@ -1,28 +1,31 @@
-"""The elements that are analysed, whose moduli follow from those of the fine cells."""
+"""The elements that are analysed, whose moduli follow from those of the voxels."""
 
 from __future__ import annotations
+
+from abc import ABC, abstractmethod
 
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.fem.element import quadrature_stiffness
+from carillon.fem.finite_cells.cells import FiniteCells
+from carillon.fem.finite_cells.model import finite_cell_model
+from carillon.fem.finite_cells.shapes import strain_factors
 from carillon.fem.geometry import HexMesh, blocks_from_mesh
-from carillon.fem.model import Constants, fine_model
-from carillon.fem.moduli import at_points
+from carillon.fem.model import Constants, Solid, fine_model
+from solver.analysis.modal_solver import ModalSolver, Modes
 from solver.analysis.problem import ProblemOptions
+from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.model import block_moduli, coarse_model
 
 Array = NDArray[np.float64]
 
+STRAINS = 6
+"""Rank of the stiffness of a point."""
 
-class AnalysedElements:
-    """Fine cells, or the blocks that a coarsening makes of them.
 
-    Parameters
-    ----------
-    mesh
-        Fine mesh.
-    options
-        The solid, of which constants, coarsening and forests are used.
+class AnalysedElements(ABC):
+    """Elements of a solid as functions of the moduli (M,) [Pa] of its voxels.
 
     Attributes
     ----------
@@ -30,34 +33,126 @@ class AnalysedElements:
         The solid that is analysed, with moduli of 1 Pa.
     """
 
-    def __init__(self, mesh: HexMesh, options: ProblemOptions) -> None:
-        constants: Constants = {"poisson": options.poisson, "density": options.density}
-        self._coarsening = options.coarsening()
-        if self._coarsening is None:
-            self.model = fine_model(mesh, np.ones(mesh.n_cells), **constants)
-            return
-        self._blocks = blocks_from_mesh(mesh)
-        ones = np.ones((self._blocks.coarse.n_cells, 8))
-        fraction = self._coarsening.lumped_fraction
-        self.model = coarse_model(self._blocks, ones, fraction, **constants)
+    model: Solid
 
-    def moduli(self, young: Array) -> Array:
-        """Moduli (c, 8) [Pa] at the quadrature points from those (M,) [Pa] of the fine cells."""
-        if self._coarsening is None:
-            return at_points(young)
-        return self._coarsening.moduli(block_moduli(self._blocks, young))
+    @abstractmethod
+    def with_young(self, young: Array) -> Solid:
+        """The solid with these moduli."""
 
+    @abstractmethod
+    def solve(self, solver: ModalSolver, young: Array, start: Modes | Array | None) -> Modes:
+        """Its modes by a solver of `model`, see `ModalSolver.solve`."""
+
+    @abstractmethod
     def slopes(self, young: Array, directions: Array) -> Array:
-        """Derivatives (8 c, m) of `moduli` along `directions` (M, m) of the fine moduli.
+        """Derivatives (p c, m) of the moduli at the p points of each element.
+
+        `directions` (M, m) are those of the voxels' moduli that they are taken along.
 
         Raises
         ------
         UserError
             If the coarsening has no derivatives.
         """
-        if self._coarsening is None:
-            return np.repeat(directions, 8, axis=0)
+
+    @property
+    @abstractmethod
+    def strains(self) -> Array:
+        """B (p, 6, 3 k): a unit of modulus at point p has the stiffness B_p^T B_p."""
+
+
+def analysed_elements(
+    mesh: HexMesh, options: ProblemOptions, cells: FiniteCells | None = None
+) -> AnalysedElements:
+    """What a solid is analysed by: finite cells, fine voxels, or the blocks of a coarsening.
+
+    Parameters
+    ----------
+    mesh
+        Its voxels.
+    options
+        The solid, of which constants, coarsening and forests are used.
+    cells
+        The finite cells that have these voxels, if it is one of them.
+    """
+    constants: Constants = {"poisson": options.poisson, "density": options.density}
+    if cells is not None:
+        return _CellElements(cells, constants)
+    coarsening = options.coarsening()
+    if coarsening is None:
+        return _FineElements(mesh, constants)
+    return _CoarseElements(mesh, coarsening, constants)
+
+
+class _FineElements(AnalysedElements):
+    """The voxels themselves."""
+
+    def __init__(self, mesh: HexMesh, constants: Constants) -> None:
+        self.model = fine_model(mesh, np.ones(mesh.n_cells), **constants)
+
+    def with_young(self, young: Array) -> Solid:
+        return self.model.with_young(young)
+
+    def solve(self, solver: ModalSolver, young: Array, start: Modes | Array | None) -> Modes:
+        return solver.solve(young, start)
+
+    def slopes(self, young: Array, directions: Array) -> Array:
+        return np.repeat(directions, 8, axis=0)
+
+    @property
+    def strains(self) -> Array:
+        values, vectors = np.linalg.eigh(quadrature_stiffness(self.model.poisson))
+        factors = np.sqrt(np.maximum(values, 0.0))[:, None, :] * vectors
+        factors = np.sqrt(self.model.mesh.edge) * factors[:, :, -STRAINS:]
+        return np.ascontiguousarray(factors.transpose(0, 2, 1))
+
+
+class _CoarseElements(_FineElements):
+    """Blocks of voxels, by a coarsening."""
+
+    def __init__(self, mesh: HexMesh, coarsening: Coarsening, constants: Constants) -> None:
+        self._coarsening, self._constants = coarsening, constants
+        self._blocks = blocks_from_mesh(mesh)
+        self.model = self._model(np.ones((self._blocks.coarse.n_cells, 8)))
+
+    def _model(self, moduli: Array) -> Solid:
+        fraction = self._coarsening.lumped_fraction
+        return coarse_model(self._blocks, moduli, fraction, **self._constants)
+
+    def _moduli(self, young: Array) -> Array:
+        return self._coarsening.moduli(block_moduli(self._blocks, young))
+
+    def with_young(self, young: Array) -> Solid:
+        return self._model(self._moduli(young))
+
+    def solve(self, solver: ModalSolver, young: Array, start: Modes | Array | None) -> Modes:
+        return solver.solve_coarse(self._moduli(young), start)
+
+    def slopes(self, young: Array, directions: Array) -> Array:
         blocks = self._blocks
         _, rows = self._coarsening.moduli_with_derivatives(block_moduli(blocks, young))
         inside = np.where(blocks.mask[:, :, None], directions[blocks.fine_of_block], 0.0)
         return np.asarray((rows @ inside).reshape(-1, directions.shape[1]))
+
+
+class _CellElements(AnalysedElements):
+    """Finite cells, whose stiffness is linear in the voxels' moduli."""
+
+    def __init__(self, cells: FiniteCells, constants: Constants) -> None:
+        self._cells = cells
+        ones = np.ones(cells.mesh.n_cells)
+        self.model = finite_cell_model(cells, ones, constants["poisson"], constants["density"])
+
+    def with_young(self, young: Array) -> Solid:
+        return self.model.with_young(young)
+
+    def solve(self, solver: ModalSolver, young: Array, start: Modes | Array | None) -> Modes:
+        return solver.solve(young, start)
+
+    def slopes(self, young: Array, directions: Array) -> Array:
+        columns = [self._cells.point_values(along).ravel() for along in directions.T]
+        return np.stack(columns, axis=1)
+
+    @property
+    def strains(self) -> Array:
+        return np.sqrt(2.0 * self.model.mesh.edge) * strain_factors(self.model.poisson)

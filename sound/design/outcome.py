@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -100,7 +100,7 @@ class Outcome:
             targets=targets,
             coordinates=evaluation.z,
             young=factor * moduli,
-            model=replace(simulation.model, young=factor * simulation.elements.moduli(moduli)),
+            model=simulation.elements.with_young(factor * moduli),
             eigenvalues=factor * evaluation.modes.values,
             modes=simulation.mesh_rows(evaluation.modes.vectors),
             surface_vertices=problem.vertices,

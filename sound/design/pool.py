@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError, UserError
+from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.geometry import HexMesh
 from carillon.threads import one_thread
 from solver.analysis.problem import ProblemOptions
@@ -54,11 +55,14 @@ class Setting:
     material: ReducedMaterial
     strikes: Sequence[Strike]
     objective: Objective
+    cells: FiniteCells | None = None
 
     def simulation(self, tolerance: float = TOLERANCE) -> Simulation:
         """Its simulation, on as many threads as this process is allowed."""
         modes = len(self.objective.targets.frequencies)
-        return Simulation(self.mesh, self.options, self.material, self.strikes, modes, tolerance)
+        return Simulation(
+            self.mesh, self.options, self.material, self.strikes, modes, tolerance, self.cells
+        )
 
 
 @dataclass(frozen=True)

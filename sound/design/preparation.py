@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from carillon.fem.geometry import hexmesh_from_voxels, voxelize
 from carillon.fem.geometry.surface import surface_name
 from carillon.runtime import allowed_cores
+from solver.analysis.problem import discretised
 from sound.clips.files import extract_file
 from sound.clips.targets import Targets, share_frequencies
 from sound.design.material import ReducedMaterial
@@ -67,13 +67,11 @@ def prepare(project: Project, targets: Targets | None = None) -> DesignProblem:
     strikes = project.strikes(surface)
     objective = Objective(targets_of(project) if targets is None else targets, project.weights)
     name = surface_name(solid.mesh)
-    mesh = hexmesh_from_voxels(
-        voxelize(surface, solid.resolution, solid.fill, solid.components, name)
-    )
+    mesh, cells = discretised(surface, solid, name)
     material = ReducedMaterial.of_mesh(
         mesh, project.material.dimensions, project.material.young, project.material.law
     )
-    setting = Setting(mesh, solid, material, strikes, objective)
+    setting = Setting(mesh, solid, material, strikes, objective, cells)
     return DesignProblem(project, np.asarray(surface.vertices), np.asarray(surface.faces), setting)
 
 

@@ -12,32 +12,22 @@ import numpy as np
 import scipy.linalg as la
 from numpy.typing import NDArray
 
-from carillon.fem.element import quadrature_stiffness
 from solver.analysis.modal_solver import Modes
 from solver.linear import Inverse
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-CELLS_AT_ONCE = 128
-"""Cells whose strain energies exist together."""
-STRAINS = 6
-"""Rank of the stiffness of a quadrature point."""
+POINTS_AT_ONCE = 1024
+"""Points of elements whose strain energies exist together."""
 SHIFT_FRACTION = 0.6
 """Fraction of the last eigenvalue above which a shift is sought."""
 DEPENDENT = 1e-10
 """Share (squared) of a vector below which it lies in the space that it was made orthogonal to."""
 
 
-def strain_factors(poisson: float) -> Array:
-    """B (8, 6, 24) with K_q = B_q^T B_q: strains of an element of unit edge, weighted."""
-    values, vectors = np.linalg.eigh(quadrature_stiffness(poisson))
-    factors = np.sqrt(np.maximum(values, 0.0))[:, None, :] * vectors
-    return np.ascontiguousarray(factors[:, :, -STRAINS:].transpose(0, 2, 1))
-
-
 def projected_stiffness(
-    corners: Index,
+    nodes: NDArray[np.integer],
     strains: Array,
     vectors: Array,
     others: Array,
@@ -47,16 +37,16 @@ def projected_stiffness(
 
     Parameters
     ----------
-    corners : (c, 8)
-        Nodes of the elements.
-    strains : (8, 6, 24)
-        Strain factors, the edge of an element included.
+    nodes : (c, k)
+        Of the elements.
+    strains : (p, 6, 3 k)
+        See `sound.design.elements.AnalysedElements.strains`.
     vectors : (3 n, N)
         Modes u.
     others : (3 n, T, N)
         Vectors x, T of each mode.
-    slopes : (8 c, m)
-        Derivatives of the moduli at the quadrature points.
+    slopes : (p c, m)
+        Derivatives of the moduli at the elements' points.
 
     Returns
     -------
@@ -65,19 +55,21 @@ def projected_stiffness(
     beyond : (m, T, N)
         u_i^T (dK/dz) x_i.
     """
-    count, points = vectors.shape[1], others.shape[1]
+    count, struck, points = vectors.shape[1], others.shape[1], len(strains)
     pairs = count * (count + 1) // 2
-    total = np.zeros((slopes.shape[1], pairs + points * count))
+    total = np.zeros((slopes.shape[1], pairs + struck * count))
     columns = np.ascontiguousarray(others.reshape(len(vectors), -1))
-    for first in range(0, len(corners), CELLS_AT_ONCE):
-        cells = corners[first : first + CELLS_AT_ONCE]
-        energies = np.empty((8 * len(cells), total.shape[1]))
-        _pair_energies(cells, strains, vectors, columns, energies)
-        total += slopes[8 * first : 8 * (first + len(cells))].T @ energies
+    flat = np.ascontiguousarray(strains.reshape(-1, strains.shape[2]))
+    at_once = max(1, POINTS_AT_ONCE // points)
+    for first in range(0, len(nodes), at_once):
+        cells = nodes[first : first + at_once]
+        energies = np.empty((points * len(cells), total.shape[1]))
+        _pair_energies(cells, flat, vectors, columns, energies)
+        total += slopes[points * first : points * (first + len(cells))].T @ energies
     upper = np.triu_indices(count)
     inside = np.empty((len(total), count, count))
     inside[:, upper[0], upper[1]] = inside[:, upper[1], upper[0]] = total[:, :pairs]
-    return inside, total[:, pairs:].reshape(-1, points, count)
+    return inside, total[:, pairs:].reshape(-1, struck, count)
 
 
 def outside_response(
@@ -147,32 +139,33 @@ def _orthonormal(block: Array, mass_block: Array) -> Array:
 
 
 @numba.njit(cache=True, nogil=True, fastmath={"contract", "reassoc"}, error_model="numpy")
-def _pair_energies(corners, strains, vectors, others, energies):  # type: ignore[no-untyped-def]
-    """Energies (8 c, pairs) per unit of modulus, modes with modes and each with its others."""
+def _pair_energies(nodes, strains, vectors, others, energies):  # type: ignore[no-untyped-def]
+    """Energies (p c, pairs) per unit of modulus, modes with modes and each with its others."""
     count = vectors.shape[1]
-    points = others.shape[1] // count
-    local = np.empty((24, count))
-    local_others = np.empty((24, others.shape[1]))
-    for cell in range(len(corners)):
-        for a in range(8):
-            node = corners[cell, a]
+    struck = others.shape[1] // count
+    width, points = nodes.shape[1], len(strains) // 6
+    local = np.empty((3 * width, count))
+    local_others = np.empty((3 * width, others.shape[1]))
+    for cell in range(len(nodes)):
+        for a in range(width):
+            node = nodes[cell, a]
             local[3 * a : 3 * a + 3] = vectors[3 * node : 3 * node + 3]
             local_others[3 * a : 3 * a + 3] = others[3 * node : 3 * node + 3]
-        for q in range(8):
-            strain = strains[q] @ local
-            strain_others = strains[q] @ local_others
-            row = energies[8 * cell + q]
+        strain = strains @ local
+        strain_others = strains @ local_others
+        for q in range(points):
+            row = energies[points * cell + q]
             pair = 0
             for i in range(count):
                 row[pair : pair + count - i] = 0.0
-                for s in range(6):
+                for s in range(6 * q, 6 * q + 6):
                     factor = strain[s, i]
                     for j in range(i, count):
                         row[pair + j - i] += factor * strain[s, j]
                 pair += count - i
-            for p in range(points):
+            for p in range(struck):
                 for i in range(count):
                     value = 0.0
-                    for s in range(6):
+                    for s in range(6 * q, 6 * q + 6):
                         value += strain[s, i] * strain_others[s, p * count + i]
                     row[pair + p * count + i] = value

@@ -10,20 +10,20 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.fem.block import degrees_of_freedom
+from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.geometry import HexMesh
-from carillon.fem.model import RIGID_MODES, ElasticModel
+from carillon.fem.model import RIGID_MODES, Solid
 from solver.analysis.modal_solver import ModalSolver, Modes
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
 from solver.response.contact import interpolation
-from sound.design.elements import AnalysedElements
+from sound.design.elements import analysed_elements
 from sound.design.material import ReducedMaterial
 from sound.design.objective import Sensitivity
 from sound.design.sensitivity import (
     outside_response,
     projected_stiffness,
     shift_between,
-    strain_factors,
 )
 from sound.strikes import Strike
 
@@ -67,7 +67,7 @@ class Simulation:
     Parameters
     ----------
     mesh
-        Fine mesh.
+        Its voxels.
     options
         The solid, of which constants, coarsening and forests are used.
     material
@@ -78,6 +78,8 @@ class Simulation:
         Number N of elastic modes.
     tolerance
         Relative error of the eigenvalues.
+    cells
+        The finite cells that have these voxels, if it is one of them.
     """
 
     def __init__(
@@ -88,19 +90,20 @@ class Simulation:
         strikes: Sequence[Strike],
         modes: int,
         tolerance: float = TOLERANCE,
+        cells: FiniteCells | None = None,
     ) -> None:
         self.material = material
-        self.elements = AnalysedElements(mesh, options)
+        self.elements = analysed_elements(mesh, options, cells)
         self.modes = modes
         analysis = SolverOptions(modes=RIGID_MODES + modes, tolerance=tolerance)
         self.solver = ModalSolver(self.model, analysis, MPI.COMM_SELF)
         # Rows of the analysis are in the order of its partition.
         self._order = degrees_of_freedom(self.solver.local_mesh.nodes)
         self._pushes = pushes(self.model, strikes)[self._order]
-        self._strains = np.sqrt(self.model.mesh.edge) * strain_factors(self.model.poisson)
+        self._strains = self.elements.strains
 
     @property
-    def model(self) -> ElasticModel:
+    def model(self) -> Solid:
         """The solid that is analysed, with moduli of 1 Pa."""
         return self.elements.model
 
@@ -117,7 +120,7 @@ class Simulation:
             Whether their derivatives are asked for.
         """
         young = self.material.moduli(z)
-        modes = self.solver.solve_coarse(self.elements.moduli(young), start)
+        modes = self.elements.solve(self.solver, young, start)
         elastic = modes.vectors[:, RIGID_MODES:]
         evaluation = Evaluation(z, modes.values[RIGID_MODES:], self._pushes.T @ elastic, modes)
         return self.differentiate(evaluation) if derivatives else evaluation
@@ -138,8 +141,8 @@ class Simulation:
         inverse.destroy()
         vectors, others = np.empty_like(elastic), np.empty_like(outside)
         vectors[self._order], others[self._order] = elastic, outside
-        corners = self.model.mesh.cells
-        inside, beyond = projected_stiffness(corners, self._strains, vectors, others, slopes)
+        nodes = self.model.connectivity
+        inside, beyond = projected_stiffness(nodes, self._strains, vectors, others, slopes)
         return Sensitivity(inside, beyond)
 
     def mesh_rows(self, vectors: Array) -> Array:
@@ -149,7 +152,7 @@ class Simulation:
         return rows
 
 
-def pushes(model: ElasticModel, strikes: Sequence[Strike]) -> Array:
+def pushes(model: Solid, strikes: Sequence[Strike]) -> Array:
     """Forces (n_dofs, T) of unit impulses [N s] along the inward normals of struck points."""
     weights = interpolation(model, np.array([strike.position for strike in strikes])).toarray()
     inward = np.array([strike.inward for strike in strikes])

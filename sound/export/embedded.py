@@ -7,8 +7,9 @@ from typing import Any
 
 import h5py
 
+from carillon.fem.model import ElasticModel
 from solver.assembly.sparse import assembled
-from solver.files.model_group import put
+from solver.files.model_group import FINITE_CELLS, put
 from solver.files.modes_file import ModesFile, frequencies, write_modes
 from solver.response.contact import embedding
 from solver.studies.comparison import recomputed_residuals
@@ -22,7 +23,7 @@ SOUND = (
     "rigid ones; a_k = |u_k . f| in kg^-1/2 N s, u_k = displacement of the struck point in mode k, "
     "f = impulse in N s; within a cluster of equal frequencies a_k = (u_k . f)^2 / |U . f|"
 )
-EMBEDDING = "vertex value = sum over corners c of weights[v, c] * values[cells[cell[v], c]]"
+EMBEDDING = "vertex value = sum over nodes c of weights[v, c] * values[{}[cell[v], c]]"
 
 
 def write_embedded(path: str | Path, design: Design, parameters: dict[str, Any]) -> None:
@@ -41,7 +42,7 @@ def write_embedded(path: str | Path, design: Design, parameters: dict[str, Any])
         "method": "sound design",
         "normalisation": NORMALISATION,
         "sound": SOUND,
-        "embedding": EMBEDDING,
+        "embedding": EMBEDDING.format(_elements(design)),
         "mesh": str(design.settings.get("mesh", "")),
     }
 
@@ -60,11 +61,16 @@ def write_embedded(path: str | Path, design: Design, parameters: dict[str, Any])
     )
 
 
+def _elements(design: Design) -> str:
+    """Dataset that holds the nodes of the elements that the surface lies in."""
+    return "cells" if isinstance(design.model, ElasticModel) else f"{FINITE_CELLS}/nodes"
+
+
 def _put_more(file: h5py.File, design: Design) -> None:
     cells, weights = embedding(design.model, design.surface_vertices)
     listening = Listening.of_design(design, SoundingSolid.of_design(design))
     put_object(file, design)
-    put(file, "surface/cell", cells, "1", "row of `cells` that the vertex lies in or next to")
-    put(file, "surface/weights", weights, "1", "trilinear weights of that cell's eight corners")
+    put(file, "surface/cell", cells, "1", "row of the element that the vertex lies in or next to")
+    put(file, "surface/weights", weights, "1", "weights of that element's nodes")
     put(file, "dampings", design.targets.dampings, "1/s", "d of the elastic modes, exp(-d t)")
     put(file, "strikes/gains", listening.gains, "kg^1/2/(N s)", "samples of full scale per a_k")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from carillon import provenance
 from carillon.errors import UserError
-from carillon.fem.model import RIGID_MODES, Solid
+from carillon.fem.model import RIGID_MODES, ElasticModel, Solid
 from carillon.files import create_h5, open_h5
 from carillon.measurement import measured
 from solver.files.model_group import get_model, put, put_model
@@ -193,7 +193,7 @@ def _fault(design: Design) -> str:
         ("rates", targets.rates, (T,)),
         ("eigenvalues", design.eigenvalues, (kept,)),
         ("modes", design.modes, (design.model.n_dofs, kept)),
-        ("moduli of the coarse cells", design.model.young, (design.model.mesh.n_cells, 8)),
+        ("moduli of the coarse cells", design.model.young, _shape_of_moduli(design.model)),
         ("coordinates", design.coordinates, (None,)),
         ("fine cells", design.fine_grid, (len(design.young), 3)),
         ("surface vertices", design.surface_vertices, (None, 3)),
@@ -214,6 +214,11 @@ def _fault(design: Design) -> str:
         if not 0 <= vertex < count:
             return f"names the surface's vertex {vertex}, of which there are {count}"
     return ""
+
+
+def _shape_of_moduli(model: Solid) -> tuple[int, ...]:
+    points = (8,) if isinstance(model, ElasticModel) else ()
+    return (model.mesh.n_cells, *points)
 
 
 def _matches(own: tuple[int, ...], expected: tuple[int | None, ...]) -> bool:

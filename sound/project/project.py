@@ -11,6 +11,7 @@ from carillon.documents import read_yaml
 from carillon.errors import UserError
 from carillon.fem.geometry.surface import BUILTIN_PREFIX
 from solver.analysis.problem import ProblemOptions
+from solver.coarsening.forest import FOREST
 from sound.project.schema import check, project_schema, with_defaults
 from sound.strikes import Place, Strike, locate_all
 from sound.surface import struck_surface
@@ -28,6 +29,7 @@ _SOLID = (
     "density",
     "coarsen",
     "forest",
+    "discretisation",
 )
 LEAST_WEIGHT = 1e-12
 """Of frequencies or of amplitudes: what is smaller leaves a search with nothing to lower."""
@@ -161,6 +163,8 @@ def project_of(described: Mapping[str, Any], folder: Path) -> Project:
         solid["mesh"] = str(folder / solid["mesh"])
     if solid["forest"] is not None:
         solid["forest"] = str(folder / solid["forest"])
+    if solid["coarsen"] is None:
+        solid["coarsen"] = FOREST if solid["discretisation"] == "voxel" else "none"
     return Project(
         ProblemOptions(**solid),
         filled["modes"],

@@ -112,9 +112,7 @@ class SoundingSolid:
 
 def _require_same_object(mesh: HexMesh, designed: HexMesh) -> None:
     """Refuse a mesh that fills another box than that of the design, by more than a cell."""
-    boxes = [
-        np.stack([each.nodes.min(axis=0), each.nodes.max(axis=0)]) for each in (mesh, designed)
-    ]
+    boxes = [mesh.bounds, designed.bounds]
     if np.abs(boxes[0] - boxes[1]).max() > max(mesh.edge, designed.edge):
         sizes = [" x ".join(f"{side:.3g}" for side in np.ptp(box, axis=0)) for box in boxes]
         raise UserError(

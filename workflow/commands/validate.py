@@ -90,7 +90,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "says how far they can be trusted. The same command goes on where it was stopped. Exit "
         f"status 0 if all criteria are met, {FAILED} if one is missed."
     )
-    own = ("coarsen", "forest", "objective", "lumped")
+    own = ("coarsen", "forest", "objective", "lumped", "discretisation")
     add_options(parser, ProblemOptions, leave_out=own, positional=("mesh",))
     add_options(parser, ValidateOptions)
 

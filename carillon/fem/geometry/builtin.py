@@ -13,6 +13,7 @@ import trimesh
 
 from carillon.errors import UserError
 from carillon.fem.geometry.sweep import SECTIONS, joined, spline, sweep, tube, turned
+from carillon.fem.geometry.thin import THIN
 from carillon.fem.geometry.trials import TRIALS
 
 
@@ -169,7 +170,7 @@ BUILTINS: dict[str, Callable[[], trimesh.Trimesh]] = {
 
 
 def builtin_surface(name: str) -> trimesh.Trimesh:
-    """Surface of the built-in object or trial solid `name` in metres, of closed shells.
+    """Surface of the built-in object, thick or thin, or trial solid `name` in metres, closed.
 
     Raises
     ------
@@ -181,7 +182,7 @@ def builtin_surface(name: str) -> trimesh.Trimesh:
     >>> builtin_surface("bar").is_watertight
     True
     """
-    known = {**BUILTINS, **TRIALS}
+    known = {**BUILTINS, **THIN, **TRIALS}
     if name not in known:
         raise UserError(
             f"builtin:{name}: no such built-in object, expected one of {', '.join(known)}"

@@ -61,6 +61,12 @@ class HexMesh:
         return kinds_of_cells(self.grid, self.span, self.hanging)
 
     @property
+    def bounds(self) -> np.ndarray:
+        """Lowest and highest corner (2, 3) [m] of the box around all cells."""
+        corners = self.nodes[np.unique(self.cells)]
+        return np.stack([corners.min(axis=0), corners.max(axis=0)])
+
+    @property
     def n_nodes(self) -> int:
         return len(self.node_grid)
 
