@@ -13,9 +13,9 @@ PYTHON_OF_VENV = $(VENV)/bin/python
 CORES ?= all
 TARGETS ?= all
 PYTEST_OPTIONS ?=
-# Test files run beside each other, each in one process, the long ones first. Those of SLURM, and whoever
-# starts processes, wait much of the time, which is what more processes than two cores are for.
-PYTEST_PROCESSES ?= 4
+# Test files run beside each other, each in one process, the long ones first. Those of SLURM wait most
+# of the time, which is what the third process is for.
+PYTEST_PROCESSES ?= 3
 TORTURE_PROCESSES ?= 2
 PACKAGES = $(patsubst %/__init__.py,%,$(wildcard */__init__.py))
 RULES = $(wildcard Snakefile workflow/rules/*.smk)

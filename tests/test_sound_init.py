@@ -51,8 +51,9 @@ def test_what_is_not_asked_for_has_its_default(here):
     defaults = with_defaults({key: described[key] for key in ("mesh", "targets")}, SCHEMA)
     filled = load_project(here / "bar.yaml").as_dict()
     for key in SCHEMA["properties"]:
-        if key not in ("mesh", "targets", "modes"):
+        if key not in ("mesh", "targets", "modes", "coarsen"):
             assert filled[key] == defaults[key], key
+    assert defaults["coarsen"] == "auto" and filled["coarsen"] == "ddfem"
 
 
 def test_every_key_is_there_with_its_default_and_its_meaning(here):

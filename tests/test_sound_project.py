@@ -76,7 +76,7 @@ def test_choices_of_the_schema_are_those_of_the_code():
     assert methods == list(OPTIMISERS)
     choices = {each.name: each.metadata["choices"] for each in dataclasses.fields(SearchOptions)}
     assert methods == list(choices["method"])
-    assert set(SCHEMA["properties"]["coarsen"]["enum"]) - {None} < set(COARSENINGS)
+    assert set(SCHEMA["properties"]["coarsen"]["enum"]) - {"auto"} < set(COARSENINGS)
     assert SCHEMA["properties"]["discretisation"]["enum"] == list(DISCRETISATIONS)
 
 
@@ -171,7 +171,7 @@ RIM = LEAST["targets"][0]
         ({"mesh": None}, "mesh: found None, expected a text"),
         (
             {"coarsen": "fit"},
-            "coarsen: found 'fit', expected one of none, average, galerkin, ddfem",
+            "coarsen: found 'fit', expected one of auto, none, average, galerkin, ddfem",
         ),
         ({"poisson": 0.5}, "poisson: found 0.5, expected below 0.5"),
         ({"density": float("nan")}, "density: found nan, expected a finite number"),

@@ -31,6 +31,8 @@ _SOLID = (
     "forest",
     "discretisation",
 )
+AUTO = "auto"
+"""Coarsening that the discretisation chooses."""
 LEAST_WEIGHT = 1e-12
 """Of frequencies or of amplitudes: what is smaller leaves a search with nothing to lower."""
 
@@ -163,7 +165,7 @@ def project_of(described: Mapping[str, Any], folder: Path) -> Project:
         solid["mesh"] = str(folder / solid["mesh"])
     if solid["forest"] is not None:
         solid["forest"] = str(folder / solid["forest"])
-    if solid["coarsen"] is None:
+    if solid["coarsen"] == AUTO:
         solid["coarsen"] = FOREST if solid["discretisation"] == "voxel" else "none"
     return Project(
         ProblemOptions(**solid),

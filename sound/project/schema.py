@@ -117,7 +117,7 @@ def _expected(mistake: ValidationError) -> str:
     if mistake.validator == "type":
         return " or ".join(_TYPES[kind] for kind in ([value] if isinstance(value, str) else value))
     if mistake.validator == "enum":
-        return f"one of {', '.join('null' if each is None else each for each in value)}"
+        return f"one of {', '.join(value)}"
     return _RULES[mistake.validator].format(value)
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
-import trimesh
 from scipy.sparse.csgraph import connected_components
 
 from carillon.errors import UserError
@@ -18,6 +18,9 @@ from carillon.fem.finite_cells.shapes import octant_weights
 from carillon.fem.finite_cells.weights import weights_of_parts
 from carillon.fem.geometry.fill import Grid, bounding_grid
 from carillon.fem.geometry.voxels import COMPONENTS, checked_resolution
+
+if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
+    import trimesh
 
 SMALLEST_OCTANT = 1e-6
 """Share of a voxel below which it counts as empty."""

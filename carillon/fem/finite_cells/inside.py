@@ -1,17 +1,17 @@
 """Which pieces of the lattice's lines are inside a surface, and which voxels it cuts.
 
 Inside is where the winding number is not about zero, as for voxels. Of a closed surface the
-crossings tell it; where a surface has holes, winding numbers are computed at the ends of the pieces
-between crossings, in voxels that are not inside or outside as a whole.
+crossings tell it. Where there are holes, it is followed from crossing to crossing through the
+voxels that are cut, and computed where that does not lead to what the next voxel has.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numba
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from carillon.fem.element import CORNERS
@@ -24,6 +24,9 @@ from carillon.fem.finite_cells.lines import (
     spread_lines,
 )
 from carillon.fem.geometry.fill import INSIDE, Grid, cut, winding_numbers
+
+if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
+    import trimesh
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -88,6 +91,8 @@ class Inside:
 
 def find_inside(surface: trimesh.Trimesh, grid: Grid) -> Inside:
     """The inside of a surface, which may have holes and overlapping shells."""
+    import trimesh
+
     merged = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
     merged.merge_vertices()
     vertices = np.ascontiguousarray((merged.vertices - grid.origin) / grid.edge)
