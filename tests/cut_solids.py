@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 from trimesh.transformations import euler_matrix
 
 from carillon.fem.finite_cells.build import finite_cells
@@ -13,7 +12,6 @@ from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
-from solver.assembly.sparse import assembled
 
 ANGLES = np.radians([25.0, 35.0, 15.0])
 """About x, y and z, by which solids are turned against the lattice."""
@@ -43,9 +41,3 @@ def uniform(cells: FiniteCells) -> FiniteCellModel:
 def eigenvalues(model: FiniteCellModel, count: int) -> NDArray[np.float64]:
     """The lowest ones by SLEPc."""
     return modal_analysis(model, SolverOptions(modes=count, method="slepc")).values
-
-
-def dense_eigenvalues(model: FiniteCellModel) -> NDArray[np.float64]:
-    """All of them by LAPACK."""
-    K, M = assembled(model)
-    return np.asarray(eigh(K.toarray(), M.toarray(), eigvals_only=True))

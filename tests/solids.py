@@ -12,7 +12,7 @@ from numpy.polynomial import legendre
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.element import elasticity_matrix
 from carillon.fem.geometry import HexMesh, blocks_from_mesh, hexmesh_from_grid
-from carillon.fem.model import ElasticModel, fine_model
+from carillon.fem.model import ElasticModel, Solid, fine_model
 from solver.assembly.sparse import assembled
 from solver.assembly.system import System
 from solver.coarsening.choice import make_coarsening
@@ -78,7 +78,7 @@ def local_rows(system: System, block: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(block[degrees_of_freedom(system.nodes)])
 
 
-def dense_eigenvalues(model: ElasticModel) -> np.ndarray:
+def dense_eigenvalues(model: Solid) -> np.ndarray:
     """All eigenvalues by LAPACK."""
     K, M = assembled(model)
     return la.eigh(K.toarray(), M.toarray(), eigvals_only=True)

@@ -54,14 +54,14 @@ def elasticity_matrix(poisson: float = DEFAULT_POISSON) -> Array:
 
 
 def strain_displacement(gradients: Array) -> Array:
-    """Strain-displacement matrices (p, 6, 24) from shape gradients (p, 8, 3)."""
-    matrices = np.zeros((len(gradients), 6, 8, 3))
+    """Strain-displacement matrices (p, 6, 3 k) from gradients (p, k, 3) of the k nodes' shapes."""
+    matrices = np.zeros((len(gradients), 6, gradients.shape[1], 3))
     for axis in range(3):
         matrices[:, axis, :, axis] = gradients[:, :, axis]
     for row, (a, b) in enumerate(((0, 1), (1, 2), (2, 0)), start=3):
         matrices[:, row, :, a] = gradients[:, :, b]
         matrices[:, row, :, b] = gradients[:, :, a]
-    return matrices.reshape(len(gradients), 6, 24)
+    return matrices.reshape(len(gradients), 6, -1)
 
 
 @cache

@@ -16,6 +16,7 @@ from carillon.fem.finite_cells.shapes import OCTANTS, POINTS, octant_weights
 from carillon.fem.geometry import CORNER_OFFSETS, HexMesh
 from carillon.fem.geometry.hanging import kinds_of_cells, makes_sense, node_places
 from carillon.fem.model import ElasticModel, Solid
+from carillon.fem.moduli import at_points
 from carillon.limits import DENSITIES, EDGES, POISSON
 
 Array = NDArray[np.float64]
@@ -80,7 +81,8 @@ def get_model(group: h5py.Group) -> Solid:
     """
     if FINITE_CELLS in group:
         return _finite_cell_model(group)
-    mesh = _mesh(group, *_sizes(group))
+    grid = _grid(group)
+    mesh = _mesh(group, grid, *_sizes(group, grid))
     if not _are_corners(mesh):
         raise refused(group, "cells, nodes and their places on the grid do not fit each other")
     fill = read(group, "fill", (mesh.n_cells,), INTEGER).astype(np.uint8)
@@ -90,11 +92,9 @@ def get_model(group: h5py.Group) -> Solid:
     young = read(group, "young", (mesh.n_cells, 8) if whole else (mesh.n_cells,))
     if (young < 0.0).any():
         raise refused(group, "dataset 'young' holds negative moduli")
-    if not whole:
-        young = np.repeat(young[:, None], 8, axis=1)
     return ElasticModel(
         mesh,
-        young.astype(float, copy=False),
+        at_points(young.astype(float, copy=False)),
         fill,
         number(group, "poisson", *POISSON),
         number(group, "density", *DENSITIES),
@@ -103,8 +103,11 @@ def get_model(group: h5py.Group) -> Solid:
     )
 
 
-def _mesh(group: h5py.Group, *sizes: NDArray[np.uint8]) -> HexMesh:
-    grid = read(group, "grid", (None, 3), INTEGER).astype(np.int32)
+def _grid(group: h5py.Group) -> NDArray[np.int32]:
+    return read(group, "grid", (None, 3), INTEGER).astype(np.int32)
+
+
+def _mesh(group: h5py.Group, grid: NDArray[np.int32], *sizes: NDArray[np.uint8]) -> HexMesh:
     return HexMesh(
         read(group, "cells", (len(grid), 8), INTEGER).astype(np.int32),
         grid,
@@ -116,7 +119,7 @@ def _mesh(group: h5py.Group, *sizes: NDArray[np.uint8]) -> HexMesh:
 
 
 def _finite_cell_model(group: h5py.Group) -> FiniteCellModel:
-    mesh, inner = _mesh(group), group[FINITE_CELLS]
+    mesh, inner = _mesh(group, _grid(group)), group[FINITE_CELLS]
     nodes = read(inner, "nodes", (None, len(NODES)), INTEGER).astype(np.int32)
     row = read(inner, "row", (len(nodes),), INTEGER).astype(np.int32)
     voxels = read(inner, "voxels", (len(nodes), OCTANTS), INTEGER).astype(np.int32)
@@ -136,11 +139,10 @@ def _finite_cell_model(group: h5py.Group) -> FiniteCellModel:
     )
 
 
-def _sizes(group: h5py.Group) -> tuple[NDArray[np.uint8], ...]:
+def _sizes(group: h5py.Group, grid: NDArray[np.int32]) -> tuple[NDArray[np.uint8], ...]:
     """`span` and `hanging` of the cells of a mixed mesh; nothing of one with cells of one size."""
     if not {"span", "hanging"} & set(group):
         return ()
-    grid = read(group, "grid", (None, 3), INTEGER).astype(np.int32)
     span = read(group, "span", (len(grid),), INTEGER)
     hanging = read(group, "hanging", (len(grid),), INTEGER)
     is_whole = span == 2

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from carillon.fem.block import CELL_NODES, NODES
+from carillon.fem.block import CELL_NODES, CORNER_NODES, NODES
 from carillon.fem.finite_cells.shapes import octant_weights
 from carillon.fem.geometry.hexmesh import CORNER_OFFSETS, HexMesh
 
@@ -88,21 +88,17 @@ class FiniteCells:
 
     def hexmesh(self) -> HexMesh:
         """The cells as cubes with nodes at their corners, by which neighbours are found."""
-        corners = self.nodes[:, (2 * CORNER_OFFSETS) @ [1, 3, 9]]
-        mesh = self.mesh
+        mesh, corners = self.mesh, self.nodes[:, CORNER_NODES]
         return HexMesh(corners, self.grid // 2, mesh.node_grid, mesh.origin, 2 * mesh.edge)
 
-    def point_values(
-        self, values: np.ndarray, chosen: np.ndarray | slice = slice(None)
-    ) -> np.ndarray:
+    def point_values(self, values: np.ndarray) -> np.ndarray:
         """Weighted values (c, 125) at the points of cells, from those (m,) of the voxels.
 
         A part of a cell that is empty has `FLOOR` of the mean over what is not.
         """
-        rows, voxels = self.row[chosen], self.voxels[chosen]
-        of_octants = np.where(voxels >= 0, values[voxels], 0.0)
+        of_octants = np.where(self.voxels >= 0, values[self.voxels], 0.0)
         whole = octant_weights().sum(axis=0)
-        inside = self.weights[rows]
+        inside = self.weights[self.row]
         weighted = np.einsum("co,cop->cp", of_octants, inside)
         share = 8.0 * inside.sum(axis=2)
         mean = (of_octants * share).sum(axis=1) / share.sum(axis=1)

@@ -236,15 +236,15 @@ def _in_voxels(start, place, step, columns, state, levels, n):  # type: ignore[n
         number = start[line]
         winding, run, vague = 0, len(low), False
         for voxel in range(state.shape[2] + 1):
-            kind, level = 0, 0
+            kind, level = EMPTY, 0
             if voxel < state.shape[2]:
                 kind, level = state[row, column, voxel], levels[row, column, voxel]
-            if kind != 1:
+            if kind != CUT:
                 if vague or winding != level:
                     for piece in range(run, len(low)):
                         unsure[piece] = True
-                winding, vague = level, level == 127
-                if kind == 2:
+                winding, vague = level, level == VAGUE
+                if kind == FULL:
                     low.append(float(voxel))
                     high.append(voxel + 1.0)
                     owner.append(line)
@@ -254,7 +254,7 @@ def _in_voxels(start, place, step, columns, state, levels, n):  # type: ignore[n
                     number += 1
                 run = len(low)
                 continue
-            vague = vague or level == 127
+            vague = vague or level == VAGUE
             begin = float(voxel)
             while True:
                 crossed = number < start[line + 1] and place[number] < voxel + 1.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -107,9 +108,9 @@ class FiniteCellModel(Solid):
         """The voxels that hold material, and all nodes."""
         return self.cells.mesh
 
-    @property
+    @cached_property
     def elements(self) -> CellElements:
-        """See `Solid.elements`."""
+        """See `Solid.elements`; made once, since the weights of all cells go into them."""
         return CellElements(
             self.cells.point_values(self.young),
             self.cells.point_values(np.ones(self.mesh.n_cells)),

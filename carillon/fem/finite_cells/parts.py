@@ -11,7 +11,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.finite_cells.inside import Pieces
+from carillon.fem.finite_cells.inside import CUT, FULL, Pieces
 from carillon.fem.finite_cells.lines import LINES
 
 Array = NDArray[np.float64]
@@ -83,7 +83,7 @@ def _take_along(  # type: ignore[no-untyped-def]
     at = np.empty(3, dtype=np.int64)
     for k in range(len(cells)):
         for octant in range(8):
-            if state[k, octant] != 1:
+            if state[k, octant] != CUT:
                 continue
             half_a, half_b, half_c = octant >> axis & 1, octant >> b & 1, octant >> c & 1
             voxel = cells[k, axis] + half_a
@@ -112,7 +112,7 @@ def _take_full(state, labels):  # type: ignore[no-untyped-def]
     n = labels.shape[1] // 2
     for k in range(len(state)):
         for octant in range(8):
-            if state[k, octant] == 2:
+            if state[k, octant] == FULL:
                 x, y, z = (octant & 1) * n, (octant >> 1 & 1) * n, (octant >> 2) * n
                 labels[k, x : x + n, y : y + n, z : z + n] = -1
 

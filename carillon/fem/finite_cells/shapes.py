@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.fem.block import NODES
-from carillon.fem.element import CORNERS, elasticity_matrix
+from carillon.fem.element import CORNERS, elasticity_matrix, strain_displacement
 
 Array = NDArray[np.float64]
 
@@ -106,15 +106,8 @@ def strain_factors(poisson: float) -> Array:
 
     A cell of edge h with weighted moduli w_p [Pa] has the stiffness ``h * sum_p w_p B_p^T B_p``.
     """
-    gradients = shape_gradients(points())
-    strain = np.zeros((POINTS, 6, len(NODES), 3))
-    for axis in range(3):
-        strain[:, axis, :, axis] = gradients[:, :, axis]
-    for row, (a, b) in enumerate(((0, 1), (1, 2), (2, 0)), start=3):
-        strain[:, row, :, a] = gradients[:, :, b]
-        strain[:, row, :, b] = gradients[:, :, a]
     root = np.linalg.cholesky(elasticity_matrix(poisson)).T
-    return _kept(root @ strain.reshape(POINTS, 6, -1))
+    return _kept(root @ strain_displacement(shape_gradients(points())))
 
 
 @cache

@@ -100,7 +100,7 @@ def _length(voxels: np.ndarray) -> int:
 def centre_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
     """Voxels whose centre is inside the surface by its winding number; thin parts may break off."""
     index = np.indices(grid.shape).reshape(3, -1).T
-    return inside_points(surface, grid, index + 0.5).reshape(grid.shape), grid.origin
+    return _inside(surface, grid, index + 0.5).reshape(grid.shape), grid.origin
 
 
 def orthographic_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
@@ -129,7 +129,7 @@ def filled_fraction(surface: trimesh.Trimesh, grid: Grid, touched: np.ndarray) -
     step = (np.arange(SAMPLES) + 0.5) / SAMPLES
     offsets = np.stack(np.meshgrid(step, step, step, indexing="ij"), axis=-1).reshape(-1, 3)
     points = (near[:, None, :] + offsets).reshape(-1, 3)
-    inside = inside_points(surface, grid, points).reshape(len(near), -1)
+    inside = _inside(surface, grid, points).reshape(len(near), -1)
     fraction[tuple(near.T)] = inside.mean(axis=1)
     return fraction
 
@@ -163,7 +163,7 @@ def cut(surface: trimesh.Trimesh, max_edge: float) -> trimesh.Trimesh:
     return trimesh.Trimesh(vertices, faces, process=False)
 
 
-def inside_points(surface: trimesh.Trimesh, grid: Grid, points: np.ndarray) -> np.ndarray:
+def _inside(surface: trimesh.Trimesh, grid: Grid, points: np.ndarray) -> np.ndarray:
     """Whether `points` (p, 3), in voxels from the grid's corner, are inside the surface."""
     return np.asarray(np.abs(winding_numbers(surface, grid, points)) > INSIDE)
 
