@@ -67,8 +67,14 @@ class ErrorEstimate:
         return RIGID_MODES + 1 + int(np.abs(self.errors).argmax())
 
     def excess(self, tolerance: float) -> float:
-        """How many times as large as allowed the errors are: their rms, or a third of the worst."""
-        return max(self.rms, abs(self.worst) / WORST) / tolerance
+        """See `excess`."""
+        return excess(self.errors, tolerance)
+
+
+def excess(errors: Array, tolerance: float) -> float:
+    """How many times as large as allowed errors (k,) are: their rms, or a third of the worst."""
+    rms = float(np.sqrt(np.mean(errors**2)))
+    return max(rms, float(np.abs(errors).max()) / WORST) / tolerance
 
 
 def estimate_errors(

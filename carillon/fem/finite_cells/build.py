@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
+from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from carillon.fem.block import NODES
 from carillon.fem.finite_cells.cells import FiniteCells, assemble_cells
-from carillon.fem.finite_cells.inside import CUT, EMPTY, FULL, Inside, find_inside
-from carillon.fem.finite_cells.parts import find_parts, meetings
-from carillon.fem.finite_cells.shapes import octant_weights
-from carillon.fem.finite_cells.weights import weights_of_parts
+from carillon.fem.finite_cells.cover import Cover, cover_of, divided_cover, faces_of_halves
+from carillon.fem.finite_cells.descent import parents, voxels_of_parents
+from carillon.fem.finite_cells.inside import CUT, FULL, Inside, find_inside
+from carillon.fem.finite_cells.joining import Faces, joined_nodes
 from carillon.fem.geometry.fill import Grid, bounding_grid
 from carillon.fem.geometry.voxels import COMPONENTS, checked_resolution
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
     import trimesh
 
-SMALLEST_OCTANT = 1e-6
-"""Share of a voxel below which it counts as empty."""
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
 SMALLEST_PIECE = 0.5
 """Volume [voxels] below which a loose piece is a crumb, and left out."""
 LOST = 1.1
@@ -32,6 +32,138 @@ TRIAL_FACTORS = (1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 """Factors by which a resolution is raised in search of one at which nothing is lost."""
 TRIAL_GRID = 4_000_000
 """Largest grid [voxels] of such a trial."""
+
+
+@dataclass(frozen=True)
+class Division:
+    """Finite cells some of which are divided into eight.
+
+    Attributes
+    ----------
+    cells
+        The mesh.
+    parent : (c,)
+        Undivided cell that each is, or is part of.
+    voxel : (m,)
+        Voxel of the undivided mesh whose material each voxel has.
+    """
+
+    cells: FiniteCells
+    parent: Index
+    voxel: Index
+
+
+@dataclass(frozen=True)
+class Covering:
+    """A surface, and the cells of a lattice that cover its inside.
+
+    Attributes
+    ----------
+    surface, name
+        See `finite_cells`.
+    grid
+        Lattice of the voxels.
+    cover
+        The cells and their parts.
+    kept : (p,)
+        Which parts are of the solid.
+    """
+
+    surface: trimesh.Trimesh
+    name: str
+    grid: Grid
+    cover: Cover
+    kept: NDArray[np.bool_]
+
+    @cached_property
+    def cells(self) -> FiniteCells:
+        """All cells, undivided."""
+        faces = Faces(self.cover.met, np.empty((0, 4), dtype=np.int64)).chosen(self.kept)
+        corner = self.cover.grid[self.kept]
+        nodes, places = joined_nodes(corner, np.full(len(corner), 2), faces)
+        rows, row = np.unique(np.append(0, self.cover.row[self.kept]), return_inverse=True)
+        weights = self.cover.weights[rows]
+        return assemble_cells(nodes, places, row[1:], weights, self.grid.origin, self.grid.edge)
+
+    def divided(self, places: Index) -> Division:
+        """The same, but with cells at `places` (d, 3), their lowest voxels, divided into eight.
+
+        Raises
+        ------
+        UserError
+            If the finer lattice shows that the solid is in pieces.
+        """
+        whole, half = self.cover, divided_cover(self.surface, self.grid, places)
+        undivided = np.ones(len(whole.places), dtype=bool)
+        undivided[whole.cells_at(places)] = False
+        faces = Faces(
+            np.concatenate([whole.met, half.met + np.array([len(whole), len(whole), 0])]),
+            faces_of_halves(whole, half, undivided) + np.array([0, len(whole), 0, 0]),
+        )
+        corner = np.concatenate([2 * whole.grid, half.grid])
+        span = np.repeat([4, 2], [len(whole), len(half)])
+        table = np.concatenate([whole.weights, half.weights[1:]])
+        row = np.concatenate(
+            [whole.row, np.where(half.row > 0, half.row + len(whole.weights) - 1, 0)]
+        )
+        leaves = np.concatenate(
+            [self.kept & undivided[whole.owner], np.ones(len(half), dtype=bool)]
+        )
+        chosen = self._one_piece(faces, leaves, np.concatenate([whole.volumes, half.volumes / 8.0]))
+        nodes, node_places = joined_nodes(corner[chosen], span[chosen], faces.chosen(chosen))
+        rows, row = np.unique(np.append(0, row[chosen]), return_inverse=True)
+        edge = self.grid.edge / 2.0
+        cells = assemble_cells(
+            nodes, node_places, row[1:], table[rows], self.grid.origin, edge, is_mixed=True
+        )
+        among = np.cumsum(self.kept) - 1
+        parent = np.concatenate([np.arange(len(whole)), parents(whole, half, self.kept)])[chosen]
+        parent = among[parent]
+        return Division(cells, parent, voxels_of_parents(cells, self.cells, parent))
+
+    def _one_piece(
+        self, faces: Faces, leaves: NDArray[np.bool_], volumes: Array
+    ) -> NDArray[np.bool_]:
+        """Those of the `leaves` (p,) that are of the largest piece; the others must be crumbs."""
+        own = np.flatnonzero(leaves)
+        piece = faces.chosen(leaves).pieces(len(own))
+        sizes = np.bincount(piece, volumes[own])
+        if np.count_nonzero(sizes >= SMALLEST_PIECE) > 1:
+            raise UserError(
+                f"mesh {self.name!r} falls apart where cells are divided; raise --resolution, or "
+                "join its parts"
+            )
+        chosen = np.zeros(len(leaves), dtype=bool)
+        chosen[own[piece == sizes.argmax()]] = True
+        return chosen
+
+
+def covering(
+    surface: trimesh.Trimesh, resolution: int, components: str = "error", name: str = "mesh"
+) -> Covering:
+    """The cells of a lattice that cover the inside of a surface; see `finite_cells`."""
+    resolution = checked_resolution(surface, resolution, name)
+    if components not in COMPONENTS:
+        raise UserError(
+            f"components {components!r} is unknown, expected one of {', '.join(COMPONENTS)}"
+        )
+    grid = even_grid(surface, resolution)
+    inside = find_inside(surface, grid)
+    if not _holds(inside):
+        raise UserError(_lost(surface, inside, resolution, grid, name))
+    cover = cover_of(inside)
+    piece = Faces(cover.met, np.empty((0, 4), dtype=np.int64)).pieces(len(cover))
+    volumes = np.bincount(piece, cover.volumes)
+    kept = np.flatnonzero(volumes >= SMALLEST_PIECE)
+    if not len(kept):
+        raise UserError(_lost(surface, inside, resolution, grid, name))
+    if len(kept) > 1 and components == "error":
+        listed = ", ".join(f"{volume:,.0f}" for volume in sorted(volumes[kept])[:-5:-1])
+        raise UserError(
+            f"mesh {name!r} at resolution {resolution} is in {len(kept):,} pieces ({listed} voxels "
+            f"the largest); join them or pass --components largest to keep the largest"
+        )
+    return Covering(surface, name, grid, cover, piece == volumes.argmax())
 
 
 def finite_cells(
@@ -64,27 +196,7 @@ def finite_cells(
     >>> bool(abs(cells.volume / 8.79e-4 - 1.0) < 0.01), len(cells) > 100
     (True, True)
     """
-    resolution = checked_resolution(surface, resolution, name)
-    if components not in COMPONENTS:
-        raise UserError(
-            f"components {components!r} is unknown, expected one of {', '.join(COMPONENTS)}"
-        )
-    grid = even_grid(surface, resolution)
-    inside = find_inside(surface, grid)
-    if not _holds(inside):
-        raise UserError(_lost(surface, inside, resolution, grid, name))
-    parts = _Parts.of_inside(inside)
-    piece, volumes = parts.pieces()
-    kept = np.flatnonzero(volumes >= SMALLEST_PIECE)
-    if not len(kept):
-        raise UserError(_lost(surface, inside, resolution, grid, name))
-    if len(kept) > 1 and components == "error":
-        listed = ", ".join(f"{volume:,.0f}" for volume in sorted(volumes[kept])[:-5:-1])
-        raise UserError(
-            f"mesh {name!r} at resolution {resolution} is in {len(kept):,} pieces ({listed} voxels "
-            f"the largest); join them or pass --components largest to keep the largest"
-        )
-    return parts.mesh(piece == volumes.argmax(), grid)
+    return covering(surface, resolution, components, name).cells
 
 
 def even_grid(surface: trimesh.Trimesh, resolution: int) -> Grid:
@@ -121,115 +233,3 @@ def _lost(surface: trimesh.Trimesh, inside: Inside, resolution: int, grid: Grid,
             "are lost between its lines; raise --resolution or make them thicker"
         )
     return f"{start} encloses nothing; expected a surface around a solid, repair the mesh"
-
-
-@dataclass(frozen=True)
-class _Parts:
-    """Parts of cells, and which of them meet.
-
-    Attributes
-    ----------
-    grid : (p, 3)
-        Lowest voxel of each part's cell.
-    row, weights
-        See `FiniteCells`.
-    met : (m, 3)
-        Parts that meet, the lower one first, and the axis across their face.
-    """
-
-    grid: np.ndarray
-    row: np.ndarray
-    weights: np.ndarray
-    met: np.ndarray
-
-    @classmethod
-    def of_inside(cls, inside: Inside) -> _Parts:
-        """Parts of all cells that hold anything."""
-        state, facing = _by_cell(inside.state), _by_cell(inside.facing)
-        number = np.full(state.shape[:3], -1, dtype=np.int64)
-        there = (state != EMPTY).any(axis=3)
-        number[there] = np.arange(np.count_nonzero(there))
-        cells = 2 * np.argwhere(there)[:, ::-1]
-        whole = (state[there] == FULL).all(axis=1)
-        cut = np.flatnonzero(~whole)
-        state, facing, corners = state[there][cut], facing[there][cut], cells[cut]
-        labels, counts = find_parts(corners, state, inside.pieces)
-        first = np.cumsum(counts) - counts
-        weights = weights_of_parts(
-            corners, state, facing, inside.pieces, labels, first, int(counts.sum())
-        )
-        weights[weights.sum(axis=2) < SMALLEST_OCTANT / 8.0] = 0.0
-        parts = np.ones(len(cells), dtype=np.int64)
-        parts[cut] = counts
-        owner = np.repeat(np.arange(len(cells)), parts)
-        row = np.zeros(len(owner), dtype=np.int64)
-        # Faces in planes of the lattice touch cells that they do not cut.
-        is_cut = np.abs(weights - octant_weights()).max(axis=(1, 2)) > SMALLEST_OCTANT
-        row[~whole[owner]] = np.where(is_cut, 1 + np.arange(len(weights)), 0)
-        table = np.concatenate([octant_weights()[None], weights])
-        first_part = np.cumsum(parts) - parts
-        among_cut = np.full(len(cells), -1)
-        among_cut[cut] = np.arange(len(cut))
-        met = []
-        for axis in range(3):
-            lower, upper = _neighbours(number, axis)
-            pair, below, above = meetings(among_cut[lower], among_cut[upper], labels, axis).T
-            below, above = first_part[lower[pair]] + below - 1, first_part[upper[pair]] + above - 1
-            met.append(np.stack([below, above, np.full(len(pair), axis)], axis=1))
-        return cls(cells[owner], row, table, np.concatenate(met))._without_empty()
-
-    def _without_empty(self) -> _Parts:
-        holds = self.weights.any(axis=(1, 2))[self.row]
-        number = np.cumsum(holds) - 1
-        met = self.met[holds[self.met[:, :2]].all(axis=1)]
-        met = np.column_stack([number[met[:, :2]], met[:, 2]])
-        return _Parts(self.grid[holds], self.row[holds], self.weights, met)
-
-    def pieces(self) -> tuple[np.ndarray, np.ndarray]:
-        """Number (p,) of the piece of the solid that each part is of, and volumes [voxels]."""
-        shape = (len(self.row),) * 2
-        graph = sp.coo_matrix((np.ones(len(self.met)), tuple(self.met[:, :2].T)), shape=shape)
-        piece = connected_components(graph, directed=False)[1]
-        return piece, np.bincount(piece, 8.0 * self.weights.sum(axis=(1, 2))[self.row])
-
-    def mesh(self, kept: np.ndarray, grid: Grid) -> FiniteCells:
-        """Mesh of the parts (p,) that are `kept`: neighbours share the nodes of the faces."""
-        count = len(self.row)
-        ends = len(NODES) * np.arange(count)[:, None] + np.arange(len(NODES))
-        joined = []
-        for axis in range(3):
-            below, above, _ = self.met[self.met[:, 2] == axis].T
-            low, high = (np.flatnonzero(NODES[:, axis] == side) for side in (0, 2))
-            joined.append(np.stack([ends[below][:, high].ravel(), ends[above][:, low].ravel()]))
-        left, right = np.concatenate(joined, axis=1)
-        graph = sp.coo_matrix((np.ones(len(left)), (left, right)), shape=(ends.size,) * 2)
-        label = connected_components(graph, directed=False)[1][ends[kept]]
-        _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
-        places = (self.grid[kept][:, None] + NODES).reshape(-1, 3)[first]
-        order = np.lexsort((first, *places.T))
-        rank = np.empty(len(order), dtype=np.int64)
-        rank[order] = np.arange(len(order))
-        rows, row = np.unique(np.append(0, self.row[kept]), return_inverse=True)
-        return assemble_cells(
-            rank[inverse].reshape(-1, len(NODES)),
-            places[order],
-            row[1:],
-            self.weights[rows],
-            grid.origin,
-            grid.edge,
-        )
-
-
-def _by_cell(values: np.ndarray) -> np.ndarray:
-    """Values (nz / 2, ny / 2, nx / 2, 8) of the octants of each cell, in bit order."""
-    nx, ny, nz = (size // 2 for size in values.shape)
-    octants = values.reshape(nx, 2, ny, 2, nz, 2).transpose(4, 2, 0, 5, 3, 1)
-    return np.ascontiguousarray(octants.reshape(nz, ny, nx, 8))
-
-
-def _neighbours(number: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers of cells that follow each other along an axis, of an array in (z, y, x)."""
-    turned = np.moveaxis(number, 2 - axis, 0)
-    lower, upper = turned[:-1].ravel(), turned[1:].ravel()
-    both = (lower >= 0) & (upper >= 0)
-    return lower[both], upper[both]

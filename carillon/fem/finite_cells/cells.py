@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from carillon.fem.block import CELL_NODES, CORNER_NODES, NODES
+from carillon.fem.finite_cells.hanging import corners_of, kinds_of_cells, node_places
 from carillon.fem.finite_cells.shapes import octant_weights
 from carillon.fem.geometry.hexmesh import CORNER_OFFSETS, HexMesh
 
@@ -23,6 +25,10 @@ class FiniteCells:
 
     The 27 nodes of a cell are the corners of its eight octants. Parts of a cell's inside that touch
     nowhere in it are cells of their own in the same place, with the octants that they lie in.
+
+    Some cells may be divided into eight of half the edge, which the steps of the lattice then are
+    half of; see `carillon.fem.finite_cells.hanging` for their nodes. Each of these lies in one
+    voxel.
 
     Attributes
     ----------
@@ -54,6 +60,30 @@ class FiniteCells:
         return np.asarray(self.mesh.node_grid[self.nodes[:, 0]])
 
     @property
+    def span(self) -> np.ndarray:
+        """Edge (c,) of each cell in steps of the lattice: 2, or 4 beside divided ones."""
+        return np.asarray(self.mesh.node_grid[self.nodes[:, -1], 0] - self.grid[:, 0])
+
+    @property
+    def is_mixed(self) -> bool:
+        """Whether there are cells of two sizes."""
+        return self.mesh.span is not None
+
+    @cached_property
+    def kinds(self) -> np.ndarray | None:
+        """Kinds (c,) of the cells, see `carillon.fem.finite_cells.hanging`; None if of one size."""
+        if not self.is_mixed:
+            return None
+        places = self._places()
+        own = NODES * (self.span // 2)[:, None, None]
+        octants = (self.grid // self.span[:, None] % 2) @ np.array([1, 2, 4])
+        return kinds_of_cells(octants, (places != own).any(axis=2))
+
+    def _places(self) -> np.ndarray:
+        """Places (c, 27, 3) of the nodes from the lowest corner of each cell."""
+        return np.asarray(self.mesh.node_grid[self.nodes] - self.grid[:, None])
+
+    @property
     def is_whole(self) -> np.ndarray:
         """Which cells (c,) are all inside."""
         return np.asarray(self.row == 0)
@@ -66,30 +96,45 @@ class FiniteCells:
     @property
     def volume(self) -> float:
         """Volume inside [m^3]."""
-        return float(self.fractions.sum() * self.mesh.edge**3)
+        octants = (self.span / 2.0 * self.mesh.edge) ** 3
+        return float((self.fractions.sum(axis=1) * octants).sum())
 
     def is_consistent(self) -> bool:
         """Whether nodes lie at their places, voxels in their octants, and each is of some cell."""
-        mesh = self.mesh
+        mesh, span = self.mesh, self.span
         cell, octant = np.nonzero(self.voxels >= 0)
         voxel = self.voxels[cell, octant]
-        if not np.array_equal(np.sort(voxel), np.arange(mesh.n_cells)):
+        if not np.array_equal(np.unique(voxel), np.arange(mesh.n_cells)):
             return False
         if not np.array_equal(np.unique(self.nodes), np.arange(mesh.n_nodes)):
             return False
-        grid, octants = self.grid, self.nodes[:, CELL_NODES]
+        if not np.isin(span, (2, 4) if self.is_mixed else (2,)).all():
+            return False
+        if (self.grid % span[:, None]).any():
+            return False
+        places = NODES if self.kinds is None else node_places(self.kinds)
+        if not np.array_equal(self._places(), places * (span // 2)[:, None, None]):
+            return False
+        corners, grid = self._voxels()
         return (
-            not (grid & 1).any()
-            and np.array_equal(mesh.node_grid[self.nodes], grid[:, None] + NODES)
-            and np.array_equal(mesh.cells[voxel], octants[cell, octant])
-            and np.array_equal(mesh.grid[voxel], grid[cell] + CORNER_OFFSETS[octant])
+            np.array_equal(mesh.cells[voxel], corners[cell, octant])
+            and np.array_equal(mesh.grid[voxel], grid[cell, octant])
             and bool((self.fractions[self.voxels >= 0] > 0.0).all())
         )
+
+    def _voxels(self) -> tuple[np.ndarray, np.ndarray]:
+        """Corners (c, 8, 8) and lattice coordinates (c, 8, 3) of the octants' voxels."""
+        return _voxels_of(self.nodes, self.grid, self.span, self.is_mixed)
 
     def hexmesh(self) -> HexMesh:
         """The cells as cubes with nodes at their corners, by which neighbours are found."""
         mesh, corners = self.mesh, self.nodes[:, CORNER_NODES]
-        return HexMesh(corners, self.grid // 2, mesh.node_grid, mesh.origin, 2 * mesh.edge)
+        if self.kinds is None:
+            return HexMesh(corners, self.grid // 2, mesh.node_grid, mesh.origin, 2 * mesh.edge)
+        corners, hanging = corners_of(self.kinds, self.nodes)
+        span = (self.span // 2).astype(np.uint8)
+        grid = (self.grid // 2).astype(np.int32)
+        return HexMesh(corners, grid, mesh.node_grid, mesh.origin, 2 * mesh.edge, span, hanging)
 
     def point_values(self, values: np.ndarray) -> np.ndarray:
         """Weighted values (c, 125) at the points of cells, from those (m,) of the voxels.
@@ -112,20 +157,42 @@ def assemble_cells(
     weights: np.ndarray,
     origin: np.ndarray,
     edge: float,
+    is_mixed: bool = False,
 ) -> FiniteCells:
     """Finite cells with the voxels that follow from their weights."""
+    grid = node_grid[nodes[:, 0]]
+    span = node_grid[nodes[:, -1], 0] - grid[:, 0]
+    corners, places = _voxels_of(nodes, grid, span, is_mixed)
     filled = (weights.sum(axis=2) > 0.0)[row]
     cell, octant = np.nonzero(filled)
-    grid = node_grid[nodes[cell, CELL_NODES[octant, 0]]]
-    order = np.lexsort((cell, *grid.T))
+    in_one = (span == 2) & is_mixed
+    # One voxel for all octants of a cell that lies in it.
+    first = filled.argmax(axis=1)
+    own = np.where(in_one[cell], first[cell], octant)
+    leads = np.flatnonzero(octant == own)
+    order = leads[np.lexsort((cell[leads], *places[cell[leads], octant[leads]].T))]
     voxels = np.full(filled.shape, -1, dtype=np.int32)
     voxels[cell[order], octant[order]] = np.arange(len(order))
-    corners = nodes[cell[order, None], CELL_NODES[octant[order]]]
+    voxels[cell, octant] = voxels[cell, own]
+    sizes = ()
+    if is_mixed:
+        sizes = np.full(len(order), 2, np.uint8), np.zeros(len(order), np.uint8)
     mesh = HexMesh(
-        corners.astype(np.int32),
-        grid[order].astype(np.int32),
+        corners[cell[order], octant[order]].astype(np.int32),
+        places[cell[order], octant[order]].astype(np.int32),
         node_grid.astype(np.int32),
         origin,
         edge,
+        *sizes,
     )
     return FiniteCells(nodes.astype(np.int32), voxels, row.astype(np.int32), weights, mesh)
+
+
+def _voxels_of(
+    nodes: np.ndarray, grid: np.ndarray, span: np.ndarray, is_mixed: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Corners (c, 8, 8) and lattice coordinates (c, 8, 3) of the voxels of the cells' octants."""
+    in_one = (is_mixed & (span == 2))[:, None, None]
+    corners = np.where(in_one, nodes[:, None, CORNER_NODES], nodes[:, CELL_NODES])
+    offsets = CORNER_OFFSETS * (span // 2)[:, None, None]
+    return corners, grid[:, None] + np.where(in_one, 0, offsets)

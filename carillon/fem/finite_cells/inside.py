@@ -31,8 +31,8 @@ if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-EMPTY, CUT, FULL = 0, 1, 2
-"""States of a voxel."""
+EMPTY, CUT, FULL, SKIPPED = 0, 1, 2, 3
+"""States of a voxel; skipped are those that nobody asked for."""
 ENDS = 0.02
 """Share of a piece of a line by which its ends are moved inwards to see whether they are inside."""
 RIM_POINTS = 9
@@ -66,7 +66,7 @@ class Inside:
     Attributes
     ----------
     state : (nx, ny, nz) int8
-        `EMPTY`, `CUT` or `FULL`.
+        `EMPTY`, `CUT`, `FULL` or `SKIPPED`.
     facing : (nx, ny, nz) int8
         Axis whose lines the surface crosses most often in a voxel, as it does face on.
     pieces
@@ -89,8 +89,13 @@ class Inside:
         return float(halves[0]), float(halves[1])
 
 
-def find_inside(surface: trimesh.Trimesh, grid: Grid) -> Inside:
-    """The inside of a surface, which may have holes and overlapping shells."""
+def find_inside(
+    surface: trimesh.Trimesh, grid: Grid, wanted: NDArray[np.bool_] | None = None
+) -> Inside:
+    """The inside of a surface, which may have holes and overlapping shells.
+
+    The lattice holds all of the surface, unless it is told which voxels are `wanted` (nx, ny, nz).
+    """
     import trimesh
 
     merged = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
@@ -102,13 +107,16 @@ def find_inside(surface: trimesh.Trimesh, grid: Grid) -> Inside:
     counts = np.stack([crossings_of_voxels(each, grid.shape) for each in crossed], axis=3)
     state = np.where(counts.any(axis=3), CUT, EMPTY).astype(np.int8)
     facing = counts.argmax(axis=3).astype(np.int8)
+    if wanted is not None:
+        state[~wanted] = SKIPPED
     wind = _Winding(surface, grid)
     if merged.is_watertight and merged.is_winding_consistent:
         pieces = [_of_closed_surface(each, wind) for each in crossed]
         state[(state == EMPTY) & _middles(pieces[0], grid.shape)] = FULL
     else:
         levels = _classify(state, wind)
-        pieces = [_of_open_surface(each, state, levels, wind) for each in crossed]
+        ends = wanted is None
+        pieces = [_of_open_surface(each, state, levels, wind, ends) for each in crossed]
     return Inside(state, facing, (pieces[0], pieces[1], pieces[2]))
 
 
@@ -172,28 +180,36 @@ def _classify(state: NDArray[np.int8], wind: _Winding) -> NDArray[np.int8]:
         far from whole somewhere in the voxel, as about holes.
     """
     shape = state.shape
-    ends = [size + 1 for size in shape]
-    at_corners = wind(np.indices(ends).reshape(3, -1).T.astype(float)).reshape(ends)
-    middle = wind(np.indices(shape).reshape(3, -1).T + 0.5).reshape(shape)
-    agree = np.ones(shape, dtype=bool)
-    vague = np.abs(middle - np.rint(middle)) > VAGUENESS
-    for x, y, z in CORNERS:
-        corner = at_corners[x : x + shape[0], y : y + shape[1], z : z + shape[2]]
-        agree &= (np.abs(corner) > INSIDE) == (np.abs(middle) > INSIDE)
-        vague |= np.abs(corner - np.rint(corner)) > VAGUENESS
-    plain = state == EMPTY
-    state[plain & agree & (np.abs(middle) > INSIDE)] = FULL
-    state[plain & ~agree] = CUT
-    return np.where(vague, VAGUE, np.rint(middle)).astype(np.int8)
+    there = np.argwhere(state != SKIPPED)
+    corners = (there[:, None] + CORNERS).reshape(-1, 3)
+    sizes = tuple(size + 1 for size in shape)
+    keys, which = np.unique(np.ravel_multi_index(tuple(corners.T), sizes), return_inverse=True)
+    points = np.stack(np.unravel_index(keys, sizes), axis=1).astype(float)
+    corner = wind(points)[which].reshape(-1, len(CORNERS))
+    middle = wind(there + 0.5)
+    agree = ((np.abs(corner) > INSIDE) == (np.abs(middle) > INSIDE)[:, None]).all(axis=1)
+    numbers = np.column_stack([corner, middle])
+    vague = (np.abs(numbers - np.rint(numbers)) > VAGUENESS).any(axis=1)
+    own = tuple(there.T)
+    plain = state[own] == EMPTY
+    known = np.where(agree, np.where(np.abs(middle) > INSIDE, FULL, EMPTY), CUT)
+    state[own] = np.where(plain, known, state[own])
+    levels = np.zeros(shape, dtype=np.int8)
+    levels[own] = np.where(vague, VAGUE, np.rint(middle))
+    return levels
 
 
 def _of_open_surface(
-    lines: Crossings, state: NDArray[np.int8], levels: NDArray[np.int8], wind: _Winding
+    lines: Crossings,
+    state: NDArray[np.int8],
+    levels: NDArray[np.int8],
+    wind: _Winding,
+    ends: bool,
 ) -> Pieces:
     axes = (lines.axis + 1) % 3, (lines.axis + 2) % 3, lines.axis
     turned = [np.ascontiguousarray(each.transpose(axes)) for each in (state, levels)]
     low, high, line, inside, unsure = _in_voxels(
-        lines.start, lines.place, lines.step, lines.columns, turned[0], turned[1], LINES
+        lines.start, lines.place, lines.step, lines.columns, turned[0], turned[1], ends, LINES
     )
     asked = np.flatnonzero(unsure)
     if len(asked):
@@ -223,11 +239,14 @@ def _rim(
 
 
 @numba.njit(cache=True, nogil=True)
-def _in_voxels(start, place, step, columns, state, levels, n):  # type: ignore[no-untyped-def]
+def _in_voxels(  # type: ignore[no-untyped-def]
+    start, place, step, columns, state, levels, ends, n
+):
     """Pieces of lines in voxels that are not empty: ends, line, whether inside, and whether unsure.
 
     The winding number is followed from crossing to crossing through voxels that are cut. Where it
-    then is not that of the next voxel, or a voxel is vague, crossings do not tell.
+    then is not that of the next voxel, or a voxel is vague, crossings do not tell. Where a lattice
+    ends it is zero, if the lattice `ends` outside the surface.
     """
     low, high, owner = [0.0][:0], [0.0][:0], [0][:0]
     inside, unsure = [False][:0], [False][:0]
@@ -239,6 +258,13 @@ def _in_voxels(start, place, step, columns, state, levels, n):  # type: ignore[n
             kind, level = EMPTY, 0
             if voxel < state.shape[2]:
                 kind, level = state[row, column, voxel], levels[row, column, voxel]
+            else:
+                level = 0 if ends else winding
+            if kind == SKIPPED:
+                while number < start[line + 1] and place[number] < voxel + 1.0:
+                    winding += step[number]
+                    number += 1
+                continue
             if kind != CUT:
                 if vague or winding != level:
                     for piece in range(run, len(low)):

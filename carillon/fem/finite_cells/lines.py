@@ -25,6 +25,8 @@ ALONG_AXIS = 1e-6
 """Sine of the angle between a triangle's normal and an axis up to which it counts as in a plane."""
 BESIDE = 1e-4
 """Distance [voxels] from the end of an edge, or from another plane, below which none splits it."""
+EDGES = 1e-6
+"""Distance [voxels] from the lattice up to which a crossing is of its outermost voxels."""
 MOST_PLANES = 2
 """Planes that split an edge at most, those with most area."""
 
@@ -172,11 +174,12 @@ def crossings(
 
 
 def crossings_of_voxels(lines: Crossings, shape: tuple[int, int, int]) -> NDArray[np.int32]:
-    """Number (nx, ny, nz) of crossings in each voxel."""
+    """Number (nx, ny, nz) of crossings in each voxel; those beside the lattice are of none."""
     axis = lines.axis
-    line = np.repeat(np.arange(len(lines.start) - 1), np.diff(lines.start))
+    among = np.flatnonzero((lines.place >= -EDGES) & (lines.place <= shape[axis] + EDGES))
+    line = np.repeat(np.arange(len(lines.start) - 1), np.diff(lines.start))[among]
     row, column = np.divmod(line, lines.columns)
-    place = np.clip(lines.place.astype(np.int64), 0, shape[axis] - 1)
+    place = np.clip(lines.place[among].astype(np.int64), 0, shape[axis] - 1)
     index = np.empty((3, len(line)), dtype=np.int64)
     index[axis], index[(axis + 1) % 3], index[(axis + 2) % 3] = place, row // LINES, column // LINES
     flat = np.ravel_multi_index(tuple(index), shape)

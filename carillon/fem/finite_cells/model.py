@@ -13,6 +13,7 @@ from carillon.fem.block import NODES
 from carillon.fem.element import DEFAULT_POISSON
 from carillon.fem.elements import Chosen, Elements
 from carillon.fem.finite_cells.cells import FiniteCells
+from carillon.fem.finite_cells.hanging import at_nodes, node_places, node_weights
 from carillon.fem.finite_cells.shapes import point_mass, point_stiffness, shape_functions
 from carillon.fem.geometry import HexMesh
 from carillon.fem.model import DEFAULT_DENSITY, Solid
@@ -32,9 +33,11 @@ class CellElements(Elements):
     share : (c, 125)
         The same of the density over that of the solid.
     edge
-        Spacing [m].
+        Step of the lattice [m].
     poisson, density
         See `Solid`.
+    span, kinds : (c,)
+        See `FiniteCells`, of cells of two sizes; else None.
     """
 
     young: Array
@@ -42,25 +45,41 @@ class CellElements(Elements):
     edge: float
     poisson: float
     density: float
+    span: NDArray[np.int32] | None = None
+    kinds: NDArray[np.int64] | None = None
 
     def of(self, *arrays: NDArray[Any]) -> Self:
         """See `Elements.of`."""
-        young, share = arrays
-        return replace(self, young=young, share=share)
+        young, share, *sizes = arrays
+        span, kinds = sizes or (None, None)
+        return replace(self, young=young, share=share, span=span, kinds=kinds)
 
     def arrays(self) -> list[NDArray[Any]]:
         """See `Elements.arrays`."""
-        return [self.young, self.share]
+        if self.span is None or self.kinds is None:
+            return [self.young, self.share]
+        return [self.young, self.share, self.span, self.kinds]
 
     @property
     def steps(self) -> int:
         """See `Elements.steps`."""
-        return 2
+        return 2 if self.span is None else 4
 
     @property
     def node_places(self) -> NDArray[np.int64]:
-        """Places (c, 27, 3) of the nodes in each cell, in spacings."""
-        return np.broadcast_to(NODES, (len(self), *NODES.shape))
+        """Places (c, 27, 3) of the nodes in each cell, in steps."""
+        if self.span is None or self.kinds is None:
+            return np.broadcast_to(NODES, (len(self), *NODES.shape))
+        return node_places(self.kinds) * (self.span // 2)[:, None, None]
+
+    def _edges(self, chosen: Chosen) -> Array | float:
+        """Edges [m] of the chosen cells, (c, 1) of cells of two sizes."""
+        if self.span is None:
+            return 2.0 * self.edge
+        return self.edge * self.span[chosen][:, None].astype(float)
+
+    def _between_nodes(self, matrices: Array, chosen: Chosen) -> Array:
+        return matrices if self.kinds is None else at_nodes(matrices, self.kinds[chosen])
 
     @property
     def collinear(self) -> NDArray[np.bool_]:
@@ -74,13 +93,14 @@ class CellElements(Elements):
 
     def stiffness(self, chosen: Chosen = slice(None)) -> Array:
         """Stiffness matrices (c, 81, 81) [N/m] of the chosen cells."""
-        matrices = (2.0 * self.edge * self.young[chosen]) @ point_stiffness(self.poisson)
-        return np.asarray(matrices.reshape(-1, 81, 81))
+        matrices = (self._edges(chosen) * self.young[chosen]) @ point_stiffness(self.poisson)
+        return self._between_nodes(matrices.reshape(-1, 81, 81), chosen)
 
     def nodal_mass(self, chosen: Chosen = slice(None)) -> Array:
         """Masses (c, 27, 27) [kg] of the chosen cells."""
-        scale = self.density * (2.0 * self.edge) ** 3
-        return np.asarray(((scale * self.share[chosen]) @ point_mass()).reshape(-1, 27, 27))
+        scale = self.density * self._edges(chosen) ** 3
+        matrices = (scale * self.share[chosen]) @ point_mass()
+        return self._between_nodes(matrices.reshape(-1, 27, 27), chosen)
 
 
 @dataclass(frozen=True)
@@ -117,6 +137,8 @@ class FiniteCellModel(Solid):
             self.mesh.edge,
             self.poisson,
             self.density,
+            self.cells.span if self.cells.is_mixed else None,
+            self.cells.kinds,
         )
 
     @property
@@ -136,7 +158,10 @@ class FiniteCellModel(Solid):
 
     def shape_values(self, elements: NDArray[np.integer], places: Array) -> Array:
         """Quadratic weights (p, 27), see `Solid.shape_values`."""
-        return shape_functions(places)
+        values = shape_functions(places)
+        if self.cells.kinds is None:
+            return values
+        return np.asarray(values[:, None] @ node_weights(self.cells.kinds[elements]))[:, 0]
 
     def element_moduli(self, young: Array) -> Array:
         """Weighted moduli (c, 125) [Pa] of the cells from those (m,) of the voxels; see `Solid`."""

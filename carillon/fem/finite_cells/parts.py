@@ -68,6 +68,29 @@ def meetings(lower: Index, upper: Index, labels: Labels, axis: int) -> Index:
     return np.array(found, dtype=np.int64).reshape(-1, 3)
 
 
+def meetings_of_halves(
+    whole: Index,
+    half: Index,
+    quarter: Index,
+    labels: tuple[Labels, Labels],
+    axis: int,
+    side: int,
+) -> Index:
+    """Parts that meet at faces of cells with cells of half the edge: rows (pair, part, its part).
+
+    Parameters
+    ----------
+    whole, half : (p,)
+        Cells of the two `labels`; -1 is one that is all inside.
+    quarter : (p, 2)
+        Half of the whole cell's face along each of the other axes that the smaller cell lies at.
+    side
+        Of the smaller cell that the face is on: 0, or 2 for the upper one.
+    """
+    found = _meetings_of_halves(whole, half, quarter, *labels, axis, side)
+    return np.array(found, dtype=np.int64).reshape(-1, 3)
+
+
 def box_bounds(pieces: tuple[Pieces, ...]) -> list[Array]:
     """Bounds (n, LINES - 1) of the boxes in each voxel along x, y and z."""
     x, y, z = pieces
@@ -154,28 +177,55 @@ def _meetings(lower, upper, labels, axis):  # type: ignore[no-untyped-def]
     for pair in range(len(lower)):
         _face(labels, lower[pair], axis, size - 1, below)
         _face(labels, upper[pair], axis, 0, above)
-        begin = len(found)
-        for i in range(size):
-            for j in range(size):
-                if below[i, j] and above[i, j]:
-                    _note(found, begin, pair, below[i, j], above[i, j])
-        # A thin wall askew may take boxes on the two sides that meet at edges only.
-        straight = len(found)
-        for i in range(size):
-            for j in range(size):
-                if not below[i, j]:
-                    continue
-                for m in range(max(i - 1, 0), min(i + 2, size)):
-                    for q in range(max(j - 1, 0), min(j + 2, size)):
-                        if not above[m, q]:
-                            continue
-                        alone_below, alone_above = True, True
-                        for number in range(begin, straight):
-                            alone_below = alone_below and found[number][1] != below[i, j]
-                            alone_above = alone_above and found[number][2] != above[m, q]
-                        if alone_below or alone_above:
-                            _note(found, begin, pair, below[i, j], above[m, q])
+        _meet(pair, below, above, found)
     return found
+
+
+@numba.njit(cache=True, nogil=True)
+def _meetings_of_halves(  # type: ignore[no-untyped-def]
+    whole, half, quarter, whole_labels, half_labels, axis, side
+):
+    size = whole_labels.shape[1]
+    found = [(0, 0, 0)][:0]
+    face = np.empty((size, size), dtype=np.int64)
+    one = np.empty((size, size), dtype=np.int64)
+    other = np.empty((size, size), dtype=np.int64)
+    for pair in range(len(whole)):
+        _face(whole_labels, whole[pair], axis, 0 if side else size - 1, face)
+        _face(half_labels, half[pair], axis, size - 1 if side else 0, other)
+        for i in range(size):
+            for j in range(size):
+                row, column = quarter[pair, 0] * size + i, quarter[pair, 1] * size + j
+                one[i, j] = face[row // 2, column // 2]
+        _meet(pair, one, other, found)
+    return found
+
+
+@numba.njit(cache=True, nogil=True)
+def _meet(pair, below, above, found):  # type: ignore[no-untyped-def]
+    """Note which parts on the two sides of a face meet there."""
+    size = len(below)
+    begin = len(found)
+    for i in range(size):
+        for j in range(size):
+            if below[i, j] and above[i, j]:
+                _note(found, begin, pair, below[i, j], above[i, j])
+    # A thin wall askew may take boxes on the two sides that meet at edges only.
+    straight = len(found)
+    for i in range(size):
+        for j in range(size):
+            if not below[i, j]:
+                continue
+            for m in range(max(i - 1, 0), min(i + 2, size)):
+                for q in range(max(j - 1, 0), min(j + 2, size)):
+                    if not above[m, q]:
+                        continue
+                    alone_below, alone_above = True, True
+                    for number in range(begin, straight):
+                        alone_below = alone_below and found[number][1] != below[i, j]
+                        alone_above = alone_above and found[number][2] != above[m, q]
+                    if alone_below or alone_above:
+                        _note(found, begin, pair, below[i, j], above[m, q])
 
 
 @numba.njit(cache=True, nogil=True)

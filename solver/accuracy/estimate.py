@@ -1,0 +1,64 @@
+"""How far the frequencies of finite cells are from those of the solid.
+
+What a mode loses if cells were twice and four times as large, L2 and L4 (`solver.accuracy.surplus`),
+would be e (r - 1) and e (r^2 - 1) of an error e that falls by the factor r when cells are halved,
+16 where displacements are smooth, less at edges that point inwards and other singular places. So
+r = L4 / L2 - 1, place by place, and e = L2 / (r - 1) (extrapolation as of Richardson, but local).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.fem.finite_cells.model import FiniteCellModel
+from carillon.fem.model import RIGID_MODES
+from solver.accuracy.surplus import losses
+from solver.refinement.estimate import LAST
+
+Array = NDArray[np.float64]
+
+SLOWEST, FASTEST = 1.5, 16.0
+"""Bounds of the factor by which halved cells diminish an error: the latter is that of quadratic
+displacements."""
+
+
+@dataclass(frozen=True)
+class CellErrors:
+    """Expected errors of the frequencies of finite cells.
+
+    Attributes
+    ----------
+    errors : (k,)
+        Relative errors of the frequencies of modes 7, 8, ...; positive, since they are too high.
+    shares : (c,)
+        Each cell's share in them, root mean square over the modes.
+    factors : (c,)
+        By which dividing the cell would diminish its share.
+    """
+
+    errors: Array
+    shares: Array
+    factors: Array
+
+
+def estimate_cell_errors(model: FiniteCellModel, values: Array, modes: Array) -> CellErrors:
+    """Expected errors of the frequencies of finite cells against the solid's, up to mode `LAST`.
+
+    Parameters
+    ----------
+    values, modes
+        (k,) eigenvalues [rad^2/s^2] and (n_dofs, k) mass-normalised modes, the six rigid ones
+        included.
+    """
+    elastic = slice(RIGID_MODES, min(LAST, len(values)))
+    twice, fourfold, group = losses(model, np.ascontiguousarray(modes[:, elastic]))
+    own = values[elastic]
+    lost = np.stack([np.bincount(group, (each / own).sum(axis=1)) for each in (twice, fourfold)])
+    ratio = lost[1] / np.maximum(lost[0], np.finfo(float).tiny)
+    factors = np.clip(ratio - 1.0, SLOWEST, FASTEST)[group]
+    # A frequency's relative error is half its eigenvalue's.
+    shares = 0.5 * twice / own / (factors - 1.0)[:, None]
+    return CellErrors(shares.sum(axis=0), np.sqrt(np.mean(shares**2, axis=1)), factors)
