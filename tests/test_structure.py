@@ -58,12 +58,14 @@ ARROWS = {
         solver.analysis""",
     "solver.studies.coarsening": """solver.coarsening solver.files solver.analysis
         solver.refinement solver.studies""",
+    "solver.studies.discretisation": """solver.coarsening solver.files solver.analysis
+        solver.refinement solver.studies""",
     "solver.studies.scaling": """solver.distribution solver.assembly solver.linear solver.hcms
         solver.correction solver.analysis""",
     "solver.commands": """dataset_gen.objectives solver.distribution solver.files solver.response
         solver.linear solver.analysis solver.refinement solver.studies solver.studies.benchmark
         solver.studies.calibration solver.studies.scaling solver.coarsening
-        solver.studies.coarsening""",
+        solver.studies.coarsening solver.studies.discretisation""",
     #
     "sound": "",
     "sound.clips": "sound",

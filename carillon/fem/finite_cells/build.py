@@ -35,7 +35,11 @@ TRIAL_GRID = 4_000_000
 
 
 def finite_cells(
-    surface: trimesh.Trimesh, resolution: int, components: str = "error", name: str = "mesh"
+    surface: trimesh.Trimesh,
+    resolution: int,
+    components: str = "error",
+    name: str = "mesh",
+    grid: Grid | None = None,
 ) -> FiniteCells:
     """Cover the inside of a surface with quadratic cells.
 
@@ -50,6 +54,9 @@ def finite_cells(
         ``"error"`` rejects a solid in several pieces, ``"largest"`` keeps the largest.
     name
         Name of the solid, for messages.
+    grid
+        Lattice of about this resolution around the solid, with an even number of voxels along each
+        axis; `even_grid` if None.
 
     Raises
     ------
@@ -69,7 +76,7 @@ def finite_cells(
         raise UserError(
             f"components {components!r} is unknown, expected one of {', '.join(COMPONENTS)}"
         )
-    grid = even_grid(surface, resolution)
+    grid = grid or even_grid(surface, resolution)
     inside = find_inside(surface, grid)
     if not _holds(inside):
         raise UserError(_lost(surface, inside, resolution, grid, name))
