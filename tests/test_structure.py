@@ -90,6 +90,7 @@ ARROWS = {
     "workflow.studies.objectives": """dataset_gen.objectives solver.coarsening
         workflow.studies.base""",
     "workflow.studies.coarsening": "solver.studies.coarsening workflow.studies.base",
+    "workflow.studies.discretisation": "workflow.studies.base",
     "workflow.studies.sounds": """solver.files solver.response sound sound.clips sound.project
         sound.design sound.rendering workflow workflow.studies.base""",
     "workflow.studies.validation": """solver.files solver.response solver.studies workflow
