@@ -60,10 +60,10 @@ def _print_errors(case: dict[str, Any]) -> None:
         f"finite cells of {truth['n_dofs']:,} unknowns tell to {truth['doubt_rms']:.1%} (worst "
         f"{truth['doubt_worst']:.1%}), and against its voxels"
     )
-    print(f"{'':<12s}{'unknowns':>10s}{'seconds':>9s}{'solid':>18s}{'voxels':>18s}")
-    print(f"{'':<31s}{'     rms     worst' * 2}")
+    print(f"{'':<20s}{'unknowns':>10s}{'seconds':>9s}{'solid':>18s}{'voxels':>18s}")
+    print(f"{'':<39s}{'     rms     worst' * 2}")
     for name, way in case["ways"].items():
         errors = "".join(
             f"{each['rms']:8.1%} {each['worst']:+9.1%}" for each in way["against"].values()
         )
-        print(f"{name:<12s}{way['n_dofs']:10,}{way['seconds']:9.2f}{errors}")
+        print(f"{name:<20s}{way['n_dofs']:10,}{way['seconds']:9.2f}{errors}")

@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 
 INTERPOLATED = ("uniform", "smooth")
 """Materials that vary gradually; of the others each voxel has a modulus of its own."""
+ARITHMETIC, HARMONIC = 1.0, -1.0
+"""Powers of means."""
 NOISY = ("random", "noise")
 """Those whose moduli jump from voxel to voxel."""
 
@@ -52,12 +54,13 @@ class PlacedMaterial:
         nearest = distance_transform_edt(~filled, return_distances=False, return_indices=True)
         return cls(lattice, values[tuple(nearest)], filled, interpolated)
 
-    def on(self, mesh: HexMesh) -> Array:
+    def on(self, mesh: HexMesh, power: float = ARITHMETIC) -> Array:
         """Moduli (m,) [Pa] of the voxels of another mesh, whose lattice nests with this one.
 
         They are those at the middles of the voxels or, of voxels that join several of this lattice
-        with moduli of their own, the arithmetic means over those that are of the solid (over all if
-        none is).
+        with moduli of their own, the means over those that are of the solid (over all if none is):
+        of `power` 1 arithmetic ones, which assume one strain in all, of -1 harmonic ones, which
+        assume one stress (Voigt 1889, Reuss 1929).
         """
         corner = (mesh.origin - self.lattice.origin) / self.lattice.edge
         span = mesh.edge / self.lattice.edge
@@ -73,4 +76,6 @@ class PlacedMaterial:
         joined = tuple(np.moveaxis(first[:, None] + offsets, 2, 0))
         weights = self.filled[joined].astype(float)
         weights[~weights.any(axis=1)] = 1.0
-        return np.asarray((weights * self.young[joined]).sum(axis=1) / weights.sum(axis=1))
+        powers = self.young[joined] ** power
+        means = (weights * powers).sum(axis=1) / weights.sum(axis=1)
+        return np.asarray(means ** (1.0 / power))

@@ -22,7 +22,7 @@ from solver.files.modes_file import CHECKS, frequencies
 from solver.refinement.options import ALLOWED_ERROR
 from solver.refinement.refine import RefinedModel, solve_refined
 from solver.studies.discretisation.lattices import cells_on, scaled, voxel_mesh
-from solver.studies.discretisation.material import PlacedMaterial
+from solver.studies.discretisation.material import ARITHMETIC, HARMONIC, PlacedMaterial
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
     import trimesh
@@ -100,13 +100,15 @@ class Ways:
     @property
     def named(self) -> dict[str, Callable[[], Spectrum]]:
         """All that are compared, by name."""
-        return {
+        ways = {
             "voxels": self.voxels,
             "coarse": self.coarse,
             "refined": self.refined,
             "half-cells": lambda: self.cells(0.5),
-            "cells": lambda: self.cells(1.0),
         }
+        if not self._given.material.interpolated:
+            ways["half-cells-harmonic"] = lambda: self.cells(0.5, HARMONIC)
+        return {**ways, "cells": lambda: self.cells(1.0)}
 
     def voxels(self) -> Spectrum:
         """The voxels themselves."""
@@ -141,13 +143,16 @@ class Ways:
         assert model is not None
         return _spectrum(model, modes, clock)
 
-    def cells(self, factor: float) -> Spectrum:
-        """Finite cells on a lattice of `factor` voxels in the place of one."""
+    def cells(self, factor: float, power: float = ARITHMETIC) -> Spectrum:
+        """Finite cells on a lattice of `factor` voxels in the place of one.
+
+        Where one joins several, it has the mean of their moduli, see `PlacedMaterial.on`.
+        """
         given, clock = self._given, _Clock()
         lattice = scaled(given.material.lattice, factor)
         cells = cells_on(given.surface, lattice, given.components, given.name)
         clock.end("mesh")
-        young = given.material.on(cells.mesh)
+        young = given.material.on(cells.mesh, power)
         clock.end("material")
         return self._solved(finite_cell_model(cells, young, **given.constants), clock)
 

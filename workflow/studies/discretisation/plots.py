@@ -17,6 +17,7 @@ COLOUR = {
     "coarse": COLOURS["ddfem_hcms_ec"],
     "refined": COLOURS["random"],
     "half-cells": COLOURS["ddfem_hcms_ec_accurate"],
+    "half-cells-harmonic": COLOURS["hcms"],
     "cells": COLOURS["hcms_ec"],
 }
 MARKERS = "osD^vP*Xph<>"

@@ -25,6 +25,10 @@ class DiscretisationStudy(CaseResults):
         """Runs of which every time is the median."""
         return int(self.part["runs"])
 
+    def ways_of(self, case: Case) -> list[str]:
+        """Names of the ways to the spectrum of a case."""
+        return list(self.ratings[case]["ways"])
+
     def way(self, case: Case, name: str) -> dict[str, Any]:
         """What a way to the spectrum of a case came to."""
         found: dict[str, Any] = self.ratings[case]["ways"][name]
