@@ -21,7 +21,7 @@ from solver.coarsening.forest import FOREST
 from solver.studies.comparison import frequency_errors
 from solver.studies.discretisation.lattices import voxel_lattice, voxel_mesh
 from solver.studies.discretisation.material import INTERPOLATED, NOISY, PlacedMaterial
-from solver.studies.discretisation.truth import FINER, LEFT, LEFT_OF_NOISE, Truth
+from solver.studies.discretisation.truth import FINER, LEFT, LEFT_OF_NOISE, SolidTruth
 from solver.studies.discretisation.ways import TOLERANCE, Given, Spectrum, Ways
 
 Array = NDArray[np.float64]
@@ -50,7 +50,7 @@ def rate_discretisations(options: ProblemOptions, modes: int, runs: int) -> dict
     Returns
     -------
     dict[str, Any]
-        Plain values: `truth`, see `Truth`, and `ways`, see `solver.studies.discretisation.ways`:
+        Plain values: `truth`, see `SolidTruth`, and `ways`, see `solver.studies.discretisation.ways`:
         unknowns, seconds, and errors `against` the `solid` and against its `voxels`.
 
     Raises
@@ -67,7 +67,7 @@ def rate_discretisations(options: ProblemOptions, modes: int, runs: int) -> dict
         for name, way in ways.named.items():
             found[name].append(_named(name, way))
     left = LEFT_OF_NOISE if options.material in NOISY else LEFT
-    truth = Truth.between(found["cells"][0], ways.cells(FINER), left)
+    truth = SolidTruth.between(found["cells"][0], ways.cells(FINER), left)
     truths = {"solid": truth.hertz, "voxels": found["voxels"][0].hertz[RIGID_MODES:]}
     return {
         "mesh": options.mesh,

@@ -26,7 +26,7 @@ lattices of two and four times as many."""
 
 
 @dataclass(frozen=True)
-class Truth:
+class SolidTruth:
     """Frequencies of a solid.
 
     Attributes
@@ -44,7 +44,7 @@ class Truth:
     finest: Spectrum
 
     @classmethod
-    def between(cls, cells: Spectrum, finest: Spectrum, left: float) -> Truth:
+    def between(cls, cells: Spectrum, finest: Spectrum, left: float) -> SolidTruth:
         """From finite cells on a lattice and on one `FINER` times as fine.
 
         The middle of what may be left of their difference, a share from 0 to `left`, is taken off.
@@ -53,7 +53,7 @@ class Truth:
         --------
         >>> rigid = [0.0] * 6
         >>> spectra = [Spectrum(np.array([*rigid, f]), 0, {}) for f in (110.0, 100.0)]
-        >>> truth = Truth.between(*spectra, left=1.0)
+        >>> truth = SolidTruth.between(*spectra, left=1.0)
         >>> float(truth.hertz[0]), float(truth.doubt[0])
         (95.0, 0.05)
         """

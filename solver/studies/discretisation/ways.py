@@ -154,7 +154,8 @@ class Ways:
         clock.end("mesh")
         young = given.material.on(cells.mesh, power)
         clock.end("material")
-        return self._solved(finite_cell_model(cells, young, **given.constants), clock)
+        poisson, density = given.constants["poisson"], given.constants["density"]
+        return self._solved(finite_cell_model(cells, young, poisson, density), clock)
 
     def _voxels(self, clock: _Clock) -> tuple[HexMesh, Array]:
         given = self._given
