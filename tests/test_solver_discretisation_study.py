@@ -1,4 +1,4 @@
-"""Discretisations compared: lattices that nest, one material on all of them, truths, the command."""
+"""Discretisations compared: lattices that nest, one material on all, truths, the command."""
 
 from __future__ import annotations
 
