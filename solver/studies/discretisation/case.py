@@ -50,8 +50,8 @@ def rate_discretisations(options: ProblemOptions, modes: int, runs: int) -> dict
     Returns
     -------
     dict[str, Any]
-        Plain values: `truth`, see `SolidTruth`, and `ways`, see `solver.studies.discretisation.ways`:
-        unknowns, seconds, and errors `against` the `solid` and against its `voxels`.
+        Plain values: `truth`, see `SolidTruth`, and `ways`, see `Ways`: unknowns, seconds, and
+        errors `against` the `solid` and against its `voxels`.
 
     Raises
     ------
