@@ -68,6 +68,7 @@ def test_errors_are_pooled_by_material_and_way(study):
     voxels, coarse = rows[:2]
     assert voxels["material"] == "smooth" and voxels["way"] == "Voxels"
     assert voxels["solid_rms"] == pytest.approx(((0.03**2 + 0.04**2) / 2) ** 0.5)
+    assert voxels["solid_median"] == pytest.approx(0.035)
     assert voxels["solid_worst"] == pytest.approx(-0.08)
     assert voxels["solid_where"] == "Comb 8, smooth, mode 9"
     assert (coarse["n_dofs"], coarse["seconds"], coarse["doubt"]) == (0.5, 0.5, 0.01)

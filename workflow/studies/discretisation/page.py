@@ -12,7 +12,10 @@ def page(study: DiscretisationStudy, tables: dict[str, Table]) -> str:
     """Build the page from the tables and figures of a study; nothing is computed anew."""
     rows = tables["summary"].rows
     best = [
-        min((row for row in rows if row["material"] == material), key=lambda row: row["solid_rms"])
+        min(
+            (row for row in rows if row["material"] == material),
+            key=lambda row: row["solid_median"],
+        )
         for material in study.part["materials"]
     ]
     return rendered(

@@ -19,7 +19,7 @@ WAYS = {
     "coarse": "DDFEM* of voxels",
     "refined": "DDFEM*, refined",
     "half-cells": "Finite cells, half as fine",
-    "half-cells-harmonic": "The same, harmonic means",
+    "half-cells-harmonic": "Half as fine, harmonic means",
     "cells": "Finite cells",
 }
 """All ways, for people."""
@@ -57,6 +57,7 @@ def _pooled(study: DiscretisationStudy, cases: list[Case], name: str, against: s
     worst = max(cases, key=lambda case: abs(errors[case]["worst"]))
     return {
         f"{against}_rms": _root_mean_square([each["rms"] for each in errors.values()]),
+        f"{against}_median": statistics.median(each["rms"] for each in errors.values()),
         f"{against}_worst": errors[worst]["worst"],
         f"{against}_where": f"{study.label(worst)}, mode {errors[worst]['worst_mode']}",
     }
