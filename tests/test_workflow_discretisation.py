@@ -1,4 +1,4 @@
-"""The study of discretisations: pooling, what a case shows, a miniature end to end."""
+"""The study of discretisations: pooling, what a case shows, the page, the rules."""
 
 from __future__ import annotations
 
@@ -7,10 +7,14 @@ import json
 import pytest
 import yaml
 
+from carillon.measurement import measured
 from tests.pages import Page, assert_same_numbers, assert_self_contained
-from tests.workflow_runs import PROFILE, TINY, planned, snakemake
+from tests.workflow_runs import planned, snakemake
 from workflow.studies import catalogue
 from workflow.studies.base.cases import cases_of
+from workflow.studies.base.study import named
+from workflow.studies.base.style import save
+from workflow.studies.base.table import write_table
 from workflow.studies.discretisation.results import DiscretisationStudy
 from workflow.studies.discretisation.tables import WAYS
 
@@ -45,7 +49,7 @@ def rated(solid: str, material: str) -> dict:
         "tolerance": 1e-6,
         "truth": {"n_dofs": 9000, "doubt_rms": 0.01, "doubt_worst": 0.02},
         "ways": {name: way(1.0 if name == "voxels" else 0.5) for name in names},
-        "provenance": {"commit": "none"},
+        "provenance": measured({"command": "discretisation"}),
     }
 
 
@@ -83,30 +87,27 @@ def test_every_case_has_a_row_a_way(study):
     assert [row["doubt_rms"] for row in truths(study).rows] == [0.01] * 4
 
 
-def test_the_study_is_no_part_of_the_default_run(tmp_path):
-    default = planned(snakemake(tmp_path, "--dry-run", "--cores", 1))
-    assert "find_modes" in default and "rate_discretisation" not in default
-    study = planned(snakemake(tmp_path, "discretisation", "--dry-run", "--cores", 1))
-    # No mesh files lie here: six built-in solids with four materials.
-    assert study["rate_discretisation"] == 6 * 4
-    assert "find_modes" not in study and "rate_coarsening" not in study
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory):
-    """Folder of the tiny study."""
-    folder = tmp_path_factory.mktemp("study")
-    done = snakemake(folder, "--profile", PROFILE, "discretisation", "--configfile", TINY)
-    assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-6000:]
-    return folder / "results-tiny" / "discretisation"
-
-
-@pytest.mark.slow
-def test_the_page_of_a_miniature_study_holds_its_tables(finished):
-    page = Page(finished / "report.html")
+def test_the_page_holds_its_tables_and_figures(study):
+    description = catalogue.DISCRETISATION
+    for folder in ("tables", "figures"):
+        (study.folder / folder).mkdir()
+    tables = {name: make(study) for name, make in description.entries.items()}
+    for table in tables.values():
+        write_table(table, study.folder / "tables")
+    for figure in description.figures:
+        drawn = study.folder / "figures" / figure.file
+        save(named(figure.draw)(study), [drawn.with_suffix(".svg")])
+    path = study.folder / "report.html"
+    path.write_text(named(description.page)(study, tables))
+    page = Page(path)
     assert_self_contained(page)
     assert {"plot-unknowns", "plot-seconds"} <= set(page.ids)
-    for name in ("summary", "cases", "truths", "provenance"):
-        assert_same_numbers(page, finished / "tables", name)
-    for name in ("unknowns", "seconds"):
-        assert (finished / "figures" / f"{name}.png").stat().st_size > 5000
+    for name in tables:
+        assert_same_numbers(page, study.folder / "tables", name)
+
+
+def test_a_target_makes_the_study(tmp_path):
+    found = planned(snakemake(tmp_path, "discretisation", "--dry-run", "--cores", 1))
+    # No mesh files lie here: six built-in solids with four materials.
+    assert found["rate_discretisation"] == 6 * 4
+    assert "find_modes" not in found and "rate_coarsening" not in found
