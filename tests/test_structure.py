@@ -58,12 +58,14 @@ ARROWS = {
         solver.analysis""",
     "solver.studies.coarsening": """solver.coarsening solver.files solver.analysis
         solver.refinement solver.studies""",
+    "solver.studies.discretisation": """solver.coarsening solver.files solver.analysis
+        solver.refinement solver.studies""",
     "solver.studies.scaling": """solver.distribution solver.assembly solver.linear solver.hcms
         solver.correction solver.analysis""",
     "solver.commands": """dataset_gen.objectives solver.distribution solver.files solver.response
         solver.linear solver.analysis solver.refinement solver.studies solver.studies.benchmark
         solver.studies.calibration solver.studies.scaling solver.coarsening
-        solver.studies.coarsening""",
+        solver.studies.coarsening solver.studies.discretisation""",
     #
     "sound": "",
     "sound.clips": "sound",
@@ -88,6 +90,7 @@ ARROWS = {
     "workflow.studies.objectives": """dataset_gen.objectives solver.coarsening
         workflow.studies.base""",
     "workflow.studies.coarsening": "solver.studies.coarsening workflow.studies.base",
+    "workflow.studies.discretisation": "workflow.studies.base",
     "workflow.studies.sounds": """solver.files solver.response sound sound.clips sound.project
         sound.design sound.rendering workflow workflow.studies.base""",
     "workflow.studies.validation": """solver.files solver.response solver.studies workflow

@@ -34,6 +34,10 @@ COMMANDS = {
         "solver.commands.coarsening",
         "errors of a coarse model's single modes, true and expected, and what they are due to",
     ),
+    "discretisation": Command(
+        "solver.commands.discretisation",
+        "errors, unknowns and time of voxels, coarse elements and finite cells of one solid",
+    ),
     "calibrate": Command(
         "solver.commands.calibrate",
         "constants of the objective `calibrated` from spectra of random solids",

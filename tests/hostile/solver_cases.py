@@ -114,6 +114,12 @@ each(
     "--refine-to",
 )
 each(
+    "rounds of all ways",
+    "discretisation builtin:box --resolution 4 --runs VALUE",
+    ["0", "-1", "1e3"],
+    "--runs",
+)
+each(
     "modes followed",
     "convergence builtin:box --resolution 4 --modes VALUE --out out.json",
     ["0", "-5", "6", str(2**64)],
@@ -309,6 +315,7 @@ hostile("benchmark into nowhere", "benchmark builtin:box --resolution 4 --out no
 hostile("objectives into nowhere", "objectives builtin:box --resolution 4 --out nowhere/o.json")
 hostile("rating into nowhere", "coarsening builtin:box --resolution 4 --out nowhere/case.json")
 hostile("pictures into nowhere", "coarsening builtin:box --resolution 4 --pictures nowhere/case.h5")
+hostile("ways into nowhere", "discretisation builtin:box --resolution 4 --out nowhere/case.json")
 hostile("nothing coarsened", "coarsening builtin:box --resolution 4 --coarsen none", "none")
 hostile("scaling into nowhere", "scaling builtin:box --resolution 4 --out nowhere/s.json")
 hostile("plot of no format", "scaling builtin:box --resolution 4 --plot scaling.mp3", "scaling.mp3")

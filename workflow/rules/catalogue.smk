@@ -4,7 +4,7 @@ from workflow.studies import catalogue, marks
 from workflow.studies.base.cases import cases_of
 from workflow.studies.base.study import modules_of
 
-CASES = [config["objectives"], config["coarsening"]]
+CASES = [config["objectives"], config["coarsening"], config["discretisation"]]
 
 
 wildcard_constraints:
@@ -79,7 +79,7 @@ def measured_for(study):
         ]
     if study is catalogue.FIGURES:
         return measured
-    if study in (catalogue.OBJECTIVES, catalogue.COARSENING):
+    if study in (catalogue.OBJECTIVES, catalogue.COARSENING, catalogue.DISCRETISATION):
         return [f"{folder}/cases/{case.path}" for case in cases_of(config, study.name)]
     parts = ("model", "blocks", "benchmark", "variants", "curve")
     return [f"{folder}/{part}.json" for part in parts]
@@ -133,6 +133,17 @@ def coarsening_arguments():
         "forest": part["forest"] and path_word(part["forest"]),
         "modes": part["modes"],
         "refine_to": part["refine_to"],
+    }
+    return options(how)
+
+
+def discretisation_arguments():
+    """What is compared in every case, and how often it is timed."""
+    part = config["discretisation"]
+    how = {
+        "forest": part["forest"] and path_word(part["forest"]),
+        "modes": part["modes"],
+        "runs": part["runs"],
     }
     return options(how)
 

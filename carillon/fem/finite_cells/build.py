@@ -139,7 +139,11 @@ class Covering:
 
 
 def covering(
-    surface: trimesh.Trimesh, resolution: int, components: str = "error", name: str = "mesh"
+    surface: trimesh.Trimesh,
+    resolution: int,
+    components: str = "error",
+    name: str = "mesh",
+    grid: Grid | None = None,
 ) -> Covering:
     """The cells of a lattice that cover the inside of a surface; see `finite_cells`."""
     resolution = checked_resolution(surface, resolution, name)
@@ -147,7 +151,7 @@ def covering(
         raise UserError(
             f"components {components!r} is unknown, expected one of {', '.join(COMPONENTS)}"
         )
-    grid = even_grid(surface, resolution)
+    grid = grid or even_grid(surface, resolution)
     inside = find_inside(surface, grid)
     if not _holds(inside):
         raise UserError(_lost(surface, inside, resolution, grid, name))
@@ -167,7 +171,11 @@ def covering(
 
 
 def finite_cells(
-    surface: trimesh.Trimesh, resolution: int, components: str = "error", name: str = "mesh"
+    surface: trimesh.Trimesh,
+    resolution: int,
+    components: str = "error",
+    name: str = "mesh",
+    grid: Grid | None = None,
 ) -> FiniteCells:
     """Cover the inside of a surface with quadratic cells.
 
@@ -182,6 +190,9 @@ def finite_cells(
         ``"error"`` rejects a solid in several pieces, ``"largest"`` keeps the largest.
     name
         Name of the solid, for messages.
+    grid
+        Lattice of about this resolution around the solid, with an even number of voxels along each
+        axis; `even_grid` if None.
 
     Raises
     ------
@@ -196,7 +207,7 @@ def finite_cells(
     >>> bool(abs(cells.volume / 8.79e-4 - 1.0) < 0.01), len(cells) > 100
     (True, True)
     """
-    return covering(surface, resolution, components, name).cells
+    return covering(surface, resolution, components, name, grid).cells
 
 
 def even_grid(surface: trimesh.Trimesh, resolution: int) -> Grid:

@@ -1,0 +1,1 @@
+"""The study of voxels, coarse elements and finite cells by material."""
