@@ -34,6 +34,10 @@ COMMANDS = {
         "solver.commands.coarsening",
         "errors of a coarse model's single modes, true and expected, and what they are due to",
     ),
+    "accuracy": Command(
+        "solver.commands.accuracy",
+        "errors of voxels, finite cells and tetrahedra against frequencies that no mesh made",
+    ),
     "calibrate": Command(
         "solver.commands.calibrate",
         "constants of the objective `calibrated` from spectra of random solids",
