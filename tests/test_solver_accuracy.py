@@ -92,10 +92,10 @@ def test_errors_are_told_at_equal_unknowns_and_at_equal_time():
     ]
     cells, voxels, nothing = summarised(levels)
     assert (cells["rate"], voxels["rate"]) == (pytest.approx(3.0), pytest.approx(2.0))
-    assert (cells["unknowns"], cells["seconds"]) == (8000, 4.0)
-    assert cells["error_at_unknowns"] == pytest.approx(0.01)
-    assert voxels["error_at_unknowns"] == pytest.approx(0.4 * 8.0**-0.5)
-    assert voxels["error_at_seconds"] is None  # nothing took so long
+    assert (cells["unknowns"], cells["seconds"]) == (1000, 1.0)
+    assert cells["error_at_unknowns"] == pytest.approx(0.08)
+    assert voxels["error_at_unknowns"] == pytest.approx(0.4)
+    assert voxels["error_at_seconds"] == pytest.approx(0.2)
     assert nothing["rate"] is None and nothing["error_at_unknowns"] is None
 
 

@@ -20,7 +20,7 @@ from carillon.progress import track
 from solver.analysis.problem import DISCRETISATIONS
 from solver.studies.accuracy.measurement import Spectrum, cells
 from solver.studies.accuracy.solids import ANGLES, POISSON, SOLIDS, ReferenceSolid
-from solver.studies.accuracy.tetrahedra import ORDERS, missing, tetrahedra
+from solver.studies.accuracy.tetrahedra import ORDERS, missing, tetrahedra, versions
 from solver.studies.comparison import frequency_errors
 
 Array = NDArray[np.float64]
@@ -74,7 +74,7 @@ def measure_accuracy(options: AccuracyOptions) -> dict[str, Any]:
     dict[str, Any]
         Plain values: `references`, a solid an entry, with its frequencies [Hz] and their largest
         relative change from lower degrees; `levels`, a model an entry; `summary`, see `summarised`;
-        `without`, a sentence if there are no tetrahedra.
+        `without`, a sentence if there are no tetrahedra; `packages`, versions of what made them.
     """
     without = missing()
     kinds = [*DISCRETISATIONS, *(() if without else ORDERS)]
@@ -97,6 +97,7 @@ def measure_accuracy(options: AccuracyOptions) -> dict[str, Any]:
         "runs": options.runs,
         "base": BASE,
         "without": without,
+        "packages": {} if without else versions(),
         "references": references,
         "levels": levels,
         "summary": summarised(levels),
@@ -171,7 +172,7 @@ def summarised(levels: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
             found.append(level)
     rows = []
     for solid, kinds in groups.items():
-        base = kinds[BASE][len(kinds[BASE]) // 2] if kinds.get(BASE) else {}
+        base = _middle(kinds.get(BASE, []))
         for kind, found in kinds.items():
             row = {"solid": solid, "discretisation": kind, "rate": _rate(found)}
             for size in ("unknowns", "seconds"):
@@ -179,6 +180,11 @@ def summarised(levels: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
                 row[f"error_at_{size}"] = interpolated(found, size, base.get(size))
             rows.append(row)
     return rows
+
+
+def _middle(levels: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """The level in the middle, never the finest; empty if there is none."""
+    return levels[max(0, min(len(levels) // 2, len(levels) - 2))] if levels else {}
 
 
 def _rate(levels: Sequence[dict[str, Any]]) -> float | None:

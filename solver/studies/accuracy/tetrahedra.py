@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib import import_module
+from importlib import import_module, metadata
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,7 @@ from solver.studies.accuracy.solids import DENSITY, POISSON, YOUNG, ReferenceSol
 Array = NDArray[np.float64]
 
 PACKAGES = ("gmsh", "skfem")
+INSTALLED_BY = ("gmsh", "scikit-fem")
 REQUIREMENTS = "workflow/envs/requirements-tetrahedra.txt"
 ORDERS = {"linear tetrahedra": 1, "quadratic tetrahedra": 2}
 """Degrees of the shape functions; those of the faces are the same."""
@@ -57,6 +58,11 @@ def missing() -> str:
                 f"install it by pip install -r {REQUIREMENTS}."
             )
     return ""
+
+
+def versions() -> dict[str, str]:
+    """Versions of the packages by the names that they are installed by."""
+    return {name: metadata.version(name) for name in INSTALLED_BY}
 
 
 def tetrahedra(solid: ReferenceSolid, spacing: float, kind: str, modes: int) -> Spectrum:
