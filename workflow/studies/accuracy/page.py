@@ -16,6 +16,7 @@ def page(study: AccuracyStudy, tables: dict[str, Table]) -> str:
         title="How near do the frequencies come to those of the solid?",
         tables=tables,
         measured=study.measured,
+        without=study.without,
         figures={name: inline(study.figure(f"{name}.svg")) for name in FIGURES},
         problems=[row for row in tables["levels"].rows if row.get("problem")],
     )

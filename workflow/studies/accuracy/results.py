@@ -28,6 +28,11 @@ class AccuracyStudy(Results):
         return {FILE: self.measured["provenance"]}
 
     @property
+    def without(self) -> str:
+        """One sentence if tetrahedra are left out; empty if not."""
+        return str(self.measured["without"])
+
+    @property
     def titles(self) -> dict[str, str]:
         """Names of the solids for people."""
         return {name: each["title"] for name, each in self.measured["references"].items()}
