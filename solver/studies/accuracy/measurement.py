@@ -29,6 +29,8 @@ class Spectrum:
 
     Attributes
     ----------
+    spacing
+        Between neighbouring nodes [m]; of tetrahedra as it was asked for.
     unknowns
         Of the model.
     build_seconds, solve_seconds
@@ -36,6 +38,7 @@ class Spectrum:
     """
 
     values: Array
+    spacing: float
     unknowns: int
     build_seconds: float
     solve_seconds: float
@@ -50,14 +53,16 @@ def cells(surface: trimesh.Trimesh, name: str, spacing: float, kind: str, modes:
         If the solid falls apart in such a lattice.
     """
     assert kind in DISCRETISATIONS
-    resolution = max(2, round(float(np.ptp(surface.bounds, axis=0).max()) / spacing))
+    longest = float(np.ptp(surface.bounds, axis=0).max())
+    resolution = max(2, round(longest / spacing))
     begin = time.perf_counter()
     model = _model(surface, ProblemOptions(name, resolution, discretisation=kind))
     built = time.perf_counter()
     found = modal_analysis(model, SolverOptions(modes=modes), MPI.COMM_SELF)
     values, unknowns = found.values, found.system.n_dofs
     found.system.destroy()
-    return Spectrum(values, unknowns, built - begin, time.perf_counter() - built)
+    seconds = time.perf_counter() - built
+    return Spectrum(values, longest / resolution, unknowns, built - begin, seconds)
 
 
 def _model(surface: trimesh.Trimesh, options: ProblemOptions) -> Solid:

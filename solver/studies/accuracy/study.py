@@ -149,6 +149,7 @@ def _rated(results: Sequence[Spectrum | str], exact: Array) -> dict[str, Any]:
         for name in ("build_seconds", "solve_seconds")
     }
     return {
+        "spacing": spectra[0].spacing,
         "unknowns": spectra[0].unknowns,
         **seconds,
         "seconds": sum(seconds.values()),

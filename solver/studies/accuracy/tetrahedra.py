@@ -74,7 +74,7 @@ def tetrahedra(solid: ReferenceSolid, spacing: float, kind: str, modes: int) -> 
     K, M = matrices(points, elements)
     values = lowest(K, M, modes, solid)
     solved = time.perf_counter()
-    return Spectrum(values, K.shape[0], meshed - begin, solved - meshed)
+    return Spectrum(values, spacing, K.shape[0], meshed - begin, solved - meshed)
 
 
 @contextmanager
