@@ -42,8 +42,8 @@ def box(sides: Sides, degrees: Degrees) -> Domain:
     Examples
     --------
     >>> domain = box((1.0, 2.0, 3.0), (2, 2, 2))
-    >>> round(domain.weights.sum(), 12), round(domain.weights @ domain.points[:, 0] ** 4, 12)
-    (6.0, 0.075)
+    >>> bool(np.isclose(domain.weights @ domain.points[:, 0] ** 4, 0.075))
+    True
     """
     (x, u), (y, v), (z, w) = (legendre.leggauss(_points(degree)) for degree in degrees)
     grid = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -55,8 +55,9 @@ def cylinder(sides: Sides, degrees: Degrees, bore: float = 0.0) -> Domain:
 
     Examples
     --------
-    >>> round(cylinder((2.0, 2.0, 1.0), (2, 2, 2), bore=0.5).weights.sum() / np.pi, 12)
-    0.75
+    >>> tube = cylinder((2.0, 2.0, 1.0), (2, 2, 2), bore=0.5)
+    >>> bool(np.isclose(tube.weights.sum(), 0.75 * np.pi))
+    True
     """
     degree = max(degrees[:2])
     radii, of_radii = _radial(degree, bore, power=1)
@@ -74,8 +75,8 @@ def ellipsoid(sides: Sides, degrees: Degrees, bore: float = 0.0) -> Domain:
     Examples
     --------
     >>> domain = ellipsoid((2.0, 2.0, 2.0), (2, 2, 2))
-    >>> round(domain.weights @ domain.points[:, 2] ** 4 / np.pi - 4.0 / 35.0, 12)
-    0.0
+    >>> bool(np.isclose(domain.weights @ domain.points[:, 2] ** 4, 4.0 * np.pi / 35.0))
+    True
     """
     degree = max(degrees)
     radii, of_radii = _radial(degree, bore, power=2)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
-from matplotlib.ticker import PercentFormatter
 
 from workflow.studies.accuracy.results import AccuracyStudy
 from workflow.studies.accuracy.tables import LABELS
@@ -49,7 +48,7 @@ def _figure(study: AccuracyStudy, size: str, label: str) -> Figure:
             )
         plain_numbers(panel.xaxis)
         plain_numbers(panel.yaxis)
-        panel.yaxis.set_major_formatter(PercentFormatter(1.0))
+        panel.yaxis.set_major_formatter(lambda value, _: f"{100.0 * value:g} %")
         panel.set_title(title)
     for panel in panels.flat[len(study.titles) :]:
         panel.set_visible(False)
