@@ -12,10 +12,7 @@ from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
-
-ANGLES = np.radians([25.0, 35.0, 15.0])
-"""About x, y and z, by which solids are turned against the lattice."""
-YOUNG, POISSON, DENSITY = 1e9, 0.25, 1000.0
+from solver.studies.accuracy.solids import ANGLES, DENSITY, POISSON, YOUNG
 
 
 def box(*sides: float, at: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> trimesh.Trimesh:
@@ -25,7 +22,7 @@ def box(*sides: float, at: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> trim
 
 def turned(surface: trimesh.Trimesh) -> trimesh.Trimesh:
     """The surface turned by `ANGLES`."""
-    return surface.copy().apply_transform(euler_matrix(*ANGLES))
+    return surface.copy().apply_transform(euler_matrix(*np.radians(ANGLES)))
 
 
 def spaced(surface: trimesh.Trimesh, spacing: float) -> FiniteCells:

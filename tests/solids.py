@@ -10,7 +10,6 @@ import scipy.linalg as la
 from numpy.polynomial import legendre
 
 from carillon.fem.block import degrees_of_freedom
-from carillon.fem.element import elasticity_matrix
 from carillon.fem.geometry import HexMesh, blocks_from_mesh, hexmesh_from_grid
 from carillon.fem.model import ElasticModel, Solid, fine_model
 from solver.assembly.sparse import assembled
@@ -82,67 +81,6 @@ def dense_eigenvalues(model: Solid) -> np.ndarray:
     """All eigenvalues by LAPACK."""
     K, M = assembled(model)
     return la.eigh(K.toarray(), M.toarray(), eigvals_only=True)
-
-
-def parallelepiped_eigenvalues(
-    sides: tuple[float, float, float],
-    young: float,
-    poisson: float,
-    density: float,
-    degree: int = 9,
-    profile: Callable[[np.ndarray], np.ndarray] = np.ones_like,
-) -> np.ndarray:
-    """Eigenvalues of the free parallelepiped by Rayleigh-Ritz with polynomials.
-
-    Independent of the finite elements: one global space of Legendre polynomials, exact Gauss
-    quadrature (Visscher et al. 1991 use powers in the same way).  Young's modulus is `young` times
-    `profile`, a polynomial in the first coordinate, which runs from -1 to 1, of degree 8 at most.
-    """
-    points, weights = legendre.leggauss(degree + 5)
-    values = legendre.legvander(points, degree)
-    slopes = np.stack(
-        [legendre.legval(points, legendre.legder(row)) for row in np.eye(degree + 1)], axis=1
-    )
-
-    def tables(weights: np.ndarray) -> dict[tuple[int, int], np.ndarray]:
-        """Integrals of products of the polynomials and their derivatives, by their orders."""
-        both = (values, slopes)
-        return {
-            (i, j): both[i].T @ (weights[:, None] * both[j]) for i in range(2) for j in range(2)
-        }
-
-    plain, along = tables(weights), tables(weights * profile(points))
-    indices = np.array(
-        [index for index in product(range(degree + 1), repeat=3) if sum(index) <= degree]
-    )
-    elasticity = young * elasticity_matrix(poisson)
-    half = 0.5 * np.array(sides)
-
-    def integral(a: int, b: int, first: dict[tuple[int, int], np.ndarray]) -> np.ndarray:
-        """Integral of (d_a phi_m) (d_b phi_n), with a or b = 3 for no derivative.
-
-        `first` has the integrals along the first axis.
-        """
-        result = np.full((len(indices), len(indices)), half.prod())
-        for axis, table in enumerate((first, plain, plain)):
-            factor = table[(int(a == axis), int(b == axis))]
-            scale = half[axis] ** -(int(a == axis) + int(b == axis))
-            result *= scale * factor[np.ix_(indices[:, axis], indices[:, axis])]
-        return result
-
-    lame, shear = elasticity[0, 1], elasticity[3, 3]
-    size = len(indices)
-    K = np.zeros((3, size, 3, size))
-    M = np.zeros((3, size, 3, size))
-    gradients = {(a, b): integral(a, b, along) for a in range(3) for b in range(3)}
-    for i in range(3):
-        M[i, :, i, :] = density * integral(3, 3, plain)
-        for j in range(3):
-            K[i, :, j, :] += lame * gradients[i, j] + shear * gradients[j, i]
-        for k in range(3):
-            K[i, :, i, :] += shear * gradients[k, k]
-    K, M = K.reshape(3 * size, -1), M.reshape(3 * size, -1)
-    return la.eigh(K, M, eigvals_only=True)
 
 
 def timoshenko_free_frequencies(

@@ -20,6 +20,9 @@ from solver.analysis.problem import ProblemOptions, build_problem
 from solver.files.modes_file import read_modes, write_modes
 from solver.hcms.condense import INTERFACES
 from solver.response.contact import interpolation
+from solver.studies.accuracy import domains
+from solver.studies.accuracy.ritz import free_eigenvalues
+from solver.studies.accuracy.solids import SOLIDS
 from solver.studies.comparison import compare_files
 from tests import cut_solids, solids
 from tests.cut_solids import box, spaced, turned, uniform
@@ -37,16 +40,15 @@ def material():
 
 
 @pytest.mark.parametrize(
-    ("sides", "spacing", "goal"),
-    [((0.24, 0.24, 0.012), 0.024, 0.06), ((0.24, 0.16, 0.12), 0.02, 0.003)],
+    ("name", "spacing", "goal"),
+    [("plate", 0.024, 0.065), ("block", 0.02, 0.003)],
     ids=["plate half as thick as the spacing", "block"],
 )
-def test_solids_turned_against_the_lattice(sides, spacing, goal):
-    exact = solids.parallelepiped_eigenvalues(
-        sides, cut_solids.YOUNG, cut_solids.POISSON, cut_solids.DENSITY, 11
-    )[6:36]
-    found = cut_solids.eigenvalues(uniform(spaced(turned(box(*sides)), spacing)), 36)[6:]
-    errors = np.sqrt(found / exact) - 1.0
+def test_solids_turned_against_the_lattice(name, spacing, goal):
+    solid = SOLIDS[name]
+    exact = solid.frequencies(30, fewer=4)
+    values = cut_solids.eigenvalues(uniform(spaced(solid.surface(), spacing)), 36)[6:]
+    errors = np.sqrt(values) / (2.0 * np.pi * exact) - 1.0
     assert np.sqrt(np.mean(errors**2)) < goal
 
 
@@ -58,7 +60,14 @@ def test_the_bells_equal_pairs_stay_pairs():
 
 def test_frequencies_fall_towards_those_of_the_solid():
     sides = (0.2, 0.1, 0.05)
-    exact = solids.parallelepiped_eigenvalues(sides, 1e9, 0.25, 1000.0, 10)[6:12]
+    degrees = (10, 10, 10)
+    exact = free_eigenvalues(
+        domains.box(sides, degrees),
+        degrees,
+        cut_solids.YOUNG,
+        cut_solids.POISSON,
+        cut_solids.DENSITY,
+    )[6:12]
     errors = [
         np.abs(
             cut_solids.eigenvalues(uniform(spaced(turned(box(*sides)), spacing)), 12)[6:] / exact

@@ -34,7 +34,7 @@ def moments(cells):
 
 def moments_of_box(surface, sides):
     volume = float(np.prod(sides))
-    turn = trimesh.transformations.euler_matrix(*cut_solids.ANGLES)[:3, :3]
+    turn = trimesh.transformations.euler_matrix(*np.radians(cut_solids.ANGLES))[:3, :3]
     second = turn @ np.diag(volume * np.square(sides) / 12.0) @ turn.T
     return volume, np.zeros(3), second
 

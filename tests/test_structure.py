@@ -51,6 +51,7 @@ ARROWS = {
     "solver.studies": """solver.coarsening solver.distribution solver.files solver.response
         solver.assembly solver.linear solver.subspace solver.hcms solver.correction
         solver.reference solver.analysis""",
+    "solver.studies.accuracy": "solver.assembly solver.linear solver.analysis solver.studies",
     "solver.studies.benchmark": """solver.coarsening solver.distribution solver.files
         solver.assembly solver.linear solver.subspace solver.correction solver.analysis
         solver.studies""",
@@ -65,7 +66,7 @@ ARROWS = {
     "solver.commands": """dataset_gen.objectives solver.distribution solver.files solver.response
         solver.linear solver.analysis solver.refinement solver.studies solver.studies.benchmark
         solver.studies.calibration solver.studies.scaling solver.coarsening
-        solver.studies.coarsening solver.studies.discretisation""",
+        solver.studies.accuracy solver.studies.coarsening solver.studies.discretisation""",
     #
     "sound": "",
     "sound.clips": "sound",
@@ -91,6 +92,7 @@ ARROWS = {
         workflow.studies.base""",
     "workflow.studies.coarsening": "solver.studies.coarsening workflow.studies.base",
     "workflow.studies.discretisation": "workflow.studies.base",
+    "workflow.studies.accuracy": "workflow.studies.base",
     "workflow.studies.sounds": """solver.files solver.response sound sound.clips sound.project
         sound.design sound.rendering workflow workflow.studies.base""",
     "workflow.studies.validation": """solver.files solver.response solver.studies workflow

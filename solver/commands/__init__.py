@@ -38,6 +38,10 @@ COMMANDS = {
         "solver.commands.discretisation",
         "errors, unknowns and time of voxels, coarse elements and finite cells of one solid",
     ),
+    "accuracy": Command(
+        "solver.commands.accuracy",
+        "errors of voxels, finite cells and tetrahedra against frequencies that no mesh made",
+    ),
     "calibrate": Command(
         "solver.commands.calibrate",
         "constants of the objective `calibrated` from spectra of random solids",

@@ -108,6 +108,18 @@ each(
     "modes",
 )
 each(
+    "sizes compared",
+    "accuracy --solids sphere --levels VALUE",
+    ["0", "1", "5", str(2**64), "1e0"],
+    "levels",
+)
+each(
+    "solids compared",
+    "accuracy --solids VALUE",
+    ["", "cube", "block,", "block,,plate", "../block"],
+    "solids",
+)
+each(
     "error refined to",
     "coarsening builtin:box --resolution 4 --refine-to VALUE",
     ["0", "-0.1", "nan", "inf"],
@@ -313,6 +325,7 @@ hostile("audit onto a device", "audit ZOO/modes.h5 --out null", files={"null": P
 hostile("audit on a full disk", "audit ZOO/modes.h5 --out a.json", "make room", file_size=100)
 hostile("benchmark into nowhere", "benchmark builtin:box --resolution 4 --out nowhere/row.json")
 hostile("objectives into nowhere", "objectives builtin:box --resolution 4 --out nowhere/o.json")
+hostile("accuracy into nowhere", "accuracy --solids sphere --out nowhere/a.json")
 hostile("rating into nowhere", "coarsening builtin:box --resolution 4 --out nowhere/case.json")
 hostile("pictures into nowhere", "coarsening builtin:box --resolution 4 --pictures nowhere/case.h5")
 hostile("ways into nowhere", "discretisation builtin:box --resolution 4 --out nowhere/case.json")

@@ -81,6 +81,8 @@ def measured_for(study):
         return measured
     if study in (catalogue.OBJECTIVES, catalogue.COARSENING, catalogue.DISCRETISATION):
         return [f"{folder}/cases/{case.path}" for case in cases_of(config, study.name)]
+    if study is catalogue.ACCURACY:
+        return [f"{folder}/accuracy.json"]
     parts = ("model", "blocks", "benchmark", "variants", "curve")
     return [f"{folder}/{part}.json" for part in parts]
 
@@ -143,6 +145,17 @@ def discretisation_arguments():
     how = {
         "forest": part["forest"] and path_word(part["forest"]),
         "modes": part["modes"],
+        "runs": part["runs"],
+    }
+    return options(how)
+
+
+def accuracy_arguments():
+    """What is measured, and how often."""
+    part = config["accuracy"]
+    how = {
+        "solids": ",".join(part["solids"]),
+        "levels": part["levels"],
         "runs": part["runs"],
     }
     return options(how)

@@ -1,0 +1,1 @@
+"""Frequencies of both discretisations and of tetrahedra against those that no mesh made."""

@@ -1,0 +1,1 @@
+"""The study of discretisations against frequencies that no mesh made."""
