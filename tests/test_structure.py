@@ -47,6 +47,7 @@ ARROWS = {
         solver.reference""",
     "solver.refinement": """solver.coarsening solver.distribution solver.assembly solver.linear
         solver.subspace solver.analysis""",
+    "solver.accuracy": "solver.refinement",
     "solver": "solver.analysis",
     "solver.studies": """solver.coarsening solver.distribution solver.files solver.response
         solver.assembly solver.linear solver.subspace solver.hcms solver.correction

@@ -78,12 +78,7 @@ class Covering:
     @cached_property
     def cells(self) -> FiniteCells:
         """All cells, undivided."""
-        faces = Faces(self.cover.met, np.empty((0, 4), dtype=np.int64)).chosen(self.kept)
-        corner = self.cover.grid[self.kept]
-        nodes, places = joined_nodes(corner, np.full(len(corner), 2), faces)
-        rows, row = np.unique(np.append(0, self.cover.row[self.kept]), return_inverse=True)
-        weights = self.cover.weights[rows]
-        return assemble_cells(nodes, places, row[1:], weights, self.grid.origin, self.grid.edge)
+        return _Parts.of_cover(self.cover).chosen(self.kept).cells(self.grid)
 
     def divided(self, places: Index) -> Division:
         """The same, but with cells at `places` (d, 3), their lowest voxels, divided into eight.
@@ -96,38 +91,20 @@ class Covering:
         whole, half = self.cover, divided_cover(self.surface, self.grid, places)
         undivided = np.ones(len(whole.places), dtype=bool)
         undivided[whole.cells_at(places)] = False
-        faces = Faces(
-            np.concatenate([whole.met, half.met + np.array([len(whole), len(whole), 0])]),
-            faces_of_halves(whole, half, undivided) + np.array([0, len(whole), 0, 0]),
-        )
-        corner = np.concatenate([2 * whole.grid, half.grid])
-        span = np.repeat([4, 2], [len(whole), len(half)])
-        table = np.concatenate([whole.weights, half.weights[1:]])
-        row = np.concatenate(
-            [whole.row, np.where(half.row > 0, half.row + len(whole.weights) - 1, 0)]
-        )
-        leaves = np.concatenate(
-            [self.kept & undivided[whole.owner], np.ones(len(half), dtype=bool)]
-        )
-        chosen = self._one_piece(faces, leaves, np.concatenate([whole.volumes, half.volumes / 8.0]))
-        nodes, node_places = joined_nodes(corner[chosen], span[chosen], faces.chosen(chosen))
-        rows, row = np.unique(np.append(0, row[chosen]), return_inverse=True)
-        edge = self.grid.edge / 2.0
-        cells = assemble_cells(
-            nodes, node_places, row[1:], table[rows], self.grid.origin, edge, is_mixed=True
-        )
-        among = np.cumsum(self.kept) - 1
-        parent = np.concatenate([np.arange(len(whole)), parents(whole, half, self.kept)])[chosen]
-        parent = among[parent]
+        parts = _Parts.of_two(whole, half, undivided)
+        leaves = np.append(self.kept & undivided[whole.owner], np.ones(len(half), dtype=bool))
+        chosen = self._one_piece(parts, leaves)
+        cells = parts.chosen(chosen).cells(self.grid)
+        among = self.kept & ~whole.slight
+        parent = np.append(np.arange(len(whole)), parents(whole, half, among))
+        parent = (np.cumsum(among) - 1)[parent[chosen & ~parts.slight]]
         return Division(cells, parent, voxels_of_parents(cells, self.cells, parent))
 
-    def _one_piece(
-        self, faces: Faces, leaves: NDArray[np.bool_], volumes: Array
-    ) -> NDArray[np.bool_]:
+    def _one_piece(self, parts: _Parts, leaves: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Those of the `leaves` (p,) that are of the largest piece; the others must be crumbs."""
         own = np.flatnonzero(leaves)
-        piece = faces.chosen(leaves).pieces(len(own))
-        sizes = np.bincount(piece, volumes[own])
+        piece = parts.faces.chosen(leaves).pieces(len(own))
+        sizes = np.bincount(piece, parts.volumes[own])
         if np.count_nonzero(sizes >= SMALLEST_PIECE) > 1:
             raise UserError(
                 f"mesh {self.name!r} falls apart where cells are divided; raise --resolution, or "
@@ -136,6 +113,71 @@ class Covering:
         chosen = np.zeros(len(leaves), dtype=bool)
         chosen[own[piece == sizes.argmax()]] = True
         return chosen
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """Parts of the cells of one lattice or two, all of whose arrays have a row for each.
+
+    Attributes
+    ----------
+    corner, span : (p, 3), (p,)
+        Lowest corners and edges of their cells, in steps: voxels, or halves of them.
+    row, volumes, slight : (p,)
+        See `Cover`; volumes are in voxels.
+    weights
+        That the rows are of.
+    faces
+        Where they meet.
+    """
+
+    corner: Index
+    span: Index
+    row: Index
+    volumes: Array
+    slight: NDArray[np.bool_]
+    weights: Array
+    faces: Faces
+
+    @classmethod
+    def of_cover(cls, cover: Cover) -> _Parts:
+        """Those of one lattice."""
+        span = np.full(len(cover), 2)
+        faces = Faces(cover.met, np.empty((0, 4), dtype=np.int64))
+        return cls(cover.grid, span, cover.row, cover.volumes, cover.slight, cover.weights, faces)
+
+    @classmethod
+    def of_two(cls, whole: Cover, half: Cover, undivided: NDArray[np.bool_]) -> _Parts:
+        """Those of a lattice and of one of half the edge, in place of its cells not `undivided`."""
+        count, rows = len(whole), len(whole.weights)
+        return cls(
+            np.concatenate([2 * whole.grid, half.grid]),
+            np.repeat([4, 2], [count, len(half)]),
+            np.append(whole.row, np.where(half.row > 0, half.row + rows - 1, 0)),
+            np.append(whole.volumes, half.volumes / 8.0),
+            np.append(whole.slight, half.slight),
+            np.concatenate([whole.weights, half.weights[1:]]),
+            Faces(
+                np.concatenate([whole.met, half.met + np.array([count, count, 0])]),
+                faces_of_halves(whole, half, undivided) + np.array([0, count, 0, 0]),
+            ),
+        )
+
+    def chosen(self, kept: NDArray[np.bool_]) -> _Parts:
+        """Those that are kept (p,)."""
+        arrays = (self.corner, self.span, self.row, self.volumes, self.slight)
+        return _Parts(*(each[kept] for each in arrays), self.weights, self.faces.chosen(kept))
+
+    def cells(self, grid: Grid) -> FiniteCells:
+        """The mesh of those that are not slight, on a lattice of these voxels."""
+        nodes, places = joined_nodes(self.corner, self.span, self.faces, self.slight)
+        row = self.row[~self.slight]
+        rows, row = np.unique(np.append(0, row), return_inverse=True)
+        is_mixed = bool((self.span > 2).any())
+        edge = grid.edge / 2.0 if is_mixed else grid.edge
+        return assemble_cells(
+            nodes, places, row[1:], self.weights[rows], grid.origin, edge, is_mixed
+        )
 
 
 def covering(
@@ -156,8 +198,8 @@ def covering(
     if not _holds(inside):
         raise UserError(_lost(surface, inside, resolution, grid, name))
     cover = cover_of(inside)
-    piece = Faces(cover.met, np.empty((0, 4), dtype=np.int64)).pieces(len(cover))
-    volumes = np.bincount(piece, cover.volumes)
+    piece = _Parts.of_cover(cover).faces.pieces(len(cover))
+    volumes = np.bincount(piece, np.where(cover.slight, 0.0, cover.volumes))
     kept = np.flatnonzero(volumes >= SMALLEST_PIECE)
     if not len(kept):
         raise UserError(_lost(surface, inside, resolution, grid, name))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +22,9 @@ Index = NDArray[np.int64]
 
 SMALLEST_OCTANT = 1e-6
 """Share of a voxel below which it counts as empty."""
+FEWEST_LINES = 24
+"""Pieces of lines that a cell needs, of the 256 across it. With fewer, points are too few to tell
+displacements from motions without strain, and there are slow motions that no solid has."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,8 @@ class Cover:
         See `carillon.fem.finite_cells.cells.FiniteCells`.
     met : (m, 3)
         Parts that meet, the lower one first, and the axis across their face.
+    slight : (p,)
+        Parts so small that they only hold others together, and are no cells.
     """
 
     places: Index
@@ -57,6 +62,7 @@ class Cover:
     row: Index
     weights: Array
     met: Index
+    slight: NDArray[np.bool_]
 
     def __len__(self) -> int:
         return len(self.row)
@@ -98,7 +104,7 @@ def cover_of(inside: Inside) -> Cover:
     state, facing, corners = state[there][cut], facing[there][cut], places[cut]
     labels, counts = find_parts(corners, state, inside.pieces)
     first = np.cumsum(counts) - counts
-    weights = weights_of_parts(
+    weights, lines = weights_of_parts(
         corners, state, facing, inside.pieces, labels, first, int(counts.sum())
     )
     weights[weights.sum(axis=2) < SMALLEST_OCTANT / 8.0] = 0.0
@@ -111,6 +117,8 @@ def cover_of(inside: Inside) -> Cover:
     row[~whole[owner]] = np.where(is_cut, 1 + np.arange(len(weights)), 0)
     table = np.concatenate([octant_weights()[None], weights])
     holds = table.any(axis=(1, 2))[row]
+    slight = np.zeros(len(owner), dtype=bool)
+    slight[~whole[owner]] = lines < FEWEST_LINES
     among_cut = np.full(len(places), -1)
     among_cut[cut] = np.arange(len(cut))
     found = Cover(
@@ -123,6 +131,7 @@ def cover_of(inside: Inside) -> Cover:
         row[holds],
         table,
         np.empty((0, 3), dtype=np.int64),
+        slight[holds],
     )
     return _with_meetings(found, numbers)
 
@@ -135,8 +144,7 @@ def _with_meetings(cover: Cover, numbers: Index) -> Cover:
         below, above = cover.numbered(lower[pair], below), cover.numbered(upper[pair], above)
         rows = np.stack([below, above, np.full(len(pair), axis)], axis=1)
         met.append(rows[(rows >= 0).all(axis=1)])
-    fields = {**cover.__dict__, "met": np.concatenate(met)}
-    return Cover(**fields)
+    return replace(cover, met=np.concatenate(met))
 
 
 def divided_cover(surface: trimesh.Trimesh, grid: Grid, places: Index) -> Cover:
@@ -155,7 +163,7 @@ def divided_cover(surface: trimesh.Trimesh, grid: Grid, places: Index) -> Cover:
     divided[tuple(((places - low) // 2).T)] = True
     wanted = divided.repeat(4, axis=0).repeat(4, axis=1).repeat(4, axis=2)
     found = cover_of(find_inside(surface, box, wanted))
-    return Cover(**{**found.__dict__, "places": found.places + 2 * low})
+    return replace(found, places=found.places + 2 * low)
 
 
 def faces_of_halves(whole: Cover, half: Cover, undivided: NDArray[np.bool_]) -> Index:

@@ -48,8 +48,12 @@ class Faces:
         return _components(count, pairs[:, 0], pairs[:, 1])
 
 
-def joined_nodes(corner: Index, span: Index, faces: Faces) -> tuple[Index, Index]:
+def joined_nodes(
+    corner: Index, span: Index, faces: Faces, slight: NDArray[np.bool_]
+) -> tuple[Index, Index]:
     """Nodes (c, 27) of cells, and the places (n, 3) of the nodes, ordered by (z, y, x).
+
+    Some cells are so slight (p,) that they are not among the c, but they hold others together.
 
     Parameters
     ----------
@@ -60,6 +64,8 @@ def joined_nodes(corner: Index, span: Index, faces: Faces) -> tuple[Index, Index
     own = _COUNT * np.arange(len(corner))[:, None] + np.arange(_COUNT)
     joins = [_of_alike(own, faces.alike)]
     hanging, beyond, same = _of_unlike(own, corner, span, faces.unlike)
+    hangs_from_cell = ~slight[beyond // _COUNT]
+    hanging, beyond = hanging[hangs_from_cell], beyond[hangs_from_cell]
     joins.append(same)
     label = _components(count, *np.concatenate(joins, axis=1))
     # A node that hangs between two cells hangs from nodes that they share.
@@ -71,7 +77,7 @@ def joined_nodes(corner: Index, span: Index, faces: Faces) -> tuple[Index, Index
     replaced[label[hanging]] = label[beyond]
     hangs = np.zeros(count, dtype=bool)
     hangs[label[hanging]] = True
-    nodes = np.where(hangs[label], replaced[label], label)[own]
+    nodes = np.where(hangs[label], replaced[label], label)[own[~slight]]
     places = np.repeat(corner, _COUNT, axis=0) + (NODES * (span[:, None, None] // 2)).reshape(-1, 3)
     return _ordered(nodes, label, np.where(hangs[label, None], -1, places))
 

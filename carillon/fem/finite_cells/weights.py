@@ -29,8 +29,10 @@ def weights_of_parts(
     labels: Labels,
     first: Index,
     count: int,
-) -> Array:
+) -> tuple[Array, Index]:
     """Weights (count, 8, 125) of the points for the inside of each octant of each part.
+
+    With them comes on how many pieces of lines (count,) those of a part rest.
 
     An octant is integrated along the axis that the surface faces there.
 
@@ -47,7 +49,7 @@ def weights_of_parts(
     first : (k,)
         Number of each cell's first part.
     """
-    weights = np.zeros((count, OCTANTS, POINTS))
+    weights, lines = np.zeros((count, OCTANTS, POINTS)), np.zeros(count, dtype=np.int64)
     for each, bounds in zip(pieces, box_bounds(pieces)):
         chosen = (state == CUT) & (facing == each.axis)
         _integrate(
@@ -62,12 +64,14 @@ def weights_of_parts(
             bounds,
             POINT_PLACES,
             weights,
+            lines,
         )
     cell, octant = np.nonzero(state == FULL)
     corner = LINES * np.stack([octant & 1, octant >> 1 & 1, octant >> 2], axis=1)
     part = labels[cell, corner[:, 0], corner[:, 1], corner[:, 2]].astype(np.int64)
     weights[first[cell] + part - 1, octant] = octant_weights()[octant]
-    return weights
+    np.add.at(lines, first[cell] + part - 1, LINES**2)
+    return weights, lines
 
 
 def _across(spread: Spread) -> Array:
@@ -80,7 +84,7 @@ def _across(spread: Spread) -> Array:
 
 @numba.njit(cache=True, nogil=True)
 def _integrate(  # type: ignore[no-untyped-def]
-    cells, chosen, axis, labels, first, pieces, lines_b, lines_c, bounds, points, weights
+    cells, chosen, axis, labels, first, pieces, lines_b, lines_c, bounds, points, weights, lines
 ):
     start, low, high, columns = pieces
     n = lines_b.shape[1]
@@ -111,6 +115,7 @@ def _integrate(  # type: ignore[no-untyped-def]
                         if part == 0:
                             continue
                         _along(0.5 * (half_a + begin), 0.5 * (half_a + end), points, along)
+                        lines[first[k] + part - 1] += 1
                         to = weights[first[k] + part - 1, octant]
                         for mb in range(5):
                             for mc in range(5):
