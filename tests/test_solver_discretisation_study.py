@@ -10,8 +10,8 @@ import pytest
 
 from carillon.fem.geometry import builtin_surface, hexmesh_from_grid
 from carillon.fem.geometry.fill import Grid
-from solver.studies.discretisation.lattices import cells_on, scaled, voxel_lattice, voxel_mesh
-from solver.studies.discretisation.material import HARMONIC, PlacedMaterial
+from solver.accuracy.lattices import cells_on, scaled, voxel_lattice, voxel_mesh
+from solver.accuracy.material import HARMONIC, PlacedMaterial
 from solver.studies.discretisation.truth import SolidTruth
 from solver.studies.discretisation.ways import Spectrum
 

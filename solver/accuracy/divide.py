@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 
 from carillon.fem.finite_cells.build import Covering
 from carillon.fem.finite_cells.model import FiniteCellModel
-from carillon.fem.model import RIGID_MODES
 from solver.accuracy.estimate import CellErrors, estimate_cell_errors
-from solver.refinement.estimate import excess
 from solver.refinement.refine import RefinementStep
 
 Array = NDArray[np.float64]
@@ -19,7 +17,7 @@ Index = NDArray[np.int64]
 
 REMAINING = 0.7
 """Share of the allowed error that cells are divided for."""
-MOST_DIVIDED = 0.3
+MOST_DIVIDED = 0.1
 """Share of the cells up to which dividing some is worth more than a finer lattice."""
 MOST_STEPS = 3
 """Times that cells are divided at most."""
@@ -42,36 +40,19 @@ class DividedCells:
         self._steps = 0
 
     def advance(self, values: Array, modes: Array, tolerance: float) -> tuple[RefinementStep, bool]:
-        """Rate the model by its eigenvalues (k,) and modes (n_dofs, k), and divide cells.
-
-        Returns
-        -------
-        tuple[RefinementStep, bool]
-            What was rated, and whether the model stays as it is: its errors are within `tolerance`,
-            or so many cells would have to be divided that a finer lattice is the better way.
-        """
+        """See `Refinable.advance`; cells are divided unless too many of them would have to be."""
         found = estimate_cell_errors(self.model, values, modes)
-        worst = int(found.errors.argmax())
-        step = RefinementStep(
-            self.model.n_dofs,
-            len(self._places),
-            float(np.sqrt(np.mean(found.errors**2))),
-            float(found.errors[worst]),
-            RIGID_MODES + 1 + worst,
-            RIGID_MODES + len(found.errors),
-            found.errors,
-        )
-        above = excess(found.errors, tolerance)
+        step = RefinementStep(self.model.n_dofs, len(self._places), found.errors)
+        above = found.errors.excess(tolerance)
         if above <= 1.0 or self._steps == MOST_STEPS:
             return step, True
         chosen = self._chosen(found, REMAINING / above)
-        if not len(chosen):
-            return step, True
-        self._divide(chosen)
-        return step, False
+        if len(chosen):
+            self._divide(chosen)
+        return step, not len(chosen)
 
     def _chosen(self, found: CellErrors, left: float) -> Index:
-        """Places (d, 3) of cells to divide so that a share of the error is `left`; none if too many.
+        """Places (d, 3) of cells to divide so that of the error a share is `left`, or of the worst.
 
         Those that were divided cannot be divided again.
         """

@@ -1,9 +1,10 @@
 """How far the frequencies of finite cells are from those of the solid.
 
-What a mode loses if cells were twice and four times as large, L2 and L4 (`solver.accuracy.surplus`),
-would be e (r - 1) and e (r^2 - 1) of an error e that falls by the factor r when cells are halved,
-16 where displacements are smooth, less at edges that point inwards and other singular places. So
-r = L4 / L2 - 1, place by place, and e = L2 / (r - 1) (extrapolation as of Richardson, but local).
+Let an error e fall by the factor r when cells are halved: 16 where displacements are smooth, less
+at edges that point inwards and other singular places. If cells were twice and four times as large,
+modes would lose L2 = e (r - 1) and L4 = e (r^2 - 1), which `solver.accuracy.surplus` finds. So,
+place by place, r = L4 / L2 - 1 and e = L2 / (r - 1): Richardson's extrapolation without a second
+solve.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from carillon.fem.finite_cells.model import FiniteCellModel
 from carillon.fem.model import RIGID_MODES
 from solver.accuracy.surplus import losses
-from solver.refinement.estimate import LAST
+from solver.refinement.errors import LAST, ExpectedErrors
 
 Array = NDArray[np.float64]
 
@@ -31,15 +32,15 @@ class CellErrors:
 
     Attributes
     ----------
-    errors : (k,)
-        Relative errors of the frequencies of modes 7, 8, ...; positive, since they are too high.
+    errors
+        Of the frequencies; positive, since they are too high.
     shares : (c,)
         Each cell's share in them, root mean square over the modes.
     factors : (c,)
         By which dividing the cell would diminish its share.
     """
 
-    errors: Array
+    errors: ExpectedErrors
     shares: Array
     factors: Array
 
@@ -61,4 +62,5 @@ def estimate_cell_errors(model: FiniteCellModel, values: Array, modes: Array) ->
     factors = np.clip(ratio - 1.0, SLOWEST, FASTEST)[group]
     # A frequency's relative error is half its eigenvalue's.
     shares = 0.5 * twice / own / (factors - 1.0)[:, None]
-    return CellErrors(shares.sum(axis=0), np.sqrt(np.mean(shares**2, axis=1)), factors)
+    errors = ExpectedErrors(shares.sum(axis=0))
+    return CellErrors(errors, np.sqrt(np.mean(shares**2, axis=1)), factors)

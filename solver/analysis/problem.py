@@ -13,9 +13,8 @@ from carillon.arguments import whole_number
 from carillon.errors import UserError
 from carillon.fem import geometry, materials
 from carillon.fem.element import DEFAULT_POISSON
-from carillon.fem.finite_cells.build import finite_cells
-from carillon.fem.finite_cells.cells import FiniteCells
-from carillon.fem.finite_cells.model import finite_cell_model
+from carillon.fem.finite_cells.build import Covering, covering
+from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.geometry import COMPONENTS, FILLS, HexMesh, hexmesh_from_voxels, voxelize
 from carillon.fem.materials import young_modulus
 from carillon.fem.model import DEFAULT_DENSITY, ElasticModel, Solid
@@ -92,7 +91,8 @@ class ProblemOptions:
 class Problem:
     """Voxels, their moduli (m,) [Pa], the model to solve, and how long making them took.
 
-    `coarsening` tells what the coarse elements rest on, see `Coarsening.record`.
+    `coarsening` tells what the coarse elements rest on, see `Coarsening.record`; `covering` is that
+    of finite cells.
     """
 
     fine: HexMesh
@@ -100,11 +100,18 @@ class Problem:
     model: Solid
     seconds: dict[str, float]
     coarsening: dict[str, str] = field(default_factory=dict)
+    covering: Covering | None = None
 
     @property
     def hexahedra(self) -> ElasticModel:
         """The model, which is one of hexahedra."""
         assert isinstance(self.model, ElasticModel)
+        return self.model
+
+    @property
+    def finite_cells(self) -> FiniteCellModel:
+        """The model, which is one of finite cells."""
+        assert isinstance(self.model, FiniteCellModel)
         return self.model
 
 
@@ -127,8 +134,8 @@ def build_problem(options: ProblemOptions) -> Problem:
     assigned = time.perf_counter()
     seconds = {"mesh": meshed - begin, "material": assigned - meshed}
     if cells is not None:
-        model = finite_cell_model(cells, young, options.poisson, options.density)
-        return Problem(mesh, young, model, seconds)
+        model = finite_cell_model(cells.cells, young, options.poisson, options.density)
+        return Problem(mesh, young, model, seconds, covering=cells)
     coarsening = options.coarsening()
     elements = build_model(
         mesh,
@@ -146,7 +153,7 @@ def build_problem(options: ProblemOptions) -> Problem:
 
 def discretised(
     surface: trimesh.Trimesh, options: ProblemOptions, name: str
-) -> tuple[HexMesh, FiniteCells | None]:
+) -> tuple[HexMesh, Covering | None]:
     """Voxels of a surface in metres, and the finite cells that they belong to, if it shall be such.
 
     Raises
@@ -160,8 +167,8 @@ def discretised(
             return hexmesh_from_voxels(voxels), None
         case "finite-cell":
             _require_nothing_for_voxels(options)
-            cells = finite_cells(surface, options.resolution, options.components, name)
-            return cells.mesh, cells
+            cells = covering(surface, options.resolution, options.components, name)
+            return cells.cells.mesh, cells
         case other:
             raise UserError(
                 f"discretisation {other!r} is unknown, expected one of {', '.join(DISCRETISATIONS)}"

@@ -16,7 +16,7 @@ from solver.analysis.problem import ProblemOptions
 from solver.coarsening.choice import METHODS
 from solver.coarsening.forest import FOREST
 from solver.commands.running import add_solid, on_ranks, parameters, require_outputs, write_json
-from solver.refinement.estimate import LAST
+from solver.refinement.errors import LAST
 from solver.refinement.options import ALLOWED_ERROR
 from solver.studies.coarsening.case import PICTURES, rate_coarsening
 from solver.studies.coarsening.pictures import write_pictures

@@ -11,24 +11,29 @@ import json
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.model import ElasticModel, Solid, fine_model
+from carillon.arguments import whole_number
+from carillon.errors import UserError
+from carillon.fem.model import Solid
 from carillon.options import add_options, collect
 from carillon.progress import say
+from solver.accuracy.options import FIRST_RESOLUTION, AccuracyOptions
+from solver.accuracy.solving import FROM_FINE, FROM_SOLID, Wishes, solve_accurately, solve_solid
 from solver.analysis.modal_solver import ModalSolver, Modes
 from solver.analysis.options import SolverOptions
-from solver.analysis.problem import Problem, ProblemOptions, build_problem
+from solver.analysis.problem import Problem, ProblemOptions
 from solver.commands.running import add_solid, on_ranks, parameters, require_outputs
-from solver.distribution.collective import compute_on_root
 from solver.files.initial_modes import modes_from_file
-from solver.files.modes_file import frequencies, read_modes, write_modes
+from solver.files.modes_file import frequencies, write_modes
 from solver.linear import petsc_options
+from solver.refinement.errors import in_words
 from solver.refinement.options import RefinementOptions
-from solver.refinement.refine import RefinedModel, RefinementStep, evidence_of, solve_refined
+from solver.refinement.refine import RefinementStep
 
 EXAMPLES = """examples:
   modes builtin:bell --resolution 32 --out bell.h5
@@ -36,10 +41,19 @@ EXAMPLES = """examples:
   modes bunny.obj --resolution 48 --method slepc --modes 60 --out truth.h5
 """
 
+REFINED = {"fine_blocks": "blocks fine", "divided_cells": "cells divided"}
+EXPECTED = {FROM_FINE: "error against the voxels", FROM_SOLID: "distance from the solid"}
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    add_solid(parser)
+    add_solid(parser, "resolution")
+    parser.add_argument(
+        "--resolution",
+        type=whole_number(2),
+        help="voxels, or lattice spacings, along the longest side; needed without --accuracy",
+    )
+    add_options(parser, AccuracyOptions)
     add_options(parser, RefinementOptions)
     add_options(parser, SolverOptions, leave_out=("seed",))
     parser.add_argument("--out", required=True, help="modes file to write (HDF5)")
@@ -58,35 +72,46 @@ def run(arguments: argparse.Namespace) -> None:
     """Build the solid, solve, verify, write."""
     with on_ranks(arguments.petsc) as comm:
         require_outputs(arguments, comm)
+        accuracy = collect(AccuracyOptions, arguments)
+        arguments.resolution = _resolution(arguments)
         described = collect(ProblemOptions, arguments)
         options = collect(SolverOptions, arguments)
-        tolerance = collect(RefinementOptions, arguments).tolerance(described.coarsen)
-        problem = compute_on_root(comm, lambda: build_problem(described))
+        refine_to = collect(RefinementOptions, arguments).tolerance(
+            described.coarsen, described.discretisation
+        )
         petsc_options.insert_options(arguments.petsc, options.method)
         initial = arguments.initial_modes
 
-        def solve(model: Solid | None) -> Modes:
+        def solve(model: Solid | None, modes: int | None = None) -> Modes:
             nonlocal initial
-            prepared = ModalSolver(model, options, comm, verbose=sys.stderr.isatty())
+            asked = options if modes is None else replace(options, modes=min(modes, options.modes))
+            prepared = ModalSolver(model, asked, comm, verbose=sys.stderr.isatty())
             start = None
             if initial is not None:
-                start = modes_from_file(initial, model, options.modes, prepared.local_mesh, comm)
+                start = modes_from_file(initial, model, asked.modes, prepared.local_mesh, comm)
                 initial = None
             result = prepared.solve(initial_modes=start)
             result.seconds = {**prepared.seconds, **result.seconds}
             return result
 
         begin = time.perf_counter()
-        if tolerance is None:
-            model = None if problem is None else problem.model
-            result, achieved = solve(model), {}
+        wishes = Wishes(refine_to, accuracy.is_estimated(described, options), initial)
+        if accuracy.accuracy is None:
+            solved = solve_solid(described, solve, wishes, comm, _report)
         else:
-            refined = compute_on_root(comm, lambda: _refined(problem, described, initial))
-            model, result, steps = solve_refined(solve, refined, tolerance, comm, _report)
-            achieved = evidence_of(steps)
-            spent = time.perf_counter() - begin - sum(result.seconds.values())
-            result.seconds = {"refinement": spent, **result.seconds}
-        attributes = {} if problem is None else _attributes(arguments, problem, result, achieved)
+            described, solved = solve_accurately(
+                described, accuracy.accuracy, solve, wishes, comm, _report
+            )
+            arguments.resolution = described.resolution
+        problem, model, result = solved.problem, solved.model, solved.modes
+        attributes: dict[str, Any] = {}
+        if problem is not None:
+            if solved.achieved:
+                # What was solved on the way, and estimated.
+                told = sum(problem.seconds.values()) + sum(result.seconds.values())
+                rest = max(time.perf_counter() - begin - told, 0.0)
+                result.seconds = {"refinement": rest, **result.seconds}
+            attributes = _attributes(arguments, problem, result, solved.achieved)
 
         def write(blocks: Iterator[NDArray[np.float64]]) -> None:
             assert model is not None
@@ -106,30 +131,19 @@ def run(arguments: argparse.Namespace) -> None:
             _print_summary(attributes, result.values, arguments)
 
 
-def _refined(
-    problem: Problem | None, described: ProblemOptions, initial: str | None
-) -> RefinedModel:
-    """The coarse model, with those blocks fine that are so in the file to start from."""
-    assert problem is not None
-    coarsening = described.coarsening()
-    assert coarsening is not None
-    mesh = None if initial is None else read_modes(initial, with_modes=False).mesh
-    coarse = problem.model
-    assert isinstance(coarse, ElasticModel)
-    fine = fine_model(
-        problem.fine,
-        problem.young,
-        poisson=coarse.poisson,
-        density=coarse.density,
-        lumped=coarse.lumped,
-    )
-    return RefinedModel(fine, coarsening, mesh)
+def _resolution(arguments: argparse.Namespace) -> int:
+    if arguments.resolution is not None:
+        return int(arguments.resolution)
+    if arguments.accuracy is None:
+        raise UserError("expected --resolution, or --accuracy to choose one")
+    return FIRST_RESOLUTION
 
 
-def _report(step: RefinementStep) -> None:
+def _report(what: str, step: RefinementStep) -> None:
+    errors = step.errors
     say(
-        f"{step.unknowns:,} unknowns, {step.fine_blocks:,} blocks fine: frequencies are expected "
-        f"to be {step.rms:.1%} off, mode {step.worst_mode} {step.worst:+.1%}",
+        f"{step.unknowns:,} unknowns, {step.refined:,} {REFINED[what]}: frequencies are expected "
+        f"to be {errors.rms:.1%} off, mode {errors.worst_mode} {errors.worst:+.1%}",
         visible=sys.stderr.isatty(),
     )
 
@@ -182,13 +196,12 @@ def _print_summary(
         f"orthogonal to {attributes['orthogonality']:.1e}, {total:.1f} s on {attributes['ranks']} "
         f"rank{'s' if attributes['ranks'] > 1 else ''}"
     )
-    if "expected_frequency_error_rms" in attributes:
-        first, last = attributes["expected_frequency_error_modes"]
-        kept = attributes["fine_blocks"]
-        print(
-            f"expected error of frequencies {first} to {last}: "
-            f"{attributes['expected_frequency_error_rms']:.1%} rms, worst "
-            f"{attributes['expected_frequency_error_worst']:+.1%} (mode "
-            f"{attributes['expected_frequency_error_worst_mode']}); "
-            f"{kept:,} block{'s' if kept != 1 else ''} kept fine"
-        )
+    for prefix, words in EXPECTED.items():
+        if f"{prefix}_rms" in attributes:
+            print(f"expected {words} {in_words(attributes, prefix)}{_refined_in_words(attributes)}")
+
+
+def _refined_in_words(attributes: dict[str, Any]) -> str:
+    return "".join(
+        f"; {attributes[what]:,} {words}" for what, words in REFINED.items() if what in attributes
+    )

@@ -21,18 +21,13 @@ from carillon.fem.geometry import Blocks, prolongation
 from carillon.fem.model import RIGID_MODES, ElasticModel
 from solver.assembly.sparse import sum_blocks
 from solver.refinement.energies import element_energies, fine_energies
+from solver.refinement.errors import LAST, ExpectedErrors
 from solver.refinement.two_grid import TwoGrid
 
 Array = NDArray[np.float64]
 
-LAST = 60
-"""Number of the last mode whose error is estimated; the first is 7."""
-
 MODES_USED = LAST + 12
 """Modes that are corrected, since modes may change places."""
-
-WORST = 3.0
-"""The worst frequency may be off by so many times what their root mean square may."""
 
 
 @dataclass(frozen=True)
@@ -41,40 +36,15 @@ class ErrorEstimate:
 
     Attributes
     ----------
-    errors : (k,)
-        Relative errors of the frequencies of modes 7, 8, ... in the order of their numbers.
+    errors
+        Of the frequencies.
     shares : (mc,)
         Root mean square over these modes of each element's share of the eigenvalues' error; 0 for
         fine cells.
     """
 
-    errors: Array
+    errors: ExpectedErrors
     shares: Array
-
-    @property
-    def rms(self) -> float:
-        """Root mean square of the errors."""
-        return float(np.sqrt(np.mean(self.errors**2)))
-
-    @property
-    def worst(self) -> float:
-        """Error of largest magnitude, with its sign."""
-        return float(self.errors[np.abs(self.errors).argmax()])
-
-    @property
-    def worst_mode(self) -> int:
-        """Number of the mode that has it, from 1."""
-        return RIGID_MODES + 1 + int(np.abs(self.errors).argmax())
-
-    def excess(self, tolerance: float) -> float:
-        """See `excess`."""
-        return excess(self.errors, tolerance)
-
-
-def excess(errors: Array, tolerance: float) -> float:
-    """How many times as large as allowed errors (k,) are: their rms, or a third of the worst."""
-    rms = float(np.sqrt(np.mean(errors**2)))
-    return max(rms, float(np.abs(errors).max()) / WORST) / tolerance
 
 
 def estimate_errors(
@@ -107,8 +77,8 @@ def estimate_errors(
     >>> two_grid = TwoGrid(fine_model(mesh, young))
     >>> blocks = blocks_from_mesh(mesh)
     >>> estimate = estimate_errors(two_grid, blocks, coarse, found.eigenvalues, found.modes)
-    >>> estimate.errors.shape, bool(estimate.rms > 0.1)
-    ((24,), True)
+    >>> estimate.errors.last, estimate.errors.rms > 0.1
+    (30, True)
     """
     elastic = np.ascontiguousarray(modes[:, RIGID_MODES:MODES_USED])
     exact, vectors = two_grid.lowest(blocks, elastic)
@@ -117,7 +87,7 @@ def estimate_errors(
     ratio = np.maximum(values[RIGID_MODES : RIGID_MODES + count], 0.0) / exact
     errors = np.sqrt(ratio) - 1.0
     shares = error_shares(blocks, coarse, two_grid.fine, exact, vectors)
-    return ErrorEstimate(errors, np.sqrt(np.mean(shares**2, axis=1)))
+    return ErrorEstimate(ExpectedErrors(errors), np.sqrt(np.mean(shares**2, axis=1)))
 
 
 def error_shares(

@@ -11,34 +11,39 @@ from solver.coarsening.forest import FOREST
 
 ALLOWED_ERROR = 0.05
 """Expected error of frequencies that blocks are kept fine for if nothing is said."""
+ALLOWED_DISTANCE = 0.01
+"""Expected distance from the solid's that finite cells are divided for if nothing is said."""
 
 
 @dataclass(frozen=True)
 class RefinementOptions:
-    """Which error a coarse model may have."""
+    """Which error a coarse model, or one of finite cells, may have."""
 
     refine_to: float | None = option(
         None,
-        "keep blocks fine until the expected error of the frequencies of modes 7 to 60 is at most "
-        "so large: its root mean square, and a third of the worst (default "
-        f"{ALLOWED_ERROR:g} with --coarsen {FOREST}; 0 keeps none fine and expects nothing)",
+        "keep blocks fine, or divide finite cells, until the expected error of the frequencies of "
+        "modes 7 to 60 is at most so large: its root mean square, and a third of the worst "
+        f"(default {ALLOWED_ERROR:g} with --coarsen {FOREST}, {ALLOWED_DISTANCE:g} with "
+        "--discretisation finite-cell; 0 refines nothing)",
         type=number_between(0.0, 10.0),
         metavar="ERROR",
     )
 
-    def tolerance(self, coarsen: str) -> float | None:
-        """The allowed error; None if nothing is to be estimated.
+    def tolerance(self, coarsen: str, discretisation: str = "voxel") -> float | None:
+        """The allowed error; None if nothing is to be refined.
 
         Raises
         ------
         UserError
-            If it was given and there is no coarse mesh.
+            If it was given and there is nothing to refine.
         """
+        if discretisation == "finite-cell":
+            return (ALLOWED_DISTANCE if self.refine_to is None else self.refine_to) or None
         if coarsen == "none":
             if self.refine_to is not None:
                 raise UserError(
                     "--refine-to keeps blocks of a coarse mesh fine, and there is none: add "
-                    f"--coarsen {FOREST} or leave it out"
+                    f"--coarsen {FOREST} or --discretisation finite-cell, or leave it out"
                 )
             return None
         if self.refine_to is None:

@@ -1,26 +1,31 @@
-"""Coarse models whose worst blocks stay fine, until the expected error is small enough."""
+"""Models that are refined where it matters until the expected error is small enough.
+
+Of coarse ones the worst blocks stay fine.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.fem.geometry import Blocks, HexMesh, blocks_from_mesh, blocks_with_coarse
-from carillon.fem.model import RIGID_MODES, Constants, ElasticModel
+from carillon.fem.model import Constants, ElasticModel, Solid
 from solver.analysis.modal_solver import Modes
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.model import coarse_model, element_moduli
 from solver.distribution.collective import bcast_from_root
+from solver.refinement.errors import ExpectedErrors
 from solver.refinement.estimate import MODES_USED, ErrorEstimate, estimate_errors
 from solver.refinement.two_grid import TwoGrid
 
 Array = NDArray[np.float64]
+Model = TypeVar("Model", bound=Solid)
 
 REMAINING = 0.6
 """Share of the allowed error that elements are refined to in a step, if shares were errors."""
@@ -31,27 +36,39 @@ HASTE = 0.85
 
 @dataclass(frozen=True)
 class RefinementStep:
-    """A coarse mesh that was tried.
+    """A model that was tried.
 
     Attributes
     ----------
     unknowns
-        Of its model.
-    fine_blocks
-        Number of blocks that stay fine.
-    rms, worst, worst_mode
-        Expected relative errors of the frequencies of modes 7 to `last`.
-    errors : (k,)
-        All of them.
+        Of the model.
+    refined
+        Number of its blocks that stay fine, or of its cells that are divided.
+    errors
+        That its frequencies are expected to have.
     """
 
     unknowns: int
-    fine_blocks: int
-    rms: float
-    worst: float
-    worst_mode: int
-    last: int
-    errors: Array
+    refined: int
+    errors: ExpectedErrors
+
+
+class Refinable(Protocol[Model]):
+    """A model that can be refined where it needs to be."""
+
+    @property
+    def model(self) -> Model:
+        """The model as it is now."""
+
+    def advance(self, values: Array, modes: Array, tolerance: float) -> tuple[RefinementStep, bool]:
+        """Rate the model by its eigenvalues (k,) and modes (n_dofs, k), and refine it.
+
+        Returns
+        -------
+        tuple[RefinementStep, bool]
+            What was rated, and whether the model stays as it is: its errors are within `tolerance`,
+            or refining it is not the way to get them there.
+        """
 
 
 class RefinedModel:
@@ -103,24 +120,10 @@ class RefinedModel:
         return len(np.unique(cells, axis=0))
 
     def advance(self, values: Array, modes: Array, tolerance: float) -> tuple[RefinementStep, bool]:
-        """Rate the model by its eigenvalues (k,) and modes (n_dofs, k), and refine it.
-
-        Returns
-        -------
-        tuple[RefinementStep, bool]
-            What was rated, and whether its errors are within `tolerance`: then it stays as it is.
-        """
+        """See `Refinable.advance`."""
         estimate = estimate_errors(self._two_grid, self.blocks, self.model, values, modes)
-        step = RefinementStep(
-            self.blocks.coarse.n_dofs,
-            self.fine_blocks,
-            estimate.rms,
-            estimate.worst,
-            estimate.worst_mode,
-            RIGID_MODES + len(estimate.errors),
-            estimate.errors,
-        )
-        done = estimate.excess(tolerance) <= 1.0
+        step = RefinementStep(self.blocks.coarse.n_dofs, self.fine_blocks, estimate.errors)
+        done = estimate.errors.excess(tolerance) <= 1.0
         if not done:
             self._refine(estimate, tolerance)
         return step, done
@@ -128,7 +131,7 @@ class RefinedModel:
     def _refine(self, estimate: ErrorEstimate, tolerance: float) -> None:
         """Keep fine the elements with the largest shares of an error above `tolerance`."""
         order = np.argsort(-estimate.shares, kind="stable")
-        left = REMAINING * HASTE**self._steps / estimate.excess(tolerance)
+        left = REMAINING * HASTE**self._steps / estimate.errors.excess(tolerance)
         reached = np.cumsum(estimate.shares[order])
         count = 1 + int(np.searchsorted(reached, (1.0 - left) * reached[-1]))
         self.blocks = self._with_fine(order[:count])
@@ -145,12 +148,12 @@ class RefinedModel:
 
 
 def solve_refined(
-    solve: Callable[[ElasticModel | None], Modes],
-    refined: RefinedModel | None,
+    solve: Callable[[Model | None], Modes],
+    refined: Refinable[Model] | None,
     tolerance: float,
     comm: MPI.Comm = MPI.COMM_WORLD,
     report: Callable[[RefinementStep], None] | None = None,
-) -> tuple[ElasticModel | None, Modes, list[RefinementStep]]:
+) -> tuple[Model | None, Modes, list[RefinementStep]]:
     """Solve, estimate and refine until the expected error is at most `tolerance`; collective.
 
     Parameters
@@ -167,7 +170,7 @@ def solve_refined(
 
     Returns
     -------
-    tuple[ElasticModel | None, Modes, list[RefinementStep]]
+    tuple[Model | None, Modes, list[RefinementStep]]
         The last model, on rank 0; its modes, and the steps.
 
     Examples
@@ -182,7 +185,7 @@ def solve_refined(
     >>> start = RefinedModel(fine, make_coarsening("ddfem"))
     >>> how = SolverOptions(method="slepc", modes=30)
     >>> model, modes, steps = solve_refined(lambda model: modal_analysis(model, how), start, 0.03)
-    >>> steps[0].rms > 0.03 >= steps[-1].rms, model.n_dofs < fine.n_dofs
+    >>> steps[0].errors.rms > 0.03 >= steps[-1].errors.rms, model.n_dofs < fine.n_dofs
     (True, True)
     """
     steps: list[RefinementStep] = []
@@ -201,20 +204,7 @@ def solve_refined(
 
 
 def _advance(
-    refined: RefinedModel | None, modes: Modes, gathered: Array | None, tolerance: float
+    refined: Refinable[Any] | None, modes: Modes, gathered: Array | None, tolerance: float
 ) -> tuple[RefinementStep, bool]:
     assert refined is not None and gathered is not None
     return refined.advance(modes.values[:MODES_USED], gathered, tolerance)
-
-
-def evidence_of(steps: list[RefinementStep]) -> dict[str, Any]:
-    """What the last step achieved, as plain values for a file."""
-    last = steps[-1]
-    return {
-        "expected_frequency_error_rms": last.rms,
-        "expected_frequency_error_worst": last.worst,
-        "expected_frequency_error_worst_mode": last.worst_mode,
-        "expected_frequency_error_modes": [RIGID_MODES + 1, last.last],
-        "fine_blocks": last.fine_blocks,
-        "refinement_steps": len(steps) - 1,
-    }

@@ -71,7 +71,8 @@ def prepare(project: Project, targets: Targets | None = None) -> DesignProblem:
     material = ReducedMaterial.of_mesh(
         mesh, project.material.dimensions, project.material.young, project.material.law
     )
-    setting = Setting(mesh, solid, material, strikes, objective, cells)
+    whole = None if cells is None else cells.cells
+    setting = Setting(mesh, solid, material, strikes, objective, whole)
     return DesignProblem(project, np.asarray(surface.vertices), np.asarray(surface.faces), setting)
 
 

@@ -70,4 +70,4 @@ def _model(surface: trimesh.Trimesh, options: ProblemOptions) -> Solid:
     young = np.full(mesh.n_cells, YOUNG)
     if cells is None:
         return fine_model(mesh, young, poisson=POISSON, density=DENSITY)
-    return finite_cell_model(cells, young, POISSON, DENSITY)
+    return finite_cell_model(cells.cells, young, POISSON, DENSITY)

@@ -17,7 +17,8 @@ from solver.analysis.options import SolverOptions
 from solver.analysis.problem import Problem, ProblemOptions, build_problem
 from solver.coarsening.coarsening import Coarsening
 from solver.files.modes_file import CHECKS, frequencies
-from solver.refinement.estimate import LAST, MODES_USED, WORST
+from solver.refinement.errors import LAST, WORST
+from solver.refinement.estimate import MODES_USED
 from solver.refinement.refine import RefinedModel, RefinementStep, solve_refined
 from solver.studies.coarsening.matching import FAR_OFF
 from solver.studies.coarsening.pictures import ModePicture
@@ -150,7 +151,7 @@ def rate_coarsening(options: ProblemOptions, modes: int, tolerance: float) -> Ra
 
 def _rating(truth: SolvedModel, attempts: _Attempts, at: int, modes: int) -> CoarseRating:
     made, step = attempts.made[at], attempts.steps[at]
-    return CoarseRating(truth, made.blocks, made.solution, step.errors, modes)
+    return CoarseRating(truth, made.blocks, made.solution, step.errors.errors, modes)
 
 
 def _described(attempts: _Attempts, at: int) -> dict[str, Any]:
@@ -158,7 +159,7 @@ def _described(attempts: _Attempts, at: int) -> dict[str, Any]:
     return {
         "n_dofs": step.unknowns,
         "elements": made.blocks.coarse.n_cells,
-        "fine_blocks": step.fine_blocks,
+        "fine_blocks": step.refined,
         "refinement_steps": at,
         "seconds": attempts.seconds(at + 1),
     }

@@ -15,12 +15,12 @@ from carillon.fem.materials import young_modulus
 from carillon.fem.model import RIGID_MODES, Constants
 from carillon.limits import require_constants
 from carillon.progress import track
+from solver.accuracy.lattices import voxel_lattice, voxel_mesh
+from solver.accuracy.material import INTERPOLATED, NOISY, PlacedMaterial
 from solver.analysis.problem import ProblemOptions
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.forest import FOREST
 from solver.studies.comparison import frequency_errors
-from solver.studies.discretisation.lattices import voxel_lattice, voxel_mesh
-from solver.studies.discretisation.material import INTERPOLATED, NOISY, PlacedMaterial
 from solver.studies.discretisation.truth import FINER, LEFT, LEFT_OF_NOISE, SolidTruth
 from solver.studies.discretisation.ways import TOLERANCE, Given, Spectrum, Ways
 

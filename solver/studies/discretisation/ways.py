@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from carillon.fem.finite_cells.model import finite_cell_model
 from carillon.fem.geometry import HexMesh
 from carillon.fem.model import Constants, ElasticModel, Solid, fine_model
+from solver.accuracy.lattices import cells_on, scaled, voxel_mesh
+from solver.accuracy.material import ARITHMETIC, HARMONIC, PlacedMaterial
 from solver.analysis.modal_solver import Modes, modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.coarsening.coarsening import Coarsening
@@ -21,8 +23,6 @@ from solver.coarsening.model import build_model
 from solver.files.modes_file import CHECKS, frequencies
 from solver.refinement.options import ALLOWED_ERROR
 from solver.refinement.refine import RefinedModel, solve_refined
-from solver.studies.discretisation.lattices import cells_on, scaled, voxel_mesh
-from solver.studies.discretisation.material import ARITHMETIC, HARMONIC, PlacedMaterial
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
     import trimesh

@@ -1,0 +1,40 @@
+"""How near the frequencies shall be to those of the solid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from carillon.arguments import number_between
+from carillon.options import option
+from solver.analysis.options import SolverOptions
+from solver.analysis.problem import ProblemOptions
+
+FIRST_RESOLUTION = 16
+"""Resolution to begin with in search of one that is accurate enough."""
+
+
+@dataclass(frozen=True)
+class AccuracyOptions:
+    """Which distance from the solid's frequencies is asked for, and whether it is estimated."""
+
+    accuracy: float | None = option(
+        None,
+        "raise the resolution until frequencies are expected to be so near to the solid's: the "
+        "root mean square of the relative errors, and a third of the worst "
+        f"(from --resolution, or {FIRST_RESOLUTION})",
+        type=number_between(1e-5, 1.0),
+        metavar="ERROR",
+    )
+    estimate: bool | None = option(
+        None,
+        "estimate how far frequencies are from the solid's; voxels are compared with finite cells "
+        "(default: unless a mesh is coarsened, or for slepc and arpack)",
+    )
+
+    def is_estimated(self, solid: ProblemOptions, solver: SolverOptions) -> bool:
+        """Whether the distance from the solid is estimated."""
+        if self.accuracy is not None:
+            return True
+        if self.estimate is not None:
+            return self.estimate
+        return solid.coarsen == "none" and solver.method == "hcms"

@@ -1,0 +1,205 @@
+"""Solve a solid, refine it where that is asked for, and tell how far it is from the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+from mpi4py import MPI
+
+from carillon.errors import UserError
+from carillon.fem.model import ElasticModel, Solid, fine_model
+from carillon.progress import say
+from solver.accuracy.divide import DividedCells
+from solver.accuracy.voxels import Reference
+from solver.analysis.modal_solver import Modes
+from solver.analysis.problem import Problem, ProblemOptions, build_problem
+from solver.distribution.collective import bcast_from_root, compute_on_root
+from solver.files.modes_file import read_modes
+from solver.refinement.errors import LAST, ExpectedErrors
+from solver.refinement.refine import Refinable, RefinedModel, RefinementStep, solve_refined
+
+FROM_FINE, FROM_SOLID = "expected_frequency_error", "solid_frequency_error"
+"""Attributes that tell errors against the fine voxels and against the solid."""
+MOST_UNKNOWNS = 400_000
+"""Unknowns from which no finer lattice is tried."""
+LEAST_STEP, LARGEST_STEP = 1.2, 2.0
+"""Factors by which a resolution is raised."""
+
+
+class Solve(Protocol):
+    """Finds modes of a model, as many as are asked for, or `modes` if they are fewer."""
+
+    def __call__(self, model: Solid | None, modes: int | None = None) -> Modes:
+        """Collective; the model is None but on rank 0."""
+
+
+@dataclass
+class Solved:
+    """A solid's modes.
+
+    Attributes
+    ----------
+    problem, model
+        The solid, and the model of it that was solved; on rank 0, None on the others.
+    modes
+        Of the model.
+    achieved
+        Plain values: what is expected of the frequencies' errors.
+    """
+
+    problem: Problem | None
+    model: Solid | None
+    modes: Modes
+    achieved: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What is asked for of a solid's modes.
+
+    Attributes
+    ----------
+    refine_to
+        Expected error down to which a coarse mesh or finite cells are refined; None for as they
+        are.
+    estimated
+        Whether the distance from the solid is to be told.
+    start
+        Modes file whose refined mesh is begun from.
+    """
+
+    refine_to: float | None = None
+    estimated: bool = False
+    start: str | None = None
+
+
+def solve_solid(
+    described: ProblemOptions,
+    solve: Solve,
+    wishes: Wishes,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    report: Callable[[str, RefinementStep], None] | None = None,
+) -> Solved:
+    """Modes of a solid and what they are expected to be off; collective.
+
+    Parameters
+    ----------
+    report
+        Called on rank 0 with what was refined and each step of it.
+
+    Raises
+    ------
+    UserError
+        For anything wrong with the solid.
+    """
+    problem = compute_on_root(comm, lambda: build_problem(described))
+    if described.discretisation == "finite-cell":
+        prefix, what = FROM_SOLID, "divided_cells"
+    else:
+        prefix, what = FROM_FINE, "fine_blocks"
+    tolerance = wishes.refine_to
+    if tolerance is None and prefix == FROM_SOLID and wishes.estimated:
+        tolerance = np.inf
+    if tolerance is None:
+        model = None if problem is None else problem.model
+        solved = Solved(problem, model, solve(model), {})
+    else:
+        refined = compute_on_root(comm, lambda: _refinable(problem, described, wishes.start))
+        told = None if report is None else (lambda step: report(what, step))
+        model, modes, steps = solve_refined(solve, refined, tolerance, comm, told)
+        achieved = steps[-1].errors.attributes(prefix)
+        achieved |= {what: steps[-1].refined, "refinement_steps": len(steps) - 1}
+        solved = Solved(problem, model, modes, achieved)
+    if wishes.estimated and described.discretisation == "voxel":
+        solved.achieved |= _distance_of_voxels(described, solved, solve, comm)
+    return solved
+
+
+def solve_accurately(
+    described: ProblemOptions,
+    accuracy: float,
+    solve: Solve,
+    wishes: Wishes,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    report: Callable[[str, RefinementStep], None] | None = None,
+) -> tuple[ProblemOptions, Solved]:
+    """The same at the lowest resolution, from that described, that is expected to be accurate.
+
+    Raises
+    ------
+    UserError
+        Also if that would be too large.
+    """
+    while True:
+        solved = solve_solid(described, solve, wishes, comm, report)
+        if f"{FROM_SOLID}_rms" not in solved.achieved:
+            raise UserError("--accuracy needs a distance from the solid, which could not be told")
+        errors = solved.achieved[f"{FROM_SOLID}_rms"], solved.achieved[f"{FROM_SOLID}_worst"]
+        excess = max(errors[0], abs(errors[1]) / 3.0) / accuracy
+        if excess <= 1.0:
+            return described, solved
+        unknowns = comm.bcast(None if solved.model is None else solved.model.n_dofs)
+        factor = float(np.clip(np.sqrt(excess), LEAST_STEP, LARGEST_STEP))
+        if unknowns * factor**2 > MOST_UNKNOWNS:
+            raise UserError(
+                f"--accuracy {accuracy:g} needs more than {MOST_UNKNOWNS:,} unknowns; resolution "
+                f"{described.resolution} is expected to be {errors[0]:.2g} off, worst "
+                f"{errors[1]:+.2g}, which --resolution {described.resolution} gives"
+            )
+        solved.modes.destroy()
+        described = replace(described, resolution=int(np.ceil(factor * described.resolution)))
+
+
+def _refinable(
+    problem: Problem | None, described: ProblemOptions, start: str | None
+) -> Refinable[Any]:
+    """The coarse model, with those blocks fine that are so in the file to start from, or cells."""
+    assert problem is not None
+    if problem.covering is not None:
+        return DividedCells(problem.covering, problem.finite_cells)
+    coarsening = described.coarsening()
+    assert coarsening is not None
+    mesh = None if start is None else read_modes(start, with_modes=False).mesh
+    return RefinedModel(_fine(problem), coarsening, mesh)
+
+
+def _fine(problem: Problem) -> ElasticModel:
+    coarse = problem.hexahedra
+    return fine_model(
+        problem.fine,
+        problem.young,
+        poisson=coarse.poisson,
+        density=coarse.density,
+        lumped=coarse.lumped,
+    )
+
+
+def _distance_of_voxels(
+    described: ProblemOptions, solved: Solved, solve: Solve, comm: MPI.Comm
+) -> dict[str, Any]:
+    """Distance of voxels from the solid; nothing, but a sentence, where there is none to be had."""
+
+    def reference() -> Reference | None:
+        assert solved.problem is not None
+        try:
+            return Reference.of_voxels(described, solved.problem)
+        except UserError as error:
+            say(f"how far frequencies are from the solid's cannot be told: {error}")
+            return None
+
+    cells = compute_on_root(comm, reference)
+    if not comm.bcast(cells is not None):
+        return {}
+    found = solve(None if cells is None else cells.model, LAST)
+    modes = found.system.gather(found.vectors)
+
+    def errors() -> ExpectedErrors:
+        assert cells is not None and modes is not None
+        return cells.errors(solved.modes.values, found.values, modes)
+
+    achieved = bcast_from_root(comm, errors).attributes(FROM_SOLID)
+    found.destroy()
+    return achieved

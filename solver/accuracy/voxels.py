@@ -1,0 +1,65 @@
+"""How far the frequencies of voxels are from those of the solid, by finite cells."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
+from carillon.fem.geometry import load_surface, surface_name
+from carillon.fem.model import RIGID_MODES
+from solver.accuracy.estimate import estimate_cell_errors
+from solver.accuracy.lattices import cells_on, voxel_lattice
+from solver.accuracy.material import INTERPOLATED, PlacedMaterial
+from solver.analysis.problem import Problem, ProblemOptions
+from solver.refinement.errors import ExpectedErrors
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Finite cells of the solid that voxels stand for, with the voxels' material.
+
+    Attributes
+    ----------
+    model
+        Of cells on the voxels' lattice.
+    """
+
+    model: FiniteCellModel
+
+    @classmethod
+    def of_voxels(cls, described: ProblemOptions, problem: Problem) -> Reference:
+        """That of the problem with this description.
+
+        Raises
+        ------
+        UserError
+            If the solid is lost between the lines of the lattice.
+        """
+        surface = load_surface(described.mesh, described.unit)
+        lattice = voxel_lattice(surface, described.resolution)
+        cells = cells_on(surface, lattice, "largest", surface_name(described.mesh))
+        gradual = described.material in INTERPOLATED
+        material = PlacedMaterial.of_voxels(lattice, problem.fine, problem.young, gradual)
+        young = material.on(cells.mesh)
+        return cls(finite_cell_model(cells, young, described.poisson, described.density))
+
+    def errors(self, voxels: Array, values: Array, modes: Array) -> ExpectedErrors:
+        """Expected errors of the frequencies of the voxels, or of coarse elements of them.
+
+        Parameters
+        ----------
+        voxels
+            (k,) their eigenvalues [rad^2/s^2].
+        values, modes
+            (l,) eigenvalues and (n_dofs, l) modes of the finite cells.
+        """
+        own = estimate_cell_errors(self.model, values, modes).errors.errors
+        count = min(len(own), len(voxels) - RIGID_MODES)
+        chosen = slice(RIGID_MODES, RIGID_MODES + count)
+        ratio = np.sqrt(np.maximum(voxels[chosen], 0.0) / values[chosen])
+        return ExpectedErrors(ratio * (1.0 + own[:count]) - 1.0)
