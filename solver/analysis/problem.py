@@ -13,7 +13,6 @@ from carillon.arguments import whole_number
 from carillon.errors import UserError
 from carillon.fem import geometry, materials
 from carillon.fem.element import DEFAULT_POISSON
-from carillon.fem.finite_cells.build import finite_cells
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.model import finite_cell_model
 from carillon.fem.geometry import COMPONENTS, FILLS, HexMesh, hexmesh_from_voxels, voxelize
@@ -159,6 +158,8 @@ def discretised(
             voxels = voxelize(surface, options.resolution, options.fill, options.components, name)
             return hexmesh_from_voxels(voxels), None
         case "finite-cell":
+            from carillon.fem.finite_cells.build import finite_cells  # Its import takes long.
+
             _require_nothing_for_voxels(options)
             cells = finite_cells(surface, options.resolution, options.components, name)
             return cells.mesh, cells
