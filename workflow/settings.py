@@ -7,12 +7,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import yaml
 from jsonschema.exceptions import ValidationError
 from snakemake.utils import update_config, validate
 
 from carillon import provenance
-from carillon.documents import read_yaml
+from carillon.documents import read_own_yaml, read_yaml
 from carillon.errors import UserError
 from carillon.fem.materials import NAMES as MATERIALS
 from dataset_gen.objectives import OBJECTIVES, require_objective
@@ -40,7 +39,7 @@ BUILTIN_MESHES = ("bar", "bell", "bowl", "box", "frying-pan", "pitcher", "plate"
 @cache
 def schema() -> dict[str, Any]:
     """The JSON schema of the configuration, which nobody changes."""
-    loaded: dict[str, Any] = yaml.safe_load(SCHEMA.read_text())
+    loaded: dict[str, Any] = read_own_yaml(SCHEMA)
     return loaded
 
 

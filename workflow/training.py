@@ -131,7 +131,7 @@ def check_study(config: Mapping[str, Any]) -> None:
             f"forests_study.curve_rows: {max(requested['curve_rows']):,} rows, but "
             f"default_forest.dataset.samples gives {8 * data['samples']:,}"
         )
-    for name in requested["variants"]:
+    for name in requested["variants"] or ():
         if name not in VARIANTS:
             known = ", ".join(VARIANTS)
             raise UserError(f"forests_study.variants: {name!r} is unknown, choose from {known}")
