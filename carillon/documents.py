@@ -101,6 +101,15 @@ def read_yaml(path: str | Path, what: str) -> dict[str, Any]:
     return document
 
 
+def read_own_yaml(path: Path) -> Any:
+    """What a file says that comes with the package.
+
+    LibYAML reads it in a tenth of the time, where it is installed.
+    """
+    with path.open("rb") as stream:
+        return yaml.load(stream, getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+
+
 def parse_yaml(text: str) -> Any:
     """What a text in YAML says.
 

@@ -129,7 +129,6 @@ def _flops_per_fit(objective: str, young: Array, poisson: float) -> float | None
 
     The least squares at the end, a few thousandths of it, are left out.
     """
-    fit(objective, young, poisson)
     with flops.counted() as counts:
         fit(objective, young, poisson)
     return sum(counts) / len(young) if counts else None

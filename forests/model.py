@@ -15,14 +15,12 @@ from numpy.typing import NDArray
 from carillon import provenance
 from carillon.errors import UserError
 from carillon.files import create_h5, open_h5
+from forests import default
 from forests.layout import FEATURE_BITS, FEATURE_MASK, NODE, aligned
 from forests.scaling import FEATURES, PATTERNS, TRANSFORMS
 
 KIND = "forests"
 SCHEMA = 2
-
-DEFAULT_FILE = Path(__file__).parent / "default.h5"
-"""Trained forests that come with the package."""
 
 VOID, FILLED = 0, 1
 """Forest of void origins (Reg1 of Eq. 12) and of filled origins (Reg2)."""
@@ -156,22 +154,6 @@ def _require_sound(path: Path, forests: Forests) -> None:
         raise UserError(f"{path}: its trees are inconsistent; train the forests again")
 
 
-def default_path() -> Path:
-    """File of the forests that come with the package.
-
-    Raises
-    ------
-    UserError
-        If it is not there.
-    """
-    if not DEFAULT_FILE.is_file():
-        raise UserError(
-            f"{DEFAULT_FILE}: the forests that come with Carillon are not there; install it again, "
-            "or train forests and name their file"
-        )
-    return DEFAULT_FILE
-
-
 def load_model(path: str | Path | None = None) -> Model:
     """Read and validate a model, by default the one that comes with the package.
 
@@ -186,7 +168,7 @@ def load_model(path: str | Path | None = None) -> Model:
     >>> model.objective, model.poisson, model.forests.trees
     ('calibrated', 0.25, 3)
     """
-    path = default_path() if path is None else Path(path)
+    path = default.default_path() if path is None else Path(path)
     with open_h5(path, KIND, SCHEMA, sealed=True) as file:
         forests = Forests(
             roots=_array(path, file, "roots", np.dtype(np.int32)),

@@ -9,7 +9,7 @@ from carillon.fem.element import DEFAULT_POISSON
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, fit
 from dataset_gen.sampling import moduli, samples
 from forests import coarsen, load_model
-from forests.model import default_path
+from forests.default import default_path
 
 SEED = 1000
 """Of no training."""

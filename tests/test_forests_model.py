@@ -14,7 +14,7 @@ from dataset_gen.objectives import DEFAULT_OBJECTIVE, fit
 from dataset_gen.sampling import samples
 from dataset_gen.settings import ShardOptions
 from forests import coarsen, load_model, save_model
-from forests import model as forests_model
+from forests import default as default_forests
 from forests.baselines import average, galerkin
 from forests.model import FILLED, HIGH, KIND, LOW, SCHEMA, VOID, Forests
 from forests.scaling import PATTERNS
@@ -233,16 +233,16 @@ def test_arrays_lie_in_the_file_as_they_are(models, tmp_path):
 
 
 def test_missing_default_forests_are_told(monkeypatch, tmp_path):
-    monkeypatch.setattr(forests_model, "DEFAULT_FILE", tmp_path / "default.h5")
+    monkeypatch.setattr(default_forests, "DEFAULT_FILE", tmp_path / "default.h5")
     with pytest.raises(UserError, match="not there"):
         load_model()
 
 
 def test_default_forests_are_loaded_without_a_name(monkeypatch, models, tmp_path):
-    monkeypatch.setattr(forests_model, "DEFAULT_FILE", tmp_path / "default.h5")
+    monkeypatch.setattr(default_forests, "DEFAULT_FILE", tmp_path / "default.h5")
     save_model(tmp_path / "default.h5", models["log"])
     assert load_model().nbytes == models["log"].nbytes
-    assert forests_model.default_path() == tmp_path / "default.h5"
+    assert default_forests.default_path() == tmp_path / "default.h5"
 
 
 def test_inspect_counts_what_is_there(models, tmp_path):

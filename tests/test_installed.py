@@ -68,7 +68,7 @@ def test_the_console_script_is_the_program(site, installed):
 
 
 def test_modules_and_data_come_from_the_installation(site, installed, tmp_path):
-    where = installed("-c", "import carillon, forests.model as m; print(m.DEFAULT_FILE)").stdout
+    where = installed("-c", "import carillon, forests.default as d; print(d.DEFAULT_FILE)").stdout
     assert Path(where.strip()) == site / "forests" / "default.h5"
     installed("-m", "carillon", "inspect-forests")
     # Ground truth needs the fewest kernels, which have to be compiled for the other folder.

@@ -11,7 +11,7 @@ import pytest
 from carillon.errors import UserError
 from carillon.fem.geometry import blocks_from_mesh
 from forests import coarsen
-from forests import model as forest_model
+from forests import default as default_forests
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.coarsening.forest import forest_or_reason, load_forest
 from solver.coarsening.model import block_moduli
@@ -32,7 +32,7 @@ def forests(tmp_path_factory, run_cli):
 @pytest.fixture
 def as_default(forests, monkeypatch):
     """The small forests in the place of those of the package."""
-    monkeypatch.setattr(forest_model, "default_path", lambda: forests)
+    monkeypatch.setattr(default_forests, "default_path", lambda: forests)
 
 
 @pytest.fixture
@@ -40,7 +40,7 @@ def no_default(monkeypatch):
     def absent():
         raise UserError("default.h5: no such file")
 
-    monkeypatch.setattr(forest_model, "default_path", absent)
+    monkeypatch.setattr(default_forests, "default_path", absent)
 
 
 def options(**changes) -> ProblemOptions:

@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from carillon.errors import UserError
-from forests import model as forest_model
+from forests import default as default_forests
 from tests.pages import Page, assert_same_numbers, assert_self_contained
 from tests.workflow_runs import CHECKOUT, PROFILE, TINY, planned, snakemake
 from workflow import settings
@@ -32,7 +32,7 @@ def test_default_forests_are_trained_tree_by_tree_and_not_in_the_default_run(tmp
 @pytest.mark.parametrize("named", [True, False])
 def test_the_study_takes_forests_that_are_named_or_the_default_ones(tmp_path, monkeypatch, named):
     config = yaml.safe_load((CHECKOUT / "workflow" / "config" / "laptop.yaml").read_text())
-    monkeypatch.setattr(forest_model, "default_path", lambda: tmp_path / "default.h5")
+    monkeypatch.setattr(default_forests, "default_path", lambda: tmp_path / "default.h5")
     config["forests_study"]["model"] = "own.h5" if named else None
     files = settings.forest_files(config["forests_study"]["model"])
     assert files == ["own.h5" if named else str(tmp_path / "default.h5")]

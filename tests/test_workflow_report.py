@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from workflow.studies.base import numbers
+from workflow.studies.base.colours import COLOURS, themed
 from workflow.studies.base.media import cropped
 from workflow.studies.base.numbers import show
-from workflow.studies.base.style import COLOURS, svg, themed
+from workflow.studies.base.style import svg
 from workflow.studies.base.table import Column, Table, read_table, write_table
 from workflow.studies.report.mode_pictures import aligned, cluster
 

@@ -55,6 +55,8 @@ _LATER = (
     *("solver.studies.calibration.gauss_newton", "solver.studies.scaling.plot"),
     *("snakemake.utils", "soundfile", "igl", "scipy.signal", "scipy.optimize", "trimesh"),
     *("networkx", "multiprocessing.pool", "matplotlib.pyplot"),
+    *("scipy.ndimage", "scipy.cluster.vq", "scipy.sparse.csgraph"),
+    *("carillon.fem.finite_cells.build", "dataset_gen.objectives.fitting"),
 )
 """What the programs import when they need it."""
 

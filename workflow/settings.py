@@ -7,16 +7,15 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import yaml
 from jsonschema.exceptions import ValidationError
 from snakemake.utils import update_config, validate
 
 from carillon import provenance
-from carillon.documents import read_yaml
+from carillon.documents import read_own_yaml, read_yaml
 from carillon.errors import UserError
 from carillon.fem.materials import NAMES as MATERIALS
 from dataset_gen.objectives import OBJECTIVES, require_objective
-from forests import model as forest_model
+from forests import default as default_forests
 from workflow import training
 from workflow.arguments import path_word
 from workflow.room import require_place
@@ -40,7 +39,7 @@ BUILTIN_MESHES = ("bar", "bell", "bowl", "box", "frying-pan", "pitcher", "plate"
 @cache
 def schema() -> dict[str, Any]:
     """The JSON schema of the configuration, which nobody changes."""
-    loaded: dict[str, Any] = yaml.safe_load(SCHEMA.read_text())
+    loaded: dict[str, Any] = read_own_yaml(SCHEMA)
     return loaded
 
 
@@ -183,7 +182,7 @@ def forests_file(config: Mapping[str, Any]) -> str | None:
     """
     named: str | None = config["forests"]["model"]
     if named == DEFAULT_FORESTS:
-        return str(forest_model.default_path())
+        return str(default_forests.default_path())
     return None if named is None else path_word(named)
 
 
@@ -200,7 +199,7 @@ def studied_objectives(config: Mapping[str, Any]) -> list[str]:
 def forest_files(named: str | None = None) -> list[str]:
     """File of the forests that are named, or else of those of the package; none without either."""
     try:
-        return [path_word(named) if named else str(forest_model.default_path())]
+        return [path_word(named) if named else str(default_forests.default_path())]
     except UserError:
         return []
 

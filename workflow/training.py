@@ -8,6 +8,7 @@ from typing import Any
 
 from carillon.errors import UserError
 from dataset_gen.sampling import moduli
+from forests.studies.variants import VARIANTS
 from workflow.arguments import options
 
 
@@ -130,13 +131,10 @@ def check_study(config: Mapping[str, Any]) -> None:
             f"forests_study.curve_rows: {max(requested['curve_rows']):,} rows, but "
             f"default_forest.dataset.samples gives {8 * data['samples']:,}"
         )
-    if requested["variants"]:
-        from forests.studies.training import VARIANTS  # Needs scikit-learn: a long import.
-
-        for name in requested["variants"]:
-            if name not in VARIANTS:
-                known = ", ".join(VARIANTS)
-                raise UserError(f"forests_study.variants: {name!r} is unknown, choose from {known}")
+    for name in requested["variants"] or ():
+        if name not in VARIANTS:
+            known = ", ".join(VARIANTS)
+            raise UserError(f"forests_study.variants: {name!r} is unknown, choose from {known}")
 
 
 def default(config: Mapping[str, Any]) -> Training:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from carillon.fem.laplacian import laplacian_modes
 from carillon.fem.moduli_file import read_moduli
 from carillon.places import require_file
 
@@ -52,6 +51,8 @@ def smooth(mesh: HexMesh, seed: int = 0) -> Array:
 
 def smooth_field(mesh: HexMesh, seed: int = 0) -> Array:
     """Values (m,) within -1 and 1: a random sum of the lowest Laplacian eigenvectors."""
+    from carillon.fem.laplacian import laplacian_modes  # Its import takes long.
+
     _, modes = laplacian_modes(mesh, SMOOTH_MODES + 1)
     modes = modes[:, 1:]
     weights = np.random.default_rng(seed).standard_normal(modes.shape[1])

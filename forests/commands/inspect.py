@@ -6,7 +6,7 @@ import argparse
 import json
 
 from forests import summary
-from forests.model import default_path
+from forests.default import default_path
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

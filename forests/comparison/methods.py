@@ -24,8 +24,9 @@ from forests.comparison.database import (
     look_up,
     save_databases,
 )
+from forests.default import default_path
 from forests.evaluate import coarsen
-from forests.model import Model, default_path, load_model
+from forests.model import Model, load_model
 
 
 @dataclass(frozen=True)

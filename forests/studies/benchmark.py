@@ -18,8 +18,9 @@ from carillon.arguments import number_between, whole_number
 from carillon.fem.element import Array
 from carillon.options import option
 from carillon.progress import track
+from forests.default import default_path
 from forests.evaluate import MOST_BLOCKS, coarsen, coarsen_with_derivatives
-from forests.model import FILLED, VOID, Model, default_path, load_model
+from forests.model import FILLED, VOID, Model, load_model
 from forests.scaling import FEATURES, prepare
 from forests.studies.synthetic import coherent_blocks, complete_forests, random_blocks
 from forests.training.join import join

@@ -17,6 +17,7 @@ from dataset_gen.generate import generate
 from dataset_gen.settings import ShardOptions
 from forests.layout import NODE
 from forests.model import RECORD
+from forests.studies.variants import VARIANTS
 from forests.training.dataset import Dataset, Samples, dataset_of, joined
 from forests.training.leaves import answers_of
 from forests.training.ranks import Ranks
@@ -34,20 +35,6 @@ LEAST_RATIO = 1e-12
 """A regression of ratios may answer 0 or less, which has no logarithm: this is taken instead."""
 
 Row = dict[str, Any]
-
-VARIANTS: dict[str, dict[str, Any]] = {
-    "ratios, variance splits (paper)": {"transform": "ratio", "grower": "best"},
-    "ratios, log target": {"transform": "ratio-log", "grower": "best"},
-    "bounded ratios, log target": {"transform": "bounded", "grower": "best"},
-    "logarithms": {"grower": "best"},
-    "logarithms, extra-trees": {"grower": "extra"},
-    "ratios, log target, linear splits": {"transform": "ratio-log"},
-    "bounded ratios, linear splits": {"transform": "bounded"},
-    "logarithms, linear splits": {},
-    "the same, 1 tree": {"trees": 1},
-    "the same, 6 trees": {"trees": 6},
-}
-"""Trainings that are compared, as what they change of the default one."""
 
 
 def fresh_samples(dataset: Dataset) -> dict[str, Samples]:

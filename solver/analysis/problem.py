@@ -13,7 +13,6 @@ from carillon.arguments import whole_number
 from carillon.errors import UserError
 from carillon.fem import geometry, materials
 from carillon.fem.element import DEFAULT_POISSON
-from carillon.fem.finite_cells.build import Covering, covering
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.geometry import COMPONENTS, FILLS, HexMesh, hexmesh_from_voxels, voxelize
 from carillon.fem.materials import young_modulus
@@ -28,6 +27,8 @@ from solver.coarsening.model import build_model
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
     import trimesh
+
+    from carillon.fem.finite_cells.build import Covering
 
 Array = NDArray[np.float64]
 
@@ -166,6 +167,8 @@ def discretised(
             voxels = voxelize(surface, options.resolution, options.fill, options.components, name)
             return hexmesh_from_voxels(voxels), None
         case "finite-cell":
+            from carillon.fem.finite_cells.build import covering  # Its import takes long.
+
             _require_nothing_for_voxels(options)
             cells = covering(surface, options.resolution, options.components, name)
             return cells.cells.mesh, cells

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dataset_gen.objectives import Fits, fit, lumped_share
+from dataset_gen import objectives
 from solver.coarsening.coarsening import Array, Coarsening
 
 FIT = "fit"
@@ -23,7 +23,7 @@ class FitCoarsening(Coarsening):
     """
 
     def __init__(self, objective: str, poisson: float) -> None:
-        super().__init__(FIT, lumped_share(objective))
+        super().__init__(FIT, objectives.lumped_share(objective))
         self.objective = objective
         self.poisson = poisson
 
@@ -31,11 +31,11 @@ class FitCoarsening(Coarsening):
         """See `Coarsening.moduli`."""
         return self.fits(e).moduli
 
-    def fits(self, e: Array) -> Fits:
+    def fits(self, e: Array) -> objectives.Fits:
         """The same as `dataset_gen.objectives.fit`, but blocks that are equal are fitted once."""
         distinct, row = np.unique(e, axis=0, return_inverse=True)
-        fits = fit(self.objective, distinct, self.poisson)
-        return Fits(*(values[row.ravel()] for values in fits))
+        fits = objectives.fit(self.objective, distinct, self.poisson)
+        return objectives.Fits(*(values[row.ravel()] for values in fits))
 
     def record(self) -> dict[str, str]:
         """The objective."""

@@ -5,11 +5,10 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
+import forests
 from carillon.errors import UserError
 from dataset_gen.objectives import lumped_share
-from forests import Model, coarsen, load_model
-from forests import model as forest_model
-from forests.evaluate import coarsen_with_derivatives
+from forests import default as default_forests
 from solver.coarsening.coarsening import Array, Coarsening
 
 FOREST = "ddfem"
@@ -34,7 +33,7 @@ class ForestCoarsening(Coarsening):
         First digits of the file's SHA-256.
     """
 
-    def __init__(self, source: str, model: Model, sha256: str) -> None:
+    def __init__(self, source: str, model: forests.Model, sha256: str) -> None:
         super().__init__(FOREST, lumped_share(model.objective))
         self.source = source
         self.model = model
@@ -42,11 +41,11 @@ class ForestCoarsening(Coarsening):
 
     def moduli(self, e: Array) -> Array:
         """See `Coarsening.moduli`."""
-        return coarsen(self.model, e)
+        return forests.coarsen(self.model, e)
 
     def moduli_with_derivatives(self, e: Array) -> tuple[Array, Array]:
         """See `forests.evaluate.coarsen_with_derivatives`."""
-        return coarsen_with_derivatives(self.model, e)
+        return forests.coarsen_with_derivatives(self.model, e)
 
     def record(self) -> dict[str, str]:
         """The file, its checksum and the objective that its forests learned."""
@@ -66,8 +65,8 @@ def load_forest(path: str | Path | None, poisson: float) -> ForestCoarsening:
         If there are none, the file is not a model, or they are for another Poisson's ratio.
     """
     source = DEFAULT if path is None else str(path)
-    file = forest_model.default_path() if path is None else Path(path)
-    model = load_model(file)
+    file = default_forests.default_path() if path is None else Path(path)
+    model = forests.load_model(file)
     if abs(model.poisson - poisson) > 1e-12:
         raise UserError(_mismatch(path, model.poisson, poisson))
     with open(file, "rb") as stream:

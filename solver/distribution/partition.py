@@ -7,7 +7,6 @@ import warnings
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.cluster.vq import kmeans2
 from scipy.sparse.csgraph import connected_components
 
 from carillon.errors import UserError
@@ -58,6 +57,8 @@ def _clusters(points: NDArray[np.float64], count: int, seed: int) -> NDArray[np.
     scikit-learn's where they are many, since SciPy's seeding takes time like their square.
     """
     if count <= FEW_CLUSTERS:
+        from scipy.cluster.vq import kmeans2
+
         rng, tries = np.random.default_rng(seed), []
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # an empty cluster does no harm

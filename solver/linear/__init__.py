@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from solver.assembly.system import Layout, System
+
+if TYPE_CHECKING:
+    from solver.assembly.system import Layout, System
 
 Array = NDArray[np.float64]
 

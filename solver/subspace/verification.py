@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
 from carillon.fem.model import RIGID_MODES
-from solver.assembly.system import System
+
+if TYPE_CHECKING:
+    from solver.assembly.system import System
 
 Array = NDArray[np.float64]
 

@@ -9,9 +9,9 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import yaml
 from jsonschema import Draft202012Validator
 
+from carillon.documents import read_own_yaml
 from carillon.errors import UserError
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ _RULES = {
 @cache
 def project_schema() -> dict[str, Any]:
     """The schema of a project."""
-    loaded: dict[str, Any] = yaml.safe_load(SCHEMA.read_text(encoding="utf-8"))
+    loaded: dict[str, Any] = read_own_yaml(SCHEMA)
     return loaded
 
 

@@ -8,14 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import ArrayLike
+
+from carillon.documents import read_own_yaml
 
 Rates = Mapping[str, Any]
 """See `workflow/schemas/rates.schema.yaml`."""
 Sizes = Mapping[str, float]
 
-KNOWN: dict[str, Any] = yaml.safe_load(Path(__file__).with_name("rules.yaml").read_text())
+KNOWN: dict[str, Any] = read_own_yaml(Path(__file__).with_name("rules.yaml"))
 """The stages, and what is known of the rules."""
 
 QUANTITIES = ["seconds", "memory_mb", "files_mb"]

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import yaml
 
 from carillon import provenance
+from carillon.documents import read_own_yaml
 from carillon.errors import UserError, one_line
 from carillon.measurement import memory_bytes
 from carillon.progress import say
@@ -51,7 +51,7 @@ def measure() -> dict[str, Any]:
         speeds = json.loads(_run(["dataset_gen", "benchmark", "--json"], Path(name)))
         fits = {**speeds["objectives"], SAMPLED: speeds["fits_per_second"]["sampled"]}
         done: list[pd.DataFrame] = []
-        runs = yaml.safe_load(RUNS.read_text())
+        runs = read_own_yaml(RUNS)
         for number, values in enumerate(runs, 1):
             say(f"measuring: run {number} of {len(runs)}")
             done.append(finished(Path(name, f"run-{number}"), values, fits))

@@ -6,8 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from carillon.documents import read_own_yaml
 from carillon.errors import UserError
 from carillon.files import cause
 from carillon.places import require_file
@@ -29,7 +28,7 @@ def checked(values: Any, where: str) -> Rates:
     UserError
         With one sentence about the first value that does not fit; `where` begins it.
     """
-    mistake = first_mistake(yaml.safe_load(SCHEMA.read_text()), values)
+    mistake = first_mistake(read_own_yaml(SCHEMA), values)
     if mistake is not None:
         place = ".".join(map(str, mistake.absolute_path)) or "contents"
         raise UserError(

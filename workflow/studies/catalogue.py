@@ -5,13 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from carillon.documents import read_own_yaml
 from workflow.studies.base.study import Figure, Study
 
-_DESCRIBED: dict[str, dict[str, Any]] = yaml.safe_load(
-    Path(__file__).with_suffix(".yaml").read_text("utf-8")
-)
+_DESCRIBED: dict[str, dict[str, Any]] = read_own_yaml(Path(__file__).with_suffix(".yaml"))
 ALL = {
     name: Study(
         name,

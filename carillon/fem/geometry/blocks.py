@@ -13,7 +13,6 @@ from functools import cache
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from carillon.fem.geometry.faces import face_neighbours
 from carillon.fem.geometry.hanging import node_weights
@@ -67,6 +66,8 @@ def parts_of_patterns() -> np.ndarray:
 
     Parts are numbered by their first cells; void cells have 0 and mean nothing.
     """
+    from scipy.sparse.csgraph import connected_components  # Its import takes long.
+
     beside = np.abs(CORNER_OFFSETS[:, None] - CORNER_OFFSETS).sum(axis=2) == 1
     numbers = np.zeros((256, 8), dtype=np.int64)
     for pattern in range(256):

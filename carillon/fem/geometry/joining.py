@@ -7,7 +7,6 @@ from functools import cache
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from carillon.fem.geometry.hexmesh import CORNER_OFFSETS, HexMesh
 from carillon.fem.geometry.refinement import hanging_corners, hanging_nodes
@@ -81,6 +80,8 @@ def _joined_corners(parts: Parts, alone: np.ndarray) -> np.ndarray:
     common. Cells of one block that share an edge only are not joined by it. Corners (m, 8) of cells
     that stand `alone` are not interpolated.
     """
+    from scipy.sparse.csgraph import connected_components  # Its import takes long.
+
     # A block's cells meet other blocks at nodes that lie on a plane between blocks.
     fine, position = parts.fine, parts.position
     between = (fine.node_grid & 1 == 0).any(axis=1)

@@ -7,9 +7,6 @@ from functools import lru_cache
 from itertools import product
 
 import numpy as np
-from scipy import ndimage
-
-FACES = ndimage.generate_binary_structure(3, 1)
 
 # A 3x3x3 neighbourhood is an integer with one bit per position.
 _POSITIONS = np.array(list(product((-1, 0, 1), repeat=3)))
@@ -43,7 +40,9 @@ def pieces(filled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     sizes : (n_pieces,)
         Voxels in each piece, descending.
     """
-    raw, count = ndimage.label(filled, structure=FACES)
+    from scipy import ndimage  # Its import takes long.
+
+    raw, count = ndimage.label(filled)
     sizes = np.bincount(raw.ravel(), minlength=count + 1)[1:]
     order = np.argsort(-sizes, kind="stable")
     rank = np.zeros(count + 1, dtype=np.int32)

@@ -23,9 +23,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import yaml
 from jinja2 import Environment, StrictUndefined
 
+from carillon.documents import read_own_yaml
 from workflow.studies.base.numbers import show
 from workflow.studies.base.table import Column, Table, columns_of
 
@@ -74,7 +74,7 @@ def tables_of(file: str) -> dict[str, Entry]:
 
 @cache
 def _read(file: str) -> dict[str, dict[str, str]]:
-    return yaml.safe_load((STUDIES / file).read_text("utf-8"))
+    return read_own_yaml(STUDIES / file)
 
 
 def _entry(name: str, entry: dict[str, str]) -> Entry:

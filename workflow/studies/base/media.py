@@ -19,8 +19,9 @@ from carillon.fem.geometry import HexMesh
 from carillon.fem.geometry.picture import draw, mark
 from carillon.files import atomic_path
 from solver.response.response import FLOOR_DECIBELS, SAMPLE_RATE_HERTZ, decibels, spectrogram
+from workflow.studies.base.colours import MUTED, themed
 from workflow.studies.base.page import data_uri
-from workflow.studies.base.style import MUTED, PNG_DPI, svg, themed
+from workflow.studies.base.style import PNG_DPI, svg
 
 Array = NDArray[np.float64]
 Pixels = NDArray[np.uint8]

@@ -9,9 +9,9 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+from workflow.studies.base.colours import themed
 from workflow.studies.base.conditions import LABELS
 from workflow.studies.base.numbers import show
-from workflow.studies.base.style import themed
 
 HERE = Path(__file__).parent
 

@@ -13,34 +13,12 @@ from matplotlib.axis import Axis
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from carillon.files import atomic_path
+from workflow.studies.base.colours import FAINT, INK, MUTED
 
 matplotlib.use("Agg")
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-INK, MUTED, FAINT = "#23211d", "#6f6a60", "#dedad1"
-"""Text and truth, axes, grid."""
-
-COLOURS = {
-    "truth": INK,
-    "ddfem_slepc": "#7a6a9c",
-    "hcms": "#8a94a0",
-    "hcms_ec": "#1f7a6d",
-    "ddfem_hcms_ec_accurate": "#8fb3a6",
-    "ddfem_hcms_ec": "#b8641b",
-    "random": "#b03a5b",
-}
-"""Colour of each variant, the same in all figures and on the page."""
-
-THEMED = {
-    INK: "--ink",
-    MUTED: "--muted",
-    FAINT: "--faint",
-    **{colour: f"--{name.replace('_', '-')}" for name, colour in COLOURS.items() if colour != INK},
-}
-"""Style-sheet variables that take the place of colours on the page, so that figures follow it into
-the dark."""
 
 SETTINGS: Any = {
     "font.family": "sans-serif",
@@ -122,10 +100,3 @@ def svg(figure: Figure, name: str) -> str:
     source = re.sub(r"<metadata>.*?</metadata>", "", source, flags=re.DOTALL)
     source = re.sub(r'\bid="', f'id="{name}-', source)
     return re.sub(r'(href="#|url\(#)', rf"\g<1>{name}-", source)
-
-
-def themed(source: str) -> str:
-    """Replace colours and fonts of an SVG by style-sheet variables, which only a page defines."""
-    for colour, variable in THEMED.items():
-        source = re.sub(colour, f"var({variable})", source, flags=re.IGNORECASE)
-    return re.sub(r"font-family: [^;\"]*", "font-family: var(--sans)", source)

@@ -8,7 +8,8 @@ import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from workflow.studies.base.style import COLOURS, MUTED, named_rows, plain_numbers
+from workflow.studies.base.colours import COLOURS, MUTED
+from workflow.studies.base.style import named_rows, plain_numbers
 from workflow.studies.coarsening.results import MODELS, CoarseningStudy
 
 COLOUR = {"plain": COLOURS["ddfem_hcms_ec"], "refined": COLOURS["hcms_ec"]}

@@ -8,8 +8,9 @@ from typing import Any
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
+from workflow.studies.base.colours import COLOURS, MUTED
 from workflow.studies.base.entry import Row
-from workflow.studies.base.style import COLOURS, MUTED, named_rows, plain_numbers
+from workflow.studies.base.style import named_rows, plain_numbers
 from workflow.studies.forests.results import ForestsStudy
 from workflow.studies.report.blocks_tables import compared, kind_of, kinds_of, method_of
 

@@ -8,7 +8,8 @@ import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from workflow.studies.base.style import COLOURS, FAINT, MUTED, named_rows, plain_numbers
+from workflow.studies.base.colours import COLOURS, FAINT, MUTED
+from workflow.studies.base.style import named_rows, plain_numbers
 from workflow.studies.objectives.goals import rms_limits
 from workflow.studies.objectives.results import Objectives
 

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from carillon.fem.model import RIGID_MODES
+from workflow.studies.base.colours import COLOURS
 from workflow.studies.base.results import Results
-from workflow.studies.base.style import COLOURS
 from workflow.studies.report.convergence_tables import ACCELERATIONS, PAPER, RANDOM, start_label
 from workflow.variants import TRUTH
 

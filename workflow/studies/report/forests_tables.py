@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
+from carillon.documents import read_own_yaml
 from workflow.studies.base.entry import Row
 from workflow.studies.report.results import Run
 
-SCORES = yaml.safe_load(Path(__file__).with_name("scores.yaml").read_text(encoding="utf-8"))
+SCORES = read_own_yaml(Path(__file__).with_name("scores.yaml"))
 
 
 def training(run: Run) -> Iterator[Row]:

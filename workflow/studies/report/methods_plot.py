@@ -5,8 +5,9 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
+from workflow.studies.base.colours import COLOURS, FAINT, INK, MUTED
 from workflow.studies.base.results import Results
-from workflow.studies.base.style import COLOURS, FAINT, INK, MUTED, named_rows, plain
+from workflow.studies.base.style import named_rows, plain
 from workflow.studies.base.table import MAX, MIN
 from workflow.studies.report.methods_tables import METHODS
 

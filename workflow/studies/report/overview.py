@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from carillon.fem.geometry.picture import draw
 from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import read_modes
-from workflow.studies.base.style import COLOURS, MUTED, plain
+from workflow.studies.base.colours import COLOURS, MUTED
+from workflow.studies.base.style import plain
 from workflow.studies.report.mode_pictures import aligned, displacement, view_of
 from workflow.studies.report.plots import LINES
 from workflow.studies.report.results import Run

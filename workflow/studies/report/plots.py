@@ -7,10 +7,10 @@ from typing import Any
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
-from solver.studies.scaling import plot
+from workflow.studies.base.colours import COLOURS, FAINT
 from workflow.studies.base.numbers import show
 from workflow.studies.base.results import Results
-from workflow.studies.base.style import COLOURS, FAINT, SETTINGS, named_rows, plain
+from workflow.studies.base.style import SETTINGS, named_rows, plain
 from workflow.studies.report.convergence_plot import visible
 from workflow.studies.report.spectra_tables import TIMED
 from workflow.variants import SHOWN, TRUTH, VARIANTS
@@ -68,4 +68,6 @@ def times_figure(run: Results) -> Figure:
 
 def scaling_figure(results: Results, model: str) -> Figure:
     """Measured and modelled wall times over the number of ranks."""
+    from solver.studies.scaling import plot  # Its import takes long.
+
     return plot.scaling_figure(results.read_json(f"models/{model}/scaling.json"), SETTINGS)

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
+from carillon.documents import read_own_yaml
 from workflow.arguments import options
 from workflow.settings import BUILTIN, located
 
@@ -197,4 +197,4 @@ def _mesh(mesh: str, config: Mapping[str, Any]) -> str:
 
 @cache
 def _described() -> dict[str, Any]:
-    return yaml.safe_load(EXAMPLES.read_text(encoding="utf-8"))
+    return read_own_yaml(EXAMPLES)

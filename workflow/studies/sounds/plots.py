@@ -11,8 +11,9 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from workflow.studies.base.colours import COLOURS, INK, MUTED
 from workflow.studies.base.media import COLOUR_MAP
-from workflow.studies.base.style import COLOURS, INK, MUTED, plain_numbers
+from workflow.studies.base.style import plain_numbers
 from workflow.studies.base.table import Table
 from workflow.studies.sounds.results import SoundResults
 from workflow.studies.sounds.tables import METHODS

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
+from carillon.documents import read_own_yaml
 from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import frequencies
 from solver.studies.comparison import AUDIBLE_FIRST, AUDIBLE_LAST
@@ -18,9 +18,7 @@ from workflow.studies.report.findings import headline
 from workflow.studies.validation.evidence import COARSENED, SOLVED, Evidence
 from workflow.variants import TRUTH
 
-TEXTS: dict[str, Any] = yaml.safe_load(
-    Path(__file__).with_name("criteria.yaml").read_text(encoding="utf-8")
-)
+TEXTS: dict[str, Any] = read_own_yaml(Path(__file__).with_name("criteria.yaml"))
 Limited = tuple[float | None, float]
 """What was found, and its limit."""
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from carillon.fem.geometry import HexMesh
 from carillon.fem.geometry.picture import draw, draw_surface, guess_up, view_of
 from solver.response.contact import Contact
+from workflow.studies.base.colours import COLOURS
 from workflow.studies.base.media import COLOUR_MAP, Pixels, cropped, marked_picture, solid_picture
-from workflow.studies.base.style import COLOURS
 
 Array = NDArray[np.float64]
 

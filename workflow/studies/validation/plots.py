@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from solver.response.response import SAMPLE_RATE_HERTZ, spectrogram
 from solver.response.response_file import ResponseFile
+from workflow.studies.base.colours import COLOURS
 from workflow.studies.base.media import COLOUR_MAP, highest_hertz, spectrogram_figure
-from workflow.studies.base.style import COLOURS
 from workflow.studies.base.table import Table
 from workflow.studies.report.convergence_plot import visible
 from workflow.studies.report.plots import LINES

@@ -1,0 +1,143 @@
+"""Coarse moduli of many blocks by any objective."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from carillon.errors import UserError
+from carillon.fem.block import pattern_images, symmetries
+from carillon.fem.element import DEFAULT_POISSON, Array
+from dataset_gen.objectives import (
+    SAMPLED,
+    calibrated,
+    chen2015,
+    energy,
+    factored,
+    hybrid,
+    inertial,
+    oversampled,
+    require_objective,
+    require_poisson,
+    sampled_energy,
+)
+from dataset_gen.objectives.quadratic import PatternFits
+
+FITS: dict[str, Callable[[Array, int, float], PatternFits]] = {
+    "energy": energy.fit_pattern,
+    "chen2015": chen2015.fit_pattern,
+    "inertial": inertial.fit_pattern,
+    "oversampled": oversampled.fit_pattern,
+    "hybrid": hybrid.fit_pattern,
+    "factored": factored.fit_pattern,
+    "calibrated": calibrated.fit_pattern,
+}
+"""What fits blocks of one void pattern, by the name of the objective."""
+
+
+class Fits(NamedTuple):
+    """Result of `fit`.
+
+    Attributes
+    ----------
+    moduli : (n, 8)
+        Coarse moduli E, in the unit of the fine ones, positive.
+    residual : (n,)
+        Root of the objective relative to its value for E = 0.
+    converged : (n,)
+        Whether the minimiser settled.
+    """
+
+    moduli: Array
+    residual: Array
+    converged: NDArray[np.bool_]
+
+
+def _require_blocks(young: Array) -> None:
+    if young.ndim != 2 or young.shape[1] != 8:
+        raise UserError(f"fine moduli have shape {young.shape}, expected (n, 8)")
+    if not np.isfinite(young).all() or (young < 0.0).any():
+        raise UserError("fine moduli must be finite and not negative")
+    empty = np.flatnonzero(~(young > 0.0).any(axis=1))
+    if len(empty):
+        raise UserError(f"block {empty[0]} is void in all eight cells: there is nothing to fit")
+
+
+@cache
+def orientations() -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Least image (256,) of each void pattern under the symmetries, and the one used (256, 8).
+
+    Cell j of the pattern is cell [mask, j] of its image.
+    """
+    images = pattern_images()
+    return images.min(axis=1), symmetries()[images.argmin(axis=1)]
+
+
+def fit(objective: str, e: ArrayLike, poisson: float = DEFAULT_POISSON) -> Fits:
+    """Fit the coarse moduli of many blocks.
+
+    Parameters
+    ----------
+    objective
+        Name in `dataset_gen.objectives.OBJECTIVES`.
+    e : (n, 8)
+        Fine moduli in bit order, any unit, 0 where a cell is void.
+    poisson
+        Poisson's ratio of all cells.
+
+    Raises
+    ------
+    UserError
+        For an unknown objective, a bad shape, a negative or non-finite modulus, an all-void block.
+
+    Notes
+    -----
+    Blocks are turned so that 21 void patterns stand for all 255, and those of one pattern are
+    fitted together. A row's result does not depend on the other rows, bit for bit. One core is
+    used: share many rows among processes.
+
+    Examples
+    --------
+    >>> moduli = fit("oversampled", [[1, 1, 1, 1, 1, 1, 1, 1], [2, 2, 2, 2, 2, 2, 2, 2]]).moduli
+    >>> bool(np.allclose(moduli[1], 2.0 * moduli[0])), moduli.shape
+    (True, (2, 8))
+    """
+    require_objective(objective)
+    require_poisson(poisson)
+    young = np.ascontiguousarray(e, dtype=float)
+    _require_blocks(young)
+    images, turns = orientations()
+    masks = (young > 0.0) @ (1 << np.arange(8))
+    turn, image = turns[masks], images[masks]
+    turned = np.empty_like(young)
+    np.put_along_axis(turned, turn, young, axis=1)
+    moduli = np.empty_like(young)
+    residual = np.empty(len(young))
+    converged = np.empty(len(young), dtype=bool)
+    for mask in np.unique(image):
+        rows = np.flatnonzero(image == mask)
+        fits = FITS[objective](turned[rows], int(mask), float(poisson))
+        moduli[rows], residual[rows], converged[rows] = fits
+    return Fits(np.take_along_axis(moduli, turn, axis=1), residual, converged)
+
+
+def fit_samples(objective: str, e: Array, seed: int, first: int, poisson: float) -> Fits:
+    """Fit the samples `first`, `first` + 1, ... of a dataset, see `fit`.
+
+    Parameters
+    ----------
+    objective
+        Name in `dataset_gen.objectives.DATASET_OBJECTIVES`.
+    seed
+        Of the dataset; what is drawn for a fit depends on it and on the sample's number alone.
+    """
+    if objective != SAMPLED:
+        return fit(objective, e, poisson)
+    fits = [
+        sampled_energy.fit_sample(young, seed, first + row, poisson) for row, young in enumerate(e)
+    ]
+    return Fits(*(np.concatenate(column) for column in zip(*fits)))
