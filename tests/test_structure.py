@@ -47,7 +47,8 @@ ARROWS = {
         solver.reference""",
     "solver.refinement": """solver.coarsening solver.distribution solver.assembly solver.linear
         solver.subspace solver.analysis""",
-    "solver.accuracy": "solver.refinement",
+    "solver.accuracy": """solver.distribution solver.files solver.analysis
+        solver.refinement""",
     "solver": "solver.analysis",
     "solver.studies": """solver.coarsening solver.distribution solver.files solver.response
         solver.assembly solver.linear solver.subspace solver.hcms solver.correction
@@ -65,7 +66,8 @@ ARROWS = {
     "solver.studies.scaling": """solver.distribution solver.assembly solver.linear solver.hcms
         solver.correction solver.analysis""",
     "solver.commands": """dataset_gen.objectives solver.distribution solver.files solver.response
-        solver.linear solver.analysis solver.refinement solver.studies solver.studies.benchmark
+        solver.linear solver.analysis solver.refinement solver.accuracy solver.studies
+        solver.studies.benchmark
         solver.studies.calibration solver.studies.scaling solver.coarsening
         solver.studies.accuracy solver.studies.coarsening solver.studies.discretisation""",
     #

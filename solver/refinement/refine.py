@@ -26,6 +26,7 @@ from solver.refinement.two_grid import TwoGrid
 
 Array = NDArray[np.float64]
 Model = TypeVar("Model", bound=Solid)
+Refined = TypeVar("Refined", bound=Solid, covariant=True)
 
 REMAINING = 0.6
 """Share of the allowed error that elements are refined to in a step, if shares were errors."""
@@ -53,11 +54,11 @@ class RefinementStep:
     errors: ExpectedErrors
 
 
-class Refinable(Protocol[Model]):
+class Refinable(Protocol[Refined]):
     """A model that can be refined where it needs to be."""
 
     @property
-    def model(self) -> Model:
+    def model(self) -> Refined:
         """The model as it is now."""
 
     def advance(self, values: Array, modes: Array, tolerance: float) -> tuple[RefinementStep, bool]:

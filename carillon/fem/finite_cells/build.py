@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -165,8 +165,15 @@ class _Parts:
 
     def chosen(self, kept: NDArray[np.bool_]) -> _Parts:
         """Those that are kept (p,)."""
-        arrays = (self.corner, self.span, self.row, self.volumes, self.slight)
-        return _Parts(*(each[kept] for each in arrays), self.weights, self.faces.chosen(kept))
+        return replace(
+            self,
+            corner=self.corner[kept],
+            span=self.span[kept],
+            row=self.row[kept],
+            volumes=self.volumes[kept],
+            slight=self.slight[kept],
+            faces=self.faces.chosen(kept),
+        )
 
     def cells(self, grid: Grid) -> FiniteCells:
         """The mesh of those that are not slight, on a lattice of these voxels."""

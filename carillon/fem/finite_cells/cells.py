@@ -174,7 +174,7 @@ def assemble_cells(
     voxels = np.full(filled.shape, -1, dtype=np.int32)
     voxels[cell[order], octant[order]] = np.arange(len(order))
     voxels[cell, octant] = voxels[cell, own]
-    sizes = ()
+    sizes: tuple[np.ndarray, ...] = ()
     if is_mixed:
         sizes = np.full(len(order), 2, np.uint8), np.zeros(len(order), np.uint8)
     mesh = HexMesh(

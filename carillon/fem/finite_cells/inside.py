@@ -214,8 +214,8 @@ def _of_open_surface(
     asked = np.flatnonzero(unsure)
     if len(asked):
         length = high[asked] - low[asked]
-        ends = np.stack([low[asked] + ENDS * length, high[asked] - ENDS * length])
-        first, last = wind.inside(_points(lines, line[asked], ends).reshape(-1, 3)).reshape(2, -1)
+        near = np.stack([low[asked] + ENDS * length, high[asked] - ENDS * length])
+        first, last = wind.inside(_points(lines, line[asked], near).reshape(-1, 3)).reshape(2, -1)
         inside[asked] = first | last
         split, begins = asked[first != last], first[first != last]
         if len(split):

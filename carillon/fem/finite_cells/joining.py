@@ -82,7 +82,9 @@ def joined_nodes(
     return _ordered(nodes, label, np.where(hangs[label, None], -1, places))
 
 
-def _ordered(nodes: Index, label: Index, places: Index) -> tuple[Index, Index]:
+def _ordered(
+    nodes: NDArray[np.integer], label: NDArray[np.integer], places: Index
+) -> tuple[Index, Index]:
     """Nodes numbered by place, and in one place by the cells that have them."""
     own = np.flatnonzero(places[:, 0] >= 0)
     first = np.full(len(label), -1)

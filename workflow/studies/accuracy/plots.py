@@ -7,7 +7,8 @@ from matplotlib.figure import Figure
 
 from workflow.studies.accuracy.results import AccuracyStudy
 from workflow.studies.accuracy.tables import LABELS
-from workflow.studies.base.style import COLOURS, plain_numbers
+from workflow.studies.base.colours import COLOURS
+from workflow.studies.base.style import plain_numbers
 
 LOOKS = {
     "voxel": ("s-", COLOURS["hcms"]),

@@ -8,7 +8,8 @@ import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from workflow.studies.base.style import COLOURS, INK, plain, plain_numbers
+from workflow.studies.base.colours import COLOURS, INK
+from workflow.studies.base.style import plain, plain_numbers
 from workflow.studies.discretisation.results import DiscretisationStudy
 from workflow.studies.discretisation.tables import WAYS
 
