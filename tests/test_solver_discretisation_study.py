@@ -13,7 +13,7 @@ from carillon.fem.geometry.fill import Grid
 from solver.accuracy.lattices import cells_on, scaled, voxel_lattice, voxel_mesh
 from solver.accuracy.material import HARMONIC, PlacedMaterial
 from solver.studies.discretisation.truth import SolidTruth
-from solver.studies.discretisation.ways import Spectrum
+from solver.studies.discretisation.ways import TimedSpectrum
 
 LATTICE = Grid(np.array([0.1, 0.2, 0.3]), 0.01, (8, 4, 4))
 
@@ -85,7 +85,8 @@ def test_a_smooth_material_is_the_same_function_on_all_lattices():
 
 def test_the_truth_lies_between_the_finest_and_what_may_be_left():
     spectra = [
-        Spectrum(np.array([*[0.0] * 6, *hertz]), 30, {}) for hertz in ([104.0, 250.0], [100.0] * 2)
+        TimedSpectrum(np.array([*[0.0] * 6, *hertz]), 30, {})
+        for hertz in ([104.0, 250.0], [100.0] * 2)
     ]
     truth = SolidTruth.between(*spectra, left=1.0)
     assert np.allclose(truth.hertz, [25.0, 98.0]) and np.allclose(truth.doubt, [0.02, 0.75])

@@ -62,7 +62,7 @@ ARROWS = {
     "solver.studies.coarsening": """solver.coarsening solver.files solver.analysis
         solver.refinement solver.studies""",
     "solver.studies.discretisation": """solver.coarsening solver.files solver.analysis
-        solver.refinement solver.studies""",
+        solver.refinement solver.accuracy solver.studies""",
     "solver.studies.scaling": """solver.distribution solver.assembly solver.linear solver.hcms
         solver.correction solver.analysis""",
     "solver.commands": """dataset_gen.objectives solver.distribution solver.files solver.response

@@ -14,7 +14,7 @@ FIRST_RESOLUTION = 16
 
 
 @dataclass(frozen=True)
-class AccuracyOptions:
+class DistanceOptions:
     """Which distance from the solid's frequencies is asked for, and whether it is estimated."""
 
     accuracy: float | None = option(

@@ -22,7 +22,7 @@ from carillon.errors import UserError
 from carillon.fem.model import Solid
 from carillon.options import add_options, collect
 from carillon.progress import say
-from solver.accuracy.options import FIRST_RESOLUTION, AccuracyOptions
+from solver.accuracy.options import FIRST_RESOLUTION, DistanceOptions
 from solver.accuracy.solving import FROM_FINE, FROM_SOLID, Wishes, solve_accurately, solve_solid
 from solver.analysis.modal_solver import ModalSolver, Modes
 from solver.analysis.options import SolverOptions
@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=whole_number(2),
         help="voxels, or lattice spacings, along the longest side; needed without --accuracy",
     )
-    add_options(parser, AccuracyOptions)
+    add_options(parser, DistanceOptions)
     add_options(parser, RefinementOptions)
     add_options(parser, SolverOptions, leave_out=("seed",))
     parser.add_argument("--out", required=True, help="modes file to write (HDF5)")
@@ -72,7 +72,7 @@ def run(arguments: argparse.Namespace) -> None:
     """Build the solid, solve, verify, write."""
     with on_ranks(arguments.petsc) as comm:
         require_outputs(arguments, comm)
-        accuracy = collect(AccuracyOptions, arguments)
+        accuracy = collect(DistanceOptions, arguments)
         arguments.resolution = _resolution(arguments)
         described = collect(ProblemOptions, arguments)
         options = collect(SolverOptions, arguments)

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
+from carillon.fem.finite_cells.absorbing import hosts, taken_in
 from carillon.fem.finite_cells.cells import FiniteCells, assemble_cells
-from carillon.fem.finite_cells.cover import Cover, cover_of, divided_cover, faces_of_halves
+from carillon.fem.finite_cells.cover import LatticeCover, cover_of, divided_cover, faces_of_halves
 from carillon.fem.finite_cells.descent import parents, voxels_of_parents
 from carillon.fem.finite_cells.inside import CUT, FULL, Inside, find_inside
 from carillon.fem.finite_cells.joining import Faces, joined_nodes
@@ -72,7 +73,7 @@ class Covering:
     surface: trimesh.Trimesh
     name: str
     grid: Grid
-    cover: Cover
+    cover: LatticeCover
     kept: NDArray[np.bool_]
 
     @cached_property
@@ -124,7 +125,7 @@ class _Parts:
     corner, span : (p, 3), (p,)
         Lowest corners and edges of their cells, in steps: voxels, or halves of them.
     row, volumes, slight : (p,)
-        See `Cover`; volumes are in voxels.
+        See `LatticeCover`; volumes are in voxels.
     weights
         That the rows are of.
     faces
@@ -140,14 +141,16 @@ class _Parts:
     faces: Faces
 
     @classmethod
-    def of_cover(cls, cover: Cover) -> _Parts:
+    def of_cover(cls, cover: LatticeCover) -> _Parts:
         """Those of one lattice."""
         span = np.full(len(cover), 2)
         faces = Faces(cover.met, np.empty((0, 4), dtype=np.int64))
         return cls(cover.grid, span, cover.row, cover.volumes, cover.slight, cover.weights, faces)
 
     @classmethod
-    def of_two(cls, whole: Cover, half: Cover, undivided: NDArray[np.bool_]) -> _Parts:
+    def of_two(
+        cls, whole: LatticeCover, half: LatticeCover, undivided: NDArray[np.bool_]
+    ) -> _Parts:
         """Those of a lattice and of one of half the edge, in place of its cells not `undivided`."""
         count, rows = len(whole), len(whole.weights)
         return cls(
@@ -178,13 +181,12 @@ class _Parts:
     def cells(self, grid: Grid) -> FiniteCells:
         """The mesh of those that are not slight, on a lattice of these voxels."""
         nodes, places = joined_nodes(self.corner, self.span, self.faces, self.slight)
-        row = self.row[~self.slight]
-        rows, row = np.unique(np.append(0, row), return_inverse=True)
+        host = hosts(self.faces, self.slight, self.volumes)
+        row, weights = taken_in(self.corner, self.span, host, self.row, self.weights)
+        rows, row = np.unique(np.append(0, row[~self.slight]), return_inverse=True)
         is_mixed = bool((self.span > 2).any())
         edge = grid.edge / 2.0 if is_mixed else grid.edge
-        return assemble_cells(
-            nodes, places, row[1:], self.weights[rows], grid.origin, edge, is_mixed
-        )
+        return assemble_cells(nodes, places, row[1:], weights[rows], grid.origin, edge, is_mixed)
 
 
 def covering(

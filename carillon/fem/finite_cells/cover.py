@@ -23,12 +23,11 @@ Index = NDArray[np.int64]
 SMALLEST_OCTANT = 1e-6
 """Share of a voxel below which it counts as empty."""
 FEWEST_LINES = 24
-"""Pieces of lines that a cell needs, of the 256 across it. With fewer, points are too few to tell
-displacements from motions without strain, and there are slow motions that no solid has."""
+"""Pieces of lines, of the 256 across a cell, that it takes to be one, see `absorbing`."""
 
 
 @dataclass(frozen=True)
-class Cover:
+class LatticeCover:
     """Cells of one lattice that hold anything, and their parts that touch nowhere in them.
 
     Attributes
@@ -50,7 +49,7 @@ class Cover:
     met : (m, 3)
         Parts that meet, the lower one first, and the axis across their face.
     slight : (p,)
-        Parts so small that they only hold others together, and are no cells.
+        Parts that are no cells of their own, see `carillon.fem.finite_cells.absorbing`.
     """
 
     places: Index
@@ -92,7 +91,7 @@ class Cover:
         return np.asarray(self.number[self.first[cells] + labels - 1])
 
 
-def cover_of(inside: Inside) -> Cover:
+def cover_of(inside: Inside) -> LatticeCover:
     """The cells of a lattice that hold any of the inside."""
     state, facing = _by_cell(inside.state), _by_cell(inside.facing)
     there = ((state != EMPTY) & (state != SKIPPED)).any(axis=3)
@@ -121,7 +120,7 @@ def cover_of(inside: Inside) -> Cover:
     slight[~whole[owner]] = lines < FEWEST_LINES
     among_cut = np.full(len(places), -1)
     among_cut[cut] = np.arange(len(cut))
-    found = Cover(
+    found = LatticeCover(
         places,
         among_cut,
         labels,
@@ -136,7 +135,7 @@ def cover_of(inside: Inside) -> Cover:
     return _with_meetings(found, numbers)
 
 
-def _with_meetings(cover: Cover, numbers: Index) -> Cover:
+def _with_meetings(cover: LatticeCover, numbers: Index) -> LatticeCover:
     met = []
     for axis in range(3):
         lower, upper = _neighbours(numbers, axis)
@@ -147,7 +146,7 @@ def _with_meetings(cover: Cover, numbers: Index) -> Cover:
     return replace(cover, met=np.concatenate(met))
 
 
-def divided_cover(surface: trimesh.Trimesh, grid: Grid, places: Index) -> Cover:
+def divided_cover(surface: trimesh.Trimesh, grid: Grid, places: Index) -> LatticeCover:
     """Cover by cells of half the edge where those of a lattice at `places` (d, 3) are divided.
 
     Its places are in voxels of half the edge, from the same origin.
@@ -166,7 +165,7 @@ def divided_cover(surface: trimesh.Trimesh, grid: Grid, places: Index) -> Cover:
     return replace(found, places=found.places + 2 * low)
 
 
-def faces_of_halves(whole: Cover, half: Cover, undivided: NDArray[np.bool_]) -> Index:
+def faces_of_halves(whole: LatticeCover, half: LatticeCover, undivided: NDArray[np.bool_]) -> Index:
     """Parts of undivided cells (c,) and of cells of half the edge that meet: rows (k, 4).
 
     They are as in `carillon.fem.finite_cells.joining.Faces`.

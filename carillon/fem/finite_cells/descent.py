@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from carillon.fem.element import CORNERS
 from carillon.fem.finite_cells.cells import FiniteCells
-from carillon.fem.finite_cells.cover import Cover
+from carillon.fem.finite_cells.cover import LatticeCover
 
 Index = NDArray[np.int64]
 
 
-def parents(whole: Cover, half: Cover, kept: NDArray[np.bool_]) -> Index:
+def parents(whole: LatticeCover, half: LatticeCover, kept: NDArray[np.bool_]) -> Index:
     """Part (p,) of `whole` that each part of `half` lies in: of those kept, that with most in it.
 
     Where none has anything there it is the first that is kept in the place, or the first of all.
@@ -33,13 +33,15 @@ def parents(whole: Cover, half: Cover, kept: NDArray[np.bool_]) -> Index:
     return found
 
 
-def _labels(cover: Cover) -> Index:
+def _labels(cover: LatticeCover) -> Index:
     """Label (p,) of each part in its cell, from 1."""
     number = np.flatnonzero(cover.number >= 0)
     return number - cover.first[cover.owner] + 1
 
 
-def _shared_boxes(whole: Cover, half: Cover, part: int, cell: int, label: int) -> Index:
+def _shared_boxes(
+    whole: LatticeCover, half: LatticeCover, part: int, cell: int, label: int
+) -> Index:
     """Boxes that a part of a small cell shares with those of a whole one, by their labels."""
     size = whole.labels.shape[1]
     low = size // 2 * (half.grid[part] // 2 % 2)

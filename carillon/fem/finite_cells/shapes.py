@@ -82,6 +82,11 @@ def points() -> Array:
     return np.stack([x, y, z], axis=-1).reshape(-1, 3)
 
 
+def polynomials(places: Array) -> Array:
+    """Lagrange polynomials (p, 125) of the points at `places` (p, 3) in, or beside, the cell."""
+    return _products([lagrange(POINT_PLACES, places[:, axis]) for axis in range(3)])
+
+
 @cache
 def octant_weights() -> Array:
     """Weights (8, 125) of whole octants of a cell of volume one.

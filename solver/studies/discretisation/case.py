@@ -22,7 +22,7 @@ from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.forest import FOREST
 from solver.studies.comparison import frequency_errors
 from solver.studies.discretisation.truth import FINER, LEFT, LEFT_OF_NOISE, SolidTruth
-from solver.studies.discretisation.ways import TOLERANCE, Given, Spectrum, Ways
+from solver.studies.discretisation.ways import TOLERANCE, Given, TimedSpectrum, Ways
 
 Array = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ def rate_discretisations(options: ProblemOptions, modes: int, runs: int) -> dict
     assert coarsening is not None
     _run_once(WARM_UP, coarsening, WARM_UP_MODES)
     ways = Ways(_given(options), coarsening, modes)
-    found: dict[str, list[Spectrum]] = {name: [] for name in ways.named}
+    found: dict[str, list[TimedSpectrum]] = {name: [] for name in ways.named}
     for _ in track(range(runs), "rounds"):
         for name, way in ways.named.items():
             found[name].append(_named(name, way))
@@ -105,14 +105,14 @@ def _run_once(options: ProblemOptions, coarsening: Coarsening, modes: int) -> No
         way()
 
 
-def _named(name: str, way: Callable[[], Spectrum]) -> Spectrum:
+def _named(name: str, way: Callable[[], TimedSpectrum]) -> TimedSpectrum:
     try:
         return way()
     except (UserError, ConvergenceError) as error:
         raise type(error)(f"{name}: {error}") from None
 
 
-def _described(spectra: list[Spectrum], truths: dict[str, Array]) -> dict[str, Any]:
+def _described(spectra: list[TimedSpectrum], truths: dict[str, Array]) -> dict[str, Any]:
     first = spectra[0]
     totals = [sum(spectrum.seconds.values()) for spectrum in spectra]
     elastic = first.hertz[RIGID_MODES:]

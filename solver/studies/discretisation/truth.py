@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.fem.model import RIGID_MODES
-from solver.studies.discretisation.ways import Spectrum
+from solver.studies.discretisation.ways import TimedSpectrum
 
 Array = NDArray[np.float64]
 
@@ -41,10 +41,10 @@ class SolidTruth:
 
     hertz: Array
     doubt: Array
-    finest: Spectrum
+    finest: TimedSpectrum
 
     @classmethod
-    def between(cls, cells: Spectrum, finest: Spectrum, left: float) -> SolidTruth:
+    def between(cls, cells: TimedSpectrum, finest: TimedSpectrum, left: float) -> SolidTruth:
         """From finite cells on a lattice and on one `FINER` times as fine.
 
         The middle of what may be left of their difference, a share from 0 to `left`, is taken off.
@@ -52,7 +52,7 @@ class SolidTruth:
         Examples
         --------
         >>> rigid = [0.0] * 6
-        >>> spectra = [Spectrum(np.array([*rigid, f]), 0, {}) for f in (110.0, 100.0)]
+        >>> spectra = [TimedSpectrum(np.array([*rigid, f]), 0, {}) for f in (110.0, 100.0)]
         >>> truth = SolidTruth.between(*spectra, left=1.0)
         >>> float(truth.hertz[0]), float(truth.doubt[0])
         (95.0, 0.05)

@@ -58,7 +58,7 @@ class Given:
 
 
 @dataclass(frozen=True)
-class Spectrum:
+class TimedSpectrum:
     """Frequencies (k,) [Hz], rigid motions first, of a model, and wall seconds by phase."""
 
     hertz: Array
@@ -98,7 +98,7 @@ class Ways:
         self._modes = modes
 
     @property
-    def named(self) -> dict[str, Callable[[], Spectrum]]:
+    def named(self) -> dict[str, Callable[[], TimedSpectrum]]:
         """All that are compared, by name."""
         ways = {
             "voxels": self.voxels,
@@ -110,20 +110,20 @@ class Ways:
             ways["half-cells-harmonic"] = lambda: self.cells(0.5, HARMONIC)
         return {**ways, "cells": lambda: self.cells(1.0)}
 
-    def voxels(self) -> Spectrum:
+    def voxels(self) -> TimedSpectrum:
         """The voxels themselves."""
         clock = _Clock()
         mesh, young = self._voxels(clock)
         return self._solved(fine_model(mesh, young, **self._given.constants), clock)
 
-    def coarse(self) -> Spectrum:
+    def coarse(self) -> TimedSpectrum:
         """Coarse elements of their blocks."""
         clock = _Clock()
         mesh, young = self._voxels(clock)
         model = build_model(mesh, young, self._coarsening, **self._given.constants)
         return self._solved(model, clock)
 
-    def refined(self) -> Spectrum:
+    def refined(self) -> TimedSpectrum:
         """The same with blocks fine until the expected error is `ALLOWED_ERROR`."""
         clock = _Clock()
         mesh, young = self._voxels(clock)
@@ -143,7 +143,7 @@ class Ways:
         assert model is not None
         return _spectrum(model, modes, clock)
 
-    def cells(self, factor: float, power: float = ARITHMETIC) -> Spectrum:
+    def cells(self, factor: float, power: float = ARITHMETIC) -> TimedSpectrum:
         """Finite cells on a lattice of `factor` voxels in the place of one.
 
         Where one joins several, it has the mean of their moduli, see `PlacedMaterial.on`.
@@ -165,7 +165,7 @@ class Ways:
         clock.end("material")
         return mesh, young
 
-    def _solved(self, model: Solid, clock: _Clock) -> Spectrum:
+    def _solved(self, model: Solid, clock: _Clock) -> TimedSpectrum:
         clock.end("model")
         modes = self._modes_of(model)
         clock.end("solve", _checks(modes))
@@ -181,7 +181,7 @@ def _checks(modes: Modes) -> float:
     return sum(seconds for phase, seconds in modes.seconds.items() if phase in CHECKS)
 
 
-def _spectrum(model: Solid, modes: Modes, clock: _Clock) -> Spectrum:
+def _spectrum(model: Solid, modes: Modes, clock: _Clock) -> TimedSpectrum:
     hertz = frequencies(modes.values)
     modes.destroy()
-    return Spectrum(hertz, model.n_dofs, clock.seconds)
+    return TimedSpectrum(hertz, model.n_dofs, clock.seconds)
