@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.geometry import HexMesh
+from carillon.fem.elements import Elements
+from carillon.fem.model import Solid
 from solver.distribution.decomposition import Decomposition
 from solver.distribution.tree import Merge, MergeTree
 
@@ -15,10 +16,6 @@ Counts = NDArray[np.float64]
 Corners = NDArray[np.int64]
 
 _AXES = 3
-_NEIGHBOURS_ACROSS = 9
-"""Nodes of a neighbouring plane that share an element with a node."""
-_NEIGHBOURS_WITHIN = 9
-"""Nodes of its own plane that do, itself included."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +35,8 @@ class TreeSizes:
         (merges,) nodes of either group in cells that touch both.
     pairs_left, pairs_right, pairs_across
         (merges,) pairs of nodes that these cells couple.
+    element_bytes
+        Bytes of a cell under way: its nodes, and what its matrices are made from.
     """
 
     tree: MergeTree
@@ -50,15 +49,16 @@ class TreeSizes:
     pairs_left: Counts
     pairs_right: Counts
     pairs_across: Counts
+    element_bytes: float
 
 
-def sizes_of_mesh(
-    mesh: HexMesh, decomposition: Decomposition, order: NDArray[np.int64]
+def sizes_of_solid(
+    model: Solid, decomposition: Decomposition, order: NDArray[np.int64]
 ) -> TreeSizes:
-    """Sizes counted in a mesh, with what `decompose` found for it."""
+    """Sizes counted in the mesh of a solid, with what `decompose` found for it."""
     row = np.empty(len(order), dtype=np.int64)
     row[order] = np.arange(len(order))
-    corners = row[mesh.cells]
+    corners = row[model.connectivity]
     ranges = decomposition.row_ranges()
     groups = [_boundary(corners, *bounds) for bounds in ranges]
     merges = [
@@ -77,15 +77,24 @@ def sizes_of_mesh(
         np.array([cells for _, cells in groups], dtype=float),
         np.array(boundary_left),
         *columns,
+        _element_bytes(model.elements),
     )
 
 
-def sizes_of_box(parts: int, nodes: float) -> TreeSizes:
+def sizes_of_box(parts: int, nodes: float, elements: Elements) -> TreeSizes:
     """Sizes of a box of `parts` cubes, a power of two, of so many `nodes` each.
 
     Groups are cuboids that are joined along their shortest side; all their faces are taken to touch
-    others, as those of most subdomains of a large solid do, but for the box itself.
+    others, as those of most subdomains of a large solid do, but for the box itself. Where groups
+    meet, either may have any number of the layers of nodes in an element of the kind of `elements`,
+    each number as often as another.
     """
+    order = elements.steps
+    layers = np.arange(1.0, order + 1.0)
+    # Nodes of a plane that share an element with one of it, on average.
+    neighbours = (order + 2.0) ** 2
+    within = neighbours * np.mean(layers**2)
+    across = neighbours * np.mean(layers * layers[::-1])
     levels = parts.bit_length() - 1
     if parts != 1 << levels:
         raise ValueError(f"{parts} parts, expected a power of two")
@@ -100,8 +109,10 @@ def sizes_of_box(parts: int, nodes: float) -> TreeSizes:
     tree = _balanced_tree(levels)
     level = np.array(tree.levels())
     volume = np.array([np.prod(side) for side in sides])
-    surface = volume - np.array([np.prod(np.maximum(side - 2.0, 0.0)) for side in sides])
-    shell = np.array([np.prod(side + 1.0) - np.prod(side - 1.0) for side in sides])
+    inner = [np.maximum(side - 2.0 * layers.mean(), 0.0) for side in sides]
+    surface = volume - np.array([np.prod(side) for side in inner])
+    ends = [(side / order - 1.0, side / order + 1.0) for side in sides]
+    shell = np.array([np.prod(more) - np.prod(np.maximum(less, 0.0)) for less, more in ends])
     surface[-1] = shell[-1] = 0.0
     area = np.array(areas)[level[parts:] - 1] if levels else np.empty(0)
     return TreeSizes(
@@ -110,12 +121,18 @@ def sizes_of_box(parts: int, nodes: float) -> TreeSizes:
         surface[level],
         shell[level],
         0.5 * surface[level[parts:]],
-        area,
-        area,
-        _NEIGHBOURS_WITHIN * area,
-        _NEIGHBOURS_WITHIN * area,
-        _NEIGHBOURS_ACROSS * area,
+        layers.mean() * area,
+        layers.mean() * area,
+        within * area,
+        within * area,
+        across * area,
+        _element_bytes(elements),
     )
+
+
+def _element_bytes(elements: Elements) -> float:
+    of_nodes = 8 * elements.node_places.shape[1]
+    return float(of_nodes + sum(values[:1].nbytes for values in elements.arrays()))
 
 
 def _balanced_tree(levels: int) -> MergeTree:
