@@ -24,7 +24,7 @@ from carillon.progress import say
 from carillon.runtime import allowed_cores
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.coarsening.forest import load_forest
-from solver.response.contact import surface_node
+from solver.response.surface import surface_of
 from workflow import settings
 from workflow.room import make_folder
 from workflow.settings import BUILTIN, DEFAULT_FORESTS
@@ -161,7 +161,7 @@ def _checked_size(arguments: argparse.Namespace) -> str:
     for name in ("strike", "observed"):
         point = getattr(arguments, name)
         if point is not None:
-            surface_node(solid.fine, arguments.unit * np.array(point), name)
+            surface_of(solid.model).nearest(arguments.unit * np.array(point), name)
     return f"{solid.fine.n_cells:,} voxels, {solid.fine.n_dofs:,} unknowns"
 
 
