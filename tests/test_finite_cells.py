@@ -147,10 +147,18 @@ def test_stiffness_is_linear_in_the_moduli_of_the_voxels():
 def test_two_plates_in_one_cell_are_apart():
     """A gap of a quarter of the spacing: copies of the cells, and two pieces."""
     plates = trimesh.util.concatenate([box(0.2, 0.2, 0.02), box(0.2, 0.2, 0.02, at=(0, 0, 0.0245))])
-    with pytest.raises(UserError, match="is in 2 pieces .* --components largest"):
+    with pytest.raises(UserError, match="is in 2 pieces .* join them, or pass --components"):
         finite_cells(plates, 16)
     cells = finite_cells(plates, 16, "largest")
     assert cells.volume == pytest.approx(0.2 * 0.2 * 0.02, rel=1e-9)
+
+
+def test_pieces_that_a_finer_lattice_joins_are_told_the_resolution():
+    blocks = [box(0.1, 0.1, 0.1, at=(side * 0.1, 0.0, 0.0)) for side in (-1, 1)]
+    joined = turned(trimesh.util.concatenate([*blocks, box(0.12, 1e-3, 1e-3)]))
+    with pytest.raises(UserError, match="2 pieces .* raise --resolution to 30, where it is one"):
+        finite_cells(joined, 10)
+    assert len(finite_cells(joined, 30)) > 52
 
 
 def test_prongs_of_a_fork_are_copies_of_cells():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -29,9 +30,11 @@ SMALLEST_PIECE = 0.5
 LOST = 1.1
 """Ratio of the volumes by two halves of the lines beyond which parts slip between the lines."""
 TRIAL_FACTORS = (1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
-"""Factors by which a resolution is raised in search of one at which nothing is lost."""
+"""Factors by which a resolution is raised in search of one at which nothing is lost, or the solid
+is in one piece."""
 TRIAL_GRID = 4_000_000
-"""Largest grid [voxels] of such a trial."""
+PIECES_GRID = 200_000
+"""Largest grids [voxels] of such trials."""
 
 
 def finite_cells(
@@ -79,11 +82,7 @@ def finite_cells(
     if not len(kept):
         raise UserError(_lost(surface, inside, resolution, grid, name))
     if len(kept) > 1 and components == "error":
-        listed = ", ".join(f"{volume:,.0f}" for volume in sorted(volumes[kept])[:-5:-1])
-        raise UserError(
-            f"mesh {name!r} at resolution {resolution} is in {len(kept):,} pieces ({listed} voxels "
-            f"the largest); join them or pass --components largest to keep the largest"
-        )
+        raise UserError(_in_pieces(surface, volumes[kept], resolution, name))
     return parts.mesh(piece == volumes.argmax(), grid)
 
 
@@ -105,22 +104,49 @@ def _holds(inside: Inside) -> bool:
 
 def _lost(surface: trimesh.Trimesh, inside: Inside, resolution: int, grid: Grid, name: str) -> str:
     start = f"mesh {name!r} at resolution {resolution}"
-    for factor in TRIAL_FACTORS:
-        better = int(np.ceil(factor * resolution))
-        trial = even_grid(surface, better)
-        if np.prod([float(size) for size in trial.shape]) > TRIAL_GRID:
-            break
-        if _holds(find_inside(surface, trial)):
-            return (
-                f"{start} has parts far thinner than the lattice spacing of {grid.edge:.3g} m, "
-                f"which are lost between its lines; raise --resolution to {better}"
-            )
+    better = _better_resolution(surface, resolution, _holds, TRIAL_GRID)
+    if better:
+        return (
+            f"{start} has parts far thinner than the lattice spacing of {grid.edge:.3g} m, "
+            f"which are lost between its lines; raise --resolution to {better}"
+        )
     if any(len(each.low) for each in inside.pieces):
         return (
             f"{start} has parts far thinner than the lattice spacing of {grid.edge:.3g} m, which "
             "are lost between its lines; raise --resolution or make them thicker"
         )
     return f"{start} encloses nothing; expected a surface around a solid, repair the mesh"
+
+
+def _in_pieces(surface: trimesh.Trimesh, volumes: np.ndarray, resolution: int, name: str) -> str:
+    listed = ", ".join(f"{volume:,.0f}" for volume in sorted(volumes)[:-5:-1])
+    # A piece for each closed shell: these are apart, and no lattice joins them.
+    apart = 1 < surface.body_count <= len(volumes)
+    better = None if apart else _better_resolution(surface, resolution, _is_one_piece, PIECES_GRID)
+    remedy = f"raise --resolution to {better}, where it is one" if better else "join them"
+    return (
+        f"mesh {name!r} at resolution {resolution} is in {len(volumes):,} pieces ({listed} voxels "
+        f"the largest); {remedy}, or pass --components largest to keep the largest"
+    )
+
+
+def _is_one_piece(inside: Inside) -> bool:
+    volumes = _Parts.of_inside(inside).pieces()[1]
+    return _holds(inside) and np.count_nonzero(volumes >= SMALLEST_PIECE) == 1
+
+
+def _better_resolution(
+    surface: trimesh.Trimesh, resolution: int, accepts: Callable[[Inside], bool], largest: int
+) -> int | None:
+    """A higher resolution that `accepts` what is inside, on a grid of at most `largest` voxels."""
+    for factor in TRIAL_FACTORS:
+        better = int(np.ceil(factor * resolution))
+        trial = even_grid(surface, better)
+        if np.prod([float(size) for size in trial.shape]) > largest:
+            return None
+        if accepts(find_inside(surface, trial)):
+            return better
+    return None
 
 
 @dataclass(frozen=True)
