@@ -86,11 +86,11 @@ class ValidateOptions:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     parser.description = (
-        "Compute the modes of one solid four ways, prove and compare them, and build a page that "
-        "says how far they can be trusted. The same command goes on where it was stopped. Exit "
-        f"status 0 if all criteria are met, {FAILED} if one is missed."
+        "Compute the modes of one solid in several ways, prove and compare them, and build a page "
+        "that says how far they can be trusted. The same command goes on where it was stopped. "
+        f"Exit status 0 if all criteria are met, {FAILED} if one is missed."
     )
-    own = ("coarsen", "forest", "objective", "lumped", "discretisation")
+    own = ("coarsen", "forest", "objective", "lumped")
     add_options(parser, ProblemOptions, leave_out=own, positional=("mesh",))
     add_options(parser, ValidateOptions)
 
@@ -126,7 +126,10 @@ def run(arguments: argparse.Namespace) -> int:
 def configuration(arguments: argparse.Namespace) -> dict[str, Any]:
     """Configuration of a run with this one solid; what it leaves out takes the defaults."""
     given = vars(arguments)
-    keys = ("resolution", "unit", "fill", "components", "density", "modes", "seed")
+    keys = (
+        *("resolution", "discretisation", "unit", "fill", "components", "density", "modes"),
+        "seed",
+    )
     named = arguments.material in MATERIALS
     title = arguments.name or surface_name(arguments.mesh)
     model = {

@@ -26,6 +26,8 @@ class TreeSizes:
     ----------
     tree
         The merge tree.
+    element_bytes
+        Bytes of a cell under way: its nodes, and what its matrices are made from.
     nodes, boundary, crossing
         (groups,) nodes of each group, those that share a cell with a node outside, and the cells
         in which they do.
@@ -35,11 +37,10 @@ class TreeSizes:
         (merges,) nodes of either group in cells that touch both.
     pairs_left, pairs_right, pairs_across
         (merges,) pairs of nodes that these cells couple.
-    element_bytes
-        Bytes of a cell under way: its nodes, and what its matrices are made from.
     """
 
     tree: MergeTree
+    element_bytes: float
     nodes: Counts
     boundary: Counts
     crossing: Counts
@@ -49,7 +50,6 @@ class TreeSizes:
     pairs_left: Counts
     pairs_right: Counts
     pairs_across: Counts
-    element_bytes: float
 
 
 def sizes_of_solid(
@@ -72,12 +72,12 @@ def sizes_of_solid(
     columns = np.array(merges, dtype=float).reshape(-1, 5).T
     return TreeSizes(
         decomposition.tree,
+        _element_bytes(model.elements),
         np.array([stop - start for start, stop in ranges], dtype=float),
         np.array([len(rows) for rows, _ in groups], dtype=float),
         np.array([cells for _, cells in groups], dtype=float),
         np.array(boundary_left),
         *columns,
-        _element_bytes(model.elements),
     )
 
 
@@ -117,6 +117,7 @@ def sizes_of_box(parts: int, nodes: float, elements: Elements) -> TreeSizes:
     area = np.array(areas)[level[parts:] - 1] if levels else np.empty(0)
     return TreeSizes(
         tree,
+        _element_bytes(elements),
         volume[level],
         surface[level],
         shell[level],
@@ -126,7 +127,6 @@ def sizes_of_box(parts: int, nodes: float, elements: Elements) -> TreeSizes:
         within * area,
         within * area,
         across * area,
-        _element_bytes(elements),
     )
 
 
