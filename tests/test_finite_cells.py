@@ -188,14 +188,19 @@ def test_voxels_carry_the_material():
     assert values[0] < 1e-9
 
 
+SHEET = trimesh.Trimesh([[0, 0, 0], [1, 0, 0.2], [0, 1, 0.7]], [[0, 1, 2]])
+
+
 @pytest.mark.parametrize(
     ("surface", "resolution", "sentence"),
     [
         (turned(box(0.24, 5e-4, 5e-4)), 16, "parts far thinner than the lattice.*--resolution to"),
+        (box(2e4, 0.15, 0.1), 8, "parts far thinner than the lattice|encloses nothing"),
+        (SHEET, 8, "encloses nothing; expected a surface around a solid"),
         (box(0.2, 0.1, 0.1), 1, "expected a whole number of at least 2"),
         (box(0.2, 0.1, 0.1), 4000, "use a resolution of about"),
     ],
-    ids=["needle", "resolution 1", "too many"],
+    ids=["needle", "needle of two kilometres", "sheet", "resolution 1", "too many"],
 )
 def test_what_is_refused(surface, resolution, sentence):
     with pytest.raises(UserError, match=sentence):

@@ -96,6 +96,8 @@ def even_grid(surface: trimesh.Trimesh, resolution: int) -> Grid:
 
 
 def _holds(inside: Inside) -> bool:
+    if inside.sheet:
+        return False
     if not (inside.state == CUT).any():
         return bool((inside.state == FULL).any())
     volumes = inside.volumes()
@@ -104,6 +106,9 @@ def _holds(inside: Inside) -> bool:
 
 def _lost(surface: trimesh.Trimesh, inside: Inside, resolution: int, grid: Grid, name: str) -> str:
     start = f"mesh {name!r} at resolution {resolution}"
+    nothing = f"{start} encloses nothing; expected a surface around a solid, repair the mesh"
+    if inside.sheet:
+        return nothing
     better = _better_resolution(surface, resolution, _holds, TRIAL_GRID)
     if better:
         return (
@@ -115,7 +120,7 @@ def _lost(surface: trimesh.Trimesh, inside: Inside, resolution: int, grid: Grid,
             f"{start} has parts far thinner than the lattice spacing of {grid.edge:.3g} m, which "
             "are lost between its lines; raise --resolution or make them thicker"
         )
-    return f"{start} encloses nothing; expected a surface around a solid, repair the mesh"
+    return nothing
 
 
 def _in_pieces(surface: trimesh.Trimesh, volumes: np.ndarray, resolution: int, name: str) -> str:
