@@ -147,10 +147,18 @@ def test_stiffness_is_linear_in_the_moduli_of_the_voxels():
 def test_two_plates_in_one_cell_are_apart():
     """A gap of a quarter of the spacing: copies of the cells, and two pieces."""
     plates = trimesh.util.concatenate([box(0.2, 0.2, 0.02), box(0.2, 0.2, 0.02, at=(0, 0, 0.0245))])
-    with pytest.raises(UserError, match="is in 2 pieces .* --components largest"):
+    with pytest.raises(UserError, match="is in 2 pieces .* join them, or pass --components"):
         finite_cells(plates, 16)
     cells = finite_cells(plates, 16, "largest")
     assert cells.volume == pytest.approx(0.2 * 0.2 * 0.02, rel=1e-9)
+
+
+def test_pieces_that_a_finer_lattice_joins_are_told_the_resolution():
+    blocks = [box(0.1, 0.1, 0.1, at=(side * 0.1, 0.0, 0.0)) for side in (-1, 1)]
+    joined = turned(trimesh.util.concatenate([*blocks, box(0.12, 1e-3, 1e-3)]))
+    with pytest.raises(UserError, match="2 pieces .* raise --resolution to 30, where it is one"):
+        finite_cells(joined, 10)
+    assert len(finite_cells(joined, 30)) > 52
 
 
 def test_prongs_of_a_fork_are_copies_of_cells():
@@ -180,14 +188,19 @@ def test_voxels_carry_the_material():
     assert values[0] < 1e-9
 
 
+SHEET = trimesh.Trimesh([[0, 0, 0], [1, 0, 0.2], [0, 1, 0.7]], [[0, 1, 2]])
+
+
 @pytest.mark.parametrize(
     ("surface", "resolution", "sentence"),
     [
         (turned(box(0.24, 5e-4, 5e-4)), 16, "parts far thinner than the lattice.*--resolution to"),
+        (box(2e4, 0.15, 0.1), 8, "parts far thinner than the lattice|encloses nothing"),
+        (SHEET, 8, "encloses nothing; expected a surface around a solid"),
         (box(0.2, 0.1, 0.1), 1, "expected a whole number of at least 2"),
         (box(0.2, 0.1, 0.1), 4000, "use a resolution of about"),
     ],
-    ids=["needle", "resolution 1", "too many"],
+    ids=["needle", "needle of two kilometres", "sheet", "resolution 1", "too many"],
 )
 def test_what_is_refused(surface, resolution, sentence):
     with pytest.raises(UserError, match=sentence):

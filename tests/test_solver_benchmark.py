@@ -105,6 +105,17 @@ def test_people_read_every_timed_method(row):
     assert f"frequencies 7 to {MODES}" in text.replace("of modes ", "")
 
 
+def test_finite_cells_have_no_coarse_models(caplog):
+    cells = ProblemOptions("builtin:bar", 12, discretisation="finite-cell")
+    options = BenchmarkOptions(12, runs=1, arpack_regular=True)
+    found = benchmark_row(cells, options)
+    assert set(found["runs"]) == {"arpack", "slepc", "hcms", "hcms_ec"}
+    assert max(found["eigenvalue_error"][name]["max"] for name in ("arpack", "hcms_ec")) < 1e-5
+    assert found["dof_coarse"] is None and found["frequency_error"] == {}
+    assert row_lines(found)[0] == f"{found['dof_fine']:,} unknowns, 12 modes"
+    assert caplog.messages == [found["without_forest"]]
+
+
 def test_methods_alternate():
     order = []
 

@@ -16,9 +16,10 @@ from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.coarsening.choice import make_coarsening
 from solver.coarsening.model import build_model
-from solver.studies.coarsening.matching import ERROR, LOCAL, SWAP, match_modes, verdict
+from solver.studies.coarsening.matching import ERROR, LOCAL, SWAP, verdict
 from solver.studies.coarsening.pictures import ModePicture, read_pictures, write_pictures
 from solver.studies.coarsening.rating import CoarseRating, SolvedModel
+from solver.studies.matching import match_modes
 from tests import solids
 
 LAST, FOUND = 24, 30

@@ -13,6 +13,8 @@ from carillon.errors import UserError
 from carillon.fem.geometry import blocks_from_mesh, hexmesh_from_grid, prolongation
 from carillon.fem.model import RIGID_MODES, ElasticModel, fine_model
 from solver.__main__ import main
+from solver.analysis.modal_solver import modal_analysis
+from solver.analysis.options import SolverOptions
 from solver.assembly.sparse import assembled
 from solver.coarsening.model import coarse_model
 from solver.files.modes_file import ModesFile, frequencies, read_modes, write_modes
@@ -21,7 +23,6 @@ from solver.response.contact import (
     choose_contacts,
     embedding,
     interpolation,
-    surface_normals,
 )
 from solver.response.response import (
     SAMPLE_RATE_HERTZ,
@@ -37,7 +38,9 @@ from solver.response.response import (
     spectrogram,
 )
 from solver.response.response_file import StrikeOptions, read_response, respond, write_response
+from solver.response.surface import surface_normals, surface_of
 from solver.studies.audit import audit
+from tests import cut_solids
 from tests.edited_files import edited
 from tests.solids import box_mesh, random_box
 
@@ -195,6 +198,44 @@ def test_points_are_far_apart_and_a_person_may_choose_others(bar, contacts):
     np.testing.assert_allclose(again[1].position, [0.0, 0.0, 0.01], atol=1e-12)
     with pytest.raises(UserError, match=r"strike: the point \(1, 0, 0\) m is .* from the surface"):
         choose_contacts(bar, strike=[1.0, 0.0, 0.0])
+
+
+@pytest.fixture(scope="module")
+def tilted():
+    """A box that stands askew in its lattice, and modes of its finite cells."""
+    surface = cut_solids.turned(cut_solids.box(0.2, 0.12, 0.03))
+    model = cut_solids.uniform(cut_solids.spaced(surface, 0.02))
+    found = modal_analysis(model, SolverOptions(modes=12, method="slepc"))
+    values, block = found.values, found.system.gather(found.vectors)
+    hertz = frequencies(values)
+    return surface, ModesFile(values, hertz, block, found.residuals, model, {}, {})
+
+
+def test_finite_cells_are_struck_on_the_surface_itself(tilted):
+    surface, file = tilted
+    contacts = choose_contacts(file)
+    points = np.array([contact.position for contact in contacts])
+    nearest, distance, faces = surface.nearest.on_surface(points)
+    assert distance.max() < 0.15 * file.mesh.edge
+    inward = np.array([contact.inward for contact in contacts])
+    assert min(np.einsum("pi,pi->p", inward, -surface.face_normals[faces])) > 0.5
+    all_of_it = surface_of(file.model).points
+    assert np.quantile(surface.nearest.on_surface(all_of_it)[1], 0.95) < 0.2 * file.mesh.edge
+
+
+def test_a_place_outside_finite_cells_is_taken_to_the_nearest_inside(tilted, caplog):
+    surface, file = tilted
+    face = int(np.argmax(surface.area_faces))
+    middle, normal = surface.triangles_center[face], surface.face_normals[face]
+    here = choose_contacts(file, strike=middle)[0]
+    np.testing.assert_array_equal(here.position, middle)
+    assert caplog.messages == []
+    outside = choose_contacts(file, strike=middle + 0.02 * normal)[0]
+    assert np.linalg.norm(outside.position - middle) < 0.2 * file.mesh.edge
+    (said,) = caplog.messages
+    assert "strike: the point" in said and "m outside the solid" in said
+    with pytest.raises(UserError, match="from the surface of the solid"):
+        choose_contacts(file, strike=middle + 0.1 * normal)
 
 
 def one_mode(hertz: float) -> Contacts:

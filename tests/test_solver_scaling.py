@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from carillon.errors import UserError
-from carillon.fem.geometry import hexmesh_from_voxels, load_surface, voxelize
+from carillon.fem.finite_cells.build import finite_cells
+from carillon.fem.geometry import builtin_surface, hexmesh_from_voxels, load_surface, voxelize
 from carillon.fem.model import fine_model
 from solver.distribution.decomposition import decompose
 from solver.hcms.counts import Tally
@@ -25,9 +26,11 @@ from solver.studies.scaling.model import (
 )
 from solver.studies.scaling.plan import planned_counts
 from solver.studies.scaling.plot import save_plot
-from solver.studies.scaling.sizes import sizes_of_box, sizes_of_mesh
+from solver.studies.scaling.sizes import sizes_of_box, sizes_of_solid
 from solver.studies.scaling.study import PREDICTED, study_lines
 from solver.studies.scaling.work import elimination
+from tests.cut_solids import uniform
+from tests.solids import random_box
 
 BAR = ("builtin:bar", "--resolution", 24, "--material", "smooth")
 COUNT = """
@@ -37,22 +40,24 @@ from solver.distribution.local_mesh import distribute
 from solver.hcms.synthesis import synthesize
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.studies.scaling.plan import planned_counts
-from solver.studies.scaling.sizes import sizes_of_mesh
+from solver.studies.scaling.sizes import sizes_of_solid
 from solver.distribution.decomposition import decompose
 
 comm, keep = MPI.COMM_WORLD, 60
-model = build_problem(ProblemOptions("builtin:bar", 24, "smooth")).model
-local_mesh = distribute(model, 6, 0, comm)
-found = synthesize(local_mesh, keep, "free", comm).counts.per_rank(comm)
-if comm.rank == 0:
-    decomposition, order = decompose(model, 6, 0, comm.size)
-    sizes = sizes_of_mesh(model.mesh, decomposition, order)
-    planned = [each.phases() for each in planned_counts(sizes, decomposition.owner, keep)]
-    assert list(planned[0]) == list(found)
-    for phase in found:
-        for name in ("messages", "bytes", "flops"):
-            values = [float(getattr(each[phase], name)) for each in planned]
-            print(json.dumps([phase, name, values, found[phase][name].tolist()]))
+for discretisation in ("voxel", "finite-cell"):
+    options = ProblemOptions("builtin:bar", 24, "smooth", discretisation=discretisation)
+    model = build_problem(options).model
+    local_mesh = distribute(model, 6, 0, comm)
+    found = synthesize(local_mesh, keep, "free", comm).counts.per_rank(comm)
+    if comm.rank == 0:
+        decomposition, order = decompose(model, 6, 0, comm.size)
+        sizes = sizes_of_solid(model, decomposition, order)
+        planned = [each.phases() for each in planned_counts(sizes, decomposition.owner, keep)]
+        assert list(planned[0]) == list(found)
+        for phase in found:
+            for name in ("messages", "bytes", "flops"):
+                values = [float(getattr(each[phase], name)) for each in planned]
+                print(json.dumps([phase, name, values, found[phase][name].tolist()]))
 """
 
 
@@ -74,20 +79,25 @@ def test_planned_counts_are_those_of_a_run(ranks, tmp_path, mpiexec):
 
 
 def test_a_box_of_cubes_is_as_large_as_it_should_be():
-    sizes = sizes_of_box(8, 1000.0)
+    elements = random_box(1, 1, 1).elements
+    sizes = sizes_of_box(8, 1000.0, elements)
     assert sizes.nodes[:8] == pytest.approx(1000.0) and sizes.nodes[-1] == pytest.approx(8000.0)
     assert sizes.boundary[0] == pytest.approx(10**3 - 8**3) and sizes.boundary[-1] == 0.0
     # Cubes meet in a face, pairs of them in two, fours of them in four.
     assert sizes.rows_left == pytest.approx([100.0] * 4 + [200.0] * 2 + [400.0])
+    # Where quadratic cells meet, one or two of their layers belong to a group.
+    quadratic = sizes_of_box(8, 1000.0, uniform(finite_cells(builtin_surface("box"), 4)).elements)
+    assert quadratic.rows_left == pytest.approx(1.5 * sizes.rows_left)
+    assert quadratic.pairs_across == pytest.approx(2.0 * 16.0 / 9.0 * sizes.pairs_across)
     with pytest.raises(ValueError, match="power of two"):
-        sizes_of_box(6, 1000.0)
+        sizes_of_box(6, 1000.0, elements)
 
 
 def test_more_ranks_have_less_to_do_each_and_more_to_say():
     mesh = bar()
-    decomposition, order = decompose(fine_model(mesh, np.ones(mesh.n_cells)), 8, 0, 1)
-    sizes = sizes_of_mesh(mesh, decomposition, order)
-    work = elimination(mesh)
+    model = fine_model(mesh, np.ones(mesh.n_cells))
+    sizes = sizes_of_solid(model, *decompose(model, 8, 0, 1))
+    work = elimination(model)
     correction = CorrectionWork(blocks=2, solves=100, width=70)
     alone, many = (work_of_busiest(sizes, work, 60, correction, ranks) for ranks in (1, 8))
     for phase in ("local", "basis", "factor", "solve"):

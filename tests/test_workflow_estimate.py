@@ -240,6 +240,8 @@ def test_an_absent_mesh_is_guessed_and_a_built_in_one_counted():
     assert "guessed" in size_of(NamedSolid("nowhere.obj", 32)).basis
     box = size_of(NamedSolid("builtin:box", 8))
     assert box.fine == 3 * 9 * 7 * 5 and box.coarse == 3 * 5 * 4 * 3 and "counted" in box.basis
+    cells = size_of(NamedSolid("builtin:box", 8, discretisation="finite-cell"))
+    assert cells.fine == box.fine and cells.basis == "counted on its finite cells"
 
 
 def test_absent_meshes_are_planned_and_named(configs):

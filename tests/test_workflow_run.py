@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import subprocess
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +20,13 @@ from workflow.studies.base.conditions import LABELS
 from workflow.studies.base.numbers import MISSING
 from workflow.studies.base.table import read_table
 from workflow.studies.catalogue import REPORT
-from workflow.variants import CANDIDATES, SHOWN, VARIANTS
+from workflow.variants import candidates_of, shown_of, variants_of
 
 pytestmark = pytest.mark.slow
 
 MODELS = list(yaml.safe_load(TINY.read_text())["models"])
+DISCRETISED = {MODELS[0]: "voxel", MODELS[1]: "finite-cell"}
+"""How the models are divided in this run."""
 NOT_SHOWN = ("phases", "frequencies", "scaling")
 """Tables that are not on the page, or not all of them; the smallest run measures no scaling."""
 APART = ("provenance", "training", "scaling")
@@ -36,6 +39,11 @@ TITLE = "<script>alert(1)</script> $\\frac$ & |"
 """Of a model and of the report."""
 
 
+def of_model(names: Callable[[Any], Iterable[str]], model: str) -> list[str]:
+    """Variants of a model that `names` tells."""
+    return list(names({"discretisation": DISCRETISED[model]}))
+
+
 def run_tiny(folder: Path, *more: str) -> subprocess.CompletedProcess[str]:
     options = ["--profile", PROFILE, "--configfile", TINY, "names.yaml"]
     return snakemake(folder, *options, *more)
@@ -45,7 +53,9 @@ def run_tiny(folder: Path, *more: str) -> subprocess.CompletedProcess[str]:
 def finished(tmp_path_factory):
     """Folder in which the tiny run has finished."""
     folder = tmp_path_factory.mktemp("tiny")
-    names = {"results_dir": NAME, "title": TITLE, "models": {MODELS[0]: {"title": TITLE}}}
+    models = {name: {"discretisation": kind} for name, kind in DISCRETISED.items()}
+    models[MODELS[0]]["title"] = TITLE
+    names = {"results_dir": NAME, "title": TITLE, "models": models, "times": {"models": MODELS}}
     (folder / "names.yaml").write_text(yaml.safe_dump(names))
     done = run_tiny(folder)
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-6000:]
@@ -119,10 +129,11 @@ def test_page_needs_nothing_from_elsewhere(page):
 def test_page_shows_every_model_with_its_pictures(page, results):
     for model in MODELS:
         assert f"model-{model}" in page.ids
-        for variant in SHOWN:
+        for variant in of_model(shown_of, model):
             assert (results / "figures" / f"{model}-mode-{variant}.png").stat().st_size > 1000
         assert (results / "figures" / f"{model}-overview.png").is_file()
-    assert page.source.count("data:image/png;base64,") == len(MODELS) * len(SHOWN)
+    drawn = sum(len(of_model(shown_of, model)) for model in MODELS)
+    assert page.source.count("data:image/png;base64,") == drawn
 
 
 @pytest.mark.parametrize("name", [name for name in REPORT.entries if name not in NOT_SHOWN])
@@ -132,14 +143,14 @@ def test_page_and_files_hold_the_same_numbers(page, results, name):
 
 def test_frequencies_on_the_page_are_those_of_the_table(page, results):
     table = read_table(results / "tables" / "frequencies.json")
-    known = {(row["truth"], row["ddfem_hcms_ec"]): row for row in table.rows}
+    known = {row["truth"]: row for row in table.rows}
+    keys = [column.key for column in table.shown if column.key != "model"]
     shown = [row for row in page.tables["frequencies"] if row]
     assert len(shown) >= 12 * len(MODELS)
     for cells in shown:
         values = [float(value) for _, value in cells]
-        row = known[values[1], values[6]]
-        assert values[0] == row["mode"]
-        assert values[7] == row["ddfem_hcms_ec_error"]
+        row = known[values[1]]
+        assert values == [row[key] for key in keys if key in row]
 
 
 def test_spectra_satisfy_what_the_page_claims(results):
@@ -148,7 +159,10 @@ def test_spectra_satisfy_what_the_page_claims(results):
     for row in summary:
         # The tolerance of 1e-7 is on the solver's own estimate of the error.
         assert row["hcms_ec_error"] < 1e-6 < row["hcms_error"]
-        assert row["coarse_unknowns"] < row["unknowns"]
+        if DISCRETISED[row["model"]] == "voxel":
+            assert row["coarse_unknowns"] < row["unknowns"]
+        else:
+            assert "coarse_unknowns" not in row and "ddfem_error" not in row
     for row in read_table(results / "tables" / "evidence.json").rows:
         assert row["rigid_modes"] == 6
         assert row["orthogonality"] < 1e-8
@@ -160,7 +174,8 @@ def test_spectra_satisfy_what_the_page_claims(results):
 def test_every_result_tells_its_origin(results):
     rows = read_table(results / "tables" / "provenance.json").rows
     files = {row["file"] for row in rows}
-    assert {f"models/{model}/{name}.h5" for model in MODELS for name in VARIANTS} <= files
+    for model in MODELS:
+        assert {f"models/{model}/{name}.h5" for name in of_model(variants_of, model)} <= files
     assert "forests/forests.h5" in files
     for row in rows:
         assert row["command"] and row["commit"] and row["config_hash"] and row["versions"]
@@ -186,5 +201,15 @@ def test_every_benchmark_table_tells_its_conditions(page, results, name):
 
 def test_timed_rules_leave_benchmarks(results):
     for model in MODELS:
-        for variant in CANDIDATES:
+        for variant in of_model(candidates_of, model):
             assert (results / "benchmarks" / "models" / model / f"{variant}.tsv").is_file()
+
+
+def test_finite_cells_are_validated_and_timed_without_coarse_models(results):
+    cells = MODELS[1]
+    rows = read_table(results / "validation" / "tables" / f"{cells}-criteria.json").rows
+    assert {row["group"] for row in rows} == {"truth", "hcms_ec"}
+    assert {row["verdict"] for row in rows} == {"met"}
+    methods = {row["model"]: row for row in read_table(results / "tables" / "methods.json").rows}
+    assert methods[cells]["hcms_ec"] > 0.0 and methods[cells].get("dof_coarse") is None
+    assert methods[cells].get("ddfem") is None and methods[MODELS[0]]["ddfem"] > 0.0

@@ -23,7 +23,7 @@ from workflow.__main__ import main
 from workflow.studies.base.table import read_table
 from workflow.studies.catalogue import VALIDATION
 from workflow.studies.validation.criteria import Criterion
-from workflow.studies.validation.evidence import COMPARED, Evidence
+from workflow.studies.validation.evidence import Evidence
 from workflow.studies.validation.page import page as rendered
 from workflow.variants import SHOWN
 
@@ -129,7 +129,7 @@ def test_a_mode_that_is_missing_fails_in_words(run, tmp_path):
     (folder / "hcms_ec.comparison.json").write_text(json.dumps(compared))
     audits = {name: asdict(audit) for name, audit in audit_files(paths.values()).items()}
     (folder / "audit.json").write_text(json.dumps({"spectra": audits, "provenance": {}}))
-    candidates = {variant: paths[variant] for variant in COMPARED}
+    candidates = {variant: paths[variant] for variant in SHOWN[1:]}
     write_response(folder / "response.h5", respond(paths["truth"], candidates, StrikeOptions()), {})
     evidence = Evidence(tmp_path / "spoiled", "block")
     tables = {name: make(evidence) for name, make in VALIDATION.entries.items()}

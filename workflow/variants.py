@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -57,3 +59,19 @@ COARSENED = {
     "ddfem_hcms_ec": "DDFEM*",
 }
 """Variants that differ in nothing but the coarsening."""
+
+
+def variants_of(model: Mapping[str, Any]) -> dict[str, Variant]:
+    """Variants of a model, from its part of the configuration: finite cells are not coarsened."""
+    fine = model["discretisation"] != "voxel"
+    return {name: each for name, each in VARIANTS.items() if not fine or each.coarsen == "none"}
+
+
+def candidates_of(model: Mapping[str, Any]) -> tuple[str, ...]:
+    """Those of them that are compared with the truth."""
+    return tuple(name for name in CANDIDATES if name in variants_of(model))
+
+
+def shown_of(model: Mapping[str, Any]) -> tuple[str, ...]:
+    """Those of them that are drawn and listed."""
+    return tuple(name for name in SHOWN if name in variants_of(model))

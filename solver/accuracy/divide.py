@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.finite_cells.build import Covering
+from carillon.fem.finite_cells.covering import Covering
 from carillon.fem.finite_cells.model import FiniteCellModel
 from solver.accuracy.estimate import CellErrors, estimate_cell_errors
 from solver.refinement.refine import RefinementStep

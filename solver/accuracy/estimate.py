@@ -21,8 +21,8 @@ from solver.refinement.errors import LAST, ExpectedErrors
 
 Array = NDArray[np.float64]
 
-SLOWEST, FASTEST = 1.5, 16.0
-"""Bounds of the factor by which halved cells diminish an error: the latter is that of quadratic
+SLOWEST, FASTEST = 2.0, 16.0
+"""Bounds of the factor by which halved cells diminish an error: that of cracks, and of smooth
 displacements."""
 
 

@@ -28,7 +28,7 @@ from solver.coarsening.model import build_model
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
     import trimesh
 
-    from carillon.fem.finite_cells.build import Covering
+    from carillon.fem.finite_cells.covering import Covering
 
 Array = NDArray[np.float64]
 

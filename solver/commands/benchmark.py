@@ -14,12 +14,13 @@ from solver.studies.benchmark import BenchmarkOptions, benchmark_row, row_lines
 EXAMPLES = """examples:
   benchmark builtin:bell --resolution 24
   benchmark bunny.obj --resolution 32 --no-arpack --tune --out row.json
+  benchmark builtin:bell --resolution 16 --discretisation finite-cell
 """
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    add_solid(parser, "coarsen", "objective", "discretisation")
+    add_solid(parser, "coarsen", "objective")
     add_options(parser, BenchmarkOptions)
     parser.add_argument("--out", help="also write the row to this JSON file")
     parser.add_argument("--json", action="store_true", help="print JSON")

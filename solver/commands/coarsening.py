@@ -15,7 +15,7 @@ from carillon.options import collect
 from solver.analysis.problem import ProblemOptions
 from solver.coarsening.choice import METHODS
 from solver.coarsening.forest import FOREST
-from solver.commands.running import add_solid, on_ranks, parameters, require_outputs, write_json
+from solver.commands.running import add_voxels, on_ranks, parameters, require_outputs, write_json
 from solver.refinement.errors import LAST
 from solver.refinement.options import ALLOWED_ERROR
 from solver.studies.coarsening.case import PICTURES, rate_coarsening
@@ -32,7 +32,7 @@ SHOWN = ("by_index", "recognised", "expected")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    add_solid(parser, "coarsen", "discretisation")
+    add_voxels(parser)
     parser.add_argument(
         "--coarsen",
         choices=[name for name in METHODS if name != "none"],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from typing import Any
 
 from carillon.provenance import record
 from solver.commands.running import on_ranks, parameters
@@ -46,5 +47,16 @@ def run(arguments: argparse.Namespace) -> None:
         f"frequency error, 7..60    rms {comparison['frequency_rms_relative_error_7_60']:.2e}, "
         f"max {comparison['frequency_max_relative_error_7_60']:.2e}"
     )
+    if "matched" in comparison:
+        print(f"modes matched by shape    {_matched(comparison['matched'])}")
     print(f"largest subspace angle    {comparison['subspace_angle_max']:.2e} rad")
     print(f"largest residual          {comparison['residual_max']:.2e}")
+
+
+def _matched(errors: dict[str, Any]) -> str:
+    if not errors["modes"]:
+        return "none"
+    return (
+        f"{errors['modes']}, {errors['moved']} of them under another number; frequency error, "
+        f"rms {errors['rms']:.2e}, worst {errors['worst']:+.2e} (mode {errors['worst_mode']})"
+    )

@@ -12,7 +12,7 @@ from carillon.provenance import record
 from dataset_gen.objectives import OBJECTIVES, require_objective
 from solver.analysis.options import number_of_modes
 from solver.analysis.problem import ProblemOptions
-from solver.commands.running import add_solid, on_ranks, parameters, require_outputs, write_json
+from solver.commands.running import add_voxels, on_ranks, parameters, require_outputs, write_json
 from solver.studies.objectives import rate_objectives
 
 EXAMPLES = """example:
@@ -22,7 +22,7 @@ EXAMPLES = """example:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    add_solid(parser, "coarsen", "objective", "discretisation")
+    add_voxels(parser, "objective")
     parser.add_argument(
         "--modes", type=number_of_modes, default=256, help="rigid included (default 256)"
     )

@@ -51,6 +51,11 @@ def add_solid(parser: argparse.ArgumentParser, *leave_out: str) -> None:
     add_options(parser, ProblemOptions, leave_out, positional=("mesh",))
 
 
+def add_voxels(parser: argparse.ArgumentParser, *leave_out: str) -> None:
+    """Likewise of a command on blocks of voxels, which chooses the coarsening by itself."""
+    add_solid(parser, "coarsen", "discretisation", *leave_out)
+
+
 def require_outputs(arguments: argparse.Namespace, comm: MPI.Comm = MPI.COMM_SELF) -> None:
     """Check that the results can be written, and not in the place of what they are made from."""
 

@@ -28,7 +28,7 @@ EXAMPLES = """example:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    add_solid(parser, "discretisation")
+    add_solid(parser)
     add_options(parser, ScalingOptions)
     parser.add_argument("--here", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--out", help="also write the result to this JSON file")
@@ -74,7 +74,7 @@ def _measured_here(
 def _repeated(arguments: argparse.Namespace) -> list[str]:
     """Arguments with which the same solid is solved again, but for mesh and resolution."""
     fields = [field.name for field in dataclasses.fields(ProblemOptions)]
-    names = [name for name in fields if name not in ("mesh", "resolution", "discretisation")]
+    names = [name for name in fields if name not in ("mesh", "resolution")]
     words: list[str] = []
     for name in (*names, "modes", "tolerance", "linear_solver"):
         value, flag = getattr(arguments, name), f"--{name.replace('_', '-')}"

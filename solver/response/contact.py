@@ -10,11 +10,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from carillon.errors import UserError
 from carillon.fem.geometry import CORNER_OFFSETS, HexMesh
-from carillon.fem.geometry.faces import surface_quads
 from carillon.fem.model import RIGID_MODES, Solid
 from solver.files.modes_file import ModesFile
+from solver.response.surface import Surface, surface_of
 
 Array = NDArray[np.float64]
 
@@ -22,12 +21,6 @@ RULING_MODES = 6
 """Elastic modes, from the first on, that decide where a solid is struck."""
 FAR = 0.5
 """Share of the largest distance on the surface from the strike that counts as far from it."""
-SMOOTHING = 2
-"""Rings of faces that a normal is averaged over, since faces of voxels look along the axes only."""
-REACH = 3.0
-"""Cell edges that a point named by a person may be away from the surface of the voxels."""
-VANISHING = 1e-6
-"""Sums of unit normals shorter than this have no direction."""
 
 
 @dataclass(frozen=True)
@@ -57,64 +50,27 @@ def choose_contacts(
         The modes that choose: it is struck where the lowest ones give way most to a push along the
         normal, and watched where, far from there, it then moves most.
     strike, observed
-        Positions (3,) [m] that a person wants instead; the nearest nodes of the surface are taken.
+        Positions (3,) [m] that a person wants instead, see `solver.response.surface.Surface.place`.
 
     Raises
     ------
     UserError
         If a position is away from the surface.
     """
-    nodes, outward = surface_normals(truth.mesh)
-    points = truth.mesh.nodes[nodes]
-    motion, eigenvalues = _ruling_modes(truth, nodes)
-    along = np.einsum("nik,ni->nk", motion, outward)
+    surface = surface_of(truth.model)
+    motion, eigenvalues = _ruling_modes(truth, surface)
+    along = np.einsum("sik,si->sk", motion, surface.outward)
     first = int(np.argmax((along**2 / eigenvalues).sum(axis=1)))
+    struck = _contact(surface, first, strike, "strike")
     if strike is not None:
-        first = surface_node(truth.mesh, np.asarray(strike), "strike")
-    away = np.linalg.norm(points - points[first], axis=1)
+        first = surface.nearest(struck.position, "strike")
+    away = np.linalg.norm(surface.points - struck.position, axis=1)
     swing = ((motion**2).sum(axis=1) * (along[first] ** 2 / eigenvalues)).sum(axis=1)
     second = int(np.argmax(np.where(away >= FAR * away.max(), swing, -1.0)))
-    if observed is not None:
-        second = surface_node(truth.mesh, np.asarray(observed), "observed")
-    third = int(np.argmax(np.minimum(away, np.linalg.norm(points - points[second], axis=1))))
-    return [Contact(points[index], -outward[index]) for index in (first, second, third)]
-
-
-def surface_node(mesh: HexMesh, point: Array, what: str) -> int:
-    """Number, among the nodes on the surface, of that nearest to `point` (3,) [m].
-
-    Raises
-    ------
-    UserError
-        If the point, which the message calls `what`, is away from the surface.
-    """
-    points = mesh.nodes[np.unique(surface_quads(mesh))]
-    distance, index = cKDTree(points).query(point)
-    if distance > REACH * mesh.edge:
-        shown = [", ".join(f"{x:.4g}" for x in each) for each in (point, points[index])]
-        raise UserError(
-            f"{what}: the point ({shown[0]}) m is {distance:.3g} m from the surface of the voxels, "
-            f"expected at most {REACH:g} cells of {mesh.edge:.3g} m; the nearest one is "
-            f"({shown[1]}) m"
-        )
-    return int(index)
-
-
-def surface_normals(mesh: HexMesh) -> tuple[NDArray[np.int64], Array]:
-    """Nodes on the surface (s,) and their outward unit normals (s, 3).
-
-    The normals of the faces are averaged over `SMOOTHING` rings of neighbours.
-    """
-    quads = surface_quads(mesh)
-    corners = mesh.nodes[quads]
-    own = _unit(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]))
-    faces = own
-    for _ in range(SMOOTHING):
-        faces = _unit(_at_nodes(mesh, quads, faces)[quads].mean(axis=1), own)
-    nodes = np.unique(quads)
-    # Where a sheet of one cell's thickness ends, neighbours may cancel.
-    plain = _unit(_at_nodes(mesh, quads, own), np.array([0.0, 0.0, 1.0]))
-    return nodes, _unit(_at_nodes(mesh, quads, faces), plain)[nodes]
+    watched = _contact(surface, second, observed, "observed")
+    from_watched = np.linalg.norm(surface.points - watched.position, axis=1)
+    third = int(np.argmax(np.minimum(away, from_watched)))
+    return [struck, watched, _contact(surface, third)]
 
 
 def interpolation(model: Solid, points: Array) -> sp.csr_matrix:
@@ -189,24 +145,22 @@ def _from_material(
     return np.asarray(np.where(octants, distance, np.inf).min(axis=2))
 
 
-def _ruling_modes(truth: ModesFile, nodes: NDArray[np.int64]) -> tuple[Array, Array]:
+def _contact(
+    surface: Surface, index: int, wanted: Sequence[float] | None = None, what: str = ""
+) -> Contact:
+    """The point of the surface with this number, or the one that a person wants."""
+    if wanted is not None:
+        return Contact(*surface.place(np.asarray(wanted, dtype=float), what))
+    return Contact(surface.points[index], -surface.outward[index])
+
+
+def _ruling_modes(truth: ModesFile, surface: Surface) -> tuple[Array, Array]:
+    """Their motion (s, 3, k) at the points of the surface, and eigenvalues (k,)."""
     assert truth.modes is not None
     chosen = slice(RIGID_MODES, RIGID_MODES + RULING_MODES)
-    modes = truth.modes[:, chosen]
-    return modes.reshape(truth.mesh.n_nodes, 3, -1)[nodes], truth.eigenvalues[chosen]
-
-
-def _at_nodes(mesh: HexMesh, quads: NDArray[np.int32], faces: Array) -> Array:
-    """Sum (n, 3) of the faces' vectors (q, 3) at their corners."""
-    sums = np.zeros((mesh.n_nodes, 3))
-    np.add.at(sums, quads, faces[:, None, :])
-    return sums
-
-
-def _unit(vectors: Array, otherwise: Array | None = None) -> Array:
-    """The vectors (.., 3) at length one; those that vanish are replaced."""
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    if otherwise is not None:
-        vectors = np.where(length > VANISHING, vectors, otherwise)
-        length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.asarray(vectors / np.maximum(length, np.finfo(float).tiny))
+    nodal = truth.modes[:, chosen].reshape(truth.mesh.n_nodes, -1)
+    if surface.nodes is None:
+        seen = interpolation(truth.model, surface.points) @ nodal
+    else:
+        seen = nodal[surface.nodes]
+    return seen.reshape(len(surface.points), 3, -1), truth.eigenvalues[chosen]

@@ -15,6 +15,7 @@ from carillon.fem.model import RIGID_MODES, ElasticModel
 from solver.assembly.sparse import assembled
 from solver.files.modes_file import ModesFile, read_elastic, require_same_solid
 from solver.response.contact import interpolation
+from solver.studies.matching import SAME, match_clusters, mode_overlaps, recognised
 from solver.subspace.spectrum import clusters
 from solver.subspace.verification import residual_scale
 
@@ -46,6 +47,10 @@ class SpectrumComparison:
         Number of elastic modes compared.
     clusters
         First and last mode number of every cluster of the truth but the last, and its angle [rad].
+    matched
+        Frequency errors of the modes that are the same by their shapes, whatever their numbers, see
+        `solver.studies.matching.recognised`, and how many of these have `moved` to another number;
+        None on the truth's own mesh, where numbers tell.
     """
 
     candidate: str
@@ -58,10 +63,11 @@ class SpectrumComparison:
     residual_max: float
     modes_compared: int
     clusters: list[dict[str, Any]]
+    matched: dict[str, Any] | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain dictionary, ready for JSON."""
-        return asdict(self)
+        """Plain dictionary, ready for JSON, without what there is not."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
 
 
 @dataclass(frozen=True)
@@ -136,7 +142,9 @@ def compare_files(candidate: str | Path, truth: str | Path) -> SpectrumCompariso
     values, exact = a.eigenvalues[elastic], b.eigenvalues[elastic]
     shift = a.frequencies[elastic] / b.frequencies[elastic] - 1.0
     audible = frequency_errors(shift, AUDIBLE_LAST)
-    angles = _cluster_angles(a, b, count)
+    _, M = assembled(b.model)
+    modes = on_mesh_of(b, a)
+    angles = _cluster_angles(modes, b, M, count)
     return SpectrumComparison(
         str(candidate),
         str(truth),
@@ -148,6 +156,7 @@ def compare_files(candidate: str | Path, truth: str | Path) -> SpectrumCompariso
         float(recomputed_residuals(a, *assembled(a.model)).max()),
         count - RIGID_MODES,
         angles,
+        None if modes is a.modes else _matched(modes, a, b, M),
     )
 
 
@@ -178,15 +187,36 @@ def subspace_angles(modes: Array, truth: Array, M: sp.csr_matrix, groups: list[s
     return angles
 
 
-def _cluster_angles(a: ModesFile, b: ModesFile, count: int) -> list[dict[str, Any]]:
-    """Angle of every cluster of `b` but the last."""
-    assert a.modes is not None and b.modes is not None
+def _matched(modes: Array, a: ModesFile, b: ModesFile, M: sp.csr_matrix) -> dict[str, Any]:
+    """Errors of the frequencies of `a`, whose `modes` are on the mesh of `b`, matched by shape.
+
+    Modes of a cluster of either are compared as a space, and matched in their order.
+    """
+    assert b.modes is not None
+    others = modes[:, RIGID_MODES:]
+    # A partner for each mode of the truth, or for as many as the candidate has.
+    elastic = slice(RIGID_MODES, min(len(b.eigenvalues), len(a.eigenvalues)))
+    exact = b.modes[:, elastic]
+    rows, columns = clusters(b.eigenvalues[elastic]), clusters(a.eigenvalues[RIGID_MODES:])
+    matching = match_clusters(mode_overlaps(exact, others, M @ others), rows, columns)
+    errors = a.frequencies[RIGID_MODES:][matching.partners] / b.frequencies[elastic] - 1.0
+    moved = matching.partners != np.arange(len(errors))
+    return {
+        **recognised(errors, matching.overlaps),
+        "moved": int((moved & (matching.overlaps >= SAME)).sum()),
+        "overlap_median": float(np.median(matching.overlaps)),
+    }
+
+
+def _cluster_angles(
+    modes: Array, b: ModesFile, M: sp.csr_matrix, count: int
+) -> list[dict[str, Any]]:
+    """Angle of every cluster of `b` but the last to the same `modes` on its mesh."""
+    assert b.modes is not None
     elastic = slice(RIGID_MODES, count)
     groups = clusters(b.eigenvalues[elastic])[:-1]
     if not groups:
         return []
-    modes = on_mesh_of(b, a)
-    _, M = assembled(b.model)
     angles = subspace_angles(modes[:, elastic], b.modes[:, elastic], M, groups)
     return [
         {

@@ -185,7 +185,7 @@ def _point_of_solid(
     if has_modes and not options.like:
         file = read_modes(options.file)
         damping = Damping(*options.damping) if options.damping else Damping()
-        return *_voxel_point(point, file.mesh), SoundingSolid.of_modes(file, damping), None
+        return *_own_point(point, file.model), SoundingSolid.of_modes(file, damping), None
     design = read_design(options.like or options.file)
     if has_modes:
         solid = SoundingSolid.of_truth(read_modes(options.file), design)
@@ -215,20 +215,18 @@ def _surface_point(point: PointOptions, design: Design) -> tuple[Array, Array]:
     return strike.position, strike.inward
 
 
-def _voxel_point(point: PointOptions, mesh: Any) -> tuple[Array, Array]:
-    """Struck point of the voxels' surface and inward normal there."""
+def _own_point(point: PointOptions, model: Any) -> tuple[Array, Array]:
+    """Struck point of a model's own surface and inward normal there."""
     import numpy as np
 
-    from solver.response.contact import surface_node, surface_normals
+    from solver.response.surface import surface_of
 
     if point.at is None:
         raise UserError(
             "a modes file knows neither targets nor the vertices of a surface; strike it --at a "
             "point, or name its design by --like"
         )
-    nodes, outward = surface_normals(mesh)
-    index = surface_node(mesh, np.array(point.at), "--at")
-    return mesh.nodes[nodes[index]], -outward[index]
+    return surface_of(model).place(np.array(point.at), "--at")
 
 
 def _summary(options: RenderOptions, scene: _Scene, gain: float, peak: float) -> dict[str, Any]:

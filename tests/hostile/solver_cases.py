@@ -211,6 +211,20 @@ each(
         *("ZOO/needle.obj", "ZOO/apart.obj"),
     ],
 )
+CELLS = "--resolution 8 --modes 12 --discretisation finite-cell --out out.h5"
+hostile("cells of a sheet", f"modes ZOO/triangle.obj {CELLS}", "encloses nothing")
+hostile("cells of a needle", f"modes ZOO/needle.obj {CELLS}", "thinner", "--resolution")
+hostile("cells that are apart", f"modes ZOO/apart.obj {CELLS}", "pieces", "--components")
+hostile("cells of no thickness", f"modes ZOO/flat.obj {CELLS}", "is flat")
+hostile(
+    "cells with another lattice's moduli",
+    f"modes ZOO/inside-out.obj {CELLS} --material ZOO/good.npy",
+    "good.npy",
+)
+hostile("cells that are coarsened", f"modes builtin:box {CELLS} --coarsen average", "is for voxels")
+hostile(
+    "cells among objectives", "objectives builtin:box --resolution 4 --discretisation finite-cell"
+)
 each(
     "mesh that is",
     MESH,

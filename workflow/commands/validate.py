@@ -24,7 +24,7 @@ from carillon.progress import say
 from carillon.runtime import allowed_cores
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.coarsening.forest import load_forest
-from solver.response.contact import surface_node
+from solver.response.surface import surface_of
 from workflow import settings
 from workflow.room import make_folder
 from workflow.settings import BUILTIN, DEFAULT_FORESTS
@@ -86,11 +86,11 @@ class ValidateOptions:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     parser.description = (
-        "Compute the modes of one solid four ways, prove and compare them, and build a page that "
-        "says how far they can be trusted. The same command goes on where it was stopped. Exit "
-        f"status 0 if all criteria are met, {FAILED} if one is missed."
+        "Compute the modes of one solid in several ways, prove and compare them, and build a page "
+        "that says how far they can be trusted. The same command goes on where it was stopped. "
+        f"Exit status 0 if all criteria are met, {FAILED} if one is missed."
     )
-    own = ("coarsen", "forest", "objective", "lumped", "discretisation")
+    own = ("coarsen", "forest", "objective", "lumped")
     add_options(parser, ProblemOptions, leave_out=own, positional=("mesh",))
     add_options(parser, ValidateOptions)
 
@@ -126,7 +126,10 @@ def run(arguments: argparse.Namespace) -> int:
 def configuration(arguments: argparse.Namespace) -> dict[str, Any]:
     """Configuration of a run with this one solid; what it leaves out takes the defaults."""
     given = vars(arguments)
-    keys = ("resolution", "unit", "fill", "components", "density", "modes", "seed")
+    keys = (
+        *("resolution", "discretisation", "unit", "fill", "components", "density", "modes"),
+        "seed",
+    )
     named = arguments.material in MATERIALS
     title = arguments.name or surface_name(arguments.mesh)
     model = {
@@ -161,7 +164,7 @@ def _checked_size(arguments: argparse.Namespace) -> str:
     for name in ("strike", "observed"):
         point = getattr(arguments, name)
         if point is not None:
-            surface_node(solid.fine, arguments.unit * np.array(point), name)
+            surface_of(solid.model).nearest(arguments.unit * np.array(point), name)
     return f"{solid.fine.n_cells:,} voxels, {solid.fine.n_dofs:,} unknowns"
 
 

@@ -31,12 +31,13 @@ def options_of(command: str) -> dict[str, str]:
 
 
 def solid_of(command: str) -> NamedSolid | None:
-    """The solid that a command makes voxels of, if it does."""
+    """The solid that a command divides into voxels or cells, if it does."""
     options = options_of(command)
     if "resolution" not in options:
         return None
     words = shlex.split(command)
-    how = {name: options[name] for name in ("fill", "components") if name in options}
+    names = ("fill", "components", "discretisation")
+    how = {name: options[name] for name in names if name in options}
     return NamedSolid(words[words.index("solver") + 2], int(options["resolution"]), **how)
 
 

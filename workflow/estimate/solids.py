@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from carillon.errors import UserError
+from carillon.fem.finite_cells.build import finite_cells
 from carillon.fem.geometry import blocks_from_mesh, hexmesh_from_voxels, load_surface, voxelize
 from workflow.settings import BUILTIN
 
@@ -36,6 +37,7 @@ class NamedSolid(NamedTuple):
     resolution: int
     fill: str = "winding"
     components: str = "error"
+    discretisation: str = "voxel"
 
 
 @cache
@@ -53,22 +55,33 @@ def size_of(solid: NamedSolid) -> Size:
     if solid.resolution > LARGEST_COUNTED:
         # What is one piece with thick walls may be none on coarse voxels.
         with suppress(UserError):
-            unknowns, cells = _counted(solid.mesh, LARGEST_COUNTED, solid.fill, "largest")
+            coarser = solid._replace(resolution=LARGEST_COUNTED, components="largest")
+            unknowns, cells = _counted(coarser)
             growth = solid.resolution / LARGEST_COUNTED
             # A node for each cell grows with the volume, further ones with the surface.
             fine, coarse = np.rint(growth**3 * cells + growth**2 * (unknowns - cells))
-            basis = f"counted on its voxels at resolution {LARGEST_COUNTED}, times "
+            basis = f"{_basis(solid)} at resolution {LARGEST_COUNTED}, times "
             return Size(int(fine), int(coarse), f"{basis}{fine / unknowns[0]:,.1f}")
-    (fine, coarse), _ = _counted(solid.mesh, solid.resolution, solid.fill, solid.components)
-    return Size(int(fine), int(coarse), "counted on its voxels")
+    (fine, coarse), _ = _counted(solid)
+    return Size(int(fine), int(coarse), _basis(solid))
+
+
+def _basis(solid: NamedSolid) -> str:
+    return f"counted on its {'voxels' if solid.discretisation == 'voxel' else 'finite cells'}"
 
 
 @cache
-def _counted(
-    mesh: str, resolution: int, fill: str, components: str
-) -> tuple[np.ndarray, np.ndarray]:
-    """Unknowns on the fine and the coarse mesh, and what three a cell would be."""
-    voxels = voxelize(load_surface(mesh), resolution, fill, components, mesh)
+def _counted(solid: NamedSolid) -> tuple[np.ndarray, np.ndarray]:
+    """Unknowns on the fine and the coarse mesh, and what three a voxel inside would be.
+
+    Finite cells have no coarse mesh; theirs counts as it is.
+    """
+    mesh, resolution, fill, components, discretisation = solid
+    surface = load_surface(mesh)
+    if discretisation != "voxel":
+        cut = finite_cells(surface, resolution, components, mesh)
+        return np.full(2, cut.mesh.n_dofs), np.full(2, 3.0 * cut.fractions.sum())
+    voxels = voxelize(surface, resolution, fill, components, mesh)
     cells = hexmesh_from_voxels(voxels)
     unknowns = np.array([cells.n_dofs, 3 * blocks_from_mesh(cells).coarse.n_nodes])
     return unknowns, 3.0 * voxels.n_cells * np.array([1.0, 0.125])

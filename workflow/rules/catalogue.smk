@@ -57,6 +57,15 @@ def descriptions(study):
     return [settings.FOLDER / "studies" / name for name in dict.fromkeys(files)]
 
 
+def by_variant(names, pattern):
+    """Files of all models by the variants that `names` tells of each."""
+    return [
+        file
+        for name, model in config["models"].items()
+        for file in expand(pattern, model=name, variant=names(model))
+    ]
+
+
 def measured_for(study):
     """Files that the tables of a study are made from."""
     folder = place(study)
@@ -66,10 +75,8 @@ def measured_for(study):
         for solid in solids.named(config, where)
     ]
     if study is catalogue.REPORT:
-        modes = expand("{model}/{variant}.h5", model=MODELS, variant=variants.VARIANTS)
-        compared = expand(
-            "{model}/{variant}.comparison.json", model=MODELS, variant=variants.CANDIDATES
-        )
+        modes = by_variant(variants.variants_of, "{model}/{variant}.h5")
+        compared = by_variant(variants.candidates_of, "{model}/{variant}.comparison.json")
         return [
             f"{folder}/forests/forests.json",
             f"{folder}/forests/table.json",
@@ -94,7 +101,7 @@ def shown_beside(study):
         return [f"{place(study)}/cases/{case.path}".replace(".json", ".h5") for case in cases]
     if study is not catalogue.REPORT:
         return []
-    modes = expand("{model}-mode-{variant}.png", model=MODELS, variant=variants.SHOWN)
+    modes = by_variant(variants.shown_of, "{model}-mode-{variant}.png")
     return [
         *(f"{RESULTS}/figures/{name}" for name in modes),
         *(f"{RESULTS}/figures/{model}-mode.json" for model in MODELS),

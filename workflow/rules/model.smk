@@ -6,16 +6,34 @@ def model_files(wildcards):
     return settings.model_files(config, wildcards.model)
 
 
+def surface_files(wildcards):
+    """Mesh file of a model of finite cells, which is drawn; none for voxels, which are drawn."""
+    cells = config["models"][wildcards.model]["discretisation"] != "voxel"
+    return settings.model_files(config, wildcards.model) if cells else []
+
+
 def model_arguments(wildcards, resolution=None):
     """What the solid is: mesh, resolution (the model's own if None), material."""
     model = config["models"][wildcards.model]
+    cells = model["discretisation"] != "voxel"
     how = {
         "resolution": resolution or model["resolution"],
+        "discretisation": model["discretisation"] if cells else None,
         "material": settings.material_of(config, wildcards.model),
         "poisson": config["poisson"],
         **{key: model[key] for key in ("unit", "density", "seed", "fill", "components")},
     }
     return [settings.mesh_of(config, wildcards.model), *options(how)]
+
+
+def model_results(names, pattern):
+    """Results of a model by the variants that `names` tells of it, as input of a rule."""
+
+    def files(wildcards):
+        chosen = names(config["models"][wildcards.model])
+        return expand(f"{RESULTS}/{pattern}", model=wildcards.model, variant=chosen)
+
+    return files
 
 
 def variant_files(wildcards):

@@ -77,36 +77,52 @@ for study in catalogue.STUDIES:
             "../scripts/page.py"
 
 
-rule draw_modes:
-    input:
-        config=f"{RESULTS}/config.yaml",
-        modes=expand(f"{RESULTS}/models/{{{{model}}}}/{{variant}}.h5", variant=variants.SHOWN),
-    output:
-        pictures=[
-            report(
-                f"{RESULTS}/figures/{{model}}-mode-{variant}.png",
-                caption="../studies/captions/mode.rst",
-                category="Figures",
-                subcategory="{model}",
-                labels={"figure": f"First elastic mode, {variants.VARIANTS[variant].label}"},
-            )
-            for variant in variants.SHOWN
-        ],
-        description=f"{RESULTS}/figures/{{model}}-mode.json",
-    log:
-        f"{LOGS}/figures/{{model}}-mode.log",
-    localrule: True
-    params:
-        source=source("workflow.scripts.draw_modes"),
-    script:
-        "../scripts/draw_modes.py"
+# Models that have the same variants, by what their pictures are drawn from.
+for name, discretisation in {"draw_modes": "voxel", "draw_modes_of_cells": "finite-cell"}.items():
+    drawn = {
+        name: model
+        for name, model in config["models"].items()
+        if model["discretisation"] == discretisation
+    }
+    if drawn:
+
+        rule:
+            name:
+                name
+            input:
+                config=f"{RESULTS}/config.yaml",
+                surface=surface_files,
+                modes=model_results(variants.shown_of, "models/{model}/{variant}.h5"),
+            output:
+                pictures=[
+                    report(
+                        f"{RESULTS}/figures/{{model}}-mode-{variant}.png",
+                        caption="../studies/captions/mode.rst",
+                        category="Figures",
+                        subcategory="{model}",
+                        labels={
+                            "figure": f"First elastic mode, {variants.VARIANTS[variant].label}"
+                        },
+                    )
+                    for variant in variants.shown_of(next(iter(drawn.values())))
+                ],
+                description=f"{RESULTS}/figures/{{model}}-mode.json",
+            log:
+                f"{LOGS}/figures/{{model}}-mode.log",
+            wildcard_constraints:
+                model="|".join(drawn),
+            localrule: True
+            params:
+                source=source("workflow.scripts.draw_modes"),
+            script:
+                "../scripts/draw_modes.py"
 
 
 # A picture for a README or a slide: one mode and the spectrum against the truth.
 rule draw_overview:
     input:
-        modes=f"{RESULTS}/models/{{model}}/ddfem_hcms_ec.h5",
-        truth=f"{RESULTS}/models/{{model}}/{variants.TRUTH}.h5",
+        surface=surface_files,
+        modes=model_results(variants.shown_of, "models/{model}/{variant}.h5"),
         frequencies=f"{RESULTS}/tables/frequencies.json",
         config=f"{RESULTS}/config.yaml",
     output:

@@ -9,7 +9,7 @@ rule validation:
 
 rule audit_spectra:
     input:
-        expand(f"{RESULTS}/models/{{{{model}}}}/{{variant}}.h5", variant=variants.SHOWN),
+        model_results(variants.shown_of, "models/{model}/{variant}.h5"),
     output:
         f"{RESULTS}/models/{{model}}/audit.json",
     log:
@@ -26,7 +26,7 @@ rule audit_spectra:
 
 rule strike_solid:
     input:
-        expand(f"{RESULTS}/models/{{{{model}}}}/{{variant}}.h5", variant=variants.SHOWN),
+        model_results(variants.shown_of, "models/{model}/{variant}.h5"),
     output:
         f"{RESULTS}/models/{{model}}/response.h5",
     log:
@@ -46,16 +46,14 @@ rule validate_model:
     input:
         model=model_files,
         config=f"{RESULTS}/config.yaml",
-        modes=expand(f"{RESULTS}/models/{{{{model}}}}/{{variant}}.h5", variant=variants.SHOWN),
-        comparisons=expand(
-            f"{RESULTS}/models/{{{{model}}}}/{{variant}}.comparison.json",
-            variant=[variant for variant in variants.SHOWN if variant != variants.TRUTH],
+        modes=model_results(variants.shown_of, "models/{model}/{variant}.h5"),
+        comparisons=model_results(
+            lambda model: variants.shown_of(model)[1:],
+            "models/{model}/{variant}.comparison.json",
         ),
         audit=f"{RESULTS}/models/{{model}}/audit.json",
         response=f"{RESULTS}/models/{{model}}/response.h5",
-        pictures=expand(
-            f"{RESULTS}/figures/{{{{model}}}}-mode-{{variant}}.png", variant=variants.SHOWN
-        ),
+        pictures=model_results(variants.shown_of, "figures/{model}-mode-{variant}.png"),
         description=f"{RESULTS}/figures/{{model}}-mode.json",
         templates=templates("validation", "page.html.j2", "tables.yaml"),
     output:

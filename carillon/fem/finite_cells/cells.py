@@ -93,6 +93,13 @@ class FiniteCells:
         """Share (c, 8) of each octant's volume that is inside."""
         return np.asarray(8.0 * self.weights.sum(axis=2)[self.row])
 
+    def voxel_shares(self) -> np.ndarray:
+        """Share (m,) of each voxel's volume that is inside."""
+        shares = np.empty(self.mesh.n_cells)
+        there = self.voxels >= 0
+        shares[self.voxels[there]] = self.fractions[there]
+        return shares
+
     @property
     def volume(self) -> float:
         """Volume inside [m^3]."""

@@ -39,6 +39,10 @@ RIM_POINTS = 9
 """Of a piece with one end inside, which the rim of a hole cuts, where winding numbers are found."""
 VAGUENESS = 0.25
 """Distance of a winding number from a whole one beyond which holes are near."""
+SHEET = 0.55
+"""Winding number that there is somewhere inside a solid; about a sheet it is a half at most."""
+SAMPLE = 500
+"""Pieces of lines that are asked for it."""
 VAGUE = 127
 """Level of a voxel near a hole."""
 TOUCHING = 1e-9
@@ -71,11 +75,14 @@ class Inside:
         Axis whose lines the surface crosses most often in a voxel, as it does face on.
     pieces
         Of the lines along x, y and z.
+    sheet
+        Whether the surface is open and goes around nothing.
     """
 
     state: NDArray[np.int8]
     facing: NDArray[np.int8]
     pieces: tuple[Pieces, Pieces, Pieces]
+    sheet: bool = False
 
     def volumes(self) -> tuple[float, float]:
         """Volume [voxels] in the voxels that are cut, by one half of the lines and by the other."""
@@ -110,6 +117,7 @@ def find_inside(
     if wanted is not None:
         state[~wanted] = SKIPPED
     wind = _Winding(surface, grid)
+    sheet = False
     if merged.is_watertight and merged.is_winding_consistent:
         pieces = [_of_closed_surface(each, wind) for each in crossed]
         state[(state == EMPTY) & _middles(pieces[0], grid.shape)] = FULL
@@ -117,7 +125,9 @@ def find_inside(
         levels = _classify(state, wind)
         ends = wanted is None
         pieces = [_of_open_surface(each, state, levels, wind, ends) for each in crossed]
-    return Inside(state, facing, (pieces[0], pieces[1], pieces[2]))
+        there = [each for each in pieces if len(each.low)]
+        sheet = bool(there) and not any(_encloses(each, wind) for each in there)
+    return Inside(state, facing, (pieces[0], pieces[1], pieces[2]), sheet)
 
 
 class _Winding:
@@ -224,6 +234,14 @@ def _of_open_surface(
     return _joined(lines, line[inside], low[inside], high[inside])
 
 
+def _encloses(pieces: Pieces, wind: _Winding) -> bool:
+    """Whether the winding number passes `SHEET` somewhere in them, by a sample of their middles."""
+    chosen = np.unique(np.linspace(0, len(pieces.low) - 1, SAMPLE).astype(np.int64))
+    line = np.searchsorted(pieces.start, chosen, side="right") - 1
+    middles = 0.5 * (pieces.low + pieces.high)[chosen]
+    return bool(np.abs(wind(_points(pieces, line, middles))).max() > SHEET)
+
+
 def _rim(
     lines: Lines, line: Index, low: Array, high: Array, begins: NDArray[np.bool_], wind: _Winding
 ) -> Array:
@@ -304,7 +322,7 @@ def _joined(lines: Lines, line: Index, low: Array, high: Array) -> Pieces:
     follows = np.zeros(len(line), dtype=bool)
     follows[1:] = (line[1:] == line[:-1]) & (low[1:] - high[:-1] <= TOUCHING)
     first = np.flatnonzero(~follows)
-    last = np.append(first[1:], len(line)) - 1
+    last = np.append(first, len(line))[1:] - 1
     start = np.searchsorted(line[first], np.arange(len(lines.start)))
     return Pieces(lines.axis, lines.across, start, low[first], high[last])
 

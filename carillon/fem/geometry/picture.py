@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from carillon.fem.geometry.faces import boundary_faces, corner_values, surface_quads
+from carillon.fem.geometry.faces import boundary_faces, corner_values
 from carillon.fem.geometry.hexmesh import HexMesh
 
 if TYPE_CHECKING:
+    import scipy.sparse as sp
     from mpl_toolkits.mplot3d import Axes3D
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
@@ -27,6 +29,33 @@ ARROW_LENGTH = 0.22
 SMOOTHING_RINGS = 4
 
 
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """Triangles that are drawn in the place of a mesh's own faces.
+
+    Attributes
+    ----------
+    vertices : (v, 3)
+        Positions [m].
+    faces : (f, 3)
+        Triangles, wound either way.
+    weights : (v, n)
+        Interpolation from the nodes; None if nothing moves.
+    cells : (f,)
+        The cell that each triangle belongs to; None if cells have no values.
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    weights: sp.csr_matrix | None = None
+    cells: np.ndarray | None = None
+
+    def seen(self, nodal: np.ndarray) -> np.ndarray:
+        """Values (v, k) at the vertices, from those (n, k) of the nodes."""
+        assert self.weights is not None
+        return np.asarray(self.weights @ nodal)
+
+
 def draw(
     ax: Axes3D,
     mesh: HexMesh,
@@ -37,6 +66,7 @@ def draw(
     view: tuple[float, float] = VIEW,
     cmap: str = "viridis",
     limits: tuple[float, float] | None = None,
+    skin: Skin | None = None,
 ) -> Poly3DCollection:
     """Draw the surface of a mesh, deformed if asked for, lit from the upper left.
 
@@ -62,6 +92,8 @@ def draw(
         Name of a matplotlib colour map.
     limits
         Values at both ends of the colour map; their range by default.
+    skin
+        What is drawn instead of the faces of the cells, in the same place, size and light.
 
     Returns
     -------
@@ -77,7 +109,6 @@ def draw(
     from matplotlib.colors import Normalize
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    quads, cell = boundary_faces(mesh)
     turn = _rotation(guess_up(mesh) if up == "auto" else up)
     if displacement is not None:
         displacement = np.asarray(displacement, dtype=float).reshape(-1, 3)
@@ -85,20 +116,30 @@ def draw(
             raise ValueError(f"{len(displacement)} displacements for {mesh.n_nodes} nodes")
         if values is None:
             values = np.linalg.norm(displacement, axis=1)
-    points = (mesh.nodes + _drawn_motion(mesh, displacement, scale)) @ turn.T
-    corners = corner_values(mesh, points, quads, cell)
-
-    if values is None:
-        face_values = None
-        colours = np.tile(PLAIN, (len(quads), 1))
+    motion = _drawn_motion(mesh, displacement, scale)
+    quads, cell = boundary_faces(mesh)
+    points = (mesh.nodes + motion) @ turn.T
+    if skin is None:
+        corners = corner_values(mesh, points, quads, cell)
+        light = _light(corners, quads, view)
+        face_values = _on_faces(mesh, values, quads, cell)
     else:
-        face_values = _on_faces(mesh, np.asarray(values, dtype=float), quads, cell)
+        moved = 0.0 if displacement is None else skin.seen(motion)
+        corners = ((skin.vertices + moved) @ turn.T)[skin.faces]
+        light = _light_of_triangles(corners, view)
+        face_values = _on_skin(mesh, values, skin)
+
+    if face_values is None:
+        colours = np.tile(PLAIN, (len(corners), 1))
+    else:
         low, high = limits or (float(face_values.min()), float(face_values.max()))
         mapping = ScalarMappable(Normalize(low, high if high > low else low + 1.0), cmap)
         colours = mapping.to_rgba(face_values)[:, :3]
-    colours = np.clip(colours * _light(corners, quads, view)[:, None], 0, 1)
+    colours = np.clip(colours * light[:, None], 0, 1)
 
-    polygons = Poly3DCollection(corners, facecolors=colours, edgecolors=colours * 0.86)
+    # Edges show voxels; those of triangles show nothing, but would leave gaps.
+    edges = colours * 0.86 if skin is None else colours
+    polygons = Poly3DCollection(corners, facecolors=colours, edgecolors=edges)
     polygons.set_linewidth(0.25)
     if face_values is not None:
         # Kept for a colour bar; the lit colours above stay as they are.
@@ -108,40 +149,10 @@ def draw(
         polygons._face_is_mapped = polygons._edge_is_mapped = False
         polygons.update_scalarmappable = lambda: None
     ax.add_collection3d(polygons)
-    _frame(ax, points[np.unique(quads)], view)
+    # Nodes of cut cells lie outside the solid, and may move as nothing that is seen does.
+    still = skin is None or displacement is None
+    _frame(ax, points[np.unique(quads)] if still else corners.reshape(-1, 3), view)
     return polygons
-
-
-def draw_surface(
-    ax: Axes3D,
-    vertices: np.ndarray,
-    faces: np.ndarray,
-    mesh: HexMesh,
-    up: str = "auto",
-) -> None:
-    """Draw triangles as `draw` draws their voxels: in the same place, size and light.
-
-    Parameters
-    ----------
-    vertices : (v, 3)
-        Positions [m].
-    faces : (f, 3)
-        Triangles, wound either way.
-    mesh
-        The voxels.
-    """
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-    turn = _rotation(guess_up(mesh) if up == "auto" else up)
-    corners = (np.asarray(vertices) @ turn.T)[faces]
-    normal = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    towards = normal @ _direction(*np.radians(VIEW))
-    normal *= np.where(towards < 0.0, -1.0, 1.0)[:, None]
-    colours = np.clip(np.array(PLAIN) * _brightness(normal, VIEW)[:, None], 0, 1)
-    polygons = Poly3DCollection(corners, facecolors=colours, edgecolors=colours)
-    polygons.set_linewidth(0.2)
-    ax.add_collection3d(polygons)
-    _frame(ax, mesh.nodes[np.unique(surface_quads(mesh))] @ turn.T, VIEW)
 
 
 def mark(
@@ -213,11 +224,9 @@ def _rotation(up: str) -> np.ndarray:
     return np.array(rotations[up], dtype=float)
 
 
-def _drawn_motion(
-    mesh: HexMesh, displacement: np.ndarray | None, scale: float | str
-) -> np.ndarray | float:
+def _drawn_motion(mesh: HexMesh, displacement: np.ndarray | None, scale: float | str) -> np.ndarray:
     if displacement is None:
-        return 0.0
+        return np.zeros((mesh.n_nodes, 3))
     if scale != "auto":
         return float(scale) * displacement
     largest = np.linalg.norm(displacement, axis=1).max()
@@ -225,7 +234,12 @@ def _drawn_motion(
     return displacement * (DRAWN_AMPLITUDE * diagonal / largest if largest > 0 else 0.0)
 
 
-def _on_faces(mesh: HexMesh, values: np.ndarray, quads: np.ndarray, cell: np.ndarray) -> np.ndarray:
+def _on_faces(
+    mesh: HexMesh, values: np.ndarray | None, quads: np.ndarray, cell: np.ndarray
+) -> np.ndarray | None:
+    if values is None:
+        return None
+    values = np.asarray(values, dtype=float)
     if values.shape == (mesh.n_nodes,):
         return values[quads].mean(axis=1)
     if values.shape == (mesh.n_cells,):
@@ -234,6 +248,22 @@ def _on_faces(mesh: HexMesh, values: np.ndarray, quads: np.ndarray, cell: np.nda
         f"values have shape {values.shape}, expected ({mesh.n_nodes},) per node or "
         f"({mesh.n_cells},) per cell"
     )
+
+
+def _on_skin(mesh: HexMesh, values: np.ndarray | None, skin: Skin) -> np.ndarray | None:
+    if values is None:
+        return None
+    if len(values) == mesh.n_nodes:
+        return np.asarray(skin.seen(values)[skin.faces].mean(axis=1))
+    assert skin.cells is not None
+    return np.asarray(values[skin.cells])
+
+
+def _light_of_triangles(corners: np.ndarray, view: tuple[float, float]) -> np.ndarray:
+    """Brightness of triangles (f, 3, 3), whichever side of them is seen."""
+    normal = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    away = normal @ _direction(*np.radians(view)) < 0.0
+    return _brightness(np.where(away[:, None], -normal, normal), view)
 
 
 def _light(corners: np.ndarray, quads: np.ndarray, view: tuple[float, float]) -> np.ndarray:

@@ -12,7 +12,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.fem.model import ElasticModel
+from carillon.fem.model import Solid
 from solver.analysis.modal_solver import ModalSolver, Modes
 from solver.analysis.options import SolverOptions
 from solver.correction.correct import INTERACTIVE_TOLERANCE
@@ -161,7 +161,7 @@ class Methods:
         assert self.solid is not None
         return self.solid
 
-    def _model(self, coarsening: str, changed: bool = False) -> tuple[ElasticModel | None, float]:
+    def _model(self, coarsening: str, changed: bool = False) -> tuple[Solid | None, float]:
         """Model on rank 0, and the seconds that coarsening took, on every rank."""
         if coarsening == "none":
             return (None if self.solid is None else self.solid.fine), 0.0
@@ -169,16 +169,14 @@ class Methods:
         model, seconds = made or (None, 0.0)
         return model, self.comm.bcast(seconds)
 
-    def _cold(
-        self, model: ElasticModel | None, coarsened: float, options: SolverOptions
-    ) -> MethodRun:
+    def _cold(self, model: Solid | None, coarsened: float, options: SolverOptions) -> MethodRun:
         begin = self._now()
         solver = ModalSolver(model, options, self.comm)
         prepared = self._now()
         result = solver.solve()
         return replace(self._run(result, prepared, coarsened), before=prepared - begin)
 
-    def _rival(self, method: str, model: ElasticModel | None, coarsened: float) -> MethodRun:
+    def _rival(self, method: str, model: Solid | None, coarsened: float) -> MethodRun:
         """A general eigensolver, which needs nothing of what is prepared of the mesh.
 
         It is given the rigid motions, finds a few modes to spare, and is charged for one search.

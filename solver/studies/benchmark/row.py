@@ -38,6 +38,7 @@ Runs = dict[str, list[MethodRun]]
 
 SLOW = ("arpack", "arpack_regular")
 NEED_FORESTS = ("ddfem", "ddfem_hcms_ec_accurate", "ddfem_hcms_ec", "ddfem_hcms_ec_warm")
+NEED_VOXELS = (*NEED_FORESTS, "arpack_regular")
 WARM_UP_MODES = 20
 """Modes of the runs that compile the kernels and load what they need."""
 
@@ -50,8 +51,8 @@ PROBLEMS = {
 MEANING = {
     "seconds": "median wall time from moduli to modes: coarsening, assembly and solution; what "
     "needs the mesh alone is in precompute, checks of the result are in neither",
-    "precompute": "voxels, material, blocks, and for each mesh partition, sparsity and elimination "
-    "plan, made once for any material",
+    "precompute": "voxels or cells, material, blocks, and for each mesh partition, sparsity and "
+    "elimination plan, made once for any material",
     "speedup": "seconds of the inner name over seconds of the outer name",
     "speedup_with_precompute": "the same, with the partition, sparsity and elimination plan of the "
     "outer name added to its seconds, and nothing to those of the inner name",
@@ -126,10 +127,12 @@ def benchmark_row(
         If SLEPc fails; another method that does is told in `failed` and has no figures.
     """
     solid = compute_on_root(comm, partial(make_solid, options, benchmark.modes))
-    reason = comm.bcast(None if solid is None else solid.reason)
+    reason, voxels = comm.bcast(None if solid is None else (solid.reason, solid.blocks is not None))
     if comm.rank == 0 and reason:
         logger.warning(reason)
-    left_out = benchmark.left_out + (NEED_FORESTS if reason else ())
+    left_out = benchmark.left_out
+    if reason:
+        left_out += NEED_FORESTS if voxels else NEED_VOXELS
     default = SlepcConfiguration.default(comm.size)
     _run_once(Methods(solid, _few(benchmark.modes), default, options.seed, comm, True), left_out)
     methods = Methods(solid, benchmark.modes, default, options.seed, comm)
@@ -137,7 +140,7 @@ def benchmark_row(
     if tried:
         methods.configuration = min(tried, key=tried.__getitem__)
     runs, failed = _alternate(methods, benchmark, left_out)
-    spectra = _references(methods, runs, with_forests=not reason)
+    spectra = _references(methods, runs, averages=voxels, forests=not reason)
     row = {
         **bcast_from_root(comm, lambda: _describe(options, cast(BenchmarkSolid, solid))),
         "modes": benchmark.modes,
@@ -163,7 +166,8 @@ def benchmark_row(
 
 def row_lines(row: Mapping[str, Any]) -> list[str]:
     """A row as people read it."""
-    lines = [f"{row['dof_fine']:,} unknowns, coarsened {row['dof_coarse']:,}, {row['modes']} modes"]
+    coarse = "" if row["dof_coarse"] is None else f", coarsened {row['dof_coarse']:,}"
+    lines = [f"{row['dof_fine']:,} unknowns{coarse}, {row['modes']} modes"]
     for name, seconds in row["seconds"].items():
         if seconds is None:
             continue
@@ -241,10 +245,14 @@ def _alternate(
     return runs, failed
 
 
-def _references(methods: Methods, runs: Runs, with_forests: bool) -> dict[str, MethodRun]:
+def _references(
+    methods: Methods, runs: Runs, averages: bool, forests: bool
+) -> dict[str, MethodRun]:
     """Spectra by SLEPc that the others are compared with."""
-    spectra = {"fine": runs["slepc"][0], "average": methods.slepc("average")}
-    if with_forests:
+    spectra = {"fine": runs["slepc"][0]}
+    if averages:
+        spectra["average"] = methods.slepc("average")
+    if forests:
         spectra["coarse"] = runs["ddfem"][0] if "ddfem" in runs else methods.slepc("ddfem")
         spectra["coarse_changed"] = methods.slepc("ddfem", changed=True)
     return spectra
@@ -260,9 +268,10 @@ def _describe(options: ProblemOptions, solid: BenchmarkSolid) -> dict[str, Any]:
         "mesh": options.mesh,
         "resolution": options.resolution,
         "material": options.material,
+        "discretisation": options.discretisation,
         "lumped": options.lumped,
         "dof_fine": solid.fine.n_dofs,
-        "dof_coarse": 3 * solid.blocks.coarse.n_nodes,
+        "dof_coarse": None if solid.blocks is None else 3 * solid.blocks.coarse.n_nodes,
         "forest": None if solid.forest is None else solid.forest.record(),
         "without_forest": solid.reason,
     }
@@ -307,9 +316,8 @@ def _errors(runs: Runs, spectra: dict[str, MethodRun]) -> dict[str, Any]:
         "ddfem_hcms_ec_warm": "coarse_changed",
     }
     fine = spectra["fine"].values
-    coarse = {"average": spectra["average"].values}
-    if "coarse" in spectra:
-        coarse["ddfem"] = spectra["coarse"].values
+    names = {"average": "average", "ddfem": "coarse"}
+    coarse = {name: spectra[key].values for name, key in names.items() if key in spectra}
     return {
         "eigenvalue_error": {
             name: spectrum_error(runs[name][-1].values, spectra[operator].values)

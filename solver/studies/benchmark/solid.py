@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from carillon.errors import UserError
 from carillon.fem.geometry import Blocks, HexMesh, blocks_from_mesh
 from carillon.fem.materials import smooth_field
-from carillon.fem.model import ElasticModel
+from carillon.fem.model import ElasticModel, Solid
 from solver.analysis.bounds import check_mode_count
 from solver.analysis.problem import Problem, ProblemOptions, build_problem
 from solver.coarsening.choice import make_coarsening
@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 CHANGE = 0.05
 """Largest relative change of a modulus between the two materials."""
 _CHANGE_SEED = 1
+NOT_COARSENED = "without coarse models and lumped masses: they are of voxels, not of finite cells"
 
 
 @dataclass(frozen=True)
@@ -34,50 +35,51 @@ class BenchmarkSolid:
     problem
         The fine mesh with its material.
     blocks
-        The coarse mesh.
+        The coarse mesh; None of finite cells, which are not coarsened.
     changed
         (m,) moduli [Pa] that differ from the material's by a smooth field of `CHANGE`.
     forest, reason
-        The forests, or None and why there are none.
+        The forests, or None and why there are none to coarsen with.
     seconds
         Wall time of what needs the mesh alone.
     """
 
     problem: Problem
-    blocks: Blocks
+    blocks: Blocks | None
     changed: Array
     forest: ForestCoarsening | None
     reason: str
     seconds: dict[str, float]
 
     @property
-    def fine(self) -> ElasticModel:
+    def fine(self) -> Solid:
         """The fine model."""
-        return self.problem.hexahedra
+        return self.problem.model
 
     def coarsened(self, method: str, changed: bool = False) -> tuple[ElasticModel, float]:
         """Model of the blocks by `average` or `ddfem`, and the seconds from fine moduli to it."""
         young = self.changed if changed else self.problem.young
         begin = time.perf_counter()
         coarsening = self.forest if method == FOREST else make_coarsening(method)
-        assert coarsening is not None
+        assert coarsening is not None and self.blocks is not None
+        fine = self.problem.hexahedra
         model = coarse_model(
             self.blocks,
             coarsening.moduli(block_moduli(self.blocks, young)),
             coarsening.lumped_fraction,
-            poisson=self.fine.poisson,
-            density=self.fine.density,
-            lumped=self.fine.lumped,
+            poisson=fine.poisson,
+            density=fine.density,
+            lumped=fine.lumped,
         )
         return model, time.perf_counter() - begin
 
     def lumped(self) -> ElasticModel:
         """The fine model with a diagonal mass."""
-        return replace(self.fine, lumped=True)
+        return replace(self.problem.hexahedra, lumped=True)
 
 
 def make_solid(options: ProblemOptions, modes: int) -> BenchmarkSolid:
-    """Voxelise the solid and give it both materials.
+    """Discretise the solid and give it both materials.
 
     Raises
     ------
@@ -85,12 +87,15 @@ def make_solid(options: ProblemOptions, modes: int) -> BenchmarkSolid:
         For anything wrong with the mesh, the material or the forests, or if the fine or the coarse
         model has fewer unknowns than modes are wanted.
     """
-    forest, reason = forest_or_reason(options.forest, options.poisson)
     problem = build_problem(replace(options, coarsen="none"))
+    check_mode_count(modes, problem.model.n_dofs)
+    changed = problem.young * _change(problem.fine, options.seed)
+    if not isinstance(problem.model, ElasticModel):
+        return BenchmarkSolid(problem, None, changed, None, NOT_COARSENED, problem.seconds)
+    forest, reason = forest_or_reason(options.forest, options.poisson)
     begin = time.perf_counter()
     blocks = blocks_from_mesh(problem.fine)
     blocked = time.perf_counter() - begin
-    check_mode_count(modes, problem.model.n_dofs)
     unknowns = 3 * blocks.coarse.n_nodes
     if modes > unknowns:
         raise UserError(
@@ -100,7 +105,7 @@ def make_solid(options: ProblemOptions, modes: int) -> BenchmarkSolid:
     return BenchmarkSolid(
         problem,
         blocks,
-        problem.young * _change(problem.fine, options.seed),
+        changed,
         forest,
         reason,
         {**problem.seconds, "blocks": blocked},

@@ -13,16 +13,10 @@ from carillon.fem.geometry import Blocks
 from carillon.fem.model import RIGID_MODES, ElasticModel
 from solver.files.modes_file import frequencies
 from solver.studies.coarsening.blame import Blame
-from solver.studies.coarsening.matching import (
-    FAR_OFF,
-    SAME,
-    SWAP,
-    match_modes,
-    mode_overlaps,
-    verdict,
-)
+from solver.studies.coarsening.matching import FAR_OFF, SWAP, coarse_overlaps, verdict
 from solver.studies.coarsening.pictures import ModePicture
 from solver.studies.comparison import frequency_errors
+from solver.studies.matching import match_modes, recognised
 
 Array = NDArray[np.float64]
 
@@ -62,7 +56,7 @@ class CoarseRating:
         self._found = frequencies(coarse.values)[RIGID_MODES:]
         self.errors = self._found[: len(self.exact)] / self.exact - 1.0
         self.expected = expected[: len(self.exact)]
-        overlaps = mode_overlaps(
+        overlaps = coarse_overlaps(
             truth.model,
             truth.vectors[:, self._rated],
             blocks,
@@ -84,9 +78,8 @@ class CoarseRating:
         """Plain values.
 
         `by_index`, `by_projection`, `expected` sum up errors; `recognised` does so for the modes
-        whose partner overlaps them by `SAME` or more, since a partner of another shape, which a
-        mode gets that the coarse model lacks, has a frequency of its own. `modes` has them all,
-        `far_off` those more than `FAR_OFF` off with the elements to blame.
+        whose partner resembles them, see `solver.studies.matching.recognised`. `modes` has them
+        all, `far_off` those more than `FAR_OFF` off with the elements to blame.
         """
         summaries = {
             "by_index": self.errors,
@@ -98,7 +91,7 @@ class CoarseRating:
                 name: asdict(frequency_errors(errors, RIGID_MODES + len(errors)))
                 for name, errors in summaries.items()
             },
-            "recognised": self._recognised(),
+            "recognised": recognised(self.matched_errors, self.matching.overlaps),
             "rank_correlation": rank_correlation(self.expected, self.errors),
             "modes": [self._mode(index) for index in range(len(self.exact))],
             "far_off": [self._far_off(index) for index in range(len(self._far))],
@@ -111,19 +104,6 @@ class CoarseRating:
             range(len(far)), key=lambda at: (far[at]["verdict"] == SWAP, -abs(far[at]["error"]))
         )
         return [self._picture(index) for index in order[:count]]
-
-    def _recognised(self) -> dict[str, Any]:
-        modes = np.flatnonzero(self.matching.overlaps >= SAME)
-        if len(modes) == 0:
-            return {"modes": 0, "rms": None, "worst": None, "worst_mode": None}
-        errors = self.matched_errors[modes]
-        worst = int(np.abs(errors).argmax())
-        return {
-            "modes": len(modes),
-            "rms": float(np.sqrt(np.mean(errors**2))),
-            "worst": float(errors[worst]),
-            "worst_mode": RIGID_MODES + 1 + int(modes[worst]),
-        }
 
     def _picture(self, index: int) -> ModePicture:
         column = RIGID_MODES + int(self._far[index])

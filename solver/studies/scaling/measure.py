@@ -24,7 +24,7 @@ from solver.hcms.counts import Counts, Tally
 from solver.hcms.synthesis import make_subdomains, synthesize
 from solver.linear import LinearSolver
 from solver.studies.scaling.counting import CountingComm, TimedLinearSolver
-from solver.studies.scaling.work import ASSEMBLY_FLOPS, dense_flops, elimination
+from solver.studies.scaling.work import assembly_flops, dense_flops, elimination
 
 Phases = dict[str, dict[str, list[float]]]
 
@@ -161,11 +161,11 @@ class _Run:
 
     def _count_flops(self, model: Solid | None) -> None:
         ranks = self.comm.size
-        work = bcast_from_root(self.comm, lambda: elimination(cast(Solid, model).mesh))
+        work = bcast_from_root(self.comm, lambda: elimination(cast(Solid, model)))
         shared, alone = dense_flops(
             self.local_mesh.n_dofs, self.result.blocks, self.result.solves, self.width
         )
-        self.assembly.flops = ASSEMBLY_FLOPS * len(self.local_mesh.cells)
+        self.assembly.flops = assembly_flops(self.local_mesh.cells.elements)
         self.linear.factor.flops = work.flops / ranks
         self.linear.solving.flops = work.solve_flops(self.result.solves) / ranks
         own = 3 * (self.local_mesh.stop - self.local_mesh.start) / self.local_mesh.n_dofs

@@ -22,8 +22,6 @@ from solver.studies.scaling.sizes import TreeSizes
 
 HEADER_BYTES = 8 * (MOST_ARRAYS + 1) * (2 + MOST_DIMENSIONS)
 """Bytes of the announcement that goes before the arrays of a message."""
-CELL_BYTES = 8 * 8 + 8 * 8 + 1
-"""Bytes of a cell under way: corners, moduli and octants."""
 REAL_BYTES = 8
 _GROUP_MESSAGES = 8
 """Announcement, eigenvalues, boundary, modes there, three arrays of cells, projection."""
@@ -117,7 +115,7 @@ def _plan_merge(
     if apart:
         boundary = sizes.boundary[step.right]
         there.messages += _GROUP_MESSAGES
-        there.bytes += HEADER_BYTES + CELL_BYTES * sizes.crossing[step.right]
+        there.bytes += HEADER_BYTES + sizes.element_bytes * sizes.crossing[step.right]
         there.bytes += REAL_BYTES * (right + boundary + 3 * boundary * right + right**2)
 
 

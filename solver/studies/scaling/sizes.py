@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.geometry import HexMesh
+from carillon.fem.elements import Elements
+from carillon.fem.model import Solid
 from solver.distribution.decomposition import Decomposition
 from solver.distribution.tree import Merge, MergeTree
 
@@ -15,10 +16,6 @@ Counts = NDArray[np.float64]
 Corners = NDArray[np.int64]
 
 _AXES = 3
-_NEIGHBOURS_ACROSS = 9
-"""Nodes of a neighbouring plane that share an element with a node."""
-_NEIGHBOURS_WITHIN = 9
-"""Nodes of its own plane that do, itself included."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +26,8 @@ class TreeSizes:
     ----------
     tree
         The merge tree.
+    element_bytes
+        Bytes of a cell under way: its nodes, and what its matrices are made from.
     nodes, boundary, crossing
         (groups,) nodes of each group, those that share a cell with a node outside, and the cells
         in which they do.
@@ -41,6 +40,7 @@ class TreeSizes:
     """
 
     tree: MergeTree
+    element_bytes: float
     nodes: Counts
     boundary: Counts
     crossing: Counts
@@ -52,13 +52,13 @@ class TreeSizes:
     pairs_across: Counts
 
 
-def sizes_of_mesh(
-    mesh: HexMesh, decomposition: Decomposition, order: NDArray[np.int64]
+def sizes_of_solid(
+    model: Solid, decomposition: Decomposition, order: NDArray[np.int64]
 ) -> TreeSizes:
-    """Sizes counted in a mesh, with what `decompose` found for it."""
+    """Sizes counted in the mesh of a solid, with what `decompose` found for it."""
     row = np.empty(len(order), dtype=np.int64)
     row[order] = np.arange(len(order))
-    corners = row[mesh.cells]
+    corners = row[model.connectivity]
     ranges = decomposition.row_ranges()
     groups = [_boundary(corners, *bounds) for bounds in ranges]
     merges = [
@@ -72,6 +72,7 @@ def sizes_of_mesh(
     columns = np.array(merges, dtype=float).reshape(-1, 5).T
     return TreeSizes(
         decomposition.tree,
+        _element_bytes(model.elements),
         np.array([stop - start for start, stop in ranges], dtype=float),
         np.array([len(rows) for rows, _ in groups], dtype=float),
         np.array([cells for _, cells in groups], dtype=float),
@@ -80,12 +81,20 @@ def sizes_of_mesh(
     )
 
 
-def sizes_of_box(parts: int, nodes: float) -> TreeSizes:
+def sizes_of_box(parts: int, nodes: float, elements: Elements) -> TreeSizes:
     """Sizes of a box of `parts` cubes, a power of two, of so many `nodes` each.
 
     Groups are cuboids that are joined along their shortest side; all their faces are taken to touch
-    others, as those of most subdomains of a large solid do, but for the box itself.
+    others, as those of most subdomains of a large solid do, but for the box itself. Where groups
+    meet, either may have any number of the layers of nodes in an element of the kind of `elements`,
+    each number as often as another.
     """
+    order = elements.steps
+    layers = np.arange(1.0, order + 1.0)
+    # Nodes of a plane that share an element with one of it, on average.
+    neighbours = (order + 2.0) ** 2
+    within = neighbours * np.mean(layers**2)
+    across = neighbours * np.mean(layers * layers[::-1])
     levels = parts.bit_length() - 1
     if parts != 1 << levels:
         raise ValueError(f"{parts} parts, expected a power of two")
@@ -100,22 +109,30 @@ def sizes_of_box(parts: int, nodes: float) -> TreeSizes:
     tree = _balanced_tree(levels)
     level = np.array(tree.levels())
     volume = np.array([np.prod(side) for side in sides])
-    surface = volume - np.array([np.prod(np.maximum(side - 2.0, 0.0)) for side in sides])
-    shell = np.array([np.prod(side + 1.0) - np.prod(side - 1.0) for side in sides])
+    inner = [np.maximum(side - 2.0 * layers.mean(), 0.0) for side in sides]
+    surface = volume - np.array([np.prod(side) for side in inner])
+    ends = [(side / order - 1.0, side / order + 1.0) for side in sides]
+    shell = np.array([np.prod(more) - np.prod(np.maximum(less, 0.0)) for less, more in ends])
     surface[-1] = shell[-1] = 0.0
     area = np.array(areas)[level[parts:] - 1] if levels else np.empty(0)
     return TreeSizes(
         tree,
+        _element_bytes(elements),
         volume[level],
         surface[level],
         shell[level],
         0.5 * surface[level[parts:]],
-        area,
-        area,
-        _NEIGHBOURS_WITHIN * area,
-        _NEIGHBOURS_WITHIN * area,
-        _NEIGHBOURS_ACROSS * area,
+        layers.mean() * area,
+        layers.mean() * area,
+        within * area,
+        within * area,
+        across * area,
     )
+
+
+def _element_bytes(elements: Elements) -> float:
+    of_nodes = 8 * elements.node_places.shape[1]
+    return float(of_nodes + sum(values[:1].nbytes for values in elements.arrays()))
 
 
 def _balanced_tree(levels: int) -> MergeTree:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from carillon.arguments import number_between, whole_number
+from carillon.fem.elements import Elements
 from carillon.fem.model import Solid
 from carillon.options import option
 from solver import linear
@@ -26,7 +27,7 @@ from solver.studies.scaling.model import (
     predict,
     work_of_busiest,
 )
-from solver.studies.scaling.sizes import TreeSizes, sizes_of_box, sizes_of_mesh
+from solver.studies.scaling.sizes import TreeSizes, sizes_of_box, sizes_of_solid
 from solver.studies.scaling.work import Factorisation, elimination
 
 PREDICTED = tuple(1 << power for power in range(11))
@@ -108,7 +109,7 @@ def scaling_study(
 
     strong, failed = runs(dict.fromkeys(scaling.ranks, options.resolution))
     machine = fit_machine(strong, scaling.latency, scaling.bandwidth)
-    work = elimination(problem.model.mesh)
+    work = elimination(problem.model)
     result: Result = {
         "mesh": options.mesh,
         "resolution": options.resolution,
@@ -130,7 +131,8 @@ def scaling_study(
             "runs": weak,
             "failed": failed,
             "model": _modelled(
-                _weak(machine, work, strong[0], weak), ASSUMPTIONS + WEAK_ASSUMPTIONS
+                _weak(problem.model.elements, machine, work, strong[0], weak),
+                ASSUMPTIONS + WEAK_ASSUMPTIONS,
             ),
         }
     return result
@@ -174,26 +176,30 @@ def _strong(
     correction = CorrectionWork.measured(runs[0])
     rows = []
     sizes: TreeSizes | None = None
-    most = model.mesh.n_cells // FEWEST_CELLS
+    most = len(model.connectivity) // FEWEST_CELLS
     for ranks in sorted({*PREDICTED, *scaling.ranks}):
         if ranks > most:
             break
         if sizes is None or ranks > sizes.tree.parts:
-            sizes = sizes_of_mesh(model.mesh, *decompose(model, None, seed, ranks))
+            sizes = sizes_of_solid(model, *decompose(model, None, seed, ranks))
         busiest = work_of_busiest(sizes, work, runs[0]["keep"], correction, ranks)
         rows.append(_row(ranks, model.n_dofs, sizes, predict(machine, busiest)))
     return rows
 
 
 def _weak(
-    machine: MachineRates, work: Factorisation, alone: Result, runs: list[Result]
+    elements: Elements,
+    machine: MachineRates,
+    work: Factorisation,
+    alone: Result,
+    runs: list[Result],
 ) -> list[Result]:
     correction = CorrectionWork.measured(runs[0])
     unknowns = runs[0]["n_dofs"] / runs[0]["ranks"]
     parts = 1 << max(0, round(np.log2(runs[0]["subdomains"] / runs[0]["ranks"])))
     rows = []
     for ranks in PREDICTED:
-        sizes = sizes_of_box(parts * ranks, unknowns / 3.0 / parts)
+        sizes = sizes_of_box(parts * ranks, unknowns / 3.0 / parts, elements)
         grown = work.grown(ranks * unknowns / alone["n_dofs"])
         busiest = work_of_busiest(sizes, grown, runs[0]["keep"], correction, ranks)
         rows.append(_row(ranks, ranks * unknowns, sizes, predict(machine, busiest)))

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from carillon.fem.geometry import HexMesh
+from carillon.fem.elements import Elements
+from carillon.fem.model import Solid
 from solver.assembly.node_rows import Pattern
 from solver.hcms.counts import eigen_flops, product_flops
 from solver.linear.dissection import dissect
 
-ASSEMBLY_FLOPS = 2.0 * 8 * 24**2
-"""Operations of the stiffness of one element: eight matrices, scaled and added."""
 LOOKS = 3
 """Dense eigenproblems of the Krylov space that a correction solves."""
 
@@ -56,10 +55,17 @@ class Factorisation:
         return sum(16.0 * size * columns for size in self.boundary[1 : levels + 1])
 
 
-def elimination(mesh: HexMesh) -> Factorisation:
-    """Symbolic factorisation of the stiffness of a mesh."""
-    pattern = Pattern.of_cells(mesh.cells.astype(np.int64), 0, mesh.n_nodes)
-    fronts = dissect(mesh.node_grid.astype(np.int64), pattern.indptr, pattern.columns)
+def assembly_flops(elements: Elements) -> float:
+    """Operations of the stiffness of elements: a matrix for each point, scaled and added."""
+    points, nodes = elements.young.shape[1], elements.node_places.shape[1]
+    return 2.0 * len(elements) * points * (3 * nodes) ** 2
+
+
+def elimination(model: Solid) -> Factorisation:
+    """Symbolic factorisation of the stiffness of a solid."""
+    mesh, steps = model.mesh, model.elements.steps
+    pattern = Pattern.of_cells(model.connectivity.astype(np.int64), 0, mesh.n_nodes)
+    fronts = dissect(mesh.node_grid.astype(np.int64), pattern.indptr, pattern.columns, steps)
     own = 3.0 * np.diff(fronts.first)
     outside = 3.0 * np.array([len(boundary) for boundary in fronts.boundary])
     flops = own**3 / 3.0 + own**2 * outside + own * outside**2

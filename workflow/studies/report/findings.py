@@ -15,7 +15,7 @@ PROVEN_RESIDUAL = 1e-6
 def findings(tables: dict[str, Table]) -> dict[str, Any]:
     """Headline numbers over all models, from the tables of a run."""
     summary, coarsening, times, evidence, frequencies = (
-        pd.DataFrame(tables[name].rows)
+        _frame(tables[name])
         for name in ("summary", "coarsening", "times", "evidence", "frequencies")
     )
     truths = evidence.dropna(subset="inertia")
@@ -23,6 +23,8 @@ def findings(tables: dict[str, Table]) -> dict[str, Any]:
     residual = truths["residual_max"].max()
     speed_ups = summary["speed_up"]
     return {
+        # Whether any model was; finite cells are not.
+        "coarsened": len(coarsening) > 0,
         # Worst eigenvalue of any model; rms frequency errors of the coarsened mesh.
         "hcms_error": summary["hcms_error"].max(),
         "hcms_ec_error": summary["hcms_ec_error"].max(),
@@ -41,6 +43,13 @@ def findings(tables: dict[str, Table]) -> dict[str, Any]:
         "elastic_modes": len(frequencies),
         "unknowns": (summary["unknowns"].min(), summary["unknowns"].max()),
     }
+
+
+def _frame(table: Table) -> pd.DataFrame:
+    """A table with all of its columns; what rows lack is no number."""
+    frame = pd.DataFrame(table.rows, columns=[column.key for column in table.columns])
+    numbers = [column.key for column in table.columns if column.kind != "text"]
+    return frame.astype(dict.fromkeys(numbers, float))
 
 
 def headline(count: int, missed: int) -> str:

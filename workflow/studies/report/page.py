@@ -13,6 +13,8 @@ from workflow.studies.report.scaling_tables import assumptions
 from workflow.variants import SHOWN, TRUTH, VARIANTS
 
 Tables = dict[str, Table]
+KINDS = {"voxel": "voxels", "finite-cell": "finite cells"}
+"""Discretisations, in words."""
 
 
 def page(run: Run, tables: Tables) -> str:
@@ -20,8 +22,12 @@ def page(run: Run, tables: Tables) -> str:
 
     Nothing is computed anew: every number comes from a table, so that page and tables agree.
     """
+    used = {model["discretisation"] for model in run.config["models"].values()}
+    kinds = [words for name, words in KINDS.items() if name in used]
     return rendered(
         "report/page.html.j2",
+        kinds=" or ".join(kinds),
+        cells="finite-cell" in used,
         title=run.config["title"],
         variants=VARIANTS,
         truth=TRUTH,
@@ -59,7 +65,7 @@ def mode_pictures(run: Run, model: str) -> list[dict[str, Any]]:
             "source": picture_uri(run.figure(f"{model}-mode-{variant}.png")),
             **described[variant],
         }
-        for variant in SHOWN
+        for variant in run.shown_variants(model)
     ]
 
 
@@ -76,11 +82,19 @@ def _model(run: Run, tables: Tables, model: str) -> dict[str, Any]:
         "pictures": mode_pictures(run, model),
         "judgement": _judgement(run, model),
         "spectrum": inline(run.figure(f"{model}-spectrum.svg")),
+        "shown": run.shown_variants(model),
+        "skip": ["model", *_left_out(run, model)],
         "frequencies": listed_modes(of_model["frequencies"]),
         **{
             name: {row["variant"]: row for row in of_model[name]} for name in ("errors", "evidence")
         },
     }
+
+
+def _left_out(run: Run, model: str) -> list[str]:
+    """Columns of the table of frequencies that a model has nothing for."""
+    absent = [variant for variant in SHOWN if variant not in run.shown_variants(model)]
+    return [column for variant in absent for column in (variant, f"{variant}_error")]
 
 
 def _judgement(run: Run, model: str) -> str:

@@ -30,7 +30,7 @@ def spectrum_figure(run: Results, model: str) -> Figure:
     figure, (above, below) = plt.subplots(
         2, 1, figsize=(4.7, 5.0), sharex=True, height_ratios=(1, 1.15)
     )
-    for variant in SHOWN:
+    for variant in (name for name in SHOWN if name in rows[0]):
         style = {"color": COLOURS[variant], "label": VARIANTS[variant].label, **LINES[variant]}
         above.plot(mode, [row[variant] for row in rows], **style)
         if variant != TRUTH:
@@ -50,10 +50,11 @@ def times_figure(run: Results) -> Figure:
     labels = {column.key: column.label for column in times.columns}
     height = 0.8 / len(TIMED)
     figure, axes = plt.subplots(figsize=(7.6, 0.9 + 1.05 * len(rows)))
-    smallest = min(row[variant] for row in rows for variant in TIMED)
+    smallest = min(row[variant] for row in rows for variant in TIMED if variant in row)
     for index, variant in enumerate(TIMED):
-        at = [position - 0.4 + (index + 0.5) * height for position in range(len(rows))]
-        seconds = [row[variant] for row in rows]
+        there = [number for number, row in enumerate(rows) if variant in row]
+        at = [position - 0.4 + (index + 0.5) * height for position in there]
+        seconds = [rows[number][variant] for number in there]
         bars = axes.barh(at, seconds, 0.86 * height, color=COLOURS[variant], label=labels[variant])
         axes.bar_label(bars, [show(value, "seconds") for value in seconds], padding=3, size=8)
     axes.set_xscale("log")

@@ -7,11 +7,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from carillon.fem.geometry import load_surface
+from carillon.fem.geometry.picture import Skin
+from carillon.fem.model import Solid
 from solver.files.modes_file import CHECKS, ModesFile, read_modes
 from workflow import settings
 from workflow.studies.base.conditions import Record
 from workflow.studies.base.results import Results
-from workflow.variants import CANDIDATES, VARIANTS
+from workflow.studies.base.skins import skin_of
+from workflow.variants import candidates_of, shown_of, variants_of
 
 PRECOMPUTATION = ("mesh", "material")
 """Phases that come before any method: they are needed once for a solid."""
@@ -27,6 +31,18 @@ class Run(Results):
         """Names of the models in the order of the configuration."""
         return list(self.config["models"])
 
+    def shown_variants(self, model: str) -> tuple[str, ...]:
+        """Variants of a model that are drawn and listed."""
+        return shown_of(self.config["models"][model])
+
+    def skin(self, model: str, solid: Solid) -> Skin | None:
+        """The surface that a model is drawn as if it is of finite cells; None of voxels."""
+        part = self.config["models"][model]
+        if part["discretisation"] == "voxel":
+            return None
+        surface = load_surface(settings.mesh_of(self.config, model), part["unit"])
+        return skin_of(solid, surface)
+
     def modes_path(self, model: str, variant: str) -> Path:
         """Modes file of a model and variant."""
         return self.folder / "models" / model / f"{variant}.h5"
@@ -37,7 +53,7 @@ class Run(Results):
         return {
             model: {
                 variant: read_modes(self.modes_path(model, variant), with_modes=False)
-                for variant in VARIANTS
+                for variant in variants_of(self.config["models"][model])
             }
             for model in self.models
         }
@@ -55,7 +71,7 @@ class Run(Results):
         return {
             model: {
                 variant: self.read_json(f"models/{model}/{variant}.comparison.json")
-                for variant in CANDIDATES
+                for variant in candidates_of(self.config["models"][model])
             }
             for model in self.models
         }

@@ -89,8 +89,7 @@ def judge(evidence: Evidence) -> list[Criterion]:
         *_spectrum(evidence, TRUTH, limits["truth_residual"]),
         *_solver(evidence),
         *_spectrum(evidence, SOLVED, limits["residual"]),
-        *_coarsening(evidence),
-        *_spectrum(evidence, COARSENED, limits["residual"]),
+        *(_of_coarsened(evidence) if COARSENED in evidence.shown else ()),
     ]
 
 
@@ -117,6 +116,11 @@ def _solver(evidence: Evidence) -> Iterator[Criterion]:
     }
     limited = {key: (value, limits[key]) for key, value in values.items()}
     return _criteria(evidence, "solver", SOLVED, limited)
+
+
+def _of_coarsened(evidence: Evidence) -> list[Criterion]:
+    residual = evidence.tolerances["residual"]
+    return [*_coarsening(evidence), *_spectrum(evidence, COARSENED, residual)]
 
 
 def _coarsening(evidence: Evidence) -> Iterator[Criterion]:
@@ -157,15 +161,18 @@ def verdict(criteria: Sequence[Criterion]) -> dict[str, Any]:
         for each group: `title`, `question`, whether it `passed`, a `word`, a `sentence` and its
         `criteria`.
     """
+    judged = {criterion.group for criterion in criteria}
     parts = [
         _part(texts, [criterion for criterion in criteria if criterion.group == group])
         for group, texts in TEXTS["groups"].items()
+        if group in judged
     ]
+    trust = "trust" if COARSENED in judged else "trust_fine"
     missed = sum(not criterion.passed for criterion in criteria)
     return {
         "passed": missed == 0,
         "headline": headline(len(criteria), missed),
-        "advice": next((part["doubt"] for part in parts if not part["passed"]), TEXTS["trust"]),
+        "advice": next((part["doubt"] for part in parts if not part["passed"]), TEXTS[trust]),
         "parts": parts,
     }
 

@@ -10,11 +10,10 @@ from solver.files.modes_file import ModesFile, read_modes
 from solver.response.response_file import ResponseFile, read_response
 from workflow.studies.base.conditions import Record
 from workflow.studies.report.results import Run
-from workflow.variants import SHOWN, TRUTH
+from workflow.variants import TRUTH
 
 SOLVED, COARSENED = "hcms_ec", "ddfem_hcms_ec"
 """Variants that are judged: the solver on the fine mesh, and on the coarsened one."""
-COMPARED = tuple(variant for variant in SHOWN if variant != TRUTH)
 
 
 @dataclass(frozen=True)
@@ -43,13 +42,14 @@ class Evidence(Run):
         """Modes files by variant, without the modes."""
         return {
             variant: read_modes(self.modes_path(self.model, variant), with_modes=False)
-            for variant in SHOWN
+            for variant in self.shown_variants(self.model)
         }
 
     @cached_property
     def compared(self) -> dict[str, dict[str, Any]]:
         """Output of `solver compare` against the truth by variant."""
-        return {name: self.read_json(self.file(f"{name}.comparison.json")) for name in COMPARED}
+        names = [name for name in self.shown if name != TRUTH]
+        return {name: self.read_json(self.file(f"{name}.comparison.json")) for name in names}
 
     @cached_property
     def audit(self) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import numpy as np
 import yaml
 
 from carillon import provenance
+from carillon.fem.finite_cells.model import FiniteCellModel
 from carillon.fem.geometry import load_surface
 from solver.response.response import STRIKE_SECONDS
 from workflow import settings
@@ -19,9 +20,9 @@ from workflow.studies.base.table import Table
 from workflow.studies.report.page import mode_pictures
 from workflow.studies.validation import plots
 from workflow.studies.validation.criteria import judge, verdict
-from workflow.studies.validation.evidence import Evidence
+from workflow.studies.validation.evidence import COARSENED, Evidence
 from workflow.studies.validation.pictures import solid_pictures, struck_picture
-from workflow.variants import SHOWN, TRUTH, VARIANTS
+from workflow.variants import TRUTH, VARIANTS
 
 _DIGITS = 16
 
@@ -43,7 +44,7 @@ def page(evidence: Evidence, tables: dict[str, Table]) -> str:
         strike=_strike(evidence),
         sounds=_sounds(evidence),
         strike_seconds=STRIKE_SECONDS,
-        errors=inlined(plots.errors_figure(tables["errors"], evidence.tolerances), "errors"),
+        errors=inlined(plots.errors_figure(evidence, tables["errors"]), "errors"),
         shapes=inlined(plots.shapes_figure(evidence), "shapes"),
         counted=evidence.shown[TRUTH].attributes,
         files=_digests(evidence),
@@ -57,21 +58,27 @@ def _solid(evidence: Evidence) -> dict[str, Any]:
     mesh_name = settings.mesh_of(evidence.config, evidence.model)
     surface = load_surface(mesh_name, evidence.settings["unit"])
     file = evidence.shown[TRUTH]
-    mesh, young = file.mesh, file.model.young[:, 0]
+    model, mesh = file.model, file.mesh
+    cells = model.cells if isinstance(model, FiniteCellModel) else None
+    young = model.young if cells else model.young[:, 0]
     titles = ("surface", "voxels", "material")
-    pictures = solid_pictures(surface, mesh, young)
+    share = cells.voxel_shares() if cells else None
+    skin = evidence.skin(evidence.model, model)
+    pictures = solid_pictures(surface, mesh, young, share, skin)
+    coarse = evidence.shown.get(COARSENED)
     return {
         "mesh": mesh_name,
         "triangles": len(surface.faces),
         "closed": bool(surface.is_watertight),
         "surface_volume": float(abs(surface.volume)),
         "voxels": mesh.n_cells,
-        "voxel_volume": mesh.volume,
+        "voxel_volume": cells.volume if cells else mesh.volume,
+        "finite_cells": len(cells) if cells else None,
         "edge": mesh.edge,
         "sides": np.ptp(np.asarray(surface.bounds), axis=0).tolist(),
-        "mass": file.model.mass,
+        "mass": model.mass,
         "moduli": (float(young.min()), float(np.median(young)), float(young.max())),
-        "coarse_cells": evidence.shown["ddfem_hcms_ec"].mesh.n_cells,
+        "coarse_cells": None if coarse is None else coarse.mesh.n_cells,
         "pictures": [
             embedded(picture, title=title) for title, picture in zip(titles, pictures, strict=True)
         ],
@@ -83,7 +90,9 @@ def _strike(evidence: Evidence) -> dict[str, Any]:
     """Where and how the solid is struck."""
     response = evidence.response
     strike, observed = response.contacts["strike"], response.contacts["observed"]
-    picture = struck_picture(evidence.shown[TRUTH].mesh, strike, observed)
+    model = evidence.shown[TRUTH].model
+    skin = evidence.skin(evidence.model, model)
+    picture = struck_picture(model.mesh, strike, observed, skin)
     unit = evidence.settings["unit"]
     return {
         "picture": embedded(picture),
@@ -112,14 +121,14 @@ def _sounds(evidence: Evidence) -> list[dict[str, Any]]:
             "audible": response.responses[variant].audible,
             "distance": response.responses[variant].distance_decibels,
         }
-        for variant in SHOWN
+        for variant in response.responses
     ]
 
 
 def _digests(evidence: Evidence) -> list[tuple[str, str]]:
     """Names and first digits of the SHA-256 of the files that everything is made from."""
     given = settings.model_files(evidence.config, evidence.model)
-    made = [str(evidence.modes_path(evidence.model, variant)) for variant in SHOWN]
+    made = [str(evidence.modes_path(evidence.model, variant)) for variant in evidence.shown]
     digests = []
     for name in given + made:
         with open(name, "rb") as stream:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -17,8 +16,8 @@ from workflow.studies.base.media import COLOUR_MAP, highest_hertz, spectrogram_f
 from workflow.studies.base.table import Table
 from workflow.studies.report.convergence_plot import visible
 from workflow.studies.report.plots import LINES
-from workflow.studies.validation.evidence import COARSENED, COMPARED, SOLVED, Evidence
-from workflow.variants import SHOWN, TRUTH, VARIANTS
+from workflow.studies.validation.evidence import COARSENED, SOLVED, Evidence
+from workflow.variants import TRUTH, VARIANTS
 
 Array = NDArray[np.float64]
 
@@ -28,18 +27,20 @@ SMALLEST_ANGLE = 1e-10
 """Angles [rad] below this are drawn there."""
 
 
-def errors_figure(errors: Table, tolerances: Mapping[str, float]) -> Figure:
+def errors_figure(evidence: Evidence, errors: Table) -> Figure:
     """Frequencies, and relative errors of eigenvalues and frequencies, by mode number."""
+    tolerances = evidence.tolerances
     mode = [row["mode"] for row in errors.rows]
     figure, (left, middle, right) = plt.subplots(1, 3, figsize=(9.6, 3.3))
-    for variant in SHOWN:
+    for variant in evidence.shown:
         left.plot(mode, [row[variant] for row in errors.rows], **_line(variant))
-    for variant in COMPARED:
+    for variant in evidence.compared:
         for axes, quantity in ((middle, "eigenvalue"), (right, "frequency")):
             values = [row[f"{variant}_{quantity}"] for row in errors.rows]
             axes.semilogy(mode, visible(values), **_line(variant))
     _limit(middle, tolerances["eigenvalue_error"], SOLVED)
-    _limit(right, tolerances["frequency_worst"], COARSENED)
+    if COARSENED in evidence.shown:
+        _limit(right, tolerances["frequency_worst"], COARSENED)
     left.set(ylabel="frequency [Hz]", title="Natural frequencies")
     left.set_ylim(bottom=0)
     left.legend(loc="lower right")
@@ -53,14 +54,14 @@ def errors_figure(errors: Table, tolerances: Mapping[str, float]) -> Figure:
 def shapes_figure(evidence: Evidence) -> Figure:
     """Angles between the truth's clusters and each method's, by mode number."""
     figure, axes = plt.subplots(figsize=(4.7, 3.1))
-    for variant in COMPARED:
+    for variant in evidence.compared:
         clusters = evidence.compared[variant]["clusters"]
         mode = [0.5 * (cluster["first"] + cluster["last"]) for cluster in clusters]
         angle = [max(cluster["angle"], SMALLEST_ANGLE) for cluster in clusters]
         axes.semilogy(mode, np.degrees(angle), ".", ms=4, **_line(variant, line=False))
     _limit(axes, float(np.degrees(evidence.tolerances["subspace_angle"])), SOLVED)
     axes.set(xlabel="mode number", ylabel="angle [°]", title="Angle to the ground truth")
-    figure.legend(loc="outside lower center", ncols=len(COMPARED), columnspacing=1.0)
+    figure.legend(loc="outside lower center", ncols=len(evidence.compared), columnspacing=1.0)
     return figure
 
 
@@ -92,7 +93,7 @@ def motion_figure(response: ResponseFile) -> Figure:
     figure, (above, below) = plt.subplots(
         2, 1, figsize=(7.6, 4.9), sharex=True, height_ratios=(1.5, 1)
     )
-    for variant in SHOWN:
+    for variant in response.responses:
         displacement = response.responses[variant].displacement
         above.plot(milliseconds, factor * displacement @ direction, **_line(variant))
         if variant != TRUTH:
@@ -109,7 +110,7 @@ def motion_figure(response: ResponseFile) -> Figure:
     figure.legend(
         *above.get_legend_handles_labels(),
         loc="outside lower center",
-        ncols=len(SHOWN),
+        ncols=len(response.responses),
         columnspacing=1.2,
     )
     return figure

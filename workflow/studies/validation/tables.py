@@ -9,8 +9,8 @@ import numpy as np
 from carillon.fem.model import RIGID_MODES
 from workflow.studies.base.entry import Row
 from workflow.studies.validation.criteria import judge
-from workflow.studies.validation.evidence import COMPARED, Evidence
-from workflow.variants import SHOWN, TRUTH, VARIANTS
+from workflow.studies.validation.evidence import Evidence
+from workflow.variants import TRUTH, VARIANTS
 
 
 def criteria(evidence: Evidence) -> list[Row]:
@@ -24,7 +24,7 @@ def errors(evidence: Evidence) -> Iterator[Row]:
     truth = spectra[TRUTH]
     for index in range(RIGID_MODES, min(len(part.eigenvalues) for part in spectra.values())):
         row = {"mode": index + 1, TRUTH: float(truth.frequencies[index])}
-        for variant in COMPARED:
+        for variant in evidence.compared:
             spectrum = spectra[variant]
             row[variant] = float(spectrum.frequencies[index])
             row[f"{variant}_frequency"] = row[variant] / row[TRUTH] - 1.0
@@ -36,7 +36,7 @@ def errors(evidence: Evidence) -> Iterator[Row]:
 def shapes(evidence: Evidence) -> Iterator[Row]:
     """How far the spaces of modes are turned against the truth's."""
     first_mode = evidence.read_json(f"figures/{evidence.model}-mode.json")
-    for variant in COMPARED:
+    for variant in evidence.compared:
         clusters = evidence.compared[variant]["clusters"]
         row = {
             "method": VARIANTS[variant].label,
@@ -58,12 +58,12 @@ def shapes(evidence: Evidence) -> Iterator[Row]:
 def audits(evidence: Evidence) -> list[Row]:
     """What each modes file proves, found anew from the file alone."""
     spectra = evidence.audit["spectra"]
-    return [{"method": VARIANTS[name].label, **spectra[name]} for name in SHOWN if name in spectra]
+    return [{"method": VARIANTS[name].label, **spectra[name]} for name in evidence.shown]
 
 
 def responses(evidence: Evidence) -> Iterator[Row]:
     """How far motion and sound after a strike are from the truth's."""
-    for variant in SHOWN:
+    for variant in evidence.shown:
         response = evidence.response.responses[variant]
         row = {
             "method": VARIANTS[variant].label,

@@ -1,0 +1,153 @@
+"""The surface of a solid in any discretisation, with its normals."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from carillon.errors import UserError
+from carillon.fem.finite_cells.model import FiniteCellModel
+from carillon.fem.finite_cells.surface import surface_points
+from carillon.fem.geometry import HexMesh
+from carillon.fem.geometry.faces import boundary_faces, surface_quads
+from carillon.fem.model import Solid
+
+logger = logging.getLogger(__name__)
+
+Array = NDArray[np.float64]
+
+SMOOTHING = 2
+"""Rings of faces that a normal is averaged over, since faces of voxels look along the axes only."""
+REACH = 3.0
+"""Cell edges that a point named by a person may be away from the surface."""
+OUTSIDE = 0.1
+"""Cell edges beyond the surface of finite cells up to which a point counts as on it."""
+VANISHING = 1e-6
+"""Sums of unit normals shorter than this have no direction."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Points all over a surface.
+
+    Attributes
+    ----------
+    points : (s, 3)
+        Where they are [m].
+    outward : (s, 3)
+        Unit normals.
+    edge
+        Cell edge, or spacing [m].
+    nodes : (s,)
+        Nodes that the points are; None if they lie between nodes.
+    """
+
+    points: Array
+    outward: Array
+    edge: float
+    nodes: NDArray[np.int64] | None
+
+    def nearest(self, point: Array, what: str) -> int:
+        """Number of the point nearest to `point` (3,) [m].
+
+        Raises
+        ------
+        UserError
+            If the point, which the message calls `what`, is away from the surface.
+        """
+        distance, index = cKDTree(self.points).query(point)
+        if distance > REACH * self.edge:
+            kind = "solid" if self.nodes is None else "voxels"
+            raise UserError(
+                f"{what}: the point ({_shown(point)}) m is {distance:.3g} m from the surface of "
+                f"the {kind}, expected at most {REACH:g} cells of {self.edge:.3g} m; the nearest "
+                f"one is ({_shown(self.points[index])}) m"
+            )
+        return int(index)
+
+    def place(self, point: Array, what: str) -> tuple[Array, Array]:
+        """The place (3,) [m] that is meant by `point` (3,) [m], and the inward normal (3,) there.
+
+        That is the nearest node of voxels. Of finite cells it is the point itself, unless it lies
+        outside: then the nearest place that does not, and a warning says how far it is.
+
+        Raises
+        ------
+        UserError
+            See `nearest`.
+        """
+        index = self.nearest(point, what)
+        near, outward = self.points[index], self.outward[index]
+        if self.nodes is not None:
+            return near, -outward
+        beyond = float((point - near) @ outward)
+        along = point - near - beyond * outward
+        if np.linalg.norm(along) > self.edge:
+            place = near
+        else:
+            place = point if beyond <= OUTSIDE * self.edge else near + along
+        distance = float(np.linalg.norm(point - place))
+        if distance > OUTSIDE * self.edge:
+            logger.warning(
+                f"{what}: the point ({_shown(point)}) m is {distance:.3g} m outside the solid; "
+                f"({_shown(place)}) m is taken instead"
+            )
+        return place, -outward
+
+
+def surface_of(model: Solid) -> Surface:
+    """Nodes on the surface of hexahedra, or a point of it for each outer face of cells' voxels."""
+    mesh = model.mesh
+    if not isinstance(model, FiniteCellModel):
+        nodes, outward = surface_normals(mesh)
+        return Surface(mesh.nodes[nodes], outward, mesh.edge, nodes)
+    quads, voxels = boundary_faces(mesh)
+    _, outward = _face_normals(mesh, quads)
+    return Surface(surface_points(model.cells, voxels, outward), outward, mesh.edge, None)
+
+
+def surface_normals(mesh: HexMesh) -> tuple[NDArray[np.int64], Array]:
+    """Nodes on the surface (s,) and their outward unit normals (s, 3).
+
+    The normals of the faces are averaged over `SMOOTHING` rings of neighbours.
+    """
+    quads = surface_quads(mesh)
+    own, faces = _face_normals(mesh, quads)
+    nodes = np.unique(quads)
+    # Where a sheet of one cell's thickness ends, neighbours may cancel.
+    plain = _unit(_at_nodes(mesh, quads, own), np.array([0.0, 0.0, 1.0]))
+    return nodes, _unit(_at_nodes(mesh, quads, faces), plain)[nodes]
+
+
+def _face_normals(mesh: HexMesh, quads: NDArray[np.int32]) -> tuple[Array, Array]:
+    """Unit normals (q, 3) of faces, their own and smoothed."""
+    corners = mesh.nodes[quads]
+    own = _unit(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]))
+    faces = own
+    for _ in range(SMOOTHING):
+        faces = _unit(_at_nodes(mesh, quads, faces)[quads].mean(axis=1), own)
+    return own, faces
+
+
+def _at_nodes(mesh: HexMesh, quads: NDArray[np.int32], faces: Array) -> Array:
+    """Sum (n, 3) of the faces' vectors (q, 3) at their corners."""
+    sums = np.zeros((mesh.n_nodes, 3))
+    np.add.at(sums, quads, faces[:, None, :])
+    return sums
+
+
+def _unit(vectors: Array, otherwise: Array | None = None) -> Array:
+    """The vectors (.., 3) at length one; those that vanish are replaced."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    if otherwise is not None:
+        vectors = np.where(length > VANISHING, vectors, otherwise)
+        length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(vectors / np.maximum(length, np.finfo(float).tiny))
+
+
+def _shown(point: Array) -> str:
+    return ", ".join(f"{value:.4g}" for value in point)
