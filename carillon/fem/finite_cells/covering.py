@@ -71,7 +71,7 @@ class Covering:
     @cached_property
     def cells(self) -> FiniteCells:
         """All cells, undivided."""
-        return Parts.of_cover(self.cover).chosen(self.kept).cells(self.grid)
+        return CellParts.of_cover(self.cover).chosen(self.kept).cells(self.grid)
 
     def divided(self, places: Index) -> Division:
         """The same, but with cells at `places` (d, 3), their lowest voxels, divided into eight.
@@ -84,7 +84,7 @@ class Covering:
         whole, half = self.cover, divided_cover(self.surface, self.grid, places)
         undivided = np.ones(len(whole.places), dtype=bool)
         undivided[whole.cells_at(places)] = False
-        parts = Parts.of_two(whole, half, undivided)
+        parts = CellParts.of_two(whole, half, undivided)
         leaves = np.append(self.kept & undivided[whole.owner], np.ones(len(half), dtype=bool))
         chosen = self._one_piece(parts, leaves)
         cells = parts.chosen(chosen).cells(self.grid)
@@ -93,7 +93,7 @@ class Covering:
         parent = (np.cumsum(among) - 1)[parent[chosen & ~parts.slight]]
         return Division(cells, parent, voxels_of_parents(cells, self.cells, parent))
 
-    def _one_piece(self, parts: Parts, leaves: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _one_piece(self, parts: CellParts, leaves: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Those of the `leaves` (p,) that are of the largest piece; the others must be crumbs."""
         own = np.flatnonzero(leaves)
         piece = parts.faces.chosen(leaves).pieces(len(own))
@@ -109,7 +109,7 @@ class Covering:
 
 
 @dataclass(frozen=True)
-class Parts:
+class CellParts:
     """Parts of the cells of one lattice or two, all of whose arrays have a row for each.
 
     Attributes
@@ -133,14 +133,16 @@ class Parts:
     faces: Faces
 
     @classmethod
-    def of_cover(cls, cover: LatticeCover) -> Parts:
+    def of_cover(cls, cover: LatticeCover) -> CellParts:
         """Those of one lattice."""
         span = np.full(len(cover), 2)
         faces = Faces(cover.met, np.empty((0, 4), dtype=np.int64))
         return cls(cover.grid, span, cover.row, cover.volumes, cover.slight, cover.weights, faces)
 
     @classmethod
-    def of_two(cls, whole: LatticeCover, half: LatticeCover, undivided: NDArray[np.bool_]) -> Parts:
+    def of_two(
+        cls, whole: LatticeCover, half: LatticeCover, undivided: NDArray[np.bool_]
+    ) -> CellParts:
         """Those of a lattice and of one of half the edge, in place of its cells not `undivided`."""
         count, rows = len(whole), len(whole.weights)
         return cls(
@@ -156,7 +158,7 @@ class Parts:
             ),
         )
 
-    def chosen(self, kept: NDArray[np.bool_]) -> Parts:
+    def chosen(self, kept: NDArray[np.bool_]) -> CellParts:
         """Those that are kept (p,)."""
         return replace(
             self,
@@ -181,5 +183,6 @@ class Parts:
 
 def pieces(cover: LatticeCover) -> tuple[NDArray[np.int32], Array]:
     """Number (p,) of the piece of the solid that each part is of, and volumes [voxels]."""
-    piece = Parts.of_cover(cover).faces.pieces(len(cover))
-    return piece, np.bincount(piece, np.where(cover.slight, 0.0, cover.volumes))
+    piece = CellParts.of_cover(cover).faces.pieces(len(cover))
+    volumes = np.where(cover.slight, 0.0, cover.volumes)
+    return piece, np.bincount(piece, volumes).astype(np.float64)
