@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 AnyArray = NDArray[Any]
 
-MOST_ARRAYS = 8
+MOST_ARRAYS = 10
 """Arrays that one announcement has room for."""
 MOST_DIMENSIONS = 3
 

@@ -43,6 +43,9 @@ def put_model(group: h5py.Group, model: Solid) -> None:
     group.attrs["density"] = model.density
     group.attrs["cell_edge"] = mesh.edge
     group.attrs["origin"] = mesh.origin
+    if mesh.span is not None and mesh.hanging is not None:
+        put(group, "span", mesh.span, "1", "edge of each cell in steps of the grid")
+        put(group, "hanging", mesh.hanging, "1", "bit pattern of the cell's corners that hang")
     if isinstance(model, FiniteCellModel):
         put(group, "young", model.young, "Pa", "Young's modulus per voxel")
         _put_cells(group.create_group(FINITE_CELLS), model.cells)
@@ -59,14 +62,10 @@ def _put_cells(group: h5py.Group, cells: FiniteCells) -> None:
 
 
 def _put_elements(group: h5py.Group, model: ElasticModel) -> None:
-    mesh = model.mesh
     uniform = bool((model.young == model.young[:, :1]).all())
     young = model.young[:, 0] if uniform else model.young
     put(group, "young", young, "Pa", "Young's modulus per cell or per quadrature point")
     put(group, "fill", model.fill, "1", "bit pattern of the cell's octants that hold mass")
-    if mesh.span is not None and mesh.hanging is not None:
-        put(group, "span", mesh.span, "1", "edge of each cell in steps of the grid")
-        put(group, "hanging", mesh.hanging, "1", "bit pattern of the cell's corners that hang")
     group.attrs["lumped"] = model.lumped
     group.attrs["lumped_share"] = model.lumped_share
 
@@ -119,7 +118,8 @@ def _mesh(group: h5py.Group, grid: NDArray[np.int32], *sizes: NDArray[np.uint8])
 
 
 def _finite_cell_model(group: h5py.Group) -> FiniteCellModel:
-    mesh, inner = _mesh(group, _grid(group)), group[FINITE_CELLS]
+    grid, inner = _grid(group), group[FINITE_CELLS]
+    mesh = _mesh(group, grid, *_sizes(group, grid))
     nodes = read(inner, "nodes", (None, len(NODES)), INTEGER).astype(np.int32)
     row = read(inner, "row", (len(nodes),), INTEGER).astype(np.int32)
     voxels = read(inner, "voxels", (len(nodes), OCTANTS), INTEGER).astype(np.int32)

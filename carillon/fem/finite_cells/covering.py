@@ -71,7 +71,7 @@ class Covering:
     @cached_property
     def cells(self) -> FiniteCells:
         """All cells, undivided."""
-        return CellParts.of_cover(self.cover).chosen(self.kept).cells(self.grid)
+        return CellParts.of_cover(self.cover).chosen(self.kept).cells(self.grid, self.grid.edge)
 
     def divided(self, places: Index) -> Division:
         """The same, but with cells at `places` (d, 3), their lowest voxels, divided into eight.
@@ -81,17 +81,27 @@ class Covering:
         UserError
             If the finer lattice shows that the solid is in pieces.
         """
+        places = self._with_guests(places)
         whole, half = self.cover, divided_cover(self.surface, self.grid, places)
         undivided = np.ones(len(whole.places), dtype=bool)
         undivided[whole.cells_at(places)] = False
         parts = CellParts.of_two(whole, half, undivided)
         leaves = np.append(self.kept & undivided[whole.owner], np.ones(len(half), dtype=bool))
         chosen = self._one_piece(parts, leaves)
-        cells = parts.chosen(chosen).cells(self.grid)
+        cells = parts.chosen(chosen).cells(self.grid, self.grid.edge / 2.0)
         among = self.kept & ~whole.slight
         parent = np.append(np.arange(len(whole)), parents(whole, half, among))
         parent = (np.cumsum(among) - 1)[parent[chosen & ~parts.slight]]
         return Division(cells, parent, voxels_of_parents(cells, self.cells, parent))
+
+    def _with_guests(self, places: Index) -> Index:
+        """The places and those of parts that cells there have taken in."""
+        parts = CellParts.of_cover(self.cover).chosen(self.kept)
+        host = hosts(parts.faces, parts.slight, parts.volumes)
+        there = np.zeros(len(self.cover.places), dtype=bool)
+        there[self.cover.cells_at(places)] = True
+        guests = parts.slight & (host >= 0) & there[self.cover.owner[self.kept]][host]
+        return np.unique(np.concatenate([places, parts.corner[guests]]), axis=0)
 
     def _one_piece(self, parts: CellParts, leaves: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Those of the `leaves` (p,) that are of the largest piece; the others must be crumbs."""
@@ -170,15 +180,14 @@ class CellParts:
             faces=self.faces.chosen(kept),
         )
 
-    def cells(self, grid: Grid) -> FiniteCells:
-        """The mesh of those that are not slight, on a lattice of these voxels."""
+    def cells(self, grid: Grid, step: float) -> FiniteCells:
+        """The mesh of those that are not slight, by steps [m] from the corner of a lattice."""
         nodes, places = joined_nodes(self.corner, self.span, self.faces, self.slight)
         host = hosts(self.faces, self.slight, self.volumes)
         row, weights = taken_in(self.corner, self.span, host, self.row, self.weights)
         rows, row = np.unique(np.append(0, row[~self.slight]), return_inverse=True)
         is_mixed = bool((self.span > 2).any())
-        edge = grid.edge / 2.0 if is_mixed else grid.edge
-        return assemble_cells(nodes, places, row[1:], weights[rows], grid.origin, edge, is_mixed)
+        return assemble_cells(nodes, places, row[1:], weights[rows], grid.origin, step, is_mixed)
 
 
 def pieces(cover: LatticeCover) -> tuple[NDArray[np.int32], Array]:
