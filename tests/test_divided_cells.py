@@ -13,6 +13,7 @@ from carillon.fem.finite_cells import hanging
 from carillon.fem.finite_cells.build import covering, finite_cells
 from carillon.fem.finite_cells.shapes import shape_functions
 from carillon.fem.geometry import builtin_surface
+from carillon.fem.geometry.fill import Grid
 from carillon.fem.laplacian import laplacian_modes
 from solver.__main__ import main
 from solver.accuracy import solving
@@ -78,7 +79,9 @@ def test_all_divided_are_those_of_the_finer_lattice():
     surface = builtin_surface("bell")
     cover = covering(surface, 8)
     cells = cover.divided(np.unique(cover.cells.grid, axis=0)).cells
-    fine = uniform(finite_cells(surface, 16))
+    nx, ny, nz = (2 * size for size in cover.grid.shape)
+    lattice = Grid(cover.grid.origin, cover.grid.edge / 2.0, (nx, ny, nz))
+    fine = uniform(finite_cells(surface, 16, grid=lattice))
     assert cells.mesh.n_nodes == fine.mesh.n_nodes and not cells.is_mixed
     found, exact = (cut_solids.eigenvalues(model, 14)[6:] for model in (uniform(cells), fine))
     np.testing.assert_allclose(found, exact, rtol=1e-7)
