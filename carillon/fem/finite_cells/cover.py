@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.finite_cells.inside import EMPTY, FULL, SKIPPED, Inside, find_inside
+from carillon.fem.finite_cells.inside import Inside, find_inside
 from carillon.fem.finite_cells.parts import Labels, find_parts, meetings, meetings_of_halves
+from carillon.fem.finite_cells.pieces import EMPTY, FULL, SKIPPED
 from carillon.fem.finite_cells.shapes import octant_weights
 from carillon.fem.finite_cells.weights import weights_of_parts
 from carillon.fem.geometry.fill import Grid

@@ -11,8 +11,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.finite_cells.inside import CUT, FULL, Pieces
 from carillon.fem.finite_cells.lines import LINES
+from carillon.fem.finite_cells.pieces import CUT, FULL, Pieces
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -34,7 +34,7 @@ def find_parts(
     cells : (k, 3)
         Lowest voxels of the cells.
     state : (k, 8)
-        States of their octants, see `carillon.fem.finite_cells.inside`.
+        States of their octants, see `carillon.fem.finite_cells.pieces`.
     pieces
         Of the lines along x, y and z.
 

@@ -6,9 +6,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.finite_cells.inside import CUT, FULL, Pieces
 from carillon.fem.finite_cells.lines import LINES, Spread
 from carillon.fem.finite_cells.parts import Labels, box_bounds
+from carillon.fem.finite_cells.pieces import CUT, FULL, Pieces
 from carillon.fem.finite_cells.shapes import (
     OCTANTS,
     POINT_PLACES,
@@ -41,7 +41,7 @@ def weights_of_parts(
     cells : (k, 3)
         Lowest voxels of the cells.
     state, facing : (k, 8)
-        Of their octants, see `carillon.fem.finite_cells.inside`.
+        Of their octants, see `carillon.fem.finite_cells.inside.Inside`.
     pieces
         Of the lines along x, y and z.
     labels
