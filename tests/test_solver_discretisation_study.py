@@ -10,7 +10,7 @@ import pytest
 
 from carillon.fem.geometry import builtin_surface, hexmesh_from_grid
 from carillon.fem.geometry.fill import Grid
-from solver.accuracy.lattices import cells_on, scaled, voxel_lattice, voxel_mesh
+from solver.accuracy.lattices import covering_on, scaled, voxel_lattice, voxel_mesh
 from solver.accuracy.material import HARMONIC, PlacedMaterial
 from solver.studies.discretisation.truth import SolidTruth
 from solver.studies.discretisation.ways import TimedSpectrum
@@ -39,7 +39,7 @@ def test_voxels_and_cells_lie_on_one_lattice():
     assert np.allclose(mesh.origin, lattice.origin) and mesh.edge == pytest.approx(lattice.edge)
     assert (mesh.grid.max(axis=0) < lattice.shape).all()
     assert all(size % 4 == 0 for size in lattice.shape)
-    half = cells_on(surface, scaled(lattice, 0.5), "error", "bell")
+    half = covering_on(surface, scaled(lattice, 0.5), "error", "bell").cells
     assert np.allclose(half.mesh.origin, lattice.origin)
     assert half.mesh.edge == pytest.approx(2.0 * lattice.edge)
 
@@ -110,6 +110,7 @@ def test_every_way_is_rated_against_both_truths(plate):
         "coarse",
         "refined",
         "half-cells",
+        "half-cells-divided",
         "half-cells-harmonic",
         "cells",
     ]

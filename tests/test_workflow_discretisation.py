@@ -68,7 +68,7 @@ def study(tmp_path) -> DiscretisationStudy:
 
 def test_errors_are_pooled_by_material_and_way(study):
     rows = summary(study).rows
-    assert len(rows) == 5 + 6
+    assert len(rows) == 6 + 7
     voxels, coarse = rows[:2]
     assert voxels["material"] == "smooth" and voxels["way"] == "Voxels"
     assert voxels["solid_rms"] == pytest.approx(((0.03**2 + 0.04**2) / 2) ** 0.5)
@@ -80,7 +80,7 @@ def test_errors_are_pooled_by_material_and_way(study):
 
 def test_every_case_has_a_row_a_way(study):
     rows = cases(study).rows
-    assert len(rows) == 2 * (5 + 6)
+    assert len(rows) == 2 * (6 + 7)
     assert {row["name"] for row in rows if row["material"] == "noise"} == set(WAYS)
     assert (rows[0]["seconds"], rows[0]["seconds_min"], rows[0]["seconds_max"]) == (1.0, 0.9, 1.2)
     assert rows[0]["unknowns"] == 1000 and rows[0]["solid_rms"] == 0.03

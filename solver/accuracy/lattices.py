@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from carillon.fem.finite_cells.build import finite_cells
-from carillon.fem.finite_cells.cells import FiniteCells
+from carillon.fem.finite_cells.build import covering
+from carillon.fem.finite_cells.covering import Covering
 from carillon.fem.geometry import HexMesh, hexmesh_from_voxels, voxelize
 from carillon.fem.geometry.fill import Grid, bounding_grid
 
@@ -46,7 +46,7 @@ def voxel_mesh(surface: trimesh.Trimesh, resolution: int, components: str, name:
     return hexmesh_from_voxels(voxelize(surface, resolution, components=components, name=name))
 
 
-def cells_on(surface: trimesh.Trimesh, lattice: Grid, components: str, name: str) -> FiniteCells:
+def covering_on(surface: trimesh.Trimesh, lattice: Grid, components: str, name: str) -> Covering:
     """Finite cells on a lattice, see `carillon.fem.finite_cells.build.finite_cells`."""
     longest = float(np.ptp(surface.bounds, axis=0).max())
-    return finite_cells(surface, round(longest / lattice.edge), components, name, lattice)
+    return covering(surface, round(longest / lattice.edge), components, name, lattice)

@@ -11,7 +11,7 @@ from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.geometry import load_surface, surface_name
 from carillon.fem.model import RIGID_MODES
 from solver.accuracy.estimate import estimate_cell_errors
-from solver.accuracy.lattices import cells_on, voxel_lattice
+from solver.accuracy.lattices import covering_on, voxel_lattice
 from solver.accuracy.material import INTERPOLATED, PlacedMaterial
 from solver.analysis.problem import Problem, ProblemOptions
 from solver.refinement.errors import ExpectedErrors
@@ -42,7 +42,8 @@ class Reference:
         """
         surface = load_surface(described.mesh, described.unit)
         lattice = voxel_lattice(surface, described.resolution)
-        cells = cells_on(surface, lattice, "largest", surface_name(described.mesh))
+        name = surface_name(described.mesh)
+        cells = covering_on(surface, lattice, "largest", name).cells
         gradual = described.material in INTERPOLATED
         material = PlacedMaterial.of_voxels(lattice, problem.fine, problem.young, gradual)
         young = material.on(cells.mesh)

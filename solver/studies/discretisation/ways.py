@@ -5,24 +5,26 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.fem.finite_cells.model import finite_cell_model
+from carillon.fem.finite_cells.covering import Covering
+from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.geometry import HexMesh
-from carillon.fem.model import Constants, ElasticModel, Solid, fine_model
-from solver.accuracy.lattices import cells_on, scaled, voxel_mesh
+from carillon.fem.model import Constants, Solid, fine_model
+from solver.accuracy.divide import DividedCells
+from solver.accuracy.lattices import covering_on, scaled, voxel_mesh
 from solver.accuracy.material import ARITHMETIC, HARMONIC, PlacedMaterial
 from solver.analysis.modal_solver import Modes, modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.model import build_model
 from solver.files.modes_file import CHECKS, frequencies
-from solver.refinement.options import ALLOWED_ERROR
-from solver.refinement.refine import RefinedModel, solve_refined
+from solver.refinement.options import ALLOWED_DISTANCE, ALLOWED_ERROR
+from solver.refinement.refine import Refinable, RefinedModel, solve_refined
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
     import trimesh
@@ -105,6 +107,7 @@ class Ways:
             "coarse": self.coarse,
             "refined": self.refined,
             "half-cells": lambda: self.cells(0.5),
+            "half-cells-divided": lambda: self.divided(0.5),
         }
         if not self._given.material.interpolated:
             ways["half-cells-harmonic"] = lambda: self.cells(0.5, HARMONIC)
@@ -128,17 +131,26 @@ class Ways:
         clock = _Clock()
         mesh, young = self._voxels(clock)
         start = RefinedModel(fine_model(mesh, young, **self._given.constants), self._coarsening)
+        return self._refined(start, ALLOWED_ERROR, clock)
+
+    def divided(self, factor: float) -> TimedSpectrum:
+        """Cells of which some are divided for an expected error of `ALLOWED_DISTANCE`."""
+        clock = _Clock()
+        cover, model = self._cells(factor, ARITHMETIC, clock)
+        return self._refined(DividedCells(cover, model), ALLOWED_DISTANCE, clock)
+
+    def _refined(self, start: Refinable[Any], tolerance: float, clock: _Clock) -> TimedSpectrum:
         clock.end("model")
         checks = 0.0
 
-        def solve(model: ElasticModel | None) -> Modes:
+        def solve(model: Solid | None) -> Modes:
             nonlocal checks
             assert model is not None
             modes = self._modes_of(model)
             checks += _checks(modes)
             return modes
 
-        model, modes, _ = solve_refined(solve, start, ALLOWED_ERROR, MPI.COMM_SELF)
+        model, modes, _ = solve_refined(solve, start, tolerance, MPI.COMM_SELF)
         clock.end("solve", checks)
         assert model is not None
         return _spectrum(model, modes, clock)
@@ -148,14 +160,21 @@ class Ways:
 
         Where one joins several, it has the mean of their moduli, see `PlacedMaterial.on`.
         """
-        given, clock = self._given, _Clock()
+        clock = _Clock()
+        return self._solved(self._cells(factor, power, clock)[1], clock)
+
+    def _cells(
+        self, factor: float, power: float, clock: _Clock
+    ) -> tuple[Covering, FiniteCellModel]:
+        given = self._given
         lattice = scaled(given.material.lattice, factor)
-        cells = cells_on(given.surface, lattice, given.components, given.name)
+        cover = covering_on(given.surface, lattice, given.components, given.name)
+        mesh = cover.cells.mesh
         clock.end("mesh")
-        young = given.material.on(cells.mesh, power)
+        young = given.material.on(mesh, power)
         clock.end("material")
         poisson, density = given.constants["poisson"], given.constants["density"]
-        return self._solved(finite_cell_model(cells, young, poisson, density), clock)
+        return cover, finite_cell_model(cover.cells, young, poisson, density)
 
     def _voxels(self, clock: _Clock) -> tuple[HexMesh, Array]:
         given = self._given

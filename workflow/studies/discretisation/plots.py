@@ -18,6 +18,7 @@ COLOUR = {
     "coarse": COLOURS["ddfem_hcms_ec"],
     "refined": COLOURS["random"],
     "half-cells": COLOURS["ddfem_hcms_ec_accurate"],
+    "half-cells-divided": COLOURS["ddfem_slepc"],
     "half-cells-harmonic": COLOURS["hcms"],
     "cells": COLOURS["hcms_ec"],
 }

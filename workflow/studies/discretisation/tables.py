@@ -19,6 +19,7 @@ WAYS = {
     "coarse": "DDFEM* of voxels",
     "refined": "DDFEM*, refined",
     "half-cells": "Finite cells, half as fine",
+    "half-cells-divided": "Half as fine, some divided",
     "half-cells-harmonic": "Half as fine, harmonic means",
     "cells": "Finite cells",
 }
