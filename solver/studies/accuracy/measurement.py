@@ -10,8 +10,9 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.fem.finite_cells.model import finite_cell_model
+from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.model import Solid, fine_model
+from solver.accuracy.estimate import estimate_cell_errors
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import DISCRETISATIONS, ProblemOptions, discretised
@@ -35,6 +36,8 @@ class Spectrum:
         Of the model.
     build_seconds, solve_seconds
         Wall time from the surface to the mesh, and from there to the eigenvalues.
+    expected
+        Root mean square error that finite cells expect of themselves.
     """
 
     values: Array
@@ -42,6 +45,7 @@ class Spectrum:
     unknowns: int
     build_seconds: float
     solve_seconds: float
+    expected: float | None = None
 
 
 def cells(surface: trimesh.Trimesh, name: str, spacing: float, kind: str, modes: int) -> Spectrum:
@@ -59,10 +63,15 @@ def cells(surface: trimesh.Trimesh, name: str, spacing: float, kind: str, modes:
     model = _model(surface, ProblemOptions(name, resolution, discretisation=kind))
     built = time.perf_counter()
     found = modal_analysis(model, SolverOptions(modes=modes), MPI.COMM_SELF)
-    values, unknowns = found.values, found.system.n_dofs
-    found.system.destroy()
     seconds = time.perf_counter() - built
-    return Spectrum(values, longest / resolution, unknowns, built - begin, seconds)
+    expected = None
+    if isinstance(model, FiniteCellModel):
+        vectors = found.system.gather(found.vectors)
+        assert vectors is not None
+        expected = estimate_cell_errors(model, found.values, vectors).errors.rms
+    found.destroy()
+    spacing = longest / resolution
+    return Spectrum(found.values, spacing, model.n_dofs, built - begin, seconds, expected)
 
 
 def _model(surface: trimesh.Trimesh, options: ProblemOptions) -> Solid:

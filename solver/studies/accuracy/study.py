@@ -154,6 +154,7 @@ def _rated(results: Sequence[Spectrum | str], exact: Array) -> dict[str, Any]:
         **seconds,
         "seconds": sum(seconds.values()),
         "rms": errors.rms,
+        "expected": spectra[0].expected,
         "worst": errors.worst,
         "worst_mode": errors.worst_mode,
     }
@@ -222,7 +223,8 @@ def as_text(result: dict[str, Any]) -> str:
         lines += [
             "",
             f"{reference['title']}; reference to {reference['change']:.0e}",
-            f"{'':<21}{'spacing':>9}{'unknowns':>10}{'build':>8}{'solve':>8}{'rms':>9}{'worst':>9}",
+            f"{'':<21}{'spacing':>9}{'unknowns':>10}{'build':>8}{'solve':>8}{'rms':>9}{'worst':>9}"
+            f"{'expected':>10}",
         ]
         lines += [_line(level) for level in result["levels"] if level["solid"] == name]
         rows = [row for row in result["summary"] if row["solid"] == name]
@@ -240,9 +242,10 @@ def _line(level: dict[str, Any]) -> str:
     start = f"{level['discretisation']:<21}{1e3 * level['spacing']:6.1f} mm"
     if "problem" in level:
         return f"{start}  {level['problem']}"
+    expected = f"{level['expected']:10.2%}" if level.get("expected") is not None else ""
     return (
         f"{start}{level['unknowns']:10,}{level['build_seconds']:8.2f}{level['solve_seconds']:8.2f}"
-        f"{level['rms']:9.2%}{level['worst']:+9.2%}"
+        f"{level['rms']:9.2%}{level['worst']:+9.2%}{expected}"
     )
 
 
