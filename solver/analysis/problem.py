@@ -23,6 +23,7 @@ from dataset_gen.objectives import DEFAULT_OBJECTIVE, OBJECTIVES
 from solver.coarsening.choice import METHODS as COARSENINGS
 from solver.coarsening.choice import make_coarsening
 from solver.coarsening.coarsening import Coarsening
+from solver.coarsening.forest import FOREST
 from solver.coarsening.model import build_model
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
@@ -33,6 +34,8 @@ if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
 Array = NDArray[np.float64]
 
 DISCRETISATIONS = ("voxel", "finite-cell")
+AUTO = "auto"
+"""Coarsening that suits the discretisation."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +51,11 @@ class ProblemOptions:
         f"{', '.join(materials.NAMES)}, or a file with one Young's modulus [Pa] per voxel",
         metavar="NAME|FILE",
     )
-    coarsen: str = option("none", "coarsening of the blocks", choices=COARSENINGS)
+    coarsen: str = option(
+        "none",
+        f"coarsening of the blocks; {AUTO} is {FOREST} of voxels and none of finite cells",
+        choices=(AUTO, *COARSENINGS),
+    )
     forest: str | None = option(
         None, "forests for --coarsen ddfem (HDF5; default: those of the package)", metavar="FILE"
     )
@@ -72,6 +79,11 @@ class ProblemOptions:
         "of random materials, the partition, and the vectors that slepc and arpack start from",
         type=whole_number(0),
     )
+
+    def __post_init__(self) -> None:
+        if self.coarsen == AUTO:
+            suits = FOREST if self.discretisation == "voxel" else "none"
+            object.__setattr__(self, "coarsen", suits)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain dictionary, for provenance."""

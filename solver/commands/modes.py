@@ -103,6 +103,7 @@ def run(arguments: argparse.Namespace) -> None:
                 described, accuracy.accuracy, solve, wishes, comm, _report
             )
             arguments.resolution = described.resolution
+        arguments.coarsen = described.coarsen
         problem, model, result = solved.problem, solved.model, solved.modes
         attributes: dict[str, Any] = {}
         if problem is not None:

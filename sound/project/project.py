@@ -11,7 +11,6 @@ from carillon.documents import read_yaml
 from carillon.errors import UserError
 from carillon.fem.geometry.surface import BUILTIN_PREFIX
 from solver.analysis.problem import ProblemOptions
-from solver.coarsening.forest import FOREST
 from sound.project.schema import check, project_schema, with_defaults
 from sound.strikes import Place, Strike, locate_all
 from sound.surface import struck_surface
@@ -31,8 +30,6 @@ _SOLID = (
     "forest",
     "discretisation",
 )
-AUTO = "auto"
-"""Coarsening that the discretisation chooses."""
 LEAST_WEIGHT = 1e-12
 """Of frequencies or of amplitudes: what is smaller leaves a search with nothing to lower."""
 
@@ -165,8 +162,6 @@ def project_of(described: Mapping[str, Any], folder: Path) -> Project:
         solid["mesh"] = str(folder / solid["mesh"])
     if solid["forest"] is not None:
         solid["forest"] = str(folder / solid["forest"])
-    if solid["coarsen"] == AUTO:
-        solid["coarsen"] = FOREST if solid["discretisation"] == "voxel" else "none"
     return Project(
         ProblemOptions(**solid),
         filled["modes"],
