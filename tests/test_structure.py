@@ -74,7 +74,7 @@ ARROWS = {
     #
     "sound": "",
     "sound.clips": "sound",
-    "sound.project": "solver.coarsening solver.files solver.analysis sound sound.clips",
+    "sound.project": "solver.files solver.analysis sound sound.clips",
     "sound.design": """solver.coarsening solver.files solver.response solver.linear solver.subspace
         solver.analysis sound sound.clips sound.project""",
     "sound.rendering": "solver.files solver.response solver.subspace sound.project",
