@@ -17,7 +17,7 @@ Index = NDArray[np.int64]
 
 REMAINING = 0.7
 """Share of the allowed error that cells are divided for."""
-MOST_DIVIDED = 0.1
+MOST_DIVIDED = 0.15
 """Share of the cells up to which dividing some is worth more than a finer lattice."""
 MOST_STEPS = 3
 """Times that cells are divided at most."""
