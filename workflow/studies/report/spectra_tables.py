@@ -10,8 +10,8 @@ from workflow.studies.base.conditions import NOT_TIMED, ONE_COLD_RUN, measured
 from workflow.studies.base.entry import Row
 from workflow.studies.report.results import Run, precomputation_seconds, records, solve_seconds
 from workflow.variants import COARSENED as COARSENED
-from workflow.variants import SHOWN as SHOWN
 from workflow.variants import FROM_SOLID, TRUTH, VARIANTS
+from workflow.variants import SHOWN as SHOWN
 
 FAST = "ddfem_hcms_ec"
 TIMED = (TRUTH, "ddfem_slepc", "hcms", "hcms_ec", FAST)

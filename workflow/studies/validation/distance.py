@@ -15,7 +15,7 @@ MODELS = {"voxel": "voxels", "finite-cell": "finite cells"}
 
 
 def distance_in_words(evidence: Evidence) -> dict[str, str]:
-    """What is `told` of the distance, in a `word` as well; its `meaning`, and how to come `closer`."""
+    """What is `told` of the distance, and in a `word`; its `meaning`, and how to come `closer`."""
     discretisation, distance = evidence.settings["discretisation"], evidence.distance
     names: dict[str, Any] = {"model": MODELS[discretisation]}
     if distance:
