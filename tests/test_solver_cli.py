@@ -48,6 +48,8 @@ def test_modes_file_is_complete(modes_file):
     assert file.attributes["method"] == "hcms"
     assert file.attributes["density"] == 1000.0
     assert set(file.attributes["timings"]) >= {"mesh", "material", "assembly", "hcms", "correction"}
+    assert 0.0 < file.attributes["solid_frequency_error_rms"] < 1.0
+    assert "estimate" in file.attributes["timings"]
     assert set(file.provenance) >= {"commit", "config_hash", "command", "versions", "blas"}
     with h5py.File(modes_file) as raw:
         assert raw["nodes"].attrs["units"] == "m"

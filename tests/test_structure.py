@@ -87,8 +87,8 @@ ARROWS = {
     "workflow.estimate": "dataset_gen.objectives workflow",
     "workflow.studies.base": "solver.response workflow",
     "workflow.studies": "workflow.studies.base",
-    "workflow.studies.report": """solver.files solver.hcms solver.studies.scaling workflow
-        workflow.studies.base""",
+    "workflow.studies.report": """solver.files solver.hcms solver.refinement
+        solver.studies.scaling workflow workflow.studies.base""",
     "workflow.studies.figures": "workflow.studies.base workflow.studies.report",
     "workflow.studies.forests": """dataset_gen.objectives workflow.studies.base
         workflow.studies.report""",
@@ -99,8 +99,8 @@ ARROWS = {
     "workflow.studies.accuracy": "workflow.studies.base",
     "workflow.studies.sounds": """solver.files solver.response sound sound.clips sound.project
         sound.design sound.rendering workflow workflow.studies.base""",
-    "workflow.studies.validation": """solver.files solver.response solver.studies workflow
-        workflow.studies.base workflow.studies.report""",
+    "workflow.studies.validation": """solver.files solver.refinement solver.response
+        solver.studies workflow workflow.studies.base workflow.studies.report""",
     "workflow.studies.comparison": "workflow workflow.studies.base",
     "workflow.commands": """dataset_gen.objectives solver.coarsening solver.response
         solver.analysis workflow workflow.studies.base workflow.studies.comparison workflow.estimate

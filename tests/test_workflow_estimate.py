@@ -210,6 +210,17 @@ def test_the_serial_share_decides_what_more_cores_are_worth(config):
         assert hours[1] == pytest.approx((share + (1.0 - share) / 4.0) * hours[0])
 
 
+def test_the_distance_from_the_solid_costs_what_its_exponent_says(config):
+    laws = copy.deepcopy(load_rates()["laws"])
+    law = laws["find_modes hcms_ec"]["seconds"]
+    power = law["powers"].pop("estimate")
+    jobs = [jobs_of(config, "find_modes", rates=rates) for rates in (None, rated(laws=laws))]
+    told, plain = (
+        each[each["variant"] == "hcms_ec"]["hours"] - law["start"] / HOUR for each in jobs
+    )
+    assert told.to_numpy() == pytest.approx(2.0**power * plain.to_numpy())
+
+
 def test_jobs_are_those_of_the_rules(configs, tmp_path):
     file = CONFIGURATIONS / "tiny.yaml"
     done = snakemake(tmp_path, "all", "figures", "-n", "--cores", 2, "--configfile", file)

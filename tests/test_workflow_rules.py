@@ -41,6 +41,24 @@ def test_a_bad_value_on_the_command_line_stops_the_run_with_a_sentence(tmp_path)
     assert "Traceback" not in output
 
 
+def test_one_variant_of_a_model_tells_its_distance_and_all_have_one_mesh(tmp_path):
+    config = tmp_path / "config.yaml"
+    config.write_text(
+        "models:\n"
+        "  bar: {mesh: 'builtin:bar', resolution: 16}\n"
+        "  bell: {mesh: 'builtin:bell', resolution: 16, discretisation: finite-cell}\n"
+    )
+    options = ("-n", "-p", "--cores", 2, "--configfile", config)
+    done = snakemake(tmp_path, "validation", *options)
+    assert done.returncode == 0, done.stdout + done.stderr
+    runs = [line.split() for line in done.stdout.splitlines() if "-m solver modes" in line]
+    telling = {run[run.index("--out") + 1] for run in runs if "--no-estimate" not in run}
+    assert telling == {f"results/models/{model}/hcms_ec.h5" for model in ("bar", "bell")}
+    assert sum("--estimate" in run for run in runs) == 1
+    undivided = ["--refine-to 0 " in " ".join(run) for run in runs]
+    assert undivided == ["builtin:bell" in run for run in runs] and sum(undivided) == 3
+
+
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_ranks_get_a_launcher_only_where_there_are_several(tmp_path, ranks):
     config = tmp_path / "config.yaml"

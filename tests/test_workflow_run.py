@@ -159,6 +159,8 @@ def test_spectra_satisfy_what_the_page_claims(results):
     for row in summary:
         # The tolerance of 1e-7 is on the solver's own estimate of the error.
         assert row["hcms_ec_error"] < 1e-6 < row["hcms_error"]
+        told = results / "validation" / "tables" / f"{row['model']}-solid.json"
+        assert read_table(told).rows[0]["rms"] == row["solid_error"] > 0.0
         if DISCRETISED[row["model"]] == "voxel":
             assert row["coarse_unknowns"] < row["unknowns"]
         else:

@@ -7,6 +7,7 @@ import re
 import shutil
 from dataclasses import asdict
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from workflow.__main__ import main
 from workflow.studies.base.table import read_table
 from workflow.studies.catalogue import VALIDATION
 from workflow.studies.validation.criteria import Criterion
+from workflow.studies.validation.distance import distance_in_words
 from workflow.studies.validation.evidence import Evidence
 from workflow.studies.validation.page import page as rendered
 from workflow.variants import SHOWN
@@ -86,6 +88,15 @@ def test_a_good_spectrum_passes_in_words(run, page):
 
 
 @pytest.mark.slow
+def test_the_distance_from_the_solid_is_told_and_not_judged(run, page):
+    (row,) = read_table(run / "validation" / "tables" / "block-solid.json").rows
+    assert 0.0 < row["rms"] < abs(row["worst"]) < 1.0 and row["modes"] == "7–24"
+    text = words_of(page)
+    assert "How close is the model to the solid?" in text and "told and not judged" in text
+    assert row["told"] in text and "--discretisation finite-cell" in text
+
+
+@pytest.mark.slow
 def test_page_needs_nothing_from_elsewhere_and_can_be_heard(page):
     assert_self_contained(page)
     assert page.source.count("data:audio/wav;base64,") == len(SHOWN)
@@ -132,12 +143,14 @@ def test_a_mode_that_is_missing_fails_in_words(run, tmp_path):
     candidates = {variant: paths[variant] for variant in SHOWN[1:]}
     write_response(folder / "response.h5", respond(paths["truth"], candidates, StrikeOptions()), {})
     evidence = Evidence(tmp_path / "spoiled", "block")
+    evidence.tolerances["solid_rms"] = 1e-9
     tables = {name: make(evidence) for name, make in VALIDATION.entries.items()}
     html = rendered(evidence, tables)
     (tmp_path / "page.html").write_text(html)
     text = words_of(Page(tmp_path / "page.html"))
     missed = {row["key"] for row in tables["criteria"].rows if row["verdict"] == "missed"}
-    assert {"eigenvalue_error", "subspace_angle", "response", "counted"} <= missed
+    assert {"eigenvalue_error", "subspace_angle", "response", "counted", "solid_rms"} <= missed
+    assert "solid_worst" not in missed and "not close enough" in text
     assert "Failed:" in text and "not the same" in text
     assert "Do not rely on HCMS + EC for this solid and material" in text
 
@@ -147,6 +160,14 @@ def test_what_was_not_found_or_is_no_number_does_not_pass():
         assert not Criterion("truth", "key", "label", value, 1.0, "small", "why", "file").passed
     six = Criterion("truth", "rigid", "label", 7, 6, "count", "why", "file", exact=True)
     assert not six.passed and six.row["required"] == "6" and six.row["verdict"] == "missed"
+
+
+@pytest.mark.parametrize("discretisation", ["voxel", "finite-cell"])
+def test_a_distance_that_nobody_could_tell_is_said_to_be_unknown(discretisation):
+    settings = {"discretisation": discretisation}
+    words = distance_in_words(SimpleNamespace(settings=settings, distance={}))
+    assert words["word"] == "not known" and "could not be told" in words["told"]
+    assert ("--discretisation" in words["closer"]) == (discretisation == "voxel")
 
 
 @pytest.mark.parametrize(

@@ -53,6 +53,9 @@ CANDIDATES = tuple(name for name in VARIANTS if name != TRUTH)
 SHOWN = (TRUTH, "hcms", "hcms_ec", "ddfem_hcms_ec")
 """Variants whose modes are drawn and whose frequencies are listed."""
 
+FROM_SOLID = "hcms_ec"
+"""Variant that tells how far the model is from the solid."""
+
 COARSENED = {
     "average_hcms_ec": "average",
     "galerkin_hcms_ec": "Galerkin",

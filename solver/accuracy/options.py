@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from carillon.arguments import number_between
+from carillon.errors import UserError
 from carillon.options import option
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
@@ -32,8 +33,16 @@ class DistanceOptions:
     )
 
     def is_estimated(self, solid: ProblemOptions, solver: SolverOptions) -> bool:
-        """Whether the distance from the solid is estimated."""
+        """Whether the distance from the solid is estimated.
+
+        Raises
+        ------
+        UserError
+            If it is not to be, and an accuracy is asked for.
+        """
         if self.accuracy is not None:
+            if self.estimate is False:
+                raise UserError("--accuracy goes by the estimate: leave out --no-estimate")
             return True
         if self.estimate is not None:
             return self.estimate

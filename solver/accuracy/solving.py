@@ -18,11 +18,9 @@ from solver.analysis.modal_solver import Modes
 from solver.analysis.problem import Problem, ProblemOptions, build_problem
 from solver.distribution.collective import bcast_from_root, compute_on_root
 from solver.files.modes_file import read_modes
-from solver.refinement.errors import LAST, ExpectedErrors
+from solver.refinement.errors import FROM_FINE, FROM_SOLID, LAST, ExpectedErrors
 from solver.refinement.refine import Refinable, RefinedModel, RefinementStep, solve_refined
 
-FROM_FINE, FROM_SOLID = "expected_frequency_error", "solid_frequency_error"
-"""Attributes that tell errors against the fine voxels and against the solid."""
 MOST_UNKNOWNS = 400_000
 """Unknowns from which no finer lattice is tried."""
 LEAST_STEP, LARGEST_STEP = 1.2, 2.0

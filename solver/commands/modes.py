@@ -23,15 +23,15 @@ from carillon.fem.model import Solid
 from carillon.options import add_options, collect
 from carillon.progress import say
 from solver.accuracy.options import FIRST_RESOLUTION, DistanceOptions
-from solver.accuracy.solving import FROM_FINE, FROM_SOLID, Wishes, solve_accurately, solve_solid
+from solver.accuracy.solving import Wishes, solve_accurately, solve_solid
 from solver.analysis.modal_solver import ModalSolver, Modes
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import Problem, ProblemOptions
 from solver.commands.running import add_solid, on_ranks, parameters, require_outputs
 from solver.files.initial_modes import modes_from_file
-from solver.files.modes_file import frequencies, write_modes
+from solver.files.modes_file import ESTIMATE, frequencies, write_modes
 from solver.linear import petsc_options
-from solver.refinement.errors import in_words
+from solver.refinement.errors import FROM_FINE, FROM_SOLID, in_words
 from solver.refinement.options import RefinementOptions
 from solver.refinement.refine import RefinementStep
 
@@ -111,7 +111,8 @@ def run(arguments: argparse.Namespace) -> None:
                 # What was solved on the way, and estimated.
                 told = sum(problem.seconds.values()) + sum(result.seconds.values())
                 rest = max(time.perf_counter() - begin - told, 0.0)
-                result.seconds = {"refinement": rest, **result.seconds}
+                refined = refine_to is not None or accuracy.accuracy is not None
+                result.seconds["refinement" if refined else ESTIMATE] = rest
             attributes = _attributes(arguments, problem, result, solved.achieved)
 
         def write(blocks: Iterator[NDArray[np.float64]]) -> None:

@@ -25,7 +25,9 @@ Array = NDArray[np.float64]
 
 KIND = "modes"
 SCHEMA = 1
-CHECKS = ("inertia", "completion", "verification")
+ESTIMATE = "estimate"
+"""Phase that tells how far frequencies are from the solid's."""
+CHECKS = ("inertia", "completion", "verification", ESTIMATE)
 """Phases that check modes, and find those that the check misses; no method is charged for them."""
 ROUNDING = 1e-6
 """Of the largest eigenvalue: what those of rigid motions may be below zero."""

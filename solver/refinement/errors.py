@@ -16,6 +16,9 @@ FIRST = RIGID_MODES + 1
 """Number of the first mode whose error is estimated."""
 LAST = 60
 """Number of the last one."""
+FROM_FINE, FROM_SOLID = "expected_frequency_error", "solid_frequency_error"
+"""What the names of attributes begin with that tell errors against the fine voxels and against the
+solid."""
 WORST = 3.0
 """The worst frequency may be off by so many times what their root mean square may."""
 

@@ -20,7 +20,7 @@ hostile("no such command, megabytes", ["x" * 100_000])
 hostile("no such option", f"{MODES} --fast", "--fast")
 hostile("option cut short to several", f"{MODES} --in mumps")
 hostile("no mesh", "modes --resolution 4 --out out.h5", "mesh")
-hostile("no resolution", f"modes builtin:box {OUT}", "--resolution")
+hostile("no resolution", f"modes builtin:box {OUT}", "--resolution", "--accuracy")
 hostile("no out", BOX, "--out")
 hostile("a line break in an option", [*BOX.split(), "--out", "out.h5", "--fa\nst"])
 hostile("an escape sequence in an option", [*BOX.split(), "--out", "out.h5", "--\x1b[2Jfast"])
@@ -119,6 +119,22 @@ each(
     ["", "cube", "block,", "block,,plate", "../block"],
     "solids",
 )
+each(
+    "accuracy",
+    "modes builtin:box --resolution 4 --modes 12 --accuracy VALUE --out out.h5",
+    [*NO_NUMBERS, "0", "-0.1", "1.1", "1e-300"],
+    "--accuracy",
+)
+hostile("accuracy without an estimate", f"{MODES} --accuracy 0.1 --no-estimate", "--no-estimate")
+hostile("estimate of a value", f"{MODES} --estimate=0.1", "--estimate")
+each(
+    "error of modes refined to",
+    f"{MODES} --coarsen average --refine-to VALUE",
+    ["", "-0.1", "nan", "inf", "11"],
+    "--refine-to",
+)
+hostile("voxels that are refined", f"{MODES} --refine-to 0.1", "--refine-to", "--coarsen")
+hostile("voxels that are refined to nothing", f"{MODES} --refine-to 0", "--refine-to", "--coarsen")
 each(
     "error refined to",
     "coarsening builtin:box --resolution 4 --refine-to VALUE",

@@ -114,11 +114,15 @@ def run(arguments: argparse.Namespace) -> int:
     say(size)
     _run_rules(folder, arguments.cores)
     page = folder / "validation" / f"{name}.html"
-    criteria = read_table(folder / "validation" / "tables" / f"{name}-criteria.json").rows
+    criteria, told = (
+        read_table(folder / "validation" / "tables" / f"{name}-{table}.json").rows
+        for table in ("criteria", "solid")
+    )
     missed = [row for row in criteria if row["verdict"] != "met"]
     print(headline(len(criteria), len(missed)))
     for row in missed:
         print(f"  {row['label']}: {row['shown']}, required {row['required']}")
+    print(told[0]["told"])
     print(page)
     return FAILED if missed else 0
 

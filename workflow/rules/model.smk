@@ -53,8 +53,18 @@ def variant_arguments(wildcards, input):
     return [
         *options({"coarsen": variant.coarsen, "method": variant.method}),
         *forest_argument(wildcards, input),
+        *distance_arguments(wildcards),
         *(hcms_arguments(variant.corrected) if variant.method == "hcms" else []),
     ]
+
+
+def distance_arguments(wildcards):
+    """Whether the distance from the solid is told; finite cells are those of all variants."""
+    cells = config["models"][wildcards.model]["discretisation"] != "voxel"
+    told = wildcards.variant == variants.FROM_SOLID
+    # Finite cells tell it by themselves, at hardly a cost; voxels need a second solve.
+    how = {"estimate": told and not cells, "no_estimate": not told}
+    return options(how | {"refine_to": 0 if cells else None})
 
 
 def hcms_arguments(corrected):

@@ -61,6 +61,7 @@ rule validate_model:
             catalogue.VALIDATION, f"{VALIDATION}/{{model}}.html", "Validation", model="{model}"
         ),
         criteria=f"{VALIDATION}/tables/{{model}}-criteria.json",
+        solid=f"{VALIDATION}/tables/{{model}}-solid.json",
     log:
         f"{LOGS}/validation/{{model}}.log",
     localrule: True

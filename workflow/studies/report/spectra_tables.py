@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from carillon.fem.model import RIGID_MODES
+from solver.refinement.errors import FROM_SOLID as DISTANCE
 from workflow.studies.base.conditions import NOT_TIMED, ONE_COLD_RUN, measured
 from workflow.studies.base.entry import Row
 from workflow.studies.report.results import Run, precomputation_seconds, records, solve_seconds
 from workflow.variants import COARSENED as COARSENED
+from workflow.variants import FROM_SOLID, TRUTH, VARIANTS
 from workflow.variants import SHOWN as SHOWN
-from workflow.variants import TRUTH, VARIANTS
 
 FAST = "ddfem_hcms_ec"
 TIMED = (TRUTH, "ddfem_slepc", "hcms", "hcms_ec", FAST)
@@ -38,6 +39,7 @@ def summary(run: Run) -> Iterator[Row]:
             "modes": len(spectra[TRUTH].eigenvalues),
             "hcms_error": compared["hcms"]["eigenvalue_relative_error"]["max"],
             "hcms_ec_error": compared["hcms_ec"]["eigenvalue_relative_error"]["max"],
+            "solid_error": spectra[FROM_SOLID].attributes.get(f"{DISTANCE}_rms"),
             "truth_seconds": truth,
         }
         if FAST in spectra:

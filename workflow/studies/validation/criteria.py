@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,10 +15,13 @@ from solver.files.modes_file import frequencies
 from solver.studies.comparison import AUDIBLE_FIRST, AUDIBLE_LAST
 from workflow.studies.base.numbers import show
 from workflow.studies.report.findings import headline
+from workflow.studies.validation.distance import distance_in_words
 from workflow.studies.validation.evidence import COARSENED, SOLVED, Evidence
 from workflow.variants import TRUTH
 
 TEXTS: dict[str, Any] = read_own_yaml(Path(__file__).with_name("criteria.yaml"))
+SOLID = "solid"
+"""Group of what is asked about the solid itself."""
 Limited = tuple[float | None, float]
 """What was found, and its limit."""
 
@@ -90,6 +93,7 @@ def judge(evidence: Evidence) -> list[Criterion]:
         *_solver(evidence),
         *_spectrum(evidence, SOLVED, limits["residual"]),
         *(_of_coarsened(evidence) if COARSENED in evidence.shown else ()),
+        *_from_solid(evidence),
     ]
 
 
@@ -135,6 +139,19 @@ def _coarsening(evidence: Evidence) -> Iterator[Criterion]:
     return _criteria(evidence, "coarsening", COARSENED, limited, modes=modes)
 
 
+def _from_solid(evidence: Evidence) -> Iterator[Criterion]:
+    """Of what has a limit; the rest is told only."""
+    distance = evidence.distance
+    found = {f"solid_{key}": abs(distance[key]) if distance else None for key in ("rms", "worst")}
+    limited = {
+        key: (value, evidence.tolerances[key])
+        for key, value in found.items()
+        if evidence.tolerances[key] is not None
+    }
+    first, last = distance.get("modes", (AUDIBLE_FIRST, AUDIBLE_LAST))
+    return _criteria(evidence, SOLID, SOLID, limited, modes=f"modes {first}–{last}")
+
+
 def _criteria(
     evidence: Evidence, part: str, variant: str, values: dict[str, Limited], **names: str
 ) -> Iterator[Criterion]:
@@ -144,6 +161,7 @@ def _criteria(
         "audit": evidence.file("audit.json"),
         "comparison": evidence.file(f"{variant}.comparison.json"),
         "response": evidence.file("response.h5"),
+        "solved": evidence.file(f"{SOLVED}.h5"),
     }
     for key, (value, limit) in values.items():
         texts = {name: text.format(**names) for name, text in TEXTS[part][key].items()}
@@ -151,28 +169,32 @@ def _criteria(
         yield Criterion(variant, key, found=value, limit=limit, exact=exact, **texts)
 
 
-def verdict(criteria: Sequence[Criterion]) -> dict[str, Any]:
+def verdict(evidence: Evidence) -> dict[str, Any]:
     """Judgement of a model from all of its criteria.
 
     Returns
     -------
     dict[str, Any]
         Whether it `passed`; the `headline`; `advice` on what may be relied on; and the `parts`, one
-        for each group: `title`, `question`, whether it `passed`, a `word`, a `sentence` and its
-        `criteria`.
+        for each group: `title`, `question`, whether it `passed` (None if it is told only), a
+        `word`, a `sentence` and its `criteria`.
     """
+    criteria = judge(evidence)
     judged = {criterion.group for criterion in criteria}
     parts = [
-        _part(texts, [criterion for criterion in criteria if criterion.group == group])
-        for group, texts in TEXTS["groups"].items()
-        if group in judged
+        *(
+            _part(texts, [criterion for criterion in criteria if criterion.group == group])
+            for group, texts in TEXTS["groups"].items()
+            if group in judged - {SOLID}
+        ),
+        _solid_part(evidence, [criterion for criterion in criteria if criterion.group == SOLID]),
     ]
     trust = "trust" if COARSENED in judged else "trust_fine"
     missed = sum(not criterion.passed for criterion in criteria)
     return {
         "passed": missed == 0,
         "headline": headline(len(criteria), missed),
-        "advice": next((part["doubt"] for part in parts if not part["passed"]), TEXTS[trust]),
+        "advice": next((part["doubt"] for part in parts if part["passed"] is False), TEXTS[trust]),
         "parts": parts,
     }
 
@@ -183,6 +205,14 @@ def _part(texts: dict[str, Any], criteria: list[Criterion]) -> dict[str, Any]:
     sentence = texts["sentence"].format(completeness=_completeness(by_key["counted"]), **by_key)
     judged = {"passed": passed, "word": texts["words"][passed], "sentence": sentence}
     return {**texts, **judged, "criteria": criteria}
+
+
+def _solid_part(evidence: Evidence, criteria: list[Criterion]) -> dict[str, Any]:
+    texts, words = TEXTS["groups"][SOLID], distance_in_words(evidence)
+    passed = all(criterion.passed for criterion in criteria) if criteria else None
+    word = words["word"] if passed is None else texts["words"][passed]
+    judged = {"passed": passed, "word": word, "sentence": words["told"], "criteria": criteria}
+    return {**texts, **judged, "doubt": texts["doubt"].format(**words)}
 
 
 def _completeness(counted: Criterion) -> str:

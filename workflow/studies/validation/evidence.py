@@ -7,10 +7,11 @@ from functools import cached_property
 from typing import Any
 
 from solver.files.modes_file import ModesFile, read_modes
+from solver.refinement.errors import FROM_SOLID as DISTANCE
 from solver.response.response_file import ResponseFile, read_response
 from workflow.studies.base.conditions import Record
 from workflow.studies.report.results import Run
-from workflow.variants import TRUTH
+from workflow.variants import FROM_SOLID, TRUTH
 
 SOLVED, COARSENED = "hcms_ec", "ddfem_hcms_ec"
 """Variants that are judged: the solver on the fine mesh, and on the coarsened one."""
@@ -33,8 +34,8 @@ class Evidence(Run):
         return self.config["models"][self.model]
 
     @property
-    def tolerances(self) -> dict[str, float]:
-        """Limits by name."""
+    def tolerances(self) -> dict[str, Any]:
+        """Limits by name; None of what is told only."""
         return self.config["validation"]["tolerances"]
 
     @cached_property
@@ -43,6 +44,20 @@ class Evidence(Run):
         return {
             variant: read_modes(self.modes_path(self.model, variant), with_modes=False)
             for variant in self.shown_variants(self.model)
+        }
+
+    @property
+    def distance(self) -> dict[str, Any]:
+        """Expected distance of the fine mesh's frequencies from the solid's.
+
+        `rms`, `worst` (with its sign), `worst_mode` and `modes`, the first and last of them; empty
+        if it could not be told.
+        """
+        begin = f"{DISTANCE}_"
+        return {
+            key.removeprefix(begin): value
+            for key, value in self.shown[FROM_SOLID].attributes.items()
+            if key.startswith(begin)
         }
 
     @cached_property

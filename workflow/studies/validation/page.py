@@ -19,7 +19,8 @@ from workflow.studies.base.page import listed_modes, rendered
 from workflow.studies.base.table import Table
 from workflow.studies.report.page import mode_pictures
 from workflow.studies.validation import plots
-from workflow.studies.validation.criteria import judge, verdict
+from workflow.studies.validation.criteria import verdict
+from workflow.studies.validation.distance import distance_in_words
 from workflow.studies.validation.evidence import COARSENED, Evidence
 from workflow.studies.validation.pictures import solid_pictures, struck_picture
 from workflow.variants import TRUTH, VARIANTS
@@ -36,7 +37,8 @@ def page(evidence: Evidence, tables: dict[str, Table]) -> str:
         truth=TRUTH,
         config=evidence.config,
         model=evidence.settings,
-        verdict=verdict(judge(evidence)),
+        verdict=verdict(evidence),
+        distance=distance_in_words(evidence),
         tables=tables,
         listed=listed_modes(tables["errors"].rows),
         solid=_solid(evidence),

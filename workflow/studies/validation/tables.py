@@ -9,13 +9,29 @@ import numpy as np
 from carillon.fem.model import RIGID_MODES
 from workflow.studies.base.entry import Row
 from workflow.studies.validation.criteria import judge
+from workflow.studies.validation.distance import distance_in_words
 from workflow.studies.validation.evidence import Evidence
-from workflow.variants import TRUTH, VARIANTS
+from workflow.variants import FROM_SOLID, TRUTH, VARIANTS
 
 
 def criteria(evidence: Evidence) -> list[Row]:
     """Every criterion with value, limit and verdict."""
     return [criterion.row for criterion in judge(evidence)]
+
+
+def solid(evidence: Evidence) -> Iterator[Row]:
+    """How far the frequencies of the fine mesh are from the solid's."""
+    settings, distance = evidence.settings, evidence.distance
+    row = {
+        "discretisation": settings["discretisation"],
+        "resolution": settings["resolution"],
+        "unknowns": evidence.shown[FROM_SOLID].model.n_dofs,
+        "told": distance_in_words(evidence)["told"],
+    }
+    if distance:
+        first, last = distance["modes"]
+        row |= {**distance, "modes": f"{first}–{last}"}
+    yield row
 
 
 def errors(evidence: Evidence) -> Iterator[Row]:
