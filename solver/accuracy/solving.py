@@ -10,6 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 from carillon.errors import UserError
+from carillon.fem.materials import NAMES
 from carillon.fem.model import ElasticModel, Solid, fine_model
 from carillon.progress import say
 from solver.accuracy.divide import DividedCells
@@ -139,6 +140,11 @@ def solve_accurately(
         excess = max(errors[0], abs(errors[1]) / 3.0) / accuracy
         if excess <= 1.0:
             return described, solved
+        if described.material not in NAMES:
+            raise UserError(
+                f"--accuracy {accuracy:g} needs a higher --resolution than "
+                f"{described.resolution}, and {described.material} is of the voxels of that one"
+            )
         unknowns = comm.bcast(None if solved.model is None else solved.model.n_dofs)
         factor = float(np.clip(np.sqrt(excess), LEAST_STEP, LARGEST_STEP))
         if unknowns * factor**2 > MOST_UNKNOWNS:
