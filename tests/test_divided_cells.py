@@ -7,10 +7,12 @@ import json
 import numpy as np
 import pytest
 
+from carillon.errors import UserError
 from carillon.fem.block import NODES, degrees_of_freedom
 from carillon.fem.element import elasticity_matrix
 from carillon.fem.finite_cells import hanging
 from carillon.fem.finite_cells.build import covering, finite_cells
+from carillon.fem.finite_cells.covering import Covering
 from carillon.fem.finite_cells.shapes import shape_functions
 from carillon.fem.geometry import builtin_surface
 from carillon.fem.geometry.fill import Grid
@@ -202,6 +204,21 @@ def test_voxels_are_told_their_distance(tmp_path, capsys):
     assert "distance" not in capsys.readouterr().out
 
 
+def test_cells_stay_whole_where_dividing_them_fails(tmp_path, capsys, monkeypatch):
+    def fails(*_):
+        raise UserError("it falls apart")
+
+    monkeypatch.setattr(Covering, "divided", fails)
+    out = str(tmp_path / "modes.h5")
+    command = ["modes", "builtin:frying-pan", "--resolution", "12", "--modes", "12", *CELLS]
+    main([*command, "--out", out])
+    told = capsys.readouterr()
+    assert "no more cells are divided: it falls apart" in told.err and "0 cells divided" in told.out
+    main([*command, "--no-estimate", "--out", out])
+    told = capsys.readouterr()
+    assert "distance" not in told.out and "divided" not in told.err
+
+
 def test_a_resolution_is_chosen(tmp_path, capsys, monkeypatch):
     out = str(tmp_path / "modes.h5")
     command = ["modes", "builtin:plate", "--modes", "16", *CELLS, "--out", out]
@@ -214,3 +231,9 @@ def test_a_resolution_is_chosen(tmp_path, capsys, monkeypatch):
     assert "--accuracy 0.0001 needs more than 1,000 unknowns" in capsys.readouterr().err
     assert main(command) == 2
     assert "expected --resolution" in capsys.readouterr().err
+    young = tmp_path / "young.txt"
+    cells = finite_cells(builtin_surface("plate"), 6).mesh.n_cells
+    np.savetxt(young, np.full(cells, 1e9))
+    of_file = ["--resolution", "6", "--accuracy", "0.0001", "--material", str(young)]
+    assert main([*command, *of_file]) == 2
+    assert "is of the voxels of that one" in capsys.readouterr().err

@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.errors import UserError
 from carillon.fem.finite_cells.covering import Covering
 from carillon.fem.finite_cells.model import FiniteCellModel
+from carillon.progress import say
 from solver.accuracy.estimate import CellErrors, estimate_cell_errors
 from solver.refinement.refine import RefinementStep
 
@@ -47,9 +49,7 @@ class DividedCells:
         if above <= 1.0 or self._steps == MOST_STEPS:
             return step, True
         chosen = self._chosen(found, REMAINING / above)
-        if len(chosen):
-            self._divide(chosen)
-        return step, not len(chosen)
+        return step, not (len(chosen) and self._divide(chosen))
 
     def _chosen(self, found: CellErrors, left: float) -> Index:
         """Places (d, 3) of cells to divide so that of the error a share is `left`, or of the worst.
@@ -67,9 +67,16 @@ class DividedCells:
         step = self._undivided.mesh.edge / cells.mesh.edge
         return np.unique((cells.grid[order[gains[order] > 0.0]] // step).astype(np.int64), axis=0)
 
-    def _divide(self, places: Index) -> None:
-        self._places = np.unique(np.concatenate([self._places, places]), axis=0)
-        division = self._covering.divided(self._places)
+    def _divide(self, places: Index) -> bool:
+        """Divide the cells at more places (d, 3), and whether that was possible."""
+        together = np.unique(np.concatenate([self._places, places]), axis=0)
+        try:
+            division = self._covering.divided(together)
+        except UserError as error:
+            say(f"no more cells are divided: {error}")
+            return False
+        self._places = together
         young = self._undivided.young[division.voxel]
         self.model = replace(self._undivided, cells=division.cells, young=young)
         self._steps += 1
+        return True

@@ -19,7 +19,7 @@ from solver.analysis.modal_solver import Modes
 from solver.analysis.problem import Problem, ProblemOptions, build_problem
 from solver.distribution.collective import bcast_from_root, compute_on_root
 from solver.files.modes_file import read_modes
-from solver.refinement.errors import FROM_FINE, FROM_SOLID, LAST, ExpectedErrors
+from solver.refinement.errors import FROM_FINE, FROM_SOLID, LAST, WORST, ExpectedErrors
 from solver.refinement.refine import Refinable, RefinedModel, RefinementStep, solve_refined
 
 MOST_UNKNOWNS = 400_000
@@ -136,8 +136,8 @@ def solve_accurately(
         solved = solve_solid(described, solve, wishes, comm, report)
         if f"{FROM_SOLID}_rms" not in solved.achieved:
             raise UserError("--accuracy needs a distance from the solid, which could not be told")
-        errors = solved.achieved[f"{FROM_SOLID}_rms"], solved.achieved[f"{FROM_SOLID}_worst"]
-        excess = max(errors[0], abs(errors[1]) / 3.0) / accuracy
+        rms, worst = (solved.achieved[f"{FROM_SOLID}_{name}"] for name in ("rms", "worst"))
+        excess = max(rms, abs(worst) / WORST) / accuracy
         if excess <= 1.0:
             return described, solved
         if described.material not in NAMES:
@@ -149,9 +149,8 @@ def solve_accurately(
         factor = float(np.clip(np.sqrt(excess), LEAST_STEP, LARGEST_STEP))
         if unknowns * factor**2 > MOST_UNKNOWNS:
             raise UserError(
-                f"--accuracy {accuracy:g} needs more than {MOST_UNKNOWNS:,} unknowns; resolution "
-                f"{described.resolution} is expected to be {errors[0]:.2g} off, worst "
-                f"{errors[1]:+.2g}, which --resolution {described.resolution} gives"
+                f"--accuracy {accuracy:g} needs more than {MOST_UNKNOWNS:,} unknowns; --resolution "
+                f"{described.resolution} is expected to be {rms:.2g} off, worst {worst:+.2g}"
             )
         solved.modes.destroy()
         described = replace(described, resolution=int(np.ceil(factor * described.resolution)))

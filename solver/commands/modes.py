@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> None:
         described = collect(ProblemOptions, arguments)
         options = collect(SolverOptions, arguments)
         refine_to = collect(RefinementOptions, arguments).tolerance(
-            described.coarsen, described.discretisation
+            described.coarsen, described.discretisation, accuracy.estimate is not False
         )
         petsc_options.insert_options(arguments.petsc, options.method)
         initial = arguments.initial_modes

@@ -29,8 +29,13 @@ class RefinementOptions:
         metavar="ERROR",
     )
 
-    def tolerance(self, coarsen: str, discretisation: str = "voxel") -> float | None:
+    def tolerance(
+        self, coarsen: str, discretisation: str = "voxel", estimated: bool = True
+    ) -> float | None:
         """The allowed error; None if nothing is to be refined.
+
+        Finite cells are refined by the estimate of their distance from the solid, and left as they
+        are if that is not `estimated` and nothing was given.
 
         Raises
         ------
@@ -38,7 +43,9 @@ class RefinementOptions:
             If it was given and there is nothing to refine.
         """
         if discretisation == "finite-cell":
-            return (ALLOWED_DISTANCE if self.refine_to is None else self.refine_to) or None
+            if self.refine_to is None:
+                return ALLOWED_DISTANCE if estimated else None
+            return self.refine_to or None
         if coarsen == "none":
             if self.refine_to is not None:
                 raise UserError(
