@@ -53,6 +53,18 @@ def estimate_cell_errors(model: FiniteCellModel, values: Array, modes: Array) ->
     values, modes
         (k,) eigenvalues [rad^2/s^2] and (n_dofs, k) mass-normalised modes, the six rigid ones
         included.
+
+    Examples
+    --------
+    >>> import solver
+    >>> from carillon.fem.finite_cells.build import finite_cells
+    >>> from carillon.fem.finite_cells.model import finite_cell_model
+    >>> from carillon.fem.geometry import builtin_surface
+    >>> cells = finite_cells(builtin_surface("plate"), 12)
+    >>> model = finite_cell_model(cells, np.full(cells.mesh.n_cells, 1e9))
+    >>> found = solver.solve(model, modes=20, method="slepc")
+    >>> 0.0 < estimate_cell_errors(model, found.eigenvalues, found.modes).errors.rms < 0.2
+    True
     """
     elastic = slice(RIGID_MODES, min(LAST, len(values)))
     twice, fourfold, group = losses(model, np.ascontiguousarray(modes[:, elastic]))

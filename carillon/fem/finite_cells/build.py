@@ -36,7 +36,16 @@ def covering(
     name: str = "mesh",
     grid: Grid | None = None,
 ) -> Covering:
-    """The cells of a lattice that cover the inside of a surface; see `finite_cells`."""
+    """The cells of a lattice that cover the inside of a surface; see `finite_cells`.
+
+    Examples
+    --------
+    >>> from carillon.fem.geometry.builtin import builtin_surface
+    >>> cover = covering(builtin_surface("bell"), 12)
+    >>> division = cover.divided(cover.cells.grid[:3])
+    >>> len(division.cells) > len(cover.cells)
+    True
+    """
     resolution = checked_resolution(surface, resolution, name)
     if components not in COMPONENTS:
         raise UserError(
