@@ -22,15 +22,22 @@ SPECTRA = (
     "solver modes builtin:bar --resolution 12 --modes 20 --coarsen ddfem --out modes.h5",
     "solver objectives builtin:box --resolution 6 --modes 20",
 )
+CELLS = (
+    "solver modes builtin:bar --resolution 12 --modes 20 --out voxels.h5",
+    "solver modes builtin:fork --resolution 12 --modes 12 --refine-to 0.001"
+    " --discretisation finite-cell --out divided.h5",
+    "solver modes builtin:comb --resolution 12 --modes 12 --no-estimate"
+    " --discretisation finite-cell --out open.h5",
+)
 
 
 def main() -> int:
-    """Run both lists of commands side by side, on one thread each; 0 if all ended well."""
+    """Run the lists of commands side by side, on one thread each; 0 if all ended well."""
     with tempfile.TemporaryDirectory() as folder:
         python = shlex.quote(sys.executable)
         scripts = [
             " && ".join(f"{python} -m {each}" for each in commands)
-            for commands in (TRAINING, SPECTRA)
+            for commands in (TRAINING, SPECTRA, CELLS)
         ]
         environment = {**os.environ, "PYTHONPATH": str(CHECKOUT), "OMP_NUM_THREADS": "1"}
         options = {"cwd": folder, "env": environment, "stdout": subprocess.DEVNULL}

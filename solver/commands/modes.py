@@ -41,6 +41,8 @@ EXAMPLES = """examples:
   modes bunny.obj --resolution 48 --method slepc --modes 60 --out truth.h5
 """
 
+ESTIMATE_TOLERANCE = 1e-4
+"""Relative error of the eigenvalues that voxels are compared with."""
 REFINED = {"fine_blocks": "blocks fine", "divided_cells": "cells divided"}
 EXPECTED = {FROM_FINE: "error against the voxels", FROM_SOLID: "distance from the solid"}
 
@@ -84,7 +86,7 @@ def run(arguments: argparse.Namespace) -> None:
 
         def solve(model: Solid | None, modes: int | None = None) -> Modes:
             nonlocal initial
-            asked = options if modes is None else replace(options, modes=min(modes, options.modes))
+            asked = options if modes is None else _for_estimate(options, modes)
             prepared = ModalSolver(model, asked, comm, verbose=sys.stderr.isatty())
             start = None
             if initial is not None:
@@ -131,6 +133,14 @@ def run(arguments: argparse.Namespace) -> None:
         if comm.rank == 0:
             _warn_about_options()
             _print_summary(attributes, result.values, arguments)
+
+
+def _for_estimate(options: SolverOptions, modes: int) -> SolverOptions:
+    """For few modes at most, no nearer than an estimate of errors needs them."""
+    asked = replace(options, modes=min(modes, options.modes))
+    if options.method != "hcms" or options.tolerance == 0.0:
+        return asked
+    return replace(asked, tolerance=max(options.tolerance or 0.0, ESTIMATE_TOLERANCE))
 
 
 def _resolution(arguments: argparse.Namespace) -> int:
