@@ -42,6 +42,10 @@ COMMANDS = {
         "solver.commands.accuracy",
         "errors of voxels, finite cells and tetrahedra against frequencies that no mesh made",
     ),
+    "distance": Command(
+        "solver.commands.distance",
+        "distances from the solid that spectra expect, beside those from a much finer lattice",
+    ),
     "calibrate": Command(
         "solver.commands.calibrate",
         "constants of the objective `calibrated` from spectra of random solids",

@@ -1,10 +1,20 @@
-"""Which sparse Cholesky factorisation this PETSc offers."""
+"""Sparse Cholesky and LDL^T factorisations by what this PETSc offers."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from petsc4py import PETSc
 
-from carillon.errors import UserError
+from carillon.errors import ConvergenceError, UserError
+
+ROOM = (50, 200, 800)
+"""Percent by which MUMPS's guess of the memory it needs is exceeded, tried one after the other.
+Pivots that have to wait are in no guess, and on several ranks their number differs between runs."""
+_ROOM = 14
+"""MUMPS's control of it."""
+_TOO_LITTLE_ROOM = (-8, -9, -17, -20)
+"""What MUMPS's INFOG(1) says then."""
 
 
 def factor_package(ranks: int) -> str:
@@ -22,4 +32,62 @@ def factor_package(ranks: int) -> str:
     raise UserError(
         "this PETSc was built without MUMPS, which a parallel factorisation needs; run on one rank "
         "or rebuild PETSc with MUMPS"
+    )
+
+
+def factorised(
+    matrix: PETSc.Mat, controls: Mapping[int, int], prefix: str | None = None
+) -> PETSc.PC:
+    """LDL^T of a symmetric matrix, to be destroyed by the caller; collective.
+
+    Parameters
+    ----------
+    matrix
+        Symmetric, and said to be positive definite if it is, which spares the pivoting.
+    controls
+        MUMPS's ICNTL by their numbers.
+    prefix
+        Of options that may overrule this.
+
+    Raises
+    ------
+    UserError
+        On several ranks without MUMPS.
+    ConvergenceError
+        If the factorisation fails.
+    """
+    package = factor_package(matrix.comm.size)
+    status = 0
+    for room in ROOM:
+        factorisation = PETSc.PC().create(matrix.comm)
+        factorisation.setOptionsPrefix(prefix)
+        factorisation.setOperators(matrix)
+        factorisation.setType(PETSc.PC.Type.CHOLESKY)
+        factorisation.setFactorSolverType(package)
+        factorisation.setFactorSetUpSolverType()
+        if package == "mumps":
+            for control, value in {_ROOM: room, **controls}.items():
+                factorisation.getFactorMatrix().setMumpsIcntl(control, value)
+        if prefix is not None:
+            factorisation.setFromOptions()
+        try:
+            factorisation.setUp()
+        except PETSc.Error as error:
+            raise _failure(matrix, str(error)) from None
+        if package != "mumps":
+            return factorisation
+        # PETSc tells nobody before it solves.
+        status = factorisation.getFactorMatrix().getMumpsInfog(1)
+        if status >= 0:
+            return factorisation
+        factorisation.destroy()
+        if status not in _TOO_LITTLE_ROOM:
+            break
+    raise _failure(matrix, f"MUMPS: INFOG(1) = {status}")
+
+
+def _failure(matrix: PETSc.Mat, cause: str) -> ConvergenceError:
+    return ConvergenceError(
+        f"the sparse factorisation of {matrix.getSize()[0]:,} unknowns failed ({cause}); with too "
+        "little memory use more ranks on more machines, or --linear-solver amg-cg"
     )

@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from carillon.errors import ConvergenceError
 from solver.assembly.system import System
-from solver.linear.factorisation import factor_package
+from solver.linear.factorisation import factorised
 from solver.linear.petsc_options import INNER_PREFIX
 
 Array = NDArray[np.float64]
 
 COLUMNS = 128
 """Right-hand sides that MUMPS carries through its factor together."""
-_ICNTL_BLOCKING = 27
+_BLOCKING = 27
+"""MUMPS's control of that."""
 
 
 class MumpsInverse:
@@ -34,23 +34,7 @@ class MumpsInverse:
         # A negative shift makes the matrix definite, which spares the pivoting.
         option = PETSc.Mat.Option.SPD if shift < 0.0 else PETSc.Mat.Option.SYMMETRIC
         self._matrix.setOption(option, True)
-        package = factor_package(system.comm.size)
-        self._pc = PETSc.PC().create(system.comm)
-        self._pc.setOptionsPrefix(INNER_PREFIX)
-        self._pc.setOperators(self._matrix)
-        self._pc.setType(PETSc.PC.Type.CHOLESKY)
-        self._pc.setFactorSolverType(package)
-        self._pc.setFactorSetUpSolverType()
-        if package == "mumps":
-            self._pc.getFactorMatrix().setMumpsIcntl(_ICNTL_BLOCKING, COLUMNS)
-        self._pc.setFromOptions()
-        try:
-            self._pc.setUp()
-        except PETSc.Error as error:
-            raise ConvergenceError(
-                f"the sparse factorisation of {system.n_dofs:,} unknowns failed ({error}); with "
-                "too little memory use more ranks on more machines, or --linear-solver amg-cg"
-            ) from None
+        self._pc = factorised(self._matrix, {_BLOCKING: COLUMNS}, INNER_PREFIX)
         self._factor = self._pc.getFactorMatrix()
 
     def solve(self, block: Array) -> Array:

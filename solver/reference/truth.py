@@ -12,6 +12,7 @@ from carillon.errors import ConvergenceError
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.model import RIGID_MODES
 from solver.assembly.system import System
+from solver.linear.factorisation import factorised
 from solver.reference.eigensolver import smallest_eigenpairs
 from solver.subspace.rayleigh_ritz import is_orthonormal, rayleigh_ritz, rigid_pairs, safe_shift
 
@@ -263,16 +264,8 @@ def count_negative(K: PETSc.Mat, M: PETSc.Mat, value: float) -> int:
     shifted = K.copy()
     shifted.axpy(-value, M, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
     shifted.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    factorisation = PETSc.PC().create(K.comm)
-    factorisation.setOperators(shifted)
-    factorisation.setType(PETSc.PC.Type.CHOLESKY)
-    factorisation.setFactorSolverType("mumps")
-    factorisation.setFactorSetUpSolverType()
     # Inertia needs the root of the elimination tree on one rank, and its null pivots detected.
-    factor = factorisation.getFactorMatrix()
-    factor.setMumpsIcntl(13, 1)
-    factor.setMumpsIcntl(24, 1)
-    factorisation.setUp()
+    factorisation = factorised(shifted, {13: 1, 24: 1})
     negative, _, _ = factorisation.getFactorMatrix().getInertia()
     factorisation.destroy()
     shifted.destroy()
