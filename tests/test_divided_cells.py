@@ -15,7 +15,7 @@ from carillon.fem.finite_cells.build import covering, finite_cells
 from carillon.fem.finite_cells.covering import Covering
 from carillon.fem.finite_cells.shapes import shape_functions
 from carillon.fem.geometry import builtin_surface
-from carillon.fem.geometry.fill import Grid
+from carillon.fem.geometry.grid import Grid
 from carillon.fem.laplacian import laplacian_modes
 from solver.__main__ import main
 from solver.accuracy import solving

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from carillon.fem.geometry import builtin_surface, hexmesh_from_grid
-from carillon.fem.geometry.fill import Grid
+from carillon.fem.geometry.grid import Grid
 from solver.accuracy.lattices import covering_on, scaled, voxel_lattice, voxel_mesh
 from solver.accuracy.material import HARMONIC, PlacedMaterial
 from solver.studies.discretisation.truth import SolidTruth

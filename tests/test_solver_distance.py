@@ -12,28 +12,28 @@ from solver.studies.accuracy.distance import OBJECTS, as_text
 
 @pytest.fixture(scope="module")
 def measured(tmp_path_factory):
-    """What the command writes of a bar, straight and turned."""
-    out = tmp_path_factory.mktemp("distance") / "bar.json"
-    words = ["--turned", "--resolution", "10", "--reference", "15", "--out", str(out)]
-    assert main(["distance", "builtin:bar", *words]) == 0
+    """What the command writes of a plate, straight and turned."""
+    out = tmp_path_factory.mktemp("distance") / "plate.json"
+    words = ["--turned", "--resolution", "8", "--reference", "12", "--out", str(out)]
+    assert main(["distance", "builtin:plate", *words]) == 0
     return json.loads(out.read_text())
 
 
 def test_every_way_is_rated_by_the_same_reference(measured):
     straight, turned = measured["solids"]
-    assert (straight["solid"], turned["solid"]) == ("bar", "turned-bar")
+    assert (straight["solid"], turned["solid"]) == ("plate", "turned-plate")
     for solid in (straight, turned):
         ways = solid["ways"]
         assert ways["cells"]["unknowns"] < ways["divided"]["unknowns"]
         assert ways["divided"]["rms"] < ways["cells"]["rms"] < ways["voxels"]["rms"]
         assert solid["reference"]["doubt"] < 0.5 * ways["cells"]["rms"]
-    assert turned["ways"]["cells"]["rms"] > straight["ways"]["cells"]["rms"]
+    assert turned["ways"]["voxels"]["rms"] < straight["ways"]["voxels"]["rms"]
     assert all(count == {"within": 2, "of": 2} for count in measured["right"].values())
 
 
 def test_the_table_tells_both(measured):
     text = as_text(measured)
-    assert "turned-bar" in text and text.count("2 of 2") == 3
+    assert "turned-plate" in text and text.count("2 of 2") == 3
 
 
 def test_there_are_thirty_solids_with_those_that_are_turned():

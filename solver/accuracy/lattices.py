@@ -9,7 +9,7 @@ import numpy as np
 from carillon.fem.finite_cells.build import covering
 from carillon.fem.finite_cells.covering import Covering
 from carillon.fem.geometry import HexMesh, hexmesh_from_voxels, voxelize
-from carillon.fem.geometry.fill import Grid, bounding_grid
+from carillon.fem.geometry.grid import Grid, bounding_grid
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
     import trimesh

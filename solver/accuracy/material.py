@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, map_coordinates
 
 from carillon.fem.geometry import HexMesh
-from carillon.fem.geometry.fill import Grid
+from carillon.fem.geometry.grid import Grid
 
 Array = NDArray[np.float64]
 

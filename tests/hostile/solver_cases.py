@@ -355,6 +355,12 @@ hostile("audit onto a device", "audit ZOO/modes.h5 --out null", files={"null": P
 hostile("audit on a full disk", "audit ZOO/modes.h5 --out a.json", "make room", file_size=100)
 hostile("benchmark into nowhere", "benchmark builtin:box --resolution 4 --out nowhere/row.json")
 hostile("objectives into nowhere", "objectives builtin:box --resolution 4 --out nowhere/o.json")
+hostile("distance of nothing", "distance nowhere.stl", "nowhere.stl")
+hostile(
+    "distance by a coarse reference",
+    "distance builtin:box --resolution 12 --reference 12",
+    "--reference 12",
+)
 hostile("accuracy into nowhere", "accuracy --solids sphere --out nowhere/a.json")
 hostile("rating into nowhere", "coarsening builtin:box --resolution 4 --out nowhere/case.json")
 hostile("pictures into nowhere", "coarsening builtin:box --resolution 4 --pictures nowhere/case.h5")

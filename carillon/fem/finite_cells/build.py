@@ -13,7 +13,7 @@ from carillon.fem.finite_cells.cover import cover_of
 from carillon.fem.finite_cells.covering import SMALLEST_PIECE, Covering, pieces
 from carillon.fem.finite_cells.inside import Inside, find_inside
 from carillon.fem.finite_cells.pieces import CUT, FULL
-from carillon.fem.geometry.fill import Grid, bounding_grid
+from carillon.fem.geometry.grid import Grid, bounding_grid
 from carillon.fem.geometry.voxels import COMPONENTS, checked_resolution
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.

@@ -13,7 +13,7 @@ from carillon.fem.finite_cells.parts import Labels, find_parts, meetings, meetin
 from carillon.fem.finite_cells.pieces import EMPTY, FULL, SKIPPED
 from carillon.fem.finite_cells.shapes import octant_weights
 from carillon.fem.finite_cells.weights import weights_of_parts
-from carillon.fem.geometry.fill import Grid
+from carillon.fem.geometry.grid import Grid
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
     import trimesh

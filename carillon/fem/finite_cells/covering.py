@@ -15,7 +15,7 @@ from carillon.fem.finite_cells.cells import FiniteCells, assemble_cells
 from carillon.fem.finite_cells.cover import LatticeCover, divided_cover, faces_of_halves
 from carillon.fem.finite_cells.descent import parents, voxels_of_parents
 from carillon.fem.finite_cells.joining import Faces, joined_nodes
-from carillon.fem.geometry.fill import Grid
+from carillon.fem.geometry.grid import Grid
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
     import trimesh

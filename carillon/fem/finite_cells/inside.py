@@ -21,13 +21,13 @@ from carillon.fem.finite_cells.lines import (
     spread_lines,
 )
 from carillon.fem.finite_cells.open_surfaces import (
-    Winding,
     classify,
     encloses,
     pieces_of_open_surface,
 )
 from carillon.fem.finite_cells.pieces import CUT, EMPTY, FULL, SKIPPED, Pieces, joined, points_on
-from carillon.fem.geometry.fill import Grid
+from carillon.fem.geometry.grid import Grid
+from carillon.fem.geometry.winding import Winding
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
     import trimesh

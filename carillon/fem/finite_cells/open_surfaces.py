@@ -6,8 +6,6 @@ computed where that does not lead to what the next voxel has.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numba
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +13,7 @@ from numpy.typing import NDArray
 from carillon.fem.element import CORNERS
 from carillon.fem.finite_cells.lines import LINES, Crossings, Lines
 from carillon.fem.finite_cells.pieces import CUT, EMPTY, FULL, SKIPPED, Pieces, joined, points_on
-from carillon.fem.geometry.fill import INSIDE, Grid, cut, winding_numbers
-
-if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
-    import trimesh
+from carillon.fem.geometry.winding import INSIDE, Winding
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -35,23 +30,6 @@ SAMPLE = 500
 """Pieces of lines that are asked for it."""
 VAGUE = 127
 """Level of a voxel near a hole."""
-
-
-class Winding:
-    """Winding numbers about points in lattice units."""
-
-    def __init__(self, surface: trimesh.Trimesh, grid: Grid) -> None:
-        self._surface, self._grid = surface, grid
-        self._cut: trimesh.Trimesh | None = None
-
-    def __call__(self, points: Array) -> Array:
-        if self._cut is None:
-            self._cut = cut(self._surface, 2 * self._grid.edge)
-        return winding_numbers(self._cut, self._grid, points)
-
-    def inside(self, points: Array) -> NDArray[np.bool_]:
-        """Whether they are inside."""
-        return np.asarray(np.abs(self(points)) > INSIDE)
 
 
 def classify(state: NDArray[np.int8], wind: Winding) -> NDArray[np.int8]:

@@ -11,12 +11,14 @@ least half full and, of the others, those without which the solid would lose a p
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from carillon.fem.geometry.grid import Grid
+from carillon.fem.geometry.samples import Samples
 from carillon.fem.geometry.topology import pieces, thin_to
+from carillon.fem.geometry.touching import touched_voxels
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
     import trimesh
@@ -25,35 +27,8 @@ if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
 #: wall at the middle of a voxel; an even number would move every wall outwards.
 SAMPLES = 3
 
-#: Winding number from which a point is inside. Below the 1/2 of a point on the surface by more than
-#: the error of fast winding numbers (0.02), so that a wall through sample points is not ragged.
-INSIDE = 0.45
-
 #: Factor between the volumes of the voxels and of the solid beyond which they are not alike.
 TOO_THIN = 2.0
-
-#: Points whose winding number is computed at once.
-CHUNK = 2_000_000
-
-
-@dataclass(frozen=True, eq=False)
-class Grid:
-    """Cubes of edge `edge` [m], `shape` of them along the axes, from the corner `origin` [m]."""
-
-    origin: np.ndarray
-    edge: float
-    shape: tuple[int, int, int]
-
-
-def bounding_grid(surface: trimesh.Trimesh, resolution: int) -> Grid:
-    """Grid with `resolution` voxels along the longest side of the bounding box, centred on it."""
-    low, high = np.asarray(surface.bounds)
-    edge = float((high - low).max() / resolution)
-    # The tolerance keeps a side of exactly n voxels from rounding up to n + 1.
-    shape = np.maximum(np.ceil((high - low) / edge - 1e-6), 1).astype(int)
-    return Grid(
-        (low + high - edge * shape) / 2, edge, (int(shape[0]), int(shape[1]), int(shape[2]))
-    )
 
 
 def winding_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
@@ -75,9 +50,9 @@ def winding_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.n
     origin : (3,)
         Corner of the grid [m].
     """
-    surface = cut(surface, 2 * grid.edge)
-    touched = touched_voxels(surface, grid)
-    fraction = filled_fraction(surface, grid, touched)
+    corners, faces = np.asarray(surface.vertices), np.asarray(surface.faces, dtype=np.int64)
+    touched = touched_voxels(corners, faces, grid.origin, grid.edge, grid.shape)
+    fraction = filled_fraction(Samples(surface, grid, SAMPLES), touched)
     half_full = fraction >= 0.5
     labels, _ = pieces(touched | half_full)
     held = np.bincount(labels.ravel(), weights=fraction.ravel())
@@ -99,8 +74,7 @@ def _length(voxels: np.ndarray) -> int:
 
 def centre_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
     """Voxels whose centre is inside the surface by its winding number; thin parts may break off."""
-    index = np.indices(grid.shape).reshape(3, -1).T
-    return _inside(surface, grid, index + 0.5).reshape(grid.shape), grid.origin
+    return Samples(surface, grid, 1).centres(), grid.origin
 
 
 def orthographic_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
@@ -121,26 +95,15 @@ FILLS: dict[str, Callable[[trimesh.Trimesh, Grid], tuple[np.ndarray, np.ndarray]
 }
 
 
-def filled_fraction(surface: trimesh.Trimesh, grid: Grid, touched: np.ndarray) -> np.ndarray:
+def filled_fraction(samples: Samples, touched: np.ndarray) -> np.ndarray:
     """Fraction of each voxel that is inside the surface, (nx, ny, nz), in steps of 1/SAMPLES^3."""
-    fraction = centre_fill(surface, grid)[0].astype(float)
+    fraction = samples.centres().astype(float)
     # A voxel that the surface does not touch is full or empty, and its centre says which.
     near = np.argwhere(touched)
-    step = (np.arange(SAMPLES) + 0.5) / SAMPLES
-    offsets = np.stack(np.meshgrid(step, step, step, indexing="ij"), axis=-1).reshape(-1, 3)
-    points = (near[:, None, :] + offsets).reshape(-1, 3)
-    inside = _inside(surface, grid, points).reshape(len(near), -1)
-    fraction[tuple(near.T)] = inside.mean(axis=1)
+    offsets = np.indices((SAMPLES, SAMPLES, SAMPLES)).reshape(3, -1).T
+    index = (SAMPLES * near[:, None, :] + offsets).reshape(-1, 3)
+    fraction[tuple(near.T)] = samples.inside(index).reshape(len(near), -1).mean(axis=1)
     return fraction
-
-
-def touched_voxels(surface: trimesh.Trimesh, grid: Grid) -> np.ndarray:
-    """Voxels that hold a vertex of the surface after its edges are cut to half a voxel or less."""
-    vertices = np.asarray(cut(surface, grid.edge / 2).vertices)
-    index = np.floor((vertices - grid.origin) / grid.edge).astype(int)
-    touched = np.zeros(grid.shape, dtype=bool)
-    touched[tuple(np.clip(index, 0, np.array(grid.shape) - 1).T)] = True
-    return touched
 
 
 def cut_triangles(surface: trimesh.Trimesh, max_edge: float) -> float:
@@ -151,35 +114,3 @@ def cut_triangles(surface: trimesh.Trimesh, max_edge: float) -> float:
     longest = np.asarray(surface.edges_unique_length)[surface.faces_unique_edges].max(axis=1)
     halvings = np.ceil(np.log2(np.maximum(longest / max_edge, 1.0)))
     return float((4.0**halvings).sum())
-
-
-def cut(surface: trimesh.Trimesh, max_edge: float) -> trimesh.Trimesh:
-    """The same surface in triangles with edges of at most `max_edge` [m]."""
-    import trimesh
-
-    vertices, faces = trimesh.remesh.subdivide_to_size(
-        surface.vertices, surface.faces, max_edge=max_edge, max_iter=30
-    )
-    return trimesh.Trimesh(vertices, faces, process=False)
-
-
-def _inside(surface: trimesh.Trimesh, grid: Grid, points: np.ndarray) -> np.ndarray:
-    """Whether `points` (p, 3), in voxels from the grid's corner, are inside the surface."""
-    return np.asarray(np.abs(winding_numbers(surface, grid, points)) > INSIDE)
-
-
-def winding_numbers(surface: trimesh.Trimesh, grid: Grid, points: np.ndarray) -> np.ndarray:
-    """Winding numbers (p,) of the surface about `points` (p, 3), in voxels from the grid's corner.
-
-    The hierarchy behind them suffers from long triangles, see `cut`.
-    """
-    import igl
-
-    # In voxel units, so that the result does not depend on the unit of length.
-    vertices = np.ascontiguousarray((surface.vertices - grid.origin) / grid.edge)
-    faces = np.ascontiguousarray(surface.faces, dtype=np.int64)
-    numbers = np.empty(len(points))
-    for start in range(0, len(points), CHUNK):
-        part = slice(start, start + CHUNK)
-        numbers[part] = igl.fast_winding_number(vertices, faces, np.ascontiguousarray(points[part]))
-    return numbers

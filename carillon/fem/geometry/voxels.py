@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from carillon.errors import UserError
-from carillon.fem.geometry.fill import FILLS, bounding_grid, cut_triangles
+from carillon.fem.geometry.fill import FILLS, cut_triangles
+from carillon.fem.geometry.grid import bounding_grid
 from carillon.fem.geometry.topology import pieces as label_pieces
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.

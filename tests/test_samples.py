@@ -1,0 +1,74 @@
+"""What lines tell of a closed surface is what winding numbers tell, point by point."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from carillon.fem.geometry import builtin_surface
+from carillon.fem.geometry.grid import bounding_grid
+from carillon.fem.geometry.samples import Samples
+from carillon.fem.geometry.touching import touched_voxels
+from carillon.fem.geometry.winding import Winding
+
+COUNT = 3
+TURN = trimesh.transformations.euler_matrix(0.4, 0.6, 0.3)
+
+
+def every_point(shape) -> np.ndarray:
+    return np.indices([COUNT * size for size in shape]).reshape(3, -1).T
+
+
+@pytest.mark.parametrize("turned", [False, True], ids=["straight", "turned"])
+@pytest.mark.parametrize("name", ["box", "plate", "frying-pan", "snare-drum", "comb", "cup"])
+def test_lines_and_winding_numbers_agree(name, turned):
+    surface = builtin_surface(name)
+    if turned:
+        surface.apply_transform(TURN)
+    grid = bounding_grid(surface, 12)
+    index = every_point(grid.shape)
+    expected = Winding(surface, grid).inside((index + 0.5) / COUNT)
+    assert np.array_equal(Samples(surface, grid, COUNT).inside(index), expected)
+    assert expected.any()
+
+
+def test_a_wall_through_the_points_is_inside_on_all_its_sides():
+    """Of a box from the first points of its outermost voxels to the last, all points are inside."""
+    grid = bounding_grid(trimesh.creation.box((8.0, 6.0, 4.0)), 8)
+    surface = trimesh.creation.box(np.array(grid.shape) - 1.0 / COUNT)
+    index = every_point(grid.shape)
+    on_face = (index == 0).sum(axis=1) + (index == COUNT * np.array(grid.shape) - 1).sum(
+        axis=1
+    ) == 1
+    inside = Samples(surface, grid, COUNT).inside(index)
+    assert (
+        inside[on_face].all() and inside[(index > 0).all(axis=1) & (index < 11).all(axis=1)].all()
+    )
+
+
+def test_with_a_hole_the_winding_number_decides():
+    whole = builtin_surface("bell")
+    surface = trimesh.Trimesh(whole.vertices, whole.faces[:-3], process=False)
+    grid = bounding_grid(surface, 10)
+    index = every_point(grid.shape)
+    expected = Winding(surface, grid).inside((index + 0.5) / COUNT)
+    assert np.array_equal(Samples(surface, grid, COUNT).inside(index), expected)
+
+
+@pytest.mark.parametrize("name", ["bar", "pitcher", "spiral"])
+def test_touched_voxels_hold_the_vertices_of_the_surface_cut_small(name):
+    surface = builtin_surface(name)
+    grid = bounding_grid(surface, 16)
+    vertices, faces = np.asarray(surface.vertices), np.asarray(surface.faces)
+    for longest in (2.0, 0.5):
+        vertices, faces = trimesh.remesh.subdivide_to_size(
+            vertices, faces, max_edge=longest * grid.edge, max_iter=30
+        )
+    expected = np.zeros(grid.shape, dtype=bool)
+    index = np.floor((vertices - grid.origin) / grid.edge).astype(int)
+    expected[tuple(np.clip(index, 0, np.array(grid.shape) - 1).T)] = True
+    found = touched_voxels(
+        np.asarray(surface.vertices), np.asarray(surface.faces), grid.origin, grid.edge, grid.shape
+    )
+    assert np.array_equal(found, expected)
