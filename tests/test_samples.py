@@ -8,7 +8,7 @@ import trimesh
 
 from carillon.fem.geometry import builtin_surface
 from carillon.fem.geometry.grid import bounding_grid
-from carillon.fem.geometry.samples import Samples
+from carillon.fem.geometry.samples import SamplePoints
 from carillon.fem.geometry.touching import touched_voxels
 from carillon.fem.geometry.winding import Winding
 
@@ -29,7 +29,7 @@ def test_lines_and_winding_numbers_agree(name, turned):
     grid = bounding_grid(surface, 12)
     index = every_point(grid.shape)
     expected = Winding(surface, grid).inside((index + 0.5) / COUNT)
-    assert np.array_equal(Samples(surface, grid, COUNT).inside(index), expected)
+    assert np.array_equal(SamplePoints(surface, grid, COUNT).inside(index), expected)
     assert expected.any()
 
 
@@ -41,7 +41,7 @@ def test_a_wall_through_the_points_is_inside_on_all_its_sides():
     on_face = (index == 0).sum(axis=1) + (index == COUNT * np.array(grid.shape) - 1).sum(
         axis=1
     ) == 1
-    inside = Samples(surface, grid, COUNT).inside(index)
+    inside = SamplePoints(surface, grid, COUNT).inside(index)
     assert (
         inside[on_face].all() and inside[(index > 0).all(axis=1) & (index < 11).all(axis=1)].all()
     )
@@ -53,7 +53,7 @@ def test_with_a_hole_the_winding_number_decides():
     grid = bounding_grid(surface, 10)
     index = every_point(grid.shape)
     expected = Winding(surface, grid).inside((index + 0.5) / COUNT)
-    assert np.array_equal(Samples(surface, grid, COUNT).inside(index), expected)
+    assert np.array_equal(SamplePoints(surface, grid, COUNT).inside(index), expected)
 
 
 @pytest.mark.parametrize("name", ["bar", "pitcher", "spiral"])

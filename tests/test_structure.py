@@ -53,8 +53,8 @@ ARROWS = {
     "solver.studies": """solver.coarsening solver.distribution solver.files solver.response
         solver.assembly solver.linear solver.subspace solver.hcms solver.correction
         solver.reference solver.analysis""",
-    "solver.studies.accuracy": """solver.assembly solver.linear solver.analysis solver.accuracy
-        solver.studies""",
+    "solver.studies.accuracy": """solver.assembly solver.linear solver.analysis solver.refinement
+        solver.accuracy solver.studies""",
     "solver.studies.benchmark": """solver.coarsening solver.distribution solver.files
         solver.assembly solver.linear solver.subspace solver.correction solver.analysis
         solver.studies""",

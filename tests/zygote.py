@@ -154,6 +154,7 @@ def _serve() -> None:
     os.dup2(2, 1)  # what libraries print is no answer
     ctypes.CDLL(None).prctl(36, 1, 0, 0, 0)  # PR_SET_CHILD_SUBREAPER: orphans come here
     libraries = _import_all()
+    _load_kernels()
     gc.collect()
     gc.freeze()
     print(json.dumps({"ready": True}), file=answers, flush=True)
@@ -188,6 +189,14 @@ def _import_all() -> tuple[Any, Any, Any]:
     del sys.modules["carillon.__main__"]
     assert not MPI.Is_initialized()
     return MPI, PETSc, SLEPc
+
+
+def _load_kernels() -> None:
+    """Numba's own tables, which take it a third of a second, and the kernels that models take."""
+    from solver.analysis.problem import ProblemOptions, build_problem
+
+    build_problem(ProblemOptions("builtin:box", 6, coarsen="ddfem"))
+    build_problem(ProblemOptions("builtin:box", 6, discretisation="finite-cell"))
 
 
 def _be(job: Job, mark: str, libraries: tuple[Any, Any, Any], pipes: list[int]) -> NoReturn:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from carillon.fem.geometry.grid import Grid
-from carillon.fem.geometry.samples import Samples
+from carillon.fem.geometry.samples import SamplePoints
 from carillon.fem.geometry.topology import pieces, thin_to
 from carillon.fem.geometry.touching import touched_voxels
 
@@ -52,7 +52,7 @@ def winding_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.n
     """
     corners, faces = np.asarray(surface.vertices), np.asarray(surface.faces, dtype=np.int64)
     touched = touched_voxels(corners, faces, grid.origin, grid.edge, grid.shape)
-    fraction = filled_fraction(Samples(surface, grid, SAMPLES), touched)
+    fraction = filled_fraction(SamplePoints(surface, grid, SAMPLES), touched)
     half_full = fraction >= 0.5
     labels, _ = pieces(touched | half_full)
     held = np.bincount(labels.ravel(), weights=fraction.ravel())
@@ -74,7 +74,7 @@ def _length(voxels: np.ndarray) -> int:
 
 def centre_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
     """Voxels whose centre is inside the surface by its winding number; thin parts may break off."""
-    return Samples(surface, grid, 1).centres(), grid.origin
+    return SamplePoints(surface, grid, 1).centres(), grid.origin
 
 
 def orthographic_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
@@ -95,7 +95,7 @@ FILLS: dict[str, Callable[[trimesh.Trimesh, Grid], tuple[np.ndarray, np.ndarray]
 }
 
 
-def filled_fraction(samples: Samples, touched: np.ndarray) -> np.ndarray:
+def filled_fraction(samples: SamplePoints, touched: np.ndarray) -> np.ndarray:
     """Fraction of each voxel that is inside the surface, (nx, ny, nz), in steps of 1/SAMPLES^3."""
     fraction = samples.centres().astype(float)
     # A voxel that the surface does not touch is full or empty, and its centre says which.

@@ -24,7 +24,7 @@ NEAR = 1e-5
 """Distance [voxels] from a crossing up to which a point counts as on the surface."""
 
 
-class Samples:
+class SamplePoints:
     """Points at equal distances in the voxels of a grid, `count`^3 of each.
 
     Parameters
