@@ -192,10 +192,13 @@ def _import_all() -> tuple[Any, Any, Any]:
 
 
 def _load_kernels() -> None:
-    """Numba's own tables, which take it a third of a second, and the kernels that models take."""
+    """Numba's own tables, which take it a third of a second, and the kernels that models take.
+
+    No file of HDF5 may be opened here: forks that then fail to write one crash.
+    """
     from solver.analysis.problem import ProblemOptions, build_problem
 
-    build_problem(ProblemOptions("builtin:box", 6, coarsen="ddfem"))
+    build_problem(ProblemOptions("builtin:box", 6, coarsen="average"))
     build_problem(ProblemOptions("builtin:box", 6, discretisation="finite-cell"))
 
 
