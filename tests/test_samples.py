@@ -47,13 +47,29 @@ def test_a_wall_through_the_points_is_inside_on_all_its_sides():
     )
 
 
-def test_with_a_hole_the_winding_number_decides():
-    whole = builtin_surface("bell")
-    surface = trimesh.Trimesh(whole.vertices, whole.faces[:-3], process=False)
+def agreed(surface: trimesh.Trimesh) -> bool:
     grid = bounding_grid(surface, 10)
     index = every_point(grid.shape)
     expected = Winding(surface, grid).inside((index + 0.5) / COUNT)
-    assert np.array_equal(SamplePoints(surface, grid, COUNT).inside(index), expected)
+    return np.array_equal(SamplePoints(surface, grid, COUNT).inside(index), expected)
+
+
+@pytest.mark.parametrize("faces", [slice(3, None), slice(None, -400), slice(0, None, 2)])
+def test_with_holes_they_agree_too(faces):
+    whole = builtin_surface("bell")
+    assert agreed(trimesh.Trimesh(whole.vertices, whole.faces[faces], process=False))
+
+
+def test_a_pipe_without_ends_is_filled():
+    pipe = trimesh.creation.cylinder(radius=1.0, height=4.0, sections=32)
+    along = np.abs(pipe.face_normals[:, 2]) < 0.5
+    assert agreed(trimesh.Trimesh(pipe.vertices, pipe.faces[along], process=False))
+
+
+def test_triangles_turned_either_way_are_for_winding_numbers():
+    surface = builtin_surface("bowl")
+    surface.faces[::3] = surface.faces[::3, ::-1]
+    assert agreed(trimesh.Trimesh(surface.vertices, surface.faces, process=False))
 
 
 @pytest.mark.parametrize("name", ["bar", "pitcher", "spiral"])

@@ -1,8 +1,8 @@
 """Which of the sample points of a grid's voxels are inside a surface.
 
-Of a closed surface the crossings of the lines through the points tell it, which takes a hundredth
-of what winding numbers do. These are asked where there are holes, about points on the surface, and
-wherever the lines along the three axes do not agree.
+The crossings of the lines through the points tell it, which takes a hundredth of what winding
+numbers do. These are asked about points on lines that leave the solid by a hole, or on the surface,
+and wherever the lines along the three axes do not agree.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
 
 NEAR = 1e-5
 """Distance [voxels] from a crossing up to which a point counts as on the surface."""
+MOST_OPEN = 0.05
+"""Share of the triangles' sides that may be open; lines find holes everywhere beyond that."""
 
 
 class SamplePoints:
@@ -60,12 +62,17 @@ class SamplePoints:
 
 
 def _lines(surface: trimesh.Trimesh, grid: Grid, count: int) -> list | None:
-    """Crossings of the lines through the points along each axis, of a closed surface."""
+    """Crossings of the lines through the points along each axis.
+
+    None for triangles turned either way, whose crossings do not tell in from out, and for sieves.
+    """
     import trimesh
 
     merged = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
     merged.merge_vertices()
-    if not (merged.is_watertight and merged.is_winding_consistent):
+    edges = merged.edges_unique_inverse
+    open_edges = np.count_nonzero(np.bincount(edges) == 1)
+    if not merged.is_winding_consistent or open_edges > MOST_OPEN * len(edges):
         return None
     vertices = (merged.vertices - grid.origin) / grid.edge
     faces = np.ascontiguousarray(merged.faces, dtype=np.int64)
