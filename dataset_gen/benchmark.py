@@ -12,20 +12,13 @@ import numpy as np
 
 from carillon.arguments import poisson_ratio, whole_number
 from carillon.fem.element import DEFAULT_POISSON, Array
+from carillon.lanes import LANES, add_product, empty, load_tile, store_tile
 from carillon.options import option
 from carillon.progress import track
 from carillon.provenance import compiled_for, processor
 from carillon.serial import serial_blas
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, OBJECTIVES, fit, flops, sampled_energy
-from dataset_gen.objectives.lanes import (
-    LANES,
-    add_product,
-    compiled,
-    empty,
-    load_tile,
-    store_tile,
-)
-from dataset_gen.objectives.registers import PANEL
+from dataset_gen.objectives.compiled import PANEL, compiled
 from dataset_gen.sampling import samples
 
 RUNS = 7

@@ -7,8 +7,9 @@ import sys
 
 import numpy as np
 
+from carillon.registers import LANES
 from dataset_gen.objectives import fit
-from dataset_gen.objectives.registers import LANES, PANEL
+from dataset_gen.objectives.compiled import PANEL
 from dataset_gen.sampling import samples
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from carillon.fem.block import CELL_NODES
+from carillon.lanes import LANES, empty
 from dataset_gen.objectives import (
     bounded,
     coarse_response,
@@ -29,7 +30,6 @@ from dataset_gen.objectives.kernel import (
     solve_lower,
     solve_upper,
 )
-from dataset_gen.objectives.lanes import LANES, empty
 from dataset_gen.sampling import pattern_classes
 from tests import dataset_reference as reference
 

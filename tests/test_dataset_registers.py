@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from llvmlite import binding
 
-from dataset_gen.objectives import lanes, registers
+from carillon import lanes, registers
+from carillon.registers import LANES, OTHERS, X86, registers_in
+from dataset_gen.objectives.compiled import PANEL, panel_of
 from dataset_gen.objectives.kernel import COLUMNS
 from dataset_gen.objectives.oversampled import RIGID_SHARE
-from dataset_gen.objectives.registers import LANES, OTHERS, PANEL, X86, panel_of, registers_in
 from tests.fits_of_target import fits
 
 ROUNDING = np.finfo(float).eps / RIGID_SHARE
@@ -41,9 +42,9 @@ def test_a_lane_takes_one_register():
 
 
 def test_another_width_is_compiled_under_another_name(monkeypatch):
-    name = lanes._sources()
-    monkeypatch.setattr(lanes, "LANES", 2 * LANES)
-    assert lanes._sources() != name
+    name = lanes.digest_of()
+    monkeypatch.setattr(lanes, "REGISTERS", OTHERS)
+    assert lanes.digest_of() != name
 
 
 @pytest.mark.slow

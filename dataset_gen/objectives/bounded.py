@@ -6,18 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.fem.element import Array
-from dataset_gen.objectives.lanes import (
-    LANES,
-    Vector,
-    compiled,
-    empty,
-    larger,
-    load,
-    root,
-    spread,
-    store,
-    where_less,
-)
+from carillon.lanes import LANES, Vector, empty, larger, load, root, spread, store, where_less
+from dataset_gen.objectives.compiled import compiled
 
 EXCHANGES = 12
 """Exchanges of all wrong unknowns at once before the slow method that cannot cycle takes over."""

@@ -14,8 +14,10 @@ import numpy as np
 
 from carillon.fem.block import CORNER_NODES, degrees_of_freedom
 from carillon.fem.element import Array
+from carillon.lanes import LANES, empty, spread, store
 from carillon.serial import serial_blas
 from dataset_gen.objectives import flops
+from dataset_gen.objectives.compiled import compiled
 from dataset_gen.objectives.elimination import TILE, elimination_of
 from dataset_gen.objectives.free_block import (
     FreeBlock,
@@ -41,7 +43,6 @@ from dataset_gen.objectives.kernel import (
     weigh,
     write_equations,
 )
-from dataset_gen.objectives.lanes import LANES, compiled, empty, spread, store
 from dataset_gen.objectives.patterns import corner_strains, pattern_of, straining_motions
 from dataset_gen.objectives.quadratic import (
     NormalEquations,

@@ -13,7 +13,9 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from carillon.fem.element import Array
+from carillon.lanes import LANES, empty, load, root, spread, store
 from carillon.serial import serial_blas
+from dataset_gen.objectives.compiled import compiled
 from dataset_gen.objectives.descent import CURVATURE, GRADIENT
 from dataset_gen.objectives.elimination import Sum, elimination_of, lower_tiles_of, sum_of
 from dataset_gen.objectives.free_block import FreeBlock, free_block_of
@@ -30,7 +32,6 @@ from dataset_gen.objectives.kernel import (
     solve_lower,
     solve_upper,
 )
-from dataset_gen.objectives.lanes import LANES, compiled, empty, load, root, spread, store
 from dataset_gen.objectives.patterns import corner_strains, pattern_of, straining_motions
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.fem.element import Array
+from carillon.lanes import LANES, Vector, empty, load, spread, store
 from dataset_gen.objectives.coarse_response import (
     Coarse,
     CoarseResponse,
@@ -23,6 +24,7 @@ from dataset_gen.objectives.coarse_response import (
     respond,
     write_curvature,
 )
+from dataset_gen.objectives.compiled import compiled
 from dataset_gen.objectives.descent import (
     GRADIENT,
     HESSIAN,
@@ -52,7 +54,6 @@ from dataset_gen.objectives.kernel import (
     trace,
     weigh,
 )
-from dataset_gen.objectives.lanes import LANES, Vector, compiled, empty, load, spread, store
 from dataset_gen.objectives.quadratic import MODULUS_FLOOR, PatternFits, reference_moduli
 
 MODULUS_CEILING = 10.0

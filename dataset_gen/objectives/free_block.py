@@ -14,7 +14,9 @@ from scipy.linalg import qr
 
 from carillon.fem.block import cell_stiffness
 from carillon.fem.element import Array
+from carillon.lanes import Vector, empty, load, spread, store
 from carillon.serial import serial_blas
+from dataset_gen.objectives.compiled import compiled
 from dataset_gen.objectives.elimination import (
     FactorStructure,
     Sum,
@@ -31,7 +33,6 @@ from dataset_gen.objectives.kernel import (
     solve_upper,
     subtract_multiply,
 )
-from dataset_gen.objectives.lanes import Vector, compiled, empty, load, spread, store
 from dataset_gen.objectives.patterns import pattern_of
 
 

@@ -8,8 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from carillon.fem.element import Array
+from carillon.lanes import LANES, empty
 from carillon.serial import serial_blas
 from dataset_gen.objectives import flops
+from dataset_gen.objectives.compiled import compiled
 from dataset_gen.objectives.elimination import TILE, elimination_of
 from dataset_gen.objectives.free_block import FreeBlock, free_block_of
 from dataset_gen.objectives.kernel import (
@@ -27,7 +29,6 @@ from dataset_gen.objectives.kernel import (
     weigh,
     write_equations,
 )
-from dataset_gen.objectives.lanes import LANES, compiled, empty
 from dataset_gen.objectives.patterns import corner_strains, pattern_of, straining_motions
 from dataset_gen.objectives.quadratic import (
     NormalEquations,

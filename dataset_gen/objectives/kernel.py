@@ -1,7 +1,7 @@
 """What the compiled fits share: sparse Cholesky, small products, normal equations, in lanes.
 
 Every number stands for `LANES` blocks, one row of an array of lanes (see
-`dataset_gen.objectives.lanes`). A matrix has its numbers row by row; operands of products are
+`carillon.lanes`). A matrix has its numbers row by row; operands of products are
 tuples (array, first entry, stride, stride). The factorised matrices consist of 3x3 tiles in the
 order of `dataset_gen.objectives.elimination`.
 """
@@ -11,12 +11,10 @@ from __future__ import annotations
 import numpy as np
 
 from carillon.fem.element import Array
-from dataset_gen.objectives.elimination import TILE, FactorStructure, Links, Sum, factor_of
-from dataset_gen.objectives.lanes import (
+from carillon.lanes import (
     LANES,
     Vector,
     add_product,
-    compiled,
     empty,
     load,
     load_tile,
@@ -28,7 +26,8 @@ from dataset_gen.objectives.lanes import (
     subtract_product,
     zeros,
 )
-from dataset_gen.objectives.registers import PANEL
+from dataset_gen.objectives.compiled import PANEL, compiled
+from dataset_gen.objectives.elimination import TILE, FactorStructure, Links, Sum, factor_of
 
 Operand = tuple[Array, int, int, int]
 """Array, first entry, stride along the rows or columns, stride along the sum."""

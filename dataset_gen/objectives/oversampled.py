@@ -14,8 +14,10 @@ import numpy as np
 
 from carillon.fem.block import COARSE_EDGE, NODES, cell_stiffness, degrees_of_freedom
 from carillon.fem.element import CORNERS, Array, shape_functions, uniform_stiffness
+from carillon.lanes import LANES, empty, spread
 from carillon.serial import serial_blas
 from dataset_gen.objectives import flops
+from dataset_gen.objectives.compiled import compiled
 from dataset_gen.objectives.elimination import (
     TILE,
     FactorStructure,
@@ -47,7 +49,6 @@ from dataset_gen.objectives.kernel import (
     weigh,
     write_equations,
 )
-from dataset_gen.objectives.lanes import LANES, compiled, empty, spread
 from dataset_gen.objectives.patterns import corner_strains, pattern_of, straining_motions
 from dataset_gen.objectives.quadratic import (
     NormalEquations,

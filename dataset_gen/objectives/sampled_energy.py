@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from carillon.fem.element import DEFAULT_POISSON, Array
+from carillon.lanes import LANES, add_product, empty, load, spread, store, store_tile, zeros
 from carillon.serial import serial_blas
 from dataset_gen.objectives.coarse_response import (
     Coarse,
@@ -20,6 +21,7 @@ from dataset_gen.objectives.coarse_response import (
     respond,
     write_curvature,
 )
+from dataset_gen.objectives.compiled import compiled
 from dataset_gen.objectives.descent import (
     GRADIENT,
     HESSIAN,
@@ -44,17 +46,6 @@ from dataset_gen.objectives.kernel import (
     multiply,
     solve_lower,
     weigh,
-)
-from dataset_gen.objectives.lanes import (
-    LANES,
-    add_product,
-    compiled,
-    empty,
-    load,
-    spread,
-    store,
-    store_tile,
-    zeros,
 )
 from dataset_gen.objectives.patterns import pattern_of
 from dataset_gen.objectives.quadratic import MODULUS_FLOOR, PatternFits, reference_moduli

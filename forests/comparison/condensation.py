@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from carillon.fem.element import DEFAULT_POISSON, Array
+from carillon.lanes import LANES, empty
 from carillon.serial import serial_blas
 from dataset_gen.objectives.chen2015 import Corners, corners_of
+from dataset_gen.objectives.compiled import compiled
 from dataset_gen.objectives.elimination import TILE
 from dataset_gen.objectives.kernel import (
     MOTIONS,
@@ -23,7 +25,6 @@ from dataset_gen.objectives.kernel import (
     solve_lower,
     weigh,
 )
-from dataset_gen.objectives.lanes import LANES, compiled, empty
 from dataset_gen.objectives.patterns import straining_motions
 from forests.comparison.block_error import pattern_rows
 

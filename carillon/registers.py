@@ -1,8 +1,8 @@
-"""How many blocks go side by side, and how large a matrix of their numbers stays in registers.
+"""How many numbers go side by side: the vector registers of the processor.
 
-Both follow from the vector registers of the processor that numba compiles for: this one, or the one
-that the variables NUMBA_CPU_NAME and NUMBA_CPU_FEATURES name. No list of processors could tell; the
-compiler can, by the registers that its code puts eight doubles into.
+It is the processor that numba compiles for: this one, or the one that the variables NUMBA_CPU_NAME
+and NUMBA_CPU_FEATURES name. No list of processors could tell; the compiler can, by the registers
+that its code puts eight doubles into.
 """
 
 from __future__ import annotations
@@ -54,27 +54,10 @@ def assembly_of_a_sum() -> str:
     return str(library.get_asm_str())
 
 
-def panel_of(registers: Registers) -> int:
-    """Columns of the largest product of three rows whose sums stay in registers.
-
-    Beside the sums there must be room for the rows and for one column. Six or three, which divide
-    the columns that occur: 6, 18, 24 and 48.
-
-    Examples
-    --------
-    >>> panel_of(X86["zmm"]), panel_of(X86["ymm"])
-    (6, 3)
-    """
-    return 6 if 3 * 6 + 3 + 1 <= registers.number else 3
-
-
 REGISTERS = registers_in(assembly_of_a_sum())
 
 LANES = REGISTERS.doubles
-"""Blocks side by side: as many as a register holds, so that a number of each takes one register.
+"""Numbers side by side: as many as a register holds.
 
 With more the compiler splits every number over several registers, and tiles no longer fit.
 """
-
-PANEL = panel_of(REGISTERS)
-"""Columns of right-hand sides worked on together."""

@@ -1,10 +1,10 @@
-"""Blocks side by side: a numba type for a vector of `LANES` doubles, and tiles of such.
+"""Numbers side by side: a numba type for a vector of `LANES` doubles, and tiles of such.
 
-All blocks of one void pattern take the same steps, so a step is done for `LANES` of them by one
-machine instruction. Arrays of lanes are (entries, `LANES`), one row per number of the block. Inside
-compiled functions a `Lanes` value adds and multiplies like a float; a tile is a small matrix of
-them that stays in registers. How many lanes there are is the processor's, see
-`dataset_gen.objectives.registers`; what a lane computes does not depend on it.
+Problems that take the same steps do each for `LANES` of them by one machine instruction. Arrays of
+lanes are (entries, `LANES`), one row per number of a problem. Inside compiled functions a `Lanes`
+value adds and multiplies like a float; a tile is a small matrix of them that stays in registers.
+How many lanes there are is the processor's, see `carillon.registers`; what a lane computes does not
+depend on it.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from numba import njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic as numba_intrinsic
 from numba.extending import models, overload, register_model
+from numpy.typing import NDArray
 
-from carillon.fem.element import Array
-from dataset_gen.objectives.registers import LANES, PANEL
+from carillon.registers import LANES, REGISTERS
 
 BYTES = 8 * LANES
 
@@ -31,29 +31,31 @@ _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 _INDEX = ir.IntType(64)
 
 
-def _sources() -> str:
-    """Digest of the modules whose compiled functions call each other, and of their width."""
-    digest = hashlib.sha256(f"{LANES} {PANEL}".encode())
-    for name in ("lanes", "kernel", "bounded", "descent", "free_block", "coarse_response"):
-        path = Path(__file__).parent / f"{name}.py"
+def compiler(*sources: Path) -> Callable[[Callable[..., Any]], Any]:
+    """Compile with numba and cache the result under a name that changes with the `sources`.
+
+    They are the files of all functions of lanes that call each other: numba's cache notices a
+    change of the function's own file, not of the files it calls, nor of the width.
+    """
+    digest = digest_of(*sources)
+
+    def compiled(function: Callable[..., Any]) -> Any:
+        function.__qualname__ += f"_{digest}"
+        return njit(cache=True, nogil=True)(function)
+
+    return compiled
+
+
+def digest_of(*sources: Path) -> str:
+    """Digest of files, of this one, and of the registers."""
+    digest = hashlib.sha256(f"{REGISTERS}".encode())
+    for path in (Path(__file__), *sources):
         digest.update(path.read_bytes() if path.exists() else b"")
     return digest.hexdigest()[:12]
 
 
-_SOURCES = _sources()
-
-
-def compiled(function: Callable[..., Any]) -> Any:
-    """Compile with numba and cache the result under a name that changes with the kernel.
-
-    Numba's cache notices a change of the function's own file, not of the files it calls.
-    """
-    function.__qualname__ += f"_{_SOURCES}"
-    return njit(cache=True, nogil=True)(function)
-
-
 class LanesType(types.Type):
-    """One double of each of `LANES` blocks."""
+    """`LANES` doubles."""
 
     def __init__(self) -> None:
         super().__init__(name="Lanes")
@@ -316,8 +318,8 @@ add_product = _product(1)
 subtract_product = _product(-1)
 
 
-@compiled
-def empty(entries: int) -> Array:
+@compiler()
+def empty(entries: int) -> NDArray[np.float64]:
     """Uninitialised array of lanes whose rows do not straddle cache lines."""
     raw = np.empty((entries + 1) * LANES)
     skip = -(raw.ctypes.data // 8) % LANES

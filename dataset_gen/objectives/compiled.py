@@ -1,0 +1,32 @@
+"""How the fits are compiled, and how large a matrix of lanes stays in registers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from carillon.lanes import compiler
+from carillon.registers import REGISTERS, Registers
+
+MODULES = ("compiled", "kernel", "bounded", "descent", "free_block", "coarse_response")
+"""Those whose compiled functions call each other."""
+
+compiled = compiler(*(Path(__file__).parent / f"{name}.py" for name in MODULES))
+"""Decorator of compiled functions."""
+
+
+def panel_of(registers: Registers) -> int:
+    """Columns of the largest product of three rows whose sums stay in registers.
+
+    Beside the sums there must be room for the rows and for one column. Six or three, which divide
+    the columns that occur: 6, 18, 24 and 48.
+
+    Examples
+    --------
+    >>> panel_of(X86["zmm"]), panel_of(X86["ymm"])
+    (6, 3)
+    """
+    return 6 if 3 * 6 + 3 + 1 <= registers.number else 3
+
+
+PANEL = panel_of(REGISTERS)
+"""Columns of right-hand sides worked on together."""
