@@ -110,7 +110,7 @@ def _load(context: Any, builder: Any, kind: types.Array, array: Any, entry: Any)
     address = _address(context, builder, kind, array, entry)
     if kind.ndim == 1:
         return _splat(builder, builder.load(address))
-    return builder.load(address, align=BYTES)
+    return builder.load(address, align=8)
 
 
 def _call(builder: Any, name: str, *arguments: Any) -> Any:
@@ -143,7 +143,7 @@ def store(context: Any, array: Any, entry: Any, value: Any) -> Any:
     def emit(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         array, entry, value = arguments
         address = _address(context, builder, signature.args[0], array, entry)
-        builder.store(value, address, align=BYTES)
+        builder.store(value, address, align=8)
         return context.get_dummy_value()
 
     return types.void(array, types.intp, LANES_TYPE), emit
@@ -251,7 +251,7 @@ def store_tile(context: Any, target: Any, tile: Any) -> Any:
         values = cgutils.unpack_tuple(builder, arguments[1])
         for entry, value in zip(_entries(builder, tile, start, row, column), values):
             address = _address(context, builder, signature.args[0][0], array, entry)
-            builder.store(value, address, align=BYTES)
+            builder.store(value, address, align=8)
         return context.get_dummy_value()
 
     return types.void(types.unliteral(target), tile), emit

@@ -12,7 +12,7 @@ from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import Layout, assemble
 from solver.correction.correct import correct
-from solver.correction.lanczos import lanczos
+from solver.correction.lanczos import lanczos, mixed
 from solver.distribution.local_mesh import distribute
 from solver.linear import LinearSolver
 from solver.subspace.rayleigh_ritz import rayleigh_ritz
@@ -40,9 +40,8 @@ class Case:
     def run(self, shift, wanted, tolerance):
         """Lanczos around `shift`."""
         inverse = self.inner.inverse(self.system, shift)
-        return lanczos(
-            self.system, inverse, self.values, self.start, wanted, wanted + 10, tolerance
-        )
+        start, look = mixed(self.system, self.values, self.start, wanted, shift, tolerance)
+        return lanczos(self.system, inverse, start, wanted, wanted + 10, tolerance, look)
 
 
 @pytest.fixture(scope="module")

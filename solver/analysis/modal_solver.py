@@ -19,11 +19,13 @@ from solver.analysis.bounds import FEWEST_SPARE, check_mode_count, default_keep,
 from solver.analysis.options import SolverOptions
 from solver.analysis.timing import Phases, peak_memory
 from solver.assembly.system import Layout, System, assemble
-from solver.correction.correct import EIGENVALUE_TOLERANCE, correct
+from solver.correction.cold import Cold, from_nothing
+from solver.correction.correct import EIGENVALUE_TOLERANCE, carried, correct
 from solver.distribution.collective import bcast_from_root, compute_on_root
 from solver.distribution.local_mesh import LocalMesh, distribute, scatter_moduli
 from solver.hcms.synthesis import Synthesis, make_subdomains, synthesize
 from solver.linear import Inverse, LinearSolver
+from solver.reference.eigensolver import TYPES
 from solver.reference.truth import (
     RESIDUAL_TOLERANCE,
     SPARE_MODES,
@@ -40,6 +42,7 @@ from solver.subspace.verification import (
     require_six_rigid,
     verify,
 )
+from solver.subspace.weyl import CountingLaw
 
 Array = NDArray[np.float64]
 
@@ -145,7 +148,12 @@ class ModalSolver:
         comm: MPI.Comm = MPI.COMM_WORLD,
         verbose: bool = False,
     ) -> None:
-        bcast_from_root(comm, lambda: check_mode_count(options.modes, cast(Solid, model).n_dofs))
+        def checked() -> SolverOptions:
+            n_dofs = cast(Solid, model).n_dofs
+            check_mode_count(options.modes, n_dofs)
+            return options.resolved(comm.size, n_dofs)
+
+        options = bcast_from_root(comm, checked)
         self._model = model if comm.rank == 0 else None
         require_memory(model, options, comm)
         self.options = options
@@ -155,12 +163,13 @@ class ModalSolver:
         reuse_freed_memory()
         phases = Phases(comm, verbose)
         with phases("partition"):
-            self.local_mesh = distribute(model, options.subdomains, options.seed, comm)
+            subdomains = comm.size if options.method == "lanczos" else options.subdomains
+            self.local_mesh = distribute(model, subdomains, options.seed, comm)
         with phases("analysis"):
             self._layout = Layout.of_local_mesh(self.local_mesh, comm)
             self._linear = LinearSolver(options.linear_solver, self._layout)
-            self._keep = self._modes_to_keep()
             if options.method == "hcms":
+                self._keep = self._modes_to_keep()
                 self._subdomains = make_subdomains(self.local_mesh, options.interface, comm)
         self.seconds = phases.seconds
 
@@ -227,15 +236,16 @@ class ModalSolver:
             elements = local_mesh.cells.elements
             system = assemble(local_mesh, self.comm, self._layout, elements, self._threads)
         evidence: dict[str, Any] = {
+            "method": self.options.method,
             "ranks": self.comm.size,
             "threads": self._threads,
             "subdomains": local_mesh.decomposition.tree.parts,
             "n_dofs": local_mesh.n_dofs,
         }
-        if self.options.method == "hcms":
-            solution = self._hcms(local_mesh, system, initial_modes, phases, evidence)
-        else:
+        if self.options.method in TYPES:
             solution = self._general_solver(system, phases, evidence)
+        else:
+            solution = self._corrected(local_mesh, system, young, initial_modes, phases, evidence)
         values, vectors = solution.values, solution.vectors
         with phases("verification"):
             residuals, orthogonality = verify(system, values, vectors)
@@ -266,7 +276,7 @@ class ModalSolver:
         """Whether eigenpairs are asked for, not just approximations of them."""
         options = self.options
         corrected = options.corrections > 0 and options.tolerance != 0.0
-        return options.method != "hcms" or corrected
+        return options.method in TYPES or corrected
 
     def _modes_to_keep(self) -> int:
         options, n_dofs = self.options, self.local_mesh.n_dofs
@@ -277,7 +287,7 @@ class ModalSolver:
         if keep is None:
             keep = default_keep(options.modes, parts, together)
         least = options.modes + (FEWEST_SPARE if options.corrections else 0)
-        if options.method == "hcms" and keep < min(least, n_dofs):
+        if keep < min(least, n_dofs):
             raise UserError(
                 f"--retained-modes {keep} is too few for {options.modes} modes; "
                 f"expected at least {least}, and half more for fast convergence"
@@ -317,7 +327,7 @@ class ModalSolver:
             with phases("inertia"):
                 inertia = count_beyond(system, truth)
         if inertia is None or inertia.counted != inertia.computed:
-            tolerance = None if options.method == "hcms" else options.tolerance
+            tolerance = options.tolerance if options.method in TYPES else None
             with phases("completion"):
                 truth, inertia = complete(
                     system, truth, inertia, tolerance or RESIDUAL_TOLERANCE, options.seed
@@ -330,24 +340,42 @@ class ModalSolver:
             }
         return truth
 
-    def _hcms(
+    def _corrected(
         self,
         local_mesh: LocalMesh,
         system: System,
+        young: Array | None,
         initial_modes: Modes | Array | None,
         phases: Phases,
         evidence: dict[str, Any],
     ) -> _Solution:
         options = self.options
+        requested = options.modes - RIGID_MODES
+        if options.check_inertia:
+            requested += SPARE_MODES
+        tolerance = EIGENVALUE_TOLERANCE if options.tolerance is None else options.tolerance
         values: Array | None = None
         similar: Inverse | None = None
+        cold: Cold | None = None
         if isinstance(initial_modes, Modes):
             if initial_modes.system.rows.pattern is self._layout.pattern:
                 similar = initial_modes.inverse
             start: Array | None = initial_modes.start()
         else:
             start = initial_modes
-        if start is None:
+        if start is None and options.method == "lanczos":
+            with phases("lanczos"):
+                cold = from_nothing(
+                    system,
+                    self._linear,
+                    requested,
+                    carried(requested, tolerance),
+                    self._law(young),
+                    tolerance,
+                    options.seed,
+                )
+            values, start = cold.found.values, cold.found.vectors
+        elif start is None:
             with phases("hcms"):
                 synthesis = synthesize(
                     local_mesh,
@@ -362,27 +390,26 @@ class ModalSolver:
             if options.corrections == 0:
                 return self._uncorrected(synthesis)
             values, start = elastic_part(system, synthesis)
-        requested = options.modes - RIGID_MODES
-        spare = SPARE_MODES if options.check_inertia else 0
         with phases("correction"):
             result = correct(
                 system,
                 start,
-                requested + spare,
+                requested,
                 self._linear,
                 values,
-                EIGENVALUE_TOLERANCE if options.tolerance is None else options.tolerance,
+                tolerance,
                 options.corrections,
                 options.acceleration,
                 report=_reporter(self._verbose and self.comm.rank == 0),
                 similar=similar,
+                begun=cold,
             )
             rigid_values, rigid = rigid_pairs(system)
         evidence |= {
             "linear_solver": self._linear.method,
             "corrections": result.steps,
             "right_hand_sides": result.solves,
-            "eigenvalue_error_estimate": float(result.errors[:requested].max()),
+            "eigenvalue_error_estimate": float(result.errors[: options.modes - RIGID_MODES].max()),
         }
         truth = Truth(
             np.concatenate([rigid_values, result.values]),
@@ -394,6 +421,16 @@ class ModalSolver:
             truth = self._prove(system, truth, phases, evidence)
             evidence |= {"further_searches": truth.searches, "modes_added": truth.added}
         return _Solution(*truth.lowest(), result.guard, result.inverse)
+
+    def _law(self, young: Array | None) -> CountingLaw:
+        """Where the eigenvalues are expected, on every rank."""
+
+        def law() -> CountingLaw:
+            model = cast(Solid, self._model)
+            moduli = model.young if young is None else young
+            return CountingLaw.of_solid(model, moduli, self.options.modes)
+
+        return bcast_from_root(self.comm, law)
 
     def _uncorrected(self, synthesis: Synthesis) -> _Solution:
         count = self.options.modes

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from carillon.arguments import number_between, whole_number
+from carillon.errors import UserError
 from carillon.options import option
 from solver import linear
 from solver.correction.correct import ACCELERATIONS, EIGENVALUE_TOLERANCE
@@ -12,8 +13,10 @@ from solver.hcms.condense import DEFAULT_INTERFACE, INTERFACES
 from solver.reference.eigensolver import TYPES
 from solver.reference.truth import RESIDUAL_TOLERANCE
 
-METHODS = ("hcms", *TYPES)
+METHODS = ("auto", "hcms", "lanczos", *TYPES)
 MAX_CORRECTIONS = 40
+LEAST_UNKNOWNS = 4
+"""Unknowns to each mode from which on the modes are few of all there are."""
 
 number_of_modes = whole_number(1, 2**31 - 1)
 """Argument type: a number of modes, or of whatever else is at most as many as unknowns."""
@@ -38,14 +41,15 @@ class SolverOptions:
     """
 
     method: str = option(
-        "hcms",
-        "hcms with error correction, or ground truth by slepc or arpack",
+        "auto",
+        "hcms with error correction; lanczos from random vectors; auto, the faster of these; or "
+        "ground truth by slepc or arpack",
         choices=METHODS,
     )
     modes: int = option(256, "number of modes, rigid ones included", type=number_of_modes)
     tolerance: float | None = option(
         None,
-        "hcms: relative eigenvalue error to correct to "
+        "hcms, lanczos: relative eigenvalue error to correct to "
         f"(default {EIGENVALUE_TOLERANCE:g}; 0 makes exactly --corrections steps); "
         f"slepc, arpack: residual tolerance (default {RESIDUAL_TOLERANCE:g})",
         type=tolerance,
@@ -91,3 +95,32 @@ class SolverOptions:
     acceleration: str = option(
         "lanczos", "of the corrections; relaxation is the paper's", choices=ACCELERATIONS
     )
+
+    def resolved(self, ranks: int, n_dofs: int) -> SolverOptions:
+        """The same with a method for `auto`: the fastest of those that the other options allow.
+
+        Raises
+        ------
+        UserError
+            For `lanczos` with options that it has no use for.
+        """
+        for_hcms = {
+            "--retained-modes": self.retained_modes,
+            "--cutoff": self.cutoff,
+            "--subdomains": self.subdomains,
+        }
+        strange = [name for name, value in for_hcms.items() if value is not None]
+        if self.linear_solver in linear.ITERATIVE:
+            strange.append(f"--linear-solver {self.linear_solver}")
+        if self.acceleration != "lanczos":
+            strange.append(f"--acceleration {self.acceleration}")
+        if self.corrections == 0:
+            strange.append("--corrections 0")
+        if self.tolerance == 0.0:
+            strange.append("--tolerance 0")
+        if self.method == "lanczos" and strange:
+            raise UserError(f"--method lanczos has no use for {', '.join(strange)}; use hcms")
+        if self.method != "auto":
+            return self
+        few = n_dofs < LEAST_UNKNOWNS * self.modes
+        return replace(self, method="hcms" if strange or few or ranks > 1 else "lanczos")

@@ -109,13 +109,13 @@ class System:
 
     def inner(self, left: Array, right: Array) -> Array:
         """left^T right summed over the ranks; equal on all ranks."""
-        return self._summed(left.T @ right)
+        return self.summed(left.T @ right)
 
     def column_products(self, left: Array, right: Array) -> Array:
         """Inner product of each column of `left` with the same column of `right`."""
-        return self._summed(np.einsum("ij,ij->j", left, right))
+        return self.summed(np.einsum("ij,ij->j", left, right))
 
-    def _summed(self, local: Array) -> Array:
+    def summed(self, local: Array) -> Array:
         """Sum over the ranks, in place."""
         if self.comm.size > 1:
             self.comm.Allreduce(MPI.IN_PLACE, local)

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
 from solver.assembly.system import System
+from solver.correction.cold import Cold
 from solver.correction.enrichment import Ritz, Step, enrich, relax
-from solver.correction.lanczos import HIGHEST_SHIFT, ZERO_FRACTION, lanczos
+from solver.correction.lanczos import HIGHEST_SHIFT, ZERO_FRACTION, lanczos, mixed
 from solver.distribution.collective import bcast_from_root
 from solver.linear import Approximate, Inverse, LinearSolver
 from solver.subspace.rayleigh_ritz import rayleigh_ritz, safe_shift
@@ -96,6 +97,7 @@ def correct(
     report: Callable[[int, float], None] | None = None,
     observe: Callable[[int, Array], None] | None = None,
     similar: Inverse | None = None,
+    begun: Cold | None = None,
 ) -> Correction:
     """Improve the `requested` lowest elastic modes from the block `start` until they are accurate.
 
@@ -129,6 +131,8 @@ def correct(
         Called with the step and the Ritz values of the wanted modes.
     similar
         Inverse for a similar material, which does for the first step of a nearly accurate start.
+    begun
+        Block Lanczos iteration that `start` and `values` come from.
 
     Raises
     ------
@@ -145,7 +149,7 @@ def correct(
     spectrum: the last modes converge like (theta - mu) / (theta_p - mu), and the first are accurate
     early.  Otherwise it lies below the spectrum.
     """
-    rough = values is not None
+    rough = values is not None and begun is None
     if values is None:
         values, start = rayleigh_ritz(system, start)
     if len(values) < requested:
@@ -161,12 +165,20 @@ def correct(
         return Correction(values[:requested], vectors, exact, start[:, requested:])
     ritz = Ritz(system, values, start)
     iteration = _Iteration(system, linear, ritz, requested, acceleration, similar)
+    if begun is not None:
+        iteration.go_on_from(begun)
     try:
         result = iteration.run(tolerance, max_steps, rough, report, observe)
         result.inverse = iteration.lasting(tolerance)
     finally:
         iteration.destroy()
     return result
+
+
+def carried(requested: int, tolerance: float) -> int:
+    """Vectors that a block Lanczos iteration is to return: the wanted ones and those beyond."""
+    guard = default_guard(requested)
+    return requested + (guard if tolerance >= LOOSE else int(IMPROVED_GUARDS * guard) + 1)
 
 
 def default_guard(requested: int) -> int:
@@ -202,8 +214,14 @@ class _Iteration:
         if acceleration == "relaxation":
             self.width = self.improved = len(ritz.values)
             self.step = relax
-        self.solves = self.blocks = 0
+        self.told: Array | None = None
+        self.steps = self.solves = self.blocks = 0
         self.history: list[float] = []
+
+    def go_on_from(self, begun: Cold) -> None:
+        """Count what was done before, and take over what is known."""
+        self.made, self.told, self.steps = begun.inverse, begun.found.errors, 1
+        self.solves, self.blocks = begun.found.solves, begun.found.blocks
 
     def run(
         self,
@@ -214,7 +232,7 @@ class _Iteration:
         observe: Callable[[int, Array], None] | None,
     ) -> Correction:
         """Correct until the tolerance, or the last step allowed, is reached."""
-        step = 0
+        step = self.steps
         if tolerance >= LOOSE:
             # One step then has to do, for the last modes too.
             self.improved = self.width
@@ -228,7 +246,7 @@ class _Iteration:
             self.history.append(worst)
             if report is not None:
                 report(step, worst)
-            accurate = worst <= tolerance and _typical(errors) <= TYPICAL * tolerance
+            accurate = _are_accurate(errors, tolerance)
             if accurate or step >= max_steps:
                 break
             if step == 0 and lanczos_may_run and worst > NEARLY_ACCURATE * tolerance:
@@ -264,15 +282,16 @@ class _Iteration:
         )
 
     def _run_lanczos(self, tolerance: float, observe: Callable[[int, Array], None] | None) -> None:
-        width = self.width if tolerance >= LOOSE else self.improved + 1
+        width = carried(self.requested, tolerance)
         # Again where a poor start has put the shift too high, or chance on an eigenvalue; a start
         # that knows nothing of the spectrum needs one from below.
         for run in range(LANCZOS_RUNS):
             self.inside = run < LANCZOS_RUNS - 1
             inverse, ritz = self._inverse(1), self.ritz
-            result = lanczos(
-                self.system, inverse, ritz.values, ritz.vectors, self.requested, width, tolerance
+            start, look = mixed(
+                self.system, ritz.values, ritz.vectors, self.requested, inverse.shift, tolerance
             )
+            result = lanczos(self.system, inverse, start, self.requested, width, tolerance, look)
             self.solves += result.solves
             self.blocks += result.blocks
             if result.resonant:
@@ -290,6 +309,8 @@ class _Iteration:
                 if missed:
                     # No eigenvalue lies above the start's, so `krylov` has to go on from there.
                     self.ritz = ritz
+                else:
+                    self.told = result.errors
                 break
             self.destroy()
         self.inside = True
@@ -346,9 +367,17 @@ class _Iteration:
     def _residuals(self, tolerance: float) -> tuple[Array, Array, NDArray[np.int64]]:
         """Errors of the wanted modes, and residuals of those to improve with their numbers.
 
-        Wanted modes that have become accurate are locked.
+        Wanted modes that have become accurate are locked.  A block Lanczos iteration has told
+        errors of its own, far closer than those from residuals.
         """
         ritz = self.ritz
+        told, self.told = self.told, None
+        if told is not None and len(told):
+            if _are_accurate(told, tolerance):
+                ritz.errors[: self.requested] = told
+                return told, ritz.vectors[:, :0], ritz.active[:0]
+            # Far below the shift rounding mixes modes.
+            ritz = self.ritz = Ritz(self.system, *rayleigh_ritz(self.system, ritz.vectors))
         candidates = ritz.active[: max(0, self.improved - ritz.locked)]
         residual = ritz.residual(candidates)
         estimate = self._estimate(candidates, residual)
@@ -400,6 +429,11 @@ class _Iteration:
                 f"after {step} steps, {tolerance:.1e} was asked for; use another linear solver "
                 "(--linear-solver) or a looser tolerance"
             )
+
+
+def _are_accurate(errors: Array, tolerance: float) -> bool:
+    worst = float(errors.max(initial=0.0))
+    return worst <= tolerance and _typical(errors) <= TYPICAL * tolerance
 
 
 def _typical(errors: Array) -> float:

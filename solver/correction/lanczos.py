@@ -1,9 +1,9 @@
-"""Block Lanczos iteration around a shift inside the spectrum, begun from approximate modes.
+"""Block Lanczos iteration around a shift inside the spectrum.
 
-The approximate modes are mixed into few columns, each of which holds modes that lie far apart: a
-Krylov space of them holds all the modes again, and what their errors have in common is removed from
-all of them by every solve.  It takes about half the right-hand sides that correcting each mode by
-itself takes.
+It may begin from anything.  Approximate modes are mixed into few columns, each of which holds modes
+that lie far apart: a Krylov space of them holds all the modes again, and what their errors have in
+common is removed from all of them by every solve.  It takes about half the right-hand sides that
+correcting each mode by itself takes.
 """
 
 from __future__ import annotations
@@ -17,12 +17,15 @@ from numpy.typing import NDArray
 from solver.assembly.system import System
 from solver.distribution.collective import bcast_from_root
 from solver.linear import Inverse
+from solver.subspace.basis import BlockBasis
 from solver.subspace.orthonormal import WELL_CONDITIONED, is_cancelled, orthonormal
 
 Array = NDArray[np.float64]
 
 COLUMNS, FEWEST_COLUMNS = 64, 16
 """Widest and narrowest block: the narrower, the fewer right-hand sides; the wider, the faster."""
+RANDOM_COLUMNS = 24
+"""The same of a block that knows nothing of the modes, which takes more steps of any width."""
 MIXED_IN_COLUMN = 4
 """Wanted modes in a column of the first block; the space has to tell them apart again."""
 END_WEIGHT = 2.0
@@ -31,20 +34,23 @@ MIXED = 1.15
 """Modes that enter the first block, as a share of those wanted, in case some are out of order."""
 ROUGH = 1e-3
 """Tolerance above which those wanted alone enter: fewer steps then tell them apart."""
-FIRST_LOOK = 1.25
-"""Dimension of the space at the first look at its Ritz values, as a share of the modes mixed."""
+FIRST_LOOK, RANDOM_LOOK = 1.25, 1.75
+"""Dimension of the space at the first look at its Ritz values, as a share of the modes mixed, and
+of those wanted after a random start."""
 DECADES = 2.0
 """Decades that a block takes off the error at least, until two looks have told."""
 HIGHEST_SHIFT = 0.8
 """Share of the last wanted eigenvalue above which a shift is too high."""
 LONGEST = 4
 """Dimension at which the iteration ends in any case, as a multiple of the modes wanted."""
-PESSIMISM = 4.0
-"""What the estimated errors are above those of the Ritz values that the result has, at least."""
+PESSIMISM = 3.0
+"""What the bounds on the operator's errors are above those of the Ritz values of K, at least."""
 ZERO_FRACTION = 1e-8
 """Share of the last wanted eigenvalue below which one is zero, and its error absolute."""
 ROUNDING_FRACTION = 1e-3
 """Share of the shift by which rounding may take a small eigenvalue below zero."""
+ROUNDING = 1e-11
+"""Error of an eigenvalue by rounding, as a share of the shift."""
 RESOLVED = 1e-2
 """Share (squared) of the residual in the image of a Ritz vector below which it is resolved."""
 
@@ -59,15 +65,18 @@ class Lanczos:
         (k,) Ritz values [rad^2/s^2], ascending.
     vectors
         (local, k) mass-orthonormal Ritz vectors of their span, row-major.
+    errors
+        (requested,) estimated relative errors of the lowest values; none if there are too few.
     solves, blocks
         Number of right-hand sides solved, and of the blocks that they came in.
     resonant
-        Whether the shift is so close to an eigenvalue that its mode drowns the others: then the
-        values and vectors are those of the start.
+        Whether the shift is so close to an eigenvalue that its mode drowns the others: then there
+        are no values and vectors.
     """
 
     values: Array
     vectors: Array
+    errors: Array
     solves: int
     blocks: int
     resonant: bool = False
@@ -76,11 +85,11 @@ class Lanczos:
 def lanczos(
     system: System,
     inverse: Inverse,
-    values: Array,
     start: Array,
     requested: int,
     width: int,
     tolerance: float,
+    first_look: int,
 ) -> Lanczos:
     """Lowest elastic modes by the block Lanczos iteration of (K - mu M)^-1 M.
 
@@ -88,14 +97,16 @@ def lanczos(
     ----------
     inverse
         Exact, with the shift mu between zero and the last wanted eigenvalue.
-    values, start
-        (q,) and (local, q) Ritz pairs, orthogonal to the rigid motions, q >= requested.
+    start
+        (local, b) first block, see `mixed` and `solver.subspace.start.start_block`.
     requested
         Number of modes to become accurate.
     width
         Number of modes to return, as far as there are so many.
     tolerance
         Relative eigenvalue error to stop at.
+    first_look
+        Dimension of the space at the first look at its Ritz values.
 
     Notes
     -----
@@ -103,25 +114,45 @@ def lanczos(
     loses orthogonality within three steps.  The stiffness projected on the Ritz vectors of the
     operator follows from that of the last block, so the Ritz values of K itself cost little more.
     """
-    mixed = requested if tolerance > ROUGH else min(len(values), int(MIXED * requested))
-    columns = min(_columns(requested), requested)
+    columns = start.shape[1]
     longest = min(LONGEST * (requested + columns), system.n_dofs)
-    modes = start[:, :mixed]
-    begin = _mixed(values[:mixed], modes, _signs(system, modes), inverse.shift, columns)
-    basis = _Basis(system, inverse, begin, longest + begin.shape[1])
-    looks = _Looks(tolerance, int((1.0 if tolerance > ROUGH else FIRST_LOOK) * mixed), columns)
+    basis = _Basis(system, inverse, start, longest + columns)
+    looks = _Looks(tolerance, first_look, columns)
     while basis.remainder.shape[1] and basis.size < longest:
         basis.extend()
         if basis.blocks == 1 and basis.remainder.shape[1] < min(columns, longest - basis.size):
-            return Lanczos(values, start, basis.size, basis.blocks, resonant=True)
+            none = np.empty(0)
+            return Lanczos(none, start[:, :0], none, basis.size, basis.blocks, resonant=True)
         if basis.size < looks.next:
             continue
-        error, last = basis.outlook(requested)
+        errors, last = basis.outlook(requested)
         # Beyond most wanted modes the shift would take long to find the first ones.
-        if inverse.shift > HIGHEST_SHIFT * last or looks.accurate(basis.size, error):
+        too_high = inverse.shift > HIGHEST_SHIFT * last
+        if too_high or looks.accurate(basis.size, float(np.max(errors)) if len(errors) else np.inf):
             break
+    else:
+        errors, _ = basis.outlook(requested)
     ritz_values, vectors = basis.ritz_pairs(width)
-    return Lanczos(ritz_values, vectors, basis.size, basis.blocks)
+    return Lanczos(ritz_values, vectors, errors, basis.size, basis.blocks)
+
+
+def mixed(
+    system: System, values: Array, vectors: Array, requested: int, shift: float, tolerance: float
+) -> tuple[Array, int]:
+    """A first block (local, b) of approximate modes, and when to look first.
+
+    Parameters
+    ----------
+    values, vectors
+        (q,) and (local, q) Ritz pairs, orthogonal to the rigid motions, q >= requested.
+    """
+    count, look = requested, 1.0
+    if tolerance <= ROUGH:
+        count, look = min(len(values), int(MIXED * requested)), FIRST_LOOK
+    modes = vectors[:, :count]
+    columns = min(_columns(requested), requested)
+    signs = _signs(system, modes)
+    return _mixture(values[:count], modes, signs, shift, columns), int(look * count)
 
 
 def _columns(requested: int) -> int:
@@ -176,10 +207,14 @@ class _Basis:
     def __init__(self, system: System, inverse: Inverse, start: Array, capacity: int) -> None:
         self._system = system
         self._inverse = inverse
+        width = start.shape[1]
         self._rigid = system.rigid.shape[1]
-        self._vectors = np.empty((len(start), self._rigid + capacity))
-        self._vectors[:, : self._rigid] = system.rigid
+        rigid_blocks = -(-self._rigid // width)
+        self._vectors = BlockBasis(system, width, rigid_blocks + capacity // width + 1)
+        for first in range(0, self._rigid, width):
+            self._vectors.append(system.rigid[:, first : first + width])
         self._operator = np.zeros((capacity, capacity))
+        self._pairs: tuple[Array, Array, Array] | None = None
         self.size = self.blocks = 0
         self._last = slice(0, 0)
         self._sweep(start)
@@ -191,11 +226,12 @@ class _Basis:
         """Add the next block, and find the one after it."""
         system, block = self._system, self.remainder
         here = slice(self.size, self.size + block.shape[1])
-        self._vectors[:, self._rigid + here.start : self._rigid + here.stop] = block
+        self._vectors.append(block)
         self._operator[here, self._last] = self._coupling
         self._operator[self._last, here] = self._coupling.T
         self.size = here.stop
         self.blocks += 1
+        self._pairs = None
 
         image = self._inverse.solve(self._mass_remainder)
         overlap = self._sweep(image)
@@ -213,10 +249,8 @@ class _Basis:
 
     def _sweep(self, image: Array) -> Array:
         """Make `image` orthogonal to the rigid motions and the basis; returns what it held."""
-        system = self._system
-        vectors = self._vectors[:, : self._rigid + self.size]
-        overlap = system.inner(vectors, system.times_mass(image))
-        image -= vectors @ overlap
+        overlap = self._vectors.inner(self._system.times_mass(image))
+        self._vectors.remove(overlap, image)
         return overlap
 
     def _continue_with(self, block: Array, mass_block: Array, gram: Array) -> None:
@@ -234,16 +268,16 @@ class _Basis:
             self._mass_remainder = system.times_mass(self.remainder)
             self._coupling = system.inner(self._mass_remainder, block)
 
-    def outlook(self, requested: int) -> tuple[float, float]:
-        """Estimated relative error of the worst of the lowest eigenvalues, and the last.
+    def outlook(self, requested: int) -> tuple[Array, float]:
+        """Estimated relative errors (requested,) of the lowest eigenvalues, and the last of these.
 
-        Both are infinite as long as there are too few.
+        None and infinity as long as there are too few.
         """
         inverted, _, residual = self._operator_pairs()
         mu = self._inverse.shift
         order, values = _lowest(inverted, mu, len(inverted))
         if len(order) <= requested:
-            return np.inf, np.inf
+            return np.empty(0), np.inf
         inverted = inverted[order]
         square = np.einsum("ij,ij->j", residual[:, order], residual[:, order])
         unresolved = np.flatnonzero(square > RESOLVED * inverted**2)
@@ -253,7 +287,7 @@ class _Basis:
         values = values[:requested]
         size = np.maximum(values, ZERO_FRACTION * values[-1])
         error = square[:requested] / distance * (values - mu) ** 2 / size
-        return float(error.max()) / PESSIMISM, float(values[requested - 1])
+        return error / PESSIMISM + ROUNDING * mu / size, float(values[requested - 1])
 
     def _operator_pairs(self) -> tuple[Array, Array, Array]:
         """Ritz values and coefficients of the operator, and those of the residuals in `remainder`.
@@ -266,7 +300,9 @@ class _Basis:
             inverted, vectors = la.eigh(T, driver="evd", check_finite=False)
             return inverted, vectors, self._coupling @ vectors[self._last]
 
-        return bcast_from_root(self._system.comm, solve)
+        if self._pairs is None:
+            self._pairs = bcast_from_root(self._system.comm, solve)
+        return self._pairs
 
     def ritz_pairs(self, count: int) -> tuple[Array, Array]:
         """The lowest `count` Ritz pairs of K, in the span of the operator's and the remainder.
@@ -294,7 +330,8 @@ class _Basis:
             return values[:size] + mu, vectors[:, order] @ weights[:size], weights[size:]
 
         values, weights, of_last = bcast_from_root(system.comm, project)
-        vectors = self._vectors[:, self._rigid : self._rigid + self.size] @ weights
+        rigid = np.zeros((self._rigid, weights.shape[1]))
+        vectors = self._vectors.combine(np.concatenate([rigid, weights]))
         vectors += block @ of_last
         return values, vectors
 
@@ -310,7 +347,7 @@ def _signs(system: System, modes: Array) -> Array:
     return np.where(along < 0.0, -1.0, 1.0)
 
 
-def _mixed(values: Array, modes: Array, signs: Array, shift: float, columns: int) -> Array:
+def _mixture(values: Array, modes: Array, signs: Array, shift: float, columns: int) -> Array:
     """The modes in few columns (local, b), those next to each other in different ones.
 
     Those far from the shift, which need most steps, enter with most weight.

@@ -31,11 +31,14 @@ class Inverse(Protocol):
         Whether solutions are exact to rounding.
     lasting
         Whether it is nothing but arrays of this rank, which need not be freed together.
+    negative
+        Eigenvalues below the shift, by Sylvester's law of inertia.
     """
 
     shift: float
     exact: bool
     lasting: bool
+    negative: int
 
     def solve(self, block: Array) -> Array:
         """Solutions for a row-major block of right-hand sides (local unknowns, k); collective."""
@@ -53,6 +56,7 @@ class Approximate:
     def __init__(self, similar: Inverse) -> None:
         self._similar = similar
         self.shift = similar.shift
+        self.negative = similar.negative
 
     def solve(self, block: Array) -> Array:
         """Solutions of the similar system."""

@@ -91,6 +91,7 @@ class IterativeInverse:
 
     exact = False
     lasting = False
+    negative = 0
 
     def __init__(
         self,

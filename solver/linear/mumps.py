@@ -16,8 +16,8 @@ Array = NDArray[np.float64]
 
 COLUMNS = 128
 """Right-hand sides that MUMPS carries through its factor together."""
-_BLOCKING = 27
-"""MUMPS's control of that."""
+_BLOCKING, _ROOT_ON_ONE = 27, 13
+"""MUMPS's controls of that, and of whether the root of the tree lies on one rank."""
 
 
 class MumpsInverse:
@@ -34,8 +34,11 @@ class MumpsInverse:
         # A negative shift makes the matrix definite, which spares the pivoting.
         option = PETSc.Mat.Option.SPD if shift < 0.0 else PETSc.Mat.Option.SYMMETRIC
         self._matrix.setOption(option, True)
-        self._pc = factorised(self._matrix, {_BLOCKING: COLUMNS}, INNER_PREFIX)
+        # Pivots of a root that several ranks share are not counted.
+        controls = {_BLOCKING: COLUMNS, _ROOT_ON_ONE: 1} if shift > 0.0 else {_BLOCKING: COLUMNS}
+        self._pc = factorised(self._matrix, controls, INNER_PREFIX)
         self._factor = self._pc.getFactorMatrix()
+        self.negative = self._factor.getMumpsInfog(12) if shift > 0.0 else 0
 
     def solve(self, block: Array) -> Array:
         """Solutions for a row-major block of right-hand sides (local unknowns, k)."""

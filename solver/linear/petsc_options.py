@@ -19,6 +19,9 @@ OUT_OF_MEMORY, OTHER_LIBRARY = 55, 76
 _ASKED_LATE = ("view", "monitor", "reason")
 """Parts of names that PETSc asks for when it has solved."""
 
+GENERAL = ("slepc", "arpack")
+"""Methods that are SLEPc's, which have an eigensolver to be configured."""
+
 _inserted: list[str] = []
 
 
@@ -33,12 +36,12 @@ def insert_options(text: str | None, method: str = "slepc") -> None:
     """
     if text is None:
         return
-    hcms = method == "hcms"
-    prefixes = (INNER_PREFIX, MULTIGRID_PREFIX) if hcms else (OPTIONS_PREFIX,)
+    own = method not in GENERAL
+    prefixes = (INNER_PREFIX, MULTIGRID_PREFIX) if own else (OPTIONS_PREFIX,)
     strangers = [name for name in _names(text) if not name.startswith(prefixes)]
     if strangers or not text.strip().startswith(f"-{OPTIONS_PREFIX}"):
         option = f"-{strangers[0]}" if strangers else text
-        example = f"{INNER_PREFIX}mat_mumps_icntl_14" if hcms else f"{OPTIONS_PREFIX}eps_ncv"
+        example = f"{INNER_PREFIX}mat_mumps_icntl_14" if own else f"{OPTIONS_PREFIX}eps_ncv"
         raise UserError(
             f"PETSc option {option!r}: expected names with the prefix -{prefixes[0]}, like "
             f"-{example}, for --method {method}"

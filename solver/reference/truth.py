@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from carillon.errors import ConvergenceError
-from carillon.fem.block import degrees_of_freedom
 from carillon.fem.model import RIGID_MODES
 from solver.assembly.system import System
 from solver.linear.factorisation import factorised
 from solver.reference.eigensolver import smallest_eigenpairs
 from solver.subspace.rayleigh_ritz import is_orthonormal, rayleigh_ritz, rigid_pairs, safe_shift
+from solver.subspace.start import start_vector
 
 Array = NDArray[np.float64]
 
@@ -229,20 +229,6 @@ def _with_lowest(
         vectors=vectors[:, order],
         iterations=truth.iterations + iterations,
     )
-
-
-def start_vector(system: System, seed: int, search: int = 0) -> Array:
-    """Vector (local unknowns,) to start a search from, its entries spread over [-1, 1).
-
-    An entry depends on the seed, the search and the unknown's number in the mesh alone, so that the
-    vector is the same on any number of ranks: SplitMix64 (Steele et al. 2014).
-    """
-    key = np.random.SeedSequence([seed, search]).generate_state(1, np.uint64)
-    bits = degrees_of_freedom(system.nodes).astype(np.uint64) + np.uint64(1)
-    bits = bits * np.uint64(0x9E3779B97F4A7C15) + key
-    bits = (bits ^ (bits >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    bits = (bits ^ (bits >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return (bits ^ (bits >> np.uint64(31))) / 2.0**63 - 1.0
 
 
 def _gap(values: Array, modes: int, n_dofs: int) -> tuple[float, int]:

@@ -121,6 +121,7 @@ class _TimedInverse:
         self.shift = inverse.shift
         self.exact = inverse.exact
         self.lasting = False
+        self.negative = inverse.negative
         self._inverse = inverse
         self._tally = tally
 

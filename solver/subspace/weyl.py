@@ -1,0 +1,95 @@
+"""Where the eigenvalues of a solid are expected: Weyl's law, for bulky and for thin solids."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from carillon.fem.model import Solid
+
+Array = NDArray[np.float64]
+
+NEIGHBOURHOOD = 2.0
+"""Edge of the regions that vibrate as one material, in edges of a mode's share of the solid."""
+SPHERE = 36.0 * np.pi
+"""Surface of a sphere to the third power, over its volume squared: no solid has less."""
+
+
+@dataclass(frozen=True)
+class CountingLaw:
+    """About how many eigenvalues omega^2 lie below a value: the sum of `terms` omega^3, ^2 and ^1.
+
+    Attributes
+    ----------
+    terms
+        Of bulk waves [s^3], and of the in-plane [s^2] and flexural [s] waves of walls.
+    """
+
+    terms: tuple[float, float, float]
+
+    @classmethod
+    def of_solid(cls, solid: Solid, young: Array, number: int) -> CountingLaw:
+        """Weyl's law, and that of a plate which has the volume and the surface of the solid.
+
+        Without the plate a thin wall would have far too few modes.  A wave meets the geometric mean
+        of the moduli about it; regions of different material count one by one.
+
+        Parameters
+        ----------
+        young
+            (m,) or (m, 8) moduli [Pa] of the cells of `solid.mesh`.
+        number
+            Of the eigenvalue of interest, which says how large regions are.
+        """
+        mesh = solid.mesh
+        volume = solid.mass / solid.density
+        # Inside there is a node to every cell, on the surface one more to every two faces.  Cells
+        # that the surface cuts stand out from it.
+        exposed = 2.0 * (mesh.n_nodes / mesh.n_cells - 1.0) * volume / mesh.edge
+        surface = max(exposed, (SPHERE * volume**2) ** (1.0 / 3.0))
+        size = NEIGHBOURHOOD * (mesh.n_cells / number) ** (1.0 / 3.0)
+        if young.ndim == 2:
+            # Of a cell that is partly void modulus and mass are less.
+            young = young.mean(axis=1) / solid.filled.mean(axis=1)
+        modulus, share = _regions(mesh.grid, young, size)
+        # Slowness squared [s^2/m^2] of a wave of unit stiffness.
+        slow = solid.density / modulus
+        poisson = solid.poisson
+        shear = 0.5 / (1.0 + poisson)
+        pressure = (1.0 - poisson) / ((1.0 + poisson) * (1.0 - 2.0 * poisson))
+        plate = 1.0 / (1.0 - poisson**2)
+        bulk = volume / (6.0 * np.pi**2) * (pressure**-1.5 + 2.0 * shear**-1.5)
+        membrane = surface / (16.0 * np.pi) * (1.0 / plate + 1.0 / shear)
+        flexure = surface**2 / (16.0 * np.pi * volume) * np.sqrt(12.0 / plate)
+        means = (float(share @ slow**power) for power in (1.5, 1.0, 0.5))
+        factors = (bulk, membrane, flexure)
+        first, second, third = (factor * mean for factor, mean in zip(factors, means, strict=True))
+        return cls((first, second, third))
+
+    def eigenvalue(self, number: float) -> float:
+        """Value [rad^2/s^2] that about `number` eigenvalues, one at least, lie below."""
+        number = max(number, 1.0)
+        cubic, square, linear = self.terms
+
+        def excess(logarithm: float) -> float:
+            omega = np.exp(logarithm)
+            return float(np.log((cubic * omega**3 + square * omega**2 + linear * omega) / number))
+
+        # There one term alone reaches the number, and at a third of it none a third of the number.
+        terms = enumerate(self.terms)
+        highest = min(np.log(number / term) / (3 - place) for place, term in terms)
+        return float(np.exp(2.0 * brentq(excess, highest - np.log(3.0), highest)))
+
+
+def _regions(grid: NDArray[np.integer], young: Array, size: float) -> tuple[Array, Array]:
+    """Geometric means of moduli (m,) in cubes of `size` cells, and the share of cells in each."""
+    logarithms = np.log(young)
+    place = (grid // max(1, round(size))).astype(np.int64)
+    extent = place.max(axis=0) + 1
+    number = np.ravel_multi_index(tuple(place.T), tuple(extent))
+    _, region = np.unique(number, return_inverse=True)
+    cells = np.bincount(region)
+    return np.exp(np.bincount(region, logarithms) / cells), cells / len(grid)
