@@ -13,6 +13,7 @@ from solver.assembly.system import System
 from solver.correction.cold import Cold
 from solver.correction.enrichment import Ritz, Step, enrich, relax
 from solver.correction.lanczos import HIGHEST_SHIFT, ZERO_FRACTION, lanczos, mixed
+from solver.correction.lobpcg import lobpcg
 from solver.distribution.collective import bcast_from_root
 from solver.linear import Approximate, Inverse, LinearSolver
 from solver.subspace.rayleigh_ritz import rayleigh_ritz, safe_shift
@@ -107,7 +108,8 @@ def correct(
     the span of X - w Z with the over-relaxation w of Bathe & Ramaswamy (1980), as in the paper.
     Accurate modes are locked.  With `lanczos` the first step is a whole block Lanczos iteration
     from all modes together, see `solver.correction.lanczos`; what it leaves undone, and any start
-    that is nearly good enough, is for `krylov`, as everything is without an exact linear solver.
+    that is nearly good enough, is for `krylov`, as everything is with `icc-pcg`.  With `amg-cg`
+    every step takes one cycle of multigrid, see `solver.correction.lobpcg`.
 
     Parameters
     ----------
@@ -149,6 +151,8 @@ def correct(
     spectrum: the last modes converge like (theta - mu) / (theta_p - mu), and the first are accurate
     early.  Otherwise it lies below the spectrum.
     """
+    if acceleration == "lanczos" and linear.method == "amg-cg":
+        return _by_gradients(system, start, requested, linear, tolerance, max_steps, report)
     rough = values is not None and begun is None
     if values is None:
         values, start = rayleigh_ritz(system, start)
@@ -173,6 +177,40 @@ def correct(
     finally:
         iteration.destroy()
     return result
+
+
+def _by_gradients(
+    system: System,
+    start: Array,
+    requested: int,
+    linear: LinearSolver,
+    tolerance: float,
+    max_steps: int,
+    report: Callable[[int, float], None] | None,
+) -> Correction:
+    """What multigrid does best: many cheap steps, each with one cycle of it."""
+    inverse = linear.iterative(system, -safe_shift(system))
+    try:
+        width = requested + default_guard(requested)
+        start = start[:, :width]
+        found = lobpcg(system, inverse.precondition, start, requested, tolerance, max_steps, report)
+    finally:
+        inverse.destroy()
+    if found.errors.max() > tolerance > 0.0:
+        raise ConvergenceError(
+            f"conjugate gradients reached an eigenvalue error of {found.errors.max():.1e} after "
+            f"{found.steps} steps, {tolerance:.1e} was asked for; allow more steps"
+        )
+    return Correction(
+        found.values[:requested],
+        np.ascontiguousarray(found.vectors[:, :requested]),
+        found.errors,
+        np.ascontiguousarray(found.vectors[:, requested:]),
+        found.steps,
+        found.solves,
+        found.steps + 1,
+        found.history,
+    )
 
 
 def carried(requested: int, tolerance: float) -> int:

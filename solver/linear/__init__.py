@@ -11,6 +11,7 @@ from carillon.errors import UserError
 
 if TYPE_CHECKING:
     from solver.assembly.system import Layout, System
+    from solver.linear.iterative import IterativeInverse
 
 Array = NDArray[np.float64]
 
@@ -113,6 +114,12 @@ class LinearSolver:
         """Whether the shift may lie among the eigenvalues."""
         return self.method not in ITERATIVE
 
+    def iterative(self, system: System, shift: float) -> IterativeInverse:
+        """Inverse of K - shift M, for a negative shift, by an iterative method."""
+        from solver.linear.iterative import IterativeInverse
+
+        return IterativeInverse(system, shift, self.method, threads=system.rows.threads)
+
     def inverse(self, system: System, shift: float) -> Inverse:
         """Inverse of K - shift M; the shift is negative for an iterative method."""
         if self._plan is not None:
@@ -124,6 +131,4 @@ class LinearSolver:
             from solver.linear.mumps import MumpsInverse
 
             return MumpsInverse(system, shift)
-        from solver.linear.iterative import IterativeInverse
-
-        return IterativeInverse(system, shift, self.method, threads=system.rows.threads)
+        return self.iterative(system, shift)

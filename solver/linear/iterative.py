@@ -144,6 +144,10 @@ class IterativeInverse:
         finally:
             matrix.destroy()
 
+    def precondition(self, block: Array) -> Array:
+        """One application of the preconditioner to a block (local, k); collective."""
+        return self._preconditioner.apply(block)
+
     def solve(self, block: Array) -> Array:
         """Solution (local, k) for a row-major block of right-hand sides (local, k); collective.
 

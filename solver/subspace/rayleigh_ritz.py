@@ -49,7 +49,7 @@ def ritz_pairs(
     stiff = system.inner(block, stiff_block)
     gram = None if is_orthonormal(system, block, mass_block) else system.inner(block, mass_block)
     # Solved once: two processors may round apart, and an eigenvector's sign hangs on rounding.
-    return bcast_from_root(system.comm, lambda: _reduced_eigenpairs(stiff, gram))
+    return bcast_from_root(system.comm, lambda: reduced_eigenpairs(stiff, gram))
 
 
 def is_orthonormal(system: System, block: Array, mass_block: Array) -> bool:
@@ -62,7 +62,7 @@ def is_orthonormal(system: System, block: Array, mass_block: Array) -> bool:
     return bool(np.abs(difference).max(initial=0.0) < ORTHONORMAL)
 
 
-def _reduced_eigenpairs(stiff: Array, gram: Array | None) -> tuple[Array, Array]:
+def reduced_eigenpairs(stiff: Array, gram: Array | None) -> tuple[Array, Array]:
     """Eigenpairs of the dense pencil in the numerically independent directions of `gram`.
 
     Without `gram` the pencil is a matrix alone.
