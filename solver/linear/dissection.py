@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -129,15 +130,13 @@ def _cut(
     parent: list[int],
 ) -> int:
     """Append the fronts of `nodes`, children first; returns the number of the last, their root."""
-    plane = _best_plane(lattice[nodes], steps) if len(nodes) > leaf_nodes else None
+    axis, value = _best_plane(lattice, nodes, steps) if len(nodes) > leaf_nodes else (-1, 0)
     children = []
     own = nodes
-    if plane is not None:
-        axis, value = plane
-        coordinate = lattice[nodes, axis]
-        own = nodes[coordinate == value]
-        for side in (coordinate < value, coordinate > value):
-            children.append(_cut(lattice, nodes[side], steps, leaf_nodes, owns, parent))
+    if axis >= 0:
+        own, *sides = _divided(lattice, nodes, axis, value)
+        for side in sides:
+            children.append(_cut(lattice, side, steps, leaf_nodes, owns, parent))
     owns.append(own)
     parent.append(-1)
     for child in children:
@@ -145,23 +144,42 @@ def _cut(
     return len(owns) - 1
 
 
-def _best_plane(lattice: Index, steps: int) -> tuple[int, int] | None:
-    """Axis and coordinate of the plane with few nodes that leaves two sides of similar size."""
-    best = None
+@numba.njit(cache=True, nogil=True)
+def _best_plane(lattice, nodes, steps):  # type: ignore[no-untyped-def]
+    """Axis and coordinate of the plane with few nodes that leaves two sides of similar size.
+
+    Axis -1 if there is none.
+    """
+    best = (-1, 0)
     lowest = np.inf
     for axis in range(3):
-        start = lattice[:, axis].min()
-        count = np.bincount(lattice[:, axis] - start)
-        below = np.cumsum(count) - count
-        above = len(lattice) - below - count
-        smaller = np.minimum(below, above)
-        separates = (start + np.arange(len(count))) % steps == 0
-        fair = separates & (smaller >= SHORTEST_SIDE * len(lattice))
-        allowed = fair if fair.any() else separates & (smaller > 0)
-        if not allowed.any():
-            continue
-        cost = np.where(allowed, count / np.maximum(below * above, 1) ** 0.5, np.inf)
-        if cost.min() < lowest:
-            lowest = cost.min()
-            best = (axis, int(np.argmin(cost) + start))
+        start = stop = lattice[nodes[0], axis]
+        for node in nodes:
+            start, stop = min(start, lattice[node, axis]), max(stop, lattice[node, axis])
+        count = np.zeros(stop + 1 - start, dtype=np.int64)
+        for node in nodes:
+            count[lattice[node, axis] - start] += 1
+        # The best of all planes, and of those with enough nodes on either side.
+        costs, values = [np.inf, np.inf], [start, start]
+        below = 0
+        for plane in range(len(count)):
+            above = len(nodes) - below - count[plane]
+            smaller = min(below, above)
+            if smaller > 0 and (start + plane) % steps == 0:
+                cost = count[plane] / np.sqrt(below * above)
+                for kind, least in enumerate((0.0, SHORTEST_SIDE * len(nodes))):
+                    if smaller >= least and cost < costs[kind]:
+                        costs[kind], values[kind] = cost, start + plane
+            below += count[plane]
+        kind = 1 if costs[1] < np.inf else 0
+        if costs[kind] < lowest:
+            lowest = costs[kind]
+            best = (axis, values[kind])
     return best
+
+
+@numba.njit(cache=True, nogil=True)
+def _divided(lattice, nodes, axis, value):  # type: ignore[no-untyped-def]
+    """Nodes on a plane, below it and above it, in their order."""
+    coordinate = lattice[nodes, axis]
+    return nodes[coordinate == value], nodes[coordinate < value], nodes[coordinate > value]
