@@ -16,6 +16,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from carillon.fem.aggregation import COARSEST, Level, ShiftedInverse, levels_of
 from carillon.fem.geometry.faces import face_neighbours
+from carillon.threads import single_threaded_blas
 
 if TYPE_CHECKING:
     from carillon.fem.geometry import HexMesh
@@ -91,7 +92,11 @@ def _iterated(levels: list[Level], count: int) -> tuple[Array, Array]:
     inverse = ShiftedInverse(levels, SHIFT, 0.1 * TOLERANCE)
     operator = LinearOperator(matrix.shape, matvec=inverse.solve, dtype=float)
     start = np.cos(np.arange(matrix.shape[0]))
-    return _ascending(*eigsh(matrix, count, sigma=-SHIFT, OPinv=operator, v0=start, tol=TOLERANCE))
+    # Threads would add in another order, and wait for each other longer than they add.
+    with single_threaded_blas():
+        return _ascending(
+            *eigsh(matrix, count, sigma=-SHIFT, OPinv=operator, v0=start, tol=TOLERANCE)
+        )
 
 
 def _ascending(values: Array, vectors: Array) -> tuple[Array, Array]:

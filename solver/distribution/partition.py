@@ -98,9 +98,7 @@ def _refined_clusters(mesh: HexMesh, count: int, seed: int) -> NDArray[np.intege
     for level, coarser in zip(levels[-2::-1], levels[:0:-1]):
         points = level.smoothed(coarser.sums @ points, SMOOTHINGS)
         kmeans = KMeans(count, init=kmeans.cluster_centers_, n_init=1, max_iter=FURTHER_ITERATIONS)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            kmeans.fit(points, sample_weight=level.sizes)
+        kmeans.fit(points, sample_weight=level.sizes)
     return np.asarray(kmeans.labels_)
 
 
