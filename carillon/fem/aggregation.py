@@ -26,8 +26,8 @@ OVERCORRECTION = 1.6
 """Factor of coarse corrections: between constants the coarse graph is up to twice too stiff."""
 MOST_KEPT = 0.7
 """Share of the vertices beyond which a coarser graph is not worth having."""
-COARSEST = 300
-"""Vertices that a matrix is inverted for, if graphs of no more can be had."""
+COARSEST = 100
+"""Fewest vertices of the graph whose matrix a V-cycle inverts; it has up to eight times as many."""
 MOST_ITERATIONS = 200
 """Of conjugate gradients; some twenty are usual."""
 CYCLE = np.float32
