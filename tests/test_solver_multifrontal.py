@@ -76,6 +76,27 @@ def test_every_node_is_eliminated_once_and_fronts_hold_what_they_are_coupled_to(
             assert np.isin(above, fronts.boundary[parent]).all()
 
 
+@pytest.mark.parametrize("mesh", MESHES)
+def test_every_entry_is_in_the_first_front_that_has_its_row_or_column(mesh):
+    rows, plan, planes = problem(MESHES[mesh]())
+    fronts, pattern = plan.fronts, rows.pattern
+    row_of = np.repeat(np.arange(len(planes)), np.diff(pattern.indptr))
+    positions = [
+        np.append(np.arange(*fronts.first[front : front + 2]), boundary)
+        for front, boundary in enumerate(fronts.boundary)
+    ]
+    numbers = np.concatenate([entries[:, 2] for entries in plan.entries])
+    row, column = fronts.position[row_of], fronts.position[pattern.columns]
+    front = np.searchsorted(fronts.first, np.arange(len(planes)), side="right")
+    assert sorted(numbers) == np.flatnonzero(front[row] <= front[column]).tolist()
+    for entries, place in zip(plan.entries, positions, strict=True):
+        assert np.array_equal(place[entries[:, 0]], row[entries[:, 2]])
+        assert np.array_equal(place[entries[:, 1]], column[entries[:, 2]])
+    for front, parent in enumerate(fronts.parent):
+        above = np.arange(len(planes)) if parent < 0 else positions[parent]
+        assert np.array_equal(above[plan.places[front]], fronts.boundary[front])
+
+
 def test_dissection_saves_work():
     _, plan, planes = problem(solids.box_mesh(12, 12, 12))
     none = np.zeros(len(planes) + 1, dtype=np.int64)

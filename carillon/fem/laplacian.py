@@ -12,14 +12,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.linalg import eigsh
+from scipy.sparse.linalg import LinearOperator, eigsh
 
+from carillon.fem.aggregation import COARSEST, Level, ShiftedInverse, levels_of
 from carillon.fem.geometry.faces import face_neighbours
+from carillon.threads import single_threaded_blas
 
 if TYPE_CHECKING:
     from carillon.fem.geometry import HexMesh
 
 Array = NDArray[np.float64]
+
+FEW_CELLS = 12_000
+"""Cells up to which the Laplacian is factorised; the factors of more fill up."""
+SHIFT = 1e-3
+"""Below the spectrum, that the Laplacian is inverted at."""
+TOLERANCE = 1e-6
+"""Relative error of eigenvalues from an iterative inverse."""
 
 
 def cell_laplacian(mesh: HexMesh) -> sp.csr_matrix:
@@ -47,16 +56,49 @@ def laplacian_modes(mesh: HexMesh, count: int) -> tuple[Array, Array]:
     ([0.0, 1.0, 3.0], (3, 3))
     """
     matrix = cell_laplacian(mesh)
-    size = mesh.n_cells
-    count = min(count, size)
-    if size <= max(64, 2 * count + 1):
-        values, vectors = np.linalg.eigh(matrix.toarray())
-        values, vectors = values[:count], vectors[:, :count]
+    count = min(count, mesh.n_cells)
+    if mesh.n_cells <= FEW_CELLS:
+        values, vectors = _factorised(matrix, count)
     else:
-        start = np.cos(np.arange(size))
-        values, vectors = eigsh(matrix.tocsc(), count, sigma=-1e-3, which="LM", v0=start)
-        order = np.argsort(values)
-        values, vectors = values[order], vectors[:, order]
+        values, vectors = _iterated(levels_of(matrix, mesh.grid, COARSEST), count)
     peak = np.abs(vectors).argmax(axis=0)
     vectors = vectors * np.sign(vectors[peak, np.arange(count)])
     return values, vectors
+
+
+def rough_modes(level: Level, count: int) -> tuple[Array, Array]:
+    """The `count` lowest eigenpairs of a coarse graph, about those of its cells.
+
+    Vectors (m, count) have unit length over the cells.
+    """
+    scale = 1.0 / np.sqrt(level.sizes)
+    scaled = sp.diags(scale) @ level.laplacian @ sp.diags(scale)
+    values, vectors = _factorised(scaled.tocsr(), count)
+    return values, scale[:, None] * vectors
+
+
+def _factorised(matrix: sp.csr_matrix, count: int) -> tuple[Array, Array]:
+    size = matrix.shape[0]
+    if size <= max(64, 2 * count + 1):
+        values, vectors = np.linalg.eigh(matrix.toarray())
+        return values[:count], vectors[:, :count]
+    return _ascending(
+        *eigsh(matrix.tocsc(), count, sigma=-SHIFT, which="LM", v0=np.cos(np.arange(size)))
+    )
+
+
+def _iterated(levels: list[Level], count: int) -> tuple[Array, Array]:
+    matrix = levels[0].laplacian
+    inverse = ShiftedInverse(levels, SHIFT, 0.1 * TOLERANCE)
+    operator = LinearOperator(matrix.shape, matvec=inverse.solve, dtype=float)
+    start = np.cos(np.arange(matrix.shape[0]))
+    # Threads would add in another order, and wait for each other longer than they add.
+    with single_threaded_blas():
+        return _ascending(
+            *eigsh(matrix, count, sigma=-SHIFT, OPinv=operator, v0=start, tol=TOLERANCE)
+        )
+
+
+def _ascending(values: Array, vectors: Array) -> tuple[Array, Array]:
+    order = np.argsort(values)
+    return values[order], vectors[:, order]

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import warnings
 
+import numba
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from carillon.errors import UserError
+from carillon.fem.aggregation import levels_of
 from carillon.fem.geometry import HexMesh
-from carillon.fem.laplacian import laplacian_modes
+from carillon.fem.laplacian import FEW_CELLS, cell_laplacian, laplacian_modes, rough_modes
 from carillon.fem.model import Solid
+from carillon.threads import one_thread
 
 EMBEDDING_MODES = 12
 """Laplacian eigenvectors that span the clustering space, the constant left out."""
@@ -24,6 +25,10 @@ FEW_CLUSTERS = 16
 """Subdomains up to which SciPy finds them."""
 ITERATIONS, TRIES = 20, 4
 """Of SciPy's k-means, whose seeding is not greedy like scikit-learn's; the best try counts."""
+FEWEST_POINTS, FEWEST_VERTICES = 10, 1000
+"""Vertices for each subdomain, and altogether, of the coarsest graph that these are found on."""
+SMOOTHINGS, FURTHER_ITERATIONS = 3, 2
+"""Jacobi steps of the eigenvectors, and iterations of k-means, on each finer graph."""
 FEWEST_HOLDING = 3
 """Corners of one cell that a subdomain needs there for the cell to hold them together."""
 MOST_ROUNDS = 10
@@ -44,10 +49,17 @@ def partition_cells(mesh: HexMesh, parts: int, seed: int = 0) -> NDArray[np.int3
         )
     if parts == 1:
         return np.zeros(mesh.n_cells, dtype=np.int32)
+    if mesh.n_cells > FEW_CELLS:
+        # On one thread, since several would add in any order.
+        with one_thread():
+            return _without_gaps(_refined_clusters(mesh, parts, seed))
     values, vectors = laplacian_modes(mesh, EMBEDDING_MODES + 1)
-    # Commute-time weights: distances in the embedding follow distances along the solid.
-    embedding = vectors[:, 1:] / np.sqrt(np.maximum(values[1:], 1e-12))
-    return _without_gaps(_clusters(embedding, parts, seed))
+    return _without_gaps(_clusters(_embedding(values, vectors), parts, seed))
+
+
+def _embedding(values: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points (m, d) by commute-time weights: their distances follow those along the solid."""
+    return vectors[:, 1:] / np.sqrt(np.maximum(values[1:], 1e-12))
 
 
 def _clusters(points: NDArray[np.float64], count: int, seed: int) -> NDArray[np.integer]:
@@ -70,6 +82,24 @@ def _clusters(points: NDArray[np.float64], count: int, seed: int) -> NDArray[np.
 
     kmeans = KMeans(count, init="k-means++", n_init=1, random_state=seed % 2**32)
     return np.asarray(kmeans.fit_predict(points))
+
+
+def _refined_clusters(mesh: HexMesh, count: int, seed: int) -> NDArray[np.integer]:
+    """Cluster (m,) of each cell of a large mesh, found on a coarse graph of the cells first.
+
+    There are the eigenvectors and the clusters; on finer graphs both are but smoothed.
+    """
+    from sklearn.cluster import KMeans
+
+    levels = levels_of(cell_laplacian(mesh), mesh.grid, max(FEWEST_POINTS * count, FEWEST_VERTICES))
+    points = _embedding(*rough_modes(levels[-1], EMBEDDING_MODES + 1))
+    kmeans = KMeans(count, init="k-means++", n_init=TRIES, random_state=seed % 2**32)
+    kmeans.fit(points, sample_weight=levels[-1].sizes)
+    for level, coarser in zip(levels[-2::-1], levels[:0:-1]):
+        points = level.smoothed(coarser.sums @ points, SMOOTHINGS)
+        kmeans = KMeans(count, init=kmeans.cluster_centers_, n_init=1, max_iter=FURTHER_ITERATIONS)
+        kmeans.fit(points, sample_weight=level.sizes)
+    return np.asarray(kmeans.labels_)
 
 
 def partition_nodes(
@@ -127,7 +157,7 @@ def connect_subdomains(
         is_largest[by_size[np.unique(owner[by_size], return_index=True)[1]]] = True
         if is_largest.all():
             break
-        target = _closest_neighbours(cells, node_part, piece, len(sizes))
+        target = _closest_neighbours(cells, node_part, piece, ~is_largest)
         own = ~is_largest & ((sizes >= smallest) | (target < 0))
         target[is_largest] = owner[is_largest]
         target[own] = owner.max() + 1 + np.arange(own.sum())
@@ -141,41 +171,74 @@ def subdomain_pieces(cells: NDArray[np.integer], node_part: NDArray[np.int32]) -
     Nodes of a subdomain hang together if a cell has `FEWEST_HOLDING` of them or more: fewer hold
     each other by a spring at most.
     """
-    n_nodes, parts = len(node_part), int(node_part.max()) + 1
-    cell = np.repeat(np.arange(len(cells), dtype=np.int64), cells.shape[1])
-    node = cells.ravel()
-    _, patch, corners = np.unique(
-        cell * parts + node_part[node], return_inverse=True, return_counts=True
-    )
-    patch = patch.ravel()
-    holding = corners[patch] >= FEWEST_HOLDING
-    size = n_nodes + len(corners)
-    graph = sp.coo_matrix(
-        (np.ones(holding.sum()), (node[holding], n_nodes + patch[holding])), shape=(size, size)
-    )
-    _, label = connected_components(graph, directed=False)
-    return np.unique(label[:n_nodes], return_inverse=True)[1].ravel().astype(np.int64)
+    return _pieces(cells, node_part, FEWEST_HOLDING)
+
+
+@numba.njit(cache=True, nogil=True)
+def _pieces(cells, node_part, fewest):  # type: ignore[no-untyped-def]
+    above = np.arange(len(node_part))
+    for cell in range(len(cells)):
+        nodes = cells[cell]
+        for a in range(len(nodes)):
+            part, held, is_first = node_part[nodes[a]], 0, True
+            for b in range(len(nodes)):
+                same = node_part[nodes[b]] == part
+                held += same
+                is_first &= not (same and b < a)
+            if not is_first or held < fewest:
+                continue
+            for b in range(a + 1, len(nodes)):
+                if node_part[nodes[b]] == part:
+                    _join(above, nodes[a], nodes[b])
+    piece = np.empty(len(node_part), dtype=np.int64)
+    count = 0
+    for node in range(len(node_part)):
+        # A piece is numbered at its first node, which is the root of the others.
+        root = _root(above, node)
+        if root == node:
+            piece[node] = count
+            count += 1
+        else:
+            piece[node] = piece[root]
+    return piece
+
+
+@numba.njit(cache=True, nogil=True)
+def _root(above, node):  # type: ignore[no-untyped-def]
+    while above[node] != node:
+        above[node] = above[above[node]]
+        node = above[node]
+    return node
+
+
+@numba.njit(cache=True, nogil=True)
+def _join(above, left, right):  # type: ignore[no-untyped-def]
+    left, right = _root(above, left), _root(above, right)
+    above[max(left, right)] = min(left, right)
 
 
 def _closest_neighbours(
     cells: NDArray[np.integer],
     node_part: NDArray[np.int32],
     piece: NDArray[np.int64],
-    pieces: int,
+    asked: NDArray[np.bool_],
 ) -> NDArray[np.int64]:
-    """Other subdomain that shares most corners of cells with each piece; -1 without one."""
+    """Other subdomain that shares most corners of cells with each piece that is `asked` about.
+
+    -1 without one, and for the other pieces.
+    """
+    cells = cells[asked[piece][cells].any(axis=1)]
     part = node_part[cells]
-    mixed = np.flatnonzero((part != part[:, :1]).any(axis=1))
-    ours, theirs = part[mixed][:, :, None], part[mixed][:, None, :]
-    pairs = (len(mixed), cells.shape[1], cells.shape[1])
-    seen = np.broadcast_to(piece[cells[mixed]][:, :, None], pairs)[ours != theirs]
-    other = np.broadcast_to(theirs, pairs)[ours != theirs].astype(np.int64)
+    ours, theirs = part[:, :, None], part[:, None, :]
+    pairs = (ours != theirs) & asked[piece[cells]][:, :, None]
+    seen = np.broadcast_to(piece[cells][:, :, None], pairs.shape)[pairs]
+    other = np.broadcast_to(theirs, pairs.shape)[pairs].astype(np.int64)
     parts = int(node_part.max()) + 1
     pair, votes = np.unique(seen * parts + other, return_counts=True)
     voter, candidate = np.divmod(pair, parts)
     order = np.lexsort([candidate, -votes, voter])
     voters, first = np.unique(voter[order], return_index=True)
-    closest = np.full(pieces, -1, dtype=np.int64)
+    closest = np.full(len(asked), -1, dtype=np.int64)
     closest[voters] = candidate[order][first]
     return closest
 

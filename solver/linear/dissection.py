@@ -7,9 +7,13 @@ tree of fronts: the nodes of a plane are eliminated after everything that they s
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from solver.linear import symbolic
 
 Index = NDArray[np.int64]
 
@@ -31,18 +35,52 @@ class Fronts:
         (fronts + 1,) first position eliminated by each front; children come before parents.
     parent
         (fronts,) parent of each front, -1 for a root.
-    boundary
-        Sorted positions, after the front's own, that each front is coupled to.
+    position
+        (n,) place of each node in `order`.
+    offset, beyond
+        Positions, after the front's own, that each front is coupled to, in compressed form;
+        ascending within a front.
     """
 
     order: Index
     first: Index
     parent: Index
-    boundary: list[Index]
+    position: Index
+    offset: Index
+    beyond: Index
+
+    @classmethod
+    def of_order(
+        cls, order: Index, first: Index, parent: Index, indptr: Index, indices: Index
+    ) -> Fronts:
+        """Fronts that eliminate the nodes of a graph, in compressed rows, in this order."""
+        position = np.empty_like(order)
+        position[order] = np.arange(len(order))
+        offset, beyond = symbolic.boundaries(indptr, indices, order, position, first, parent)
+        return cls(order, first, parent, position, offset, beyond)
 
     def __len__(self) -> int:
         """Number of fronts."""
         return len(self.parent)
+
+    def entries(self, indptr: Index, indices: Index) -> list[NDArray[np.int32]]:
+        """Block entries (e, 3) of each front, which no earlier front has.
+
+        Row and column in the front, and number in the data of the graph.
+        """
+        tree = self.order, self.position, self.first, self.offset, self.beyond
+        start, entries = symbolic.entries(indptr, indices, *tree)
+        return np.split(entries, start[1:-1])
+
+    def places(self) -> list[Index]:
+        """Place of each front's boundary in its parent's front."""
+        places = symbolic.places(self.first, self.parent, self.offset, self.beyond)
+        return np.split(places, self.offset[1:-1])
+
+    @cached_property
+    def boundary(self) -> list[Index]:
+        """Positions that each front is coupled to."""
+        return np.split(self.beyond, self.offset[1:-1])
 
     def children(self) -> list[list[int]]:
         """Children of each front, in order."""
@@ -55,7 +93,7 @@ class Fronts:
     def solve_flops(self) -> int:
         """Floating-point operations of a solve with one right-hand side."""
         own = 3 * np.diff(self.first)
-        outside = 3 * np.array([len(boundary) for boundary in self.boundary])
+        outside = 3 * np.diff(self.offset)
         return int((2 * own**2 + 4 * own * outside).sum())
 
 
@@ -80,10 +118,7 @@ def dissect(
     _cut(lattice, np.arange(len(lattice)), steps, leaf_nodes, owns, parent)
     order = np.concatenate(owns)
     first = np.concatenate([[0], np.cumsum([len(own) for own in owns])])
-    position = np.empty(len(order), dtype=np.int64)
-    position[order] = np.arange(len(order))
-    boundary = _boundaries(position[indices], indptr, order, first, parent)
-    return Fronts(order, first, np.array(parent, dtype=np.int64), boundary)
+    return Fronts.of_order(order, first, np.array(parent, dtype=np.int64), indptr, indices)
 
 
 def _cut(
@@ -95,15 +130,13 @@ def _cut(
     parent: list[int],
 ) -> int:
     """Append the fronts of `nodes`, children first; returns the number of the last, their root."""
-    plane = _best_plane(lattice[nodes], steps) if len(nodes) > leaf_nodes else None
+    axis, value = _best_plane(lattice, nodes, steps) if len(nodes) > leaf_nodes else (-1, 0)
     children = []
     own = nodes
-    if plane is not None:
-        axis, value = plane
-        coordinate = lattice[nodes, axis]
-        own = nodes[coordinate == value]
-        for side in (coordinate < value, coordinate > value):
-            children.append(_cut(lattice, nodes[side], steps, leaf_nodes, owns, parent))
+    if axis >= 0:
+        own, *sides = _divided(lattice, nodes, axis, value)
+        for side in sides:
+            children.append(_cut(lattice, side, steps, leaf_nodes, owns, parent))
     owns.append(own)
     parent.append(-1)
     for child in children:
@@ -111,42 +144,42 @@ def _cut(
     return len(owns) - 1
 
 
-def _best_plane(lattice: Index, steps: int) -> tuple[int, int] | None:
-    """Axis and coordinate of the plane with few nodes that leaves two sides of similar size."""
-    best = None
+@numba.njit(cache=True, nogil=True)
+def _best_plane(lattice, nodes, steps):  # type: ignore[no-untyped-def]
+    """Axis and coordinate of the plane with few nodes that leaves two sides of similar size.
+
+    Axis -1 if there is none.
+    """
+    best = (-1, 0)
     lowest = np.inf
     for axis in range(3):
-        start = lattice[:, axis].min()
-        count = np.bincount(lattice[:, axis] - start)
-        below = np.cumsum(count) - count
-        above = len(lattice) - below - count
-        smaller = np.minimum(below, above)
-        separates = (start + np.arange(len(count))) % steps == 0
-        fair = separates & (smaller >= SHORTEST_SIDE * len(lattice))
-        allowed = fair if fair.any() else separates & (smaller > 0)
-        if not allowed.any():
-            continue
-        cost = np.where(allowed, count / np.maximum(below * above, 1) ** 0.5, np.inf)
-        if cost.min() < lowest:
-            lowest = cost.min()
-            best = (axis, int(np.argmin(cost) + start))
+        start = stop = lattice[nodes[0], axis]
+        for node in nodes:
+            start, stop = min(start, lattice[node, axis]), max(stop, lattice[node, axis])
+        count = np.zeros(stop + 1 - start, dtype=np.int64)
+        for node in nodes:
+            count[lattice[node, axis] - start] += 1
+        # The best of all planes, and of those with enough nodes on either side.
+        costs, values = [np.inf, np.inf], [start, start]
+        below = 0
+        for plane in range(len(count)):
+            above = len(nodes) - below - count[plane]
+            smaller = min(below, above)
+            if smaller > 0 and (start + plane) % steps == 0:
+                cost = count[plane] / np.sqrt(below * above)
+                for kind, least in enumerate((0.0, SHORTEST_SIDE * len(nodes))):
+                    if smaller >= least and cost < costs[kind]:
+                        costs[kind], values[kind] = cost, start + plane
+            below += count[plane]
+        kind = 1 if costs[1] < np.inf else 0
+        if costs[kind] < lowest:
+            lowest = costs[kind]
+            best = (axis, values[kind])
     return best
 
 
-def _boundaries(
-    neighbours: Index, indptr: Index, order: Index, first: Index, parent: list[int]
-) -> list[Index]:
-    none = np.empty(0, dtype=np.int64)
-    boundary: list[Index] = []
-    inherited: list[list[Index]] = [[] for _ in parent]
-    for front, above in enumerate(parent):
-        stop = first[front + 1]
-        rows = order[first[front] : stop]
-        touched = [neighbours[indptr[row] : indptr[row + 1]] for row in rows]
-        reached = np.unique(np.concatenate([none, *touched, *inherited[front]]))
-        outside = reached[np.searchsorted(reached, stop) :]
-        boundary.append(outside)
-        inherited[front].clear()
-        if above >= 0:
-            inherited[above].append(outside)
-    return boundary
+@numba.njit(cache=True, nogil=True)
+def _divided(lattice, nodes, axis, value):  # type: ignore[no-untyped-def]
+    """Nodes on a plane, below it and above it, in their order."""
+    coordinate = lattice[nodes, axis]
+    return nodes[coordinate == value], nodes[coordinate < value], nodes[coordinate > value]

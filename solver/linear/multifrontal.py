@@ -114,13 +114,10 @@ class Plan:
     def __init__(self, lattice: Index, indptr: Index, indices: Index, **options: Any) -> None:
         self.fronts: Fronts = dissect(lattice, indptr, indices, **options)
         fronts = self.fronts
-        self.position = np.empty(len(fronts.order), dtype=np.int64)
-        self.position[fronts.order] = np.arange(len(fronts.order))
+        self.position = fronts.position
         self.children = fronts.children()
-        self.entries = [
-            self._entries(front, indptr, self.position[indices]) for front in range(len(fronts))
-        ]
-        self.places = self._places()
+        self.entries = fronts.entries(indptr, indices)
+        self.places = fronts.places()
         own = 3 * np.diff(fronts.first)
         outside = 3 * np.array([len(boundary) for boundary in fronts.boundary])
         self.pivot_offset = np.concatenate([[0], np.cumsum([_pivot_entries(n) for n in own])])
@@ -164,35 +161,6 @@ class Plan:
                 chosen += self.children[big]
         chosen.sort(key=lambda front: -work[front])
         return [(front + 1 - int(size[front]), front + 1) for front in chosen]
-
-    def _entries(self, front: int, indptr: Index, column: Index) -> Index:
-        """Block entries (e, 3) of a front: row and column in it, and number in the data."""
-        start, stop = self.fronts.first[front : front + 2]
-        rows = self.fronts.order[start:stop]
-        counts = indptr[rows + 1] - indptr[rows]
-        number = np.repeat(indptr[rows] - np.cumsum(counts) + counts, counts) + np.arange(
-            counts.sum()
-        )
-        row = np.repeat(np.arange(stop - start), counts)
-        position = column[number]
-        later = position >= start
-        row, number, position = row[later], number[later], position[later]
-        inside = position < stop
-        outside = (stop - start) + np.searchsorted(self.fronts.boundary[front], position)
-        return np.stack([row, np.where(inside, position - start, outside), number], axis=1)
-
-    def _places(self) -> list[Index]:
-        """Place of each front's boundary in its parent's front."""
-        places = []
-        for front, parent in enumerate(self.fronts.parent):
-            boundary = self.fronts.boundary[front]
-            if parent < 0:
-                places.append(boundary)
-                continue
-            start, stop = self.fronts.first[parent : parent + 2]
-            outside = (stop - start) + np.searchsorted(self.fronts.boundary[parent], boundary)
-            places.append(np.where(boundary < stop, boundary - start, outside))
-        return places
 
 
 def _pivot_entries(n: int) -> int:

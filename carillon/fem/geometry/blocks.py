@@ -16,7 +16,7 @@ import scipy.sparse as sp
 
 from carillon.fem.geometry.faces import face_neighbours
 from carillon.fem.geometry.hanging import node_weights
-from carillon.fem.geometry.hexmesh import CORNER_OFFSETS, HexMesh
+from carillon.fem.geometry.hexmesh import CORNER_OFFSETS, HexMesh, distinct_places
 from carillon.fem.geometry.joining import Parts, coarse_mesh, corner_weights
 
 
@@ -97,8 +97,7 @@ def blocks_from_mesh(fine: HexMesh, refined: np.ndarray | None = None) -> Blocks
     >>> mixed.span.tolist(), mixed.edge, mixed.n_nodes
     ([2, 1], 0.5, 12)
     """
-    grid, block = np.unique((fine.grid >> 1)[:, ::-1], axis=0, return_inverse=True)
-    grid, block = grid[:, ::-1], block.ravel()  # Ordered by (z, y, x).
+    grid, block = distinct_places(fine.grid >> 1)
     position = (fine.grid & 1) @ np.array([1, 2, 4])
     pattern = np.bincount(block, 1 << position).astype(np.int64)
     part = parts_of_patterns()[pattern[block], position]

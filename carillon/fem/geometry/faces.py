@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 
 from carillon.fem.geometry.hanging import node_weights
@@ -24,16 +25,45 @@ def face_neighbours(mesh: HexMesh) -> np.ndarray:
     In a mixed mesh these include fine cells at the face of an element of twice the edge, whose
     corners they have for nodes there, and cells of one block that share a face, whatever hangs.
     """
-    pairs = []
-    for axis in range(3):
-        upper_side, lower_side = _face_numbers(mesh, 2 * axis + 1, 2 * axis)
-        order = np.argsort(lower_side, kind="stable")
-        begin = np.searchsorted(lower_side[order], upper_side, side="left")
-        count = np.searchsorted(lower_side[order], upper_side, side="right") - begin
-        first = np.repeat(np.arange(mesh.n_cells), count)
-        step = np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count)
-        pairs.append(np.column_stack([first, order[begin[first] + step]]))
-    return np.concatenate(pairs)
+    return np.concatenate(
+        [
+            _matches(_face_nodes(mesh, 2 * axis + 1), _face_nodes(mesh, 2 * axis), mesh.n_nodes + 1)
+            for axis in range(3)
+        ]
+    )
+
+
+@numba.njit(cache=True, nogil=True)
+def _matches(upper_sides, lower_sides, width):  # type: ignore[no-untyped-def]
+    """Pairs (p, 2) of rows that are equal, of (m, 4) numbers below `width`; in ascending order."""
+    count = len(upper_sides)
+    start = np.zeros(width + 1, dtype=np.int64)
+    for row in range(count):
+        start[lower_sides[row, 0] + 1] += 1
+    start = np.cumsum(start)
+    filled = start[:-1].copy()
+    rows = np.empty(count, dtype=np.int64)
+    for row in range(count):
+        first = lower_sides[row, 0]
+        rows[filled[first]] = row
+        filled[first] += 1
+    pairs = np.empty((count, 2), dtype=np.int64)
+    found = 0
+    for upper in range(count):
+        first = upper_sides[upper, 0]
+        for place in range(start[first], start[first + 1]):
+            lower = rows[place]
+            same = True
+            for corner in range(1, 4):
+                same &= upper_sides[upper, corner] == lower_sides[lower, corner]
+            if same:
+                if found == len(pairs):
+                    more = np.empty((2 * found, 2), dtype=np.int64)
+                    more[:found] = pairs
+                    pairs = more
+                pairs[found] = upper, lower
+                found += 1
+    return pairs[:found].copy()
 
 
 def boundary_faces(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray]:

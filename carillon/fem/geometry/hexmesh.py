@@ -100,20 +100,32 @@ def hexmesh_from_grid(grid: np.ndarray, origin: np.ndarray, edge: float) -> HexM
     grid = np.asarray(grid, dtype=np.int64).reshape(-1, 3)
     grid = grid[np.lexsort(grid.T)]
     corners = grid[:, None, :] + CORNER_OFFSETS
-    # One 64-bit key per node: sorting keys is sorting by (z, y, x).
-    size = corners.reshape(-1, 3).max(axis=0, initial=0) + 1
-    stride = np.array([1, size[0], size[0] * size[1]], dtype=np.int64)
-    keys, cells = np.unique(corners @ stride, return_inverse=True)
-    node_grid = np.stack(
-        [keys % size[0], keys // size[0] % size[1], keys // (size[0] * size[1])], axis=1
-    )
+    node_grid, cells = distinct_places(corners.reshape(-1, 3))
     return HexMesh(
         cells=cells.reshape(-1, 8).astype(np.int32),
         grid=grid.astype(np.int32),
-        node_grid=node_grid.astype(np.int32),
+        node_grid=node_grid,
         origin=np.asarray(origin, dtype=float),
         edge=float(edge),
     )
+
+
+def distinct_places(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Distinct integer coordinates (d, 3) int32 by (z, y, x), and which each of `places` (n, 3) is.
+
+    No coordinate is negative.
+
+    Examples
+    --------
+    >>> distinct, number = distinct_places(np.array([[0, 0, 1], [1, 0, 0], [0, 0, 1]]))
+    >>> distinct.tolist(), number.tolist()
+    ([[1, 0, 0], [0, 0, 1]], [1, 0, 1])
+    """
+    # One 64-bit key per place: sorting keys is sorting by (z, y, x).
+    nx, ny, _ = places.max(axis=0, initial=0).astype(np.int64) + 1
+    keys, number = np.unique(places @ np.array([1, nx, nx * ny]), return_inverse=True)
+    distinct = np.stack([keys % nx, keys // nx % ny, keys // (nx * ny)], axis=1)
+    return distinct.astype(np.int32), number.ravel()
 
 
 def hexmesh_from_voxels(voxels: VoxelModel) -> HexMesh:

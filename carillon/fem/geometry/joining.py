@@ -92,20 +92,19 @@ def _joined_corners(parts: Parts, alone: np.ndarray) -> np.ndarray:
     lower = fine.node_grid[node[at]] & 1 == 1
     # The place of the coarse corner, seen from the fine node, is the same in every block.
     offset = (CORNER_OFFSETS[coarse_corner] * lower) @ np.array([1, 2, 4])
-    keys = 8 * node[at].astype(np.int64) + offset
+    key = 8 * node[at].astype(np.int64) + offset
     part = parts.part[cell[at]]
     ends = 8 * part + coarse_corner
-    shared, key = np.unique(keys, return_inverse=True)
-    key = key.ravel()
+    keys = 8 * fine.n_nodes
     # Only keys with parts of two blocks join anything.
     blocks = parts.owner[part]
-    low, high = np.full(len(shared), len(parts.owner)), np.full(len(shared), -1)
+    low, high = np.full(keys, len(parts.owner)), np.full(keys, -1)
     np.minimum.at(low, key, blocks)
     np.maximum.at(high, key, blocks)
     joins = (low != high)[key]
     corners = 8 * len(parts.owner)
     graph = sp.coo_matrix(
         (np.ones(joins.sum()), (ends[joins], corners + key[joins])),
-        shape=(corners + len(shared),) * 2,
+        shape=(corners + keys,) * 2,
     )
     return np.asarray(connected_components(graph, directed=False)[1][:corners])
