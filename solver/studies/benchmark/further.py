@@ -12,6 +12,7 @@ from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from carillon.errors import ConvergenceError, one_line
+from carillon.fem.model import RIGID_MODES
 from solver.reference.truth import Truth, can_count, complete, count_beyond
 from solver.studies.benchmark import primme_rivals, scipy_rivals, slepc_rivals
 from solver.studies.benchmark.search import Array, Pairs, RivalSearch
@@ -140,8 +141,10 @@ def completed(search: RivalSearch, pairs: Pairs, modes: int) -> tuple[Array, int
     Raises
     ------
     ConvergenceError
-        If some of its values are no eigenvalues.
+        If it found too few, or some of its values are no eigenvalues.
     """
+    if RIGID_MODES + len(pairs[0]) < modes:
+        raise ConvergenceError(f"found {RIGID_MODES + len(pairs[0])} of {modes} modes")
     system = search.system
     values, vectors = rigid_pairs(system)
     truth = Truth(
