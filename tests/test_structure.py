@@ -56,8 +56,8 @@ ARROWS = {
     "solver.studies.accuracy": """solver.assembly solver.linear solver.analysis solver.refinement
         solver.accuracy solver.studies""",
     "solver.studies.benchmark": """solver.coarsening solver.distribution solver.files
-        solver.assembly solver.linear solver.subspace solver.correction solver.analysis
-        solver.studies""",
+        solver.assembly solver.linear solver.subspace solver.reference solver.correction
+        solver.analysis solver.studies""",
     "solver.studies.calibration": """dataset_gen.objectives solver.coarsening solver.assembly
         solver.analysis""",
     "solver.studies.coarsening": """solver.coarsening solver.files solver.analysis

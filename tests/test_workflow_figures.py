@@ -7,12 +7,15 @@ from types import SimpleNamespace
 import pytest
 import yaml
 
+from solver.studies.benchmark.methods import Methods, named
+from solver.studies.benchmark.rivals import SlepcConfiguration
 from tests.pages import Page, assert_same_numbers, assert_self_contained
 from tests.workflow_runs import CHECKOUT, PROFILE, TINY, planned, snakemake
 from workflow import solids
 from workflow.studies.base.table import read_table
 from workflow.studies.catalogue import FIGURES
 from workflow.studies.report.convergence_tables import convergence_sentences
+from workflow.studies.report.methods_tables import METHODS
 
 convergence, methods, ratios = map(FIGURES.entries.get, ("convergence", "methods", "ratios"))
 CONFIG = yaml.safe_load((CHECKOUT / "workflow" / "config" / "laptop.yaml").read_text())
@@ -73,6 +76,10 @@ def test_the_table_of_methods_has_what_was_timed_and_says_how():
     assert "5 rounds (ARPACK 1)" in table.caption
     assert "bar, HCMS: too few modes." in table.caption
     assert table.rows[0]["hcms_ec_max"] == 5.0 and table.rows[0].get("ddfem_error") is None
+
+
+def test_every_method_of_a_row_has_a_name_for_people():
+    assert list(METHODS) == list(named(Methods(None, 12, SlepcConfiguration.default(1))))
 
 
 def test_ratios_name_their_base():

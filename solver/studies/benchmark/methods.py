@@ -12,17 +12,23 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.fem.model import Solid
+from carillon.fem.model import RIGID_MODES, Solid
 from solver.analysis.modal_solver import ModalSolver, Modes
 from solver.analysis.options import SolverOptions
+from solver.assembly.system import Layout, assemble
 from solver.correction.correct import INTERACTIVE_TOLERANCE
 from solver.distribution.collective import compute_on_root
+from solver.distribution.local_mesh import distribute
 from solver.files.modes_file import CHECKS
+from solver.linear import LinearSolver
+from solver.reference.truth import SPARE_MODES, can_count
+from solver.studies.benchmark.further import RIVALS, completed
 from solver.studies.benchmark.rivals import (
     SlepcConfiguration,
     smallest_without_factor,
     without_purification,
 )
+from solver.studies.benchmark.search import RivalSearch, TimeLimit
 from solver.studies.benchmark.solid import BenchmarkSolid
 
 Array = NDArray[np.float64]
@@ -31,6 +37,10 @@ CORRECTED_TOLERANCE = 1e-6
 """Eigenvalue error of HCMS with error correction on the fine mesh."""
 RIVAL_TOLERANCE = 1e-6
 """Relative residual of SLEPc and ARPACK; their eigenvalues are far better, at no cost."""
+RIVAL_SECONDS = 300.0
+"""Wall time [s] after which a further rival is given up."""
+BELOW_ELASTIC, ABOVE_LAST = 0.5, 1.0 + 1e-4
+"""Ends of the interval that rivals are told: of the first elastic and the last eigenvalue."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +83,8 @@ class Methods:
         Of the partition.
     brief
         Whether one correction will do, as it does to compile and load everything.
+    rival_seconds
+        Wall time [s] after which a further rival is given up.
     """
 
     def __init__(
@@ -83,6 +95,7 @@ class Methods:
         seed: int = 0,
         comm: MPI.Comm = MPI.COMM_WORLD,
         brief: bool = False,
+        rival_seconds: float = RIVAL_SECONDS,
     ) -> None:
         self.solid = solid
         self.modes = modes
@@ -90,12 +103,17 @@ class Methods:
         self.seed = seed
         self.comm = comm
         self.brief = brief
+        self.rival_seconds = rival_seconds
+        self._exact: Array | None = None
         self._warm: tuple[ModalSolver, Modes] | None = None
 
     def slepc(self, coarsening: str = "none", changed: bool = False) -> MethodRun:
         """SLEPc's Krylov-Schur in shift-and-invert mode."""
         with self.configuration.in_force(self.modes):
-            return self._rival("slepc", *self._model(coarsening, changed))
+            run = self._rival("slepc", *self._model(coarsening, changed))
+        if coarsening == "none":
+            self._exact = run.values
+        return run
 
     def arpack(self) -> MethodRun:
         """ARPACK in shift-and-invert mode."""
@@ -108,6 +126,43 @@ class Methods:
         begin = self._now()
         values = smallest_without_factor(model, self.modes, RIVAL_TOLERANCE, self.seed, self.comm)
         return MethodRun(self._now() - begin, values)
+
+    def further(self, name: str) -> MethodRun:
+        """One of `RIVALS`, asked for what SLEPc is asked for, on the fine mesh.
+
+        Modes that it missed are found off the clock, see `_rival`.
+
+        Raises
+        ------
+        ConvergenceError
+            If it cannot be tried here, takes too long or fails.
+        """
+        rival = RIVALS[name]
+        rival.require(self.comm.size)
+        exact = self.slepc().values if self._exact is None else self._exact
+        model = self._root.lumped() if rival.lumped else self._root.fine
+        local_mesh = distribute(model, None, self.seed, self.comm)
+        layout = Layout.of_local_mesh(local_mesh, self.comm)
+        linear = LinearSolver("auto", layout)
+        wanted = min(self.modes + (SPARE_MODES if can_count() else 0), model.n_dofs)
+        begin = self._now()
+        search = RivalSearch(
+            assemble(local_mesh, self.comm, layout),
+            linear,
+            (self.modes if rival.interval else wanted) - RIGID_MODES,
+            (BELOW_ELASTIC * exact[RIGID_MODES], ABOVE_LAST * exact[-1]),
+            RIVAL_TOLERANCE,
+            self.seed,
+            TimeLimit(self.rival_seconds),
+        )
+        try:
+            pairs = rival.search(search)
+            seconds = self._now() - begin
+            search.limit.check()  # not every search asks in between
+            values, added = completed(search, pairs, self.modes)
+        finally:
+            search.system.destroy()
+        return MethodRun(seconds, values, added=added)
 
     def hcms(self) -> MethodRun:
         """Component mode synthesis alone."""
@@ -215,4 +270,5 @@ def named(methods: Methods) -> dict[str, Callable[[], MethodRun]]:
         "ddfem_hcms_ec": methods.ddfem_hcms_ec,
         "ddfem_hcms_ec_warm": methods.ddfem_hcms_ec_warm,
         "arpack_regular": methods.arpack_regular,
+        **{name: partial(methods.further, name) for name in RIVALS},
     }

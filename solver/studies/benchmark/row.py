@@ -10,7 +10,7 @@ from typing import Any, cast
 
 from mpi4py import MPI
 
-from carillon.arguments import whole_number
+from carillon.arguments import positive_number, whole_number
 from carillon.errors import ConvergenceError
 from carillon.fem.geometry import surface_name
 from carillon.options import option
@@ -19,7 +19,8 @@ from carillon.runtime import blas_name, loaded_blas
 from solver.analysis.options import number_of_modes
 from solver.analysis.problem import ProblemOptions
 from solver.distribution.collective import bcast_from_root, compute_on_root
-from solver.studies.benchmark.methods import MethodRun, Methods, named
+from solver.studies.benchmark.further import ALL, RIVALS
+from solver.studies.benchmark.methods import RIVAL_SECONDS, MethodRun, Methods, named
 from solver.studies.benchmark.rivals import SlepcConfiguration, configurations
 from solver.studies.benchmark.scores import (
     BASES,
@@ -36,15 +37,20 @@ logger = logging.getLogger(__name__)
 
 Runs = dict[str, list[MethodRun]]
 
-SLOW = ("arpack", "arpack_regular")
+SLOW = ("arpack", "arpack_regular", *RIVALS)
 NEED_FORESTS = ("ddfem", "ddfem_hcms_ec_accurate", "ddfem_hcms_ec", "ddfem_hcms_ec_warm")
-NEED_VOXELS = (*NEED_FORESTS, "arpack_regular")
+LUMPED = tuple(name for name, rival in RIVALS.items() if rival.lumped)
+NEED_VOXELS = (*NEED_FORESTS, "arpack_regular", *LUMPED)
 WARM_UP_MODES = 20
 """Modes of the runs that compile the kernels and load what they need."""
 
+_LUMPED_MASS = (
+    "fine mesh with a row-sum lumped mass, which {} needs to do without any factorisation; its "
+    "spectrum is another than that of the consistent mass"
+)
 PROBLEMS = {
-    "arpack_regular": "fine mesh with a row-sum lumped mass, which ARPACK needs to do without any "
-    "factorisation; its spectrum is another than that of the consistent mass",
+    "arpack_regular": _LUMPED_MASS.format("ARPACK"),
+    **{name: _LUMPED_MASS.format("a filter") for name in LUMPED},
 }
 """What a method solves, where it is another problem than its name says."""
 
@@ -82,10 +88,18 @@ class BenchmarkOptions:
     modes: int = option(256, "number of modes, rigid ones included", type=number_of_modes)
     runs: int = option(5, "rounds; in each, every method runs once", type=number_of_rounds)
     slow_runs: int | None = option(
-        None, "rounds that ARPACK takes part in (default: all)", type=number_of_rounds
+        None,
+        "rounds that ARPACK and --rivals take part in (default: all)",
+        type=number_of_rounds,
     )
     arpack: bool = option(True, "run ARPACK, the slowest method, too")
     arpack_regular: bool = option(False, "also ARPACK without a factorisation, on a lumped mass")
+    rivals: list[str] | None = option(
+        None, "further general eigensolvers, on one rank", nargs="+", choices=(*RIVALS, ALL)
+    )
+    rival_seconds: float = option(
+        RIVAL_SECONDS, "wall time after which one of these is given up [s]", type=positive_number
+    )
     tune: bool = option(
         False, "SLEPc in its fastest configuration of several, each tried once before"
     )
@@ -94,7 +108,14 @@ class BenchmarkOptions:
     def left_out(self) -> tuple[str, ...]:
         """Methods that the options leave out."""
         choices = {"arpack": self.arpack, "arpack_regular": self.arpack_regular}
+        choices |= {name: name in self.further for name in RIVALS}
         return tuple(name for name, runs in choices.items() if not runs)
+
+    @property
+    def further(self) -> tuple[str, ...]:
+        """Further rivals that the options ask for."""
+        asked = self.rivals or []
+        return tuple(name for name in RIVALS if name in asked or ALL in asked)
 
     def rounds(self, method: str) -> int:
         """Runs of a method."""
@@ -134,8 +155,17 @@ def benchmark_row(
     if reason:
         left_out += NEED_FORESTS if voxels else NEED_VOXELS
     default = SlepcConfiguration.default(comm.size)
-    _run_once(Methods(solid, _few(benchmark.modes), default, options.seed, comm, True), left_out)
-    methods = Methods(solid, benchmark.modes, default, options.seed, comm)
+    # Rivals may fail, and compile nothing.
+    brief = Methods(solid, _few(benchmark.modes), default, options.seed, comm, True)
+    _run_once(brief, (*left_out, *RIVALS))
+    methods = Methods(
+        solid,
+        benchmark.modes,
+        default,
+        options.seed,
+        comm,
+        rival_seconds=benchmark.rival_seconds,
+    )
     tried = _tune(methods) if benchmark.tune else {}
     if tried:
         methods.configuration = min(tried, key=tried.__getitem__)
@@ -144,8 +174,8 @@ def benchmark_row(
     row = {
         **bcast_from_root(comm, lambda: _describe(options, cast(BenchmarkSolid, solid))),
         "modes": benchmark.modes,
-        **_times(runs, comm.bcast(None if solid is None else solid.seconds)),
-        **_errors(runs, spectra),
+        **_times(runs, comm.bcast(None if solid is None else solid.seconds), benchmark.further),
+        **_errors(runs, spectra, benchmark.further),
         "slepc_configuration": methods.configuration.as_dict(),
         "slepc_configurations_tried": [
             {**configuration.as_dict(), "seconds": seconds}
@@ -158,7 +188,7 @@ def benchmark_row(
         "threads": max((int(library["num_threads"]) for library in loaded_blas()), default=1),
         "blas": blas_name(),
         "problem": {name: text for name, text in PROBLEMS.items() if name not in left_out},
-        "meaning": MEANING,
+        "meaning": MEANING | {name: RIVALS[name].meaning for name in benchmark.further},
     }
     methods.release()
     return row
@@ -277,7 +307,7 @@ def _describe(options: ProblemOptions, solid: BenchmarkSolid) -> dict[str, Any]:
     }
 
 
-def _times(runs: Runs, before: dict[str, float]) -> dict[str, Any]:
+def _times(runs: Runs, before: dict[str, float], further: tuple[str, ...]) -> dict[str, Any]:
     """Medians, spreads and ratios; `before` is what the mesh alone needed."""
     seconds = {name: median([run.seconds for run in results]) for name, results in runs.items()}
     planned = {
@@ -291,6 +321,7 @@ def _times(runs: Runs, before: dict[str, float]) -> dict[str, Any]:
     names = ["arpack", "slepc", *BASES]
     if "arpack_regular" in seconds:
         names.append("arpack_regular")
+    names += further
     return {
         "seconds": {
             "precompute": sum(parts.values()),
@@ -306,7 +337,7 @@ def _times(runs: Runs, before: dict[str, float]) -> dict[str, Any]:
     }
 
 
-def _errors(runs: Runs, spectra: dict[str, MethodRun]) -> dict[str, Any]:
+def _errors(runs: Runs, spectra: dict[str, MethodRun], further: tuple[str, ...]) -> dict[str, Any]:
     same_operator = {
         "arpack": "fine",
         "hcms": "fine",
@@ -314,6 +345,7 @@ def _errors(runs: Runs, spectra: dict[str, MethodRun]) -> dict[str, Any]:
         "ddfem_hcms_ec_accurate": "coarse",
         "ddfem_hcms_ec": "coarse",
         "ddfem_hcms_ec_warm": "coarse_changed",
+        **{name: "fine" for name in further if name not in LUMPED},
     }
     fine = spectra["fine"].values
     names = {"average": "average", "ddfem": "coarse"}

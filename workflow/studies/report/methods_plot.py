@@ -25,10 +25,13 @@ METHOD_COLOURS = {
 
 
 def methods_figure(results: Results) -> Figure:
-    """Median, least and greatest wall time of every method on every solid, logarithmic."""
+    """Median, least and greatest wall time of every method on every solid, logarithmic.
+
+    Further rivals are in the table alone.
+    """
     methods = results.table("methods")
     keys = {column.key for column in methods.columns}
-    timed = [name for name in METHODS if name in keys]
+    timed = [name for name in METHOD_COLOURS if name in keys]
     height = 0.8 / len(timed)
     figure, axes = plt.subplots(figsize=(7.6, 1.1 + 1.5 * len(methods.rows)))
     for index, name in enumerate(timed):

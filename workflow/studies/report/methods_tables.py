@@ -19,6 +19,16 @@ METHODS = {
     "ddfem_hcms_ec": "DDFEM* + HCMS + EC",
     "ddfem_hcms_ec_warm": "the same, warm",
     "arpack_regular": "ARPACK, no factorisation",
+    "scipy_superlu": "SciPy's ARPACK, SuperLU",
+    "scipy_lobpcg": "SciPy's LOBPCG, PyAMG",
+    "primme_direct": "PRIMME, factorisation",
+    "primme_multigrid": "PRIMME, PyAMG",
+    "slepc_lobpcg": "SLEPc's LOBPCG",
+    "slepc_gd": "SLEPc's Davidson",
+    "slepc_jd": "SLEPc's Jacobi-Davidson",
+    "slepc_ciss": "SLEPc's contour integrals",
+    "slepc_filter": "SLEPc's filter, lumped mass",
+    "slepc_evsl": "EVSL, lumped mass",
 }
 """Methods of `solver benchmark` and their names for people, in the table's order."""
 

@@ -1,0 +1,124 @@
+"""What a further rival is asked for, and how long it may take."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from carillon.errors import ConvergenceError
+from solver.assembly.system import System
+from solver.linear import LinearSolver
+from solver.subspace.rayleigh_ritz import safe_shift
+
+Array = NDArray[np.float64]
+Pairs = tuple[Array, Array]
+"""Eigenvalues (k,) [rad^2/s^2] and vectors (n, k), orthonormal with respect to `RivalSearch.M`."""
+
+
+class TimeLimit:
+    """Wall time that begins when this is made.
+
+    Parameters
+    ----------
+    seconds
+        After which a rival is given up.
+    """
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds = seconds
+        self._end = time.perf_counter() + seconds
+
+    @property
+    def over(self) -> bool:
+        """Whether it is up."""
+        return time.perf_counter() > self._end
+
+    def check(self) -> None:
+        """Raise ConvergenceError if it is up."""
+        if self.over:
+            raise ConvergenceError(f"did not converge in {self._seconds:g} s")
+
+
+@dataclass(frozen=True)
+class RivalSearch:
+    """The lowest elastic eigenpairs of an assembled system on one rank.
+
+    The unknowns are scaled so that the mass has a unit diagonal: the norms by which general solvers
+    stop mean the same for every unknown then.
+
+    Attributes
+    ----------
+    system
+        On one rank.
+    linear
+        Makes inverses on its mesh.
+    count
+        Elastic pairs wanted.
+    interval
+        An interval (low, high) [rad^2/s^2] that holds them and no rigid motions.
+    tolerance
+        Of |K x - lambda M x| / lambda in the 2-norm, where x has unit mass.
+    seed
+        Of what the search starts from.
+    limit
+        Time that it may take.
+    """
+
+    system: System
+    linear: LinearSolver
+    count: int
+    interval: tuple[float, float]
+    tolerance: float
+    seed: int
+    limit: TimeLimit
+
+    @cached_property
+    def scale(self) -> Array:
+        """(n,) factors from scaled unknowns to displacements."""
+        mass = self.system.rows.mass_csr(self.system.n_dofs)
+        return np.asarray(1.0 / np.sqrt(mass.diagonal()))
+
+    @cached_property
+    def K(self) -> sp.csr_matrix:  # noqa: N802
+        """Scaled stiffness [rad^2/s^2]."""
+        return self._scaled(self.system.rows.stiffness_csr(self.system.n_dofs))
+
+    @cached_property
+    def M(self) -> sp.csr_matrix:  # noqa: N802
+        """Scaled mass [1]."""
+        return self._scaled(self.system.rows.mass_csr(self.system.n_dofs))
+
+    @cached_property
+    def rigid(self) -> Array:
+        """(n, 6) rigid motions, orthonormal with respect to `M`."""
+        return np.asarray(self.system.rigid / self.scale[:, None])
+
+    @cached_property
+    def shift(self) -> float:
+        """Sigma [rad^2/s^2] of the definite K + sigma M."""
+        return safe_shift(self.system)
+
+    @cached_property
+    def shifted(self) -> sp.csr_matrix:
+        """K + sigma M."""
+        return self.K + self.shift * self.M
+
+    def start(self, columns: int) -> Array:
+        """Random vectors (n, columns) to start from."""
+        return np.random.default_rng(self.seed).standard_normal((self.K.shape[0], columns))
+
+    def _scaled(self, matrix: sp.csr_matrix) -> sp.csr_matrix:
+        scale = sp.diags(self.scale)
+        return (scale @ matrix @ scale).tocsr()
+
+
+def ascending(values: Any, vectors: Array) -> Pairs:
+    """Eigenpairs in the order of their values."""
+    order = np.argsort(values, kind="stable")
+    return np.asarray(values)[order], vectors[:, order]
