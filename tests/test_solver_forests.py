@@ -72,7 +72,7 @@ def test_another_poisson_ratio_is_answered_with_what_to_train(forests, as_defaul
 def test_absent_default_forests_are_left_out_with_a_sentence(no_default, caplog):
     assert forest_or_reason(None, 0.25) == (None, "without ddfem: default.h5: no such file")
     row = benchmark_row(BOX, BRIEFLY)
-    assert row["seconds"]["ddfem_hcms_ec"] is None and "ddfem" not in row["frequency_error"]
+    assert row["seconds"]["ddfem_ec"] is None and "ddfem" not in row["frequency_error"]
     assert row["without_forest"] == "without ddfem: default.h5: no such file"
     assert caplog.messages[0] == "without ddfem: default.h5: no such file"
     with pytest.raises(UserError):
@@ -109,4 +109,4 @@ def test_without_forests_their_row_is_left_out(no_default, caplog):
 def test_benchmark_times_the_default_forests(as_default):
     row = benchmark_row(BOX, BRIEFLY)
     assert row["forest"]["forest"] == "default"
-    assert row["seconds"]["ddfem"] > 0.0 and row["seconds"]["ddfem_hcms_ec_warm"] > 0.0
+    assert row["seconds"]["ddfem"] > 0.0 and row["seconds"]["ddfem_ec_warm"] > 0.0

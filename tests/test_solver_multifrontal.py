@@ -12,7 +12,8 @@ from carillon.fem.model import fine_model
 from solver.assembly.node_rows import NodeRows, Pattern
 from solver.linear import multifrontal
 from solver.linear.dissection import dissect
-from solver.linear.multifrontal import Factor, Plan
+from solver.linear.multifrontal import Factor
+from solver.linear.plan import Plan
 from tests import solids
 
 

@@ -22,7 +22,7 @@ from solver.assembly.node_rows import NodeRows, Pattern
 from solver.distribution.local_mesh import Cells
 from solver.hcms.condense import restrict_mass, restrict_stiffness
 from solver.hcms.lowest import STEPS, all_modes, lowest_modes, ritz_pairs
-from solver.linear.multifrontal import Plan
+from solver.linear.plan import Plan
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

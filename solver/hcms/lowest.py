@@ -14,7 +14,8 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from solver.assembly.node_rows import NodeRows
-from solver.linear.multifrontal import Factor, Plan
+from solver.linear.multifrontal import Factor
+from solver.linear.plan import Plan
 from solver.subspace.orthonormal import is_cancelled
 from solver.subspace.spectrum import WEYL_EXPONENT
 

@@ -103,7 +103,7 @@ class LinearSolver:
         self.method = method
         self._plan = None
         if method == "multifrontal":
-            from solver.linear.multifrontal import Plan
+            from solver.linear.plan import Plan
 
             local_mesh, pattern = layout.local_mesh, layout.pattern
             steps = local_mesh.cells.elements.steps

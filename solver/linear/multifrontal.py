@@ -8,8 +8,6 @@ panel pivots within itself, so the matrix need not be definite.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numba
@@ -18,154 +16,24 @@ import scipy.linalg as la
 from numpy.typing import NDArray
 
 from carillon.errors import LocalConvergenceError
-from carillon.lanes import compiler
-from carillon.registers import LANES
+from carillon.narrow import block, lanes_of
 from carillon.runtime import available_memory
 from carillon.threads import in_parallel, split
-from solver.linear import narrow
-from solver.linear.dissection import Fronts, dissect
-from solver.linear.narrow import block, lanes_of, subtract
+from solver.linear.plan import PANEL, Part, Plan
+from solver.linear.sweeps import (
+    STRIP,
+    add_nodes,
+    copy_nodes,
+    eliminate,
+    put_rows,
+    substitute,
+    take_rows,
+)
 
 Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-
-compiled = compiler(Path(__file__), Path(narrow.__file__))
 
 COLUMNS = 64
 """Right-hand sides that are carried through the fronts together."""
-STRIP = 192
-"""Columns of W that lie together in memory, row by row."""
-BRANCHES = 3
-"""Branches for each thread, at least: their work is not equal."""
-UPDATES_FRACTION = 1.3
-"""Memory at its peak, when updates wait for their parents, as a share of what the factor takes."""
-PANEL = 120
-"""Rows of a front that are eliminated together, and of a symmetric product that are formed."""
-
-
-@dataclass(frozen=True)
-class Part:
-    """Some fronts with the rows that they eliminate, and those beyond that they are coupled to.
-
-    Attributes
-    ----------
-    fronts
-        Their numbers, ascending.
-    positions, beyond
-        Positions in the elimination order of the part's own rows and of the rows beyond, ascending.
-    first
-        (fronts + 1,) first own row of each front, one a node.
-    near, near_offset
-        Rows that each front is coupled to, in compressed form: own rows, then rows beyond.
-    """
-
-    fronts: Index
-    positions: Index
-    beyond: Index
-    first: Index
-    near: Index
-    near_offset: Index
-
-    @classmethod
-    def of_fronts(cls, whole: Fronts, fronts: Index) -> Part:
-        """Part of these fronts, which holds all that lies between any of them in the tree."""
-        none = np.empty(0, dtype=np.int64)
-        starts, stops = whole.first[fronts], whole.first[fronts + 1]
-        positions = np.concatenate([none, *map(np.arange, starts, stops)])
-        boundary = [whole.boundary[front] for front in fronts]
-        near = np.concatenate([none, *boundary])
-        beyond = np.setdiff1d(near, positions)
-        # Outside the part all rows come later than the own ones that are coupled to them.
-        place = np.searchsorted(positions, near)
-        own = positions[np.minimum(place, len(positions) - 1)] == near if len(near) else none > 0
-        local = np.where(own, place, len(positions) + np.searchsorted(beyond, near))
-        counts = np.array([len(rows) for rows in boundary], dtype=np.int64)
-        return cls(
-            fronts,
-            positions,
-            beyond,
-            np.concatenate([[0], np.cumsum(stops - starts)]),
-            local,
-            np.concatenate([[0], np.cumsum(counts)]),
-        )
-
-
-@dataclass(frozen=True)
-class Shares:
-    """Branches of the tree, which threads work on beside each other, and the fronts above them."""
-
-    branches: list[Part]
-    top: Part
-
-
-class Plan:
-    """What a factorisation needs to know of the sparsity alone: made once, used for any material.
-
-    Parameters
-    ----------
-    lattice
-        (n, 3) integer coordinates of the nodes.
-    indptr, indices
-        Node graph in compressed rows; the data of `Factor` follow it.
-    options
-        Others of `solver.linear.dissection.dissect`.
-    """
-
-    def __init__(self, lattice: Index, indptr: Index, indices: Index, **options: Any) -> None:
-        self.fronts: Fronts = dissect(lattice, indptr, indices, **options)
-        fronts = self.fronts
-        self.position = fronts.position
-        self.children = fronts.children()
-        self.entries = fronts.entries(indptr, indices)
-        self.places = fronts.places()
-        own = 3 * np.diff(fronts.first)
-        outside = 3 * np.array([len(boundary) for boundary in fronts.boundary])
-        self.pivot_offset = np.concatenate([[0], np.cumsum([_pivot_entries(n) for n in own])])
-        self.coupling_offset = np.concatenate([[0], np.cumsum(own * outside)])
-        self.bytes = int(UPDATES_FRACTION * 8 * (self.pivot_offset[-1] + self.coupling_offset[-1]))
-        self._work = 2 * own**2 + 4 * own * outside
-        self._shares: dict[int, Shares] = {}
-
-    def shares(self, threads: int) -> Shares:
-        """How the fronts are shared among threads; made once for each number of them."""
-        if threads not in self._shares:
-            branches = self._branches(threads)
-            inside = np.concatenate([np.arange(*branch) for branch in branches])
-            top = np.setdiff1d(np.arange(len(self.fronts)), inside)
-            self._shares[threads] = Shares(
-                [Part.of_fronts(self.fronts, np.arange(*branch)) for branch in branches],
-                Part.of_fronts(self.fronts, top),
-            )
-        return self._shares[threads]
-
-    def _branches(self, threads: int) -> list[tuple[int, int]]:
-        """Half-open ranges of fronts, whole branches of the tree, that threads take in turn.
-
-        The largest come first.
-        """
-        parent = self.fronts.parent
-        work = self._work.astype(float)
-        size = np.ones(len(parent), dtype=np.int64)
-        for front, above in enumerate(parent):
-            if above >= 0:
-                work[above] += work[front]
-                size[above] += size[front]
-        chosen = [int(front) for front in np.flatnonzero(parent < 0)]
-        if threads > 1:
-            largest = work[chosen].sum() / (BRANCHES * threads)
-            while True:
-                big = max(chosen, key=lambda front: work[front])
-                if work[big] <= largest or not self.children[big]:
-                    break
-                chosen.remove(big)
-                chosen += self.children[big]
-        chosen.sort(key=lambda front: -work[front])
-        return [(front + 1 - int(size[front]), front + 1) for front in chosen]
-
-
-def _pivot_entries(n: int) -> int:
-    """Entries of the panels of n own rows, each from its first column on."""
-    return sum((stop - start) * (n - start) for start, stop in split(n, 1, PANEL))
 
 
 class Factor:
@@ -215,7 +83,7 @@ class Factor:
         updates: dict[int, Array] = {}
         first = plan.fronts.first
 
-        def eliminate(front: int) -> int:
+        def eliminated(front: int) -> int:
             n = 3 * int(first[front + 1] - first[front])
             b = 3 * len(plan.fronts.boundary[front])
             pivots = self._pivots[plan.pivot_offset[front] : plan.pivot_offset[front + 1]]
@@ -239,7 +107,7 @@ class Factor:
             return negative
 
         def eliminate_all(part: Part) -> int:
-            return sum(eliminate(int(front)) for front in part.fronts)
+            return sum(eliminated(int(front)) for front in part.fronts)
 
         shares = plan.shares(self._threads)
         branches = [(part,) for part in shares.branches]
@@ -262,30 +130,30 @@ class Factor:
 
         def taken(part: Part) -> Array:
             work = block(3 * (len(part.positions) + len(part.beyond)), lanes)
-            _take_rows(vectors, start, width, order[part.positions], lanes, work)
+            take_rows(vectors, start, width, order[part.positions], lanes, work)
             return work
 
         def up(part: Part) -> Array:
             work = taken(part)
-            self._sweep(_eliminate, part, work, lanes)
+            self._sweep(eliminate, part, work, lanes)
             return work
 
         def down(part: Part, work: Array) -> None:
             if len(part.beyond):
                 rows = np.searchsorted(top.positions, part.beyond)
-                _copy_nodes(above, 3 * len(part.positions), rows, lanes, work)
-            self._sweep(_substitute, part, work, lanes)
-            _put_rows(work, order[part.positions], lanes, solution, start, width)
+                copy_nodes(above, 3 * len(part.positions), rows, lanes, work)
+            self._sweep(substitute, part, work, lanes)
+            put_rows(work, order[part.positions], lanes, solution, start, width)
 
         works = in_parallel(up, [(part,) for part in shares.branches], threads)
         above = taken(top)
         if len(top.fronts):
             for part, work in zip(shares.branches, works, strict=True):
                 rows = np.searchsorted(top.positions, part.beyond)
-                _add_nodes(work, 3 * len(part.positions), rows, lanes, above)
-            self._sweep(_eliminate, top, above, lanes)
-            self._sweep(_substitute, top, above, lanes)
-            _put_rows(above, order[top.positions], lanes, solution, start, width)
+                add_nodes(work, 3 * len(part.positions), rows, lanes, above)
+            self._sweep(eliminate, top, above, lanes)
+            self._sweep(substitute, top, above, lanes)
+            put_rows(above, order[top.positions], lanes, solution, start, width)
         in_parallel(down, list(zip(shares.branches, works, strict=True)), threads)
 
     def _sweep(self, kernel: Any, part: Part, work: Array, lanes: int) -> None:
@@ -416,109 +284,3 @@ def _mirror(matrix):  # type: ignore[no-untyped-def]
     for row in range(len(matrix)):
         for column in range(row):
             matrix[row, column] = matrix[column, row]
-
-
-@compiled
-def _take_rows(vectors, start, width, nodes, lanes, work):  # type: ignore[no-untyped-def]
-    """Rows of `nodes` of the columns from `start` on, as the first rows of a block."""
-    flat = work.reshape(-1)
-    for a in range(len(nodes)):
-        for i in range(3):
-            row = (3 * a + i) * lanes * LANES
-            flat[row : row + width] = vectors[3 * nodes[a] + i, start : start + width]
-
-
-@compiled
-def _put_rows(work, nodes, lanes, vectors, start, width):  # type: ignore[no-untyped-def]
-    flat = work.reshape(-1)
-    for a in range(len(nodes)):
-        for i in range(3):
-            row = (3 * a + i) * lanes * LANES
-            vectors[3 * nodes[a] + i, start : start + width] = flat[row : row + width]
-
-
-@compiled
-def _copy_nodes(source, place, nodes, lanes, target):  # type: ignore[no-untyped-def]
-    """Rows of `nodes` of a block become the rows of another from `place` on."""
-    size = 3 * lanes
-    for a in range(len(nodes)):
-        row = place * lanes + size * a
-        target[row : row + size] = source[size * nodes[a] : size * (nodes[a] + 1)]
-
-
-@compiled
-def _add_nodes(source, place, nodes, lanes, target):  # type: ignore[no-untyped-def]
-    """The rows of a block from `place` on are added to the rows of `nodes` of another."""
-    size = 3 * lanes
-    for a in range(len(nodes)):
-        row = place * lanes + size * a
-        target[size * nodes[a] : size * (nodes[a] + 1)] += source[row : row + size]
-
-
-@compiled
-def _largest(first, near_offset):  # type: ignore[no-untyped-def]
-    """Own rows of the tallest front, and rows that the widest is coupled to."""
-    tallest = longest = 0
-    for number in range(len(first) - 1):
-        tallest = max(tallest, 3 * (first[number + 1] - first[number]))
-        longest = max(longest, 3 * (near_offset[number + 1] - near_offset[number]))
-    return tallest, longest
-
-
-@compiled
-def _eliminate(  # type: ignore[no-untyped-def]
-    work, lanes, fronts, first, near, near_offset, pivots, pivot_offset, coupling, coupling_offset
-):
-    tallest, longest = _largest(first, near_offset)
-    inside, outside = block(tallest, lanes), block(longest, lanes)
-    for number in range(len(fronts)):
-        front, top = fronts[number], 3 * first[number]
-        n = 3 * first[number + 1] - top
-        panels = -(-n // PANEL)
-        place = pivot_offset[front]
-        for panel in range(panels):
-            start, stop = -(-n * panel // panels), -(-n * (panel + 1) // panels)
-            size, rest = stop - start, n - stop
-            later = (pivots, place + size * size, 1, rest)
-            subtract(later, rest, size, (work, top + start, lanes), (work, top + stop, lanes))
-            place += size * (size + rest)
-        rows = near[near_offset[number] : near_offset[number + 1]]
-        outside[: 3 * len(rows) * lanes] = 0.0
-        for start in range(0, 3 * len(rows), STRIP):
-            size = min(STRIP, 3 * len(rows) - start)
-            strip = (coupling, coupling_offset[front] + n * start, 1, size)
-            subtract(strip, size, n, (work, top, lanes), (outside, start, lanes))
-        _add_nodes(outside, 0, rows, lanes, work)
-        place = pivot_offset[front]
-        for panel in range(panels):
-            start, stop = -(-n * panel // panels), -(-n * (panel + 1) // panels)
-            size = stop - start
-            inside[: size * lanes] = 0.0
-            own = (work, top + start, lanes)
-            subtract((pivots, place, size, 1), size, size, own, (inside, 0, lanes))
-            work[(top + start) * lanes : (top + stop) * lanes] = -inside[: size * lanes]
-            place += size * (n - start)
-
-
-@compiled
-def _substitute(  # type: ignore[no-untyped-def]
-    work, lanes, fronts, first, near, near_offset, pivots, pivot_offset, coupling, coupling_offset
-):
-    outside = block(_largest(first, near_offset)[1], lanes)
-    for number in range(len(fronts) - 1, -1, -1):
-        front, top = fronts[number], 3 * first[number]
-        n = 3 * first[number + 1] - top
-        rows = near[near_offset[number] : near_offset[number + 1]]
-        _copy_nodes(work, 0, rows, lanes, outside)
-        for start in range(0, 3 * len(rows), STRIP):
-            size = min(STRIP, 3 * len(rows) - start)
-            strip = (coupling, coupling_offset[front] + n * start, size, 1)
-            subtract(strip, n, size, (outside, start, lanes), (work, top, lanes))
-        panels = -(-n // PANEL)
-        place = pivot_offset[front + 1]
-        for panel in range(panels - 1, -1, -1):
-            start, stop = -(-n * panel // panels), -(-n * (panel + 1) // panels)
-            size, rest = stop - start, n - stop
-            later = (pivots, place - size * rest, rest, 1)
-            subtract(later, size, rest, (work, top + stop, lanes), (work, top + start, lanes))
-            place -= size * (size + rest)

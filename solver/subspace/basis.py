@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon import narrow
 from carillon.lanes import compiler
+from carillon.narrow import DEPTH, ROWS_NEAR, lanes_of, subtract
 from carillon.registers import LANES
 from carillon.threads import in_parallel, split
 from solver.assembly.system import System
-from solver.linear import narrow
-from solver.linear.narrow import DEPTH, ROWS_NEAR, lanes_of, subtract
 
 Array = NDArray[np.float64]
 

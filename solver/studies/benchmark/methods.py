@@ -166,21 +166,26 @@ class Methods:
 
     def hcms(self) -> MethodRun:
         """Component mode synthesis alone."""
-        return self._cold(*self._model("none"), self._options(corrections=0))
+        return self._cold(*self._model("none"), self._options(method="hcms", corrections=0))
 
     def hcms_ec(self) -> MethodRun:
         """Component mode synthesis and error correction."""
+        options = self._options(method="hcms", tolerance=CORRECTED_TOLERANCE)
+        return self._cold(*self._model("none"), options)
+
+    def fastest(self) -> MethodRun:
+        """What `--method auto` takes: block Lanczos from random vectors on one rank."""
         return self._cold(*self._model("none"), self._options(tolerance=CORRECTED_TOLERANCE))
 
-    def ddfem_hcms_ec_accurate(self) -> MethodRun:
+    def ddfem_ec_accurate(self) -> MethodRun:
         """The same on the mesh coarsened by forests."""
         return self._cold(*self._model("ddfem"), self._options(tolerance=CORRECTED_TOLERANCE))
 
-    def ddfem_hcms_ec(self) -> MethodRun:
+    def ddfem_ec(self) -> MethodRun:
         """The same on the mesh coarsened by forests, to the interactive tolerance."""
         return self._cold(*self._model("ddfem"), self._interactive)
 
-    def ddfem_hcms_ec_warm(self) -> MethodRun:
+    def ddfem_ec_warm(self) -> MethodRun:
         """The same for the changed material, from the modes of the unchanged one."""
         solver, start = self._prepared()
         model, coarsened = self._model("ddfem", changed=True)
@@ -209,6 +214,8 @@ class Methods:
         options = SolverOptions(modes=self.modes, seed=self.seed, **changes)
         if self.brief and options.method == "hcms":
             options = replace(options, tolerance=0.0, corrections=min(1, options.corrections))
+        elif self.brief and options.method == "auto":
+            options = replace(options, tolerance=INTERACTIVE_TOLERANCE)
         return options
 
     @property
@@ -266,9 +273,10 @@ def named(methods: Methods) -> dict[str, Callable[[], MethodRun]]:
         "ddfem": partial(methods.slepc, "ddfem"),
         "hcms": methods.hcms,
         "hcms_ec": methods.hcms_ec,
-        "ddfem_hcms_ec_accurate": methods.ddfem_hcms_ec_accurate,
-        "ddfem_hcms_ec": methods.ddfem_hcms_ec,
-        "ddfem_hcms_ec_warm": methods.ddfem_hcms_ec_warm,
+        "fastest": methods.fastest,
+        "ddfem_ec_accurate": methods.ddfem_ec_accurate,
+        "ddfem_ec": methods.ddfem_ec,
+        "ddfem_ec_warm": methods.ddfem_ec_warm,
         "arpack_regular": methods.arpack_regular,
         **{name: partial(methods.further, name) for name in RIVALS},
     }

@@ -38,7 +38,7 @@ logger = logging.getLogger(__name__)
 Runs = dict[str, list[MethodRun]]
 
 SLOW = ("arpack", "arpack_regular", *RIVALS)
-NEED_FORESTS = ("ddfem", "ddfem_hcms_ec_accurate", "ddfem_hcms_ec", "ddfem_hcms_ec_warm")
+NEED_FORESTS = ("ddfem", "ddfem_ec_accurate", "ddfem_ec", "ddfem_ec_warm")
 LUMPED = tuple(name for name, rival in RIVALS.items() if rival.lumped)
 NEED_VOXELS = (*NEED_FORESTS, "arpack_regular", *LUMPED)
 WARM_UP_MODES = 20
@@ -63,11 +63,12 @@ MEANING = {
     "speedup_with_precompute": "the same, with the partition, sparsity and elimination plan of the "
     "outer name added to its seconds, and nothing to those of the inner name",
     "ddfem": "coarsened by forests, then SLEPc on the coarse model (DDFEM* alone)",
-    "ddfem_hcms_ec_accurate": "coarsened by forests, then HCMS and error correction to the same "
-    "accuracy as on the fine mesh",
-    "ddfem_hcms_ec": "coarsened by forests, then HCMS and error correction to the interactive "
-    "tolerance, from nothing",
-    "ddfem_hcms_ec_warm": "the same for moduli that differ by a smooth field of 5 %, starting from "
+    "fastest": "what --method auto takes: on one rank block Lanczos from random vectors, on several "
+    "HCMS and error correction",
+    "ddfem_ec_accurate": "coarsened by forests, then the fastest to the same accuracy as on the "
+    "fine mesh",
+    "ddfem_ec": "coarsened by forests, then the fastest to the interactive tolerance, from nothing",
+    "ddfem_ec_warm": "the same for moduli that differ by a smooth field of 5 %, starting from "
     "the modes of the unchanged ones",
     "eigenvalue_error": "relative to SLEPc's eigenvalues of the same operator, fine or coarse",
     "missed": "modes that a general eigensolver's search missed in some run, found by further "
@@ -315,8 +316,8 @@ def _times(runs: Runs, before: dict[str, float], further: tuple[str, ...]) -> di
     }
     parts = {
         **before,
-        "fine_solver": planned.get("hcms_ec", 0.0),
-        "coarse_solver": planned.get("ddfem_hcms_ec", 0.0),
+        "fine_solver": planned.get("fastest", 0.0),
+        "coarse_solver": planned.get("ddfem_ec", 0.0),
     }
     names = ["arpack", "slepc", *BASES]
     if "arpack_regular" in seconds:
@@ -342,9 +343,10 @@ def _errors(runs: Runs, spectra: dict[str, MethodRun], further: tuple[str, ...])
         "arpack": "fine",
         "hcms": "fine",
         "hcms_ec": "fine",
-        "ddfem_hcms_ec_accurate": "coarse",
-        "ddfem_hcms_ec": "coarse",
-        "ddfem_hcms_ec_warm": "coarse_changed",
+        "fastest": "fine",
+        "ddfem_ec_accurate": "coarse",
+        "ddfem_ec": "coarse",
+        "ddfem_ec_warm": "coarse_changed",
         **{name: "fine" for name in further if name not in LUMPED},
     }
     fine = spectra["fine"].values

@@ -17,10 +17,11 @@ Array = NDArray[np.float64]
 BASES = {
     "hcms": ("arpack", "slepc"),
     "hcms_ec": ("arpack", "slepc"),
+    "fastest": ("arpack", "slepc", "hcms_ec"),
     "ddfem": ("arpack", "slepc"),
-    "ddfem_hcms_ec_accurate": ("arpack", "slepc", "ddfem"),
-    "ddfem_hcms_ec": ("arpack", "slepc", "ddfem", "hcms_ec"),
-    "ddfem_hcms_ec_warm": ("arpack", "slepc", "ddfem", "ddfem_hcms_ec"),
+    "ddfem_ec_accurate": ("arpack", "slepc", "ddfem"),
+    "ddfem_ec": ("arpack", "slepc", "ddfem", "fastest"),
+    "ddfem_ec_warm": ("arpack", "slepc", "ddfem", "ddfem_ec"),
 }
 """Methods that a speed-up is told of, and what it may be told over."""
 

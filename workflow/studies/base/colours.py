@@ -12,6 +12,7 @@ COLOURS = {
     "ddfem_slepc": "#7a6a9c",
     "hcms": "#8a94a0",
     "hcms_ec": "#1f7a6d",
+    "fastest": "#3a6ea5",
     "ddfem_hcms_ec_accurate": "#8fb3a6",
     "ddfem_hcms_ec": "#b8641b",
     "random": "#b03a5b",

@@ -17,9 +17,10 @@ METHOD_COLOURS = {
     "ddfem": COLOURS["ddfem_slepc"],
     "hcms": COLOURS["hcms"],
     "hcms_ec": COLOURS["hcms_ec"],
-    "ddfem_hcms_ec_accurate": COLOURS["ddfem_hcms_ec_accurate"],
-    "ddfem_hcms_ec": COLOURS["ddfem_hcms_ec"],
-    "ddfem_hcms_ec_warm": COLOURS["random"],
+    "fastest": COLOURS["fastest"],
+    "ddfem_ec_accurate": COLOURS["ddfem_hcms_ec_accurate"],
+    "ddfem_ec": COLOURS["ddfem_hcms_ec"],
+    "ddfem_ec_warm": COLOURS["random"],
     "arpack_regular": FAINT,
 }
 
