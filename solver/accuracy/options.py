@@ -9,7 +9,6 @@ from carillon.errors import UserError
 from carillon.options import option
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
-from solver.reference.eigensolver import TYPES
 
 FIRST_RESOLUTION = 16
 """Resolution to begin with in search of one that is accurate enough."""
@@ -47,4 +46,4 @@ class DistanceOptions:
             return True
         if self.estimate is not None:
             return self.estimate
-        return solid.coarsen == "none" and solver.method not in TYPES
+        return solid.coarsen == "none" and not solver.is_general

@@ -25,7 +25,6 @@ from solver.distribution.collective import bcast_from_root, compute_on_root
 from solver.distribution.local_mesh import LocalMesh, distribute, scatter_moduli
 from solver.hcms.synthesis import Synthesis, make_subdomains, synthesize
 from solver.linear import Inverse, LinearSolver
-from solver.reference.eigensolver import TYPES
 from solver.reference.truth import (
     RESIDUAL_TOLERANCE,
     SPARE_MODES,
@@ -151,7 +150,7 @@ class ModalSolver:
         def checked() -> SolverOptions:
             n_dofs = cast(Solid, model).n_dofs
             check_mode_count(options.modes, n_dofs)
-            return options.resolved(comm.size, n_dofs)
+            return options.resolved(n_dofs)
 
         options = bcast_from_root(comm, checked)
         self._model = model if comm.rank == 0 else None
@@ -242,7 +241,7 @@ class ModalSolver:
             "subdomains": local_mesh.decomposition.tree.parts,
             "n_dofs": local_mesh.n_dofs,
         }
-        if self.options.method in TYPES:
+        if self.options.is_general:
             solution = self._general_solver(system, phases, evidence)
         else:
             solution = self._corrected(local_mesh, system, young, initial_modes, phases, evidence)
@@ -276,7 +275,7 @@ class ModalSolver:
         """Whether eigenpairs are asked for, not just approximations of them."""
         options = self.options
         corrected = options.corrections > 0 and options.tolerance != 0.0
-        return options.method in TYPES or corrected
+        return options.is_general or corrected
 
     def _modes_to_keep(self) -> int:
         options, n_dofs = self.options, self.local_mesh.n_dofs
@@ -327,7 +326,7 @@ class ModalSolver:
             with phases("inertia"):
                 inertia = count_beyond(system, truth)
         if inertia is None or inertia.counted != inertia.computed:
-            tolerance = options.tolerance if options.method in TYPES else None
+            tolerance = options.tolerance if options.is_general else None
             with phases("completion"):
                 truth, inertia = complete(
                     system, truth, inertia, tolerance or RESIDUAL_TOLERANCE, options.seed

@@ -96,7 +96,12 @@ class SolverOptions:
         "lanczos", "of the corrections; relaxation is the paper's", choices=ACCELERATIONS
     )
 
-    def resolved(self, ranks: int, n_dofs: int) -> SolverOptions:
+    @property
+    def is_general(self) -> bool:
+        """Whether an eigensolver of SLEPc's finds the modes, as ground truth."""
+        return self.method in TYPES
+
+    def resolved(self, n_dofs: int) -> SolverOptions:
         """The same with a method for `auto`: the fastest of those that the other options allow.
 
         Raises
@@ -123,4 +128,4 @@ class SolverOptions:
         if self.method != "auto":
             return self
         few = n_dofs < LEAST_UNKNOWNS * self.modes
-        return replace(self, method="hcms" if strange or few or ranks > 1 else "lanczos")
+        return replace(self, method="hcms" if strange or few else "lanczos")

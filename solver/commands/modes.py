@@ -31,7 +31,6 @@ from solver.commands.running import add_solid, on_ranks, parameters, require_out
 from solver.files.initial_modes import modes_from_file
 from solver.files.modes_file import ESTIMATE, frequencies, write_modes
 from solver.linear import petsc_options
-from solver.reference.eigensolver import TYPES
 from solver.refinement.errors import FROM_FINE, FROM_SOLID, in_words
 from solver.refinement.options import RefinementOptions
 from solver.refinement.refine import RefinementStep
@@ -139,7 +138,7 @@ def run(arguments: argparse.Namespace) -> None:
 def _for_estimate(options: SolverOptions, modes: int) -> SolverOptions:
     """For few modes at most, no nearer than an estimate of errors needs them."""
     asked = replace(options, modes=min(modes, options.modes))
-    if options.method in TYPES or options.tolerance == 0.0:
+    if options.is_general or options.tolerance == 0.0:
         return asked
     return replace(asked, tolerance=max(options.tolerance or 0.0, ESTIMATE_TOLERANCE))
 

@@ -24,8 +24,6 @@ Array = NDArray[np.float64]
 
 COLUMNS, FEWEST_COLUMNS = 64, 16
 """Widest and narrowest block: the narrower, the fewer right-hand sides; the wider, the faster."""
-RANDOM_COLUMNS = 24
-"""The same of a block that knows nothing of the modes, which takes more steps of any width."""
 MIXED_IN_COLUMN = 4
 """Wanted modes in a column of the first block; the space has to tell them apart again."""
 END_WEIGHT = 2.0

@@ -96,7 +96,7 @@ def lobpcg(
         raise ConvergenceError(
             f"the start block spans {len(values)} elastic modes, {requested} are wanted; keep more"
         )
-    basis = _Basis(system, values, vectors)
+    basis = _Trial(system, values, vectors)
     errors = np.full(len(values), np.inf)
     active = np.arange(len(values))
     history: list[float] = []
@@ -128,7 +128,7 @@ def lobpcg(
     return Found(basis.values, basis.vectors, errors[:requested], step, solves, history)
 
 
-class _Basis:
+class _Trial:
     """X, P and W side by side, and their products with K and M.
 
     Attributes

@@ -174,7 +174,7 @@ class Methods:
         return self._cold(*self._model("none"), options)
 
     def fastest(self) -> MethodRun:
-        """What `--method auto` takes: block Lanczos from random vectors on one rank."""
+        """What `--method auto` takes: block Lanczos from random vectors."""
         return self._cold(*self._model("none"), self._options(tolerance=CORRECTED_TOLERANCE))
 
     def ddfem_ec_accurate(self) -> MethodRun:

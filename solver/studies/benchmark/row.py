@@ -63,8 +63,7 @@ MEANING = {
     "speedup_with_precompute": "the same, with the partition, sparsity and elimination plan of the "
     "outer name added to its seconds, and nothing to those of the inner name",
     "ddfem": "coarsened by forests, then SLEPc on the coarse model (DDFEM* alone)",
-    "fastest": "what --method auto takes: on one rank block Lanczos from random vectors, on several "
-    "HCMS and error correction",
+    "fastest": "what --method auto takes: block Lanczos from random vectors",
     "ddfem_ec_accurate": "coarsened by forests, then the fastest to the same accuracy as on the "
     "fine mesh",
     "ddfem_ec": "coarsened by forests, then the fastest to the interactive tolerance, from nothing",
