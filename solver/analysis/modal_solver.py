@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, cast
+from typing import Any, TypeGuard, cast
 
 import numpy as np
 from mpi4py import MPI
@@ -225,7 +225,8 @@ class ModalSolver:
                 )
                 local_mesh = scatter_moduli(local_mesh, moduli, self.comm)
             elements = local_mesh.cells.elements
-            system = assemble(local_mesh, self.comm, self._layout, elements, self._threads)
+            like = initial_modes.system if self._is_of_same_mesh(initial_modes) else None
+            system = assemble(local_mesh, self.comm, self._layout, elements, self._threads, like)
         evidence: dict[str, Any] = {
             "ranks": self.comm.size,
             "threads": self._threads,
@@ -267,6 +268,12 @@ class ModalSolver:
         options = self.options
         corrected = options.corrections > 0 and options.tolerance != 0.0
         return options.method != "hcms" or corrected
+
+    def _is_of_same_mesh(self, initial_modes: Modes | Array | None) -> TypeGuard[Modes]:
+        """Whether these are modes that this solver found."""
+        if not isinstance(initial_modes, Modes):
+            return False
+        return initial_modes.system.rows.pattern is self._layout.pattern
 
     def _modes_to_keep(self) -> int:
         options, n_dofs = self.options, self.local_mesh.n_dofs
@@ -342,7 +349,7 @@ class ModalSolver:
         values: Array | None = None
         similar: Inverse | None = None
         if isinstance(initial_modes, Modes):
-            if initial_modes.system.rows.pattern is self._layout.pattern:
+            if self._is_of_same_mesh(initial_modes):
                 similar = initial_modes.inverse
             start: Array | None = initial_modes.start()
         else:
