@@ -29,9 +29,13 @@ STEPWISE = ("krylov", "relaxation")
 """Accelerations that correct every mode by itself, step by step."""
 ACCELERATIONS = ("lanczos", *STEPWISE)
 LOOSE = 1e-3
-"""Tolerance from which on an inverse for a similar material is good enough for a step."""
+"""Tolerance from which on an inverse for a similar material is good enough for steps."""
 NEARLY_ACCURATE = 100.0
 """Error, as a multiple of the tolerance, below which `lanczos` leaves a start to `krylov`."""
+FOLLOWED = 50.0
+"""The same as a multiple of `NEARLY_ACCURATE`, where an inverse for a similar material is there."""
+WORTH_INEXACT = 10.0
+"""Error, as a multiple of the tolerance, above which a second step is no longer taken with it."""
 SHIFT_FRACTION = 0.52
 """Shift of an indefinite factorisation, as a share of the last wanted eigenvalue."""
 TOP, TOP_FRACTION, HIGHEST_TOP_SHIFT = 0.8, 0.98, 1.1
@@ -217,7 +221,7 @@ class _Iteration:
         step = 0
         if tolerance >= LOOSE:
             # One step then has to do, for the last modes too.
-            self.improved = self.width
+            self.improved = self.width if rough else self.requested
         lanczos_may_run = self.lanczos and tolerance > 0.0 and max_steps > 0
         if lanczos_may_run and rough:
             self._run_lanczos(tolerance, observe)
@@ -231,13 +235,13 @@ class _Iteration:
             accurate = worst <= tolerance and _typical(errors) <= TYPICAL * tolerance
             if accurate or step >= max_steps:
                 break
-            if step == 0 and lanczos_may_run and worst > NEARLY_ACCURATE * tolerance:
+            if step == 0 and lanczos_may_run and worst > self._nearly_accurate() * tolerance:
                 self._run_lanczos(tolerance, observe)
                 step = 1
                 continue
             if tolerance > 0.0:
                 self._require_progress(step, tolerance)
-            inverse = self._inverse(step)
+            inverse = self._inverse(step, tolerance)
             correction = inverse.solve(np.ascontiguousarray(residual))
             self.solves += correction.shape[1]
             self.blocks += 1
@@ -269,7 +273,7 @@ class _Iteration:
         # that knows nothing of the spectrum needs one from below.
         for run in range(LANCZOS_RUNS):
             self.inside = run < LANCZOS_RUNS - 1
-            inverse, ritz = self._inverse(1), self.ritz
+            inverse, ritz = self._exact_inverse(), self.ritz
             result = lanczos(
                 self.system, inverse, ritz.values, ritz.vectors, self.requested, width, tolerance
             )
@@ -303,11 +307,20 @@ class _Iteration:
                 f"after {step} steps, {self.requested} modes are wanted; keep more"
             )
 
-    def _inverse(self, step: int) -> Inverse:
-        """Inverse for a step; factorised anew if a start far off has put the shift too high."""
-        similar = None if step or self._only_top_is_left() else self.similar
-        if similar is not None and not self._too_high(similar):
+    def _nearly_accurate(self) -> float:
+        """Error, as a multiple of the tolerance, below which `krylov` is the faster one."""
+        return NEARLY_ACCURATE * (1.0 if self.similar is None else FOLLOWED)
+
+    def _inverse(self, step: int, tolerance: float) -> Inverse:
+        """Inverse for a step: the one for a similar material as long as that gets on."""
+        similar = None if self.made is not None else self.similar
+        near = step == 0 or self.history[-1] <= WORTH_INEXACT * tolerance
+        if similar is not None and near and not self._too_high(similar):
             return Approximate(similar)
+        return self._exact_inverse()
+
+    def _exact_inverse(self) -> Inverse:
+        """Inverse for this material, made anew if a start far off has put the shift too high."""
         if self.made is not None and self.inside and self._too_high(self.made):
             self.destroy()
         if self.made is None:
