@@ -23,7 +23,7 @@ from solver.correction.correct import EIGENVALUE_TOLERANCE, correct
 from solver.distribution.collective import bcast_from_root, compute_on_root
 from solver.distribution.local_mesh import LocalMesh, distribute, scatter_moduli
 from solver.hcms.synthesis import Synthesis, make_subdomains, synthesize
-from solver.linear import Inverse, LinearSolver
+from solver.linear import Inverse, Lasting, LinearSolver
 from solver.reference.truth import (
     RESIDUAL_TOLERANCE,
     SPARE_MODES,
@@ -78,7 +78,7 @@ class Modes:
     evidence: dict[str, Any] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     guard: Array | None = None
-    inverse: Inverse | None = None
+    inverse: Lasting | None = None
 
     def start(self) -> Array:
         """Elastic modes and guard vectors (local, k - 6 + g), to start a correction from."""
@@ -99,7 +99,7 @@ class _Solution:
     values: Array
     vectors: Array
     guard: Array | None = None
-    inverse: Inverse | None = None
+    inverse: Lasting | None = None
 
 
 class ModalSolver:
@@ -347,7 +347,7 @@ class ModalSolver:
     ) -> _Solution:
         options = self.options
         values: Array | None = None
-        similar: Inverse | None = None
+        similar: Lasting | None = None
         if isinstance(initial_modes, Modes):
             if self._is_of_same_mesh(initial_modes):
                 similar = initial_modes.inverse

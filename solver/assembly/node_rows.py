@@ -65,6 +65,12 @@ class Pattern:
         indptr, columns, entry = _graph(local, n_own, width)
         return cls(indptr, columns, entry, ghosts_there, start, stop)
 
+    @cached_property
+    def diagonal(self) -> Index:
+        """Entry (rows,) of every row's own node."""
+        row = np.repeat(np.arange(self.stop - self.start), np.diff(self.indptr))
+        return np.flatnonzero(self.columns == row)
+
     @property
     def global_columns(self) -> Index:
         """Columns in the distributed order."""
@@ -173,8 +179,12 @@ class NodeRows:
     @cached_property
     def mass_diagonal(self) -> Array:
         """Diagonal of M (local nodes,) [kg]."""
-        row = np.repeat(np.arange(self._own), np.diff(self.pattern.indptr))
-        return self.mass[self.pattern.columns == row]
+        return self.mass[self.pattern.diagonal]
+
+    @cached_property
+    def stiffness_diagonal(self) -> Array:
+        """Diagonal of K (3 local nodes,) [N/m]."""
+        return np.einsum("nii->ni", self.stiffness[self.pattern.diagonal]).ravel()
 
     def stiffness_csr(self, n_dofs: int) -> sp.csr_matrix:
         """This rank's rows of K (local unknowns, n_dofs), columns in the distributed order."""

@@ -13,7 +13,7 @@ from solver.assembly.system import System
 from solver.correction.enrichment import Ritz, Step, enrich, relax
 from solver.correction.lanczos import HIGHEST_SHIFT, ZERO_FRACTION, lanczos
 from solver.distribution.collective import bcast_from_root
-from solver.linear import Approximate, Inverse, LinearSolver
+from solver.linear import Approximate, Inverse, Lasting, LinearSolver
 from solver.subspace.rayleigh_ritz import rayleigh_ritz, safe_shift
 from solver.subspace.spectrum import WEYL_EXPONENT
 
@@ -34,7 +34,7 @@ NEARLY_ACCURATE = 100.0
 """Error, as a multiple of the tolerance, below which `lanczos` leaves a start to `krylov`."""
 FOLLOWED = 50.0
 """The same as a multiple of `NEARLY_ACCURATE`, where an inverse for a similar material is there."""
-WORTH_INEXACT = 10.0
+WORTH_INEXACT = 50.0
 """Error, as a multiple of the tolerance, above which a second step is no longer taken with it."""
 SHIFT_FRACTION = 0.52
 """Shift of an indefinite factorisation, as a share of the last wanted eigenvalue."""
@@ -85,7 +85,7 @@ class Correction:
     solves: int = 0
     blocks: int = 0
     history: list[float] = field(default_factory=list)
-    inverse: Inverse | None = None
+    inverse: Lasting | None = None
 
 
 def correct(
@@ -99,7 +99,7 @@ def correct(
     acceleration: str = "lanczos",
     report: Callable[[int, float], None] | None = None,
     observe: Callable[[int, Array], None] | None = None,
-    similar: Inverse | None = None,
+    similar: Lasting | None = None,
 ) -> Correction:
     """Improve the `requested` lowest elastic modes from the block `start` until they are accurate.
 
@@ -132,7 +132,7 @@ def correct(
     observe
         Called with the step and the Ritz values of the wanted modes.
     similar
-        Inverse for a similar material, which does for the first step of a nearly accurate start.
+        Inverse for a similar material, which does for the steps of a nearly accurate start.
 
     Raises
     ------
@@ -188,7 +188,7 @@ class _Iteration:
         ritz: Ritz,
         requested: int,
         acceleration: str,
-        similar: Inverse | None,
+        similar: Lasting | None,
     ) -> None:
         self.system = system
         self.linear = linear
@@ -316,7 +316,9 @@ class _Iteration:
         similar = None if self.made is not None else self.similar
         near = step == 0 or self.history[-1] <= WORTH_INEXACT * tolerance
         if similar is not None and near and not self._too_high(similar):
-            return Approximate(similar)
+            ritz = self.ritz
+            diagonal = self.system.rows.stiffness_diagonal
+            return Approximate(similar, diagonal, ritz.vectors, ritz.mass_vectors)
         return self._exact_inverse()
 
     def _exact_inverse(self) -> Inverse:
@@ -331,10 +333,10 @@ class _Iteration:
         highest = HIGHEST_TOP_SHIFT if self._only_top_is_left() else HIGHEST_SHIFT
         return inverse.shift > highest * self._last()
 
-    def lasting(self, tolerance: float) -> Inverse | None:
+    def lasting(self, tolerance: float) -> Lasting | None:
         """The inverse to keep for a similar material, which only a loose tolerance makes use of."""
         kept = self.similar if self.made is None else self.made
-        return kept if kept is not None and kept.lasting and tolerance >= LOOSE else None
+        return kept if isinstance(kept, Lasting) and tolerance >= LOOSE else None
 
     def destroy(self) -> None:
         """Free what the inverse made here holds; of one that lasts, nothing has to be."""

@@ -90,7 +90,6 @@ class IterativeInverse:
     """
 
     exact = False
-    lasting = False
 
     def __init__(
         self,

@@ -16,7 +16,7 @@ from carillon.fem.model import RIGID_MODES, Solid
 from solver.analysis.modal_solver import ModalSolver, Modes
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
-from solver.linear import Inverse
+from solver.linear import Inverse, Lasting
 from solver.response.contact import interpolation
 from sound.design.elements import analysed_elements
 from sound.design.material import ReducedMaterial
@@ -145,7 +145,7 @@ class Simulation:
         if inverse is None or not lies_between(values, inverse.shift):
             inverse = self.solver.inverse(modes, shift_between(values))
         sensitivity = self._sensitivity(evaluation, inverse)
-        if inverse.lasting:
+        if isinstance(inverse, Lasting):
             modes = replace(modes, inverse=inverse)
         else:
             inverse.destroy()
