@@ -14,7 +14,7 @@ from solver.assembly.system import Layout, assemble
 from solver.correction.correct import correct
 from solver.correction.lanczos import lanczos, mixed
 from solver.distribution.local_mesh import distribute
-from solver.linear import LinearSolver
+from solver.linear import Approximate, LinearSolver
 from solver.subspace.rayleigh_ritz import rayleigh_ritz
 from tests import solids
 
@@ -125,10 +125,58 @@ def test_warm_start_takes_the_inverse_of_the_material_before():
     error = np.abs(warm.values[6:] / exact - 1.0)
     assert error.max() <= 1e-3
     assert np.median(error) <= 1e-4
-    # Where one step was enough, nothing was factorised.
-    assert warm.inverse is first.inverse or warm.evidence["corrections"] > 1
+    # Nothing was factorised, and what does not depend on the moduli was not assembled again.
+    assert warm.inverse is first.inverse
+    assert warm.system.rows.mass is first.system.rows.mass
     other = ModalSolver(model, SolverOptions(modes=40, tolerance=1e-3), COMM)
     assert other.solve(young, initial_modes=first).inverse is not first.inverse
+
+
+def test_an_inverse_is_scaled_to_a_similar_stiffness():
+    """Exactly, where all moduli differ by one factor and the right-hand sides are free of M X."""
+    model = solids.random_box(6, 5, 4)
+    prepared = ModalSolver(model, SolverOptions(modes=20, tolerance=1e-9), COMM)
+    modes = prepared.solve()
+    other = prepared.solve(1.7 * model.young)
+    shift = 0.5 * modes.values[-1]
+    similar = prepared.inverse(modes, shift)
+    system, vectors = other.system, other.vectors
+    mass_vectors = system.times_mass(vectors)
+    diagonal = system.rows.stiffness_diagonal
+    np.testing.assert_allclose(diagonal, 1.7 * modes.system.rows.stiffness_diagonal)
+    block = np.random.default_rng(0).standard_normal((system.n_dofs, 3))
+    block -= mass_vectors @ (vectors.T @ block)
+    found = Approximate(similar, diagonal, vectors, mass_vectors).solve(block)
+    expected = prepared.inverse(other, 1.7 * shift).solve(block)
+    np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
+
+
+def test_one_step_follows_a_material_that_changes_smoothly():
+    model = solids.random_box(10, 7, 6)
+    prepared = ModalSolver(model, SolverOptions(modes=36, tolerance=1e-3), COMM)
+    first = prepared.solve()
+    young = model.young * (1.0 + 0.1 * np.cos(0.3 * model.mesh.grid[:, 0]))[:, None]
+    warm = prepared.solve(young, initial_modes=first)
+    assert warm.evidence["corrections"] == 1 and warm.evidence["right_hand_sides"] == 30
+    exact = solids.dense_eigenvalues(model.with_young(young))[6:36]
+    assert np.abs(warm.values[6:] / exact - 1.0).max() <= 1e-4
+
+
+@pytest.mark.parametrize(("change", "kept"), [(0.05, True), (0.4, False)])
+def test_a_similar_inverse_does_for_as_long_as_it_gets_on(change, kept):
+    """However far the material is, the result is as accurate as from anywhere else."""
+    model = solids.random_box(10, 7, 6)
+    prepared = ModalSolver(model, SolverOptions(modes=36, tolerance=1e-3), COMM)
+    first = last = prepared.solve()
+    for step in range(1, 5):
+        wave = np.cos(0.1 * step * np.arange(len(model.young)))
+        young = model.young * (1.0 + change * wave)[:, None]
+        last = prepared.solve(young, initial_modes=last)
+        exact = solids.dense_eigenvalues(model.with_young(young))[6:36]
+        error = np.abs(last.values[6:] / exact - 1.0)
+        assert error.max() <= 1e-3
+        assert np.median(error) <= 1e-4
+    assert (last.inverse is first.inverse) == kept
 
 
 def test_a_contrast_of_a_million_and_nearly_void_elements_are_solved():

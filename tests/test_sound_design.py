@@ -276,6 +276,20 @@ def test_command_from_clips_to_file_and_on(folder):
     assert read_design(folder / "design.h5").history["evaluations"][-1] > before
 
 
+def test_evaluations_are_timed_at_several_resolutions(folder, capsys, monkeypatch):
+    from sound.__main__ import main
+
+    monkeypatch.chdir(folder)
+    words = ["benchmark", "project.yaml", "--runs", "1", "--resolutions", "8", "16"]
+    assert main([*words, "--json"]) == 0
+    small, large = json.loads(capsys.readouterr().out)["evaluations"]
+    assert (small["resolution"], large["resolution"]) == (8, 16)
+    assert small["n_dofs"] < large["n_dofs"]
+    assert large["modes"] == 6 and large["gradient_seconds"] > 0.0
+    assert main(words) == 0
+    assert f"evaluation of {large['n_dofs']:,} unknowns" in capsys.readouterr().out
+
+
 def test_somebody_who_interrupts_gets_the_best_so_far(problem):
     rounds = []
 

@@ -13,6 +13,7 @@ from sound.clips.targets import Targets
 from sound.design.bark import bark, bark_slope
 from sound.design.material import LAWS, ReducedMaterial
 from sound.design.objective import Objective
+from sound.design.sensitivity import lies_between, shift_between
 from sound.design.simulation import Simulation
 from sound.project.project import Weights
 from sound.strikes import Strike
@@ -201,3 +202,46 @@ def test_coordinates_of_moduli(law):
     material = ReducedMaterial.of_mesh(block_mesh((6, 4, 3)), SIZE, 2e9, law)
     z = 0.05 * np.random.default_rng(1).standard_normal(SIZE)
     np.testing.assert_allclose(material.coordinates(3.0 * material.moduli(z)), z, atol=1e-3)
+
+
+def test_energies_of_pairs_are_those_of_the_assembled_derivative():
+    """u_i^T (dK/dz) u_j, also with more elements than are worked on together."""
+    solid = simulation((6, 6, 5), "none", "exponential")
+    z = 0.1 * np.random.default_rng(1).standard_normal(SIZE)
+    evaluation = solid.evaluate(z, derivatives=True)
+    elastic = solid.mesh_rows(evaluation.modes.vectors[:, 6:])
+    young = solid.material.moduli(z)
+    directions = solid.material.slopes(young)[:, None] * solid.material.basis
+    largest = np.abs(evaluation.sensitivity.stiffness).max()
+    for k in range(SIZE):
+        # The stiffness is linear in the moduli, which need not be positive here.
+        parts = [np.maximum(sign * directions[:, k], 1.0) for sign in (1.0, -1.0)]
+        K = np.subtract(*(assembled(solid.elements.with_young(part))[0] for part in parts))
+        found = evaluation.sensitivity.stiffness[k]
+        np.testing.assert_allclose(found, elastic.T @ (K @ elastic), atol=1e-9 * largest)
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-13])
+def test_the_inverse_of_the_derivatives_serves_the_next_analysis(tolerance):
+    shape = (8, 6, 4)
+    mesh, options = block_mesh(shape), ProblemOptions("block", 8, coarsen="none")
+    material = ReducedMaterial.of_mesh(mesh, SIZE, 1e9, "linear")
+    solid = Simulation(mesh, options, material, strikes(shape), MODES, tolerance)
+    start = solid.evaluate(np.zeros(SIZE))
+    z = np.full(SIZE, 0.01)
+    near = solid.evaluate(z, start.modes, derivatives=True)
+    assert near.modes.inverse.shift < near.eigenvalues[-1]
+    again = solid.evaluate(1.01 * z, near.modes)
+    # A loose analysis needs no other; an accurate one has no use for it.
+    assert (again.modes.inverse is near.modes.inverse) == (tolerance == 1e-3)
+    values, _ = exact(solid, 1.01 * z)
+    np.testing.assert_allclose(
+        again.eigenvalues, values, rtol=tolerance if tolerance > 1e-6 else 1e-9
+    )
+
+
+def test_a_shift_keeps_away_from_all_eigenvalues():
+    values = np.array([1.0, 4.0, 5.0, 8.0, 9.0, 10.0])
+    assert shift_between(values) == 6.5
+    assert lies_between(values, 6.0) and not lies_between(values, 8.001)
+    assert not lies_between(values, 2.0)

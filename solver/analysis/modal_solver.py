@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, cast
+from typing import Any, TypeGuard, cast
 
 import numpy as np
 from mpi4py import MPI
@@ -24,7 +24,7 @@ from solver.correction.correct import EIGENVALUE_TOLERANCE, carried, correct
 from solver.distribution.collective import bcast_from_root, compute_on_root
 from solver.distribution.local_mesh import LocalMesh, distribute, scatter_moduli
 from solver.hcms.synthesis import Synthesis, make_subdomains, synthesize
-from solver.linear import Inverse, LinearSolver
+from solver.linear import Inverse, Lasting, LinearSolver
 from solver.reference.truth import (
     RESIDUAL_TOLERANCE,
     SPARE_MODES,
@@ -80,7 +80,7 @@ class Modes:
     evidence: dict[str, Any] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     guard: Array | None = None
-    inverse: Inverse | None = None
+    inverse: Lasting | None = None
 
     def start(self) -> Array:
         """Elastic modes and guard vectors (local, k - 6 + g), to start a correction from."""
@@ -101,7 +101,7 @@ class _Solution:
     values: Array
     vectors: Array
     guard: Array | None = None
-    inverse: Inverse | None = None
+    inverse: Lasting | None = None
 
 
 class ModalSolver:
@@ -233,7 +233,8 @@ class ModalSolver:
                 )
                 local_mesh = scatter_moduli(local_mesh, moduli, self.comm)
             elements = local_mesh.cells.elements
-            system = assemble(local_mesh, self.comm, self._layout, elements, self._threads)
+            like = initial_modes.system if self._is_of_same_mesh(initial_modes) else None
+            system = assemble(local_mesh, self.comm, self._layout, elements, self._threads, like)
         evidence: dict[str, Any] = {
             "method": self.options.method,
             "ranks": self.comm.size,
@@ -276,6 +277,12 @@ class ModalSolver:
         options = self.options
         corrected = options.corrections > 0 and options.tolerance != 0.0
         return options.is_general or corrected
+
+    def _is_of_same_mesh(self, initial_modes: Modes | Array | None) -> TypeGuard[Modes]:
+        """Whether these are modes that this solver found."""
+        if not isinstance(initial_modes, Modes):
+            return False
+        return initial_modes.system.rows.pattern is self._layout.pattern
 
     def _modes_to_keep(self) -> int:
         options, n_dofs = self.options, self.local_mesh.n_dofs
@@ -354,10 +361,10 @@ class ModalSolver:
             requested += SPARE_MODES
         tolerance = EIGENVALUE_TOLERANCE if options.tolerance is None else options.tolerance
         values: Array | None = None
-        similar: Inverse | None = None
+        similar: Lasting | None = None
         cold: Cold | None = None
         if isinstance(initial_modes, Modes):
-            if initial_modes.system.rows.pattern is self._layout.pattern:
+            if self._is_of_same_mesh(initial_modes):
                 similar = initial_modes.inverse
             start: Array | None = initial_modes.start()
         else:

@@ -65,6 +65,12 @@ class Pattern:
         indptr, columns, entry = _graph(local, n_own, width)
         return cls(indptr, columns, entry, ghosts_there, start, stop)
 
+    @cached_property
+    def diagonal(self) -> Index:
+        """Entry (rows,) of every row's own node."""
+        row = np.repeat(np.arange(self.stop - self.start), np.diff(self.indptr))
+        return np.flatnonzero(self.columns == row)
+
     @property
     def global_columns(self) -> Index:
         """Columns in the distributed order."""
@@ -127,27 +133,43 @@ class NodeRows:
         (e,) entries of M [kg], the same for the three components.
     """
 
-    def __init__(self, pattern: Pattern, halo: Halo | None = None, threads: int = 1) -> None:
-        """Rows of zeros; without `halo` no other rank has a part in the matrix."""
+    def __init__(
+        self,
+        pattern: Pattern,
+        halo: Halo | None = None,
+        threads: int = 1,
+        mass: Array | None = None,
+    ) -> None:
+        """Rows of zeros; without `halo` no other rank has a part in the matrix.
+
+        With `mass` (e,), of a solid that differs in its moduli alone, only stiffness is added.
+        """
         self.pattern = pattern
         self.halo = halo
         self.threads = threads
         self.stiffness = np.zeros((len(pattern.columns), 3, 3))
-        self.mass = np.zeros(len(pattern.columns))
         # Written in order: pages that the sums are first to touch cost several times as much.
         self.stiffness.fill(0.0)
-        self.mass.fill(0.0)
+        self._massless = mass is None
+        if mass is None:
+            mass = np.zeros(len(pattern.columns))
+            mass.fill(0.0)
+        self.mass = mass
 
     def add(self, cells: slice, stiffness: Array, mass: Array) -> None:
         """Add element matrices (c, 3 k, 3 k) and (c, k, k) of some of the pattern's cells."""
-        _add_cells(self.pattern.entry[cells], stiffness, mass, self.stiffness, self.mass)
+        _add_stiffness(self.pattern.entry[cells], stiffness, self.stiffness)
+        _add_mass(self.pattern.entry[cells], mass, self.mass)
 
     def add_elements(self, elements: Elements) -> None:
         """Add the matrices of the pattern's cells, a few at a time."""
         count = ENTRIES_AT_ONCE // (9 * self.pattern.entry.shape[1] ** 2)
         for first in range(0, len(elements), count):
             chosen = slice(first, first + count)
-            self.add(chosen, elements.stiffness(chosen), elements.nodal_mass(chosen))
+            entry = self.pattern.entry[chosen]
+            _add_stiffness(entry, elements.stiffness(chosen), self.stiffness)
+            if self._massless:
+                _add_mass(entry, elements.nodal_mass(chosen), self.mass)
 
     @cached_property
     def lumped_mass(self) -> Array:
@@ -157,8 +179,12 @@ class NodeRows:
     @cached_property
     def mass_diagonal(self) -> Array:
         """Diagonal of M (local nodes,) [kg]."""
-        row = np.repeat(np.arange(self._own), np.diff(self.pattern.indptr))
-        return self.mass[self.pattern.columns == row]
+        return self.mass[self.pattern.diagonal]
+
+    @cached_property
+    def stiffness_diagonal(self) -> Array:
+        """Diagonal of K (3 local nodes,) [N/m]."""
+        return np.einsum("nii->ni", self.stiffness[self.pattern.diagonal]).ravel()
 
     def stiffness_csr(self, n_dofs: int) -> sp.csr_matrix:
         """This rank's rows of K (local unknowns, n_dofs), columns in the distributed order."""
@@ -259,16 +285,24 @@ def _graph(cells, rows, width):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _add_cells(entry, stiffness, mass, K, M):  # type: ignore[no-untyped-def]
+def _add_stiffness(entry, stiffness, K):  # type: ignore[no-untyped-def]
     for cell in range(len(entry)):
         for a in range(entry.shape[1]):
             for b in range(entry.shape[1]):
                 number = entry[cell, a, b]
                 if number >= 0:
-                    M[number] += mass[cell, a, b]
                     for i in range(3):
                         for j in range(3):
                             K[number, i, j] += stiffness[cell, 3 * a + i, 3 * b + j]
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_mass(entry, mass, M):  # type: ignore[no-untyped-def]
+    for cell in range(len(entry)):
+        for a in range(entry.shape[1]):
+            for b in range(entry.shape[1]):
+                if entry[cell, a, b] >= 0:
+                    M[entry[cell, a, b]] += mass[cell, a, b]
 
 
 @numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")

@@ -107,6 +107,11 @@ class System:
         """Mass as a PETSc matrix, made when first asked for; collective."""
         return distributed_matrix(self.rows.mass_csr(self.n_dofs), self.comm)
 
+    @cached_property
+    def mass_rigid(self) -> Array:
+        """M times the rigid motions (local, 6), made when first asked for; collective."""
+        return self.times_mass(self.rigid)
+
     def inner(self, left: Array, right: Array) -> Array:
         """left^T right summed over the ranks; equal on all ranks."""
         return self.summed(left.T @ right)
@@ -203,6 +208,7 @@ def assemble(
     layout: Layout | None = None,
     elements: Elements | None = None,
     threads: int = 1,
+    like: System | None = None,
 ) -> System:
     """Assemble stiffness and mass; every rank assembles the rows of the nodes that it owns.
 
@@ -216,11 +222,16 @@ def assemble(
         Its cells with other moduli than the local mesh's.
     threads
         Threads for products with blocks of vectors.
+    like
+        System of the same layout with other moduli, whose mass and rigid motions it shares.
     """
     layout = Layout.of_local_mesh(local_mesh, comm) if layout is None else layout
     elements = local_mesh.cells.elements if elements is None else elements
-    rows = NodeRows(layout.pattern, layout.halo, threads)
+    mass = None if like is None else like.rows.mass
+    rows = NodeRows(layout.pattern, layout.halo, threads, mass)
     rows.add_elements(elements)
+    if like is not None:
+        return replace(like, rows=rows)
     # About the centroid of the whole body: every rank must hold rows of the same six motions.
     motions = np.ascontiguousarray(rigid_motions(layout.coordinates, np.zeros(3)))
     system = System(

@@ -15,7 +15,7 @@ from solver.correction.enrichment import Ritz, Step, enrich, relax
 from solver.correction.lanczos import HIGHEST_SHIFT, ZERO_FRACTION, lanczos, mixed
 from solver.correction.lobpcg import lobpcg
 from solver.distribution.collective import bcast_from_root
-from solver.linear import Approximate, Inverse, LinearSolver
+from solver.linear import Approximate, Inverse, Lasting, LinearSolver
 from solver.subspace.rayleigh_ritz import rayleigh_ritz, safe_shift
 from solver.subspace.spectrum import WEYL_EXPONENT
 
@@ -31,9 +31,13 @@ STEPWISE = ("krylov", "relaxation")
 """Accelerations that correct every mode by itself, step by step."""
 ACCELERATIONS = ("lanczos", *STEPWISE)
 LOOSE = 1e-3
-"""Tolerance from which on an inverse for a similar material is good enough for a step."""
+"""Tolerance from which on an inverse for a similar material is good enough for steps."""
 NEARLY_ACCURATE = 100.0
 """Error, as a multiple of the tolerance, below which `lanczos` leaves a start to `krylov`."""
+FOLLOWED = 50.0
+"""The same as a multiple of `NEARLY_ACCURATE`, where an inverse for a similar material is there."""
+WORTH_INEXACT = 50.0
+"""Error, as a multiple of the tolerance, above which a second step is no longer taken with it."""
 SHIFT_FRACTION = 0.52
 """Shift of an indefinite factorisation, as a share of the last wanted eigenvalue."""
 TOP, TOP_FRACTION, HIGHEST_TOP_SHIFT = 0.8, 0.98, 1.1
@@ -83,7 +87,7 @@ class Correction:
     solves: int = 0
     blocks: int = 0
     history: list[float] = field(default_factory=list)
-    inverse: Inverse | None = None
+    inverse: Lasting | None = None
 
 
 def correct(
@@ -97,7 +101,7 @@ def correct(
     acceleration: str = "lanczos",
     report: Callable[[int, float], None] | None = None,
     observe: Callable[[int, Array], None] | None = None,
-    similar: Inverse | None = None,
+    similar: Lasting | None = None,
     begun: Cold | None = None,
 ) -> Correction:
     """Improve the `requested` lowest elastic modes from the block `start` until they are accurate.
@@ -132,7 +136,7 @@ def correct(
     observe
         Called with the step and the Ritz values of the wanted modes.
     similar
-        Inverse for a similar material, which does for the first step of a nearly accurate start.
+        Inverse for a similar material, which does for the steps of a nearly accurate start.
     begun
         Block Lanczos iteration that `start` and `values` come from.
 
@@ -234,7 +238,7 @@ class _Iteration:
         ritz: Ritz,
         requested: int,
         acceleration: str,
-        similar: Inverse | None,
+        similar: Lasting | None,
     ) -> None:
         self.system = system
         self.linear = linear
@@ -273,7 +277,7 @@ class _Iteration:
         step = self.steps
         if tolerance >= LOOSE:
             # One step then has to do, for the last modes too.
-            self.improved = self.width
+            self.improved = self.width if rough else self.requested
         lanczos_may_run = self.lanczos and tolerance > 0.0 and max_steps > 0
         if lanczos_may_run and rough:
             self._run_lanczos(tolerance, observe)
@@ -287,13 +291,13 @@ class _Iteration:
             accurate = _are_accurate(errors, tolerance)
             if accurate or step >= max_steps:
                 break
-            if step == 0 and lanczos_may_run and worst > NEARLY_ACCURATE * tolerance:
+            if step == 0 and lanczos_may_run and worst > self._nearly_accurate() * tolerance:
                 self._run_lanczos(tolerance, observe)
                 step = 1
                 continue
             if tolerance > 0.0:
                 self._require_progress(step, tolerance)
-            inverse = self._inverse(step)
+            inverse = self._inverse(step, tolerance)
             correction = inverse.solve(np.ascontiguousarray(residual))
             self.solves += correction.shape[1]
             self.blocks += 1
@@ -325,7 +329,7 @@ class _Iteration:
         # that knows nothing of the spectrum needs one from below.
         for run in range(LANCZOS_RUNS):
             self.inside = run < LANCZOS_RUNS - 1
-            inverse, ritz = self._inverse(1), self.ritz
+            inverse, ritz = self._exact_inverse(), self.ritz
             start, look = mixed(
                 self.system, ritz.values, ritz.vectors, self.requested, inverse.shift, tolerance
             )
@@ -362,11 +366,22 @@ class _Iteration:
                 f"after {step} steps, {self.requested} modes are wanted; keep more"
             )
 
-    def _inverse(self, step: int) -> Inverse:
-        """Inverse for a step; factorised anew if a start far off has put the shift too high."""
-        similar = None if step or self._only_top_is_left() else self.similar
-        if similar is not None and not self._too_high(similar):
-            return Approximate(similar)
+    def _nearly_accurate(self) -> float:
+        """Error, as a multiple of the tolerance, below which `krylov` is the faster one."""
+        return NEARLY_ACCURATE * (1.0 if self.similar is None else FOLLOWED)
+
+    def _inverse(self, step: int, tolerance: float) -> Inverse:
+        """Inverse for a step: the one for a similar material as long as that gets on."""
+        similar = None if self.made is not None else self.similar
+        near = step == 0 or self.history[-1] <= WORTH_INEXACT * tolerance
+        if similar is not None and near and not self._too_high(similar):
+            ritz = self.ritz
+            diagonal = self.system.rows.stiffness_diagonal
+            return Approximate(similar, diagonal, ritz.vectors, ritz.mass_vectors)
+        return self._exact_inverse()
+
+    def _exact_inverse(self) -> Inverse:
+        """Inverse for this material, made anew if a start far off has put the shift too high."""
         if self.made is not None and self.inside and self._too_high(self.made):
             self.destroy()
         if self.made is None:
@@ -377,10 +392,10 @@ class _Iteration:
         highest = HIGHEST_TOP_SHIFT if self._only_top_is_left() else HIGHEST_SHIFT
         return inverse.shift > highest * self._last()
 
-    def lasting(self, tolerance: float) -> Inverse | None:
+    def lasting(self, tolerance: float) -> Lasting | None:
         """The inverse to keep for a similar material, which only a loose tolerance makes use of."""
         kept = self.similar if self.made is None else self.made
-        return kept if kept is not None and kept.lasting and tolerance >= LOOSE else None
+        return kept if isinstance(kept, Lasting) and tolerance >= LOOSE else None
 
     def destroy(self) -> None:
         """Free what the inverse made here holds; of one that lasts, nothing has to be."""

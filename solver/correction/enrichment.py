@@ -49,7 +49,6 @@ class Ritz:
         self.values = values.copy()
         self.vectors = np.ascontiguousarray(vectors)
         self.mass_vectors = system.times_mass(self.vectors)
-        self.mass_rigid = system.times_mass(system.rigid)
         self.errors = np.full(len(values), np.nan)
         self.active: Index = np.arange(len(values))
 
@@ -150,7 +149,7 @@ def enrich(
     ConvergenceError
         If a Ritz value is not positive, which rounding alone can cause.
     """
-    Z, overlap, gram, untouched = _independent(system, ritz, corrections)
+    Z, overlap, gram, untouched = _independent(system, ritz, corrections, inverse.exact)
     if inverse.exact and untouched and np.diag(gram).min(initial=1.0) > SMALL_CORRECTION:
         mu = inverse.shift
         across = mu * overlap
@@ -178,8 +177,12 @@ def enrich(
     ritz.replace_active(values, vectors)
 
 
-def _independent(system: System, ritz: Ritz, Z: Array) -> tuple[Array, Array, Array, bool]:
+def _independent(
+    system: System, ritz: Ritz, Z: Array, untouched: bool
+) -> tuple[Array, Array, Array, bool]:
     """Z, or a basis of what it adds to X, well-conditioned enough to orthonormalise by Cholesky.
+
+    Z is not tried as it is unless it may stay `untouched`.
 
     Returns
     -------
@@ -187,8 +190,11 @@ def _independent(system: System, ritz: Ritz, Z: Array) -> tuple[Array, Array, Ar
         The columns (local, a), X^T M Z, Z^T M Z, and whether Z was good as it is.
     """
     for passes in range(MOST_PASSES):
-        Z -= system.rigid @ system.inner(ritz.mass_rigid, Z)
+        Z -= system.rigid @ system.inner(system.mass_rigid, Z)
         overlap = system.inner(ritz.mass_vectors, Z)
+        if not (untouched or passes):
+            Z -= ritz.vectors @ overlap
+            continue
         gram = system.inner(Z, system.times_mass(Z))
         outside = _outside(overlap, gram)
         basis, condition = bcast_from_root(system.comm, partial(orthonormal, outside))

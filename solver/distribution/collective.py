@@ -13,7 +13,8 @@ T = TypeVar("T")
 def bcast_from_root(comm: MPI.Comm, compute: Callable[[], T]) -> T:
     """Call `compute` on rank 0 and give every rank its result, or its exception."""
     result, failure = _attempt(comm, compute)
-    result, failure = comm.bcast((result, failure), root=0)
+    if comm.size > 1:
+        result, failure = comm.bcast((result, failure), root=0)
     if failure is not None:
         # Every rank raises it, so that no rank is left waiting for the others.
         raise failure

@@ -30,15 +30,12 @@ class Inverse(Protocol):
         (K - shift M) is inverted [rad^2/s^2].
     exact
         Whether solutions are exact to rounding.
-    lasting
-        Whether it is nothing but arrays of this rank, which need not be freed together.
     negative
         Eigenvalues below the shift, by Sylvester's law of inertia.
     """
 
     shift: float
     exact: bool
-    lasting: bool
     negative: int
 
     def solve(self, block: Array) -> Array:
@@ -48,20 +45,72 @@ class Inverse(Protocol):
         """Free what numpy does not."""
 
 
+class Lasting:
+    """An inverse on one rank to keep for similar materials: nothing but arrays, never to be freed.
+
+    Attributes
+    ----------
+    diagonal
+        (local unknowns,) of its stiffness [N/m].
+    """
+
+    exact = True
+
+    def __init__(self, factor: Inverse, diagonal: Array) -> None:
+        self._factor = factor
+        self.diagonal = diagonal
+        self.shift = factor.shift
+        self.negative = factor.negative
+
+    def solve(self, block: Array) -> Array:
+        """See `Inverse.solve`."""
+        return self._factor.solve(block)
+
+    def destroy(self) -> None:
+        """Nothing but arrays to free."""
+
+
 class Approximate:
-    """An inverse for a similar material, good for a correction that need not be exact."""
+    """An inverse for a similar material, good for a correction that need not be exact.
+
+    Parameters
+    ----------
+    similar
+        Inverse for the other material.
+    diagonal
+        (local unknowns,) of the stiffness [N/m] here.
+    vectors, mass_vectors
+        (local, m) mass-orthonormal X that corrections need not lie in, and M X.
+
+    Notes
+    -----
+    Where moduli differ smoothly, K is about D K' D with D^2 the ratio of the diagonals, and
+    (K - mu M)^-1 about D^-1 (K' - mu M)^-1 D^-1 but for motions of low frequency, where the mass
+    has its part.  Those are in X: the right-hand sides are made free of M X, or what D changes in
+    them would be magnified next to the shift.
+    """
 
     exact = False
-    lasting = False
 
-    def __init__(self, similar: Inverse) -> None:
+    def __init__(
+        self, similar: Lasting, diagonal: Array, vectors: Array, mass_vectors: Array
+    ) -> None:
         self._similar = similar
+        self._vectors, self._mass_vectors = vectors, mass_vectors
+        ratio = np.divide(
+            similar.diagonal, diagonal, out=np.ones_like(diagonal), where=diagonal > 0
+        )
+        self._scale = np.sqrt(ratio)[:, None]
         self.shift = similar.shift
         self.negative = similar.negative
 
     def solve(self, block: Array) -> Array:
-        """Solutions of the similar system."""
-        return self._similar.solve(block)
+        """Solutions of the similar system, scaled."""
+        block = self._scale * block
+        block -= self._mass_vectors @ (self._vectors.T @ block)
+        solution = self._similar.solve(block)
+        solution *= self._scale
+        return solution
 
     def destroy(self) -> None:
         """Leave it to its owner."""
@@ -126,7 +175,8 @@ class LinearSolver:
             from solver.linear.multifrontal import Factor
 
             rows = system.rows
-            return Factor(self._plan, rows.stiffness, rows.mass, shift, rows.threads)
+            factor = Factor(self._plan, rows.stiffness, rows.mass, shift, rows.threads)
+            return Lasting(factor, rows.stiffness_diagonal)
         if self.method == "mumps":
             from solver.linear.mumps import MumpsInverse
 

@@ -90,7 +90,6 @@ class IterativeInverse:
     """
 
     exact = False
-    lasting = False
     negative = 0
 
     def __init__(

@@ -62,7 +62,6 @@ class Factor:
     """
 
     exact = True
-    lasting = True
 
     def __init__(
         self, plan: Plan, stiffness: Array, mass: Array, shift: float, threads: int = 1

@@ -24,7 +24,6 @@ class MumpsInverse:
     """Action of (K - shift M)^-1."""
 
     exact = True
-    lasting = False
 
     def __init__(self, system: System, shift: float) -> None:
         self.shift = shift

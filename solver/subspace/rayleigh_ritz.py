@@ -14,6 +14,8 @@ Array = NDArray[np.float64]
 
 RIGID_TOLERANCE = 1e-7
 """A column whose elastic part is shorter than this fraction of it is a rigid motion."""
+ELASTIC = 1e-13
+"""The same for its rigid part: below it nothing but rounding is to be removed."""
 WELL_CONDITIONED = 1e-3
 """Least diagonal entry of the Gram matrix's Cholesky factor for which the factor is used."""
 RANK_TOLERANCE = 1e-13
@@ -90,11 +92,12 @@ def remove_rigid(system: System, block: Array) -> tuple[Array, Array]:
 
     Columns that were rigid motions, of which only rounding is left, are dropped.
     """
-    rigid = system.rigid
-    mass_rigid = system.times_mass(rigid)
+    rigid, mass_rigid = system.rigid, system.mass_rigid
     mass_block = system.times_mass(block)
     before = system.column_products(block, mass_block)
     share = system.inner(mass_rigid, block)
+    if (share**2 <= ELASTIC**2 * before).all():
+        return block, mass_block
     block = block - rigid @ share
     mass_block -= mass_rigid @ share
     after = system.column_products(block, mass_block)

@@ -20,6 +20,13 @@ class DesignBenchmarkOptions:
 
     project: str = option(REQUIRED, "project file (YAML)")
     runs: int = option(7, "timed evaluations", type=whole_number(1, 1000))
+    resolutions: list[int] | None = option(
+        None,
+        "time evaluations alone, of the solid in these numbers of voxels along its longest side",
+        type=whole_number(1),
+        nargs="+",
+        metavar="N",
+    )
     json: bool = option(False, "print everything as JSON")
 
 
@@ -31,33 +38,48 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure and print."""
-    from sound.design.benchmark import benchmark
+    from sound.design.benchmark import benchmark, time_sizes
     from sound.design.preparation import prepare
     from sound.project.project import load_project, with_optimiser
 
     options = collect(DesignBenchmarkOptions, arguments)
     settings = asdict(collect(SearchOptions, arguments))
     project = with_optimiser(load_project(options.project), **settings)
-    results = benchmark(prepare(project), options.runs, lambda what: say(f"measuring: {what}"))
+
+    def report(what: str) -> None:
+        say(f"measuring: {what}")
+
+    results: dict[str, Any]
+    if options.resolutions is None:
+        results = benchmark(prepare(project), options.runs, report)
+    else:
+        results = {"evaluations": time_sizes(project, options.resolutions, options.runs, report)}
     if options.json:
         print(json.dumps({**results, "provenance": measured(project.as_dict())}))
         return 0
-    print(_table(results))
+    for times in results.get("evaluations", [results.get("evaluation")]):
+        print(_sentence(times))
+    if "rows" in results:
+        print(_table(results["rows"]))
     return 0
 
 
-def _table(results: dict[str, Any]) -> str:
-    times = results["evaluation"]
-    lines = [
+def _sentence(times: dict[str, Any]) -> str:
+    return (
         f"evaluation of {times['n_dofs']:,} unknowns, {times['modes']} modes, "
-        f"{times['coordinates']} coordinates, one thread, median of {times['runs']}:",
+        f"{times['coordinates']} coordinates, one thread, median of {times['runs']}:\n"
         f"  cold {1e3 * times['cold_seconds']:.0f} ms, warm {1e3 * times['warm_seconds']:.0f} ms "
         f"(analysis {1e3 * times['analysis_seconds']:.0f}), with derivatives "
-        f"{1e3 * times['gradient_seconds']:.0f} ms",
+        f"{1e3 * times['gradient_seconds']:.0f} ms"
+    )
+
+
+def _table(rows: list[dict[str, Any]]) -> str:
+    lines = [
         f"{'method':8} {'cost':>19} {'fall':>7} {'90 % after':>11} {'evaluations':>12} "
         f"{'a minute':>9} {'seconds':>8}",
     ]
-    for row in results["rows"]:
+    for row in rows:
         after = row["seconds_to_90_percent"]
         lines.append(
             f"{row['method']:8} {row['cost_start']:8.4g} -> {row['cost_end']:7.4g} "

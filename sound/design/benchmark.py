@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from statistics import median
 from typing import Any
@@ -15,9 +15,10 @@ from carillon.threads import one_thread
 from sound.design.objective import fall
 from sound.design.optimise import optimise
 from sound.design.optimisers import OPTIMISERS
-from sound.design.preparation import DesignProblem
+from sound.design.preparation import DesignProblem, prepare, targets_of
 from sound.design.simulation import Evaluation
 from sound.project.design_file import Design
+from sound.project.project import Project
 
 Array = NDArray[np.float64]
 
@@ -27,7 +28,7 @@ CHANGE = 0.05
 
 @dataclass(frozen=True)
 class EvaluationTimes:
-    """Median wall times of an evaluation on one thread.
+    """Median processor times of an evaluation on one thread.
 
     Attributes
     ----------
@@ -38,7 +39,7 @@ class EvaluationTimes:
     gradient_seconds : float [s]
         The same, with derivatives of all frequencies and amplitudes.
     analysis_seconds : float [s]
-        Of the warm one, the modal analysis; the rest is coarsening.
+        Of the warm one, the modal analysis (wall time); the rest is coarsening.
     runs : int
         Measured after one that warms up.
     n_dofs, modes, coordinates : int
@@ -94,6 +95,24 @@ def compare_optimisers(
     return rows
 
 
+def time_sizes(
+    project: Project,
+    resolutions: Sequence[int],
+    runs: int,
+    report: Callable[[str], None] | None = None,
+) -> list[dict[str, Any]]:
+    """Times of evaluations of the project's solid at several resolutions, one row for each."""
+    targets, rows = targets_of(project), []
+    for resolution in resolutions:
+        if report is not None:
+            report(f"evaluations at resolution {resolution}")
+        solid = replace(project.solid, resolution=resolution)
+        problem = prepare(replace(project, solid=solid), targets)
+        times = time_evaluations(problem, runs, project.optimiser.seed)
+        rows.append({"resolution": resolution, **asdict(times)})
+    return rows
+
+
 def benchmark(
     problem: DesignProblem, runs: int, report: Callable[[str], None] | None = None
 ) -> dict[str, Any]:
@@ -125,10 +144,10 @@ def _row(method: str, design: Design) -> dict[str, Any]:
 
 
 def _timed(work: Callable[[int], Evaluation], runs: int) -> tuple[list[float], list[Evaluation]]:
-    """Wall times of `runs` runs after one that warms up, and what they returned."""
+    """Processor times of `runs` runs after one that warms up, and what they returned."""
     seconds, results = [], []
     for run in range(runs + 1):
-        begin = time.perf_counter()
+        begin = time.process_time()
         results.append(work(run))
-        seconds.append(time.perf_counter() - begin)
+        seconds.append(time.process_time() - begin)
     return seconds[1:], results[1:]

@@ -21,8 +21,9 @@ from sound.design.search import HistoryEntry, Search
 from sound.design.simulation import Evaluation, Simulation
 from sound.project.design_file import HISTORY_TYPE, Design
 
-FINAL_TOLERANCE = 1e-8
-"""Relative error of the eigenvalues that a design is written with."""
+FINAL_TOLERANCE = 1e-12
+"""Relative error of the eigenvalues that a design is written with; its root is that of the modes,
+and so of the terms of the cost."""
 
 
 @dataclass(frozen=True)

@@ -14,14 +14,24 @@ from numpy.typing import NDArray
 
 from solver.analysis.modal_solver import Modes
 from solver.linear import Inverse
+from solver.subspace.orthonormal import is_cancelled
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 POINTS_AT_ONCE = 1024
 """Points of elements whose strain energies exist together."""
-SHIFT_FRACTION = 0.6
-"""Fraction of the last eigenvalue above which a shift is sought."""
+CELLS_AT_ONCE = 8
+"""Elements whose strains do."""
+SHIFTS = (0.5, 0.75)
+"""Range of a shift, as shares of the last eigenvalue: with it among the computed ones a Krylov
+space is near to all of them, and an analysis of a similar material can use the inverse, too."""
+MOST_BLOCKS = 16
+"""Blocks of a Krylov space at most."""
+MOST_PASSES = 3
+"""Times that a block is made orthogonal; twice is enough but for rounding."""
+CLOSE = 0.2
+"""Share of the largest distance to all eigenvalues from which another shift is as good."""
 DEPENDENT = 1e-10
 """Share (squared) of a vector below which it lies in the space that it was made orthogonal to."""
 
@@ -58,13 +68,13 @@ def projected_stiffness(
     count, struck, points = vectors.shape[1], others.shape[1], len(strains)
     pairs = count * (count + 1) // 2
     total = np.zeros((slopes.shape[1], pairs + struck * count))
-    columns = np.ascontiguousarray(others.reshape(len(vectors), -1))
+    columns = np.concatenate([vectors, others.reshape(len(vectors), -1)], axis=1)
     flat = np.ascontiguousarray(strains.reshape(-1, strains.shape[2]))
     at_once = max(1, POINTS_AT_ONCE // points)
     for first in range(0, len(nodes), at_once):
         cells = nodes[first : first + at_once]
         energies = np.empty((points * len(cells), total.shape[1]))
-        _pair_energies(cells, flat, vectors, columns, energies)
+        _pair_energies(cells, flat, columns, count, energies)
         total += slopes[points * first : points * (first + len(cells))].T @ energies
     upper = np.triu_indices(count)
     inside = np.empty((len(total), count, count))
@@ -73,13 +83,14 @@ def projected_stiffness(
 
 
 def outside_response(
-    modes: Modes, inverse: Inverse, elastic: Array, values: Array, pushes: Array, blocks: int
+    modes: Modes, inverse: Inverse, elastic: Array, values: Array, pushes: Array, accuracy: float
 ) -> Array:
     """x (3 n, T, N) with x_pk = sum of u_j (u_j^T f_p) / (lambda_k - lambda_j) over other modes.
 
     These are all solutions of (K - lambda_k M) x = -f, without the part of f that the computed
-    modes hold, and all lie near one Krylov space of (K - mu M)^-1 M: of its `blocks` blocks of T
-    vectors, made orthogonal to the computed modes, the Galerkin solutions are taken.
+    modes hold, and all lie near one Krylov space of (K - mu M)^-1 M: of its blocks of T vectors,
+    made orthogonal to the computed modes, the Galerkin solutions are taken, with as many blocks as
+    it takes until one more changes no solution by more than `accuracy`.
 
     Parameters
     ----------
@@ -93,79 +104,134 @@ def outside_response(
         Their eigenvalues.
     pushes : (3 n, T)
         Forces f.
-    blocks : int
-        Of the Krylov space.
+    accuracy : float
+        Largest relative change by the last block.
     """
-    system = modes.system
-    known = np.concatenate([system.rigid, elastic], axis=1)
-    mass_known = system.times_mass(known)
-    free = pushes - mass_known @ (known.T @ pushes)
-    basis = np.empty((len(pushes), 0))
-    block = free
-    for _ in range(blocks):
-        block = inverse.solve(np.ascontiguousarray(block))
-        for _ in range(2):
-            block -= known @ (mass_known.T @ block)
-            block -= basis @ (basis.T @ system.times_mass(block))
-        block = _orthonormal(block, system.times_mass(block))
-        if not block.shape[1]:
+    system, struck = modes.system, pushes.shape[1]
+    known = size = system.rigid.shape[1] + elastic.shape[1]
+    whole, mass_whole = np.empty((2, len(pushes), known + MOST_BLOCKS * struck))
+    whole[:, :known] = np.concatenate([system.rigid, elastic], axis=1)
+    mass_whole[:, :known] = system.times_mass(whole[:, :known])
+    free = pushes - mass_whole[:, :known] @ (whole[:, :known].T @ pushes)
+    mass_block, stiffness = free, np.empty((0, 0))
+    solution = np.zeros((0, struck * len(values)))
+    for _ in range(MOST_BLOCKS):
+        block = inverse.solve(np.ascontiguousarray(mass_block))
+        mass_block, gram = _made_orthogonal(modes, block, whole[:, :size], mass_whole[:, :size])
+        weights = _orthonormal(gram)
+        if not weights.shape[1]:
             break
-        basis = np.concatenate([basis, block], axis=1)
-        block = system.times_mass(block)
-    ritz, rotation = la.eigh(basis.T @ system.times_stiffness(basis))
-    basis = basis @ rotation
-    held = basis.T @ free
-    weights = held[:, :, None] / (values[None, None, :] - ritz[:, None, None])
-    solution = basis @ weights.reshape(len(ritz), -1)
-    return solution.reshape(len(pushes), pushes.shape[1], -1)
+        block, mass_block = block @ weights, mass_block @ weights
+        here = slice(size, size + weights.shape[1])
+        whole[:, here], mass_whole[:, here] = block, mass_block
+        size = here.stop
+        basis = whole[:, known:size]
+        stiffness = _bordered(stiffness, basis.T @ system.times_stiffness(block))
+        before, solution = solution, _galerkin(stiffness, basis.T @ free, values)
+        change = solution.copy()
+        change[: len(before)] -= before
+        if (la.norm(change, axis=0) <= accuracy * la.norm(solution, axis=0)).all():
+            break
+    return (whole[:, known:size] @ solution).reshape(len(pushes), struck, -1)
+
+
+def _made_orthogonal(
+    modes: Modes, block: Array, basis: Array, mass_basis: Array
+) -> tuple[Array, Array]:
+    """M times `block`, and its Gram matrix, once it is made orthogonal to `basis`, in place."""
+    for _ in range(MOST_PASSES):
+        overlap = mass_basis.T @ block
+        block -= basis @ overlap
+        mass_block = modes.system.times_mass(block)
+        gram = block.T @ mass_block
+        if not is_cancelled(gram, overlap):
+            break
+    return mass_block, gram
+
+
+def _bordered(matrix: Array, last: Array) -> Array:
+    """A symmetric matrix (m, m) with the columns `last` (m + b, b), and rows that mirror them."""
+    size = len(matrix)
+    whole = np.empty((len(last),) * 2)
+    whole[:size, :size], whole[:, size:], whole[size:, :size] = matrix, last, last[:size].T
+    return whole
+
+
+def _galerkin(stiffness: Array, held: Array, values: Array) -> Array:
+    """Solutions (m, T N) of (lambda_k - H) y = h in an orthonormal basis, H (m, m) and h (m, T)."""
+    ritz, rotation = la.eigh(stiffness, check_finite=False)
+    weights = (rotation.T @ held)[:, :, None] / (values[None, None, :] - ritz[:, None, None])
+    return np.asarray(rotation @ weights.reshape(len(ritz), -1))
 
 
 def shift_between(values: Array) -> float:
-    """A shift in the widest gap of the eigenvalues (N,) above `SHIFT_FRACTION` of the last one."""
-    top = values[values >= SHIFT_FRACTION * values[-1]]
-    if len(top) < 2:
-        return float(SHIFT_FRACTION * values[-1])
-    gap = int(np.argmax(np.diff(top)))
-    return float(0.5 * (top[gap] + top[gap + 1]))
+    """The shift in the range of `SHIFTS` that is farthest from all of the eigenvalues (N,)."""
+    ends = values[-1] * np.array(SHIFTS)
+    middles = 0.5 * (values[1:] + values[:-1])
+    possible = np.concatenate([ends, middles[(middles > ends[0]) & (middles < ends[1])]])
+    distances = [_distance(values, each) for each in possible]
+    return float(possible[np.argmax(distances)])
 
 
-def _orthonormal(block: Array, mass_block: Array) -> Array:
-    """M-orthonormal columns that span `block`, dependent ones dropped."""
-    gram = block.T @ mass_block
+def lies_between(values: Array, shift: float) -> bool:
+    """Whether a shift is hardly closer to an eigenvalue of (N,) than that of `shift_between`."""
+    best = _distance(values, shift_between(values))
+    return SHIFTS[0] * values[-1] <= shift and _distance(values, shift) >= CLOSE * best
+
+
+def _distance(values: Array, shift: float) -> float:
+    return float(np.abs(values - shift).min())
+
+
+def _orthonormal(gram: Array) -> Array:
+    """Coefficients that make vectors with this Gram matrix orthonormal, dependent ones dropped."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
     spread, directions = np.linalg.eigh(gram * scale * scale[:, None])
     kept = spread > DEPENDENT
-    return np.asarray(block @ (scale[:, None] * directions[:, kept] / np.sqrt(spread[kept])))
+    return np.asarray(scale[:, None] * directions[:, kept] / np.sqrt(spread[kept]))
 
 
 @numba.njit(cache=True, nogil=True, fastmath={"contract", "reassoc"}, error_model="numpy")
-def _pair_energies(nodes, strains, vectors, others, energies):  # type: ignore[no-untyped-def]
-    """Energies (p c, pairs) per unit of modulus, modes with modes and each with its others."""
-    count = vectors.shape[1]
-    struck = others.shape[1] // count
+def _pair_energies(nodes, strains, columns, count, energies):  # type: ignore[no-untyped-def]
+    """Energies (p c, pairs) per unit of modulus, modes with modes and each with its others.
+
+    The first `count` columns are the modes, then come the others, point after point.
+    """
     width, points = nodes.shape[1], len(strains) // 6
-    local = np.empty((3 * width, count))
-    local_others = np.empty((3 * width, others.shape[1]))
-    for cell in range(len(nodes)):
-        for a in range(width):
-            node = nodes[cell, a]
-            local[3 * a : 3 * a + 3] = vectors[3 * node : 3 * node + 3]
-            local_others[3 * a : 3 * a + 3] = others[3 * node : 3 * node + 3]
-        strain = strains @ local
-        strain_others = strains @ local_others
-        for q in range(points):
-            row = energies[points * cell + q]
-            pair = 0
-            for i in range(count):
-                row[pair : pair + count - i] = 0.0
-                for s in range(6 * q, 6 * q + 6):
-                    factor = strain[s, i]
-                    for j in range(i, count):
-                        row[pair + j - i] += factor * strain[s, j]
-                pair += count - i
-            for p in range(struck):
+    each = columns.shape[1]
+    # Many columns at once, as few of them do not keep BLAS busy.
+    local = np.empty((3 * width, CELLS_AT_ONCE * each))
+    strain = np.empty((len(strains), CELLS_AT_ONCE * each))
+    for first in range(0, len(nodes), CELLS_AT_ONCE):
+        cells = nodes[first : first + CELLS_AT_ONCE]
+        for k in range(len(cells)):
+            for a in range(width):
+                node = cells[k, a]
+                for i in range(3):
+                    local[3 * a + i, k * each : (k + 1) * each] = columns[3 * node + i]
+        np.dot(strains, local, strain)
+        for k in range(len(cells)):
+            for q in range(points):
+                own = strain[6 * q : 6 * q + 6, k * each : k * each + count]
+                others = strain[6 * q : 6 * q + 6, k * each + count : (k + 1) * each]
+                row = energies[points * (first + k) + q]
+                pair = 0
                 for i in range(count):
-                    value = 0.0
-                    for s in range(6 * q, 6 * q + 6):
-                        value += strain[s, i] * strain_others[s, p * count + i]
-                    row[pair + p * count + i] = value
+                    a0, a1, a2 = own[0, i], own[1, i], own[2, i]
+                    a3, a4, a5 = own[3, i], own[4, i], own[5, i]
+                    for j in range(i, count):
+                        row[pair + j - i] = (
+                            a0 * own[0, j]
+                            + a1 * own[1, j]
+                            + a2 * own[2, j]
+                            + a3 * own[3, j]
+                            + a4 * own[4, j]
+                            + a5 * own[5, j]
+                        )
+                    pair += count - i
+                for start in range(0, others.shape[1], count):
+                    for i in range(count):
+                        value = 0.0
+                        for s in range(6):
+                            value += own[s, i] * others[s, start + i]
+                        row[pair + start + i] = value

@@ -16,11 +16,13 @@ from carillon.fem.model import RIGID_MODES, Solid
 from solver.analysis.modal_solver import ModalSolver, Modes
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
+from solver.linear import Inverse, Lasting
 from solver.response.contact import interpolation
 from sound.design.elements import analysed_elements
 from sound.design.material import ReducedMaterial
 from sound.design.objective import Sensitivity
 from sound.design.sensitivity import (
+    lies_between,
     outside_response,
     projected_stiffness,
     shift_between,
@@ -32,8 +34,9 @@ Array = NDArray[np.float64]
 TOLERANCE = 1e-3
 """Relative error of eigenvalues at which an analysis stops; a thousandth is a hundredth of a
 bark."""
-KRYLOV_BLOCKS = 6
-"""Blocks of the Krylov space for what lies outside the computed modes, see `outside_response`."""
+RESPONSE = 0.1
+"""Accuracy of what lies outside the computed modes, as a share of theirs: the root of that of the
+eigenvalues."""
 
 
 @dataclass
@@ -52,6 +55,8 @@ class Evaluation:
         All of the analysis, to start the next one from.
     sensitivity
         Derivatives, if they were asked for.
+    inverse
+        (K - mu M)^-1 of this very material, if the analysis made one.
     """
 
     z: Array
@@ -59,6 +64,7 @@ class Evaluation:
     pushed: Array
     modes: Modes
     sensitivity: Sensitivity | None = None
+    inverse: Inverse | None = None
 
 
 class Simulation:
@@ -101,6 +107,7 @@ class Simulation:
         self._order = degrees_of_freedom(self.solver.local_mesh.nodes)
         self._pushes = pushes(self.model, strikes)[self._order]
         self._strains = self.elements.strains
+        self._accuracy = RESPONSE * np.sqrt(tolerance)
 
     @property
     def model(self) -> Solid:
@@ -122,23 +129,36 @@ class Simulation:
         young = self.material.moduli(z)
         modes = self.elements.solve(self.solver, young, start)
         elastic = modes.vectors[:, RIGID_MODES:]
-        evaluation = Evaluation(z, modes.values[RIGID_MODES:], self._pushes.T @ elastic, modes)
+        similar = start.inverse if isinstance(start, Modes) else None
+        own = None if modes.inverse is similar else modes.inverse
+        pushed = self._pushes.T @ elastic
+        evaluation = Evaluation(z, modes.values[RIGID_MODES:], pushed, modes, inverse=own)
         return self.differentiate(evaluation) if derivatives else evaluation
 
     def differentiate(self, evaluation: Evaluation) -> Evaluation:
-        """The same evaluation with derivatives."""
+        """The same evaluation with derivatives.
+
+        Its modes then have the inverse of their own material, for an analysis that starts there.
+        """
+        modes, values = evaluation.modes, evaluation.eigenvalues
+        inverse = evaluation.inverse
+        if inverse is None or not lies_between(values, inverse.shift):
+            inverse = self.solver.inverse(modes, shift_between(values))
+        sensitivity = self._sensitivity(evaluation, inverse)
+        if isinstance(inverse, Lasting):
+            modes = replace(modes, inverse=inverse)
+        else:
+            inverse.destroy()
+        return replace(evaluation, sensitivity=sensitivity, modes=modes)
+
+    def _sensitivity(self, evaluation: Evaluation, inverse: Inverse) -> Sensitivity:
         young = self.material.moduli(evaluation.z)
         elastic = np.ascontiguousarray(evaluation.modes.vectors[:, RIGID_MODES:])
-        return replace(evaluation, sensitivity=self._sensitivity(young, evaluation, elastic))
-
-    def _sensitivity(self, young: Array, evaluation: Evaluation, elastic: Array) -> Sensitivity:
         directions = self.material.slopes(young)[:, None] * self.material.basis
         slopes = self.elements.slopes(young, directions)
-        inverse = self.solver.inverse(evaluation.modes, shift_between(evaluation.eigenvalues))
         outside = outside_response(
-            evaluation.modes, inverse, elastic, evaluation.eigenvalues, self._pushes, KRYLOV_BLOCKS
+            evaluation.modes, inverse, elastic, evaluation.eigenvalues, self._pushes, self._accuracy
         )
-        inverse.destroy()
         vectors, others = np.empty_like(elastic), np.empty_like(outside)
         vectors[self._order], others[self._order] = elastic, outside
         nodes = self.model.connectivity

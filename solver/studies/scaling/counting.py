@@ -120,7 +120,6 @@ class _TimedInverse:
     def __init__(self, inverse: Inverse, tally: Tally) -> None:
         self.shift = inverse.shift
         self.exact = inverse.exact
-        self.lasting = False
         self.negative = inverse.negative
         self._inverse = inverse
         self._tally = tally
