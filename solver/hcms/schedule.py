@@ -20,7 +20,7 @@ from solver.distribution.tree import Merge, MergeTree
 from solver.hcms.counts import eigen_flops
 from solver.hcms.scalapack import available, grid_side
 
-MOVED_COST = 0.1
+MOVED_COST = 0.3
 """What it adds to the cost of a merge that both its groups have to be sent."""
 PRODUCT_COST = 60.0
 """Operations of a merge's products for each of n^2 reduced unknowns and (nodes)^(2/3), about."""
