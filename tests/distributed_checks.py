@@ -29,7 +29,12 @@ from solver.assembly.system import assemble
 from solver.distribution.local_mesh import LocalMesh, distribute
 from solver.distribution.messages import receive_arrays, send_arrays
 from solver.files.modes_file import write_modes
+from solver.hcms import schedule as scheduling
 from solver.hcms.condense import INTERFACES
+from solver.hcms.counts import Tally
+from solver.hcms.merge import Reduced, all_pairs
+from solver.hcms.scalapack import grid_side
+from solver.hcms.shared import shared_pairs
 from solver.hcms.synthesis import synthesize
 from solver.linear.multigrid import Multigrid
 from solver.reference.truth import complete, count_beyond, solve_truth, start_vector
@@ -206,17 +211,24 @@ def messages_counted_are_messages_sent() -> None:
     sent = sum(phase["messages"] for phase in per_rank.values())
     assert sent[COMM.rank] == counting.sent["messages"]
     assert (COMM.size == 1) == (sent.sum() == 0)
-    # Each merge of two ranks: an announcement and at most seven arrays up, two messages down.
-    crossing = _crossing_merges(local_mesh)
-    assert sent.sum() <= 10 * crossing + 2 * (COMM.size - 1)
+    # A merge of two ranks: an announcement and at most seven arrays of a group, modes of the other
+    # at the interface, two projections, and coefficients on their way back.
+    across, moved = _merges_across_ranks(local_mesh, 60)
+    assert sent.sum() <= 16 * across + 20 * moved + 2 * (COMM.size - 1)
     flops = sum(phase["flops"] for phase in per_rank.values())
     assert (flops > 0).all()
 
 
-def _crossing_merges(local_mesh: LocalMesh) -> int:
-    leader = local_mesh.decomposition.leaders()
-    merges = local_mesh.decomposition.tree.merges
-    return sum(leader[merge.left] != leader[merge.right] for merge in merges)
+def _merges_across_ranks(local_mesh: LocalMesh, keep: int) -> tuple[int, int]:
+    """Merges of groups of different ranks, and those of groups of the same rank made elsewhere."""
+    decomposition = local_mesh.decomposition
+    nodes = [stop - start for start, stop in decomposition.row_ranges()]
+    holder = scheduling.schedule(decomposition.tree, decomposition.owner, nodes, keep).holder
+    merges = decomposition.tree.merges
+    across = sum(holder[merge.left] != holder[merge.right] for merge in merges)
+    elsewhere = [merge for merge in merges if holder[merge.group] != holder[merge.left]]
+    moved = sum(holder[merge.left] == holder[merge.right] for merge in elsewhere)
+    return across, moved
 
 
 def arrays_arrive_as_they_were() -> None:
@@ -235,6 +247,68 @@ def arrays_arrive_as_they_were() -> None:
         assert now.dtype == before.dtype
         assert now.shape == before.shape
         assert (now == before).all()
+
+
+def shared_merges_are_those_of_one_rank() -> None:
+    """Every merge of groups of different ranks is shared by all ranks of both."""
+    model = on_first(solids.random_box(9, 6, 5))
+    local_mesh = distribute(model, PARTS, comm=COMM)
+    alone = synthesize(local_mesh, 60, "free", COMM).values
+    before = scheduling.SHARED_SIZE, scheduling.SHARED_PRODUCTS
+    scheduling.SHARED_SIZE, scheduling.SHARED_PRODUCTS = 20, 1e3
+    plan = scheduling.schedule(
+        local_mesh.decomposition.tree,
+        local_mesh.decomposition.owner,
+        [stop - start for start, stop in local_mesh.decomposition.row_ranges()],
+        60,
+    )
+    shared = synthesize(local_mesh, 60, "free", COMM)
+    scheduling.SHARED_SIZE, scheduling.SHARED_PRODUCTS = before
+    assert len(plan.teams[-1]) == {1: 1, 2: 1, 3: 1, 4: 4, 7: 4}[COMM.size]
+    assert plan.ranks_of(len(plan.teams) - 1, local_mesh.decomposition.tree.merges[-1]) == {
+        *range(COMM.size)
+    }
+    # Sums in another order: rounding alone.
+    assert np.abs(shared.values - alone).max() < 1e-12 * alone[-1]
+    system = assemble(local_mesh, COMM)
+    gram = system.inner(shared.vectors, system.times_mass(shared.vectors))
+    assert np.abs(gram - np.eye(len(gram))).max() < 1e-9
+
+
+def shared_eigenpairs_are_those_of_lapack() -> None:
+    random = np.random.default_rng(5)
+    for size, generalised in ((3, True), (40, True), (150, False), (201, True)):
+        square = random.standard_normal((size, size))
+        K = np.asfortranarray(square @ square.T)
+        M = np.eye(size, order="F")
+        M[1:, 0] = 0.3 / size
+        pencil = Reduced(np.tril(K), np.tril(M) if generalised else None)
+        expected, _ = all_pairs(
+            Reduced(K.copy(order="F"), M.copy(order="F") if generalised else None), Tally()
+        )
+        ranks = grid_side(COMM.size) ** 2
+        if COMM.rank >= ranks:
+            continue
+        team = COMM.Create_group(COMM.group.Incl(range(ranks)))
+        found = shared_pairs(team, pencil if COMM.rank == 0 else None, Tally())
+        team.Free()
+        assert (found is None) == (COMM.rank > 0)
+        if found is not None:
+            assert np.abs(found[0] - expected).max() < 1e-12 * expected[-1]
+
+
+def failure_of_shared_eigenpairs_is_told() -> None:
+    pencil = Reduced(np.eye(60, order="F"), -np.eye(60, order="F"))
+    ranks = grid_side(COMM.size) ** 2
+    if COMM.rank >= ranks:
+        return
+    team = COMM.Create_group(COMM.group.Incl(range(ranks)))
+    try:
+        shared_pairs(team, pencil if COMM.rank == 0 else None, Tally())
+    except np.linalg.LinAlgError as error:
+        assert "pdpotrf of ScaLAPACK" in str(error)
+    else:
+        raise AssertionError("no error")
 
 
 def synthesis_bounds_the_spectrum() -> None:

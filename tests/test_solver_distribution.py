@@ -15,13 +15,18 @@ EVERYWHERE = [
     "shares_make_up_the_solid",
     "products_are_those_of_the_whole_matrices",
     "synthesis_bounds_the_spectrum",
+    "shared_merges_are_those_of_one_rank",
 ]
 SOME = [
     "arrays_arrive_as_they_were",
     "messages_counted_are_messages_sent",
     "groups_that_do_not_touch_can_be_merged",
 ]
-FEW = ["a_share_is_no_larger_than_its_part_of_the_mesh"]
+FEW = [
+    "a_share_is_no_larger_than_its_part_of_the_mesh",
+    "shared_eigenpairs_are_those_of_lapack",
+    "failure_of_shared_eigenpairs_is_told",
+]
 FIRST = [
     "only_the_first_rank_holds_arrays_of_the_length_of_the_mesh",
     "failure_of_the_writer_is_everyones",

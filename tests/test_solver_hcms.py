@@ -17,7 +17,8 @@ from solver.distribution.partition import connect_subdomains, partition_nodes, s
 from solver.distribution.tree import assign_ranks, build_tree
 from solver.hcms.counts import eigen_flops, krylov_flops
 from solver.hcms.merge import boundary_of, interface
-from solver.hcms.synthesis import make_subdomains, modes_to_keep, synthesize
+from solver.hcms.schedule import modes_to_keep
+from solver.hcms.synthesis import make_subdomains, synthesize
 from tests import solids
 
 COMM = MPI.COMM_SELF

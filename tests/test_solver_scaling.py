@@ -35,8 +35,10 @@ from tests.solids import random_box
 BAR = ("builtin:bar", "--resolution", 24, "--material", "smooth")
 COUNT = """
 import json
+import sys
 from mpi4py import MPI
 from solver.distribution.local_mesh import distribute
+from solver.hcms import schedule
 from solver.hcms.synthesis import synthesize
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.studies.scaling.plan import planned_counts
@@ -44,6 +46,8 @@ from solver.studies.scaling.sizes import sizes_of_solid
 from solver.distribution.decomposition import decompose
 
 comm, keep = MPI.COMM_WORLD, 60
+if len(sys.argv) > 1:
+    schedule.SHARED_SIZE, schedule.SHARED_PRODUCTS = 20, 1e3
 for discretisation in ("voxel", "finite-cell"):
     options = ProblemOptions("builtin:bar", 24, "smooth", discretisation=discretisation)
     model = build_problem(options).model
@@ -66,11 +70,11 @@ def bar():
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [1, 2, 3])
-def test_planned_counts_are_those_of_a_run(ranks, tmp_path, mpiexec):
+@pytest.mark.parametrize(("ranks", "options"), [(1, ""), (2, ""), (3, ""), (6, "shared")])
+def test_planned_counts_are_those_of_a_run(ranks, options, tmp_path, mpiexec):
     program = tmp_path / "count.py"
     program.write_text(COUNT)
-    done = mpiexec(ranks, program, check=True)
+    done = mpiexec(ranks, program, *options.split(), check=True)
     rows = [json.loads(line) for line in done.stdout.splitlines()]
     assert {phase for phase, *_ in rows} >= {"local", "merge 1", "down", "basis"}
     for phase, name, planned, found in rows:

@@ -57,10 +57,6 @@ class Decomposition:
             for start, stop in self.tree.ranges()
         ]
 
-    def leaders(self) -> list[int]:
-        """Rank of every group of the tree: the owner of its first subdomain."""
-        return [int(self.owner[start]) for start, _ in self.tree.ranges()]
-
 
 def decompose(
     model: Solid, subdomains: int | None = None, seed: int = 0, ranks: int = 1

@@ -21,6 +21,11 @@ from solver.hcms.lowest import BLOCK_FRACTION, STEPS
 
 Array = NDArray[np.float64]
 
+SHARED_COST = 1.8
+"""Time of an operation of ScaLAPACK on two ranks over one of LAPACK, for orders of 450 to 800."""
+SENT_A_COLUMN = 4
+"""Vectors that a rank sends on for every column that ScaLAPACK reduces."""
+
 
 @dataclass
 class Tally:
@@ -143,6 +148,19 @@ def eigen_flops(size: int, generalised: bool) -> float:
     adds Cholesky (1/3), the reduction to standard form (1) and the vectors' (1).
     """
     return (14.0 / 3.0 + (7.0 / 3.0 if generalised else 0.0)) * float(size) ** 3
+
+
+def count_shared_eigenproblem(tally: Tally, size: int, generalised: bool, ranks: int) -> None:
+    """Add one rank's part of the same, shared by several in ScaLAPACK: an estimate.
+
+    Operations are those that LAPACK would do in the time, see `SHARED_COST`.  For every column, the
+    tridiagonalisation sends parts of vectors `SENT_A_COLUMN` times along the grid of ranks.
+    """
+    side = np.sqrt(ranks)
+    sent = SENT_A_COLUMN * np.ceil(np.log2(side))
+    tally.flops += SHARED_COST * eigen_flops(size, generalised) / ranks
+    tally.messages += sent * size
+    tally.bytes += 8.0 * sent * size**2 / side
 
 
 def krylov_flops(size: int, modes: int, steps: int = STEPS) -> float:

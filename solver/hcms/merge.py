@@ -24,7 +24,8 @@ from solver.assembly.sparse import assemble_elements
 from solver.distribution.local_mesh import Cells
 from solver.distribution.messages import AnyArray
 from solver.hcms.condense import restrict_stiffness
-from solver.hcms.counts import Tally, eigen_flops, product_flops, sparse_product_flops
+from solver.hcms.counts import Tally, eigen_flops, sparse_product_flops
+from solver.hcms.crew import Crew
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -156,25 +157,20 @@ def interface(cells: Cells, start: int, middle: int, stop: int, treatment: str) 
     return Interface(rows[:count], rows[count:], K, M)
 
 
-def project(modes: Array, matrix: sp.csr_matrix, others: Array, tally: Tally) -> Array:
-    """modes^T matrix others, for a sparse matrix; counted in `tally`."""
+def project(modes: Array, matrix: sp.csr_matrix, others: Array, crew: Crew) -> Array:
+    """modes^T matrix others, for a sparse matrix; the dense product is shared by the crew."""
     if matrix.nnz == 0:
         return np.zeros((modes.shape[1], others.shape[1]))
-    tally.flops += sparse_product_flops(matrix.nnz, others.shape[1])
-    tally.flops += product_flops(modes.shape[1], len(modes), others.shape[1])
-    return np.asarray(modes.T @ (matrix @ others))
+    crew.tally.flops += sparse_product_flops(matrix.nnz, others.shape[1])
+    return crew.transposed_product(modes, np.asarray(matrix @ others))
 
 
-def left_projection(left: Group, between: Interface, tally: Tally) -> Array:
-    """V1^T dK11 V1 (k1, k1)."""
-    modes = left.modes_at(between.left)
-    return project(modes, between.stiffness_left, modes, tally)
-
-
-def right_projection(right: Group, between: Interface, tally: Tally) -> Array:
-    """V2^T dK22 V2 (k2, k2)."""
-    modes = right.modes_at(between.right)
-    return project(modes, between.stiffness_right, modes, tally)
+def across_mass(left: Group, right: Group, between: Interface, crew: Crew) -> Array | None:
+    """V2^T dM21 V1 (k2, k1); None if no mass is shared by the groups."""
+    if between.mass.nnz == 0:
+        return None
+    modes = left.modes_at(between.left), right.modes_at(between.right)
+    return project(modes[1], between.mass_across, modes[0], crew)
 
 
 class Reduced(NamedTuple):
@@ -185,46 +181,37 @@ class Reduced(NamedTuple):
 
 
 def reduced_pencil(
-    left: Group,
-    right: Group,
-    between: Interface,
-    projections: tuple[Array, Array],
-    tally: Tally,
+    values: tuple[Array, Array], stiffness: tuple[Array, Array, Array], mass_across: Array | None
 ) -> Reduced:
     """Pencil of the joined groups in the space of their kept modes.
 
-    `projections` are those of the left and of the right group.
+    Parameters
+    ----------
+    values
+        Eigenvalues of the left and of the right group.
+    stiffness
+        V1^T dK11 V1 (k1, k1), V2^T dK22 V2 (k2, k2) and V2^T dK21 V1 (k2, k1).
+    mass_across
+        V2^T dM21 V1 (k2, k1); None if it is zero.
     """
-    split = len(left.values)
-    size = split + len(right.values)
-    modes_left, modes_right = left.modes_at(between.left), right.modes_at(between.right)
+    split = len(values[0])
+    size = split + len(values[1])
     K = np.zeros((size, size), order="F")
-    K[:split, :split], K[split:, split:] = projections
-    K[split:, :split] = project(modes_right, between.stiffness_across, modes_left, tally)
-    K[np.diag_indices(size)] += np.concatenate([left.values, right.values])
-    if between.mass.nnz == 0:
+    K[:split, :split], K[split:, split:], K[split:, :split] = stiffness
+    K[np.diag_indices(size)] += np.concatenate(values)
+    if mass_across is None:
         return Reduced(K, None)
     M = np.zeros((size, size), order="F")
-    M[split:, :split] = project(modes_right, between.mass_across, modes_left, tally)
+    M[split:, :split] = mass_across
     M[np.diag_indices(size)] = 1.0
     return Reduced(K, M)
 
 
-def lowest_pairs(
-    reduced: Reduced, keep: int, tally: Tally, cutoff: float | None = None
-) -> tuple[Array, Array]:
-    """Lowest eigenpairs of the reduced pencil: `keep`, or more if more values are zero.
-
-    With a `cutoff`, those up to it instead of `keep`.
-
-    Returns
-    -------
-    tuple[Array, Array]
-        Values (k,) and coefficients Q (k1 + k2, k).
-    """
+def all_pairs(reduced: Reduced, tally: Tally) -> tuple[Array, Array]:
+    """All eigenvalues (n,) and vectors (n, n) of the reduced pencil, which is overwritten."""
     K, M = reduced
     tally.flops += eigen_flops(len(K), M is not None)
-    values, Q = la.eigh(
+    values, vectors = la.eigh(
         K,
         M,
         driver="evd" if M is None else "gvd",
@@ -232,14 +219,21 @@ def lowest_pairs(
         overwrite_b=True,
         check_finite=False,
     )
+    return values, vectors
+
+
+def number_kept(values: Array, keep: int, cutoff: float | None = None) -> int:
+    """How many of all `values` (n,) a group keeps: `keep`, or more if more of them are zero.
+
+    With a `cutoff`, those up to it instead of `keep`.
+    """
     zeros = int(np.searchsorted(values, ZERO_FRACTION * values[-1]))
     if cutoff is not None:
         keep = max(RIGID_MODES, int(np.searchsorted(values, cutoff, side="right")))
-    keep = min(max(keep, zeros), len(values))
-    return values[:keep], Q[:, :keep]
+    return min(max(keep, zeros), len(values))
 
 
-def join(left: Group, right: Group, values: Array, Q: Array, tally: Tally) -> Group:
+def join(left: Group, right: Group, values: Array, Q: Array, crew: Crew) -> Group:
     """The joined group, given the eigenpairs of its reduced pencil."""
     split = len(left.values)
     # Cells that touch both groups and a third are in both sets.
@@ -247,8 +241,6 @@ def join(left: Group, right: Group, values: Array, Q: Array, tally: Tally) -> Gr
     boundary, cells = boundary_of(left.cells.join(third), left.start, right.stop)
     count = int(np.searchsorted(boundary, left.stop))
     modes = np.empty((3 * len(boundary), Q.shape[1]))
-    np.matmul(left.modes_at(boundary[:count]), Q[:split], out=modes[: 3 * count])
-    np.matmul(right.modes_at(boundary[count:]), Q[split:], out=modes[3 * count :])
-    tally.flops += product_flops(3 * count, split, Q.shape[1])
-    tally.flops += product_flops(len(modes) - 3 * count, len(Q) - split, Q.shape[1])
+    modes[: 3 * count] = crew.product(left.modes_at(boundary[:count]), Q[:split])
+    modes[3 * count :] = crew.product(right.modes_at(boundary[count:]), Q[split:])
     return Group(left.start, right.stop, values, boundary, modes, cells)

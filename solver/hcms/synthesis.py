@@ -1,10 +1,11 @@
 """Hierarchical component mode synthesis over MPI ranks (section 7.2).
 
-Upward, every merge happens on the rank that leads its left group.  The right group's leader forms
-its part of the reduced pencil and sends it with the group's eigenvalues, its boundary cells and the
-rows of its modes there; nothing else is ever needed of it.  Downward, the coefficients of the final
-modes travel back along the tree, so that the full basis is formed once, from the small local bases,
-and stays distributed by rows.
+Upward, every merge happens on one rank, its holder, see `solver.hcms.schedule`.  Where the groups
+are on two ranks, one sends its group's eigenvalues, boundary cells and the rows of its modes there,
+gets those of the other's modes that it needs, and forms its part of the reduced pencil; large
+pencils are solved by several ranks.  Downward, the coefficients of the final modes travel back
+along the tree, so that the full basis is formed once, from the small local bases, and stays
+distributed by rows.
 """
 
 from __future__ import annotations
@@ -16,33 +17,22 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.fem.block import degrees_of_freedom
-from carillon.fem.model import RIGID_MODES
 from carillon.threads import in_parallel
-from solver.distribution.local_mesh import Cells, LocalMesh
-from solver.distribution.messages import Sent, receive_arrays, send_arrays
-from solver.distribution.tree import Merge
+from solver.distribution.local_mesh import LocalMesh
+from solver.distribution.messages import receive_arrays, send_arrays
+from solver.hcms.ascent import Ascent
 from solver.hcms.condense import DEFAULT_INTERFACE
-from solver.hcms.counts import Counts, Tally, krylov_flops, product_flops
+from solver.hcms.counts import Counts, krylov_flops, product_flops
 from solver.hcms.local import Subdomain
 from solver.hcms.lowest import FEWER_STEPS, STEPS
-from solver.hcms.merge import (
-    Group,
-    Interface,
-    boundary_of,
-    group_from_arrays,
-    interface,
-    join,
-    left_projection,
-    lowest_pairs,
-    reduced_pencil,
-    right_projection,
-)
+from solver.hcms.merge import Group, boundary_of
+from solver.hcms.schedule import modes_to_keep, schedule
 
 Array = NDArray[np.float64]
 
 FEW_SUBDOMAINS = 8
 """Subdomains up to which the accuracy of their modes tells."""
-_UP, _DOWN = 11, 12
+_DOWN = 12
 
 
 @dataclass
@@ -62,16 +52,6 @@ class Synthesis:
     values: Array
     vectors: Array
     counts: Counts
-
-
-def modes_to_keep(fraction: float, keep: int) -> int:
-    """Modes that a group with `fraction` of the unknowns keeps when the whole keeps `keep`.
-
-    Modes below a common frequency scale with the volume; those that carry the interface with its
-    surface.  The square root lies between and grows by 1.4 at each merge.  The rigid motions are
-    always among them.
-    """
-    return max(RIGID_MODES, int(np.ceil(keep * np.sqrt(fraction))))
 
 
 def local_steps(parts: int) -> int:
@@ -130,7 +110,7 @@ def synthesize(
     climb = _Climb(local_mesh, keep, treatment, comm, cutoff)
     with climb.counts.local.running():
         climb.solve_subdomains(subdomains, threads)
-    climb.merge_groups()
+    climb.ascent.merge_groups(climb.counts)
     with climb.counts.down.running():
         values = climb.root_values()
         weights = climb.push_down()
@@ -140,16 +120,16 @@ def synthesize(
 
 
 class _Climb:
-    """One rank's way up the merge tree and down again.
+    """One rank's part in the modes of the subdomains, and in what becomes of them.
 
     Attributes
     ----------
     groups
-        Groups that this rank leads and that have not been merged yet.
+        Groups that this rank holds and that have not been merged yet.
     bases
         (3 nodes, k) local modes of this rank's subdomains.
-    coefficients
-        Q of the merges that this rank made, split between left and right.
+    ascent
+        The merges.
     """
 
     def __init__(
@@ -158,16 +138,17 @@ class _Climb:
         self.local_mesh = local_mesh
         self.keep = keep
         self.cutoff = cutoff
-        self.treatment = treatment
         self.comm = comm
         self.tree = local_mesh.decomposition.tree
-        self.leader = local_mesh.decomposition.leaders()
         self.ranges = local_mesh.decomposition.row_ranges()
-        self.levels = self.tree.levels()
-        self.counts = Counts(self.levels[-1])
+        nodes = [stop - start for start, stop in self.ranges]
+        owner = local_mesh.decomposition.owner
+        plan = schedule(self.tree, owner, nodes, keep)
+        self.holder = plan.holder
+        self.counts = Counts(self.tree.levels()[-1])
         self.groups: dict[int, Group] = {}
         self.bases: dict[int, Array] = {}
-        self.coefficients: dict[int, tuple[Array, Array]] = {}
+        self.ascent = Ascent(local_mesh, plan, self.groups, keep, cutoff, treatment, comm)
 
     def solve_subdomains(self, subdomains: dict[int, Subdomain], threads: int) -> None:
         """Lowest modes of every subdomain of this rank."""
@@ -194,51 +175,6 @@ class _Climb:
             self.bases[part] = basis
             self.groups[part] = Group(start, stop, values, boundary, rows, crossing)
 
-    def merge_groups(self) -> None:
-        """Merge the groups that this rank leads, and send those that another rank merges."""
-        sent = []
-        for step in self.tree.merges:
-            tally = self.counts.merges[self.levels[step.group] - 1]
-            here, there = self.leader[step.left], self.leader[step.right]
-            with tally.running():
-                if self.comm.rank == here:
-                    self._merge(step, tally)
-                elif self.comm.rank == there:
-                    sent.append(self._send_up(step, tally))
-        with self.counts.down.idle():
-            for messages in sent:
-                messages.wait()
-
-    def _merge(self, step: Merge, tally: Tally) -> None:
-        left = self.groups.pop(step.left)
-        between = self._interface(step, left.cells)
-        projected = left_projection(left, between, tally)
-        if step.right in self.groups:
-            right = self.groups.pop(step.right)
-            projected_right = right_projection(right, between, tally)
-        else:
-            with tally.idle():
-                arrays = receive_arrays(self.comm, self.leader[step.right], _UP)
-            projected_right = arrays.pop()
-            right = group_from_arrays(arrays, *self.ranges[step.right], left.cells)
-        reduced = reduced_pencil(left, right, between, (projected, projected_right), tally)
-        count, cutoff = self._count(step.group), self._cutoff(step.group)
-        values, Q = lowest_pairs(reduced, count, tally, cutoff)
-        self.groups[step.group] = join(left, right, values, Q, tally)
-        split = len(left.values)
-        self.coefficients[step.group] = Q[:split], Q[split:]
-
-    def _send_up(self, step: Merge, tally: Tally) -> Sent:
-        right = self.groups.pop(step.right)
-        projected = right_projection(right, self._interface(step, right.cells), tally)
-        arrays = [*right.arrays(), projected]
-        return tally.sent(send_arrays(self.comm, arrays, self.leader[step.left], _UP))
-
-    def _interface(self, step: Merge, cells: Cells) -> Interface:
-        start, middle = self.ranges[step.left]
-        _, stop = self.ranges[step.right]
-        return interface(cells, start, middle, stop, self.treatment)
-
     def _count(self, group: int) -> int:
         start, stop = self.ranges[group]
         return modes_to_keep((stop - start) / self.ranges[-1][1], self.keep)
@@ -249,7 +185,7 @@ class _Climb:
 
     def root_values(self) -> Array:
         """Eigenvalues of the whole, on every rank."""
-        comm, root, leader = self.comm, len(self.ranges) - 1, self.leader[-1]
+        comm, root, leader = self.comm, len(self.ranges) - 1, self.holder[-1]
         count = np.zeros(1, dtype=np.int64)
         values = np.empty(0)
         if comm.rank == leader:
@@ -271,22 +207,25 @@ class _Climb:
         weights: dict[int, Array] = {}
         sent = []
         for step in reversed(self.tree.merges):
-            here, there = self.leader[step.left], self.leader[step.right]
+            here = self.holder[step.group]
+            # The right side first: more often another rank is waiting for it.
             if self.comm.rank == here:
                 above = weights.pop(step.group, None)
-                sides = self.coefficients.pop(step.group)
-                # The right side first: another rank may be waiting for it.
+                sides = self.ascent.coefficients.pop(step.group)
                 for child, side in zip((step.right, step.left), reversed(sides)):
                     block = side if above is None else side @ above
                     if above is not None:
                         tally.flops += product_flops(len(side), len(above), above.shape[1])
-                    if self.leader[child] == here:
+                    if self.holder[child] == here:
                         weights[child] = block
                     else:
-                        sent.append(tally.sent(send_arrays(self.comm, [block], there, _DOWN)))
-            elif self.comm.rank == there:
-                with tally.idle():
-                    (weights[step.right],) = receive_arrays(self.comm, here, _DOWN)
+                        messages = send_arrays(self.comm, [block], self.holder[child], _DOWN)
+                        sent.append(tally.sent(messages))
+            else:
+                for child in (step.right, step.left):
+                    if self.comm.rank == self.holder[child]:
+                        with tally.idle():
+                            (weights[child],) = receive_arrays(self.comm, here, _DOWN)
         with tally.idle():
             for messages in sent:
                 messages.wait()

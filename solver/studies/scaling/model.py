@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from solver.distribution.decomposition import COST_EXPONENT
 from solver.distribution.tree import assign_ranks
-from solver.hcms.counts import Tally
+from solver.hcms.counts import SENT_A_COLUMN, SHARED_COST, Tally
 from solver.studies.scaling.counting import rounds
 from solver.studies.scaling.plan import planned_counts
 from solver.studies.scaling.sizes import TreeSizes
@@ -34,8 +34,12 @@ ASSUMPTIONS = (
     "phases follow each other, and so do the levels of the merge tree: who has less to do waits",
     "the rate of a kind of phase is the same for all sizes: small matrices cost no more per "
     "operation than large ones",
-    "operations of the synthesis are counted merge by merge with the formulas of the solver, and "
-    "those of subdomains and factorisation estimated from nested dissection",
+    "operations of the synthesis are counted merge by merge with the formulas of the solver, for "
+    "the ranks that it would have make and share each merge, and those of subdomains and "
+    "factorisation estimated from nested dissection",
+    f"an eigenproblem shared by ranks takes {SHARED_COST:g} times as many operations, as on two "
+    f"ranks here, evenly divided, and {SENT_A_COLUMN} messages a column and direction of the grid",
+    "who shares products of modes sends rows and sums to each helper one after the other",
     "factorisation and solves divide evenly over the ranks; their messages are the updates of the "
     "largest front at each of the log2(ranks) uppermost levels",
     "a collective call takes log2(ranks) rounds of its whole payload",
