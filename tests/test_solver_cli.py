@@ -47,7 +47,8 @@ def test_modes_file_is_complete(modes_file):
     assert np.allclose(file.frequencies, np.sqrt(file.eigenvalues) / (2 * np.pi))
     assert file.attributes["method"] == "lanczos"
     assert file.attributes["density"] == 1000.0
-    assert set(file.attributes["timings"]) >= {"mesh", "material", "assembly", "lanczos", "correction"}
+    timed = {"mesh", "material", "assembly", "lanczos", "correction"}
+    assert set(file.attributes["timings"]) >= timed
     assert 0.0 < file.attributes["solid_frequency_error_rms"] < 1.0
     assert "estimate" in file.attributes["timings"]
     assert set(file.provenance) >= {"commit", "config_hash", "command", "versions", "blas"}
