@@ -2,14 +2,14 @@
 
 Several copies of OpenBLAS live in one process: numpy's, scipy's and PETSc's.  An idle worker thread
 of one copy spins for 2^26 cycles beside the workers of another, which halves the speed of code that
-calls them in turn; it is told to go to sleep after 2^20.
+calls them in turn; it is told to go to sleep at once.
 """
 
 from __future__ import annotations
 
 from collections.abc import MutableMapping
 
-SETTINGS = {"OPENBLAS_THREAD_TIMEOUT": "20"}
+SETTINGS = {"OPENBLAS_THREAD_TIMEOUT": "4"}
 
 
 def configure(environment: MutableMapping[str, str]) -> None:

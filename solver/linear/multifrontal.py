@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from carillon.errors import LocalConvergenceError
 from carillon.narrow import block, lanes_of
 from carillon.runtime import available_memory
-from carillon.threads import in_parallel, split
+from carillon.threads import in_parallel, in_tree, split
 from solver.linear.plan import PANEL, Part, Plan
 from solver.linear.sweeps import (
     STRIP,
@@ -82,7 +82,7 @@ class Factor:
         updates: dict[int, Array] = {}
         first = plan.fronts.first
 
-        def eliminated(front: int) -> int:
+        def eliminated(front: int, threads: int = 1) -> int:
             n = 3 * int(first[front + 1] - first[front])
             b = 3 * len(plan.fronts.boundary[front])
             pivots = self._pivots[plan.pivot_offset[front] : plan.pivot_offset[front + 1]]
@@ -99,19 +99,26 @@ class Factor:
                 kept = coupling[n * strip : n * (strip + few)].reshape(n, few)
                 kept[:] = scaled[:, n + strip : n + strip + few]
             if b:
-                update = _product(own[:, n:], scaled[:, n:])
+                update = _product(own[:, n:], scaled[:, n:], threads)
                 for child in children:
                     _add_beyond(update, n // 3, plan.places[child], updates.pop(child))
                 updates[front] = update
             return negative
 
-        def eliminate_all(part: Part) -> int:
+        parts = plan.parts(self._threads)
+
+        def eliminate_part(part: Part) -> int:
             return sum(eliminated(int(front)) for front in part.fronts)
 
-        shares = plan.shares(self._threads)
-        branches = [(part,) for part in shares.branches]
-        negative = sum(in_parallel(eliminate_all, branches, self._threads))
-        return negative + eliminate_all(shares.top)
+        # The fronts above the branches are few and large: threads share each of them.
+        branches = [
+            part for part, below in zip(parts.parts, parts.children, strict=True) if not below
+        ]
+        negative = sum(in_parallel(eliminate_part, [(part,) for part in branches], self._threads))
+        for part, below in zip(parts.parts, parts.children, strict=True):
+            if below:
+                negative += eliminated(int(part.fronts[0]), self._threads)
+        return negative
 
     def solve(self, vectors: Array) -> Array:
         """Solution (3 n, k) for a C-ordered block of right-hand sides (3 n, k)."""
@@ -121,39 +128,31 @@ class Factor:
         return solution
 
     def _solve_columns(self, vectors: Array, solution: Array, start: int, stop: int) -> None:
-        """Solve for the columns [start, stop): up the branches, through the top, down again."""
-        plan, threads, width = self._plan, self._threads, stop - start
-        shares = plan.shares(threads)
-        order = plan.fronts.order
-        top, lanes = shares.top, lanes_of(width)
+        """Solve for the columns [start, stop): up the tree of parts, and down again."""
+        tree, width = self._plan.parts(self._threads), stop - start
+        order, lanes = self._plan.fronts.order, lanes_of(width)
+        works: list[Array] = [np.empty(0)] * len(tree.parts)
 
-        def taken(part: Part) -> Array:
+        def up(number: int) -> None:
+            part = tree.parts[number]
             work = block(3 * (len(part.positions) + len(part.beyond)), lanes)
             take_rows(vectors, start, width, order[part.positions], lanes, work)
-            return work
-
-        def up(part: Part) -> Array:
-            work = taken(part)
+            for child in tree.children[number]:
+                first = 3 * len(tree.parts[child].positions)
+                add_nodes(works[child], first, tree.inherited[child], lanes, work)
             self._sweep(eliminate, part, work, lanes)
-            return work
+            works[number] = work
 
-        def down(part: Part, work: Array) -> None:
-            if len(part.beyond):
-                rows = np.searchsorted(top.positions, part.beyond)
-                copy_nodes(above, 3 * len(part.positions), rows, lanes, work)
+        def down(number: int) -> None:
+            part, work, above = tree.parts[number], works[number], tree.parent[number]
+            if above >= 0:
+                first = 3 * len(part.positions)
+                copy_nodes(works[above], first, tree.inherited[number], lanes, work)
             self._sweep(substitute, part, work, lanes)
             put_rows(work, order[part.positions], lanes, solution, start, width)
 
-        works = in_parallel(up, [(part,) for part in shares.branches], threads)
-        above = taken(top)
-        if len(top.fronts):
-            for part, work in zip(shares.branches, works, strict=True):
-                rows = np.searchsorted(top.positions, part.beyond)
-                add_nodes(work, 3 * len(part.positions), rows, lanes, above)
-            self._sweep(eliminate, top, above, lanes)
-            self._sweep(substitute, top, above, lanes)
-            put_rows(above, order[top.positions], lanes, solution, start, width)
-        in_parallel(down, list(zip(shares.branches, works, strict=True)), threads)
+        in_tree(up, tree.parent, self._threads)
+        in_tree(down, tree.parent, self._threads, from_root=True)
 
     def _sweep(self, kernel: Any, part: Part, work: Array, lanes: int) -> None:
         plan = self._plan
@@ -231,12 +230,15 @@ def _inverse(block: Array) -> tuple[Array, int]:
     return result, negative
 
 
-def _product(left: Array, right: Array) -> Array:
+def _product(left: Array, right: Array, threads: int) -> Array:
     """The upper triangle of left^T right, which is symmetric; below it anything."""
     size = left.shape[1]
     product = np.empty((size, size))
-    for start, stop in split(size, 1, PANEL):
+
+    def panel(start: int, stop: int) -> None:
         np.matmul(left[:, start:stop].T, right[:, start:], out=product[start:stop, start:])
+
+    in_parallel(panel, split(size, 1, PANEL), threads)
     return product
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -44,6 +44,14 @@ class Part:
     near: Index
     near_offset: Index
 
+    def rows_of(self, positions: Index) -> Index:
+        """Rows of positions that the part has: own rows, then rows beyond."""
+        if not len(self.positions):
+            return np.searchsorted(self.beyond, positions)
+        place = np.minimum(np.searchsorted(self.positions, positions), len(self.positions) - 1)
+        outside = len(self.positions) + np.searchsorted(self.beyond, positions)
+        return np.where(self.positions[place] == positions, place, outside)
+
     @classmethod
     def of_fronts(cls, whole: Fronts, fronts: Index) -> Part:
         """Part of these fronts, which holds all that lies between any of them in the tree."""
@@ -53,27 +61,55 @@ class Part:
         boundary = [whole.boundary[front] for front in fronts]
         near = np.concatenate([none, *boundary])
         beyond = np.setdiff1d(near, positions)
-        # Outside the part all rows come later than the own ones that are coupled to them.
-        place = np.searchsorted(positions, near)
-        own = positions[np.minimum(place, len(positions) - 1)] == near if len(near) else none > 0
-        local = np.where(own, place, len(positions) + np.searchsorted(beyond, near))
         counts = np.array([len(rows) for rows in boundary], dtype=np.int64)
-        return cls(
+        part = cls(
             fronts,
             positions,
             beyond,
             np.concatenate([[0], np.cumsum(stops - starts)]),
-            local,
+            near,
             np.concatenate([[0], np.cumsum(counts)]),
         )
+        return replace(part, near=part.rows_of(near))
 
 
 @dataclass(frozen=True)
-class Shares:
-    """Branches of the tree, which threads work on beside each other, and the fronts above them."""
+class Parts:
+    """All fronts in parts that threads work on: branches of the tree, and single fronts above them.
 
-    branches: list[Part]
-    top: Part
+    Attributes
+    ----------
+    parts
+        Children before parents.
+    parent
+        Number of each part's parent, -1 for a root.
+    children
+        Numbers of each part's children.
+    inherited
+        Rows of each part's `beyond` in its parent: own rows, then rows beyond.
+    """
+
+    parts: list[Part]
+    parent: list[int]
+    children: list[list[int]]
+    inherited: list[Index]
+
+    @classmethod
+    def of_ranges(cls, whole: Fronts, ranges: list[tuple[int, int]]) -> Parts:
+        """Parts of consecutive fronts, the last of which is above all the others."""
+        parts = [Part.of_fronts(whole, np.arange(*each)) for each in ranges]
+        part_of = np.repeat(np.arange(len(parts)), [stop - start for start, stop in ranges])
+        above = whole.parent[[stop - 1 for _, stop in ranges]]
+        parent = [int(part_of[front]) if front >= 0 else -1 for front in above]
+        children: list[list[int]] = [[] for _ in parts]
+        inherited = []
+        for number, (part, place) in enumerate(zip(parts, parent, strict=True)):
+            rows = part.beyond[:0]
+            if place >= 0:
+                children[place].append(number)
+                rows = parts[place].rows_of(part.beyond)
+            inherited.append(rows)
+        return cls(parts, parent, children, inherited)
 
 
 class Plan:
@@ -102,43 +138,37 @@ class Plan:
         self.coupling_offset = np.concatenate([[0], np.cumsum(own * outside)])
         self.bytes = int(UPDATES_FRACTION * 8 * (self.pivot_offset[-1] + self.coupling_offset[-1]))
         self._work = 2 * own**2 + 4 * own * outside
-        self._shares: dict[int, Shares] = {}
+        self._parts: dict[int, Parts] = {}
 
-    def shares(self, threads: int) -> Shares:
+    def parts(self, threads: int) -> Parts:
         """How the fronts are shared among threads; made once for each number of them."""
-        if threads not in self._shares:
-            branches = self._branches(threads)
-            inside = np.concatenate([np.arange(*branch) for branch in branches])
-            top = np.setdiff1d(np.arange(len(self.fronts)), inside)
-            self._shares[threads] = Shares(
-                [Part.of_fronts(self.fronts, np.arange(*branch)) for branch in branches],
-                Part.of_fronts(self.fronts, top),
-            )
-        return self._shares[threads]
+        if threads not in self._parts:
+            self._parts[threads] = Parts.of_ranges(self.fronts, self._ranges(threads))
+        return self._parts[threads]
 
-    def _branches(self, threads: int) -> list[tuple[int, int]]:
-        """Half-open ranges of fronts, whole branches of the tree, that threads take in turn.
-
-        The largest come first.
-        """
+    def _ranges(self, threads: int) -> list[tuple[int, int]]:
+        """Half-open ranges of fronts: whole branches of similar work, and each front above them."""
         parent = self.fronts.parent
+        if threads == 1:
+            return [(0, len(parent))]
         work = self._work.astype(float)
         size = np.ones(len(parent), dtype=np.int64)
         for front, above in enumerate(parent):
             if above >= 0:
                 work[above] += work[front]
                 size[above] += size[front]
-        chosen = [int(front) for front in np.flatnonzero(parent < 0)]
-        if threads > 1:
-            largest = work[chosen].sum() / (BRANCHES * threads)
-            while True:
-                big = max(chosen, key=lambda front: work[front])
-                if work[big] <= largest or not self.children[big]:
-                    break
-                chosen.remove(big)
-                chosen += self.children[big]
-        chosen.sort(key=lambda front: -work[front])
-        return [(front + 1 - int(size[front]), front + 1) for front in chosen]
+        branches = [int(front) for front in np.flatnonzero(parent < 0)]
+        largest = work[branches].sum() / (BRANCHES * threads)
+        alone = []
+        while True:
+            big = max(branches, key=lambda front: work[front])
+            if work[big] <= largest or not self.children[big]:
+                break
+            branches.remove(big)
+            branches += self.children[big]
+            alone.append(big)
+        ranges = [(front + 1 - int(size[front]), front + 1) for front in branches]
+        return sorted(ranges + [(front, front + 1) for front in alone])
 
 
 def _pivot_entries(n: int) -> int:
