@@ -11,6 +11,8 @@ import numpy as np
 from carillon.errors import UserError
 from carillon.fem.element import Array
 from carillon.files import require_writable
+from carillon.runtime import allowed_threads
+from carillon.threads import in_parallel
 from dataset_gen.objectives import closed_form, fit
 from forests.baselines import average, galerkin
 from forests.comparison.cases import BlockCase
@@ -156,10 +158,15 @@ def databases_of(
         return {case: _stored(stored, base, poisson, path) for case, base in bases.items()}
     if path is not None:
         require_writable(path)
-    databases = {
-        case: build(base, poisson, label=f"database of {case.name}", progress=True)
-        for case, base in bases.items()
-    }
+    # Compiled code fills them.  One bar for each of several at a time would be unreadable.
+    threads = min(allowed_threads(), len(bases))
+
+    def filled(case: BlockCase) -> Database:
+        label = f"database of {case.name}"
+        return build(bases[case], poisson, label=label, progress=threads == 1)
+
+    made = in_parallel(filled, [(case,) for case in bases], threads)
+    databases = dict(zip(bases, made, strict=True))
     if path is not None:
         save_databases(path, list(databases.values()))
     return databases

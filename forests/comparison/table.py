@@ -35,8 +35,11 @@ from forests.comparison.methods import (
 from forests.evaluate import MOST_BLOCKS
 from forests.model import Model
 
-TIMED_BLOCKS = 2000
-"""Most blocks that a run for the cost per block takes."""
+TIMED_BLOCKS, FEWEST_TIMED = 2000, 64
+"""Blocks that a run for the cost per block takes, at the most and at the least."""
+
+TIMED_SECONDS = 0.2
+"""What a run shall take, as far as these numbers allow."""
 
 TIMED_RUNS = 5
 """Runs whose median is the cost per block, after one that warms up; min and max are kept too."""
@@ -64,13 +67,19 @@ class TableOptions:
 
 
 def cost_per_block(method: Method, young: Array) -> Row:
-    """Cost [s] of blocks (n, 8) that are coarsened together on one core, and in how many runs."""
-    seconds = []
-    for _ in range(1 + TIMED_RUNS):
+    """Cost [s] of blocks (n, 8) that are coarsened together on one core, and in how many runs.
+
+    As many as can be in the time are taken, which the first few tell.
+    """
+
+    def run(count: int) -> float:
         start = time.perf_counter()
-        method.coarsen(young)
-        seconds.append((time.perf_counter() - start) / len(young))
-    timed = seconds[1:]
+        method.coarsen(young[:count])
+        return (time.perf_counter() - start) / min(count, len(young))
+
+    run(1)
+    count = min(max(round(TIMED_SECONDS / run(FEWEST_TIMED)), FEWEST_TIMED), TIMED_BLOCKS)
+    timed = [run(count) for _ in range(1 + TIMED_RUNS)][1:]
     return {
         "seconds_per_block": statistics.median(timed),
         "seconds_per_block_min": min(timed),
@@ -165,7 +174,7 @@ def _row(case: BlockCase, method: Method, young: Array, errors: Errors) -> Row:
         "method": method.name,
         **case.columns(),
         **summary(errors),
-        **cost_per_block(method, young[:TIMED_BLOCKS]),
+        **cost_per_block(method, young),
         "storage_bytes": method.storage_bytes,
         "training_seconds": method.training_seconds,
         "clamped": method.clamped,

@@ -16,11 +16,11 @@ from carillon.fem.moduli import require_coarse_moduli
 from carillon.progress import say
 from carillon.runtime import limit_threads, reuse_freed_memory
 from solver.analysis.bounds import FEWEST_SPARE, check_mode_count, default_keep, require_memory
-from solver.analysis.options import SolverOptions
+from solver.analysis.options import RANDOM, SolverOptions
 from solver.analysis.timing import Phases, peak_memory
 from solver.assembly.system import Layout, System, assemble
-from solver.correction.cold import Cold, from_nothing
-from solver.correction.correct import EIGENVALUE_TOLERANCE, carried, correct
+from solver.correction.cold import Approximation, Cold, from_nothing
+from solver.correction.correct import EIGENVALUE_TOLERANCE, carried, correct, resolved
 from solver.distribution.collective import bcast_from_root, compute_on_root
 from solver.distribution.local_mesh import LocalMesh, distribute, scatter_moduli
 from solver.hcms.synthesis import Synthesis, make_subdomains, synthesize
@@ -104,6 +104,10 @@ class _Solution:
     inverse: Lasting | None = None
 
 
+Initial = Modes | Approximation | Array
+"""What an analysis may start from."""
+
+
 class ModalSolver:
     """Modes of one mesh for any material on it.
 
@@ -162,19 +166,19 @@ class ModalSolver:
         reuse_freed_memory()
         phases = Phases(comm, verbose)
         with phases("partition"):
-            subdomains = comm.size if options.method == "lanczos" else options.subdomains
+            subdomains = comm.size if options.method in RANDOM else options.subdomains
             self.local_mesh = distribute(model, subdomains, options.seed, comm)
         with phases("analysis"):
             self._layout = Layout.of_local_mesh(self.local_mesh, comm)
             self._linear = LinearSolver(options.linear_solver, self._layout)
+            if options.method == "lanczos" and not self._linear.indefinite:
+                self.options = options = replace(options, method="lobpcg")
             if options.method == "hcms":
                 self._keep = self._modes_to_keep()
                 self._subdomains = make_subdomains(self.local_mesh, options.interface, comm)
         self.seconds = phases.seconds
 
-    def solve(
-        self, young: Array | None = None, initial_modes: Modes | Array | None = None
-    ) -> Modes:
+    def solve(self, young: Array | None = None, initial_modes: Initial | None = None) -> Modes:
         """Compute the lowest modes.
 
         All ranks call it and get the same values.
@@ -185,8 +189,8 @@ class ModalSolver:
             Young's modulus [Pa] as `Solid.with_young` takes it, (m,) of the voxels for example, on
             rank 0; that of the model if not given.
         initial_modes
-            Modes of a similar material on the same mesh, or this rank's rows (local, k) of such:
-            they are corrected instead of those of HCMS.
+            Modes of a similar material on the same mesh, or this rank's rows (local, k) of such,
+            or those of a coarser mesh, see `solver.analysis.coarse_start`: they are corrected.
 
         Raises
         ------
@@ -198,9 +202,7 @@ class ModalSolver:
         """
         return self._solve(young, initial_modes, lambda model, given: model.element_moduli(given))
 
-    def solve_coarse(
-        self, moduli: Array | None, initial_modes: Modes | Array | None = None
-    ) -> Modes:
+    def solve_coarse(self, moduli: Array | None, initial_modes: Initial | None = None) -> Modes:
         """The same with the moduli (m, 8) [Pa] that a coarsening made, on rank 0.
 
         They may lie beyond the limits of those that users give.
@@ -221,7 +223,7 @@ class ModalSolver:
     def _solve(
         self,
         young: Array | None,
-        initial_modes: Modes | Array | None,
+        initial_modes: Initial | None,
         moduli_of: Callable[[Solid, Array], Array],
     ) -> Modes:
         phases = Phases(self.comm, self._verbose)
@@ -278,7 +280,7 @@ class ModalSolver:
         corrected = options.corrections > 0 and options.tolerance != 0.0
         return options.is_general or corrected
 
-    def _is_of_same_mesh(self, initial_modes: Modes | Array | None) -> TypeGuard[Modes]:
+    def _is_of_same_mesh(self, initial_modes: Initial | None) -> TypeGuard[Modes]:
         """Whether these are modes that this solver found."""
         if not isinstance(initial_modes, Modes):
             return False
@@ -331,7 +333,8 @@ class ModalSolver:
         inertia = None
         if can_count():
             with phases("inertia"):
-                inertia = count_beyond(system, truth)
+                count = None if options.is_general else self._linear.count_below
+                inertia = count_beyond(system, truth, count)
         if inertia is None or inertia.counted != inertia.computed:
             tolerance = options.tolerance if options.is_general else None
             with phases("completion"):
@@ -351,7 +354,7 @@ class ModalSolver:
         local_mesh: LocalMesh,
         system: System,
         young: Array | None,
-        initial_modes: Modes | Array | None,
+        initial_modes: Initial | None,
         phases: Phases,
         evidence: dict[str, Any],
     ) -> _Solution:
@@ -363,22 +366,31 @@ class ModalSolver:
         values: Array | None = None
         similar: Lasting | None = None
         cold: Cold | None = None
+        near: Approximation | None = None
         if isinstance(initial_modes, Modes):
             if self._is_of_same_mesh(initial_modes):
                 similar = initial_modes.inverse
             start: Array | None = initial_modes.start()
+        elif isinstance(initial_modes, Approximation):
+            near, start = initial_modes, None
+            if options.method != "lanczos":
+                start = near.vectors
         else:
             start = initial_modes
-        if start is None and options.method == "lanczos":
+        if start is None and options.method == "lobpcg":
+            pass
+        elif start is None and options.method == "lanczos":
             with phases("lanczos"):
                 cold = from_nothing(
                     system,
                     self._linear,
                     requested,
+                    resolved(requested, tolerance),
                     carried(requested, tolerance),
                     self._law(young),
                     tolerance,
                     options.seed,
+                    near,
                 )
             values, start = cold.found.values, cold.found.vectors
         elif start is None:

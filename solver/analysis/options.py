@@ -13,7 +13,9 @@ from solver.hcms.condense import DEFAULT_INTERFACE, INTERFACES
 from solver.reference.eigensolver import TYPES
 from solver.reference.truth import RESIDUAL_TOLERANCE
 
-METHODS = ("auto", "hcms", "lanczos", *TYPES)
+METHODS = ("auto", "hcms", "lanczos", "lobpcg", *TYPES)
+RANDOM = ("lanczos", "lobpcg")
+"""Methods that begin with random vectors."""
 MAX_CORRECTIONS = 40
 LEAST_UNKNOWNS = 4
 """Unknowns to each mode from which on the modes are few of all there are."""
@@ -42,8 +44,9 @@ class SolverOptions:
 
     method: str = option(
         "auto",
-        "hcms with error correction; lanczos from random vectors; auto, the faster of these; or "
-        "ground truth by slepc or arpack",
+        "hcms with error correction; from random vectors lanczos, or lobpcg with multigrid for "
+        "what is too large to factorise; auto, the fastest of these; or ground truth by slepc or "
+        "arpack",
         choices=METHODS,
     )
     modes: int = option(256, "number of modes, rigid ones included", type=number_of_modes)
@@ -107,25 +110,36 @@ class SolverOptions:
         Raises
         ------
         UserError
-            For `lanczos` with options that it has no use for.
+            For options that the method has no use for.
         """
-        for_hcms = {
+        given = {
             "--retained-modes": self.retained_modes,
             "--cutoff": self.cutoff,
             "--subdomains": self.subdomains,
         }
-        strange = [name for name, value in for_hcms.items() if value is not None]
-        if self.linear_solver in linear.ITERATIVE:
-            strange.append(f"--linear-solver {self.linear_solver}")
+        strange = [name for name, value in given.items() if value is not None]
         if self.acceleration != "lanczos":
             strange.append(f"--acceleration {self.acceleration}")
         if self.corrections == 0:
             strange.append("--corrections 0")
         if self.tolerance == 0.0:
             strange.append("--tolerance 0")
-        if self.method == "lanczos" and strange:
-            raise UserError(f"--method lanczos has no use for {', '.join(strange)}; use hcms")
+        if self.linear_solver == "icc-pcg":
+            strange.append("--linear-solver icc-pcg")
+        if self.method in RANDOM and strange:
+            raise UserError(f"--method {self.method} has no use for {', '.join(strange)}; use hcms")
+        multigrid = self.linear_solver == "amg-cg"
+        if self.method == "lanczos" and multigrid:
+            raise UserError("--method lanczos has no use for --linear-solver amg-cg; use lobpcg")
+        if self.method == "lobpcg":
+            if self.linear_solver not in ("auto", "amg-cg"):
+                raise UserError(
+                    f"--method lobpcg has no use for --linear-solver {self.linear_solver}; use "
+                    "lanczos"
+                )
+            return replace(self, linear_solver="amg-cg")
         if self.method != "auto":
             return self
-        few = n_dofs < LEAST_UNKNOWNS * self.modes
-        return replace(self, method="hcms" if strange or few else "lanczos")
+        if strange or n_dofs < LEAST_UNKNOWNS * self.modes:
+            return replace(self, method="hcms")
+        return replace(self, method="lobpcg" if multigrid else "lanczos")

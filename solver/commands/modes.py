@@ -24,10 +24,15 @@ from carillon.options import add_options, collect
 from carillon.progress import say
 from solver.accuracy.options import FIRST_RESOLUTION, DistanceOptions
 from solver.accuracy.solving import Wishes, solve_accurately, solve_solid
-from solver.analysis.modal_solver import ModalSolver, Modes
+from solver.analysis.coarse_start import coarse_start
+from solver.analysis.modal_solver import Initial, ModalSolver, Modes
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import Problem, ProblemOptions
+from solver.coarsening.choice import make_coarsening
+from solver.coarsening.coarsening import Coarsening
+from solver.coarsening.forest import forest_or_reason
 from solver.commands.running import add_solid, on_ranks, parameters, require_outputs
+from solver.distribution.collective import compute_on_root
 from solver.files.initial_modes import modes_from_file
 from solver.files.modes_file import ESTIMATE, frequencies, write_modes
 from solver.linear import petsc_options
@@ -63,6 +68,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--initial-modes", metavar="MODES", help="modes file of a similar material to start from"
     )
     parser.add_argument(
+        "--refine",
+        action="store_true",
+        help="start from the modes of the coarsened solid (by forests, or Galerkin's without)",
+    )
+    parser.add_argument(
         "--petsc",
         metavar="OPTIONS",
         help='options for PETSc and SLEPc with the prefix carillon_, as in "-carillon_eps_ncv 400"',
@@ -83,15 +93,18 @@ def run(arguments: argparse.Namespace) -> None:
         )
         petsc_options.insert_options(arguments.petsc, options.method)
         initial = arguments.initial_modes
+        coarsening = compute_on_root(comm, lambda: _coarsening(arguments, described))
 
         def solve(model: Solid | None, modes: int | None = None) -> Modes:
             nonlocal initial
             asked = options if modes is None else _for_estimate(options, modes)
             prepared = ModalSolver(model, asked, comm, verbose=sys.stderr.isatty())
-            start = None
+            start: Initial | None = None
             if initial is not None:
                 start = modes_from_file(initial, model, asked.modes, prepared.local_mesh, comm)
                 initial = None
+            elif arguments.refine:
+                start = coarse_start(prepared, model, coarsening)
             result = prepared.solve(initial_modes=start)
             result.seconds = {**prepared.seconds, **result.seconds}
             return result
@@ -133,6 +146,18 @@ def run(arguments: argparse.Namespace) -> None:
         if comm.rank == 0:
             _warn_about_options()
             _print_summary(attributes, result.values, arguments)
+
+
+def _coarsening(arguments: argparse.Namespace, described: ProblemOptions) -> Coarsening | None:
+    """What makes the coarse solid to start from."""
+    if not arguments.refine:
+        return None
+    if described.coarsen != "none" or described.discretisation != "voxel":
+        raise UserError("--refine starts from the coarsened solid: expected voxels, --coarsen none")
+    if arguments.initial_modes is not None:
+        raise UserError("--refine makes the modes to start from: leave out --initial-modes")
+    forest, _ = forest_or_reason(described.forest, described.poisson)
+    return forest or make_coarsening("galerkin")
 
 
 def _for_estimate(options: SolverOptions, modes: int) -> SolverOptions:

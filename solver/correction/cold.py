@@ -1,16 +1,21 @@
-"""Modes of which nothing is known: block Lanczos from random vectors."""
+"""Modes of which little is known: block Lanczos from random vectors, or modes of a coarser mesh."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
 from solver.assembly.system import System
-from solver.correction.lanczos import RANDOM_LOOK, Lanczos, lanczos
+from solver.correction.lanczos import RANDOM_LOOK, Lanczos, lanczos, mixed
 from solver.correction.shift import AIM, inverse_amid
 from solver.linear import Inverse, LinearSolver
 from solver.subspace.start import start_block
 from solver.subspace.weyl import CountingLaw
+
+Array = NDArray[np.float64]
 
 MODES_OF_EIGHT, FEWEST_COLUMNS, MOST_COLUMNS = 100, 8, 24
 """Modes for every eight columns of the first block, and its least and greatest width: the narrower,
@@ -20,6 +25,22 @@ NEAR = 20_000
 as many."""
 ATTEMPTS, OFF_RESONANCE = 3, 0.97
 """Shifts that are tried, and by what the next is moved off an eigenvalue that one has hit."""
+
+
+@dataclass(frozen=True)
+class Approximation:
+    """Modes of a coarser model.
+
+    Attributes
+    ----------
+    values
+        (q,) its elastic eigenvalues [rad^2/s^2], which are about those of the fine model.
+    vectors
+        (local, q) its modes on the fine mesh, which are far too stiff there.
+    """
+
+    values: Array
+    vectors: Array
 
 
 @dataclass
@@ -34,23 +55,27 @@ def from_nothing(
     system: System,
     linear: LinearSolver,
     requested: int,
+    resolved: int,
     width: int,
     law: CountingLaw,
     tolerance: float,
     seed: int = 0,
+    near: Approximation | None = None,
 ) -> Cold:
-    """Lowest elastic modes from random vectors.
+    """Lowest elastic modes from random vectors, or from the modes of a coarser model.
 
     Parameters
     ----------
-    requested, width
-        Modes to become accurate, and to return.
+    requested, resolved, width
+        Modes wanted, to become accurate, and to return.
     law
         Where eigenvalues are expected, for the shift.
     tolerance
         Relative eigenvalue error to stop at.
     seed
         Of the random vectors, which do not depend on the number of ranks.
+    near
+        Modes to begin with, more than requested.
 
     Raises
     ------
@@ -58,14 +83,25 @@ def from_nothing(
         If every shift is an eigenvalue.
     """
     elastic = system.n_dofs - system.rigid.shape[1]
-    start = start_block(system, min(_columns(requested, system.n_dofs), elastic), seed)
+    columns = min(_columns(requested, system.n_dofs), elastic)
+    start, look = start_block(system, columns, seed), int(RANDOM_LOOK * requested)
     share = AIM
     for _ in range(ATTEMPTS):
-        inverse = inverse_amid(system, linear, requested, law, share)
-        look = int(RANDOM_LOOK * requested)
-        found = lanczos(system, inverse, start, requested, width, tolerance, look)
+        first = None if near is None else float(near.values[int(share * requested)])
+        inverse = inverse_amid(system, linear, requested, law, share, first)
+        if near is not None:
+            start, look = mixed(
+                system,
+                near.values,
+                near.vectors,
+                requested,
+                inverse.shift,
+                tolerance,
+                columns,
+            )
+        found = lanczos(system, inverse, start, resolved, width, tolerance, look)
         if not found.resonant:
-            return Cold(found, inverse)
+            return Cold(replace(found, errors=found.errors[:requested]), inverse)
         inverse.destroy()
         share *= OFF_RESONANCE
     raise ConvergenceError(

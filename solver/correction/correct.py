@@ -18,6 +18,7 @@ from solver.distribution.collective import bcast_from_root
 from solver.linear import Approximate, Inverse, Lasting, LinearSolver
 from solver.subspace.rayleigh_ritz import rayleigh_ritz, safe_shift
 from solver.subspace.spectrum import WEYL_EXPONENT
+from solver.subspace.start import start_block
 
 Array = NDArray[np.float64]
 
@@ -92,7 +93,7 @@ class Correction:
 
 def correct(
     system: System,
-    start: Array,
+    start: Array | None,
     requested: int,
     linear: LinearSolver,
     values: Array | None = None,
@@ -118,7 +119,8 @@ def correct(
     Parameters
     ----------
     start
-        (local, q) approximate modes, q > requested for a margin.
+        (local, q) approximate modes, q > requested for a margin; None for random vectors, which
+        only multigrid begins with.
     requested
         Number of elastic modes to correct.
     linear
@@ -157,6 +159,7 @@ def correct(
     """
     if acceleration == "lanczos" and linear.method == "amg-cg":
         return _by_gradients(system, start, requested, linear, tolerance, max_steps, report)
+    assert start is not None
     rough = values is not None and begun is None
     if values is None:
         values, start = rayleigh_ritz(system, start)
@@ -185,7 +188,7 @@ def correct(
 
 def _by_gradients(
     system: System,
-    start: Array,
+    start: Array | None,
     requested: int,
     linear: LinearSolver,
     tolerance: float,
@@ -194,8 +197,10 @@ def _by_gradients(
 ) -> Correction:
     """What multigrid does best: many cheap steps, each with one cycle of it."""
     inverse = linear.iterative(system, -safe_shift(system))
+    width = requested + default_guard(requested)
     try:
-        width = requested + default_guard(requested)
+        if start is None:
+            start = inverse.precondition(system.times_mass(start_block(system, width, 0)))
         start = start[:, :width]
         found = lobpcg(system, inverse.precondition, start, requested, tolerance, max_steps, report)
     finally:
@@ -221,6 +226,17 @@ def carried(requested: int, tolerance: float) -> int:
     """Vectors that a block Lanczos iteration is to return: the wanted ones and those beyond."""
     guard = default_guard(requested)
     return requested + (guard if tolerance >= LOOSE else int(IMPROVED_GUARDS * guard) + 1)
+
+
+def resolved(requested: int, tolerance: float) -> int:
+    """Modes that a first iteration has to find accurately.
+
+    Those beyond decide how fast the modes of a similar material follow, which only a loose
+    tolerance is for.
+    """
+    return requested + (
+        int(IMPROVED_GUARDS * default_guard(requested)) if tolerance >= LOOSE else 0
+    )
 
 
 def default_guard(requested: int) -> int:

@@ -135,20 +135,28 @@ def lanczos(
 
 
 def mixed(
-    system: System, values: Array, vectors: Array, requested: int, shift: float, tolerance: float
+    system: System,
+    values: Array,
+    vectors: Array,
+    requested: int,
+    shift: float,
+    tolerance: float,
+    columns: int | None = None,
 ) -> tuple[Array, int]:
     """A first block (local, b) of approximate modes, and when to look first.
 
     Parameters
     ----------
     values, vectors
-        (q,) and (local, q) Ritz pairs, orthogonal to the rigid motions, q >= requested.
+        (q,) and (local, q) approximate pairs, orthogonal to the rigid motions, q >= requested.
+    columns
+        Width of the block, if modes are not so near as those of HCMS.
     """
     count, look = requested, 1.0
     if tolerance <= ROUGH:
         count, look = min(len(values), int(MIXED * requested)), FIRST_LOOK
     modes = vectors[:, :count]
-    columns = min(_columns(requested), requested)
+    columns = min(columns or _columns(requested), requested)
     signs = _signs(system, modes)
     return _mixture(values[:count], modes, signs, shift, columns), int(look * count)
 

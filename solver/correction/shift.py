@@ -15,7 +15,12 @@ TRIES = 4
 
 
 def inverse_amid(
-    system: System, linear: LinearSolver, requested: int, law: CountingLaw, share: float = AIM
+    system: System,
+    linear: LinearSolver,
+    requested: int,
+    law: CountingLaw,
+    share: float = AIM,
+    first: float | None = None,
 ) -> Inverse:
     """Inverse of K - mu M, a share of the `requested` lowest elastic eigenvalues below mu.
 
@@ -23,10 +28,13 @@ def inverse_amid(
     ----------
     law
         Where eigenvalues are expected; a factor of its own is found as counts come in.
+    first
+        Shift to begin with, if more is known than the law.
     """
     low, high, scale = 0.0, float("inf"), 1.0
     for _ in range(TRIES - 1):
-        shift = scale * law.eigenvalue(share * requested + RIGID_MODES)
+        shift = first or scale * law.eigenvalue(share * requested + RIGID_MODES)
+        first = None
         if not low < shift < high:
             shift = (low * high) ** 0.5
         inverse = linear.inverse(system, shift)

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
+from carillon.runtime import available_memory
 
 if TYPE_CHECKING:
     from solver.assembly.system import Layout, System
     from solver.linear.iterative import IterativeInverse
+    from solver.linear.plan import Plan
 
 Array = NDArray[np.float64]
 
 METHODS = ("auto", "multifrontal", "mumps", "icc-pcg", "amg-cg")
 ITERATIVE = ("icc-pcg", "amg-cg")
-LARGEST_FRONTS = 120_000
-"""Nodes up to which `auto` uses the multifrontal solver, whose fronts are stored in full."""
+LARGEST_SHARED = 500_000
+"""Unknowns up to which `auto` factorises on several ranks."""
+MEMORY_SHARE = 0.8
+"""Of the free memory, what a factorisation may take."""
 
 
 class Inverse(Protocol):
@@ -127,7 +132,7 @@ class LinearSolver:
         `multifrontal`: sparse factorisation by blocks, on one rank.  `mumps`: the same by MUMPS, on
         any number of ranks.  `icc-pcg`: conjugate gradients with incomplete Cholesky, the paper's.
         `amg-cg`: conjugate gradients with algebraic multigrid, for models too large to factorise.
-        `auto`: the fastest of the direct ones.
+        `auto`: the fastest direct one that the memory holds, or else `amg-cg`.
     layout
         Of the mesh.
 
@@ -140,23 +145,42 @@ class LinearSolver:
     def __init__(self, method: str, layout: Layout) -> None:
         if method not in METHODS:
             raise UserError(f"linear solver {method!r}, expected one of {', '.join(METHODS)}")
-        nodes = layout.local_mesh.n_dofs // 3
-        if method == "auto":
-            alone = layout.comm.size == 1 and nodes <= LARGEST_FRONTS
-            method = "multifrontal" if alone else "mumps"
-        if method == "multifrontal" and layout.comm.size > 1:
+        alone = layout.comm.size == 1
+        if method == "multifrontal" and not alone:
             raise UserError(
                 f"the linear solver multifrontal runs on one rank, not on {layout.comm.size}; "
                 "use mumps"
             )
+        self._layout = layout
+        if method == "auto" and alone:
+            available = available_memory()
+            fits = available is None or self._plan.bytes < MEMORY_SHARE * available
+            method = "multifrontal" if fits else "amg-cg"
+        elif method == "auto":
+            small = layout.local_mesh.n_dofs <= LARGEST_SHARED
+            method = "mumps" if small else "amg-cg"
         self.method = method
-        self._plan = None
         if method == "multifrontal":
-            from solver.linear.plan import Plan
+            # What depends on the mesh alone.
+            self._plan  # noqa: B018
 
-            local_mesh, pattern = layout.local_mesh, layout.pattern
-            steps = local_mesh.cells.elements.steps
-            self._plan = Plan(local_mesh.lattice(), pattern.indptr, pattern.columns, steps=steps)
+    @cached_property
+    def _plan(self) -> Plan:
+        """Elimination of this rank's rows, which are all rows."""
+        from solver.linear.plan import Plan
+
+        local_mesh, pattern = self._layout.local_mesh, self._layout.pattern
+        steps = local_mesh.cells.elements.steps
+        return Plan(local_mesh.lattice(), pattern.indptr, pattern.columns, steps=steps)
+
+    def count_below(self, system: System, value: float) -> int | None:
+        """Eigenvalues of K - value M below zero, by inertia; None if that is MUMPS's to do."""
+        if system.comm.size > 1:
+            return None
+        from solver.linear.multifrontal import count_below
+
+        rows = system.rows
+        return count_below(self._plan, rows.stiffness, rows.mass, value, rows.threads)
 
     @property
     def indefinite(self) -> bool:
@@ -171,7 +195,7 @@ class LinearSolver:
 
     def inverse(self, system: System, shift: float) -> Inverse:
         """Inverse of K - shift M; the shift is negative for an iterative method."""
-        if self._plan is not None:
+        if self.method == "multifrontal":
             from solver.linear.multifrontal import Factor
 
             rows = system.rows

@@ -66,59 +66,17 @@ class Factor:
     def __init__(
         self, plan: Plan, stiffness: Array, mass: Array, shift: float, threads: int = 1
     ) -> None:
+        _require_memory(plan, plan.bytes)
         self._plan = plan
         self._threads = threads
         self.shift = shift
-        _require_memory(plan)
         self._pivots = np.empty(plan.pivot_offset[-1])
         self._coupling = np.empty(plan.coupling_offset[-1])
-        self.negative = self._factor(stiffness, mass)
+        kept = self._pivots, self._coupling
+        self.negative = _eliminate(plan, stiffness, mass, shift, threads, kept)
 
     def destroy(self) -> None:
         """Nothing but arrays to free."""
-
-    def _factor(self, stiffness: Array, mass: Array) -> int:
-        plan = self._plan
-        updates: dict[int, Array] = {}
-        first = plan.fronts.first
-
-        def eliminated(front: int, threads: int = 1) -> int:
-            n = 3 * int(first[front + 1] - first[front])
-            b = 3 * len(plan.fronts.boundary[front])
-            pivots = self._pivots[plan.pivot_offset[front] : plan.pivot_offset[front + 1]]
-            coupling = self._coupling[plan.coupling_offset[front] : plan.coupling_offset[front + 1]]
-            own = np.zeros((n, n + b))
-            _add_entries(own, plan.entries[front], stiffness, mass, self.shift)
-            # A piece that nothing connects to the rest has no update.
-            children = [child for child in plan.children[front] if child in updates]
-            for child in children:
-                _subtract_from_own(own, plan.places[child], updates[child])
-            scaled, negative = _eliminate_panels(own, pivots)
-            for strip in range(0, b, STRIP):
-                few = min(STRIP, b - strip)
-                kept = coupling[n * strip : n * (strip + few)].reshape(n, few)
-                kept[:] = scaled[:, n + strip : n + strip + few]
-            if b:
-                update = _product(own[:, n:], scaled[:, n:], threads)
-                for child in children:
-                    _add_beyond(update, n // 3, plan.places[child], updates.pop(child))
-                updates[front] = update
-            return negative
-
-        parts = plan.parts(self._threads)
-
-        def eliminate_part(part: Part) -> int:
-            return sum(eliminated(int(front)) for front in part.fronts)
-
-        # The fronts above the branches are few and large: threads share each of them.
-        branches = [
-            part for part, below in zip(parts.parts, parts.children, strict=True) if not below
-        ]
-        negative = sum(in_parallel(eliminate_part, [(part,) for part in branches], self._threads))
-        for part, below in zip(parts.parts, parts.children, strict=True):
-            if below:
-                negative += eliminated(int(part.fronts[0]), self._threads)
-        return negative
 
     def solve(self, vectors: Array) -> Array:
         """Solution (3 n, k) for a C-ordered block of right-hand sides (3 n, k)."""
@@ -129,7 +87,7 @@ class Factor:
 
     def _solve_columns(self, vectors: Array, solution: Array, start: int, stop: int) -> None:
         """Solve for the columns [start, stop): up the tree of parts, and down again."""
-        tree, width = self._plan.parts(self._threads), stop - start
+        tree, width = self._plan.shares(self._threads), stop - start
         order, lanes = self._plan.fronts.order, lanes_of(width)
         works: list[Array] = [np.empty(0)] * len(tree.parts)
 
@@ -170,18 +128,81 @@ class Factor:
         )
 
 
-def _require_memory(plan: Plan) -> None:
+def count_below(plan: Plan, stiffness: Array, mass: Array, value: float, threads: int = 1) -> int:
+    """Number of eigenvalues below `value`, by a factorisation that is forgotten as it is made.
+
+    The arguments and errors are those of `Factor`.
+    """
+    _require_memory(plan, plan.bytes_of_updates)
+    return _eliminate(plan, stiffness, mass, value, threads, None)
+
+
+def _require_memory(plan: Plan, needed: int) -> None:
     """The system lends memory that it has not got, and kills who uses it."""
     available = available_memory()
-    if available is not None and plan.bytes > available:
+    if available is not None and needed > available:
         raise LocalConvergenceError(
             f"the sparse factorisation of {3 * len(plan.position):,} unknowns takes about "
-            f"{plan.bytes / 1e9:.1f} GB, {available / 1e9:.1f} GB are free; use --linear-solver "
+            f"{needed / 1e9:.1f} GB, {available / 1e9:.1f} GB are free; use --linear-solver "
             "amg-cg, or mumps on more ranks of more machines"
         )
 
 
-def _eliminate_panels(own: Array, pivots: Array) -> tuple[Array, int]:
+def _eliminate(
+    plan: Plan,
+    stiffness: Array,
+    mass: Array,
+    shift: float,
+    threads: int,
+    kept: tuple[Array, Array] | None,
+) -> int:
+    """Eliminate all fronts, and count the negative eigenvalues of their pivots.
+
+    What a solve needs goes to `kept`: pivots with what couples panels, and W in strips.
+    """
+    updates: dict[int, Array] = {}
+    first = plan.fronts.first
+
+    def eliminated(front: int, threads: int = 1) -> int:
+        n = 3 * int(first[front + 1] - first[front])
+        b = 3 * len(plan.fronts.boundary[front])
+        own = np.zeros((n, n + b))
+        _add_entries(own, plan.entries[front], stiffness, mass, shift)
+        # A piece that nothing connects to the rest has no update.
+        children = [child for child in plan.children[front] if child in updates]
+        for child in children:
+            _subtract_from_own(own, plan.places[child], updates[child])
+        pivots = None
+        if kept is not None:
+            pivots = kept[0][plan.pivot_offset[front] : plan.pivot_offset[front + 1]]
+        scaled, negative = _eliminate_panels(own, pivots)
+        if kept is not None:
+            coupling = kept[1][plan.coupling_offset[front] : plan.coupling_offset[front + 1]]
+            for strip in range(0, b, STRIP):
+                few = min(STRIP, b - strip)
+                part = coupling[n * strip : n * (strip + few)].reshape(n, few)
+                part[:] = scaled[:, n + strip : n + strip + few]
+        if b:
+            update = _product(own[:, n:], scaled[:, n:], threads)
+            for child in children:
+                _add_beyond(update, n // 3, plan.places[child], updates.pop(child))
+            updates[front] = update
+        return negative
+
+    def eliminated_part(part: Part) -> int:
+        return sum(eliminated(int(front)) for front in part.fronts)
+
+    # The fronts above the branches are few and large: threads share each of them.
+    tree = plan.shares(threads)
+    branches = [(part,) for part, below in zip(tree.parts, tree.children, strict=True) if not below]
+    negative = sum(in_parallel(eliminated_part, branches, threads))
+    for part, below in zip(tree.parts, tree.children, strict=True):
+        if below:
+            negative += eliminated(int(part.fronts[0]), threads)
+    return negative
+
+
+def _eliminate_panels(own: Array, pivots: Array | None) -> tuple[Array, int]:
     """Eliminate the own rows of a front, a panel of them at a time.
 
     Parameters
@@ -210,6 +231,8 @@ def _eliminate_panels(own: Array, pivots: Array) -> tuple[Array, int]:
         inverse, below = _inverse(rows[:, :size])
         negative += below
         np.matmul(inverse, rows[:, size:], out=scaled[start:stop, stop:])
+        if pivots is None:
+            continue
         for part in (inverse, scaled[start:stop, stop:n]):
             pivots[place : place + part.size].reshape(part.shape)[:] = part
             place += part.size

@@ -17,8 +17,8 @@ PANEL = 120
 """Rows of a front that are eliminated together."""
 BRANCHES = 3
 """Branches for each thread, at least: their work is not equal."""
-UPDATES_FRACTION = 1.3
-"""Memory at its peak, when updates wait for their parents, as a share of what the factor takes."""
+MEMORY_MARGIN = 1.2
+"""Memory of fronts and updates over what one thread would need, since several are at work."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Parts:
+class Shares:
     """All fronts in parts that threads work on: branches of the tree, and single fronts above them.
 
     Attributes
@@ -95,7 +95,7 @@ class Parts:
     inherited: list[Index]
 
     @classmethod
-    def of_ranges(cls, whole: Fronts, ranges: list[tuple[int, int]]) -> Parts:
+    def of_ranges(cls, whole: Fronts, ranges: list[tuple[int, int]]) -> Shares:
         """Parts of consecutive fronts, the last of which is above all the others."""
         parts = [Part.of_fronts(whole, np.arange(*each)) for each in ranges]
         part_of = np.repeat(np.arange(len(parts)), [stop - start for start, stop in ranges])
@@ -123,6 +123,11 @@ class Plan:
         Node graph in compressed rows; the data of `Factor` follow it.
     options
         Others of `solver.linear.dissection.dissect`.
+
+    Attributes
+    ----------
+    bytes, bytes_of_updates
+        Memory that a factorisation takes while it is made, and without what a solve needs of it.
     """
 
     def __init__(self, lattice: Index, indptr: Index, indices: Index, **options: Any) -> None:
@@ -136,15 +141,25 @@ class Plan:
         outside = 3 * np.array([len(boundary) for boundary in fronts.boundary])
         self.pivot_offset = np.concatenate([[0], np.cumsum([_pivot_entries(n) for n in own])])
         self.coupling_offset = np.concatenate([[0], np.cumsum(own * outside)])
-        self.bytes = int(UPDATES_FRACTION * 8 * (self.pivot_offset[-1] + self.coupling_offset[-1]))
+        self.bytes_of_updates = int(8 * MEMORY_MARGIN * self._most_at_a_time(own, outside))
+        kept = self.pivot_offset[-1] + self.coupling_offset[-1]
+        self.bytes = 8 * int(kept) + self.bytes_of_updates
         self._work = 2 * own**2 + 4 * own * outside
-        self._parts: dict[int, Parts] = {}
+        self._shares: dict[int, Shares] = {}
 
-    def parts(self, threads: int) -> Parts:
+    def _most_at_a_time(self, own: Index, outside: Index) -> int:
+        """Numbers in a front and in the updates that wait for their parents, at the most."""
+        waiting = most = 0
+        for front, (n, b) in enumerate(zip(own.tolist(), outside.tolist(), strict=True)):
+            most = max(most, waiting + 2 * n * (n + b) + b * b)
+            waiting += b * b - sum(int(outside[child]) ** 2 for child in self.children[front])
+        return most
+
+    def shares(self, threads: int) -> Shares:
         """How the fronts are shared among threads; made once for each number of them."""
-        if threads not in self._parts:
-            self._parts[threads] = Parts.of_ranges(self.fronts, self._ranges(threads))
-        return self._parts[threads]
+        if threads not in self._shares:
+            self._shares[threads] = Shares.of_ranges(self.fronts, self._ranges(threads))
+        return self._shares[threads]
 
     def _ranges(self, threads: int) -> list[tuple[int, int]]:
         """Half-open ranges of fronts: whole branches of similar work, and each front above them."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -116,13 +117,16 @@ def can_count() -> bool:
     return bool(PETSc.Sys.hasExternalPackage("mumps"))
 
 
-def count_beyond(system: System, truth: Truth) -> Inertia:
+def count_beyond(
+    system: System, truth: Truth, count: Callable[[System, float], int | None] | None = None
+) -> Inertia:
     """Count, by the inertia of K - mu M, the eigenvalues below a mu beyond the last wanted one.
 
-    The shift mu lies in the widest gap among the spare modes.
+    The shift mu lies in the widest gap among the spare modes.  MUMPS counts, unless `count` can.
     """
     value, computed = _gap(truth.values, truth.modes, system.n_dofs)
-    return Inertia(value, count_below(system, value), computed)
+    counted = None if count is None else count(system, value)
+    return Inertia(value, count_below(system, value) if counted is None else counted, computed)
 
 
 def complete(

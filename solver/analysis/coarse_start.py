@@ -1,0 +1,89 @@
+"""Modes of the coarsened solid on its fine mesh, as a start for those of the fine solid."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from carillon.errors import UserError
+from carillon.fem.geometry import Blocks, blocks_from_mesh, prolongation
+from carillon.fem.model import RIGID_MODES, ElasticModel, Solid
+from solver.analysis.modal_solver import ModalSolver
+from solver.analysis.options import SolverOptions
+from solver.coarsening.coarsening import Coarsening
+from solver.coarsening.model import coarse_model, element_moduli
+from solver.correction.cold import Approximation
+from solver.correction.correct import default_guard
+from solver.distribution.collective import compute_on_root
+from solver.files.initial_modes import COLUMNS, scatter_rows
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 1e-3
+"""Relative eigenvalue error of the coarse modes: less than what coarsening adds."""
+
+
+def coarse_start(
+    solver: ModalSolver, model: Solid | None, coarsening: Coarsening | None
+) -> Approximation:
+    """Modes of the 2x2x2 blocks of a fine model, prolonged to its nodes; collective.
+
+    Parameters
+    ----------
+    solver
+        Prepared for the fine model.
+    model, coarsening
+        The fine model, of voxels with one modulus each, and what makes coarse elements of its
+        blocks; on rank 0.
+
+    Raises
+    ------
+    UserError
+        For a model that is not coarsened, or too few coarse unknowns.
+    """
+    comm = solver.comm
+    blocks: Blocks | None = None
+
+    def coarsened() -> ElasticModel:
+        nonlocal blocks
+        assert model is not None and coarsening is not None
+        if (
+            not isinstance(model, ElasticModel)
+            or model.mesh.span is not None
+            or not model.filled.all()
+        ):
+            raise UserError(
+                "--refine starts from the coarsened solid; expected voxels that are not coarsened"
+            )
+        blocks = blocks_from_mesh(model.mesh)
+        moduli = element_moduli(blocks, model.young[:, 0], coarsening)
+        return coarse_model(
+            blocks,
+            moduli,
+            coarsening.lumped_fraction,
+            poisson=model.poisson,
+            density=model.density,
+            lumped=model.lumped,
+        )
+
+    coarse = compute_on_root(comm, coarsened)
+    wanted = solver.options.modes
+    modes = wanted + default_guard(wanted)
+    options = SolverOptions(modes=modes, tolerance=TOLERANCE, seed=solver.options.seed)
+    found = ModalSolver(coarse, options, comm).solve()
+    whole = found.system.gather(found.vectors[:, RIGID_MODES:])
+    found.destroy()
+
+    def prolonged() -> Iterator[Array]:
+        assert blocks is not None and whole is not None
+        interpolation = sp.kron(prolongation(blocks), sp.identity(3), format="csr")
+        for first in range(0, whole.shape[1], COLUMNS):
+            yield interpolation @ np.ascontiguousarray(whole[:, first : first + COLUMNS])
+
+    count = len(found.values) - RIGID_MODES
+    blocks_of_columns = prolonged() if comm.rank == 0 else []
+    rows = scatter_rows(blocks_of_columns, count, solver.local_mesh, comm)
+    return Approximation(found.values[RIGID_MODES:], rows)
