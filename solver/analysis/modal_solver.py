@@ -372,14 +372,11 @@ class ModalSolver:
                 similar = initial_modes.inverse
             start: Array | None = initial_modes.start()
         elif isinstance(initial_modes, Approximation):
-            near, start = initial_modes, None
-            if options.method != "lanczos":
-                start = near.vectors
+            near, start = initial_modes, initial_modes.vectors
         else:
             start = initial_modes
-        if start is None and options.method == "lobpcg":
-            pass
-        elif start is None and options.method == "lanczos":
+        together = options.acceleration == "lanczos" and self._linear.indefinite
+        if (start is None and options.method == "lanczos") or (near is not None and together):
             with phases("lanczos"):
                 cold = from_nothing(
                     system,
@@ -393,7 +390,7 @@ class ModalSolver:
                     near,
                 )
             values, start = cold.found.values, cold.found.vectors
-        elif start is None:
+        elif start is None and options.method == "hcms":
             with phases("hcms"):
                 synthesis = synthesize(
                     local_mesh,

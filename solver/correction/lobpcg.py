@@ -28,6 +28,8 @@ STAGNATION, PROGRESS = 12, 0.7
 SAFETY = 2.0
 """Error of an eigenvalue over what one cycle of the preconditioner makes of its residual, at most.
 """
+LEFT = 0.5
+"""Share of what the last step took off an eigenvalue that may be left of its error."""
 
 
 @dataclass
@@ -89,7 +91,8 @@ def lobpcg(
     -----
     A Ritz value theta with the residual r is r^T (K - theta M)^-1 r too high, to second order.
     Where r has no part in the modes below theta_m, the last of the block, that is at most
-    theta_m / (theta_m - theta) times r^T K^-1 r, for which the preconditioner stands.
+    theta_m / (theta_m - theta) times r^T K^-1 r, for which the preconditioner stands; should it be
+    too small, what the last step took off the value tells.
     """
     values, vectors = rayleigh_ritz(system, start)
     if len(values) < requested:
@@ -97,7 +100,7 @@ def lobpcg(
             f"the start block spans {len(values)} elastic modes, {requested} are wanted; keep more"
         )
     basis = _Trial(system, values, vectors)
-    errors = np.full(len(values), np.inf)
+    errors, before = np.full(len(values), np.inf), np.full(len(values), np.inf)
     active = np.arange(len(values))
     history: list[float] = []
     solves = 0
@@ -109,6 +112,9 @@ def lobpcg(
         last = basis.values[-1]
         distance = np.maximum(last - basis.values[active], np.finfo(float).eps * last)
         errors[active] = SAFETY * energy * last / (distance * basis.values[active])
+        fallen = before[active] / basis.values[active] - 1.0
+        errors[active] = np.maximum(errors[active], LEFT * fallen)
+        before = basis.values
         worst = float(errors[:requested].max())
         history.append(worst)
         if report is not None:

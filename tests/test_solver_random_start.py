@@ -1,0 +1,206 @@
+"""Modes from random vectors: expected eigenvalues, the shift, both iterations, the proof."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from carillon.errors import ConvergenceError, UserError
+from carillon.fem.geometry import blocks_from_mesh, builtin_surface, hexmesh_from_voxels, voxelize
+from carillon.fem.materials import young_modulus
+from carillon.fem.model import RIGID_MODES, fine_model
+from solver import linear
+from solver.analysis.coarse_start import coarse_start
+from solver.analysis.modal_solver import ModalSolver
+from solver.analysis.options import SolverOptions
+from solver.assembly.system import Layout, assemble
+from solver.coarsening.choice import make_coarsening
+from solver.correction.lobpcg import lobpcg
+from solver.correction.shift import LEAST, MOST, inverse_amid
+from solver.distribution.local_mesh import distribute
+from solver.linear import LinearSolver
+from solver.reference.truth import count_below as mumps_count
+from solver.subspace.basis import BlockBasis
+from solver.subspace.start import start_block
+from solver.subspace.weyl import CountingLaw
+from tests import solids
+
+COMM = MPI.COMM_SELF
+SOLIDS = {"bell": 14, "plate": 20, "bar": 20, "box": 8}
+FACTOR = 4.0
+"""How far expected eigenvalues may be off, above or below."""
+
+
+def built_in(name, material="uniform"):
+    """Model of a built-in object."""
+    mesh = hexmesh_from_voxels(voxelize(builtin_surface(name), SOLIDS[name]))
+    return fine_model(mesh, young_modulus(material, mesh, 0))
+
+
+class Case:
+    """A model assembled on this rank, and its elastic eigenvalues by LAPACK."""
+
+    def __init__(self, model, linear_solver="multifrontal"):
+        local_mesh = distribute(model, 1, comm=COMM)
+        layout = Layout.of_local_mesh(local_mesh, COMM)
+        self.model = model
+        self.system = assemble(local_mesh, COMM, layout)
+        self.linear = LinearSolver(linear_solver, layout)
+        self.exact = solids.dense_eigenvalues(model)[RIGID_MODES:]
+
+
+@pytest.fixture(scope="module")
+def box():
+    """Box of random material."""
+    return Case(solids.random_box(9, 6, 5))
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+@pytest.mark.parametrize("material", ["uniform", "two-region", "random"])
+def test_eigenvalues_lie_about_where_they_are_expected(name, material):
+    model = built_in(name, material)
+    found = ModalSolver(model, SolverOptions(modes=100, tolerance=1e-3), COMM).solve().values
+    for number in (30, 99):
+        expected = CountingLaw.of_solid(model, model.young, number).eigenvalue(number)
+        assert 1.0 / FACTOR < expected / found[number] < FACTOR
+
+
+def test_the_law_scales_as_a_spectrum_does():
+    law = CountingLaw((1e-9, 1e-5, 1e-2))
+    values = [law.eigenvalue(number) for number in (1, 10, 100)]
+    assert values == sorted(values)
+    model = solids.uniform_box(6, 5, 4, 0.01)
+    once = CountingLaw.of_solid(model, model.young, 20).eigenvalue(20)
+    stiffer = CountingLaw.of_solid(model, 4.0 * model.young, 20).eigenvalue(20)
+    larger = solids.uniform_box(6, 5, 4, 0.02)
+    assert stiffer == pytest.approx(4.0 * once)
+    assert CountingLaw.of_solid(larger, larger.young, 20).eigenvalue(20) == pytest.approx(once / 4)
+
+
+@pytest.mark.parametrize("wrong", [0.1, 1.0, 10.0])
+def test_the_shift_gets_among_the_wanted_eigenvalues_however_wrong_the_law(box, wrong):
+    terms = CountingLaw.of_solid(box.model, box.model.young, 60).terms
+    law = CountingLaw(tuple(term / wrong for term in terms))
+    inverse = inverse_amid(box.system, box.linear, 60, law)
+    below = int((box.exact < inverse.shift).sum())
+    assert inverse.negative == RIGID_MODES + below
+    assert LEAST * 60 <= below <= MOST * 60
+
+
+@pytest.mark.parametrize("share", [0.02, 0.3, 0.9])
+def test_inertia_counts_eigenvalues_with_and_without_a_factor_to_keep(box, share):
+    value = float(box.exact[int(share * len(box.exact))]) * (1.0 + 1e-6)
+    expected = RIGID_MODES + int((box.exact < value).sum())
+    assert box.linear.inverse(box.system, value).negative == expected
+    assert box.linear.count_below(box.system, value) == expected
+    assert mumps_count(box.system, value) == expected
+
+
+@pytest.mark.parametrize("method", ["lanczos", "lobpcg"])
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-6])
+def test_modes_are_as_accurate_as_asked_and_proven(box, method, tolerance):
+    options = SolverOptions(modes=46, tolerance=tolerance, method=method, check_inertia=True)
+    found = ModalSolver(box.model, options, COMM).solve()
+    error = found.values[RIGID_MODES:] / box.exact[:40] - 1.0
+    assert -1e-9 < error.min() <= error.max() <= tolerance
+    assert found.evidence["method"] == method
+    assert found.evidence["inertia_count"] == found.evidence["inertia_expected"]
+    assert found.evidence["eigenvalue_error_estimate"] <= tolerance
+
+
+def test_symmetric_solids_keep_all_copies():
+    cube = Case(solids.uniform_box(7, 7, 7, 0.01))
+    found = ModalSolver(cube.model, SolverOptions(modes=60, tolerance=1e-8), COMM).solve()
+    assert np.abs(found.values[RIGID_MODES:] / cube.exact[:54] - 1.0).max() <= 1e-8
+
+
+def test_conjugate_gradients_end_where_they_no_longer_get_on(box):
+    start = start_block(box.system, 20, 0)
+    # Next to nothing from a preconditioner must not look like an error of next to nothing.
+    with pytest.raises(ConvergenceError, match="conjugate gradients stagnate .* 1.0e-06"):
+        lobpcg(box.system, lambda block: 1e-20 * np.sin(block), start, 10, 1e-6, 200)
+    with pytest.raises(ConvergenceError, match="spans 20 elastic modes, 30 are wanted"):
+        lobpcg(box.system, np.array, start, 30, 1e-6, 200)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("columns", [1, 6, 24, 37])
+def test_blocks_of_a_basis_are_one_matrix(box, threads, columns):
+    box.system.rows.threads = threads
+    rng = np.random.default_rng(columns)
+    rows = box.system.n_dofs
+    basis = BlockBasis(box.system, 24, 3)
+    parts = [rng.standard_normal((rows, width)) for width in (24, 6, 17)]
+    for part in parts:
+        basis.append(part)
+    whole = np.concatenate(parts, axis=1)
+    vectors = rng.standard_normal((rows, columns))
+    overlap = basis.inner(vectors)
+    np.testing.assert_allclose(overlap, whole.T @ vectors, atol=1e-9)
+    rest = vectors.copy()
+    basis.remove(overlap, rest)
+    np.testing.assert_allclose(rest, vectors - whole @ overlap, atol=1e-7)
+    weights = rng.standard_normal((basis.size, columns))
+    np.testing.assert_allclose(basis.combine(weights), whole @ weights, atol=1e-9)
+    box.system.rows.threads = 1
+
+
+def test_what_no_memory_holds_is_left_to_multigrid(box, monkeypatch):
+    monkeypatch.setattr(linear, "available_memory", lambda: 1000)
+    found = ModalSolver(box.model, SolverOptions(modes=26, tolerance=1e-4), COMM).solve()
+    assert (found.evidence["method"], found.evidence["linear_solver"]) == ("lobpcg", "amg-cg")
+    assert np.abs(found.values[RIGID_MODES:] / box.exact[:20] - 1.0).max() <= 1e-4
+
+
+@pytest.mark.parametrize(
+    ("given", "complaint"),
+    [
+        ({"method": "lanczos", "corrections": 0}, "lanczos has no use for --corrections 0"),
+        ({"method": "lobpcg", "subdomains": 4}, "lobpcg has no use for --subdomains"),
+        ({"method": "lanczos", "linear_solver": "amg-cg"}, "amg-cg; use lobpcg"),
+        ({"method": "lobpcg", "linear_solver": "mumps"}, "mumps; use lanczos"),
+    ],
+)
+def test_options_of_other_methods_are_refused(box, given, complaint):
+    with pytest.raises(UserError, match=complaint):
+        ModalSolver(box.model, SolverOptions(modes=20, **given), COMM)
+
+
+@pytest.mark.parametrize("method", ["lanczos", "lobpcg", "hcms"])
+def test_coarse_modes_are_a_start(method):
+    model = built_in("bell", "smooth")
+    options = SolverOptions(modes=46, tolerance=1e-6, method=method)
+    solver = ModalSolver(model, options, COMM)
+    start = coarse_start(solver, model, make_coarsening("galerkin"))
+    coarse = blocks_from_mesh(model.mesh).coarse.n_nodes
+    assert start.vectors.shape[0] == model.n_dofs > 3 * coarse
+    found = solver.solve(initial_modes=start)
+    cold = ModalSolver(model, options, COMM).solve()
+    np.testing.assert_allclose(found.values[6:], cold.values[6:], rtol=1e-6)
+    assert found.evidence["right_hand_sides"] <= cold.evidence["right_hand_sides"]
+
+
+def test_a_coarsened_model_has_nothing_to_start_from(run_cli, tmp_path):
+    out = tmp_path / "modes.h5"
+    command = ["modes", "builtin:bar", "--resolution", 12, "--modes", 12, "--out", out, "--refine"]
+    done = run_cli("solver", *command, "--coarsen", "ddfem")
+    assert done.returncode == 2 and "expected voxels, --coarsen none" in done.stderr
+    done = run_cli("solver", *command, "--initial-modes", tmp_path / "other.h5")
+    assert done.returncode == 2 and "leave out --initial-modes" in done.stderr
+    assert not out.exists()
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("method", ["lanczos", "lobpcg"])
+def test_any_number_of_ranks_finds_the_same(method, mpiexec, tmp_path):
+    out = tmp_path / "modes.h5"
+    command = ["modes", "builtin:bell", "--resolution", 12, "--modes", 40, "--tolerance", "1e-8"]
+    command += ["--method", method, "--refine", "--no-estimate", "--json", "--out", out]
+    spectra = []
+    for ranks in (1, 2, 3):
+        summary = json.loads(mpiexec(ranks, "solver", *command, check=True).stdout)
+        spectra.append(summary["frequencies_hz"][RIGID_MODES:])
+    np.testing.assert_allclose(spectra[1:], [spectra[0]] * 2, rtol=1e-8)
