@@ -6,7 +6,8 @@ from carillon import lazily
 
 if TYPE_CHECKING:
     from solver.analysis.library import Solution, solve
-    from solver.analysis.modal_solver import ModalSolver, Modes
+    from solver.analysis.modal_solver import ModalSolver
+    from solver.analysis.modes import Modes
     from solver.analysis.options import SolverOptions
 
 __all__ = ["ModalSolver", "Modes", "Solution", "SolverOptions", "solve"]
@@ -17,7 +18,7 @@ __getattr__ = lazily.exports(
         "Solution": "analysis.library",
         "solve": "analysis.library",
         "ModalSolver": "analysis.modal_solver",
-        "Modes": "analysis.modal_solver",
+        "Modes": "analysis.modes",
         "SolverOptions": "analysis.options",
     },
 )

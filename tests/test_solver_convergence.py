@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from solver.correction.correct import ACCELERATIONS
+from solver.correction.correction import ACCELERATIONS
 from solver.hcms.condense import INTERFACES
 from solver.studies.convergence import STARTS, STEPWISE
 

@@ -15,7 +15,7 @@ from carillon.fem.model import ElasticModel, Solid, fine_model
 from carillon.progress import say
 from solver.accuracy.divide import DividedCells
 from solver.accuracy.voxels import Reference
-from solver.analysis.modal_solver import Modes
+from solver.analysis.modes import Modes
 from solver.analysis.problem import Problem, ProblemOptions, build_problem
 from solver.distribution.collective import bcast_from_root, compute_on_root
 from solver.files.modes_file import read_modes

@@ -10,7 +10,7 @@ from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES, Solid
 from carillon.runtime import available_memory
 from solver.analysis.options import SolverOptions
-from solver.correction.correct import FEWEST_GUARDS, default_guard
+from solver.correction.correction import FEWEST_GUARDS, default_guard
 from solver.distribution.collective import bcast_from_root
 from solver.reference.truth import SPARE_MODES
 

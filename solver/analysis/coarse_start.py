@@ -16,7 +16,7 @@ from solver.analysis.options import SolverOptions
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.model import coarse_model, element_moduli
 from solver.correction.cold import Approximation
-from solver.correction.correct import default_guard
+from solver.correction.correction import default_guard
 from solver.distribution.collective import compute_on_root
 from solver.files.initial_modes import COLUMNS, scatter_rows
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, TypeGuard, cast
 
 import numpy as np
@@ -16,11 +16,13 @@ from carillon.fem.moduli import require_coarse_moduli
 from carillon.progress import say
 from carillon.runtime import limit_threads, reuse_freed_memory
 from solver.analysis.bounds import FEWEST_SPARE, check_mode_count, default_keep, require_memory
+from solver.analysis.modes import Initial, Modes
 from solver.analysis.options import RANDOM, SolverOptions
 from solver.analysis.timing import Phases, peak_memory
 from solver.assembly.system import Layout, System, assemble
 from solver.correction.cold import Approximation, Cold, from_nothing
-from solver.correction.correct import EIGENVALUE_TOLERANCE, carried, correct, resolved
+from solver.correction.correct import correct
+from solver.correction.correction import EIGENVALUE_TOLERANCE, carried, resolved
 from solver.distribution.collective import bcast_from_root, compute_on_root
 from solver.distribution.local_mesh import LocalMesh, distribute, scatter_moduli
 from solver.hcms.synthesis import Synthesis, make_subdomains, synthesize
@@ -50,51 +52,6 @@ ORTHOGONAL_TO_RIGID = 1e-10
 
 
 @dataclass
-class Modes:
-    """Result of a modal analysis.
-
-    Attributes
-    ----------
-    values
-        (k,) eigenvalues [rad^2/s^2], ascending.
-    vectors
-        (local, k) mass-normalised modes, this rank's rows of `system`, row-major.
-    residuals
-        (k,) residual ratios, see `solver.subspace.verification.residual_ratios`.
-    evidence
-        What the solver achieved: orthogonality, error estimate, steps, inertia, rigid modes, ranks,
-        peak memory.
-    seconds
-        Wall time by phase.
-    guard
-        (local, g) less accurate vectors beyond, which a warm start makes use of; None if there are
-        none.
-    inverse
-        Inverse that a warm start makes use of, if there is one.
-    """
-
-    values: Array
-    vectors: Array
-    residuals: Array
-    system: System
-    evidence: dict[str, Any] = field(default_factory=dict)
-    seconds: dict[str, float] = field(default_factory=dict)
-    guard: Array | None = None
-    inverse: Lasting | None = None
-
-    def start(self) -> Array:
-        """Elastic modes and guard vectors (local, k - 6 + g), to start a correction from."""
-        blocks = [self.vectors[:, RIGID_MODES:], *([] if self.guard is None else [self.guard])]
-        return np.concatenate(blocks, axis=1)
-
-    def destroy(self) -> None:
-        """Free what numpy does not; collective."""
-        if self.inverse is not None:
-            self.inverse.destroy()
-        self.system.destroy()
-
-
-@dataclass
 class _Solution:
     """Eigenpairs, and what a warm start makes use of, see `Modes`."""
 
@@ -102,10 +59,6 @@ class _Solution:
     vectors: Array
     guard: Array | None = None
     inverse: Lasting | None = None
-
-
-Initial = Modes | Approximation | Array
-"""What an analysis may start from."""
 
 
 class ModalSolver:

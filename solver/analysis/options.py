@@ -8,7 +8,7 @@ from carillon.arguments import number_between, whole_number
 from carillon.errors import UserError
 from carillon.options import option
 from solver import linear
-from solver.correction.correct import ACCELERATIONS, EIGENVALUE_TOLERANCE
+from solver.correction.correction import ACCELERATIONS, EIGENVALUE_TOLERANCE
 from solver.hcms.condense import DEFAULT_INTERFACE, INTERFACES
 from solver.reference.eigensolver import TYPES
 from solver.reference.truth import RESIDUAL_TOLERANCE

@@ -25,7 +25,8 @@ from carillon.progress import say
 from solver.accuracy.options import FIRST_RESOLUTION, DistanceOptions
 from solver.accuracy.solving import Wishes, solve_accurately, solve_solid
 from solver.analysis.coarse_start import coarse_start
-from solver.analysis.modal_solver import Initial, ModalSolver, Modes
+from solver.analysis.modal_solver import ModalSolver
+from solver.analysis.modes import Initial, Modes
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import Problem, ProblemOptions
 from solver.coarsening.choice import make_coarsening
@@ -165,7 +166,8 @@ def _for_estimate(options: SolverOptions, modes: int) -> SolverOptions:
     asked = replace(options, modes=min(modes, options.modes))
     if options.is_general or options.tolerance == 0.0:
         return asked
-    return replace(asked, tolerance=max(options.tolerance or 0.0, ESTIMATE_TOLERANCE))
+    tolerance = max(options.tolerance or 0.0, ESTIMATE_TOLERANCE)
+    return replace(asked, method="auto", tolerance=tolerance)
 
 
 def _resolution(arguments: argparse.Namespace) -> int:

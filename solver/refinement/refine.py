@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from carillon.fem.geometry import Blocks, HexMesh, blocks_from_mesh, blocks_with_coarse
 from carillon.fem.model import Constants, ElasticModel, Solid
-from solver.analysis.modal_solver import Modes
+from solver.analysis.modes import Modes
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.model import coarse_model, element_moduli
 from solver.distribution.collective import bcast_from_root

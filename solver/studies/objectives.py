@@ -19,7 +19,8 @@ from carillon.errors import ConvergenceError
 from carillon.fem.geometry import Blocks, blocks_from_mesh
 from carillon.fem.model import RIGID_MODES, ElasticModel, Solid
 from carillon.progress import track
-from solver.analysis.modal_solver import Modes, modal_analysis
+from solver.analysis.modal_solver import modal_analysis
+from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import Problem, ProblemOptions, build_problem
 from solver.coarsening.coarsening import Coarsening

@@ -13,7 +13,8 @@ from carillon.fem.finite_cells.model import finite_cell_model
 from carillon.fem.finite_cells.shapes import strain_factors
 from carillon.fem.geometry import HexMesh, blocks_from_mesh
 from carillon.fem.model import Constants, Solid, fine_model
-from solver.analysis.modal_solver import ModalSolver, Modes
+from solver.analysis.modal_solver import ModalSolver
+from solver.analysis.modes import Modes
 from solver.analysis.problem import ProblemOptions
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.model import block_moduli, coarse_model

@@ -12,7 +12,7 @@ import numpy as np
 import scipy.linalg as la
 from numpy.typing import NDArray
 
-from solver.analysis.modal_solver import Modes
+from solver.analysis.modes import Modes
 from solver.linear import Inverse
 from solver.subspace.orthonormal import is_cancelled
 

@@ -13,7 +13,8 @@ from carillon.fem.block import degrees_of_freedom
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.geometry import HexMesh
 from carillon.fem.model import RIGID_MODES, Solid
-from solver.analysis.modal_solver import ModalSolver, Modes
+from solver.analysis.modal_solver import ModalSolver
+from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
 from solver.linear import Inverse, Lasting

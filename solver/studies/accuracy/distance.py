@@ -24,7 +24,8 @@ from carillon.options import option
 from carillon.progress import track
 from solver.accuracy.estimate import estimate_cell_errors
 from solver.accuracy.solving import Solved, Wishes, solve_solid
-from solver.analysis.modal_solver import Modes, modal_analysis
+from solver.analysis.modal_solver import modal_analysis
+from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
 from solver.refinement.errors import FROM_SOLID

@@ -13,10 +13,11 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.fem.model import RIGID_MODES, Solid
-from solver.analysis.modal_solver import ModalSolver, Modes
+from solver.analysis.modal_solver import ModalSolver
+from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import Layout, assemble
-from solver.correction.correct import INTERACTIVE_TOLERANCE
+from solver.correction.correction import INTERACTIVE_TOLERANCE
 from solver.distribution.collective import compute_on_root
 from solver.distribution.local_mesh import distribute
 from solver.files.modes_file import CHECKS

@@ -12,7 +12,8 @@ from mpi4py import MPI
 from carillon.errors import ConvergenceError, UserError
 from carillon.fem.geometry import Blocks
 from carillon.fem.model import ElasticModel
-from solver.analysis.modal_solver import Modes, modal_analysis
+from solver.analysis.modal_solver import modal_analysis
+from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import Problem, ProblemOptions, build_problem
 from solver.coarsening.coarsening import Coarsening

@@ -18,7 +18,8 @@ from carillon.fem.model import Constants, Solid, fine_model
 from solver.accuracy.divide import DividedCells
 from solver.accuracy.lattices import covering_on, scaled, voxel_mesh
 from solver.accuracy.material import ARITHMETIC, HARMONIC, PlacedMaterial
-from solver.analysis.modal_solver import Modes, modal_analysis
+from solver.analysis.modal_solver import modal_analysis
+from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.model import build_model

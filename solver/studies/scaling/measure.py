@@ -17,7 +17,8 @@ from solver.analysis.bounds import check_mode_count, default_keep
 from solver.analysis.modal_solver import elastic_part
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import Layout, System, assemble
-from solver.correction.correct import Correction, correct, default_guard
+from solver.correction.correct import correct
+from solver.correction.correction import Correction, default_guard
 from solver.distribution.collective import bcast_from_root
 from solver.distribution.local_mesh import LocalMesh, distribute
 from solver.hcms.counts import Counts, Tally

@@ -15,7 +15,7 @@ from carillon.options import option
 from solver import linear
 from solver.analysis.options import number_of_modes, positive_tolerance
 from solver.analysis.problem import ProblemOptions, build_problem
-from solver.correction.correct import INTERACTIVE_TOLERANCE
+from solver.correction.correction import INTERACTIVE_TOLERANCE
 from solver.distribution.decomposition import decompose
 from solver.studies.scaling.launch import MOST_RANKS, measure_each, require_ranks
 from solver.studies.scaling.model import (

@@ -1,0 +1,65 @@
+"""What a modal analysis finds, and what another may start from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.fem.model import RIGID_MODES
+from solver.assembly.system import System
+from solver.correction.cold import Approximation
+from solver.linear import Lasting
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class Modes:
+    """Result of a modal analysis.
+
+    Attributes
+    ----------
+    values
+        (k,) eigenvalues [rad^2/s^2], ascending.
+    vectors
+        (local, k) mass-normalised modes, this rank's rows of `system`, row-major.
+    residuals
+        (k,) residual ratios, see `solver.subspace.verification.residual_ratios`.
+    evidence
+        What the solver achieved: orthogonality, error estimate, steps, inertia, rigid modes, ranks,
+        peak memory.
+    seconds
+        Wall time by phase.
+    guard
+        (local, g) less accurate vectors beyond, which a warm start makes use of; None if there are
+        none.
+    inverse
+        Inverse that a warm start makes use of, if there is one.
+    """
+
+    values: Array
+    vectors: Array
+    residuals: Array
+    system: System
+    evidence: dict[str, Any] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    guard: Array | None = None
+    inverse: Lasting | None = None
+
+    def start(self) -> Array:
+        """Elastic modes and guard vectors (local, k - 6 + g), to start a correction from."""
+        blocks = [self.vectors[:, RIGID_MODES:], *([] if self.guard is None else [self.guard])]
+        return np.concatenate(blocks, axis=1)
+
+    def destroy(self) -> None:
+        """Free what numpy does not; collective."""
+        if self.inverse is not None:
+            self.inverse.destroy()
+        self.system.destroy()
+
+
+Initial = Modes | Approximation | Array
+"""What an analysis may start from."""

@@ -1,0 +1,312 @@
+"""The subspace iteration of an error correction, step by step or by block Lanczos."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.errors import ConvergenceError
+from solver.assembly.system import System
+from solver.correction.cold import Cold
+from solver.correction.correction import (
+    IMPROVED_GUARDS,
+    LOOSE,
+    Correction,
+    carried,
+    default_guard,
+)
+from solver.correction.enrichment import Ritz, Step, enrich, relax
+from solver.correction.lanczos import HIGHEST_SHIFT, ZERO_FRACTION, lanczos, mixed
+from solver.distribution.collective import bcast_from_root
+from solver.linear import Approximate, Inverse, Lasting, LinearSolver
+from solver.subspace.rayleigh_ritz import rayleigh_ritz, safe_shift
+from solver.subspace.spectrum import WEYL_EXPONENT
+
+Array = NDArray[np.float64]
+
+TYPICAL = 0.1
+"""Share of the tolerance that the median of the errors has to reach."""
+NEARLY_ACCURATE = 100.0
+"""Error, as a multiple of the tolerance, below which `lanczos` leaves a start to `krylov`."""
+FOLLOWED = 50.0
+"""The same as a multiple of `NEARLY_ACCURATE`, where an inverse for a similar material is there."""
+WORTH_INEXACT = 50.0
+"""Error, as a multiple of the tolerance, above which a second step is no longer taken with it."""
+SHIFT_FRACTION = 0.52
+"""Shift of an indefinite factorisation, as a share of the last wanted eigenvalue."""
+TOP, TOP_FRACTION, HIGHEST_TOP_SHIFT = 0.8, 0.98, 1.1
+"""With all modes accurate below the first share of the last wanted value, the shift is the second,
+and too high above the third."""
+LANCZOS_RUNS, OFF_RESONANCE = 3, 0.97
+"""Lanczos iterations at most, and by what the shift is moved off an eigenvalue it has hit."""
+STAGNATION, PROGRESS = 6, 0.8
+"""Steps after which a correction gives up, if the error is not below this share of their worst."""
+ROUGH_MASS = 0.5
+"""Consistent mass of a rough residual, as a share of what the row sums make of it."""
+
+
+class Iteration:
+    """State of the subspace iteration."""
+
+    def __init__(
+        self,
+        system: System,
+        linear: LinearSolver,
+        ritz: Ritz,
+        requested: int,
+        acceleration: str,
+        similar: Lasting | None,
+    ) -> None:
+        self.system = system
+        self.linear = linear
+        self.ritz = ritz
+        self.requested = requested
+        self.inside = acceleration != "relaxation" and linear.indefinite
+        self.lanczos = acceleration == "lanczos" and linear.indefinite
+        self.share = SHIFT_FRACTION
+        self.similar = similar
+        self.made: Inverse | None = None
+        guard = default_guard(requested)
+        self.width = requested + guard
+        self.reach = self.improved = requested + int(IMPROVED_GUARDS * guard)
+        self.step: Step = enrich
+        if acceleration == "relaxation":
+            self.width = self.improved = len(ritz.values)
+            self.step = relax
+        self.told: Array | None = None
+        self.steps = self.solves = self.blocks = 0
+        self.history: list[float] = []
+
+    def go_on_from(self, begun: Cold) -> None:
+        """Count what was done before, and take over what is known."""
+        self.made, self.told, self.steps = begun.inverse, begun.found.errors, 1
+        self.solves, self.blocks = begun.found.solves, begun.found.blocks
+
+    def run(
+        self,
+        tolerance: float,
+        max_steps: int,
+        rough: bool,
+        report: Callable[[int, float], None] | None,
+        observe: Callable[[int, Array], None] | None,
+    ) -> Correction:
+        """Correct until the tolerance, or the last step allowed, is reached."""
+        step = self.steps
+        if tolerance >= LOOSE:
+            # One step then has to do, for the last modes too.
+            self.improved = self.width if rough else self.requested
+        lanczos_may_run = self.lanczos and tolerance > 0.0 and max_steps > 0
+        if lanczos_may_run and rough:
+            self._run_lanczos(tolerance, observe)
+            step = 1
+        while True:
+            errors, residual, active = self._residuals(tolerance)
+            worst = float(errors.max(initial=0.0))
+            self.history.append(worst)
+            if report is not None:
+                report(step, worst)
+            accurate = _are_accurate(errors, tolerance)
+            if accurate or step >= max_steps:
+                break
+            if step == 0 and lanczos_may_run and worst > self._nearly_accurate() * tolerance:
+                self._run_lanczos(tolerance, observe)
+                step = 1
+                continue
+            if tolerance > 0.0:
+                self._require_progress(step, tolerance)
+            inverse = self._inverse(step, tolerance)
+            correction = inverse.solve(np.ascontiguousarray(residual))
+            self.solves += correction.shape[1]
+            self.blocks += 1
+            self.step(self.system, self.ritz, correction, active, inverse, self.width)
+            step += 1
+            self._require_independent(step)
+            if observe is not None:
+                observe(step, np.sort(self.ritz.values)[: self.requested])
+        if tolerance > 0.0 and not accurate:
+            raise ConvergenceError(
+                f"error correction reached an eigenvalue error of {worst:.1e} after {step} steps, "
+                f"{tolerance:.1e} was asked for; allow more steps or keep more modes"
+            )
+        values, vectors, errors = self.ritz.lowest(len(self.ritz.values))
+        return Correction(
+            values[: self.requested],
+            np.ascontiguousarray(vectors[:, : self.requested]),
+            errors[: self.requested],
+            vectors[:, self.requested :],
+            step,
+            self.solves,
+            self.blocks,
+            self.history,
+        )
+
+    def _run_lanczos(self, tolerance: float, observe: Callable[[int, Array], None] | None) -> None:
+        width = carried(self.requested, tolerance)
+        # Again where a poor start has put the shift too high, or chance on an eigenvalue; a start
+        # that knows nothing of the spectrum needs one from below.
+        for run in range(LANCZOS_RUNS):
+            self.inside = run < LANCZOS_RUNS - 1
+            inverse, ritz = self._exact_inverse(), self.ritz
+            start, look = mixed(
+                self.system, ritz.values, ritz.vectors, self.requested, inverse.shift, tolerance
+            )
+            result = lanczos(self.system, inverse, start, self.requested, width, tolerance, look)
+            self.solves += result.solves
+            self.blocks += result.blocks
+            if result.resonant:
+                self.destroy()
+                self.share *= OFF_RESONANCE
+                continue
+            bounds = (1.0 + tolerance) * ritz.values[: self.requested]
+            missed = (
+                len(result.values) < self.requested
+                or (result.values[: self.requested] > bounds).any()
+            )
+            self.ritz = Ritz(self.system, result.values, result.vectors)
+            self._require_independent(1)
+            if not self._too_high(inverse):
+                if missed:
+                    # No eigenvalue lies above the start's, so `krylov` has to go on from there.
+                    self.ritz = ritz
+                else:
+                    self.told = result.errors
+                break
+            self.destroy()
+        self.inside = True
+        if observe is not None:
+            observe(1, self.ritz.values[: self.requested])
+
+    def _require_independent(self, step: int) -> None:
+        if len(self.ritz.values) < self.requested:
+            raise ConvergenceError(
+                f"the iterated vectors collapsed to {len(self.ritz.values)} independent ones "
+                f"after {step} steps, {self.requested} modes are wanted; keep more"
+            )
+
+    def _nearly_accurate(self) -> float:
+        """Error, as a multiple of the tolerance, below which `krylov` is the faster one."""
+        return NEARLY_ACCURATE * (1.0 if self.similar is None else FOLLOWED)
+
+    def _inverse(self, step: int, tolerance: float) -> Inverse:
+        """Inverse for a step: the one for a similar material as long as that gets on."""
+        similar = None if self.made is not None else self.similar
+        near = step == 0 or self.history[-1] <= WORTH_INEXACT * tolerance
+        if similar is not None and near and not self._too_high(similar):
+            ritz = self.ritz
+            diagonal = self.system.rows.stiffness_diagonal
+            return Approximate(similar, diagonal, ritz.vectors, ritz.mass_vectors)
+        return self._exact_inverse()
+
+    def _exact_inverse(self) -> Inverse:
+        """Inverse for this material, made anew if a start far off has put the shift too high."""
+        if self.made is not None and self.inside and self._too_high(self.made):
+            self.destroy()
+        if self.made is None:
+            self.made = self.linear.inverse(self.system, self._shift())
+        return self.made
+
+    def _too_high(self, inverse: Inverse) -> bool:
+        highest = HIGHEST_TOP_SHIFT if self._only_top_is_left() else HIGHEST_SHIFT
+        return inverse.shift > highest * self._last()
+
+    def lasting(self, tolerance: float) -> Lasting | None:
+        """The inverse to keep for a similar material, which only a loose tolerance makes use of."""
+        kept = self.similar if self.made is None else self.made
+        return kept if isinstance(kept, Lasting) and tolerance >= LOOSE else None
+
+    def destroy(self) -> None:
+        """Free what the inverse made here holds; of one that lasts, nothing has to be."""
+        if self.made is not None:
+            self.made.destroy()
+            self.made = None
+
+    def _last(self) -> float:
+        """Ritz value of the last wanted mode, the same on all ranks."""
+        return float(np.sort(self.ritz.values)[self.requested - 1])
+
+    def _shift(self) -> float:
+        if not self.inside:
+            return -safe_shift(self.system)
+        return self._last() * (TOP_FRACTION if self._only_top_is_left() else self.share)
+
+    def _only_top_is_left(self) -> bool:
+        """Whether just modes at the end of those wanted are not accurate yet."""
+        lowest = float(self.ritz.values[self.ritz.active].min(initial=np.inf))
+        return self.ritz.locked > 0 and lowest > TOP * self._last()
+
+    def _residuals(self, tolerance: float) -> tuple[Array, Array, NDArray[np.int64]]:
+        """Errors of the wanted modes, and residuals of those to improve with their numbers.
+
+        Wanted modes that have become accurate are locked.  A block Lanczos iteration has told
+        errors of its own, far closer than those from residuals.
+        """
+        ritz = self.ritz
+        told, self.told = self.told, None
+        if told is not None and len(told):
+            if _are_accurate(told, tolerance):
+                ritz.errors[: self.requested] = told
+                return told, ritz.vectors[:, :0], ritz.active[:0]
+            # Far below the shift rounding mixes modes.
+            ritz = self.ritz = Ritz(self.system, *rayleigh_ritz(self.system, ritz.vectors))
+        candidates = ritz.active[: max(0, self.improved - ritz.locked)]
+        residual = ritz.residual(candidates)
+        estimate = self._estimate(candidates, residual)
+        ritz.errors[candidates] = bcast_from_root(self.system.comm, lambda: estimate)
+        errors = ritz.errors[np.argsort(ritz.values, kind="stable")[: self.requested]]
+        limit = tolerance if _typical(errors) <= TYPICAL * tolerance else TYPICAL * tolerance
+        inside = candidates[: max(0, self.requested - ritz.locked)]
+        accurate = inside[ritz.errors[inside] <= limit]
+        chosen = ~np.isin(candidates, accurate)
+        ritz.lock(accurate)
+        return errors, residual[:, chosen], candidates[chosen]
+
+    def _estimate(self, candidates: NDArray[np.int64], residual: Array) -> Array:
+        values = self.ritz.values[candidates]
+        last = self._first_beyond()
+        rows = self.system.rows
+        mass = rows.lumped_mass
+        if not rows.has_diagonal_mass:
+            # Row sums of cells that a surface cuts may be small or negative.
+            diagonal = rows.mass_diagonal
+            mass = np.where(mass >= diagonal, ROUGH_MASS * mass, diagonal)
+        weighted = residual / np.repeat(mass, 3)[:, None]
+        square = self.system.column_products(residual, weighted)
+        distance = np.maximum(last - values, np.finfo(float).eps * last)
+        size = np.maximum(values, ZERO_FRACTION * last)
+        return np.maximum(square / (size * distance), np.finfo(float).eps)
+
+    def _first_beyond(self) -> float:
+        """Value up to which the subspace holds all that is there.
+
+        Those of the guard vectors of another material are far too high: until they are improved
+        they count for no more than Weyl's law says.
+        """
+        values = np.sort(self.ritz.values)
+        if self.step is relax:
+            return float(values[(3 * self.requested + len(values)) // 4])
+        number = min(self.reach, len(values))
+        value = float(values[number - 1])
+        if self.blocks == 0 and self.similar is not None:
+            grown = (number / self.requested) ** WEYL_EXPONENT
+            return min(value, grown * float(values[self.requested - 1]))
+        return value
+
+    def _require_progress(self, step: int, tolerance: float) -> None:
+        recent = self.history[-STAGNATION - 1 :]
+        if len(recent) > STAGNATION and recent[-1] > PROGRESS * max(recent[:-1]):
+            raise ConvergenceError(
+                f"error correction stagnates at an eigenvalue error of {min(self.history):.1e} "
+                f"after {step} steps, {tolerance:.1e} was asked for; use another linear solver "
+                "(--linear-solver) or a looser tolerance"
+            )
+
+
+def _are_accurate(errors: Array, tolerance: float) -> bool:
+    worst = float(errors.max(initial=0.0))
+    return worst <= tolerance and _typical(errors) <= TYPICAL * tolerance
+
+
+def _typical(errors: Array) -> float:
+    return float(np.median(errors)) if len(errors) else 0.0
