@@ -22,7 +22,7 @@ def panel_of(registers: Registers) -> int:
 
     Examples
     --------
-    >>> panel_of(X86["zmm"]), panel_of(X86["ymm"])
+    >>> panel_of(Registers(8, 32)), panel_of(Registers(4, 16))
     (6, 3)
     """
     return 6 if 3 * 6 + 3 + 1 <= registers.number else 3
