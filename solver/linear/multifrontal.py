@@ -10,18 +10,16 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
-import scipy.linalg as la
 from numpy.typing import NDArray
 
 from carillon.errors import LocalConvergenceError
 from carillon.narrow import block, lanes_of
 from carillon.runtime import available_memory
-from carillon.threads import in_parallel, in_tree, split
-from solver.linear.plan import PANEL, Part, Plan
+from carillon.threads import in_tree, split
+from solver.linear.elimination import eliminate_fronts
+from solver.linear.plan import Part, Plan
 from solver.linear.sweeps import (
-    STRIP,
     add_nodes,
     copy_nodes,
     eliminate,
@@ -73,7 +71,7 @@ class Factor:
         self._pivots = np.empty(plan.pivot_offset[-1])
         self._coupling = np.empty(plan.coupling_offset[-1])
         kept = self._pivots, self._coupling
-        self.negative = _eliminate(plan, stiffness, mass, shift, threads, kept)
+        self.negative = eliminate_fronts(plan, stiffness, mass, shift, threads, kept)
 
     def destroy(self) -> None:
         """Nothing but arrays to free."""
@@ -134,7 +132,7 @@ def count_below(plan: Plan, stiffness: Array, mass: Array, value: float, threads
     The arguments and errors are those of `Factor`.
     """
     _require_memory(plan, plan.bytes_of_updates)
-    return _eliminate(plan, stiffness, mass, value, threads, None)
+    return eliminate_fronts(plan, stiffness, mass, value, threads, None)
 
 
 def _require_memory(plan: Plan, needed: int) -> None:
@@ -146,165 +144,3 @@ def _require_memory(plan: Plan, needed: int) -> None:
             f"{needed / 1e9:.1f} GB, {available / 1e9:.1f} GB are free; use --linear-solver "
             "amg-cg, or mumps on more ranks of more machines"
         )
-
-
-def _eliminate(
-    plan: Plan,
-    stiffness: Array,
-    mass: Array,
-    shift: float,
-    threads: int,
-    kept: tuple[Array, Array] | None,
-) -> int:
-    """Eliminate all fronts, and count the negative eigenvalues of their pivots.
-
-    What a solve needs goes to `kept`: pivots with what couples panels, and W in strips.
-    """
-    updates: dict[int, Array] = {}
-    first = plan.fronts.first
-
-    def eliminated(front: int, threads: int = 1) -> int:
-        n = 3 * int(first[front + 1] - first[front])
-        b = 3 * len(plan.fronts.boundary[front])
-        own = np.zeros((n, n + b))
-        _add_entries(own, plan.entries[front], stiffness, mass, shift)
-        # A piece that nothing connects to the rest has no update.
-        children = [child for child in plan.children[front] if child in updates]
-        for child in children:
-            _subtract_from_own(own, plan.places[child], updates[child])
-        pivots = None
-        if kept is not None:
-            pivots = kept[0][plan.pivot_offset[front] : plan.pivot_offset[front + 1]]
-        scaled, negative = _eliminate_panels(own, pivots)
-        if kept is not None:
-            coupling = kept[1][plan.coupling_offset[front] : plan.coupling_offset[front + 1]]
-            for strip in range(0, b, STRIP):
-                few = min(STRIP, b - strip)
-                part = coupling[n * strip : n * (strip + few)].reshape(n, few)
-                part[:] = scaled[:, n + strip : n + strip + few]
-        if b:
-            update = _product(own[:, n:], scaled[:, n:], threads)
-            for child in children:
-                _add_beyond(update, n // 3, plan.places[child], updates.pop(child))
-            updates[front] = update
-        return negative
-
-    def eliminated_part(part: Part) -> int:
-        return sum(eliminated(int(front)) for front in part.fronts)
-
-    # The fronts above the branches are few and large: threads share each of them.
-    tree = plan.shares(threads)
-    branches = [(part,) for part, below in zip(tree.parts, tree.children, strict=True) if not below]
-    negative = sum(in_parallel(eliminated_part, branches, threads))
-    for part, below in zip(tree.parts, tree.children, strict=True):
-        if below:
-            negative += eliminated(int(part.fronts[0]), threads)
-    return negative
-
-
-def _eliminate_panels(own: Array, pivots: Array | None) -> tuple[Array, int]:
-    """Eliminate the own rows of a front, a panel of them at a time.
-
-    Parameters
-    ----------
-    own
-        (n, n + b) own rows of the matrix, of which the upper triangle counts; on return those of
-        the matrix from which the panels before were eliminated.
-    pivots
-        What becomes of each panel's own columns: the inverse of its diagonal block, and the product
-        with it of what couples the panel to the panels after.
-
-    Returns
-    -------
-    tuple[Array, int]
-        (n, n + b) these products, for the rows beyond too, and the number of negative eigenvalues
-        of the diagonal blocks.
-    """
-    n = len(own)
-    scaled = np.empty_like(own)
-    negative = place = 0
-    for start, stop in split(n, 1, PANEL):
-        rows = own[start:stop, start:]
-        if start:
-            rows -= own[:start, start:stop].T @ scaled[:start, start:]
-        size = stop - start
-        inverse, below = _inverse(rows[:, :size])
-        negative += below
-        np.matmul(inverse, rows[:, size:], out=scaled[start:stop, stop:])
-        if pivots is None:
-            continue
-        for part in (inverse, scaled[start:stop, stop:n]):
-            pivots[place : place + part.size].reshape(part.shape)[:] = part
-            place += part.size
-    return scaled, negative
-
-
-def _inverse(block: Array) -> tuple[Array, int]:
-    """Inverse of a symmetric matrix, given its upper triangle, and its negative eigenvalues."""
-    factor, pivots, _ = la.lapack.dsytrf(np.array(block).T, lower=1, overwrite_a=1)
-    # Every 2x2 pivot of Bunch and Kaufman has one eigenvalue of either sign.
-    single = pivots > 0
-    negative = int((np.diag(factor)[single] < 0.0).sum() + (~single).sum() // 2)
-    inverse, failed = la.lapack.dsytri(factor, pivots, lower=1, overwrite_a=1)
-    if failed:
-        raise LocalConvergenceError("the shifted matrix is singular to rounding; change the shift")
-    result = inverse.T
-    _mirror(result)
-    return result, negative
-
-
-def _product(left: Array, right: Array, threads: int) -> Array:
-    """The upper triangle of left^T right, which is symmetric; below it anything."""
-    size = left.shape[1]
-    product = np.empty((size, size))
-
-    def panel(start: int, stop: int) -> None:
-        np.matmul(left[:, start:stop].T, right[:, start:], out=product[start:stop, start:])
-
-    in_parallel(panel, split(size, 1, PANEL), threads)
-    return product
-
-
-@numba.njit(cache=True, nogil=True)
-def _add_entries(matrix, entries, stiffness, mass, shift):  # type: ignore[no-untyped-def]
-    for entry in range(entries.shape[0]):
-        row, column, number = 3 * entries[entry, 0], 3 * entries[entry, 1], entries[entry, 2]
-        for i in range(3):
-            for j in range(3):
-                matrix[row + i, column + j] += stiffness[number, i, j]
-            matrix[row + i, column + i] -= shift * mass[number]
-
-
-@numba.njit(cache=True, nogil=True)
-def _subtract_from_own(own, places, update):  # type: ignore[no-untyped-def]
-    count = own.shape[0] // 3
-    for a in range(len(places)):
-        if places[a] >= count:
-            break
-        for i in range(3):
-            target = own[3 * places[a] + i]
-            source = update[3 * a + i]
-            for b in range(a, len(places)):
-                for j in range(3):
-                    target[3 * places[b] + j] -= source[3 * b + j]
-
-
-@numba.njit(cache=True, nogil=True)
-def _add_beyond(total, count, places, update):  # type: ignore[no-untyped-def]
-    for a in range(len(places)):
-        if places[a] < count:
-            continue
-        for i in range(3):
-            target = total[3 * (places[a] - count) + i]
-            source = update[3 * a + i]
-            for b in range(a, len(places)):
-                for j in range(3):
-                    target[3 * (places[b] - count) + j] += source[3 * b + j]
-
-
-@numba.njit(cache=True, nogil=True)
-def _mirror(matrix):  # type: ignore[no-untyped-def]
-    """The upper triangle becomes the lower one too."""
-    for row in range(len(matrix)):
-        for column in range(row):
-            matrix[row, column] = matrix[column, row]

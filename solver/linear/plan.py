@@ -15,6 +15,8 @@ Index = NDArray[np.int64]
 
 PANEL = 120
 """Rows of a front that are eliminated together."""
+STRIP = 192
+"""Columns of W, and rows of an update, that lie together in memory; whole nodes."""
 BRANCHES = 3
 """Branches for each thread, at least: their work is not equal."""
 MEMORY_MARGIN = 1.2
@@ -126,6 +128,8 @@ class Plan:
 
     Attributes
     ----------
+    own_rows, outside_rows
+        (fronts,) unknowns that each front eliminates, and others that these are coupled to.
     bytes, bytes_of_updates
         Memory that a factorisation takes while it is made, and without what a solve needs of it.
     """
@@ -137,8 +141,8 @@ class Plan:
         self.children = fronts.children()
         self.entries = fronts.entries(indptr, indices)
         self.places = fronts.places()
-        own = 3 * np.diff(fronts.first)
-        outside = 3 * np.array([len(boundary) for boundary in fronts.boundary])
+        own = self.own_rows = 3 * np.diff(fronts.first)
+        outside = self.outside_rows = 3 * np.diff(fronts.offset)
         self.pivot_offset = np.concatenate([[0], np.cumsum([_pivot_entries(n) for n in own])])
         self.coupling_offset = np.concatenate([[0], np.cumsum(own * outside)])
         self.bytes_of_updates = int(8 * MEMORY_MARGIN * self._most_at_a_time(own, outside))
@@ -151,8 +155,9 @@ class Plan:
         """Numbers in a front and in the updates that wait for their parents, at the most."""
         waiting = most = 0
         for front, (n, b) in enumerate(zip(own.tolist(), outside.tolist(), strict=True)):
-            most = max(most, waiting + 2 * n * (n + b) + b * b)
-            waiting += b * b - sum(int(outside[child]) ** 2 for child in self.children[front])
+            most = max(most, waiting + n * (2 * n + b) + packed_size(b))
+            waiting += packed_size(b)
+            waiting -= sum(packed_size(int(outside[child])) for child in self.children[front])
         return most
 
     def shares(self, threads: int) -> Shares:
@@ -189,3 +194,9 @@ class Plan:
 def _pivot_entries(n: int) -> int:
     """Entries of the panels of n own rows, each from its first column on."""
     return sum((stop - start) * (n - start) for start, stop in split(n, 1, PANEL))
+
+
+def packed_size(rows: int) -> int:
+    """Entries of a symmetric matrix whose upper triangle is kept in strips of rows."""
+    strips, rest = divmod(rows, STRIP)
+    return strips * STRIP * rows - STRIP * STRIP * strips * (strips - 1) // 2 + rest * rest

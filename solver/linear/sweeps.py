@@ -9,12 +9,9 @@ from carillon.lanes import compiler
 from carillon.narrow import block, subtract
 from carillon.registers import LANES
 from solver.linear import plan
-from solver.linear.plan import PANEL
+from solver.linear.plan import PANEL, STRIP
 
 compiled = compiler(Path(__file__), Path(narrow.__file__), Path(plan.__file__))
-
-STRIP = 192
-"""Columns of W that lie together in memory, row by row."""
 
 
 @compiled

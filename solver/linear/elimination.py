@@ -1,0 +1,235 @@
+"""Elimination of the fronts of a multifrontal factorisation, children before parents."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import scipy.linalg as la
+from numpy.typing import NDArray
+
+from carillon.errors import LocalConvergenceError
+from carillon.lanes import compiler
+from carillon.threads import in_parallel, split
+from solver.linear import plan as plans
+from solver.linear.plan import PANEL, STRIP, Part, Plan, packed_size
+
+Array = NDArray[np.float64]
+
+compiled = compiler(Path(__file__), Path(plans.__file__))
+
+
+def eliminate_fronts(
+    plan: Plan,
+    stiffness: Array,
+    mass: Array,
+    shift: float,
+    threads: int,
+    kept: tuple[Array, Array] | None,
+) -> int:
+    """Eliminate all rows of K - shift M.
+
+    Parameters
+    ----------
+    plan, stiffness, mass, shift, threads
+        See `solver.linear.multifrontal.Factor`.
+    kept
+        What a solve needs goes there: pivots with what couples panels, and W in strips.
+
+    Returns
+    -------
+    int
+        Number of negative eigenvalues of the pivots.
+
+    Raises
+    ------
+    LocalConvergenceError
+        If the shift is an eigenvalue to rounding.
+    """
+    updates: dict[int, Array] = {}
+    own_rows, outside = plan.own_rows, plan.outside_rows
+
+    def eliminated(front: int, room: Array, threads: int = 1) -> int:
+        n, b = int(own_rows[front]), int(outside[front])
+        own = room[: n * (n + b)].reshape(n, n + b)
+        own[:] = 0.0
+        _add_entries(own, plan.entries[front], stiffness, mass, shift)
+        # A piece that nothing connects to the rest has no update.
+        children = [child for child in plan.children[front] if child in updates]
+        for child in children:
+            _subtract_from_own(own, plan.places[child], updates[child])
+        pivots = coupling = None
+        if kept is not None:
+            pivots = kept[0][plan.pivot_offset[front] : plan.pivot_offset[front + 1]]
+            coupling = kept[1][plan.coupling_offset[front] : plan.coupling_offset[front + 1]]
+        inverses, negative = _eliminate_panels(own, pivots)
+        if b:
+            update = _update(own, inverses, coupling, threads)
+            for child in children:
+                _add_beyond(update, b, n // 3, plan.places[child], updates.pop(child))
+            updates[front] = update
+        return negative
+
+    def eliminated_part(part: Part, threads: int = 1) -> int:
+        numbers = part.fronts
+        largest = (own_rows[numbers] * (own_rows[numbers] + outside[numbers])).max()
+        room = np.empty(int(largest))
+        return sum(eliminated(int(front), room, threads) for front in numbers)
+
+    # The fronts above the branches are few and large: threads share each of them.
+    tree = plan.shares(threads)
+    branches = [(part,) for part, below in zip(tree.parts, tree.children, strict=True) if not below]
+    negative = sum(in_parallel(eliminated_part, branches, threads))
+    for part, below in zip(tree.parts, tree.children, strict=True):
+        if below:
+            negative += eliminated_part(part, threads)
+    return negative
+
+
+def _eliminate_panels(own: Array, pivots: Array | None) -> tuple[list[Array], int]:
+    """Eliminate the own rows of a front, a panel of them at a time.
+
+    Parameters
+    ----------
+    own
+        (n, n + b) own rows of the matrix, of which the upper triangle counts; on return those of
+        the matrix from which the panels before were eliminated.
+    pivots
+        What becomes of each panel's own columns: the inverse of its diagonal block, and the product
+        with it of what couples the panel to the panels after.
+
+    Returns
+    -------
+    tuple[list[Array], int]
+        These inverses, and the number of negative eigenvalues of the diagonal blocks.
+    """
+    n = len(own)
+    scaled = np.empty((n, n))
+    inverses: list[Array] = []
+    negative = place = 0
+    for start, stop in split(n, 1, PANEL):
+        rows = own[start:stop, start:]
+        if start:
+            rows -= scaled[:start, start:stop].T @ own[:start, start:]
+        size = stop - start
+        inverse, below = _inverse(rows[:, :size])
+        inverses.append(inverse)
+        negative += below
+        later = scaled[start:stop, stop:]
+        np.matmul(inverse, rows[:, size : n - start], out=later)
+        if pivots is None:
+            continue
+        for part in (inverse, later):
+            pivots[place : place + part.size].reshape(part.shape)[:] = part
+            place += part.size
+    return inverses, negative
+
+
+def _inverse(block: Array) -> tuple[Array, int]:
+    """Inverse of a symmetric matrix, given its upper triangle, and its negative eigenvalues."""
+    factor, pivots, _ = la.lapack.dsytrf(np.array(block).T, lower=1, overwrite_a=1)
+    # Every 2x2 pivot of Bunch and Kaufman has one eigenvalue of either sign.
+    single = pivots > 0
+    negative = int((np.diag(factor)[single] < 0.0).sum() + (~single).sum() // 2)
+    inverse, failed = la.lapack.dsytri(factor, pivots, lower=1, overwrite_a=1)
+    if failed:
+        raise LocalConvergenceError("the shifted matrix is singular to rounding; change the shift")
+    result = inverse.T
+    _mirror(result)
+    return result, negative
+
+
+def _update(own: Array, inverses: list[Array], coupling: Array | None, threads: int) -> Array:
+    """What the elimination of the own rows takes off the rows beyond, packed.
+
+    Parameters
+    ----------
+    own, inverses
+        Of `_eliminate_panels`.
+    coupling
+        The inverses times the own rows' columns beyond become this, a strip of columns after the
+        other.
+
+    Returns
+    -------
+    Array
+        The upper triangle of a symmetric matrix: strips of rows, each a rectangle that begins at
+        its first diagonal entry, what is left of the diagonal being anything.
+    """
+    n = len(own)
+    beyond = own[:, n:]
+    b = beyond.shape[1]
+    update = np.empty(packed_size(b))
+    panels = split(n, 1, PANEL)
+
+    def strip(first: int) -> None:
+        last = min(first + STRIP, b)
+        if coupling is None:
+            scaled = np.empty((n, last - first))
+        else:
+            scaled = coupling[n * first : n * last].reshape(n, last - first)
+        for (start, stop), inverse in zip(panels, inverses, strict=True):
+            np.matmul(inverse, beyond[start:stop, first:last], out=scaled[start:stop])
+        place = packed_size(b) - packed_size(b - first)
+        size = (last - first) * (b - first)
+        rows = update[place : place + size].reshape(last - first, b - first)
+        for start, stop in split(last - first, 1, PANEL):
+            left = scaled[:, start:stop].T
+            np.matmul(left, beyond[:, first + start :], out=rows[start:stop, start:])
+
+    in_parallel(strip, [(first,) for first in range(0, b, STRIP)], threads)
+    return update
+
+
+@compiled
+def _add_entries(matrix, entries, stiffness, mass, shift):  # type: ignore[no-untyped-def]
+    for entry in range(entries.shape[0]):
+        row, column, number = 3 * entries[entry, 0], 3 * entries[entry, 1], entries[entry, 2]
+        for i in range(3):
+            for j in range(3):
+                matrix[row + i, column + j] += stiffness[number, i, j]
+            matrix[row + i, column + i] -= shift * mass[number]
+
+
+@compiled
+def _row(packed, size, row):  # type: ignore[no-untyped-def]
+    """A row of a packed matrix, from the first column of its strip on, which is returned too."""
+    first = row // STRIP * STRIP
+    place = first * size - first * (first - STRIP) // 2 + (row - first) * (size - first)
+    return packed[place : place + size - first], first
+
+
+@compiled
+def _subtract_from_own(own, places, update):  # type: ignore[no-untyped-def]
+    count, size = own.shape[0] // 3, 3 * len(places)
+    for a in range(len(places)):
+        if places[a] >= count:
+            break
+        for i in range(3):
+            target = own[3 * places[a] + i]
+            source, first = _row(update, size, 3 * a + i)
+            for b in range(a, len(places)):
+                for j in range(3):
+                    target[3 * places[b] + j] -= source[3 * b + j - first]
+
+
+@compiled
+def _add_beyond(total, total_size, count, places, update):  # type: ignore[no-untyped-def]
+    size = 3 * len(places)
+    for a in range(len(places)):
+        if places[a] < count:
+            continue
+        for i in range(3):
+            target, start = _row(total, total_size, 3 * (places[a] - count) + i)
+            source, first = _row(update, size, 3 * a + i)
+            for b in range(a, len(places)):
+                for j in range(3):
+                    target[3 * (places[b] - count) + j - start] += source[3 * b + j - first]
+
+
+@compiled
+def _mirror(matrix):  # type: ignore[no-untyped-def]
+    """The upper triangle becomes the lower one too."""
+    for row in range(len(matrix)):
+        for column in range(row):
+            matrix[row, column] = matrix[column, row]
