@@ -144,7 +144,9 @@ def test_blocks_of_a_basis_are_one_matrix(box, threads, columns):
     basis.remove(overlap, rest)
     np.testing.assert_allclose(rest, vectors - whole @ overlap, atol=1e-7)
     weights = rng.standard_normal((basis.size, columns))
-    np.testing.assert_allclose(basis.combine(weights), whole @ weights, atol=1e-9)
+    of_rest = rng.standard_normal((columns, columns))
+    combined = basis.combine(weights, rest, of_rest)
+    np.testing.assert_allclose(combined, whole @ weights + rest @ of_rest, atol=1e-7)
     box.system.rows.threads = 1
 
 

@@ -372,6 +372,7 @@ class ModalSolver:
                 similar=similar,
                 begun=cold,
             )
+            cold = start = None  # a factorisation, and a copy of the modes
             rigid_values, rigid = rigid_pairs(system)
         evidence |= {
             "linear_solver": self._linear.method,

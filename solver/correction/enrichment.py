@@ -36,8 +36,8 @@ class Ritz:
     ----------
     values
         (m,) Ritz values [rad^2/s^2].
-    vectors, mass_vectors
-        (local, m) mass-orthonormal X, orthogonal to the rigid motions, and M X; row-major.
+    vectors
+        (local, m) mass-orthonormal X, orthogonal to the rigid motions; row-major.
     errors
         (m,) last estimate of each value's relative error.
     active
@@ -48,9 +48,16 @@ class Ritz:
         self.system = system
         self.values = values.copy()
         self.vectors = np.ascontiguousarray(vectors)
-        self.mass_vectors = system.times_mass(self.vectors)
+        self._mass_vectors: Array | None = None
         self.errors = np.full(len(values), np.nan)
         self.active: Index = np.arange(len(values))
+
+    @property
+    def mass_vectors(self) -> Array:
+        """M X, which accurate vectors are never asked for; collective."""
+        if self._mass_vectors is None:
+            self._mass_vectors = self.system.times_mass(self.vectors)
+        return self._mass_vectors
 
     @property
     def locked(self) -> int:
@@ -90,7 +97,7 @@ class Ritz:
         if locked.any():
             vectors = np.concatenate([self.vectors[:, locked], vectors], axis=1)
             mass_vectors = np.concatenate([self.mass_vectors[:, locked], mass_vectors], axis=1)
-        self.vectors, self.mass_vectors = vectors, mass_vectors
+        self.vectors, self._mass_vectors = vectors, mass_vectors
         count = int(locked.sum())
         self.values = np.concatenate([self.values[locked], values])
         self.errors = np.concatenate([self.errors[locked], np.full(len(values), np.nan)])

@@ -133,9 +133,9 @@ class Iteration:
         values, vectors, errors = self.ritz.lowest(len(self.ritz.values))
         return Correction(
             values[: self.requested],
-            np.ascontiguousarray(vectors[:, : self.requested]),
+            vectors[:, : self.requested],
             errors[: self.requested],
-            vectors[:, self.requested :],
+            np.ascontiguousarray(vectors[:, self.requested :]),
             step,
             self.solves,
             self.blocks,

@@ -337,9 +337,7 @@ class _Basis:
 
         values, weights, of_last = bcast_from_root(system.comm, project)
         rigid = np.zeros((self._rigid, weights.shape[1]))
-        vectors = self._vectors.combine(np.concatenate([rigid, weights]))
-        vectors += block @ of_last
-        return values, vectors
+        return values, self._vectors.combine(np.concatenate([rigid, weights]), block, of_last)
 
 
 def _signs(system: System, modes: Array) -> Array:

@@ -91,8 +91,8 @@ class BlockBasis:
         if not np.may_share_memory(block, vectors):
             vectors[:] = block.reshape(self._rows, -1)[:, : vectors.shape[1]]
 
-    def combine(self, weights: Array) -> Array:
-        """The basis vectors times `weights` (size, k): vectors (local, k)."""
+    def combine(self, weights: Array, block: Array, of_block: Array) -> Array:
+        """The basis vectors times `weights` (size, k), and a block (local, b) times its (b, k)."""
         spread = np.zeros((self._count * self._width, weights.shape[1]))
         spread[self._columns] = weights
         result = np.empty((self._rows, weights.shape[1]))
@@ -102,6 +102,7 @@ class BlockBasis:
                 rows = slice(first, min(first + ROWS_COMBINED, stop))
                 together = self._blocks[: self._count, rows].transpose(1, 0, 2)
                 np.matmul(together.reshape(together.shape[0], -1), spread, out=result[rows])
+                result[rows] += block[rows] @ of_block
 
         in_parallel(part, self._ranges(ROWS_COMBINED), self._threads)
         return result
