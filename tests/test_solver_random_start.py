@@ -18,6 +18,7 @@ from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import Layout, assemble
 from solver.coarsening.choice import make_coarsening
+from solver.correction.lanczos import mixed
 from solver.correction.lobpcg import lobpcg
 from solver.correction.shift import LEAST, MOST, inverse_amid
 from solver.distribution.local_mesh import distribute
@@ -183,6 +184,12 @@ def test_coarse_modes_are_a_start(method):
     cold = ModalSolver(model, options, COMM).solve()
     np.testing.assert_allclose(found.values[6:], cold.values[6:], rtol=1e-6)
     assert found.evidence["right_hand_sides"] <= cold.evidence["right_hand_sides"]
+
+
+def test_no_column_vanishes_where_the_shift_is_a_value_of_the_start(box):
+    values, vectors = np.arange(1.0, 15.0), start_block(box.system, 14, 0)
+    block, _ = mixed(box.system, values, vectors, 14, values[7], 1e-3, columns=8)
+    assert np.linalg.cond(block) < 1e6
 
 
 def test_a_coarsened_model_has_nothing_to_start_from(run_cli, tmp_path):

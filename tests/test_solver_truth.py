@@ -17,6 +17,7 @@ from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import assemble
 from solver.distribution.local_mesh import distribute
+from solver.reference import eigensolver
 from solver.reference.truth import complete, count_below, count_beyond, solve_truth, start_vector
 from solver.subspace.verification import verify
 from tests import solids
@@ -100,6 +101,15 @@ def test_nothing_is_missed_in_symmetric_solids(solid, method):
         assert (values[:6] < 1e-9 * exact[6]).all()
         residuals, orthogonality = verify(system, values, vectors)
         assert orthogonality < 1e-9 and residuals.max() < 1e-3
+
+
+def test_what_one_factorisation_refuses_the_next_does(monkeypatch):
+    model, modes = SYMMETRIC[next(iter(SYMMETRIC))]
+    system = system_of(model)
+    expected = solve_truth(system, modes).values
+    packages = ["no such package", *eigensolver.definite_packages(1)]
+    monkeypatch.setattr(eigensolver, "definite_packages", lambda ranks: packages)
+    np.testing.assert_allclose(solve_truth(system, modes).values, expected, rtol=1e-9, atol=1e-3)
 
 
 @pytest.mark.parametrize("method", ["slepc", "arpack"])

@@ -16,7 +16,7 @@ from forests.training.train import TrainingOptions
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
 from solver.response.response_file import StrikeOptions
-from solver.studies.benchmark.row import BenchmarkOptions
+from solver.studies.benchmark.options import BenchmarkOptions
 from solver.studies.scaling.study import ScalingOptions
 from workflow import settings
 
@@ -151,6 +151,7 @@ OTHER_DEFAULTS = {
     "dataset.samples": "an option that has to be given",
     "dataset.shards": "two cores make two at once",
     "solver.tolerance": "the option's depends on the method",
+    "figures.rough": "the paper has no such figure, but its reader asks",
     "scaling.modes": "a study of a few minutes",
     "scaling.ranks": "a list, since JSON has no tuples",
     "figures.slow_runs": "ARPACK takes minutes a run",

@@ -28,6 +28,8 @@ MIXED_IN_COLUMN = 4
 """Wanted modes in a column of the first block; the space has to tell them apart again."""
 END_WEIGHT = 2.0
 """Exponent of a mode's distance to the shift, by which it enters the first block."""
+LEAST_WEIGHT = 1e-3
+"""Weight that it has at least, as a share of the greatest: the shift may be one of the values."""
 MIXED = 1.15
 """Modes that enter the first block, as a share of those wanted, in case some are out of order."""
 ROUGH = 1e-3
@@ -358,6 +360,7 @@ def _mixture(values: Array, modes: Array, signs: Array, shift: float, columns: i
     """
     count = len(values)
     weight = np.abs(values - shift) ** END_WEIGHT
+    weight = np.maximum(weight, LEAST_WEIGHT * weight.max())
     number = np.arange(count)
     mixture = np.zeros((count, columns))
     mixture[number, number % columns] = signs * weight / weight.max()

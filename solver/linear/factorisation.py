@@ -35,6 +35,15 @@ def factor_package(ranks: int) -> str:
     )
 
 
+def definite_packages(ranks: int) -> list[str]:
+    """The same for positive definite matrices: the fastest, and what may do if that refuses.
+
+    CHOLMOD is the faster one, but does not pivot.
+    """
+    alone = ranks == 1 and PETSc.Sys.hasExternalPackage("suitesparse")
+    return [*(["cholmod"] if alone else []), factor_package(ranks)]
+
+
 def factorised(
     matrix: PETSc.Mat, controls: Mapping[int, int], prefix: str | None = None
 ) -> PETSc.PC:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +13,7 @@ from slepc4py import SLEPc
 
 from carillon.errors import UserError
 from solver.assembly.system import System
-from solver.linear.factorisation import factor_package
+from solver.linear.factorisation import definite_packages
 from solver.linear.petsc_options import OPTIONS_PREFIX, require_known_options
 
 Array = NDArray[np.float64]
@@ -20,6 +22,9 @@ TYPES = {"slepc": SLEPc.EPS.Type.KRYLOVSCHUR, "arpack": SLEPc.EPS.Type.ARPACK}
 MAX_ITERATIONS = 500
 ARPACK_MARGIN = 2
 """Unknowns beyond the pairs wanted that ARPACK needs."""
+SUBSPACE, FEWEST_MORE = 1.25, 24
+"""Vectors that Krylov-Schur keeps for each pair wanted, and least number beyond these.  To make the
+two a pair that SLEPc would keep orthogonal takes longer than the solves that they save."""
 
 
 def smallest_eigenpairs(
@@ -72,6 +77,26 @@ def smallest_eigenpairs(
     UserError
         If this SLEPc lacks the method.
     """
+    *others, last = definite_packages(system.comm.size)
+    search = partial(_search, system, known, count, shift, start, tolerance, method, configurable)
+    for package in others:
+        with suppress(PETSc.Error):
+            return search(package)
+    return search(last)
+
+
+def _search(
+    system: System,
+    known: Array,
+    count: int,
+    shift: float,
+    start: Array,
+    tolerance: float,
+    method: str,
+    configurable: bool,
+    package: str,
+) -> tuple[Array, Array, int]:
+    """`smallest_eigenpairs` by one package's factorisation."""
     solver = SLEPc.EPS().create(system.comm)
     vectors = [_petsc_vector(start, system.comm)]
     try:
@@ -88,10 +113,12 @@ def smallest_eigenpairs(
         asked = count
         if method == "arpack":
             asked = min(count + known.shape[1], system.n_dofs - ARPACK_MARGIN)
+            solver.setDimensions(asked)
         else:
             vectors += [_petsc_vector(column, system.comm) for column in known.T]
             solver.setDeflationSpace(vectors[1:])
-        solver.setDimensions(asked)
+            subspace = max(round(SUBSPACE * asked), asked + FEWEST_MORE)
+            solver.setDimensions(asked, min(subspace, system.n_dofs))
         solver.setTarget(-shift)
         solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
         transform = solver.getST()
@@ -101,7 +128,7 @@ def smallest_eigenpairs(
         linear.setType(PETSc.KSP.Type.PREONLY)
         preconditioner = linear.getPC()
         preconditioner.setType(PETSc.PC.Type.CHOLESKY)
-        preconditioner.setFactorSolverType(factor_package(system.comm.size))
+        preconditioner.setFactorSolverType(package)
         if configurable:
             solver.setOptionsPrefix(OPTIONS_PREFIX)
             solver.setFromOptions()

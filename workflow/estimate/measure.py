@@ -83,7 +83,7 @@ def finished(
     """
     folder.mkdir()
     file = folder / "config.json"
-    file.write_text(json.dumps(values))
+    file.write_text(json.dumps({**values, "solver": {**values.get("solver", {}), "cores": cores}}))
     jobs = plan(settings.complete([file]), cores)
     jobs["sizes"] = sizes_of(jobs, fits_per_second)
     jobs["law"] = [known_of(job.rule, job.variant)["law"] for job in jobs.itertuples()]

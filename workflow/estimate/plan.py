@@ -33,9 +33,9 @@ def plan(config: Mapping[str, Any], cores_per_node: int, cores: int | None = Non
     Parameters
     ----------
     cores_per_node
-        What jobs that take all cores get, unless the configuration says.
+        What jobs of a cluster get, unless the configuration says.
     cores
-        All cores, which several ranks may share.
+        All cores, which several ranks may share; more than those of a node on a cluster.
 
     Raises
     ------
@@ -44,7 +44,8 @@ def plan(config: Mapping[str, Any], cores_per_node: int, cores: int | None = Non
     """
     with TemporaryDirectory() as folder:
         values, meshes = _placeless(config, Path(folder))
-        values["solver"]["cores"] = config["solver"]["cores"] or cores_per_node
+        if cores is not None and cores > cores_per_node:
+            values["solver"]["cores"] = config["solver"]["cores"] or cores_per_node
         file = Path(folder, "config.json")
         file.write_text(json.dumps(values))
         # Snakemake alters the process that it runs in; a fork has loaded most of it already.

@@ -14,19 +14,22 @@ MODELS = list(config["models"])
 
 # Timed rules take all cores, so that no other job disturbs their wall times.
 # On a cluster nothing says how many there are but the configuration.
-SOLVER_CORES = config["solver"]["cores"] or workflow.resource_settings.cores or 1
+ALL_CORES = workflow.resource_settings.cores or 1
+SOLVER_CORES = config["solver"]["cores"] or ALL_CORES
 RANKS = config["solver"]["ranks"]
+# Runs whose result is a spectrum go side by side: there are many, and threads share no run as well.
+RUN_CORES = config["solver"]["cores"] or min(ALL_CORES, max(RANKS, ALL_CORES // 4))
 # What starts ranks, in a job of SLURM its own.
 ANY_LAUNCHER = "srun --mpi=pmix" if "SLURM_JOB_ID" in os.environ else "mpiexec"
 
 
-def resources_of(ranks):
-    """Ranks, cores of each, and as `mpi` what goes in front of a program on several ranks.
+def resources_of(ranks, cores):
+    """Ranks, their share of the cores, and as `mpi` what goes in front of a program on several ranks.
 
     The words of `mpi` are quoted here, as it is the one thing that goes to a shell as it is.
     """
     launcher = quoted(config["solver"]["launcher"] or ANY_LAUNCHER) if ranks > 1 else ""
-    return {"mpi": launcher, "tasks": ranks, "cpus_per_task": max(1, SOLVER_CORES // ranks)}
+    return {"mpi": launcher, "tasks": ranks, "cpus_per_task": max(1, cores // ranks)}
 
 
 def python_on(ranks):
@@ -81,14 +84,14 @@ def growing(first):
     return lambda wildcards, attempt: first * 2 ** (attempt - 1)
 
 
-def limits(rule, memory=None, ranks=None):
+def limits(rule, memory=None, ranks=None, cores=SOLVER_CORES):
     """Memory and time of a rule from the configuration, and what its ranks need if it has any.
 
     `memory` [MB] is taken if the configuration names none.
     """
     asked = config["resources"][rule]
     megabytes, minutes = growing(asked["memory_mb"] or memory), growing(asked["minutes"])
-    return {"mem_mb": megabytes, "runtime": minutes, **(resources_of(ranks) if ranks else {})}
+    return {"mem_mb": megabytes, "runtime": minutes, **(resources_of(ranks, cores) if ranks else {})}
 
 
 wildcard_constraints:

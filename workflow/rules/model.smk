@@ -77,7 +77,7 @@ def hcms_arguments(corrected):
 
 def times_arguments(part):
     """How methods are timed, from a part of the configuration."""
-    keys = ("modes", "runs", "slow_runs", "tune", "arpack_regular", "rivals")
+    keys = ("modes", "runs", "slow_runs", "tune", "arpack_regular", "rough", "rivals")
     return options({key: part.get(key) for key in keys})
 
 

@@ -11,9 +11,9 @@ rule find_modes:
         f"{LOGS}/models/{{model}}/{{variant}}.log",
     benchmark:
         f"{BENCHMARKS}/models/{{model}}/{{variant}}.tsv"
-    threads: SOLVER_CORES
+    threads: RUN_CORES
     resources:
-        **limits("find_modes", ranks=RANKS),
+        **limits("find_modes", ranks=RANKS, cores=RUN_CORES),
     params:
         source=source("solver.commands.modes"),
         model=model_arguments,
@@ -33,7 +33,7 @@ rule follow_convergence:
         f"{LOGS}/models/{{model}}/convergence.log",
     benchmark:
         f"{BENCHMARKS}/models/{{model}}/convergence.tsv"
-    threads: SOLVER_CORES
+    threads: RUN_CORES
     resources:
         **limits("follow_convergence"),
     params:

@@ -13,6 +13,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.fem.model import RIGID_MODES, Solid
+from solver.analysis.coarse_start import coarse_start
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
@@ -38,6 +39,8 @@ CORRECTED_TOLERANCE = 1e-6
 """Eigenvalue error of HCMS with error correction on the fine mesh."""
 RIVAL_TOLERANCE = 1e-6
 """Relative residual of SLEPc and ARPACK; their eigenvalues are far better, at no cost."""
+ROUGH_TOLERANCE = 1e-3
+"""Either's, where the fine solid is wanted roughly."""
 RIVAL_SECONDS = 300.0
 """Wall time [s] after which a further rival is given up."""
 BELOW_ELASTIC, ABOVE_LAST = 0.5, 1.0 + 1e-4
@@ -116,6 +119,11 @@ class Methods:
             self._exact = run.values
         return run
 
+    def slepc_rough(self) -> MethodRun:
+        """SLEPc's Krylov-Schur to the rough tolerance."""
+        with self.configuration.in_force(self.modes):
+            return self._rival("slepc", *self._model("none"), ROUGH_TOLERANCE)
+
     def arpack(self) -> MethodRun:
         """ARPACK in shift-and-invert mode."""
         with without_purification():
@@ -178,6 +186,15 @@ class Methods:
         """What `--method auto` takes: block Lanczos from random vectors."""
         return self._cold(*self._model("none"), self._options(tolerance=CORRECTED_TOLERANCE))
 
+    def fastest_rough(self) -> MethodRun:
+        """The same to the rough tolerance."""
+        return self._cold(*self._model("none"), self._options(tolerance=ROUGH_TOLERANCE))
+
+    def refined(self) -> MethodRun:
+        """The same from the modes of the solid coarsened by forests."""
+        options = self._options(tolerance=ROUGH_TOLERANCE)
+        return self._cold(*self._model("none"), options, from_coarse=True)
+
     def ddfem_ec_accurate(self) -> MethodRun:
         """The same on the mesh coarsened by forests."""
         return self._cold(*self._model("ddfem"), self._options(tolerance=CORRECTED_TOLERANCE))
@@ -232,21 +249,37 @@ class Methods:
         model, seconds = made or (None, 0.0)
         return model, self.comm.bcast(seconds)
 
-    def _cold(self, model: Solid | None, coarsened: float, options: SolverOptions) -> MethodRun:
+    def _cold(
+        self,
+        model: Solid | None,
+        coarsened: float,
+        options: SolverOptions,
+        from_coarse: bool = False,
+    ) -> MethodRun:
         begin = self._now()
         solver = ModalSolver(model, options, self.comm)
         prepared = self._now()
-        result = solver.solve()
+        start = None
+        if from_coarse:
+            forest = None if self.solid is None else self.solid.forest
+            start = coarse_start(solver, model, forest)
+        result = solver.solve(initial_modes=start)
         return replace(self._run(result, prepared, coarsened), before=prepared - begin)
 
-    def _rival(self, method: str, model: Solid | None, coarsened: float) -> MethodRun:
+    def _rival(
+        self,
+        method: str,
+        model: Solid | None,
+        coarsened: float,
+        tolerance: float = RIVAL_TOLERANCE,
+    ) -> MethodRun:
         """A general eigensolver, which needs nothing of what is prepared of the mesh.
 
         It is given the rigid motions, finds a few modes to spare, and is charged for one search.
         Modes that this missed, by the count of eigenvalues, are found by others off the clock: its
         eigenvalues are a reference, which must be complete, and its time is favoured.
         """
-        options = self._options(method=method, tolerance=RIVAL_TOLERANCE)
+        options = self._options(method=method, tolerance=tolerance)
         return replace(self._cold(model, coarsened, options), before=0.0)
 
     def _run(self, result: Modes, begin: float, coarsened: float) -> MethodRun:
@@ -275,6 +308,9 @@ def named(methods: Methods) -> dict[str, Callable[[], MethodRun]]:
         "hcms": methods.hcms,
         "hcms_ec": methods.hcms_ec,
         "fastest": methods.fastest,
+        "slepc_rough": methods.slepc_rough,
+        "fastest_rough": methods.fastest_rough,
+        "refined": methods.refined,
         "ddfem_ec_accurate": methods.ddfem_ec_accurate,
         "ddfem_ec": methods.ddfem_ec,
         "ddfem_ec_warm": methods.ddfem_ec_warm,

@@ -18,8 +18,9 @@ from carillon.errors import ConvergenceError
 from carillon.fem.model import RIGID_MODES, ElasticModel
 from solver.assembly.system import System, assemble
 from solver.distribution.local_mesh import distribute
-from solver.linear.factorisation import factor_package
+from solver.linear.factorisation import definite_packages
 from solver.linear.petsc_options import OPTIONS_PREFIX
+from solver.reference.eigensolver import FEWEST_MORE, SUBSPACE
 from solver.subspace.rayleigh_ritz import rigid_pairs
 
 Array = NDArray[np.float64]
@@ -28,8 +29,6 @@ PACKAGES = {"cholmod": "suitesparse", "mumps": "mumps"}
 """Sparse Cholesky factorisations that are tried, and the packages that PETSc has them from."""
 SUBSPACES = (1.25, 1.5, 2.0)
 """Lanczos vectors for each mode wanted that are tried."""
-FEWEST_MORE = 24
-"""Lanczos vectors beyond the modes wanted, however few these are."""
 MOST_RESTARTS = 2000
 """Restarts that ARPACK may make without a factorisation."""
 
@@ -51,8 +50,8 @@ class SlepcConfiguration:
 
     @classmethod
     def default(cls, ranks: int) -> SlepcConfiguration:
-        """What `solver modes --method slepc` does: MUMPS and twice as many vectors as modes."""
-        return cls(factor_package(ranks), 2.0)
+        """What `solver modes --method slepc` does."""
+        return cls(definite_packages(ranks)[0], SUBSPACE)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain dictionary, ready for JSON."""

@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, cast
 
 from mpi4py import MPI
 
-from carillon.arguments import positive_number, whole_number
 from carillon.errors import ConvergenceError
 from carillon.fem.geometry import surface_name
-from carillon.options import option
 from carillon.progress import track
 from carillon.runtime import blas_name, loaded_blas
-from solver.analysis.options import number_of_modes
 from solver.analysis.problem import ProblemOptions
 from solver.distribution.collective import bcast_from_root, compute_on_root
-from solver.studies.benchmark.further import ALL, RIVALS
-from solver.studies.benchmark.methods import RIVAL_SECONDS, MethodRun, Methods, named
+from solver.studies.benchmark.further import RIVALS
+from solver.studies.benchmark.methods import MethodRun, Methods, named
+from solver.studies.benchmark.options import ROUGH, BenchmarkOptions
 from solver.studies.benchmark.rivals import SlepcConfiguration, configurations
 from solver.studies.benchmark.scores import (
     BASES,
@@ -37,8 +34,7 @@ logger = logging.getLogger(__name__)
 
 Runs = dict[str, list[MethodRun]]
 
-SLOW = ("arpack", "arpack_regular", *RIVALS)
-NEED_FORESTS = ("ddfem", "ddfem_ec_accurate", "ddfem_ec", "ddfem_ec_warm")
+NEED_FORESTS = ("refined", "ddfem", "ddfem_ec_accurate", "ddfem_ec", "ddfem_ec_warm")
 LUMPED = tuple(name for name, rival in RIVALS.items() if rival.lumped)
 NEED_VOXELS = (*NEED_FORESTS, "arpack_regular", *LUMPED)
 WARM_UP_MODES = 20
@@ -64,6 +60,9 @@ MEANING = {
     "outer name added to its seconds, and nothing to those of the inner name",
     "ddfem": "coarsened by forests, then SLEPc on the coarse model (DDFEM* alone)",
     "fastest": "what --method auto takes: block Lanczos from random vectors",
+    "slepc_rough": "SLEPc to a residual of 1e-3",
+    "fastest_rough": "the fastest to an eigenvalue error of 1e-3",
+    "refined": "the same from the modes of the solid coarsened by forests, which is solved before",
     "ddfem_ec_accurate": "coarsened by forests, then the fastest to the same accuracy as on the "
     "fine mesh",
     "ddfem_ec": "coarsened by forests, then the fastest to the interactive tolerance, from nothing",
@@ -75,53 +74,6 @@ MEANING = {
     "frequency_error": "of the coarse model, by mode number, relative to SLEPc on the fine mesh",
 }
 """What the figures of a row mean, for the row itself."""
-
-
-number_of_rounds = whole_number(1, 10_000)
-"""Argument type: a number of rounds."""
-
-
-@dataclass(frozen=True)
-class BenchmarkOptions:
-    """How a row is measured."""
-
-    modes: int = option(256, "number of modes, rigid ones included", type=number_of_modes)
-    runs: int = option(5, "rounds; in each, every method runs once", type=number_of_rounds)
-    slow_runs: int | None = option(
-        None,
-        "rounds that ARPACK and --rivals take part in (default: all)",
-        type=number_of_rounds,
-    )
-    arpack: bool = option(True, "run ARPACK, the slowest method, too")
-    arpack_regular: bool = option(False, "also ARPACK without a factorisation, on a lumped mass")
-    rivals: list[str] | None = option(
-        None, "further general eigensolvers, on one rank", nargs="+", choices=(*RIVALS, ALL)
-    )
-    rival_seconds: float = option(
-        RIVAL_SECONDS, "wall time after which one of these is given up [s]", type=positive_number
-    )
-    tune: bool = option(
-        False, "SLEPc in its fastest configuration of several, each tried once before"
-    )
-
-    @property
-    def left_out(self) -> tuple[str, ...]:
-        """Methods that the options leave out."""
-        choices = {"arpack": self.arpack, "arpack_regular": self.arpack_regular}
-        choices |= {name: name in self.further for name in RIVALS}
-        return tuple(name for name, runs in choices.items() if not runs)
-
-    @property
-    def further(self) -> tuple[str, ...]:
-        """Further rivals that the options ask for."""
-        asked = self.rivals or []
-        return tuple(name for name in RIVALS if name in asked or ALL in asked)
-
-    def rounds(self, method: str) -> int:
-        """Runs of a method."""
-        if method in SLOW and self.slow_runs is not None:
-            return min(self.runs, self.slow_runs)
-        return self.runs
 
 
 def benchmark_row(
@@ -318,7 +270,8 @@ def _times(runs: Runs, before: dict[str, float], further: tuple[str, ...]) -> di
         "fine_solver": planned.get("fastest", 0.0),
         "coarse_solver": planned.get("ddfem_ec", 0.0),
     }
-    names = ["arpack", "slepc", *BASES]
+    asked = [name for name in (*BASES, "slepc_rough") if name not in ROUGH or name in seconds]
+    names = ["arpack", "slepc", *asked]
     if "arpack_regular" in seconds:
         names.append("arpack_regular")
     names += further
@@ -343,6 +296,7 @@ def _errors(runs: Runs, spectra: dict[str, MethodRun], further: tuple[str, ...])
         "hcms": "fine",
         "hcms_ec": "fine",
         "fastest": "fine",
+        **dict.fromkeys(ROUGH, "fine"),
         "ddfem_ec_accurate": "coarse",
         "ddfem_ec": "coarse",
         "ddfem_ec_warm": "coarse_changed",

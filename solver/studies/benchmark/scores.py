@@ -18,6 +18,8 @@ BASES = {
     "hcms": ("arpack", "slepc"),
     "hcms_ec": ("arpack", "slepc"),
     "fastest": ("arpack", "slepc", "hcms_ec"),
+    "fastest_rough": ("slepc_rough",),
+    "refined": ("slepc_rough", "fastest_rough"),
     "ddfem": ("arpack", "slepc"),
     "ddfem_ec_accurate": ("arpack", "slepc", "ddfem"),
     "ddfem_ec": ("arpack", "slepc", "ddfem", "fastest"),

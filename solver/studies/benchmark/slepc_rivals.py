@@ -13,7 +13,7 @@ from slepc4py import SLEPc
 
 from carillon.errors import ConvergenceError
 from solver.assembly.petsc_matrix import distributed_matrix
-from solver.linear.factorisation import factor_package
+from solver.linear.factorisation import definite_packages
 from solver.studies.benchmark.search import Array, Pairs, RivalSearch, TimeLimit, ascending
 
 STANDARD = (SLEPc.EPS.Type.KRYLOVSCHUR, SLEPc.EPS.Type.EVSL)
@@ -122,15 +122,10 @@ def _preconditioned(search: RivalSearch, kind: str, prepare: Callable[[SLEPc.EPS
         inner = transform.getKSP()
         inner.setType(PETSc.KSP.Type.PREONLY)
         inner.getPC().setType(PETSc.PC.Type.CHOLESKY)
-        inner.getPC().setFactorSolverType(_package())
+        inner.getPC().setFactorSolverType(definite_packages(1)[0])
         prepare(solver)
 
     return _solve(search, kind, prepare_all)
-
-
-def _package() -> str:
-    """CHOLMOD, which solves for one right-hand side faster than MUMPS."""
-    return "cholmod" if PETSc.Sys.hasExternalPackage("suitesparse") else factor_package(1)
 
 
 def _solve(search: RivalSearch, kind: str, prepare: Callable[[SLEPc.EPS], None]) -> Pairs:

@@ -1,0 +1,62 @@
+"""How a row of the time table is measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from carillon.arguments import positive_number, whole_number
+from carillon.options import option
+from solver.analysis.options import number_of_modes
+from solver.studies.benchmark.further import ALL, RIVALS
+from solver.studies.benchmark.methods import RIVAL_SECONDS
+
+SLOW = ("arpack", "arpack_regular", *RIVALS)
+ROUGH = ("slepc_rough", "fastest_rough", "refined")
+
+number_of_rounds = whole_number(1, 10_000)
+"""Argument type: a number of rounds."""
+
+
+@dataclass(frozen=True)
+class BenchmarkOptions:
+    """How a row is measured."""
+
+    modes: int = option(256, "number of modes, rigid ones included", type=number_of_modes)
+    runs: int = option(5, "rounds; in each, every method runs once", type=number_of_rounds)
+    slow_runs: int | None = option(
+        None,
+        "rounds that ARPACK and --rivals take part in (default: all)",
+        type=number_of_rounds,
+    )
+    arpack: bool = option(True, "run ARPACK, the slowest method, too")
+    arpack_regular: bool = option(False, "also ARPACK without a factorisation, on a lumped mass")
+    rough: bool = option(False, "also the fine mesh to 1e-3, from random vectors and coarse modes")
+    rivals: list[str] | None = option(
+        None, "further general eigensolvers, on one rank", nargs="+", choices=(*RIVALS, ALL)
+    )
+    rival_seconds: float = option(
+        RIVAL_SECONDS, "wall time after which one of these is given up [s]", type=positive_number
+    )
+    tune: bool = option(
+        False, "SLEPc in its fastest configuration of several, each tried once before"
+    )
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Methods that the options leave out."""
+        choices = {"arpack": self.arpack, "arpack_regular": self.arpack_regular}
+        choices |= dict.fromkeys(ROUGH, self.rough)
+        choices |= {name: name in self.further for name in RIVALS}
+        return tuple(name for name, runs in choices.items() if not runs)
+
+    @property
+    def further(self) -> tuple[str, ...]:
+        """Further rivals that the options ask for."""
+        asked = self.rivals or []
+        return tuple(name for name in RIVALS if name in asked or ALL in asked)
+
+    def rounds(self, method: str) -> int:
+        """Runs of a method."""
+        if method in SLOW and self.slow_runs is not None:
+            return min(self.runs, self.slow_runs)
+        return self.runs
