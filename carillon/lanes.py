@@ -36,6 +36,9 @@ def compiler(*sources: Path) -> Callable[[Callable[..., Any]], Any]:
 
     They are the files of all functions of lanes that call each other: numba's cache notices a
     change of the function's own file, not of the files it calls, nor of the width.
+
+    Never compile closures: code from the cache is linked by the function's name and the types of
+    its arguments, and one closure would be taken for another that a second process compiled.
     """
     digest = digest_of(*sources)
 
@@ -203,6 +206,8 @@ def _operate(symbol: Any, instruction: str) -> None:
 
     def implementation(left: Any, right: Any) -> Any:
         return apply(left, right)
+
+    implementation.__qualname__ += f"_{instruction}"  # unlike the other operators', see `compiler`
 
     @overload(symbol)
     def operate(left: Any, right: Any) -> Any:

@@ -9,7 +9,6 @@ side by side and filled up with zeros.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,29 +43,22 @@ def block(rows: int, lanes: int) -> Array:
     return zeros
 
 
-def _strip_of(wide: int) -> Any:
-    """Kernel for a strip of the block, `wide` registers wide, and some rows of the matrix."""
-
-    @compiled
-    def strip(matrix, near, end, depth, right, result, column):  # type: ignore[no-untyped-def]
-        entries, corner, down, along = matrix
-        sums, place, lanes = result
-        row = near
-        while row + ROWS <= end:
-            at = (sums, (place + row) * lanes + column, lanes, 1)
-            left = (entries, corner + row * down, down, along)
-            store_tile(at, subtract_product(load_tile(at, ROWS, wide), left, right, depth))
-            row += ROWS
-        while row < end:
-            at = (sums, (place + row) * lanes + column, lanes, 1)
-            left = (entries, corner + row * down, down, along)
-            store_tile(at, subtract_product(load_tile(at, 1, wide), left, right, depth))
-            row += 1
-
-    return strip
-
-
-_strip_of_1, _strip_of_2, _strip_of_3, _strip_of_4 = (_strip_of(wide) for wide in range(1, 5))
+@compiled
+def _strip(matrix, near, end, depth, right, result, column, wide):  # type: ignore[no-untyped-def]
+    """A strip of the block, `wide` registers wide (a literal number), and some rows of the matrix."""
+    entries, corner, down, along = matrix
+    sums, place, lanes = result
+    row = near
+    while row + ROWS <= end:
+        at = (sums, (place + row) * lanes + column, lanes, 1)
+        left = (entries, corner + row * down, down, along)
+        store_tile(at, subtract_product(load_tile(at, ROWS, wide), left, right, depth))
+        row += ROWS
+    while row < end:
+        at = (sums, (place + row) * lanes + column, lanes, 1)
+        left = (entries, corner + row * down, down, along)
+        store_tile(at, subtract_product(load_tile(at, 1, wide), left, right, depth))
+        row += 1
 
 
 @compiled
@@ -94,11 +86,11 @@ def subtract(matrix, rows, depth, factor, result, start=0):  # type: ignore[no-u
                 wide = min(WIDE, lanes - column)
                 right = (block, (top + k) * lanes + column, 1, lanes)
                 if wide == 4:
-                    _strip_of_4(part, near, end, few, right, result, column)
+                    _strip(part, near, end, few, right, result, column, 4)
                 elif wide == 3:
-                    _strip_of_3(part, near, end, few, right, result, column)
+                    _strip(part, near, end, few, right, result, column, 3)
                 elif wide == 2:
-                    _strip_of_2(part, near, end, few, right, result, column)
+                    _strip(part, near, end, few, right, result, column, 2)
                 else:
-                    _strip_of_1(part, near, end, few, right, result, column)
+                    _strip(part, near, end, few, right, result, column, 1)
                 column += wide

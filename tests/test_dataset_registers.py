@@ -1,9 +1,18 @@
 """Lanes and tiles follow the registers of the processor compiled for, and results do not."""
 
+import pkgutil
+from importlib import import_module
+
 import numpy as np
 import pytest
 from llvmlite import binding
+from numba.core.dispatcher import Dispatcher
 
+import carillon
+import dataset_gen
+import forests
+import solver
+import sound
 from carillon import lanes, registers
 from carillon.registers import LANES, OTHERS, X86, registers_in
 from dataset_gen.objectives.compiled import PANEL, panel_of
@@ -45,6 +54,25 @@ def test_another_width_is_compiled_under_another_name(monkeypatch):
     name = lanes.digest_of()
     monkeypatch.setattr(lanes, "REGISTERS", OTHERS)
     assert lanes.digest_of() != name
+
+
+def test_no_closure_is_compiled():
+    """Those of one factory share a name in numba's cache, and runs would call each other's."""
+    packages = [carillon, dataset_gen, forests, solver, sound]
+    names = [
+        module.name
+        for package in packages
+        for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
+        if not module.name.endswith("__main__")
+    ]
+    compiled = [
+        value.py_func.__qualname__
+        for name in names
+        for value in vars(import_module(name)).values()
+        if isinstance(value, Dispatcher)
+    ]
+    assert len(compiled) > 50
+    assert not [name for name in compiled if "<locals>" in name]
 
 
 @pytest.mark.slow
