@@ -45,7 +45,7 @@ def block(rows: int, lanes: int) -> Array:
 
 @compiled
 def _strip(matrix, near, end, depth, right, result, column, wide):  # type: ignore[no-untyped-def]
-    """A strip of the block, `wide` registers wide (a literal number), and some rows of the matrix."""
+    """A strip of the block, `wide` (a literal) registers wide, and some rows of the matrix."""
     entries, corner, down, along = matrix
     sums, place, lanes = result
     row = near
