@@ -44,12 +44,13 @@ env:  ## only the environment: .venv with PETSc and SLEPc
 	@bash workflow/envs/setup.sh
 
 run: env  ## the default workflow; ends at results/report.html
+	@$(PYTHON_OF_VENV) -m workflow compile training spectra
 	@snakemake --profile workflow/profiles/default --cores $(CORES) $(TARGETS)
 	@echo "report: $(abspath results/report.html)"
 
 test: env  ## the whole test suite
 	@bash workflow/envs/packages.sh install tests >/dev/null || echo "tests without them are skipped"
-	@$(PYTHON_OF_VENV) -m tests.warm_up 2>/dev/null || echo "kernels are compiled by the tests"
+	@$(PYTHON_OF_VENV) -m workflow compile
 	@$(PYTHON_OF_VENV) -m pytest -q -n $(PYTEST_PROCESSES) --dist loadfile \
 		--no-loadscope-reorder $(PYTEST_OPTIONS)
 

@@ -1,4 +1,4 @@
-"""Command line: `python -m workflow estimate | compare | digest | validate`."""
+"""Command line: `python -m workflow COMMAND`; `--help` lists the commands."""
 
 from __future__ import annotations
 

@@ -14,6 +14,9 @@ COMMANDS = {
         "workflow.commands.compare",
         "two folders of results side by side, and what moved beyond noise",
     ),
+    "compile": Command(
+        "workflow.commands.compile", "kernels, once and side by side, before many jobs start"
+    ),
     "digest": Command(
         "workflow.commands.digest",
         "what result files say, as one number: equal for runs that found the same bits",
