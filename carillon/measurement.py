@@ -1,4 +1,4 @@
-"""Provenance of what was timed: also memory, ranks, threads and date."""
+"""Provenance of what was timed: also vector registers, memory, ranks, threads and date."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from carillon.provenance import record
+from carillon.provenance import compiled_for, record
 from carillon.runtime import allowed_threads
 
 _GROUP_LIMIT = Path("/sys/fs/cgroup/memory.max")
@@ -26,9 +26,13 @@ def measured(
     threads
         Of each rank; what the process may use if None.
     """
+    from carillon.registers import LANES  # whose import takes half a second
+
     counts = [ranks] if isinstance(ranks, int) else ranks
     return {
         **record(parameters),
+        "compiled_for": compiled_for(),
+        "vector_bits": 64 * LANES,
         "memory_bytes": memory_bytes(),
         "ranks": ", ".join(map(str, counts)),
         "threads": allowed_threads() if threads is None else threads,

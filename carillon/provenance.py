@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import platform
 import shlex
 import subprocess
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import h5py
+from llvmlite import binding
 
 from carillon import __version__
 from carillon.runtime import allowed_cores, blas_name
@@ -74,9 +76,7 @@ def processor() -> str:
 
 def compiled_for() -> str:
     """Processor that numba compiles for, as LLVM calls it: this one or that of NUMBA_CPU_NAME."""
-    from numba.core.registry import cpu_target  # whose import takes a second
-
-    return str(cpu_target.target_context.codegen().magic_tuple()[1])
+    return os.environ.get("NUMBA_CPU_NAME") or str(binding.get_host_cpu_name())
 
 
 def config_hash(parameters: dict[str, Any]) -> str:

@@ -177,8 +177,8 @@ def test_a_reference_of_text_serves_as_baseline(tmp_path):
     write_table(replace(spreads(), name="times"), results / "tables")
     (results / "benchmarks" / "models").mkdir(parents=True)
     (results / "benchmarks" / "models" / "bell.tsv").write_text("s\th:m:s\n2.5\t0:00:02\n")
-    write_reference(results)
-    reference = results / "reference"
+    write_reference(results, "generic")
+    reference = results / "reference" / "generic"
     assert not list(reference.rglob("*.json"))
     assert "| models | 2.50 s |" in (reference / "README.md").read_text()
     assert (reference / "tables" / "times.md").is_file()

@@ -1,5 +1,6 @@
 # A run beside another one: `snakemake compare --config baseline=FOLDER`, and the small tables that
 # are kept for others to compare theirs with: `snakemake reference`.
+from carillon.provenance import compiled_for
 from workflow.studies.comparison.folders import require_tables
 
 if config["baseline"]:
@@ -32,11 +33,12 @@ rule reference:
         report=f"{RESULTS}/report.html",
         tables=tables_in(catalogue.REPORT),
     output:
-        f"{RESULTS}/reference/README.md",
+        f"{RESULTS}/reference/{compiled_for()}/README.md",
     log:
         f"{LOGS}/reference.log",
     localrule: True
     params:
         source=source("workflow.scripts.write_reference"),
+        processor=compiled_for(),
     script:
         "../scripts/write_reference.py"

@@ -4,4 +4,4 @@ from pathlib import Path
 
 from workflow.studies.comparison.reference import write_reference
 
-write_reference(Path(snakemake.input.config).parent)
+write_reference(Path(snakemake.input.config).parent, snakemake.params.processor)

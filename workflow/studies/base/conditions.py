@@ -14,6 +14,8 @@ Record = Mapping[str, Any]
 
 LABELS = {
     "processor": "Processor",
+    "compiled_for": "Compiled for",
+    "vectors": "Vector registers",
     "cores": "Cores",
     "memory": "Memory",
     "ranks": "MPI ranks",
@@ -29,6 +31,9 @@ LABELS = {
 }
 """Conditions for people, in the order in which they are shown."""
 
+TOLD = ("processor", "compiled_for", "cores", "ranks", "threads", "blas", "commit")
+"""Those that a record tells in the words that are shown."""
+
 NAMED = 3
 """Rows that are named where conditions differ; the others are counted."""
 
@@ -39,9 +44,9 @@ class Conditions:
 
     Attributes
     ----------
-    processor, cores, memory, ranks, threads, blas, versions, commit
-        Of the measurement; `cores` are those that the process could use. Where rows differ, each
-        value is followed by its rows.
+    processor, compiled_for, vectors, cores, memory, ranks, threads, blas, versions, commit
+        Of the measurement; `cores` are those that the process could use, `compiled_for` is LLVM's
+        name of the processor. Where rows differ, each value is followed by its rows.
     configuration
         Hash of the resolved configuration, whatever the folders.
     runs, spread
@@ -53,6 +58,8 @@ class Conditions:
     """
 
     processor: str
+    compiled_for: str
+    vectors: str
     cores: str
     memory: str
     ranks: str
@@ -76,8 +83,9 @@ class Conditions:
         """Machine, ranks, runs and date in one line."""
         warning = f"; not the same for all rows: {self.differing}" if self.differing else ""
         return (
-            f"{self.processor}, {self.cores} cores, {self.memory}; ranks {self.ranks}, threads "
-            f"{self.threads}; runs {self.runs}; {self.date}{warning}"
+            f"{self.processor} ({self.compiled_for}, vectors of {self.vectors}), {self.cores} "
+            f"cores, {self.memory}; ranks {self.ranks}, threads {self.threads}; runs "
+            f"{self.runs}; {self.date}{warning}"
         )
 
     def as_markdown(self) -> str:
@@ -165,10 +173,8 @@ def versions_of(record: Record) -> str:
 def _texts(record: Record) -> dict[str, str]:
     """What a record tells, in words."""
     return {
-        **{
-            key: str(record.get(key, MISSING))
-            for key in ("processor", "cores", "ranks", "threads", "blas", "commit")
-        },
+        **{key: str(record.get(key, MISSING)) for key in TOLD},
+        "vectors": f"{record['vector_bits']} bits" if "vector_bits" in record else MISSING,
         "memory": show(record.get("memory_bytes"), "bytes"),
         "versions": versions_of(record) or MISSING,
     }

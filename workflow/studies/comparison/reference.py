@@ -19,6 +19,7 @@ from workflow.studies.comparison.comparison import APART
 from workflow.studies.comparison.folders import Folder, read_folder
 
 FOLDER = "reference"
+"""Below the results; in it, a folder for each processor that a run was made on."""
 DIGITS = 7
 """Significant digits that are kept: more than any rule of the comparison looks at."""
 LONG = 200
@@ -57,18 +58,18 @@ Of the jobs that are benchmarked (`benchmarks/`), which are all that take long:
 """
 
 
-def write_reference(results: str | Path) -> None:
-    """Write tables, configuration and a description to `reference` below a folder of results."""
+def write_reference(results: str | Path, processor: str) -> None:
+    """Write tables, configuration and a description to `reference/PROCESSOR` below the results."""
     results = Path(results)
     folder = read_folder(results)
-    target = results / FOLDER
+    target = results / FOLDER / processor
     shutil.rmtree(target, ignore_errors=True)
     for path, table in folder.tables.items():
         _put(target / f"{path}.csv", rounded(table).as_csv())
         if len(table.rows) < LONG and not path.endswith(APART):
             _put(target / f"{path}.md", table.as_markdown())
     _put(target / "config.yaml", (results / "config.yaml").read_text())
-    _put(target / "README.md", description(folder))
+    _put(target / "README.md", description(folder, target))
     size = sizes_by_part(target)["all"]
     if size > LARGE:
         say(f"{target}: {size:,} bytes are much to keep with the source, {LARGE:,} would be less")
@@ -89,14 +90,14 @@ def rounded(table: Table) -> Table:
     return replace(table, rows=[{key: kept(row[key]) for key in row} for row in table.rows])
 
 
-def description(folder: Folder) -> str:
+def description(folder: Folder, place: Path) -> str:
     """What the reference is, on which machine it was made, and what that took."""
     conditions = folder.tables[TIMED].conditions
     texts = conditions.texts if conditions else {}
     of_run = {LABELS[key]: text for key, text in texts.items() if key not in OF_TABLES}
     return DESCRIPTION.format(
         title=folder.config["title"],
-        place=folder.path / FOLDER,
+        place=place,
         conditions=_table("", "", of_run),
         seconds=_table("Jobs", "Time", seconds_by_part(folder.path), "seconds"),
         sizes=_table("Results", "Size", sizes_by_part(folder.path), "bytes"),
