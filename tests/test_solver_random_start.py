@@ -18,8 +18,8 @@ from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import Layout, assemble
 from solver.coarsening.choice import make_coarsening
-from solver.correction.lanczos import mixed
 from solver.correction.lobpcg import lobpcg
+from solver.correction.mixture import mixed
 from solver.correction.shift import LEAST, MOST, inverse_amid
 from solver.distribution.local_mesh import distribute
 from solver.linear import LinearSolver

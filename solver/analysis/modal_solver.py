@@ -10,14 +10,15 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES, Solid
 from carillon.fem.moduli import require_coarse_moduli
 from carillon.progress import say
 from carillon.runtime import limit_threads, reuse_freed_memory
-from solver.analysis.bounds import FEWEST_SPARE, check_mode_count, default_keep, require_memory
+from solver.analysis.bounds import check_mode_count, require_memory
+from solver.analysis.components import ComponentModes, elastic_part, lowest_pairs
 from solver.analysis.modes import Initial, Modes
 from solver.analysis.options import RANDOM, SolverOptions
+from solver.analysis.proof import completed, ground_truth
 from solver.analysis.timing import Phases, peak_memory
 from solver.assembly.system import Layout, System, assemble
 from solver.correction.cold import Approximation, Cold, from_nothing
@@ -25,17 +26,8 @@ from solver.correction.correct import correct
 from solver.correction.correction import EIGENVALUE_TOLERANCE, carried, resolved
 from solver.distribution.collective import bcast_from_root, compute_on_root
 from solver.distribution.local_mesh import LocalMesh, distribute, scatter_moduli
-from solver.hcms.synthesis import Synthesis, make_subdomains, synthesize
 from solver.linear import Inverse, Lasting, LinearSolver
-from solver.reference.truth import (
-    RESIDUAL_TOLERANCE,
-    SPARE_MODES,
-    Truth,
-    can_count,
-    complete,
-    count_beyond,
-    solve_truth,
-)
+from solver.reference.truth import SPARE_MODES, Truth, can_count
 from solver.subspace.rayleigh_ritz import rigid_pairs
 from solver.subspace.verification import (
     count_rigid,
@@ -46,9 +38,6 @@ from solver.subspace.verification import (
 from solver.subspace.weyl import CountingLaw
 
 Array = NDArray[np.float64]
-
-ORTHOGONAL_TO_RIGID = 1e-10
-"""Largest overlap of HCMS modes with the rigid motions that needs no correction."""
 
 
 @dataclass
@@ -127,8 +116,7 @@ class ModalSolver:
             if options.method == "lanczos" and not self._linear.indefinite:
                 self.options = options = replace(options, method="lobpcg")
             if options.method == "hcms":
-                self._keep = self._modes_to_keep()
-                self._subdomains = make_subdomains(self.local_mesh, options.interface, comm)
+                self._components = ComponentModes(self.local_mesh, options, self._together, comm)
         self.seconds = phases.seconds
 
     def solve(self, young: Array | None = None, initial_modes: Initial | None = None) -> Modes:
@@ -198,7 +186,8 @@ class ModalSolver:
             "n_dofs": local_mesh.n_dofs,
         }
         if self.options.is_general:
-            solution = self._general_solver(system, phases, evidence)
+            truth = ground_truth(system, self.options, phases, evidence)
+            solution = _Solution(*truth.lowest())
         else:
             solution = self._corrected(local_mesh, system, young, initial_modes, phases, evidence)
         values, vectors = solution.values, solution.vectors
@@ -233,74 +222,16 @@ class ModalSolver:
         corrected = options.corrections > 0 and options.tolerance != 0.0
         return options.is_general or corrected
 
+    @property
+    def _together(self) -> bool:
+        """Whether a block Lanczos iteration corrects all modes together."""
+        return self.options.acceleration == "lanczos" and self._linear.indefinite
+
     def _is_of_same_mesh(self, initial_modes: Initial | None) -> TypeGuard[Modes]:
         """Whether these are modes that this solver found."""
         if not isinstance(initial_modes, Modes):
             return False
         return initial_modes.system.rows.pattern is self._layout.pattern
-
-    def _modes_to_keep(self) -> int:
-        options, n_dofs = self.options, self.local_mesh.n_dofs
-        together = options.acceleration == "lanczos" and self._linear.indefinite
-        together = together and options.corrections > 0 and options.tolerance != 0.0
-        parts = self.local_mesh.decomposition.tree.parts
-        keep = options.retained_modes
-        if keep is None:
-            keep = default_keep(options.modes, parts, together)
-        least = options.modes + (FEWEST_SPARE if options.corrections else 0)
-        if keep < min(least, n_dofs):
-            raise UserError(
-                f"--retained-modes {keep} is too few for {options.modes} modes; "
-                f"expected at least {least}, and half more for fast convergence"
-            )
-        return keep
-
-    def _general_solver(
-        self, system: System, phases: Phases, evidence: dict[str, Any]
-    ) -> _Solution:
-        options = self.options
-        proving = options.check_inertia is not False
-        with phases("eigensolver"):
-            truth = solve_truth(
-                system,
-                options.modes,
-                options.method,
-                options.tolerance or RESIDUAL_TOLERANCE,
-                SPARE_MODES if proving and can_count() else 0,
-                options.seed,
-            )
-        if proving:
-            truth = self._prove(system, truth, phases, evidence)
-        evidence |= {
-            "eigensolver_iterations": truth.iterations,
-            "further_searches": truth.searches,
-            "modes_added": truth.added,
-        }
-        return _Solution(*truth.lowest())
-
-    def _prove(
-        self, system: System, truth: Truth, phases: Phases, evidence: dict[str, Any]
-    ) -> Truth:
-        """`truth` with the modes that it lacked."""
-        options = self.options
-        inertia = None
-        if can_count():
-            with phases("inertia"):
-                count = None if options.is_general else self._linear.count_below
-                inertia = count_beyond(system, truth, count)
-        if inertia is None or inertia.counted != inertia.computed:
-            tolerance = options.tolerance if options.is_general else None
-            with phases("completion"):
-                truth, inertia = complete(
-                    system, truth, inertia, tolerance or RESIDUAL_TOLERANCE, options.seed
-                )
-        if inertia is not None:
-            evidence |= {
-                "inertia_at": inertia.value,
-                "inertia_count": inertia.counted,
-                "inertia_expected": inertia.computed,
-            }
-        return truth
 
     def _corrected(
         self,
@@ -328,8 +259,7 @@ class ModalSolver:
             near, start = initial_modes, initial_modes.vectors
         else:
             start = initial_modes
-        together = options.acceleration == "lanczos" and self._linear.indefinite
-        if (start is None and options.method == "lanczos") or (near is not None and together):
+        if (start is None and options.method == "lanczos") or (near is not None and self._together):
             with phases("lanczos"):
                 cold = from_nothing(
                     system,
@@ -345,18 +275,9 @@ class ModalSolver:
             values, start = cold.found.values, cold.found.vectors
         elif start is None and options.method == "hcms":
             with phases("hcms"):
-                synthesis = synthesize(
-                    local_mesh,
-                    self._keep,
-                    options.interface,
-                    self.comm,
-                    self._subdomains,
-                    self._threads,
-                    None if options.cutoff is None else (2.0 * np.pi * options.cutoff) ** 2,
-                )
-            evidence["hcms"] = synthesis.counts.summary(self.comm)
+                synthesis = self._components.synthesis(local_mesh, self._threads, evidence)
             if options.corrections == 0:
-                return self._uncorrected(synthesis)
+                return _Solution(*lowest_pairs(synthesis, options.modes))
             values, start = elastic_part(system, synthesis)
         with phases("correction"):
             result = correct(
@@ -387,7 +308,8 @@ class ModalSolver:
             result.steps,
         )
         if options.check_inertia and can_count():
-            truth = self._prove(system, truth, phases, evidence)
+            count = self._linear.count_below
+            truth = completed(system, truth, options, phases, evidence, count)
             evidence |= {"further_searches": truth.searches, "modes_added": truth.added}
         return _Solution(*truth.lowest(), result.guard, result.inverse)
 
@@ -400,17 +322,6 @@ class ModalSolver:
             return CountingLaw.of_solid(model, moduli, self.options.modes)
 
         return bcast_from_root(self.comm, law)
-
-    def _uncorrected(self, synthesis: Synthesis) -> _Solution:
-        count = self.options.modes
-        if len(synthesis.values) < count:
-            raise UserError(
-                f"HCMS kept {len(synthesis.values)} modes, {count} are asked for; raise "
-                "--retained-modes or lower --subdomains"
-            )
-        return _Solution(
-            synthesis.values[:count], np.ascontiguousarray(synthesis.vectors[:, :count])
-        )
 
 
 def modal_analysis(
@@ -425,15 +336,6 @@ def modal_analysis(
     prepared = ModalSolver(model, options, comm)
     modes = prepared.solve()
     return replace(modes, seconds={**prepared.seconds, **modes.seconds})
-
-
-def elastic_part(system: System, synthesis: Synthesis) -> tuple[Array | None, Array]:
-    """Ritz values and vectors without the rigid motions; no values if the two are not apart."""
-    elastic = np.ascontiguousarray(synthesis.vectors[:, RIGID_MODES:])
-    overlap = system.inner(system.times_mass(system.rigid), elastic)
-    if overlap.size and np.abs(overlap).max() > ORTHOGONAL_TO_RIGID:
-        return None, synthesis.vectors
-    return synthesis.values[RIGID_MODES:], elastic
 
 
 def _threads_of_rank(comm: MPI.Comm) -> int:

@@ -20,6 +20,9 @@ COMMANDS = {
     "benchmark": Command(
         "solver.commands.benchmark", "time all methods on one solid (Fig. 11)", ranks=True
     ),
+    "profile": Command(
+        "solver.commands.profile", "where the time goes, beside what the machine can do"
+    ),
     "scaling": Command(
         "solver.commands.scaling",
         "wall time over the number of ranks, measured and modelled",

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
 from solver.assembly.system import System
-from solver.correction.lanczos import RANDOM_LOOK, Lanczos, lanczos, mixed
+from solver.correction.lanczos import Lanczos, lanczos
+from solver.correction.mixture import mixed
 from solver.correction.shift import AIM, inverse_amid
 from solver.linear import Inverse, LinearSolver
 from solver.subspace.start import start_block
@@ -23,6 +24,8 @@ the fewer right-hand sides."""
 NEAR = 20_000
 """Unknowns beyond which a factorisation leaves the cache, and eight columns take as long as twice
 as many."""
+RANDOM_LOOK = 1.75
+"""Dimension of the space at the first look, as a share of the modes wanted."""
 ATTEMPTS, OFF_RESONANCE = 3, 0.97
 """Shifts that are tried, and by what the next is moved off an eigenvalue that one has hit."""
 

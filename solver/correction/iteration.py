@@ -18,7 +18,9 @@ from solver.correction.correction import (
     default_guard,
 )
 from solver.correction.enrichment import Ritz, Step, enrich, relax
-from solver.correction.lanczos import HIGHEST_SHIFT, ZERO_FRACTION, lanczos, mixed
+from solver.correction.krylov import ZERO_FRACTION
+from solver.correction.lanczos import HIGHEST_SHIFT, lanczos
+from solver.correction.mixture import mixed
 from solver.distribution.collective import bcast_from_root
 from solver.linear import Approximate, Inverse, Lasting, LinearSolver
 from solver.subspace.rayleigh_ritz import rayleigh_ritz, safe_shift

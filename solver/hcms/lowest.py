@@ -113,7 +113,7 @@ def _krylov(
             # Twice is enough.
             block -= basis @ (basis.T @ rows.times_mass(block))
             gram = block.T @ rows.times_mass(block)
-        block, coefficients = _independent(rows, block, gram)
+        block, coefficients = _independent(rows, block, gram, basis)
         block = block @ coefficients
         basis = np.concatenate([basis, block], axis=1)
     return basis
@@ -134,14 +134,22 @@ def ritz_pairs(rows: NodeRows, block: Array) -> tuple[Array, Array]:
     return values, block @ (whitening @ rotation)
 
 
-def _independent(rows: NodeRows, block: Array, gram: Array | None = None) -> tuple[Array, Array]:
-    """Columns that span what `block` does, and coefficients that make them orthonormal."""
+def _independent(
+    rows: NodeRows, block: Array, gram: Array | None = None, basis: Array | None = None
+) -> tuple[Array, Array]:
+    """Columns that span what `block` does, and coefficients that make them orthonormal.
+
+    What rounding has left in them of an M-orthonormal `basis` is magnified with directions that are
+    few in the block, and removed again.
+    """
     if gram is None:
         gram = block.T @ rows.times_mass(block)
     whitening, condition = _whitening(gram)
     if condition < WELL_CONDITIONED:
         # Twice is enough.
         block = block @ whitening
+        if basis is not None:
+            block -= basis @ (basis.T @ rows.times_mass(block))
         whitening, _ = _whitening(block.T @ rows.times_mass(block))
     return block, whitening
 

@@ -154,7 +154,7 @@ class LinearSolver:
         self._layout = layout
         if method == "auto" and alone:
             available = available_memory()
-            fits = available is None or self._plan.bytes < MEMORY_SHARE * available
+            fits = available is None or self.plan.bytes < MEMORY_SHARE * available
             method = "multifrontal" if fits else "amg-cg"
         elif method == "auto":
             small = layout.local_mesh.n_dofs <= LARGEST_SHARED
@@ -162,10 +162,10 @@ class LinearSolver:
         self.method = method
         if method == "multifrontal":
             # What depends on the mesh alone.
-            self._plan  # noqa: B018
+            self.plan  # noqa: B018
 
     @cached_property
-    def _plan(self) -> Plan:
+    def plan(self) -> Plan:
         """Elimination of this rank's rows, which are all rows."""
         from solver.linear.plan import Plan
 
@@ -180,7 +180,7 @@ class LinearSolver:
         from solver.linear.multifrontal import count_below
 
         rows = system.rows
-        return count_below(self._plan, rows.stiffness, rows.mass, value, rows.threads)
+        return count_below(self.plan, rows.stiffness, rows.mass, value, rows.threads)
 
     @property
     def indefinite(self) -> bool:
@@ -199,7 +199,7 @@ class LinearSolver:
             from solver.linear.multifrontal import Factor
 
             rows = system.rows
-            factor = Factor(self._plan, rows.stiffness, rows.mass, shift, rows.threads)
+            factor = Factor(self.plan, rows.stiffness, rows.mass, shift, rows.threads)
             return Lasting(factor, rows.stiffness_diagonal)
         if self.method == "mumps":
             from solver.linear.mumps import MumpsInverse

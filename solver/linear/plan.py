@@ -132,6 +132,8 @@ class Plan:
         (fronts,) unknowns that each front eliminates, and others that these are coupled to.
     bytes, bytes_of_updates
         Memory that a factorisation takes while it is made, and without what a solve needs of it.
+    operations, operations_of_solve
+        Sums and products of a factorisation, and of a solve for one right-hand side.
     """
 
     def __init__(self, lattice: Index, indptr: Index, indices: Index, **options: Any) -> None:
@@ -149,6 +151,9 @@ class Plan:
         kept = self.pivot_offset[-1] + self.coupling_offset[-1]
         self.bytes = 8 * int(kept) + self.bytes_of_updates
         self._work = 2 * own**2 + 4 * own * outside
+        self.operations_of_solve = float(self._work.sum())
+        n, b = own.astype(float), outside.astype(float)
+        self.operations = float((n**3 / 3.0 + n**2 * b + n * b**2).sum())
         self._shares: dict[int, Shares] = {}
 
     def _most_at_a_time(self, own: Index, outside: Index) -> int:

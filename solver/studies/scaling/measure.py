@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from carillon.fem.model import RIGID_MODES, Solid
 from solver.analysis.bounds import check_mode_count, default_keep
-from solver.analysis.modal_solver import elastic_part
+from solver.analysis.components import elastic_part
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import Layout, System, assemble
 from solver.correction.correct import correct

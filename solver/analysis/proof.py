@@ -1,0 +1,85 @@
+"""Ground truth by a general eigensolver, and the count of eigenvalues that tells it complete."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from solver.analysis.options import SolverOptions
+from solver.analysis.timing import Phases
+from solver.assembly.system import System
+from solver.reference.truth import (
+    RESIDUAL_TOLERANCE,
+    SPARE_MODES,
+    Truth,
+    can_count,
+    complete,
+    count_beyond,
+    solve_truth,
+)
+
+
+def ground_truth(
+    system: System, options: SolverOptions, phases: Phases, evidence: dict[str, Any]
+) -> Truth:
+    """Eigenpairs by SLEPc or ARPACK, counted unless `options` say that they need not be.
+
+    What was found goes into `evidence`, the seconds into `phases`.
+
+    Raises
+    ------
+    ConvergenceError
+        See `solver.reference.truth.solve_truth` and `complete`.
+    """
+    counting = options.check_inertia is not False
+    with phases("eigensolver"):
+        truth = solve_truth(
+            system,
+            options.modes,
+            options.method,
+            options.tolerance or RESIDUAL_TOLERANCE,
+            SPARE_MODES if counting and can_count() else 0,
+            options.seed,
+        )
+    if counting:
+        truth = completed(system, truth, options, phases, evidence)
+    evidence |= {
+        "eigensolver_iterations": truth.iterations,
+        "further_searches": truth.searches,
+        "modes_added": truth.added,
+    }
+    return truth
+
+
+def completed(
+    system: System,
+    truth: Truth,
+    options: SolverOptions,
+    phases: Phases,
+    evidence: dict[str, Any],
+    count: Callable[[System, float], int | None] | None = None,
+) -> Truth:
+    """`truth` with the modes that it lacked, which a count of the eigenvalues tells.
+
+    Parameters
+    ----------
+    count
+        What counts the eigenvalues below a value; MUMPS where it is None or gives None.
+    """
+    inertia = None
+    if can_count():
+        with phases("inertia"):
+            inertia = count_beyond(system, truth, count)
+    if inertia is None or inertia.counted != inertia.computed:
+        tolerance = options.tolerance if options.is_general else None
+        with phases("completion"):
+            truth, inertia = complete(
+                system, truth, inertia, tolerance or RESIDUAL_TOLERANCE, options.seed
+            )
+    if inertia is not None:
+        evidence |= {
+            "inertia_at": inertia.value,
+            "inertia_count": inertia.counted,
+            "inertia_expected": inertia.computed,
+        }
+    return truth
