@@ -44,7 +44,7 @@ env:  ## only the environment: .venv with PETSc and SLEPc
 	@bash workflow/envs/setup.sh
 
 run: env  ## the default workflow; ends at results/report.html
-	@$(PYTHON_OF_VENV) -m workflow compile training spectra
+	@$(PYTHON_OF_VENV) -m workflow compile training spectra blocks
 	@snakemake --profile workflow/profiles/default --cores $(CORES) $(TARGETS)
 	@echo "report: $(abspath results/report.html)"
 

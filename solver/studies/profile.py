@@ -176,8 +176,12 @@ def profile(model: Solid, options: ProfileOptions = ProfileOptions(), seed: int 
             f"{model.n_dofs:,} unknowns are too many to be factorised in the free memory; a "
             "profile of the method for fewer is all there is: lower --resolution"
         )
-    solutions = [_timed(solver.solve) for _ in range(1 + options.runs)][1:]
-    system = solutions[0][0].system
+    whole = []
+    for _ in range(1 + options.runs):
+        solution, seconds = _timed(solver.solve)
+        whole.append(seconds)
+        system = solution.system
+        del solution  # whose memory the next one takes over
     layout = Layout.of_local_mesh(solver.local_mesh, MPI.COMM_SELF)
     linear = LinearSolver("multifrontal", layout)
     threads = system.rows.threads
@@ -209,7 +213,7 @@ def profile(model: Solid, options: ProfileOptions = ProfileOptions(), seed: int 
         start.shape[1],
         threads,
         options.runs,
-        statistics.median(seconds for _, seconds in solutions),
+        statistics.median(whole[1:]),
         phases,
         dgemm_rate(),
         memory_rate(threads),

@@ -26,7 +26,7 @@ from carillon.runtime import allowed_cores
 
 EXAMPLES = """examples:
   compile
-  compile training spectra
+  compile training spectra blocks
 """
 
 CHECKOUT = Path(__file__).resolve().parents[2]
@@ -38,12 +38,12 @@ GROUPS = {
     "training": (
         "dataset_gen generate --samples 200 --out shard.h5",
         "forests train shard.h5 --out forests.h5",
-        "forests table --model forests.h5 --blocks 8 --materials 2",
     ),
     "spectra": (
         "solver modes builtin:bar --resolution 12 --modes 20 --method hcms --estimate --out a.h5",
         "solver modes builtin:bar --resolution 12 --modes 20 --coarsen ddfem --out b.h5",
     ),
+    "blocks": ("forests table --blocks 8 --materials 2",),
     "studies": (
         "solver modes builtin:fork --resolution 12 --modes 12 --refine-to 0.001"
         " --discretisation finite-cell --out divided.h5",
@@ -52,7 +52,7 @@ GROUPS = {
         "solver objectives builtin:box --resolution 6 --modes 20",
     ),
 }
-"""Commands that between them run every kernel: of forests, of the default run, of the rest."""
+"""Commands that between them run every kernel: of the default run, and of the studies."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
