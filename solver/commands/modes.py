@@ -104,7 +104,7 @@ def run(arguments: argparse.Namespace) -> None:
             if initial is not None:
                 start = modes_from_file(initial, model, asked.modes, prepared.local_mesh, comm)
                 initial = None
-            elif arguments.refine:
+            elif arguments.refine and modes is None:  # the cells of an estimate are no voxels
                 start = coarse_start(prepared, model, coarsening)
             result = prepared.solve(initial_modes=start)
             result.seconds = {**prepared.seconds, **result.seconds}

@@ -91,7 +91,11 @@ def limits(rule, memory=None, ranks=None, cores=SOLVER_CORES):
     """
     asked = config["resources"][rule]
     megabytes, minutes = growing(asked["memory_mb"] or memory), growing(asked["minutes"])
-    return {"mem_mb": megabytes, "runtime": minutes, **(resources_of(ranks, cores) if ranks else {})}
+    return {
+        "mem_mb": megabytes,
+        "runtime": minutes,
+        **(resources_of(ranks, cores) if ranks else {}),
+    }
 
 
 wildcard_constraints:
