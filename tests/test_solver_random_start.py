@@ -202,6 +202,12 @@ def test_a_coarsened_model_has_nothing_to_start_from(run_cli, tmp_path):
     assert not out.exists()
 
 
+def test_a_start_from_the_coarse_solid_goes_with_an_estimate(run_cli, tmp_path):
+    command = ["modes", "builtin:bar", "--resolution", 12, "--modes", 12, "--estimate", "--refine"]
+    done = run_cli("solver", *command, "--out", tmp_path / "modes.h5", check=True)
+    assert "expected distance from the solid" in done.stdout
+
+
 @pytest.mark.mpi
 @pytest.mark.parametrize("method", ["lanczos", "lobpcg"])
 def test_any_number_of_ranks_finds_the_same(method, mpiexec, tmp_path):
