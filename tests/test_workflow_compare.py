@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +12,7 @@ import pytest
 import yaml
 
 from tests.pages import Page, assert_self_contained
-from tests.workflow_runs import TINY, snakemake
+from tests.workflow_runs import CHECKOUT, TINY, snakemake
 from workflow.__main__ import main
 from workflow.studies.base.conditions import Repeats, conditions
 from workflow.studies.base.table import Column, Table, read_csv_table, write_table
@@ -168,6 +169,11 @@ def test_conditions_and_keys_that_differ_come_first(before, tmp_path):
         assert line in text and text.index(line) < text.index("| slower |")
     assert "scipy" not in text and "results_dir" not in text
     assert "Not the same: Processor;" in text
+
+
+def test_the_reference_that_is_kept_names_no_folder_of_a_machine():
+    for file in (CHECKOUT / "results" / "reference").rglob("*.*"):
+        assert not re.search(r"(^|[\s,=\"'])/\w+/", file.read_text(), re.MULTILINE), file
 
 
 def test_a_reference_of_text_serves_as_baseline(tmp_path):

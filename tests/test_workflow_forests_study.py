@@ -29,6 +29,13 @@ def test_default_forests_are_trained_tree_by_tree_and_not_in_the_default_run(tmp
     assert not {"grow_tree", "compare_on_blocks", "rate_objectives"} & set(default)
 
 
+def test_the_default_forests_are_named_as_seen_from_the_checkout(monkeypatch):
+    monkeypatch.chdir(CHECKOUT)
+    assert settings.forest_files() == ["forests/default.h5"]
+    monkeypatch.chdir(CHECKOUT / "tests")
+    assert settings.forest_files() == [str(CHECKOUT / "forests" / "default.h5")]
+
+
 @pytest.mark.parametrize("named", [True, False])
 def test_the_study_takes_forests_that_are_named_or_the_default_ones(tmp_path, monkeypatch, named):
     config = yaml.safe_load((CHECKOUT / "workflow" / "config" / "laptop.yaml").read_text())

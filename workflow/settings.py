@@ -182,7 +182,7 @@ def forests_file(config: Mapping[str, Any]) -> str | None:
     """
     named: str | None = config["forests"]["model"]
     if named == DEFAULT_FORESTS:
-        return str(default_forests.default_path())
+        return _forests_of_package()
     return None if named is None else path_word(named)
 
 
@@ -199,9 +199,15 @@ def studied_objectives(config: Mapping[str, Any]) -> list[str]:
 def forest_files(named: str | None = None) -> list[str]:
     """File of the forests that are named, or else of those of the package; none without either."""
     try:
-        return [path_word(named) if named else str(default_forests.default_path())]
+        return [path_word(named) if named else _forests_of_package()]
     except UserError:
         return []
+
+
+def _forests_of_package() -> str:
+    """Their file; relative within a checkout, so that results name no folder of a machine."""
+    file, here = default_forests.default_path(), Path.cwd()
+    return str(file.relative_to(here) if file.is_relative_to(here) else file)
 
 
 def _require_models(where: str, names: Iterable[str], models: Iterable[str]) -> None:

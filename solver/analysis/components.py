@@ -63,9 +63,8 @@ class ComponentModes:
 def _modes_to_keep(local_mesh: LocalMesh, options: SolverOptions, together: bool) -> int:
     keep = options.retained_modes
     if keep is None:
-        corrected = options.corrections > 0 and options.tolerance != 0.0
         parts = local_mesh.decomposition.tree.parts
-        keep = default_keep(options.modes, parts, together and corrected)
+        keep = default_keep(options.modes, parts, together and options.is_corrected)
     least = options.modes + (FEWEST_SPARE if options.corrections else 0)
     if keep < min(least, local_mesh.n_dofs):
         raise UserError(

@@ -218,9 +218,7 @@ class ModalSolver:
     @property
     def _exact(self) -> bool:
         """Whether eigenpairs are asked for, not just approximations of them."""
-        options = self.options
-        corrected = options.corrections > 0 and options.tolerance != 0.0
-        return options.is_general or corrected
+        return self.options.is_general or self.options.is_corrected
 
     @property
     def _together(self) -> bool:

@@ -104,6 +104,11 @@ class SolverOptions:
         """Whether an eigensolver of SLEPc's finds the modes, as ground truth."""
         return self.method in TYPES
 
+    @property
+    def is_corrected(self) -> bool:
+        """Whether approximate modes are corrected, and to a tolerance."""
+        return self.corrections > 0 and self.tolerance != 0.0
+
     def resolved(self, n_dofs: int) -> SolverOptions:
         """The same with a method for `auto`: the fastest of those that the other options allow.
 

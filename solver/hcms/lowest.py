@@ -106,17 +106,23 @@ def _krylov(
     block = basis if width is None else np.ascontiguousarray(basis[:, -width:])
     for _ in range(steps):
         block = factor.solve(rows.times_mass(block))
-        inside = basis.T @ rows.times_mass(block)
-        block -= basis @ inside
+        inside = _sweep(rows, basis, block)
         gram = block.T @ rows.times_mass(block)
         if is_cancelled(gram, inside):
             # Twice is enough.
-            block -= basis @ (basis.T @ rows.times_mass(block))
+            _sweep(rows, basis, block)
             gram = block.T @ rows.times_mass(block)
         block, coefficients = _independent(rows, block, gram, basis)
         block = block @ coefficients
         basis = np.concatenate([basis, block], axis=1)
     return basis
+
+
+def _sweep(rows: NodeRows, basis: Array, block: Array) -> Array:
+    """Make `block` M-orthogonal to the M-orthonormal `basis`; returns what it held of it."""
+    inside = basis.T @ rows.times_mass(block)
+    block -= basis @ inside
+    return inside
 
 
 def _extrapolated(values: Array, count: int) -> float:
@@ -149,7 +155,7 @@ def _independent(
         # Twice is enough.
         block = block @ whitening
         if basis is not None:
-            block -= basis @ (basis.T @ rows.times_mass(block))
+            _sweep(rows, basis, block)
         whitening, _ = _whitening(block.T @ rows.times_mass(block))
     return block, whitening
 

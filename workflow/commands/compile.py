@@ -12,16 +12,14 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
-from llvmlite import binding
-
 from carillon.errors import UserError
 from carillon.files import atomic_path
 from carillon.progress import say
+from carillon.provenance import compiled_for
 from carillon.runtime import allowed_cores
 
 EXAMPLES = """examples:
@@ -76,8 +74,8 @@ def run(arguments: argparse.Namespace) -> None:
     for name in groups:
         with suppress(OSError, UserError):
             DONE.mkdir(exist_ok=True)
-        with suppress(OSError, UserError), atomic_path(DONE / f"{name}.json") as temporary:
-            temporary.write_text(wanted)
+            with atomic_path(DONE / f"{name}.json") as temporary:
+                temporary.write_text(wanted)
 
 
 def _compile(group: str) -> None:
@@ -89,7 +87,7 @@ def _compile(group: str) -> None:
     }
     with tempfile.TemporaryDirectory() as folder:
         for command in GROUPS[group]:
-            words: Sequence[str] = [sys.executable, "-m", *command.split()]
+            words = [sys.executable, "-m", *command.split()]
             done = subprocess.run(
                 words, cwd=folder, env=environment, capture_output=True, text=True, check=False
             )
@@ -110,5 +108,4 @@ def sources() -> str:
     """The processor, and every source with its time and size, as compiled kernels are kept by."""
     files = sorted(path for each in PACKAGES for path in (CHECKOUT / each).rglob("*.py"))
     stamps = [[str(path), path.stat().st_mtime_ns, path.stat().st_size] for path in files]
-    named = [os.environ.get(name) for name in ("NUMBA_CPU_NAME", "NUMBA_CACHE_DIR")]
-    return json.dumps([binding.get_host_cpu_name(), *named, stamps])
+    return json.dumps([compiled_for(), os.environ.get("NUMBA_CACHE_DIR"), stamps])

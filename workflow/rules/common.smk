@@ -17,7 +17,7 @@ MODELS = list(config["models"])
 ALL_CORES = workflow.resource_settings.cores or 1
 SOLVER_CORES = config["solver"]["cores"] or ALL_CORES
 RANKS = config["solver"]["ranks"]
-# Runs whose result is a spectrum go side by side: there are many, and threads share no run as well.
+# Runs whose result is a spectrum go side by side: threads within one leave more of a core idle.
 RUN_CORES = config["solver"]["cores"] or min(ALL_CORES, max(RANKS, ALL_CORES // 4))
 # What starts ranks, in a job of SLURM its own.
 ANY_LAUNCHER = "srun --mpi=pmix" if "SLURM_JOB_ID" in os.environ else "mpiexec"

@@ -7,8 +7,8 @@ rule figures:
         f"{place(catalogue.FIGURES)}/report.html",
 
 
-# The rules below take all cores, although some use one, since they time what they do. The forests
-# are those of the package.
+# Rules that time what they do take all cores, although some use one. The forests are those of the
+# package.
 use rule time_methods as time_methods_in_full with:
     input:
         model=shape_mesh,
