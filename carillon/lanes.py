@@ -104,7 +104,8 @@ def _address(context: Any, builder: Any, kind: types.Array, array: Any, entry: A
     data = context.make_array(kind)(context, builder, array).data
     if kind.ndim == 1:
         return builder.gep(data, [entry])
-    first = builder.gep(data, [builder.mul(entry, _INDEX(LANES))])
+    start = builder.mul(entry, _INDEX(LANES)) if kind.layout == "C" else entry
+    first = builder.gep(data, [start])
     return builder.bitcast(first, _VECTOR.as_pointer())
 
 
@@ -281,11 +282,16 @@ def _entries(builder: Any, tile: TileType, start: Any, row: Any, column: Any) ->
 
 def _vectors(emitting: Any, kind: Any, operand: Any, index: Any, count: int) -> list[Any]:
     """Entries of an operand (array, first, stride, stride of depth) at depth `index`."""
+    at = cgutils.unpack_tuple(emitting[1], operand)
+    return _entries_of(emitting, kind[0], at, index, count)
+
+
+def _entries_of(emitting: Any, kind: Any, at: Any, index: Any, count: int) -> list[Any]:
     context, builder = emitting
-    array, start, stride, depth = cgutils.unpack_tuple(builder, operand)
+    array, start, stride, depth = at
     start = builder.add(start, builder.mul(depth, index))
     entries = [_at(builder, start, (stride, n)) for n in range(count)]
-    return [_load(context, builder, kind[0], array, entry) for entry in entries]
+    return [_load(context, builder, kind, array, entry) for entry in entries]
 
 
 def _product(sign: int) -> Any:
@@ -323,9 +329,52 @@ add_product = _product(1)
 subtract_product = _product(-1)
 
 
+@intrinsic
+def add_gathered(context: Any, tile: Any, left: Any, right: Any, chosen: Any, few: Any) -> Any:
+    """tile + the sum of A_n B_m over the numbers n from few[0] to few[1], with m = chosen[n].
+
+    A_n is the n-th square block of a flat array, row by row; B is (array, first entry, stride of
+    columns, stride of depth, stride of blocks).
+    """
+    kinds = types.unliteral(left), types.unliteral(right)
+
+    def emit(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        given, left, right, chosen, few = arguments
+        emitting = context, builder
+        sums = [
+            cgutils.alloca_once_value(builder, value)
+            for value in cgutils.unpack_tuple(builder, given)
+        ]
+        *operand, stride = cgutils.unpack_tuple(builder, right)
+        numbers = context.make_array(signature.args[3])(context, builder, chosen).data
+        first, last = cgutils.unpack_tuple(builder, few)
+        with cgutils.for_range_slice(builder, first, last, _INDEX(1), _INDEX) as (number, _):
+            of_block = builder.mul(builder.load(builder.gep(numbers, [number])), stride)
+            block = builder.mul(number, _INDEX(tile.rows**2))
+            for k in range(tile.rows):
+                array, start, across, down = operand
+                at = array, builder.add(start, of_block), across, down
+                columns = _entries_of(emitting, kinds[1][0], at, _INDEX(k), tile.columns)
+                for i in range(tile.rows):
+                    entry = builder.add(block, _INDEX(tile.rows * i + k))
+                    factor = _load(context, builder, kinds[0], left, entry)
+                    for total, column in zip(sums[i * tile.columns :], columns):
+                        fused = _call(builder, "fmuladd", factor, column, builder.load(total))
+                        builder.store(fused, total)
+        return cgutils.pack_array(builder, [builder.load(total) for total in sums])
+
+    return tile(tile, *kinds, chosen, few), emit
+
+
 @compiler()
 def empty(entries: int) -> NDArray[np.float64]:
     """Uninitialised array of lanes whose rows do not straddle cache lines."""
     raw = np.empty((entries + 1) * LANES)
     skip = -(raw.ctypes.data // 8) % LANES
     return raw[skip : skip + entries * LANES].reshape(entries, LANES)
+
+
+def sliding(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Array of lanes over a flat array: row k holds the numbers from k on, and shares them."""
+    rows = max(0, len(numbers) - LANES + 1)
+    return np.lib.stride_tricks.as_strided(numbers, (rows, LANES), 2 * numbers.strides)

@@ -17,7 +17,9 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.fem.elements import Elements
+from carillon.registers import LANES
 from carillon.threads import in_parallel, split
+from solver.assembly.row_products import multiply
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -215,19 +217,25 @@ class NodeRows:
         return self._product(block, False)
 
     def _product(self, block: Array, stiffness: bool) -> Array:
+        width = block.shape[1]
         block = np.ascontiguousarray(block)
+        if width < LANES:
+            block = np.pad(block, ((0, 0), (0, LANES - width)))
         ghosts = block[:0] if self.halo is None else self.halo.exchange(block)
         result = np.empty_like(block)
-        pattern = self.pattern
-        kernel, entries = (
-            (_multiply_stiffness, self.stiffness) if stiffness else (_multiply_mass, self.mass)
-        )
+        graph = self.pattern.indptr, self.pattern.columns
+        entries = self.stiffness
+        arrays = block, ghosts, result
+        if not stiffness:
+            # The three components of a node follow each other, and all have the same mass.
+            entries = self.mass[:, None, None]
+            arrays = tuple(each.reshape(-1, 3 * block.shape[1]) for each in arrays)
 
         def rows(start: int, stop: int) -> None:
-            kernel(start, stop, pattern.indptr, pattern.columns, entries, block, ghosts, result)
+            multiply((start, stop), graph, entries, *arrays)
 
         in_parallel(rows, split(self._own, self.threads, max(self._own, 1)), self.threads)
-        return result
+        return result if width >= LANES else np.ascontiguousarray(result[:, :width])
 
 
 def _sorted(matrix: sp.csr_matrix) -> sp.csr_matrix:
@@ -303,72 +311,3 @@ def _add_mass(entry, mass, M):  # type: ignore[no-untyped-def]
             for b in range(entry.shape[1]):
                 if entry[cell, a, b] >= 0:
                     M[entry[cell, a, b]] += mass[cell, a, b]
-
-
-@numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
-def _multiply_stiffness(  # type: ignore[no-untyped-def]
-    start, stop, indptr, columns, blocks, X, ghosts, result
-):
-    own = X.shape[0] // 3
-    width = X.shape[1]
-    for row in range(start, stop):
-        result[3 * row : 3 * row + 3] = 0.0
-        y0, y1, y2 = result[3 * row], result[3 * row + 1], result[3 * row + 2]
-        for number in range(indptr[row], indptr[row + 1]):
-            column = columns[number]
-            if column < own:
-                x = X[3 * column : 3 * column + 3]
-            else:
-                x = ghosts[3 * (column - own) : 3 * (column - own) + 3]
-            x0, x1, x2 = x[0], x[1], x[2]
-            B = blocks[number]
-            b00, b01, b02 = B[0, 0], B[0, 1], B[0, 2]
-            b10, b11, b12 = B[1, 0], B[1, 1], B[1, 2]
-            b20, b21, b22 = B[2, 0], B[2, 1], B[2, 2]
-            for k in range(width):
-                y0[k] += b00 * x0[k] + b01 * x1[k] + b02 * x2[k]
-                y1[k] += b10 * x0[k] + b11 * x1[k] + b12 * x2[k]
-                y2[k] += b20 * x0[k] + b21 * x1[k] + b22 * x2[k]
-
-
-@numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
-def _multiply_mass(  # type: ignore[no-untyped-def]
-    start, stop, indptr, columns, entries, X, ghosts, result
-):
-    # The three components of a node follow each other, and all have the same mass.
-    own = X.shape[0] // 3
-    width = 3 * X.shape[1]
-    inner = X.reshape(own, width)
-    outer = ghosts.reshape(ghosts.shape[0] // 3, width)
-    y = result.reshape(own, width)
-    for row in range(start, stop):
-        sums = y[row]
-        sums[:] = 0.0
-        number = indptr[row]
-        last = indptr[row + 1]
-        # Four neighbours at a time: most of the time goes into loading and storing the sums.
-        while number + 4 <= last:
-            m0, m1, m2, m3 = (
-                entries[number],
-                entries[number + 1],
-                entries[number + 2],
-                entries[number + 3],
-            )
-            x0 = _row(columns[number], own, inner, outer)
-            x1 = _row(columns[number + 1], own, inner, outer)
-            x2 = _row(columns[number + 2], own, inner, outer)
-            x3 = _row(columns[number + 3], own, inner, outer)
-            for k in range(width):
-                sums[k] += m0 * x0[k] + m1 * x1[k] + m2 * x2[k] + m3 * x3[k]
-            number += 4
-        while number < last:
-            m0 = entries[number]
-            x0 = _row(columns[number], own, inner, outer)
-            for k in range(width):
-                sums[k] += m0 * x0[k]
-            number += 1
-
-
-@numba.njit(cache=True, nogil=True, inline="always")
-def _row(column, own, inner, outer):  # type: ignore[no-untyped-def]
-    return inner[column] if column < own else outer[column - own]
