@@ -220,7 +220,8 @@ class NodeRows:
         width = block.shape[1]
         block = np.ascontiguousarray(block)
         if width < LANES:
-            block = np.pad(block, ((0, 0), (0, LANES - width)))
+            narrow, block = block, np.zeros((len(block), LANES))
+            block[:, :width] = narrow
         ghosts = block[:0] if self.halo is None else self.halo.exchange(block)
         result = np.empty_like(block)
         graph = self.pattern.indptr, self.pattern.columns

@@ -70,6 +70,8 @@ class System:
         This rank's rows of K [N/m] and M [kg].
     rigid
         (local, 6) this rank's rows of the mass-orthonormal rigid motions.
+    mass_rigid
+        (local, 6) M times these.
     coordinates
         (local nodes, 3) positions relative to the centroid, in units of the largest half extent.
     nodes
@@ -82,6 +84,7 @@ class System:
 
     rows: NodeRows
     rigid: Array
+    mass_rigid: Array
     coordinates: Array
     nodes: NDArray[np.int64]
     start: int
@@ -106,11 +109,6 @@ class System:
     def M(self) -> Any:  # noqa: N802
         """Mass as a PETSc matrix, made when first asked for; collective."""
         return distributed_matrix(self.rows.mass_csr(self.n_dofs), self.comm)
-
-    @cached_property
-    def mass_rigid(self) -> Array:
-        """M times the rigid motions (local, 6), made when first asked for; collective."""
-        return self.times_mass(self.rigid)
 
     def inner(self, left: Array, right: Array) -> Array:
         """left^T right summed over the ranks; equal on all ranks."""
@@ -234,9 +232,11 @@ def assemble(
         return replace(like, rows=rows)
     # About the centroid of the whole body: every rank must hold rows of the same six motions.
     motions = np.ascontiguousarray(rigid_motions(layout.coordinates, np.zeros(3)))
+    mass_motions = rows.times_mass(motions)
     system = System(
         rows,
         motions,
+        mass_motions,
         layout.coordinates,
         local_mesh.nodes,
         local_mesh.start,
@@ -244,9 +244,11 @@ def assemble(
         local_mesh.n_dofs,
         comm,
     )
-    gram = system.inner(motions, system.times_mass(motions))
-    rigid = np.ascontiguousarray(np.linalg.solve(np.linalg.cholesky(gram), motions.T).T)
-    return replace(system, rigid=rigid)
+    factor = np.linalg.cholesky(system.inner(motions, mass_motions))
+    rigid, mass_rigid = (
+        np.ascontiguousarray(np.linalg.solve(factor, each.T).T) for each in (motions, mass_motions)
+    )
+    return replace(system, rigid=rigid, mass_rigid=mass_rigid)
 
 
 def _centred(local_mesh: LocalMesh, comm: MPI.Comm) -> Array:

@@ -156,7 +156,7 @@ def enrich(
     ConvergenceError
         If a Ritz value is not positive, which rounding alone can cause.
     """
-    Z, overlap, gram, untouched = _independent(system, ritz, corrections, inverse.exact)
+    Z, overlap, gram, untouched = _independent(system, ritz, corrections)
     if inverse.exact and untouched and np.diag(gram).min(initial=1.0) > SMALL_CORRECTION:
         mu = inverse.shift
         across = mu * overlap
@@ -184,12 +184,8 @@ def enrich(
     ritz.replace_active(values, vectors)
 
 
-def _independent(
-    system: System, ritz: Ritz, Z: Array, untouched: bool
-) -> tuple[Array, Array, Array, bool]:
+def _independent(system: System, ritz: Ritz, Z: Array) -> tuple[Array, Array, Array, bool]:
     """Z, or a basis of what it adds to X, well-conditioned enough to orthonormalise by Cholesky.
-
-    Z is not tried as it is unless it may stay `untouched`.
 
     Returns
     -------
@@ -199,9 +195,6 @@ def _independent(
     for passes in range(MOST_PASSES):
         Z -= system.rigid @ system.inner(system.mass_rigid, Z)
         overlap = system.inner(ritz.mass_vectors, Z)
-        if not (untouched or passes):
-            Z -= ritz.vectors @ overlap
-            continue
         gram = system.inner(Z, system.times_mass(Z))
         outside = _outside(overlap, gram)
         basis, condition = bcast_from_root(system.comm, partial(orthonormal, outside))

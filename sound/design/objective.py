@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from sound.project.project import Weights
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 
 RESOLVED = 3e-3
 """Standard deviation of the average over neighbouring modes, as a share of their frequency: about
@@ -42,12 +43,15 @@ class Sensitivity:
 
     Attributes
     ----------
-    stiffness : (m, N, N) [rad^2/s^2]
-        u_i^T (dK/dz) u_j of the elastic modes.
+    pairs : (P, 2)
+        Numbers i <= j of elastic modes that are close to each other, first all with i = j.
+    stiffness : (m, P) [rad^2/s^2]
+        u_i^T (dK/dz) u_j of these.
     outside : (m, T, N)
-        Part of the derivative of each pushed mode that lies outside the computed modes.
+        Part of the derivative of each pushed mode that lies outside the modes close to it.
     """
 
+    pairs: Index
     stiffness: Array
     outside: Array
 
@@ -154,7 +158,7 @@ def _slopes(eigenvalues: Array, sensitivity: Sensitivity) -> Array:
     Equal eigenvalues part in any direction and have no derivatives one by one.  The mean is that of
     a change that keeps them together; of a pair, it is what central differences find.
     """
-    slopes = np.einsum("mii->mi", sensitivity.stiffness).copy()
+    slopes = sensitivity.stiffness[:, : len(eigenvalues)].copy()
     for group in clusters(eigenvalues, CLUSTER):
         slopes[:, group] = slopes[:, group].mean(axis=1, keepdims=True)
     return np.asarray(slopes)
@@ -166,9 +170,9 @@ def _average_slopes(
     """b_k (T, N) and its derivatives (T, N, m).
 
     With h_k(lambda) the kernel as a function of the eigenvalue, the sum over i of h_k(lambda_i)
-    a_i^2 is f^T U h_k(Lambda) U^T f.  Its derivative is that of a function of a matrix: divided
-    differences of h_k stand where the eigenvectors' derivatives would have differences of
-    eigenvalues in their denominators, and stay finite where these vanish.
+    a_i^2 is f^T U h_k(Lambda) U^T f.  Its derivative is that of a function of a matrix: for modes
+    close to each other divided differences of h_k stand where the eigenvectors' derivatives would
+    have differences of eigenvalues in their denominators, and stay finite where these vanish.
     """
     frequencies = np.sqrt(eigenvalues)
     kernel = _kernel(frequencies)
@@ -178,18 +182,17 @@ def _average_slopes(
     # Derivative of the kernel (k, i) with respect to eigenvalue i; that to k is opposite in scale.
     by_own = -kernel * (ratio - 1.0) * ratio / (2.0 * RESOLVED**2 * eigenvalues[None, :])
     by_centre = -by_own * eigenvalues[None, :] / eigenvalues[:, None]
-    gaps = eigenvalues[:, None] - eigenvalues[None, :]
-    near = np.abs(gaps) <= EQUAL * eigenvalues[:, None]
-    divided = (kernel[:, :, None] - kernel[:, None, :]) / np.where(near, 1.0, gaps)
-    mean_slope = 0.5 * (by_own[:, :, None] + by_own[:, None, :])
-    divided = np.where(near, mean_slope, divided)
+    i, j = sensitivity.pairs.T
+    gaps = eigenvalues[i] - eigenvalues[j]
+    equal = np.abs(gaps) <= EQUAL * eigenvalues[i]
+    divided = (kernel[:, i] - kernel[:, j]) / np.where(equal, 1.0, gaps)
+    divided = np.where(equal, 0.5 * (by_own[:, i] + by_own[:, j]), divided)
+    divided *= np.where(i == j, 1.0, 2.0)
     values = _slopes(eigenvalues, sensitivity)
     m, count = values.shape
-    flat = sensitivity.stiffness.reshape(m, -1)
     slopes = np.empty((len(pushed), count, m))
     for point, a in enumerate(pushed):
-        weights = (divided * (a[:, None] * a[None, :])).reshape(count, -1)
-        slopes[point] = weights @ flat.T
+        slopes[point] = (divided * (a[i] * a[j])) @ sensitivity.stiffness.T
         slopes[point] += (2.0 * kernel * a) @ sensitivity.outside[:, point].T
         # The centre of the average moves, and so does the sum that divides it.
         moved = (by_centre @ a**2)[:, None] * values.T

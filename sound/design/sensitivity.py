@@ -13,6 +13,7 @@ import scipy.linalg as la
 from numpy.typing import NDArray
 
 from solver.analysis.modes import Modes
+from solver.assembly.system import System
 from solver.linear import Inverse
 from solver.subspace.orthonormal import is_cancelled
 
@@ -30,8 +31,10 @@ MOST_BLOCKS = 16
 """Blocks of a Krylov space at most."""
 MOST_PASSES = 3
 """Times that a block is made orthogonal; twice is enough but for rounding."""
-CLOSE = 0.2
+CLEAR = 0.2
 """Share of the largest distance to all eigenvalues from which another shift is as good."""
+CLOSE = 1e-2
+"""Relative difference of eigenvalues up to which modes are close to each other."""
 DEPENDENT = 1e-10
 """Share (squared) of a vector below which it lies in the space that it was made orthogonal to."""
 
@@ -40,10 +43,11 @@ def projected_stiffness(
     nodes: NDArray[np.integer],
     strains: Array,
     vectors: Array,
+    pairs: Index,
     others: Array,
     slopes: Array,
 ) -> tuple[Array, Array]:
-    """u_i^T (dK/dz) u_j, and u_i^T (dK/dz) x_i with vectors that belong to a mode.
+    """u_i^T (dK/dz) u_j of some pairs, and u_i^T (dK/dz) x_i with vectors that belong to a mode.
 
     Parameters
     ----------
@@ -53,6 +57,8 @@ def projected_stiffness(
         See `sound.design.elements.AnalysedElements.strains`.
     vectors : (3 n, N)
         Modes u.
+    pairs : (P, 2)
+        Numbers i and j, see `close_pairs`.
     others : (3 n, T, N)
         Vectors x, T of each mode.
     slopes : (p c, m)
@@ -60,26 +66,57 @@ def projected_stiffness(
 
     Returns
     -------
-    inside : (m, N, N)
+    inside : (m, P)
         u_i^T (dK/dz) u_j.
     beyond : (m, T, N)
         u_i^T (dK/dz) x_i.
     """
     count, struck, points = vectors.shape[1], others.shape[1], len(strains)
-    pairs = count * (count + 1) // 2
-    total = np.zeros((slopes.shape[1], pairs + struck * count))
+    total = np.zeros((slopes.shape[1], len(pairs) + struck * count))
     columns = np.concatenate([vectors, others.reshape(len(vectors), -1)], axis=1)
     flat = np.ascontiguousarray(strains.reshape(-1, strains.shape[2]))
     at_once = max(1, POINTS_AT_ONCE // points)
     for first in range(0, len(nodes), at_once):
         cells = nodes[first : first + at_once]
         energies = np.empty((points * len(cells), total.shape[1]))
-        _pair_energies(cells, flat, columns, count, energies)
+        _pair_energies(cells, flat, columns, pairs, count, energies)
         total += slopes[points * first : points * (first + len(cells))].T @ energies
-    upper = np.triu_indices(count)
-    inside = np.empty((len(total), count, count))
-    inside[:, upper[0], upper[1]] = inside[:, upper[1], upper[0]] = total[:, :pairs]
-    return inside, total[:, pairs:].reshape(-1, struck, count)
+    return total[:, : len(pairs)], total[:, len(pairs) :].reshape(-1, struck, count)
+
+
+def close_pairs(values: Array) -> Index:
+    """Numbers (P, 2) of eigenvalues (N,) that differ by `CLOSE` at most, first each with itself."""
+    own = np.arange(len(values))
+    i, j = np.triu_indices(len(values), 1)
+    close = _are_close(values[i], values[j])
+    return np.concatenate([np.stack([own, own], 1), np.stack([i[close], j[close]], 1)])
+
+
+def inside_response(elastic: Array, values: Array, pushed: Array) -> Array:
+    """x (3 n, T, N) with x_pk = sum of u_j (u_j^T f_p) / (lambda_k - lambda_j) over the computed.
+
+    Modes close to k are left out.
+
+    Parameters
+    ----------
+    elastic : (3 n, N)
+        Modes u.
+    values : (N,) [rad^2/s^2]
+        Their eigenvalues.
+    pushed : (T, N)
+        u_j^T f_p.
+    """
+    other, own = values[:, None], values[None, :]
+    close = _are_close(other, own)
+    inverse = np.where(close, 0.0, 1.0 / np.where(close, 1.0, own - other))
+    weights = pushed.T[:, :, None] * inverse[:, None, :]
+    return np.asarray(
+        (elastic @ weights.reshape(len(values), -1)).reshape(len(elastic), *weights.shape[1:])
+    )
+
+
+def _are_close(one: Array, other: Array) -> NDArray[np.bool_]:
+    return np.asarray(np.abs(one - other) <= CLOSE * np.maximum(one, other))
 
 
 def outside_response(
@@ -107,46 +144,81 @@ def outside_response(
     accuracy : float
         Largest relative change by the last block.
     """
-    system, struck = modes.system, pushes.shape[1]
-    known = size = system.rigid.shape[1] + elastic.shape[1]
-    whole, mass_whole = np.empty((2, len(pushes), known + MOST_BLOCKS * struck))
-    whole[:, :known] = np.concatenate([system.rigid, elastic], axis=1)
-    mass_whole[:, :known] = system.times_mass(whole[:, :known])
-    free = pushes - mass_whole[:, :known] @ (whole[:, :known].T @ pushes)
-    mass_block, stiffness = free, np.empty((0, 0))
+    struck = pushes.shape[1]
+    space = _Space(modes.system, elastic, MOST_BLOCKS * struck)
+    free = block = space.free_of(pushes)
     solution = np.zeros((0, struck * len(values)))
     for _ in range(MOST_BLOCKS):
-        block = inverse.solve(np.ascontiguousarray(mass_block))
-        mass_block, gram = _made_orthogonal(modes, block, whole[:, :size], mass_whole[:, :size])
-        weights = _orthonormal(gram)
-        if not weights.shape[1]:
+        block = space.add(inverse.solve(np.ascontiguousarray(block)))
+        if not block.shape[1]:
             break
-        block, mass_block = block @ weights, mass_block @ weights
-        here = slice(size, size + weights.shape[1])
-        whole[:, here], mass_whole[:, here] = block, mass_block
-        size = here.stop
-        basis = whole[:, known:size]
-        stiffness = _bordered(stiffness, basis.T @ system.times_stiffness(block))
-        before, solution = solution, _galerkin(stiffness, basis.T @ free, values)
+        before, solution = solution, _galerkin(space.stiffness, space.basis.T @ free, values)
         change = solution.copy()
         change[: len(before)] -= before
         if (la.norm(change, axis=0) <= accuracy * la.norm(solution, axis=0)).all():
             break
-    return (whole[:, known:size] @ solution).reshape(len(pushes), struck, -1)
+    return (space.basis @ solution).reshape(len(pushes), struck, -1)
 
 
-def _made_orthogonal(
-    modes: Modes, block: Array, basis: Array, mass_basis: Array
-) -> tuple[Array, Array]:
-    """M times `block`, and its Gram matrix, once it is made orthogonal to `basis`, in place."""
-    for _ in range(MOST_PASSES):
-        overlap = mass_basis.T @ block
-        block -= basis @ overlap
-        mass_block = modes.system.times_mass(block)
-        gram = block.T @ mass_block
-        if not is_cancelled(gram, overlap):
-            break
-    return mass_block, gram
+class _Space:
+    """Growing subspace, orthogonal to the rigid motions and the computed modes.
+
+    Parameters
+    ----------
+    elastic
+        These modes.
+    room
+        Vectors that it may grow to.
+
+    Attributes
+    ----------
+    stiffness
+        V^T K V (m, m) with the orthonormal basis V.
+    """
+
+    def __init__(self, system: System, elastic: Array, room: int) -> None:
+        self._system = system
+        self._known = self._size = system.rigid.shape[1] + elastic.shape[1]
+        self._vectors, self._mass_vectors = np.empty((2, len(elastic), self._known + room))
+        known = np.concatenate([system.rigid, elastic], axis=1)
+        self._vectors[:, : self._known] = known
+        self._mass_vectors[:, : self._known] = system.times_mass(known)
+        self.stiffness = np.empty((0, 0))
+
+    @property
+    def basis(self) -> Array:
+        """V (3 n, m)."""
+        return self._vectors[:, self._known : self._size]
+
+    def free_of(self, forces: Array) -> Array:
+        """Forces (3 n, T) less the part that the subspace, and what it is orthogonal to, hold."""
+        vectors, mass_vectors = self._vectors[:, : self._size], self._mass_vectors[:, : self._size]
+        return np.asarray(forces - mass_vectors @ (vectors.T @ forces))
+
+    def add(self, block: Array) -> Array:
+        """Let the subspace grow by a block (3 n, b), which is lost; M times what it added."""
+        mass_block, gram = self._made_orthogonal(block)
+        weights = _orthonormal(gram)
+        block, mass_block = block @ weights, mass_block @ weights
+        end = self._size + weights.shape[1]
+        self._vectors[:, self._size : end] = block
+        self._mass_vectors[:, self._size : end] = mass_block
+        self._size = end
+        last = self.basis.T @ self._system.times_stiffness(block)
+        self.stiffness = _bordered(self.stiffness, last)
+        return mass_block
+
+    def _made_orthogonal(self, block: Array) -> tuple[Array, Array]:
+        """M times `block`, and its Gram matrix, once it is made orthogonal to all, in place."""
+        vectors, mass_vectors = self._vectors[:, : self._size], self._mass_vectors[:, : self._size]
+        for _ in range(MOST_PASSES):
+            overlap = mass_vectors.T @ block
+            block -= vectors @ overlap
+            mass_block = self._system.times_mass(block)
+            gram = block.T @ mass_block
+            if not is_cancelled(gram, overlap):
+                break
+        return mass_block, gram
 
 
 def _bordered(matrix: Array, last: Array) -> Array:
@@ -176,7 +248,7 @@ def shift_between(values: Array) -> float:
 def lies_between(values: Array, shift: float) -> bool:
     """Whether a shift is hardly closer to an eigenvalue of (N,) than that of `shift_between`."""
     best = _distance(values, shift_between(values))
-    return SHIFTS[0] * values[-1] <= shift and _distance(values, shift) >= CLOSE * best
+    return SHIFTS[0] * values[-1] <= shift and _distance(values, shift) >= CLEAR * best
 
 
 def _distance(values: Array, shift: float) -> float:
@@ -192,10 +264,11 @@ def _orthonormal(gram: Array) -> Array:
 
 
 @numba.njit(cache=True, nogil=True, fastmath={"contract", "reassoc"}, error_model="numpy")
-def _pair_energies(nodes, strains, columns, count, energies):  # type: ignore[no-untyped-def]
-    """Energies (p c, pairs) per unit of modulus, modes with modes and each with its others.
+def _pair_energies(nodes, strains, columns, pairs, count, energies):  # type: ignore[no-untyped-def]
+    """Energies (p c, P + T N) per unit of modulus: of pairs of modes, and of each with its others.
 
-    The first `count` columns are the modes, then come the others, point after point.
+    The first `count` columns are the modes, then come the others, point after point; the first
+    `count` pairs are those of a mode with itself.
     """
     width, points = nodes.shape[1], len(strains) // 6
     each = columns.shape[1]
@@ -212,26 +285,30 @@ def _pair_energies(nodes, strains, columns, count, energies):  # type: ignore[no
         np.dot(strains, local, strain)
         for k in range(len(cells)):
             for q in range(points):
-                own = strain[6 * q : 6 * q + 6, k * each : k * each + count]
-                others = strain[6 * q : 6 * q + 6, k * each + count : (k + 1) * each]
+                own = strain[6 * q : 6 * q + 6, k * each : (k + 1) * each]
                 row = energies[points * (first + k) + q]
-                pair = 0
-                for i in range(count):
-                    a0, a1, a2 = own[0, i], own[1, i], own[2, i]
-                    a3, a4, a5 = own[3, i], own[4, i], own[5, i]
-                    for j in range(i, count):
-                        row[pair + j - i] = (
-                            a0 * own[0, j]
-                            + a1 * own[1, j]
-                            + a2 * own[2, j]
-                            + a3 * own[3, j]
-                            + a4 * own[4, j]
-                            + a5 * own[5, j]
-                        )
-                    pair += count - i
-                for start in range(0, others.shape[1], count):
-                    for i in range(count):
-                        value = 0.0
-                        for s in range(6):
-                            value += own[s, i] * others[s, start + i]
-                        row[pair + start + i] = value
+                _products(own, 0, count, row, 0)
+                for pair in range(count, len(pairs)):
+                    i, j = pairs[pair]
+                    value = 0.0
+                    for s in range(6):
+                        value += own[s, i] * own[s, j]
+                    row[pair] = value
+                for start in range(count, each, count):
+                    _products(own, start, count, row, len(pairs) + start - count)
+
+
+@numba.njit(cache=True, nogil=True, fastmath={"contract", "reassoc"}, error_model="numpy")
+def _products(strain, start, count, row, place):  # type: ignore[no-untyped-def]
+    """Of the first columns of strains (6, k), each with that as far from `start` on."""
+    s0, s1, s2, s3, s4, s5 = strain[0], strain[1], strain[2], strain[3], strain[4], strain[5]
+    for i in range(count):
+        j = start + i
+        row[place + i] = (
+            s0[i] * s0[j]
+            + s1[i] * s1[j]
+            + s2[i] * s2[j]
+            + s3[i] * s3[j]
+            + s4[i] * s4[j]
+            + s5[i] * s5[j]
+        )

@@ -23,6 +23,8 @@ from sound.design.elements import analysed_elements
 from sound.design.material import ReducedMaterial
 from sound.design.objective import Sensitivity
 from sound.design.sensitivity import (
+    close_pairs,
+    inside_response,
     lies_between,
     outside_response,
     projected_stiffness,
@@ -157,14 +159,16 @@ class Simulation:
         elastic = np.ascontiguousarray(evaluation.modes.vectors[:, RIGID_MODES:])
         directions = self.material.slopes(young)[:, None] * self.material.basis
         slopes = self.elements.slopes(young, directions)
+        values = evaluation.eigenvalues
         outside = outside_response(
-            evaluation.modes, inverse, elastic, evaluation.eigenvalues, self._pushes, self._accuracy
+            evaluation.modes, inverse, elastic, values, self._pushes, self._accuracy
         )
+        outside += inside_response(elastic, values, evaluation.pushed)
         vectors, others = np.empty_like(elastic), np.empty_like(outside)
         vectors[self._order], others[self._order] = elastic, outside
-        nodes = self.model.connectivity
-        inside, beyond = projected_stiffness(nodes, self._strains, vectors, others, slopes)
-        return Sensitivity(inside, beyond)
+        nodes, pairs = self.model.connectivity, close_pairs(values)
+        inside, beyond = projected_stiffness(nodes, self._strains, vectors, pairs, others, slopes)
+        return Sensitivity(pairs, inside, beyond)
 
     def mesh_rows(self, vectors: Array) -> Array:
         """Vectors (n_dofs, k) in mesh node order from those in the order of an analysis."""
