@@ -38,7 +38,7 @@ def in_parallel(
     """
     if threads == 1 or len(arguments) == 1:
         return [work(*each) for each in arguments]
-    with single_threaded_blas():
+    with blas_threads(1):
         return list(_pool(threads).map(lambda each: work(*each), arguments))
 
 
@@ -69,7 +69,7 @@ def in_tree(
             first, then = (above, number) if from_root else (number, above)
             after[first].append(then)
             waiting[then] += 1
-    with single_threaded_blas():
+    with blas_threads(1):
         running = {_pool(threads).submit(work, n): n for n in range(count) if not waiting[n]}
         try:
             while running:
@@ -87,9 +87,9 @@ def in_tree(
 
 
 @contextmanager
-def single_threaded_blas() -> Iterator[None]:
-    """Every BLAS of this process on one thread within the body."""
-    with _controller().limit(limits=1, user_api="blas"):
+def blas_threads(count: int) -> Iterator[None]:
+    """Every BLAS of this process on so many threads within the body."""
+    with _controller().limit(limits=count, user_api="blas"):
         yield
 
 

@@ -6,6 +6,7 @@ Every rank makes the same checks, and one that fails ends them all.
 from __future__ import annotations
 
 import sys
+import time
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -25,7 +26,7 @@ from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.assembly.sparse import assembled
-from solver.assembly.system import assemble
+from solver.assembly.system import Layout, assemble
 from solver.distribution.local_mesh import LocalMesh, distribute
 from solver.distribution.messages import receive_arrays, send_arrays
 from solver.files.modes_file import write_modes
@@ -36,6 +37,7 @@ from solver.hcms.merge import Reduced, all_pairs
 from solver.hcms.scalapack import grid_side
 from solver.hcms.shared import shared_pairs
 from solver.hcms.synthesis import synthesize
+from solver.linear import LinearSolver
 from solver.linear.multigrid import Multigrid
 from solver.reference.truth import complete, count_beyond, solve_truth, start_vector
 from tests import cut_solids, solids
@@ -396,11 +398,48 @@ def multigrid_is_the_same_bits_again() -> None:
     assert all((other == first).all() for other in others)
 
 
+def one_rank_factorises_for_all() -> None:
+    model = solids.random_box(9, 6, 5)
+    values = solids.dense_eigenvalues(model)
+    shift = 0.5 * (values[11] + values[12])
+    local_mesh = distribute(on_first(model), PARTS, comm=COMM)
+    layout = Layout.of_local_mesh(local_mesh, COMM)
+    system = assemble(local_mesh, COMM, layout)
+    linear = LinearSolver("auto", layout)
+    assert linear.method == "multifrontal"
+    inverse = linear.inverse(system, shift)
+    assert inverse.negative == linear.count_below(system, shift) == 12
+    block = np.random.default_rng(COMM.rank).standard_normal((len(system.rigid), 5))
+    found = inverse.solve(block)
+    residual = system.times_stiffness(found) - shift * system.times_mass(found) - block
+    assert np.abs(residual).max() < 1e-10
+    inverse.destroy()
+
+
+def others_sleep_while_one_works_alone() -> None:
+    local_mesh = distribute(on_first(solids.random_box(4, 3, 2)), COMM.size, comm=COMM)
+    leader = LinearSolver("multifrontal", Layout.of_local_mesh(local_mesh, COMM)).leader
+    begin = time.process_time()
+    assert leader.alone(lambda: time.sleep(1.0)) is None
+    assert time.process_time() - begin < 0.5
+
+    def fail() -> None:
+        raise UserError("as it should")
+
+    try:
+        leader.alone(fail)
+    except UserError as error:
+        assert str(error) == "as it should"
+    else:
+        raise AssertionError("the error reached rank 0 alone")
+
+
 def repetitions_give_the_same_bits() -> None:
     model = on_first(solids.random_box(9, 6, 5))
     for options in (
         SolverOptions(modes=20, corrections=0),
         SolverOptions(modes=20, tolerance=1e-4, linear_solver="icc-pcg"),
+        SolverOptions(modes=20, tolerance=1e-7),
     ):
         first, *others = (modal_analysis(model, options, COMM) for _ in range(REPETITIONS))
         for other in others:

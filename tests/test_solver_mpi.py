@@ -25,10 +25,17 @@ def truth(tmp_path_factory, run_cli) -> Path:
     return path
 
 
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_one_rank_factorises_for_its_machine(ranks, mpiexec):
+    names = "one_rank_factorises_for_all,others_sleep_while_one_works_alone"
+    mpiexec(ranks, PROGRAM, names, check=True)
+
+
+@pytest.mark.parametrize("linear_solver", ["auto", "mumps"])
 @pytest.mark.parametrize("ranks", [1, 2, 3, pytest.param(7, marks=pytest.mark.slow)])
-def test_corrected_modes_on_any_number_of_ranks(ranks, truth, tmp_path, mpiexec):
+def test_corrected_modes_on_any_number_of_ranks(ranks, linear_solver, truth, tmp_path, mpiexec):
     out = tmp_path / "modes.h5"
-    options = ("--tol", "1e-11", "--out", out)
+    options = ("--tol", "1e-11", "--linear-solver", linear_solver, "--out", out)
     mpiexec(ranks, "solver", "modes", *MODEL, *MODES, *options, check=True)
     comparison = compare_files(out, truth)
     assert comparison.eigenvalue_relative_error["max"] < 1e-10

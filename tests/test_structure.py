@@ -37,7 +37,7 @@ ARROWS = {
     "solver.files": "solver.distribution",
     "solver.response": "solver.files",
     "solver.assembly": "solver.distribution",
-    "solver.linear": "solver.assembly",
+    "solver.linear": "solver.distribution solver.assembly",
     "solver.subspace": "solver.distribution solver.assembly",
     "solver.hcms": "solver.distribution solver.assembly solver.linear solver.subspace",
     "solver.correction": "solver.distribution solver.assembly solver.linear solver.subspace",

@@ -16,7 +16,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from carillon.fem.aggregation import COARSEST, Level, ShiftedInverse, levels_of
 from carillon.fem.geometry.faces import face_neighbours
-from carillon.threads import single_threaded_blas
+from carillon.threads import blas_threads
 
 if TYPE_CHECKING:
     from carillon.fem.geometry import HexMesh
@@ -93,7 +93,7 @@ def _iterated(levels: list[Level], count: int) -> tuple[Array, Array]:
     operator = LinearOperator(matrix.shape, matvec=inverse.solve, dtype=float)
     start = np.cos(np.arange(matrix.shape[0]))
     # Threads would add in another order, and wait for each other longer than they add.
-    with single_threaded_blas():
+    with blas_threads(1):
         return _ascending(
             *eigsh(matrix, count, sigma=-SHIFT, OPinv=operator, v0=start, tol=TOLERANCE)
         )

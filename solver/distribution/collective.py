@@ -30,6 +30,15 @@ def compute_on_root(comm: MPI.Comm, compute: Callable[[], T]) -> T | None:
     return result
 
 
+def share_a_machine(comm: MPI.Comm) -> bool:
+    """Whether all ranks have the same memory; collective."""
+    machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    try:
+        return bool(machine.size == comm.size)
+    finally:
+        machine.Free()
+
+
 def _attempt(comm: MPI.Comm, compute: Callable[[], T]) -> tuple[T | None, Exception | None]:
     """Result of `compute` on rank 0, or the exception, marked as one that all ranks will raise."""
     if comm.rank == 0:

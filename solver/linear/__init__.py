@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from carillon.errors import UserError
 from carillon.runtime import available_memory
+from solver.distribution.collective import bcast_from_root, share_a_machine
 
 if TYPE_CHECKING:
     from solver.assembly.system import Layout, System
     from solver.linear.iterative import IterativeInverse
+    from solver.linear.leader import Leader
     from solver.linear.plan import Plan
 
 Array = NDArray[np.float64]
@@ -22,6 +24,8 @@ METHODS = ("auto", "multifrontal", "mumps", "icc-pcg", "amg-cg")
 ITERATIVE = ("icc-pcg", "amg-cg")
 LARGEST_SHARED = 500_000
 """Unknowns up to which `auto` factorises on several ranks."""
+MOST_LED = 8
+"""Ranks of one machine up to which `auto` has one of them factorise, with threads, for all."""
 MEMORY_SHARE = 0.8
 """Of the free memory, what a factorisation may take."""
 
@@ -129,58 +133,65 @@ class LinearSolver:
     Parameters
     ----------
     method
-        `multifrontal`: sparse factorisation by blocks, on one rank.  `mumps`: the same by MUMPS, on
-        any number of ranks.  `icc-pcg`: conjugate gradients with incomplete Cholesky, the paper's.
-        `amg-cg`: conjugate gradients with algebraic multigrid, for models too large to factorise.
-        `auto`: the fastest direct one that the memory holds, or else `amg-cg`.
+        `multifrontal`: sparse factorisation by blocks, on the ranks of one machine.  `mumps`: the
+        same by MUMPS, on any number of ranks.  `icc-pcg`: conjugate gradients with incomplete
+        Cholesky, the paper's.  `amg-cg`: conjugate gradients with algebraic multigrid, for models
+        too large to factorise.  `auto`: the fastest direct one that the memory holds, or else
+        `amg-cg`.
     layout
         Of the mesh.
 
     Raises
     ------
     UserError
-        For an unknown method, or `multifrontal` on several ranks.
+        For an unknown method, or `multifrontal` on ranks of several machines.
     """
 
     def __init__(self, method: str, layout: Layout) -> None:
         if method not in METHODS:
             raise UserError(f"linear solver {method!r}, expected one of {', '.join(METHODS)}")
-        alone = layout.comm.size == 1
-        if method == "multifrontal" and not alone:
+        self._layout = layout
+        self._together = share_a_machine(layout.comm)
+        if method == "multifrontal" and not self._together:
             raise UserError(
-                f"the linear solver multifrontal runs on one rank, not on {layout.comm.size}; "
+                "the linear solver multifrontal runs on one machine, the ranks are on several; "
                 "use mumps"
             )
-        self._layout = layout
-        if method == "auto" and alone:
-            available = available_memory()
-            fits = available is None or self.plan.bytes < MEMORY_SHARE * available
-            method = "multifrontal" if fits else "amg-cg"
+        if method == "auto" and self._together and layout.comm.size <= MOST_LED:
+            method = "multifrontal" if self._fits() else "amg-cg"
         elif method == "auto":
             small = layout.local_mesh.n_dofs <= LARGEST_SHARED
             method = "mumps" if small else "amg-cg"
         self.method = method
         if method == "multifrontal":
             # What depends on the mesh alone.
-            self.plan  # noqa: B018
+            self.leader  # noqa: B018
 
     @cached_property
-    def plan(self) -> Plan:
-        """Elimination of this rank's rows, which are all rows."""
-        from solver.linear.plan import Plan
+    def leader(self) -> Leader:
+        """Rank that factorises for all of a machine; made when first asked for, collective."""
+        from solver.linear.leader import Leader
 
-        local_mesh, pattern = self._layout.local_mesh, self._layout.pattern
-        steps = local_mesh.cells.elements.steps
-        return Plan(local_mesh.lattice(), pattern.indptr, pattern.columns, steps=steps)
+        return Leader(self._layout)
+
+    @property
+    def plan(self) -> Plan:
+        """Elimination of all rows, which rank 0 has."""
+        assert self.leader.plan is not None
+        return self.leader.plan
+
+    def _fits(self) -> bool:
+        def fits() -> bool:
+            available = available_memory()
+            return available is None or self.plan.bytes < MEMORY_SHARE * available
+
+        # Made on all ranks first.
+        self.leader  # noqa: B018
+        return bcast_from_root(self._layout.comm, fits)
 
     def count_below(self, system: System, value: float) -> int | None:
-        """Eigenvalues of K - value M below zero, by inertia; None if that is MUMPS's to do."""
-        if system.comm.size > 1:
-            return None
-        from solver.linear.multifrontal import count_below
-
-        rows = system.rows
-        return count_below(self.plan, rows.stiffness, rows.mass, value, rows.threads)
+        """Eigenvalues of K - value M below zero, by inertia; None where that is MUMPS's to do."""
+        return self.leader.count_below(system, value) if self._together else None
 
     @property
     def indefinite(self) -> bool:
@@ -196,11 +207,9 @@ class LinearSolver:
     def inverse(self, system: System, shift: float) -> Inverse:
         """Inverse of K - shift M; the shift is negative for an iterative method."""
         if self.method == "multifrontal":
-            from solver.linear.multifrontal import Factor
-
-            rows = system.rows
-            factor = Factor(self.plan, rows.stiffness, rows.mass, shift, rows.threads)
-            return Lasting(factor, rows.stiffness_diagonal)
+            inverse = self.leader.inverse(system, shift)
+            alone = system.comm.size == 1
+            return Lasting(inverse, system.rows.stiffness_diagonal) if alone else inverse
         if self.method == "mumps":
             from solver.linear.mumps import MumpsInverse
 

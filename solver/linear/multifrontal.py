@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from carillon.errors import LocalConvergenceError
 from carillon.narrow import block, lanes_of
 from carillon.runtime import available_memory
-from carillon.threads import in_tree, split
+from carillon.threads import in_parallel, in_tree, split
 from solver.linear.elimination import eliminate_fronts
 from solver.linear.plan import Part, Plan
 from solver.linear.sweeps import (
@@ -32,6 +32,8 @@ Array = NDArray[np.float64]
 
 COLUMNS = 64
 """Right-hand sides that are carried through the fronts together."""
+FEWEST = 24
+"""Right-hand sides for each thread from which it takes them through all fronts by itself."""
 
 
 class Factor:
@@ -79,13 +81,23 @@ class Factor:
     def solve(self, vectors: Array) -> Array:
         """Solution (3 n, k) for a C-ordered block of right-hand sides (3 n, k)."""
         solution = np.empty_like(vectors)
-        for start, stop in split(vectors.shape[1], 1, COLUMNS):
-            self._solve_columns(vectors, solution, start, stop)
+        width, threads = vectors.shape[1], self._threads
+        if width >= threads * FEWEST:
+
+            def alone(start: int, stop: int) -> None:
+                self._solve_columns(vectors, solution, start, stop, 1)
+
+            in_parallel(alone, split(width, threads, COLUMNS), threads)
+        else:
+            for start, stop in split(width, 1, COLUMNS):
+                self._solve_columns(vectors, solution, start, stop, threads)
         return solution
 
-    def _solve_columns(self, vectors: Array, solution: Array, start: int, stop: int) -> None:
+    def _solve_columns(
+        self, vectors: Array, solution: Array, start: int, stop: int, threads: int
+    ) -> None:
         """Solve for the columns [start, stop): up the tree of parts, and down again."""
-        tree, width = self._plan.shares(self._threads), stop - start
+        tree, width = self._plan.shares(threads), stop - start
         order, lanes = self._plan.fronts.order, lanes_of(width)
         works: list[Array] = [np.empty(0)] * len(tree.parts)
 
@@ -107,8 +119,8 @@ class Factor:
             self._sweep(substitute, part, work, lanes)
             put_rows(work, order[part.positions], lanes, solution, start, width)
 
-        in_tree(up, tree.parent, self._threads)
-        in_tree(down, tree.parent, self._threads, from_root=True)
+        in_tree(up, tree.parent, threads)
+        in_tree(down, tree.parent, threads, from_root=True)
 
     def _sweep(self, kernel: Any, part: Part, work: Array, lanes: int) -> None:
         plan = self._plan

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from carillon.threads import single_threaded_blas
+from carillon.threads import blas_threads
 from sound.bounds import require_level
 from sound.clips.candidates import BAND_DECAY, BAND_SAMPLES, LEAST_DECAY, candidates, rings
 from sound.clips.damped import damped_sinusoids, superposed
@@ -134,7 +134,7 @@ def extract(
     _require_no_steady_tone(clip, rate)
     scale = float(np.abs(clip).max())
     searched = clip[: round(LONGEST_SECONDS * rate)] / scale
-    with single_threaded_blas():  # many small matrices
+    with blas_threads(1):  # many small matrices
         fit = _fitted(searched, rate, visible)
     _require_modes(fit, len(searched), rate)
     kept = fit.chosen(_is_mode(fit, len(searched)))

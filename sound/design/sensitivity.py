@@ -13,7 +13,6 @@ import scipy.linalg as la
 from numpy.typing import NDArray
 
 from solver.analysis.modes import Modes
-from solver.assembly.system import System
 from solver.linear import Inverse
 from solver.subspace.orthonormal import is_cancelled
 
@@ -145,7 +144,7 @@ def outside_response(
         Largest relative change by the last block.
     """
     struck = pushes.shape[1]
-    space = _Space(modes.system, elastic, MOST_BLOCKS * struck)
+    space = _Space(modes, elastic, MOST_BLOCKS * struck)
     free = block = space.free_of(pushes)
     solution = np.zeros((0, struck * len(values)))
     for _ in range(MOST_BLOCKS):
@@ -165,8 +164,10 @@ class _Space:
 
     Parameters
     ----------
+    modes
+        Of the analysis.
     elastic
-        These modes.
+        Those but the rigid ones.
     room
         Vectors that it may grow to.
 
@@ -176,8 +177,8 @@ class _Space:
         V^T K V (m, m) with the orthonormal basis V.
     """
 
-    def __init__(self, system: System, elastic: Array, room: int) -> None:
-        self._system = system
+    def __init__(self, modes: Modes, elastic: Array, room: int) -> None:
+        self._system = system = modes.system
         self._known = self._size = system.rigid.shape[1] + elastic.shape[1]
         self._vectors, self._mass_vectors = np.empty((2, len(elastic), self._known + room))
         known = np.concatenate([system.rigid, elastic], axis=1)
