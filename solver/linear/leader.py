@@ -29,8 +29,9 @@ Array = NDArray[np.float64]
 Number = TypeVar("Number", np.float64, np.int64)
 T = TypeVar("T")
 
-NAP = 1e-4
-"""Seconds that a waiting rank sleeps between two looks."""
+NAP, SHORTEST_NAP = 0.03, 1e-4
+"""Time that a waiting rank sleeps between two looks, which take some from those at work: as a share
+of that waited so far, and the least [s]."""
 
 
 class Leader:
@@ -82,9 +83,9 @@ class Leader:
                 self.comm.Ibarrier().Wait()
 
         if self.comm.rank:
-            arrived = self.comm.Ibarrier()
+            arrived, begin = self.comm.Ibarrier(), time.monotonic()
             while not arrived.Test():
-                time.sleep(NAP)
+                time.sleep(max(SHORTEST_NAP, NAP * (time.monotonic() - begin)))
         return compute_on_root(self.comm, awake)
 
     def inverse(self, system: System, shift: float) -> Inverse:

@@ -13,6 +13,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.fem.model import RIGID_MODES, Solid
+from carillon.runtime import reuse_freed_memory
 from solver.analysis.bounds import check_mode_count, default_keep
 from solver.analysis.components import elastic_part
 from solver.analysis.options import SolverOptions
@@ -57,6 +58,7 @@ def measure(
         If there are too few unknowns for so many modes, or more ranks than subdomains.
     """
     bcast_from_root(comm, lambda: check_mode_count(options.modes, cast(Solid, model).n_dofs))
+    reuse_freed_memory()
     _Run(model, replace(options, modes=min(20, options.modes), tolerance=0.0, corrections=1), comm)
     runs = [_Run(model, options, comm) for _ in range(REPEATS)]
     seconds = comm.bcast([run.seconds for run in runs])
