@@ -225,12 +225,10 @@ class NodeRows:
         ghosts = block[:0] if self.halo is None else self.halo.exchange(block)
         result = np.empty_like(block)
         graph = self.pattern.indptr, self.pattern.columns
-        entries = self.stiffness
-        arrays = block, ghosts, result
-        if not stiffness:
-            # The three components of a node follow each other, and all have the same mass.
-            entries = self.mass[:, None, None]
-            arrays = tuple(each.reshape(-1, 3 * block.shape[1]) for each in arrays)
+        # The three components of a node follow each other, and all have the same mass.
+        entries, components = (self.stiffness, 1) if stiffness else (self.mass[:, None, None], 3)
+        shape = (-1, components * block.shape[1])
+        arrays = block.reshape(shape), ghosts.reshape(shape), result.reshape(shape)
 
         def rows(start: int, stop: int) -> None:
             multiply((start, stop), graph, entries, *arrays)

@@ -18,6 +18,9 @@ Array = NDArray[np.float64]
 
 compiled = compiler(Path(__file__), Path(plans.__file__))
 
+BLOCKED = 64
+"""Columns that LAPACK eliminates together, for which it needs room."""
+
 
 def eliminate_fronts(
     plan: Plan,
@@ -127,7 +130,8 @@ def _eliminate_panels(own: Array, pivots: Array | None) -> tuple[list[Array], in
 
 def _inverse(block: Array) -> tuple[Array, int]:
     """Inverse of a symmetric matrix, given its upper triangle, and its negative eigenvalues."""
-    factor, pivots, _ = la.lapack.dsytrf(np.array(block).T, lower=1, overwrite_a=1)
+    room = BLOCKED * len(block)
+    factor, pivots, _ = la.lapack.dsytrf(np.array(block).T, lower=1, lwork=room, overwrite_a=1)
     # Every 2x2 pivot of Bunch and Kaufman has one eigenvalue of either sign.
     single = pivots > 0
     negative = int((np.diag(factor)[single] < 0.0).sum() + (~single).sum() // 2)

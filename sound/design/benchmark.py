@@ -66,9 +66,8 @@ def time_evaluations(problem: DesignProblem, runs: int = 7, seed: int = 0) -> Ev
         moves *= CHANGE / np.linalg.norm(moves, axis=1, keepdims=True)
         here = simulation.evaluate(np.zeros(size))
         cold, _ = _timed(lambda k: simulation.evaluate(moves[k]), runs)
-        warm, evaluations = _timed(lambda k: simulation.evaluate(moves[k], here.modes), runs)
+        warm, analysis = _timed(lambda k: simulation.evaluate(moves[k], here.modes), runs)
         gradient, _ = _timed(lambda k: simulation.evaluate(moves[k], here.modes, True), runs)
-    analysis = [sum(each.modes.seconds.values()) for each in evaluations]
     return EvaluationTimes(
         median(cold),
         median(warm),
@@ -143,11 +142,13 @@ def _row(method: str, design: Design) -> dict[str, Any]:
     }
 
 
-def _timed(work: Callable[[int], Evaluation], runs: int) -> tuple[list[float], list[Evaluation]]:
-    """Processor times of `runs` runs after one that warms up, and what they returned."""
-    seconds, results = [], []
+def _timed(work: Callable[[int], Evaluation], runs: int) -> tuple[list[float], list[float]]:
+    """Processor times of `runs` runs after one that warms up, and wall times of their analyses."""
+    seconds, analyses = [], []
     for run in range(runs + 1):
         begin = time.process_time()
-        results.append(work(run))
+        evaluation = work(run)
         seconds.append(time.process_time() - begin)
-    return seconds[1:], results[1:]
+        analyses.append(sum(evaluation.modes.seconds.values()))
+        del evaluation  # whose memory the next one takes over
+    return seconds[1:], analyses[1:]
