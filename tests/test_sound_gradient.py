@@ -13,7 +13,7 @@ from sound.clips.targets import Targets
 from sound.design.bark import bark, bark_slope
 from sound.design.material import LAWS, ReducedMaterial
 from sound.design.objective import Objective
-from sound.design.sensitivity import lies_between, shift_between
+from sound.design.outside import lies_between, shift_between
 from sound.design.simulation import Simulation
 from sound.project.project import Weights
 from sound.strikes import Strike

@@ -7,9 +7,11 @@ on the columns beside it.
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
+from numba import literally
 from numpy.typing import NDArray
 
 from carillon import narrow
@@ -22,6 +24,8 @@ Index = NDArray[np.int64]
 
 compiled = compiler(Path(__file__), Path(narrow.__file__))
 
+STRIPS = (8, 4, 3, 2, 1)
+"""Registers to a strip of columns."""
 ROWS_NEAR = 128
 """Rows that are gone through for some of the columns before the next columns are, so that what they
 share with each other stays near."""
@@ -53,8 +57,25 @@ def multiply(
     """
     width, size = vectors.shape[1], blocks.shape[1]
     flat = [sliding(each.reshape(-1)) for each in (vectors, ghosts, result)]
-    kernel = _multiply_scalars if size == 1 else _multiply_blocks
-    kernel(*rows, len(vectors) // size, *graph, blocks.reshape(-1), *flat, width)
+    kernel, widest = (_multiply_scalars, 2 * WIDE) if size == 1 else (_multiply_blocks, WIDE)
+    strips = _strips(width, widest)
+    kernel(rows, len(vectors) // size, *graph, blocks.reshape(-1), *flat, width, strips)
+
+
+@cache
+def _strips(width: int, widest: int) -> Index:
+    """First column, and registers, of strips that cover so many columns.
+
+    The last ones may go over columns once more, so that all registers are full.
+    """
+    strips, column = [], 0
+    while column < width:
+        most = min(widest, -(-(width - column) // LANES), width // LANES)
+        wide = max(each for each in STRIPS if each <= most)
+        column = min(column, width - wide * LANES)
+        strips.append((column, wide))
+        column += wide * LANES
+    return np.array(strips)
 
 
 @compiled
@@ -78,46 +99,36 @@ def _strip(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _multiply_blocks(  # type: ignore[no-untyped-def]
-    start, stop, own, indptr, columns, blocks, vectors, ghosts, result, width
+def _multiply(  # type: ignore[no-untyped-def]
+    rows, own, indptr, columns, blocks, vectors, ghosts, result, width, strips, size
 ):
-    for first in range(start, stop, ROWS_NEAR):
-        rows = (first, min(first + ROWS_NEAR, stop))
-        column = 0
-        while column < width:
-            # The last registers may go over columns once more, so that all are full.
-            wide = min(WIDE, -(-(width - column) // LANES), width // LANES)
-            column = min(column, width - wide * LANES)
-            place = (column, width)
-            if wide == 4:
-                _strip(rows, own, indptr, columns, blocks, vectors, ghosts, result, place, 3, 4)
+    literally(size)
+    for first in range(rows[0], rows[1], ROWS_NEAR):
+        few = (first, min(first + ROWS_NEAR, rows[1]))
+        for strip in range(len(strips)):
+            place = (strips[strip, 0], width)
+            wide = strips[strip, 1]
+            if wide == 8:
+                _strip(few, own, indptr, columns, blocks, vectors, ghosts, result, place, size, 8)
+            elif wide == 4:
+                _strip(few, own, indptr, columns, blocks, vectors, ghosts, result, place, size, 4)
             elif wide == 3:
-                _strip(rows, own, indptr, columns, blocks, vectors, ghosts, result, place, 3, 3)
+                _strip(few, own, indptr, columns, blocks, vectors, ghosts, result, place, size, 3)
             elif wide == 2:
-                _strip(rows, own, indptr, columns, blocks, vectors, ghosts, result, place, 3, 2)
+                _strip(few, own, indptr, columns, blocks, vectors, ghosts, result, place, size, 2)
             else:
-                _strip(rows, own, indptr, columns, blocks, vectors, ghosts, result, place, 3, 1)
-            column += wide * LANES
+                _strip(few, own, indptr, columns, blocks, vectors, ghosts, result, place, size, 1)
+
+
+@compiled
+def _multiply_blocks(  # type: ignore[no-untyped-def]
+    rows, own, indptr, columns, blocks, vectors, ghosts, result, width, strips
+):
+    _multiply(rows, own, indptr, columns, blocks, vectors, ghosts, result, width, strips, 3)
 
 
 @compiled
 def _multiply_scalars(  # type: ignore[no-untyped-def]
-    start, stop, own, indptr, columns, blocks, vectors, ghosts, result, width
+    rows, own, indptr, columns, blocks, vectors, ghosts, result, width, strips
 ):
-    for first in range(start, stop, ROWS_NEAR):
-        rows = (first, min(first + ROWS_NEAR, stop))
-        column = 0
-        while column < width:
-            wide = min(2 * WIDE, -(-(width - column) // LANES), width // LANES)
-            wide = 8 if wide >= 8 else 4 if wide >= 4 else min(wide, 2)
-            column = min(column, width - wide * LANES)
-            place = (column, width)
-            if wide == 8:
-                _strip(rows, own, indptr, columns, blocks, vectors, ghosts, result, place, 1, 8)
-            elif wide == 4:
-                _strip(rows, own, indptr, columns, blocks, vectors, ghosts, result, place, 1, 4)
-            elif wide == 2:
-                _strip(rows, own, indptr, columns, blocks, vectors, ghosts, result, place, 1, 2)
-            else:
-                _strip(rows, own, indptr, columns, blocks, vectors, ghosts, result, place, 1, 1)
-            column += wide * LANES
+    _multiply(rows, own, indptr, columns, blocks, vectors, ghosts, result, width, strips, 1)

@@ -1,20 +1,17 @@
 """Derivatives of eigenpairs through the coarsening and the reduced material (appendix 2).
 
 With M-orthonormal modes, d lambda_k = u_k^T dK u_k and the derivative of u_k is the sum over all
-other modes j of u_j (u_j^T dK u_k) / (lambda_k - lambda_j).  The computed modes enter as they are;
-what the others add is found in a Krylov space, where the appendix leaves it out.
+other modes j of u_j (u_j^T dK u_k) / (lambda_k - lambda_j).  Of a pushed mode f^T u_k that is one
+product u_k^T dK x_k, with x_k the sum of u_j (u_j^T f) / (lambda_k - lambda_j).  Modes close to k,
+which the differences in the denominators would magnify, are left out of x_k, and their products
+u_i^T dK u_j are found one by one; modes that were not computed are for `sound.design.outside`.
 """
 
 from __future__ import annotations
 
 import numba
 import numpy as np
-import scipy.linalg as la
 from numpy.typing import NDArray
-
-from solver.analysis.modes import Modes
-from solver.linear import Inverse
-from solver.subspace.orthonormal import is_cancelled
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -23,19 +20,8 @@ POINTS_AT_ONCE = 1024
 """Points of elements whose strain energies exist together."""
 CELLS_AT_ONCE = 8
 """Elements whose strains do."""
-SHIFTS = (0.5, 0.75)
-"""Range of a shift, as shares of the last eigenvalue: with it among the computed ones a Krylov
-space is near to all of them, and an analysis of a similar material can use the inverse, too."""
-MOST_BLOCKS = 16
-"""Blocks of a Krylov space at most."""
-MOST_PASSES = 3
-"""Times that a block is made orthogonal; twice is enough but for rounding."""
-CLEAR = 0.2
-"""Share of the largest distance to all eigenvalues from which another shift is as good."""
 CLOSE = 1e-2
 """Relative difference of eigenvalues up to which modes are close to each other."""
-DEPENDENT = 1e-10
-"""Share (squared) of a vector below which it lies in the space that it was made orthogonal to."""
 
 
 def projected_stiffness(
@@ -116,152 +102,6 @@ def inside_response(elastic: Array, values: Array, pushed: Array) -> Array:
 
 def _are_close(one: Array, other: Array) -> NDArray[np.bool_]:
     return np.asarray(np.abs(one - other) <= CLOSE * np.maximum(one, other))
-
-
-def outside_response(
-    modes: Modes, inverse: Inverse, elastic: Array, values: Array, pushes: Array, accuracy: float
-) -> Array:
-    """x (3 n, T, N) with x_pk = sum of u_j (u_j^T f_p) / (lambda_k - lambda_j) over other modes.
-
-    These are all solutions of (K - lambda_k M) x = -f, without the part of f that the computed
-    modes hold, and all lie near one Krylov space of (K - mu M)^-1 M: of its blocks of T vectors,
-    made orthogonal to the computed modes, the Galerkin solutions are taken, with as many blocks as
-    it takes until one more changes no solution by more than `accuracy`.
-
-    Parameters
-    ----------
-    modes
-        Of the analysis.
-    inverse
-        (K - mu M)^-1 with mu between the eigenvalues, not close to one.
-    elastic : (3 n, N)
-        The computed modes but for the rigid ones.
-    values : (N,) [rad^2/s^2]
-        Their eigenvalues.
-    pushes : (3 n, T)
-        Forces f.
-    accuracy : float
-        Largest relative change by the last block.
-    """
-    struck = pushes.shape[1]
-    space = _Space(modes, elastic, MOST_BLOCKS * struck)
-    free = block = space.free_of(pushes)
-    solution = np.zeros((0, struck * len(values)))
-    for _ in range(MOST_BLOCKS):
-        block = space.add(inverse.solve(np.ascontiguousarray(block)))
-        if not block.shape[1]:
-            break
-        before, solution = solution, _galerkin(space.stiffness, space.basis.T @ free, values)
-        change = solution.copy()
-        change[: len(before)] -= before
-        if (la.norm(change, axis=0) <= accuracy * la.norm(solution, axis=0)).all():
-            break
-    return (space.basis @ solution).reshape(len(pushes), struck, -1)
-
-
-class _Space:
-    """Growing subspace, orthogonal to the rigid motions and the computed modes.
-
-    Parameters
-    ----------
-    modes
-        Of the analysis.
-    elastic
-        Those but the rigid ones.
-    room
-        Vectors that it may grow to.
-
-    Attributes
-    ----------
-    stiffness
-        V^T K V (m, m) with the orthonormal basis V.
-    """
-
-    def __init__(self, modes: Modes, elastic: Array, room: int) -> None:
-        self._system = system = modes.system
-        self._known = self._size = system.rigid.shape[1] + elastic.shape[1]
-        self._vectors, self._mass_vectors = np.empty((2, len(elastic), self._known + room))
-        known = np.concatenate([system.rigid, elastic], axis=1)
-        self._vectors[:, : self._known] = known
-        self._mass_vectors[:, : self._known] = system.times_mass(known)
-        self.stiffness = np.empty((0, 0))
-
-    @property
-    def basis(self) -> Array:
-        """V (3 n, m)."""
-        return self._vectors[:, self._known : self._size]
-
-    def free_of(self, forces: Array) -> Array:
-        """Forces (3 n, T) less the part that the subspace, and what it is orthogonal to, hold."""
-        vectors, mass_vectors = self._vectors[:, : self._size], self._mass_vectors[:, : self._size]
-        return np.asarray(forces - mass_vectors @ (vectors.T @ forces))
-
-    def add(self, block: Array) -> Array:
-        """Let the subspace grow by a block (3 n, b), which is lost; M times what it added."""
-        mass_block, gram = self._made_orthogonal(block)
-        weights = _orthonormal(gram)
-        block, mass_block = block @ weights, mass_block @ weights
-        end = self._size + weights.shape[1]
-        self._vectors[:, self._size : end] = block
-        self._mass_vectors[:, self._size : end] = mass_block
-        self._size = end
-        last = self.basis.T @ self._system.times_stiffness(block)
-        self.stiffness = _bordered(self.stiffness, last)
-        return mass_block
-
-    def _made_orthogonal(self, block: Array) -> tuple[Array, Array]:
-        """M times `block`, and its Gram matrix, once it is made orthogonal to all, in place."""
-        vectors, mass_vectors = self._vectors[:, : self._size], self._mass_vectors[:, : self._size]
-        for _ in range(MOST_PASSES):
-            overlap = mass_vectors.T @ block
-            block -= vectors @ overlap
-            mass_block = self._system.times_mass(block)
-            gram = block.T @ mass_block
-            if not is_cancelled(gram, overlap):
-                break
-        return mass_block, gram
-
-
-def _bordered(matrix: Array, last: Array) -> Array:
-    """A symmetric matrix (m, m) with the columns `last` (m + b, b), and rows that mirror them."""
-    size = len(matrix)
-    whole = np.empty((len(last),) * 2)
-    whole[:size, :size], whole[:, size:], whole[size:, :size] = matrix, last, last[:size].T
-    return whole
-
-
-def _galerkin(stiffness: Array, held: Array, values: Array) -> Array:
-    """Solutions (m, T N) of (lambda_k - H) y = h in an orthonormal basis, H (m, m) and h (m, T)."""
-    ritz, rotation = la.eigh(stiffness, check_finite=False)
-    weights = (rotation.T @ held)[:, :, None] / (values[None, None, :] - ritz[:, None, None])
-    return np.asarray(rotation @ weights.reshape(len(ritz), -1))
-
-
-def shift_between(values: Array) -> float:
-    """The shift in the range of `SHIFTS` that is farthest from all of the eigenvalues (N,)."""
-    ends = values[-1] * np.array(SHIFTS)
-    middles = 0.5 * (values[1:] + values[:-1])
-    possible = np.concatenate([ends, middles[(middles > ends[0]) & (middles < ends[1])]])
-    distances = [_distance(values, each) for each in possible]
-    return float(possible[np.argmax(distances)])
-
-
-def lies_between(values: Array, shift: float) -> bool:
-    """Whether a shift is hardly closer to an eigenvalue of (N,) than that of `shift_between`."""
-    best = _distance(values, shift_between(values))
-    return SHIFTS[0] * values[-1] <= shift and _distance(values, shift) >= CLEAR * best
-
-
-def _distance(values: Array, shift: float) -> float:
-    return float(np.abs(values - shift).min())
-
-
-def _orthonormal(gram: Array) -> Array:
-    """Coefficients that make vectors with this Gram matrix orthonormal, dependent ones dropped."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
-    spread, directions = np.linalg.eigh(gram * scale * scale[:, None])
-    kept = spread > DEPENDENT
-    return np.asarray(scale[:, None] * directions[:, kept] / np.sqrt(spread[kept]))
 
 
 @numba.njit(cache=True, nogil=True, fastmath={"contract", "reassoc"}, error_model="numpy")

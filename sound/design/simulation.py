@@ -22,14 +22,8 @@ from solver.response.contact import interpolation
 from sound.design.elements import analysed_elements
 from sound.design.material import ReducedMaterial
 from sound.design.objective import Sensitivity
-from sound.design.sensitivity import (
-    close_pairs,
-    inside_response,
-    lies_between,
-    outside_response,
-    projected_stiffness,
-    shift_between,
-)
+from sound.design.outside import lies_between, outside_response, shift_between
+from sound.design.sensitivity import close_pairs, inside_response, projected_stiffness
 from sound.strikes import Strike
 
 Array = NDArray[np.float64]
