@@ -23,7 +23,7 @@ LEAST_QUALITY = 2.0
 LEAST_DECAY = 0.1
 """Nepers (0.87 dB) by which a mode must decay within the clip; what does not is a steady tone."""
 _MOST_GROWTH = 5.0
-"""Nepers by which a sinusoid may grow within a band, for a clip that does not decay to be told."""
+"""Nepers by which a sinusoid may grow within the clip, for one that does not decay to be told."""
 _LATER = 16
 """Samples of a band by which a second search begins later."""
 MOST = 200
@@ -40,14 +40,18 @@ def candidates(rest: Array, rate: int, width: float, label: str, visible: bool) 
     """
     count = int(0.5 * rate / width) + 1
     parts = track(bands(rest, rate, width, BAND_SAMPLES), label, count, visible=visible)
-    of_bands = [_band_exponents(band, rate) for band in parts]
+    most = _MOST_GROWTH / len(rest)
+    of_bands = [_band_exponents(band, rate, most) for band in parts]
     exponents = np.concatenate([each for each, _ in of_bands])
     energies = np.concatenate([energies for _, energies in of_bands])
     return exponents[np.sort(np.argsort(-energies, kind="stable")[:MOST])]
 
 
-def _band_exponents(band: Band, rate: int) -> tuple[Complex, Array]:
-    """Exponents (k,) per sample of the clip, and the energy (k,) that each has in the band."""
+def _band_exponents(band: Band, rate: int, growth: float) -> tuple[Complex, Array]:
+    """Exponents (k,) per sample of the clip, and the energy (k,) that each has in the band.
+
+    None grows by more than `growth` nepers a sample.
+    """
     nothing = np.zeros(0, complex), np.zeros(0)
     power = np.abs(np.fft.fft(band.signal)) ** 2
     if len(power) < 4 * _LATER or power.max() < _PEAK * np.median(power):
@@ -59,8 +63,7 @@ def _band_exponents(band: Band, rate: int) -> tuple[Complex, Array]:
     exponents = exponents[inside] + 2j * np.pi * band.centre / rate
     low, high = 2.0 * np.pi * LOWEST_HERTZ / rate, HIGHEST_FRACTION * np.pi
     sounds = (exponents.imag > low) & (exponents.imag < high) & rings(exponents)
-    grows = exponents.real * len(band.signal) * rate / band.rate > _MOST_GROWTH
-    kept = sounds & ~grows
+    kept = sounds & (exponents.real <= growth)
     return exponents[kept], energies[inside][kept]
 
 

@@ -7,8 +7,6 @@ forms, the normal equations of a fit cost nothing beside its right-hand side.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import scipy.linalg as la
 from numpy.typing import NDArray
@@ -16,7 +14,11 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_BLOCK = 2048
+_BLOCK = 512
+_SILENT = -300.0
+"""Natural logarithm of what counts as zero."""
+_MOST_GROWTH = 40.0
+"""Nepers by which a sinusoid may grow within the signal, beyond which sums overflow."""
 _CLOSEST = 1e-3
 _FIRST_DAMPING, _LEAST_DAMPING = 1e-3, 1e-6
 _CONVERGED = 1e-9
@@ -59,26 +61,42 @@ def damped_sinusoids(
 
 def superposed(exponents: Complex, coefficients: Complex, count: int) -> Array:
     """Samples (count,) of Re sum_k c_k exp(lambda_k n)."""
+    cosines, sines, starts = _turns(exponents, count)
+    weights = starts * coefficients
     with np.errstate(over="ignore", invalid="ignore"):
-        parts = [(powers @ coefficients).real for powers, _ in _blocks(exponents, count)]
-    return np.concatenate(parts) if parts else np.zeros(0)
+        blocks = _real(weights) @ cosines.T - _real(-1j * weights) @ sines.T
+    return np.asarray(blocks.ravel()[:count])
 
 
 def correlations(exponents: Complex, signal: Array) -> Complex:
     """Sums (2, k) over the samples of signal[n] exp(lambda_k n) and of the same times n."""
-    total = np.zeros((2, len(exponents)), complex)
-    for powers, n in _blocks(exponents, len(signal)):
-        part = signal[n[0] : n[-1] + 1]
-        total += np.stack([part, n * part]) @ powers
-    return total
+    cosines, sines, starts = _turns(exponents, len(signal))
+    blocks = np.zeros((len(starts), len(cosines)))
+    blocks.ravel()[: len(signal)] = signal
+    later = blocks * np.arange(len(cosines))
+    first = np.arange(len(starts)) * len(cosines)
+    plain = starts * (blocks @ cosines + 1j * (blocks @ sines))
+    slope = starts * (later @ cosines + 1j * (later @ sines)) + first[:, None] * plain
+    return np.stack([plain.sum(axis=0), slope.sum(axis=0)])
 
 
-def _blocks(exponents: Complex, count: int) -> Iterator[tuple[Complex, NDArray[np.intp]]]:
-    """exp(lambda_k n) for a block of sample numbers n at a time, and those numbers."""
-    first = np.exp(np.outer(np.arange(min(_BLOCK, count)), exponents))
-    for start in range(0, count, _BLOCK):
-        n = np.arange(start, min(start + _BLOCK, count))
-        yield first[: len(n)] * np.exp(start * exponents), n
+def _turns(exponents: Complex, count: int) -> tuple[Array, Array, Complex]:
+    """Both parts (b, k) of exp(lambda_k n) in the first block of samples n, and its value (m, k) at
+    the first of each block.
+
+    The value at any sample is a product of the two.
+    """
+    size = min(_BLOCK, max(count, 1))
+    starts = np.outer(np.arange(0, count, size), exponents)
+    # Numbers too small for the processor's normal format would slow the products down.
+    starts = np.where(starts.real > _SILENT, np.exp(starts), 0.0)
+    within = np.exp(np.outer(np.arange(size), exponents))
+    return _real(within), _real(-1j * within), starts
+
+
+def _real(values: Complex) -> Array:
+    """Real parts side by side, as BLAS wants them."""
+    return np.ascontiguousarray(values.real)
 
 
 def normal_matrix(exponents: Complex, directions: Complex, count: int, order: int = 2) -> Array:
@@ -169,6 +187,9 @@ def refined(
         sums = correlations(exponents, rest)
         step = solved(matrix, np.concatenate([sums[0], sums[1] * coefficients]), damping)
         change, move = np.split(step, 2)
+        if ((exponents + move).real * count > _MOST_GROWTH).any():
+            damping = 100.0 * max(damping, _LEAST_DAMPING)
+            continue
         new_rest = signal - superposed(exponents + move, coefficients + change, count)
         gain = 1.0 - (new_rest @ new_rest) / (rest @ rest)
         if not gain > 0.0:  # too long a step, which may even have overflown

@@ -43,11 +43,26 @@ def ester(vectors: Complex) -> int:
 
 def _subspace(signal: Complex) -> Complex:
     rows = len(signal) // 3
-    hankel = np.lib.stride_tricks.sliding_window_view(signal, len(signal) - rows + 1)
     most = min(MOST, rows - 2)
-    covariance = hankel @ hankel.conj().T
+    covariance = _covariance(signal, rows)
     vectors = la.eigh(covariance, subset_by_index=(rows - most, rows - 1))[1]
     return np.asarray(vectors[:, ::-1])
+
+
+def _covariance(signal: Complex, rows: int) -> Complex:
+    """Hankel matrix (rows, columns) of a signal times its own adjoint.
+
+    An entry differs from the one up and left of it by what the rows lose and gain at their ends.
+    """
+    columns = len(signal) - rows + 1
+    change = np.outer(signal[columns:], signal[columns:].conj())
+    change -= np.outer(signal[: rows - 1], signal[: rows - 1].conj())
+    matrix = np.empty((rows, rows), complex)
+    matrix[0] = np.lib.stride_tricks.sliding_window_view(signal, columns).conj() @ signal[:columns]
+    matrix[:, 0] = matrix[0].conj()
+    for row in range(1, rows):
+        matrix[row, 1:] = matrix[row - 1, :-1] + change[row - 1]
+    return matrix
 
 
 def _shift_error(vectors: Complex, across: Complex) -> float:
