@@ -22,6 +22,8 @@ _MOST_GROWTH = 40.0
 _CLOSEST = 1e-3
 _FIRST_DAMPING, _LEAST_DAMPING = 1e-3, 1e-6
 _CONVERGED = 1e-9
+_WELL_CONDITIONED = 1e-5
+"""Least diagonal entry of a Cholesky factor with which a matrix is inverted."""
 
 
 def exponents_of(frequencies: Array, dampings: Array, rate: int) -> Complex:
@@ -164,7 +166,15 @@ def inverse(matrix: Array, damping: float = 1e-13) -> Array:
     scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), np.finfo(float).tiny))
     scaled = matrix * scale * scale[:, None]
     scaled[np.diag_indices_from(scaled)] += damping
-    return np.asarray(la.pinvh(scaled) * scale * scale[:, None])
+    if not len(scaled):
+        return scaled
+    factor, failed = la.lapack.dpotrf(scaled, lower=True)
+    if failed or np.diag(factor).min() < _WELL_CONDITIONED:
+        return np.asarray(la.pinvh(scaled) * scale * scale[:, None])
+    lower, _ = la.lapack.dpotri(factor, lower=True, overwrite_c=True)
+    lower = np.tril(lower)
+    both = lower + np.tril(lower, -1).T
+    return np.asarray(both * scale * scale[:, None])
 
 
 def fitted_coefficients(exponents: Complex, signal: Array) -> Complex:
@@ -191,7 +201,7 @@ def refined(
             damping = 100.0 * max(damping, _LEAST_DAMPING)
             continue
         new_rest = signal - superposed(exponents + move, coefficients + change, count)
-        gain = 1.0 - (new_rest @ new_rest) / (rest @ rest)
+        gain = 1.0 - (new_rest @ new_rest) / max(rest @ rest, np.finfo(float).tiny)
         if not gain > 0.0:  # too long a step, which may even have overflown
             damping = 100.0 * max(damping, _LEAST_DAMPING)
             continue

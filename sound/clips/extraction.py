@@ -4,8 +4,9 @@ Ren, Yeh and Lin (2013), whom the paper follows, fit peaks of spectrograms.  Her
 into bands, ESPRIT (Roy and Kailath 1989) finds the damped sinusoids of every band, ESTER (Badeau,
 David and Richard 2006) their number, and a least-squares fit to the whole clip refines them.  This
 is done for narrow bands, which tell slow and close modes apart, and then, on what those leave, for
-wide ones, in which modes that die away at once stand out.  What does not stand out of the noise
-is dropped, which is why ESTER may be generous.
+wide ones, in which modes that die away at once stand out.  What still stands out of the rest is
+added, see `sound.clips.pursuit`, and what does not stand out of the noise is dropped, which is why
+ESTER may be generous.
 
 Two modes come apart if their frequencies differ by the half-power bandwidth d / pi or more where
 the signal is 20 dB above the noise, by two thirds of it at 40 dB.  Errors of modes that stand apart
@@ -24,8 +25,9 @@ from carillon.errors import UserError
 from carillon.threads import blas_threads
 from sound.bounds import require_level
 from sound.clips.candidates import BAND_DECAY, BAND_SAMPLES, LEAST_DECAY, candidates, rings
-from sound.clips.damped import damped_sinusoids, superposed
+from sound.clips.damped import damped_sinusoids, fitted_coefficients, superposed
 from sound.clips.onset import strike_sample
+from sound.clips.pursuit import further
 from sound.clips.significance import Fit, settled
 
 Array = NDArray[np.float64]
@@ -33,10 +35,18 @@ Complex = NDArray[np.complex128]
 
 LONGEST_SECONDS = 6.0
 """Time after the strike that is searched for modes."""
+LONGEST_BLOW = 0.03
+"""Time [s] after the strike from which on modes ring freely."""
+BLOW_SHARES = (0.005, 0.01, 0.025, 0.05, 0.1)
+"""Shares of the energy that may come before."""
+WORTH_IT = 0.95
+"""Share of what is left from which on another beginning is not worth a second fit."""
 SHORTEST_SAMPLES = 256
 """Samples from the strike on without which there is nothing to be searched."""
 FEWEST_PERIODS = 3.0
 """Periods of a mode that a clip must hold; what has fewer is drift rather than a mode."""
+PURSUITS = 6
+"""Rounds in which what stands out of the rest is added."""
 WIDTH_FACTORS = (1.0, 4.0, 16.0)
 """Widths of bands, one search after the other."""
 _SETTLING_STEPS, _FINAL_STEPS = 4, 20
@@ -135,9 +145,16 @@ def extract(
     scale = float(np.abs(clip).max())
     searched = clip[: round(LONGEST_SECONDS * rate)] / scale
     with blas_threads(1):  # many small matrices
-        fit = _fitted(searched, rate, visible)
+        start, fit = _begun(searched, rate, visible)
+    clip, searched, strike = clip[start:], searched[start:], strike + start
     _require_modes(fit, len(searched), rate)
-    kept = fit.chosen(_is_mode(fit, len(searched)))
+    is_mode = _is_mode(fit, len(searched))
+    kept = fit.chosen(is_mode)
+    if not is_mode.all():
+        # What is no mode may have held up one beside it.
+        with blas_threads(1):
+            kept = settled(kept.exponents, searched, _SETTLING_STEPS)
+        kept = kept.chosen(_is_mode(kept, len(searched)))
     return _as_sound(kept, clip, strike, rate, scale, modes)
 
 
@@ -177,6 +194,31 @@ def _steady(hertz: float, seconds: float) -> str:
     )
 
 
+def _begun(clip: Array, rate: int, visible: bool) -> tuple[int, Fit]:
+    """The sample from which on the modes ring freely, and their fit from there on.
+
+    A blow lasts some milliseconds, in which modes are still driven, or none. Of a fit from the
+    strike on and one from where the modes of the first explain most, that is taken which leaves
+    least of the clip, what comes before included.
+    """
+    energy = np.concatenate([[0.0], np.cumsum(clip**2)])
+
+    def left(start: int, fit: Fit) -> float:
+        rest = clip[start:]
+        rest = rest - superposed(fit.exponents, fitted_coefficients(fit.exponents, rest), len(rest))
+        return float(energy[start] + rest @ rest)
+
+    latest = max(0, min(round(LONGEST_BLOW * rate), len(clip) - SHORTEST_SAMPLES))
+    passed = np.searchsorted(energy, np.array(BLOW_SHARES) * energy[-1])
+    first = _fitted(clip, rate, visible)
+    starts = [int(start) for start in np.unique(np.minimum(passed, latest))]
+    start = min(starts, key=lambda each: left(each, first))
+    if left(start, first) > WORTH_IT * left(0, first):
+        return 0, first
+    second = _fitted(clip[start:], rate, visible)
+    return (start, second) if left(start, second) < left(0, first) else (0, first)
+
+
 def _fitted(clip: Array, rate: int, visible: bool) -> Fit:
     """All damped sinusoids that stand out of a clip."""
     fit = settled(np.zeros(0, complex), clip, 0)
@@ -191,6 +233,21 @@ def _fitted(clip: Array, rate: int, visible: bool) -> Fit:
         new = new[~_is_beside(new, slow.exponents)]
         quick = quick[~_is_beside(quick, new)]
         fit = settled(np.concatenate([slow.exponents, quick, new]), clip, _SETTLING_STEPS)
+    for _ in range(PURSUITS):
+        rest = clip - superposed(fit.exponents, fit.coefficients, len(clip))
+        new = further(rest, rate)
+        new = new[~_is_beside(new, fit.exponents)]
+        if not len(new):
+            break
+        before = len(fit.exponents)
+        fit = settled(np.concatenate([fit.exponents, new]), clip, _SETTLING_STEPS)
+        if len(fit.exponents) <= before:
+            break
+    return _final(fit, clip)
+
+
+def _final(fit: Fit, clip: Array) -> Fit:
+    """A fit refined to the end, each mode once."""
     fit = settled(fit.exponents, clip, _FINAL_STEPS)
     return settled(fit.exponents[~_is_drowned(fit)], clip, 0)
 

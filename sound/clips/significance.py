@@ -13,8 +13,8 @@ from sound.clips.damped import fitted_coefficients, inverse, normal_matrix, refi
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-PROMINENCE = 100.0
-"""Energy of a mode over that of the noise under it; at 100 its damping is uncertain by 20 %."""
+FALSE_MODES = 1e-4
+"""Modes that noise alone makes a clip seem to hold."""
 _NEIGHBOURHOOD = 100.0
 """Angular frequency on either side of a mode, in dampings, from which its noise is taken."""
 _LEAST_LEVEL = 1e-15
@@ -73,10 +73,21 @@ def _pruned(exponents: Complex, clip: Array) -> Fit:
         prominence = _gain(exponents, coefficients, len(clip)) / level
         padded = np.pad(prominence, 1, constant_values=np.inf)
         least = (prominence <= padded[:-2]) & (prominence <= padded[2:])
-        weak = least & (prominence < PROMINENCE)
+        weak = least & (prominence < threshold(exponents, len(clip)))
         if not weak.any():
             return Fit(exponents, coefficients, prominence, level)
         exponents = exponents[~weak]
+
+
+def threshold(exponents: Complex, samples: int) -> Array:
+    """Prominence (k,) that noise alone makes fewer than `FALSE_MODES` sinusoids exceed.
+
+    That of noise has an exponential distribution of mean 2, and sinusoids that decay as fast as one
+    of them tell so many frequencies apart as their bandwidths fit into the spectrum.
+    """
+    decay = np.maximum(-exponents.real, 1.0 / samples)
+    frequencies = np.maximum(1.0, 0.5 * np.pi / decay)
+    return np.asarray(2.0 * np.log(frequencies / FALSE_MODES))
 
 
 def _gain(exponents: Complex, coefficients: Complex, samples: int) -> Array:

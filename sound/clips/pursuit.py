@@ -1,0 +1,69 @@
+"""What still stands out of a rest: peaks of its spectra under windows that die away."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sound.clips.candidates import HIGHEST_FRACTION, LEAST_QUALITY, LOWEST_HERTZ
+from sound.clips.significance import threshold
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+NEIGHBOURHOOD = 100.0
+"""Angular frequency, in dampings, over which the noise around a peak is averaged."""
+APART = 4.0
+"""Distance of two new sinusoids, over the decay of the quicker one."""
+MOST = 40
+"""Sinusoids that are added at a time."""
+
+
+def further(rest: Array, rate: int) -> Complex:
+    """Exponents (k,) per sample of damped sinusoids that stand out of a rest, strongest first.
+
+    Under a window exp(-d n) the power of a sinusoid that decays as fast is largest compared to that
+    of the noise, which is the median around.
+    """
+    from scipy.fft import next_fast_len, rfft
+
+    n = np.arange(len(rest))
+    size = next_fast_len(2 * len(rest), real=True)
+    decay, found, scores = 1.0 / len(rest), [], []
+    while decay < np.pi / (4.0 * LEAST_QUALITY):
+        window = np.exp(-decay * n)
+        power = np.abs(rfft(rest * window, size)) ** 2 / (window @ window)
+        reach = max(16, round(NEIGHBOURHOOD * decay / (2.0 * np.pi) * size))
+        level = _medians(power, reach) / np.log(2.0)
+        score = 2.0 * power / np.maximum(level, np.finfo(float).tiny)
+        peaks = 1 + np.flatnonzero((score[1:-1] >= score[:-2]) & (score[1:-1] > score[2:]))
+        omega = 2.0 * np.pi * peaks / size
+        rings = omega > 2.0 * LEAST_QUALITY * decay
+        inside = (omega > 2.0 * np.pi * LOWEST_HERTZ / rate) & (omega < HIGHEST_FRACTION * np.pi)
+        exponents = -decay + 1j * omega
+        stands_out = score[peaks] > threshold(exponents, len(rest))
+        kept = rings & inside & stands_out
+        found.append(exponents[kept])
+        scores.append(score[peaks][kept])
+        decay *= 2.0
+    return _apart(np.concatenate(found), np.concatenate(scores))
+
+
+def _medians(power: Array, reach: int) -> Array:
+    """Median of the power around each frequency, between medians of stretches."""
+    stretches = max(1, len(power) // reach)
+    parts = np.array_split(power, stretches)
+    middles = np.cumsum([len(part) for part in parts]) - 0.5 * len(parts[0])
+    return np.interp(np.arange(len(power)), middles, [np.median(part) for part in parts])
+
+
+def _apart(exponents: Complex, scores: Array) -> Complex:
+    """The strongest, none close to a stronger one."""
+    chosen: list[complex] = []
+    for number in np.argsort(-scores):
+        each = exponents[number]
+        if all(abs(each - other) > APART * -min(each.real, other.real) for other in chosen):
+            chosen.append(complex(each))
+        if len(chosen) == MOST:
+            break
+    return np.array(chosen, complex)
