@@ -19,6 +19,7 @@ from sound.clips.esprit import esprit
 from sound.clips.extraction import ModalSound, extract
 from sound.clips.instruments import synthesised
 from sound.clips.onset import strike_sample
+from sound.clips.pursuit import further
 from sound.clips.wav import read_wav
 
 RATE = 8000
@@ -173,6 +174,27 @@ def test_the_noise_of_a_blow_is_no_mode():
     assert (apart < FREQUENCY_TOLERANCE).all()
     left = np.sum((sound.residual - knock[-len(sound.residual) :]) ** 2)
     assert left < 0.2 * np.sum(knock**2)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_noise_of_any_seed_holds_no_mode(seed):
+    with pytest.raises(UserError, match="no modes that stand out"):
+        extract(np.random.default_rng(seed).standard_normal(4000), RATE)
+
+
+def test_what_stands_out_of_the_rest_is_found():
+    true = modes(5, 3000.0, seed=11, lowest=200.0)
+    found = further(sampled(true, RATE, 1.0), RATE)
+    hertz = found.imag * RATE / (2.0 * np.pi)
+    assert (np.abs(hertz[:, None] / true.frequencies - 1.0).min(axis=0) < 0.02).all()
+    assert not len(further(noise(RATE), RATE))
+
+
+def test_a_clip_that_swells_at_its_end_overflows_nowhere():
+    clip = sampled(modes(4, 3000.0, seed=13), RATE, 4.0)
+    clip[-400:] += 3e-4 * np.exp(np.arange(400) / 60.0) * np.sin(np.arange(400))
+    with np.errstate(over="raise", invalid="raise"):
+        assert len(extract(clip, RATE).frequencies) >= 4
 
 
 def test_hum_is_no_mode():

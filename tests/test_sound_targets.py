@@ -128,6 +128,16 @@ def test_extract_command_writes_what_is_left(clips, tmp_path, capsys):
     np.testing.assert_allclose(rest, noise[-len(rest) :], atol=2e-4)
 
 
+def test_extract_command_says_where_most_is_no_mode(clips, tmp_path, capsys):
+    samples, rate = read_wav(clips / "a.wav")
+    noise = 0.1 * np.random.default_rng(0).standard_normal(len(samples))
+    write_wav(tmp_path / "noisy.wav", samples + noise, rate)
+    assert main(["extract", str(clips / "a.wav"), "--modes", "2"]) == 0
+    assert "noise" not in capsys.readouterr().out
+    assert main(["extract", str(tmp_path / "noisy.wav")]) == 0
+    assert "the rest is noise" in capsys.readouterr().out
+
+
 def test_extract_command_names_the_bad_clip(clips, tmp_path, refuses):
     path = tmp_path / "noise.wav"
     write_wav(path, np.random.default_rng(0).uniform(-0.5, 0.5, 4000), RATE)

@@ -17,6 +17,10 @@ if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     from sound.clips.targets import Targets
 
 
+MOSTLY_MODES = 0.8
+"""Share of a clip's energy in modes below which that is said."""
+
+
 @dataclass(frozen=True)
 class ExtractOptions:
     """Clips whose modes are extracted, and what is written of them."""
@@ -82,15 +86,22 @@ def _content(clips: list[str], sounds: list[ModalSound], targets: Targets) -> di
     }
 
 
+def _line(clip: dict[str, Any]) -> str:
+    """What was found in one clip, and whether that is the most of it."""
+    line = (
+        f"{clip['file']}: strike at {clip['strike_seconds']:.4f} s, {clip['order']} modes found, "
+        f"which explain {100.0 * clip['explained']:.2f} % of the energy"
+    )
+    if clip["explained"] >= MOSTLY_MODES:
+        return line
+    return f"{line}; the rest is noise, or tones that do not fade evenly, and no material has it"
+
+
 def _lines(content: dict[str, Any]) -> list[str]:
     """A line per clip, then a line per mode with its level in each clip."""
     from math import log10
 
-    lines = [
-        f"{clip['file']}: strike at {clip['strike_seconds']:.4f} s, {clip['order']} modes found, "
-        f"which explain {100.0 * clip['explained']:.2f} % of the energy"
-        for clip in content["clips"]
-    ]
+    lines = [_line(clip) for clip in content["clips"]]
     names = content["names"]
     lines.append("  ".join(["    Hz", "      1/s", *(f"{name:>22}" for name in names)]))
     loudest = [max(row) for row in content["amplitudes"]]
