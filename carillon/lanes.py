@@ -104,6 +104,7 @@ def _address(context: Any, builder: Any, kind: types.Array, array: Any, entry: A
     data = context.make_array(kind)(context, builder, array).data
     if kind.ndim == 1:
         return builder.gep(data, [entry])
+    # Rows of a `sliding` array follow each other by a number.
     start = builder.mul(entry, _INDEX(LANES)) if kind.layout == "C" else entry
     first = builder.gep(data, [start])
     return builder.bitcast(first, _VECTOR.as_pointer())

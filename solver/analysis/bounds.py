@@ -11,7 +11,7 @@ from carillon.fem.model import RIGID_MODES, Solid
 from carillon.runtime import available_memory
 from solver.analysis.options import SolverOptions
 from solver.correction.correction import FEWEST_GUARDS, default_guard
-from solver.distribution.collective import bcast_from_root
+from solver.distribution.collective import bcast_from_root, ranks_of_machine
 from solver.reference.truth import SPARE_MODES
 
 FEWEST_SPARE = SPARE_MODES
@@ -41,9 +41,7 @@ def check_mode_count(modes: int, n_dofs: int) -> None:
 
 def require_memory(model: Solid | None, options: SolverOptions, comm: MPI.Comm) -> None:
     """Raise UserError if the vectors of this rank's machine alone are more than its free memory."""
-    node = comm.Split_type(MPI.COMM_TYPE_SHARED)
-    share = node.size / comm.size
-    node.Free()
+    share = ranks_of_machine(comm) / comm.size
 
     def check() -> None:
         n_dofs = cast(Solid, model).n_dofs

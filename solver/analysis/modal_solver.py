@@ -24,7 +24,7 @@ from solver.assembly.system import Layout, System, assemble
 from solver.correction.cold import Approximation, Cold, from_nothing
 from solver.correction.correct import correct
 from solver.correction.correction import EIGENVALUE_TOLERANCE, carried, resolved
-from solver.distribution.collective import bcast_from_root, compute_on_root
+from solver.distribution.collective import bcast_from_root, compute_on_root, ranks_of_machine
 from solver.distribution.local_mesh import LocalMesh, distribute, scatter_moduli
 from solver.linear import Inverse, Lasting, LinearSolver
 from solver.reference.truth import SPARE_MODES, Truth, can_count
@@ -104,7 +104,7 @@ class ModalSolver:
         self.options = options
         self.comm = comm
         self._verbose = verbose
-        self._threads = _threads_of_rank(comm)
+        self._threads = limit_threads(ranks_of_machine(comm))
         reuse_freed_memory()
         phases = Phases(comm, verbose)
         with phases("partition"):
@@ -334,15 +334,6 @@ def modal_analysis(
     prepared = ModalSolver(model, options, comm)
     modes = prepared.solve()
     return replace(modes, seconds={**prepared.seconds, **modes.seconds})
-
-
-def _threads_of_rank(comm: MPI.Comm) -> int:
-    """Threads of this rank, so that ranks x threads do not exceed the cores of its machine."""
-    node = comm.Split_type(MPI.COMM_TYPE_SHARED)
-    try:
-        return limit_threads(node.size)
-    finally:
-        node.Free()
 
 
 def _reporter(visible: bool) -> Callable[[int, float], None] | None:

@@ -21,7 +21,7 @@ from carillon.fem.element import rigid_motions
 from carillon.fem.elements import Elements
 from solver.assembly.node_rows import Halo, NodeRows, Pattern
 from solver.assembly.petsc_matrix import distributed_matrix
-from solver.distribution.collective import compute_on_root
+from solver.distribution.collective import compute_on_root, gather_rows
 from solver.distribution.local_mesh import LocalMesh
 
 Array = NDArray[np.float64]
@@ -152,11 +152,11 @@ class System:
 
     def _column_blocks(self, block: Array, columns: int) -> Iterator[Array | None]:
         """Columns in mesh node order on rank 0, None elsewhere; every rank must take them all."""
-        nodes = self._gathered(self.nodes[:, None], 1)
+        nodes = gather_rows(self.comm, self.nodes[:, None])
         dofs = None if nodes is None else degrees_of_freedom(nodes[:, 0])
         for first in range(0, block.shape[1], columns):
             local = np.ascontiguousarray(block[:, first : first + columns])
-            received = self._gathered(local, 3)
+            received = gather_rows(self.comm, local)
             if received is None or dofs is None:
                 yield None
             else:
@@ -180,17 +180,6 @@ class System:
 
         self.stream_to_root(block, collect)
         return whole if self.comm.rank == 0 else None
-
-    def _gathered(self, local: NDArray[Number], per_node: int) -> NDArray[Number] | None:
-        """Rows of all ranks on rank 0, of an array (per_node * local nodes, c)."""
-        columns = local.shape[1]
-        counts = self.comm.gather(local.size)
-        if self.comm.rank:
-            self.comm.Gatherv(local, None)
-            return None
-        whole = np.empty((per_node * self.n_dofs // 3, columns), dtype=local.dtype)
-        self.comm.Gatherv(local, (whole, counts))
-        return whole
 
     def destroy(self) -> None:
         """Free the PETSc matrices, if there are any."""

@@ -16,7 +16,7 @@ from carillon.files import atomic_path
 from carillon.options import add_options
 from carillon.runtime import limit_threads, warn_about_reference_blas
 from solver.analysis.problem import ProblemOptions
-from solver.distribution.collective import bcast_from_root
+from solver.distribution.collective import bcast_from_root, ranks_of_machine
 from solver.linear import petsc_options
 
 INPUTS = ("mesh", "material", "forest", "truth", "initial_modes", "files", "candidates")
@@ -35,9 +35,7 @@ def on_ranks(petsc: str | None = None) -> Iterator[MPI.Comm]:
         Options that the user gave to PETSc.
     """
     comm = MPI.COMM_WORLD
-    node = comm.Split_type(MPI.COMM_TYPE_SHARED)
-    limit_threads(node.size)
-    node.Free()
+    limit_threads(ranks_of_machine(comm))
     if comm.rank == 0:
         warn_about_reference_blas()
     try:

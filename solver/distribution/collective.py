@@ -1,12 +1,15 @@
-"""What rank 0 computes for all ranks, errors included."""
+"""What rank 0 computes for all ranks, errors included, and what it is given for that."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import TypeVar, cast
 
+import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
+Number = TypeVar("Number", np.float64, np.int64)
 T = TypeVar("T")
 
 
@@ -30,13 +33,25 @@ def compute_on_root(comm: MPI.Comm, compute: Callable[[], T]) -> T | None:
     return result
 
 
-def share_a_machine(comm: MPI.Comm) -> bool:
-    """Whether all ranks have the same memory; collective."""
+def ranks_of_machine(comm: MPI.Comm) -> int:
+    """How many of the ranks have the memory of this one; collective."""
     machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
     try:
-        return bool(machine.size == comm.size)
+        return int(machine.size)
     finally:
         machine.Free()
+
+
+def gather_rows(comm: MPI.Comm, part: NDArray[Number]) -> NDArray[Number] | None:
+    """Rows of all ranks, of an array (rows, c) that each passes, on rank 0; None elsewhere."""
+    rows = comm.gather(len(part))
+    if rows is None:
+        comm.Gatherv(part, None)
+        return None
+    columns = part.shape[1]
+    whole = np.empty((sum(rows), columns), dtype=part.dtype)
+    comm.Gatherv(part, (whole, [columns * each for each in rows]))
+    return whole
 
 
 def _attempt(comm: MPI.Comm, compute: Callable[[], T]) -> tuple[T | None, Exception | None]:

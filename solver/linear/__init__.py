@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from carillon.errors import UserError
 from carillon.runtime import available_memory
-from solver.distribution.collective import bcast_from_root, share_a_machine
+from solver.distribution.collective import bcast_from_root, ranks_of_machine
 
 if TYPE_CHECKING:
     from solver.assembly.system import Layout, System
@@ -151,7 +151,7 @@ class LinearSolver:
         if method not in METHODS:
             raise UserError(f"linear solver {method!r}, expected one of {', '.join(METHODS)}")
         self._layout = layout
-        self._together = share_a_machine(layout.comm)
+        self._together = ranks_of_machine(layout.comm) == layout.comm.size
         if method == "multifrontal" and not self._together:
             raise UserError(
                 "the linear solver multifrontal runs on one machine, the ranks are on several; "
@@ -177,16 +177,15 @@ class LinearSolver:
     @property
     def plan(self) -> Plan:
         """Elimination of all rows, which rank 0 has."""
-        assert self.leader.plan is not None
-        return self.leader.plan
+        return self.leader.whole_plan
 
     def _fits(self) -> bool:
+        leader = self.leader
+
         def fits() -> bool:
             available = available_memory()
-            return available is None or self.plan.bytes < MEMORY_SHARE * available
+            return available is None or leader.whole_plan.bytes < MEMORY_SHARE * available
 
-        # Made on all ranks first.
-        self.leader  # noqa: B018
         return bcast_from_root(self._layout.comm, fits)
 
     def count_below(self, system: System, value: float) -> int | None:

@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.runtime import allowed_threads
 from carillon.threads import blas_threads
-from solver.distribution.collective import compute_on_root
+from solver.distribution.collective import compute_on_root, gather_rows
 from solver.linear.multifrontal import Factor, count_below
 from solver.linear.plan import Plan
 
@@ -42,42 +41,44 @@ class Leader:
     layout
         Of the mesh.
 
-    Attributes
-    ----------
-    plan
-        Elimination of all rows, on rank 0 alone.
     """
 
     def __init__(self, layout: Layout) -> None:
         self.comm = comm = layout.comm
-        self._rows = comm.gather(layout.pattern.stop - layout.pattern.start)
-        self._entries = comm.gather(len(layout.pattern.columns))
-        everyone = comm.allgather((os.sched_getaffinity(0), allowed_threads()))
-        self._cores = set().union(*(cores for cores, _ in everyone))
-        self.threads = min(len(self._cores), sum(threads for _, threads in everyone))
+        self._cores = set[int]().union(*comm.allgather(os.sched_getaffinity(0)))
         local_mesh, pattern = layout.local_mesh, layout.pattern
-        lattice = self._collected(local_mesh.lattice(), self._rows)
-        counts = self._collected(np.diff(pattern.indptr)[:, None], self._rows)
-        columns = self._collected(pattern.global_columns[:, None], self._entries)
+        self._unknowns = comm.gather(3 * (pattern.stop - pattern.start))
+        lattice = self.collected(local_mesh.lattice())
+        counts = self.collected(np.diff(pattern.indptr)[:, None])
+        columns = self.collected(pattern.global_columns[:, None])
 
         def planned() -> Plan:
-            indptr = np.concatenate([[0], np.cumsum(cast(NDArray[np.int64], counts))])
+            indptr = np.concatenate([[0], np.cumsum(counts)])
             steps = local_mesh.cells.elements.steps
             return Plan(lattice, indptr, columns.ravel(), steps=steps)
 
-        self.plan = self.alone(planned)
+        self._plan = self.alone(planned)
 
-    def alone(self, compute: Callable[[], T]) -> T | None:
+    @property
+    def whole_plan(self) -> Plan:
+        """Elimination of all rows, on rank 0 alone."""
+        return cast(Plan, self._plan)
+
+    def threads(self, system: System) -> int:
+        """Threads that rank 0 has while it works for all."""
+        return min(len(self._cores), self.comm.size * system.rows.threads)
+
+    def alone(self, compute: Callable[[], T], threads: int = 1) -> T | None:
         """Call `compute` on rank 0, which may use all cores and keeps the result.
 
-        Its exception is raised on every rank.
+        BLAS has so many `threads` within. An exception is raised on every rank.
         """
         if self.comm.size == 1:
             return compute()
 
         def awake() -> T:
             try:
-                with _on_cores(self._cores), blas_threads(self.threads):
+                with _on_cores(self._cores), blas_threads(threads):
                     return compute()
             finally:
                 self.comm.Ibarrier().Wait()
@@ -90,54 +91,44 @@ class Leader:
 
     def inverse(self, system: System, shift: float) -> Inverse:
         """(K - shift M)^-1 by a factor on rank 0."""
-        matrices = self._matrices(system)
+        matrices, threads = self._matrices(system), self.threads(system)
 
         def factor() -> Factor:
-            return Factor(cast(Plan, self.plan), *matrices, shift, self.threads)
+            return Factor(self.whole_plan, *matrices, shift, threads)
 
-        made = self.alone(factor)
+        made = self.alone(factor, threads)
         return made if made is not None and self.comm.size == 1 else _LedInverse(self, shift, made)
 
     def count_below(self, system: System, value: float) -> int:
         """Eigenvalues of K - value M below zero, by inertia."""
-        stiffness, mass = self._matrices(system)
+        matrices, threads = self._matrices(system), self.threads(system)
 
         def count() -> int:
-            return count_below(cast(Plan, self.plan), stiffness, mass, value, self.threads)
+            return count_below(self.whole_plan, *matrices, value, threads)
 
-        return self.comm.bcast(self.alone(count))
+        return self.comm.bcast(self.alone(count, threads))
 
     def _matrices(self, system: System) -> tuple[Array, Array]:
         """All entries of K and M along the graph on rank 0; nothing elsewhere."""
         rows = system.rows
-        stiffness = self._collected(rows.stiffness.reshape(-1, 9), self._entries)
-        mass = self._collected(rows.mass[:, None], self._entries)
+        stiffness = self.collected(rows.stiffness.reshape(-1, 9))
+        mass = self.collected(rows.mass[:, None])
         return stiffness.reshape(-1, 3, 3), mass.ravel()
 
-    def collected(self, block: Array) -> Array:
-        """All rows (n, k) of a block on rank 0; nothing elsewhere."""
-        by_node = self._collected(block.reshape(len(block) // 3, -1), self._rows)
-        return by_node.reshape(-1, block.shape[1])
+    def collected(self, part: NDArray[Number]) -> NDArray[Number]:
+        """Rows of all ranks on rank 0; nothing elsewhere."""
+        if self.comm.size == 1:
+            return part
+        whole = gather_rows(self.comm, np.ascontiguousarray(part))
+        return part[:0] if whole is None else whole
 
     def handed_out(self, whole: Array | None, like: Array) -> Array:
         """Every rank's rows of what rank 0 has."""
-        part = np.empty_like(like)
-        sent = None
+        part, sent = np.empty_like(like), None
         if whole is not None:
-            sent = whole, _sizes(self._rows, 3 * like.shape[1])
+            sent = whole, [like.shape[1] * each for each in cast(list[int], self._unknowns)]
         self.comm.Scatterv(sent, part)
         return part
-
-    def _collected(self, part: NDArray[Number], rows: list[int] | None) -> NDArray[Number]:
-        part = np.ascontiguousarray(part)
-        if self.comm.size == 1:
-            return part
-        if rows is None:
-            self.comm.Gatherv(part, None)
-            return part[:0]
-        whole = np.empty((sum(rows), part.shape[1]), dtype=part.dtype)
-        self.comm.Gatherv(part, (whole, _sizes(rows, part.shape[1])))
-        return whole
 
 
 class _LedInverse:
@@ -159,10 +150,6 @@ class _LedInverse:
     def destroy(self) -> None:
         """Forget the factor."""
         self._factor = None
-
-
-def _sizes(rows: list[int] | None, width: int) -> list[int]:
-    return [width * each for each in rows or []]
 
 
 @contextmanager

@@ -82,15 +82,13 @@ class Factor:
         """Solution (3 n, k) for a C-ordered block of right-hand sides (3 n, k)."""
         solution = np.empty_like(vectors)
         width, threads = vectors.shape[1], self._threads
-        if width >= threads * FEWEST:
+        # Threads share the blocks of columns, or the fronts of one block after the other.
+        sharing, each = (threads, 1) if width >= threads * FEWEST else (1, threads)
 
-            def alone(start: int, stop: int) -> None:
-                self._solve_columns(vectors, solution, start, stop, 1)
+        def solve(start: int, stop: int) -> None:
+            self._solve_columns(vectors, solution, start, stop, each)
 
-            in_parallel(alone, split(width, threads, COLUMNS), threads)
-        else:
-            for start, stop in split(width, 1, COLUMNS):
-                self._solve_columns(vectors, solution, start, stop, threads)
+        in_parallel(solve, split(width, sharing, COLUMNS), sharing)
         return solution
 
     def _solve_columns(

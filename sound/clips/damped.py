@@ -65,8 +65,7 @@ def superposed(exponents: Complex, coefficients: Complex, count: int) -> Array:
     """Samples (count,) of Re sum_k c_k exp(lambda_k n)."""
     cosines, sines, starts = _turns(exponents, count)
     weights = starts * coefficients
-    with np.errstate(over="ignore", invalid="ignore"):
-        blocks = _real(weights) @ cosines.T - _real(-1j * weights) @ sines.T
+    blocks = _real(weights) @ cosines.T - _real(-1j * weights) @ sines.T
     return np.asarray(blocks.ravel()[:count])
 
 
@@ -170,11 +169,11 @@ def inverse(matrix: Array, damping: float = 1e-13) -> Array:
         return scaled
     factor, failed = la.lapack.dpotrf(scaled, lower=True)
     if failed or np.diag(factor).min() < _WELL_CONDITIONED:
-        return np.asarray(la.pinvh(scaled) * scale * scale[:, None])
-    lower, _ = la.lapack.dpotri(factor, lower=True, overwrite_c=True)
-    lower = np.tril(lower)
-    both = lower + np.tril(lower, -1).T
-    return np.asarray(both * scale * scale[:, None])
+        inverted = la.pinvh(scaled)
+    else:
+        lower, _ = la.lapack.dpotri(factor, lower=True)
+        inverted = lower + np.tril(lower, -1).T
+    return np.asarray(inverted * scale * scale[:, None])
 
 
 def fitted_coefficients(exponents: Complex, signal: Array) -> Complex:
@@ -197,12 +196,11 @@ def refined(
         sums = correlations(exponents, rest)
         step = solved(matrix, np.concatenate([sums[0], sums[1] * coefficients]), damping)
         change, move = np.split(step, 2)
-        if ((exponents + move).real * count > _MOST_GROWTH).any():
-            damping = 100.0 * max(damping, _LEAST_DAMPING)
-            continue
-        new_rest = signal - superposed(exponents + move, coefficients + change, count)
-        gain = 1.0 - (new_rest @ new_rest) / max(rest @ rest, np.finfo(float).tiny)
-        if not gain > 0.0:  # too long a step, which may even have overflown
+        gain = 0.0
+        if ((exponents + move).real * count <= _MOST_GROWTH).all():
+            new_rest = signal - superposed(exponents + move, coefficients + change, count)
+            gain = 1.0 - (new_rest @ new_rest) / max(rest @ rest, np.finfo(float).tiny)
+        if not gain > 0.0:  # too long a step
             damping = 100.0 * max(damping, _LEAST_DAMPING)
             continue
         exponents, coefficients, rest = exponents + move, coefficients + change, new_rest

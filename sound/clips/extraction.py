@@ -146,16 +146,9 @@ def extract(
     searched = clip[: round(LONGEST_SECONDS * rate)] / scale
     with blas_threads(1):  # many small matrices
         start, fit = _begun(searched, rate, visible)
-    clip, searched, strike = clip[start:], searched[start:], strike + start
-    _require_modes(fit, len(searched), rate)
-    is_mode = _is_mode(fit, len(searched))
-    kept = fit.chosen(is_mode)
-    if not is_mode.all():
-        # What is no mode may have held up one beside it.
-        with blas_threads(1):
-            kept = settled(kept.exponents, searched, _SETTLING_STEPS)
-        kept = kept.chosen(_is_mode(kept, len(searched)))
-    return _as_sound(kept, clip, strike, rate, scale, modes)
+        _require_modes(fit, len(searched) - start, rate)
+        fit = _modes_of(fit, searched[start:])
+    return _as_sound(fit, clip[start:], strike + start, rate, scale, modes)
 
 
 def _require_sound(clip: Array) -> None:
@@ -213,10 +206,11 @@ def _begun(clip: Array, rate: int, visible: bool) -> tuple[int, Fit]:
     first = _fitted(clip, rate, visible)
     starts = [int(start) for start in np.unique(np.minimum(passed, latest))]
     start = min(starts, key=lambda each: left(each, first))
-    if left(start, first) > WORTH_IT * left(0, first):
+    before = left(0, first)
+    if left(start, first) > WORTH_IT * before:
         return 0, first
     second = _fitted(clip[start:], rate, visible)
-    return (start, second) if left(start, second) < left(0, first) else (0, first)
+    return (start, second) if left(start, second) < before else (0, first)
 
 
 def _fitted(clip: Array, rate: int, visible: bool) -> Fit:
@@ -273,6 +267,15 @@ def _is_mode(fit: Fit, samples: int) -> NDArray[np.bool_]:
     """Which sinusoids decay and sound for several periods within the clip."""
     decays = -fit.exponents.real * samples > LEAST_DECAY
     return decays & rings(fit.exponents) & _has_periods(fit, samples)
+
+
+def _modes_of(fit: Fit, clip: Array) -> Fit:
+    """The modes of a fit, without what is none but may have held up one beside it."""
+    is_mode = _is_mode(fit, len(clip))
+    if is_mode.all():
+        return fit
+    fit = settled(fit.exponents[is_mode], clip, _SETTLING_STEPS)
+    return fit.chosen(_is_mode(fit, len(clip)))
 
 
 def _has_periods(fit: Fit, samples: int) -> NDArray[np.bool_]:

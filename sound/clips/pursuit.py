@@ -6,13 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sound.clips.candidates import HIGHEST_FRACTION, LEAST_QUALITY, LOWEST_HERTZ
-from sound.clips.significance import threshold
+from sound.clips.significance import NEIGHBOURHOOD, power_under, threshold
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-NEIGHBOURHOOD = 100.0
-"""Angular frequency, in dampings, over which the noise around a peak is averaged."""
 APART = 4.0
 """Distance of two new sinusoids, over the decay of the quicker one."""
 MOST = 40
@@ -25,14 +23,12 @@ def further(rest: Array, rate: int) -> Complex:
     Under a window exp(-d n) the power of a sinusoid that decays as fast is largest compared to that
     of the noise, which is the median around.
     """
-    from scipy.fft import next_fast_len, rfft
+    from scipy.fft import next_fast_len
 
-    n = np.arange(len(rest))
     size = next_fast_len(2 * len(rest), real=True)
     decay, found, scores = 1.0 / len(rest), [], []
     while decay < np.pi / (4.0 * LEAST_QUALITY):
-        window = np.exp(-decay * n)
-        power = np.abs(rfft(rest * window, size)) ** 2 / (window @ window)
+        power = power_under(rest, decay, size)
         reach = max(16, round(NEIGHBOURHOOD * decay / (2.0 * np.pi) * size))
         level = _medians(power, reach) / np.log(2.0)
         score = 2.0 * power / np.maximum(level, np.finfo(float).tiny)

@@ -15,7 +15,7 @@ Complex = NDArray[np.complex128]
 
 FALSE_MODES = 1e-4
 """Modes that noise alone makes a clip seem to hold."""
-_NEIGHBOURHOOD = 100.0
+NEIGHBOURHOOD = 100.0
 """Angular frequency on either side of a mode, in dampings, from which its noise is taken."""
 _LEAST_LEVEL = 1e-15
 """Variance of noise that is always assumed, relative to the peak: that of 24-bit samples."""
@@ -106,20 +106,29 @@ def _level(exponents: Complex, rest: Array) -> Array:
     It is the median, over frequencies around the sinusoid's, of the rest's correlation with
     sinusoids that die away as fast to the nearest power of 2.
     """
-    from scipy.fft import next_fast_len, rfft
+    from scipy.fft import next_fast_len
 
     size = next_fast_len(len(rest), real=True)
-    n = np.arange(len(rest))
     slowest = 1.0 / len(rest)
     octaves = np.round(np.log2(np.maximum(-exponents.real, slowest) / slowest))
     level = np.empty(len(exponents))
     for octave in np.unique(octaves):
         rate = slowest * 2.0**octave
-        window = np.exp(-rate * n)
-        power = np.abs(rfft(rest * window, size)) ** 2 / (window @ window)
-        reach = round(_NEIGHBOURHOOD * rate / (2.0 * np.pi) * size)
+        power = power_under(rest, rate, size)
+        reach = round(NEIGHBOURHOOD * rate / (2.0 * np.pi) * size)
         for k in np.flatnonzero(octaves == octave):
             bin_number = round(exponents[k].imag / (2.0 * np.pi) * size)
             around = power[max(0, bin_number - reach) : bin_number + reach + 1]
             level[k] = np.median(around) / np.log(2.0)
     return np.maximum(level, _LEAST_LEVEL)
+
+
+def power_under(rest: Array, decay: float, size: int) -> Array:
+    """Power spectrum of a rest, padded to `size`, under a window exp(-decay n).
+
+    That of white noise is its variance.
+    """
+    from scipy.fft import rfft
+
+    window = np.exp(-decay * np.arange(len(rest)))
+    return np.asarray(np.abs(rfft(rest * window, size)) ** 2 / (window @ window))
