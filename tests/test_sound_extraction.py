@@ -7,6 +7,7 @@ import pytest
 import soundfile
 
 from carillon.errors import UserError
+from sound.clips.clipping import is_clipped
 from sound.clips.damped import (
     correlations,
     damped_sinusoids,
@@ -20,6 +21,7 @@ from sound.clips.extraction import ModalSound, extract
 from sound.clips.instruments import synthesised
 from sound.clips.onset import strike_sample
 from sound.clips.pursuit import further
+from sound.clips.ringing import LONGEST_BLOW
 from sound.clips.wav import read_wav
 
 RATE = 8000
@@ -89,7 +91,7 @@ def test_parameters_come_back_from_a_stereo_file_with_silence_before_the_strike(
     random = np.random.default_rng(2)
     clip += 1e-4 * random.standard_normal(len(clip))
     path = tmp_path / "clip.wav"
-    soundfile.write(path, np.stack([1.2 * clip, 0.8 * clip], axis=1), RATE, subtype="PCM_24")
+    soundfile.write(path, np.stack([0.8 * clip, clip], axis=1), RATE, subtype="PCM_24")
     sound = extract(*read_wav(path))
     assert sound.evidence["strike_seconds"] == pytest.approx(strike / RATE, abs=1e-3)
     np.testing.assert_allclose(sound.frequencies, true.frequencies, rtol=FREQUENCY_TOLERANCE)
@@ -195,6 +197,30 @@ def test_a_clip_that_swells_at_its_end_overflows_nowhere():
     clip[-400:] += 3e-4 * np.exp(np.arange(400) / 60.0) * np.sin(np.arange(400))
     with np.errstate(over="raise", invalid="raise"):
         assert len(extract(clip, RATE).frequencies) >= 4
+
+
+@pytest.mark.parametrize("gain", [1.6, 2.5])
+def test_clipped_samples_have_no_say(gain):
+    true = modes(5, 3000.0, seed=5)
+    clip = sampled(true, RATE, 1.0, 60.0)
+    gain /= np.abs(clip).max()
+    clipped = np.clip(gain * clip, -1.0, 1.0)
+    sound = extract(clipped, RATE)
+    assert sound.evidence["clipped_samples"] == np.count_nonzero(is_clipped(clipped)) > 20
+    np.testing.assert_allclose(sound.frequencies, true.frequencies, rtol=FREQUENCY_TOLERANCE)
+    np.testing.assert_allclose(sound.dampings, true.dampings, rtol=DAMPING_TOLERANCE)
+    np.testing.assert_allclose(sound.amplitudes, gain * true.amplitudes, rtol=0.01)
+
+
+def test_modes_are_those_that_ring_after_the_blow():
+    true = modes(5, 3000.0, seed=5)
+    clip = sampled(true, RATE, 1.0, 40.0)
+    blow = round(0.006 * RATE)
+    driven = 0.5 * np.random.default_rng(3).standard_normal(blow) * np.abs(clip).max()
+    sound = extract(np.concatenate([driven, clip]), RATE)
+    assert 0.005 < sound.evidence["blow_seconds"] <= LONGEST_BLOW
+    assert 0.02 < sound.evidence["blow_share"] < 0.5
+    np.testing.assert_allclose(sound.frequencies, true.frequencies, rtol=FREQUENCY_TOLERANCE)
 
 
 def test_hum_is_no_mode():

@@ -29,14 +29,21 @@ def esprit(signal: Complex) -> Complex:
 def ester(vectors: Complex) -> int:
     """Number of sinusoids: the largest order whose subspace hardly changes under a shift.
 
-    The criterion of Badeau, David and Richard (2006): J(p) is the inverse square of the spectral
-    norm of what least squares leaves of the shift of the first p vectors.  It is largest at the
-    number of sinusoids, or of the strong ones among them; the last order within a fiftieth of the
-    maximum counts, as too many do less harm than too few.
+    The criterion of Badeau, David and Richard (2006): J(p) is the inverse square of the norm of
+    what least squares leaves of the shift of the first p vectors; here it is the Frobenius norm,
+    which needs no decomposition for each order.  J is largest at the number of sinusoids, or of the
+    strong ones among them; the last order within a fiftieth of the maximum counts, as too many do
+    less harm than too few.
     """
     across = vectors[:-1].conj().T @ vectors[1:]
-    orders = np.arange(1, vectors.shape[1] + 1)
-    squares = [_shift_error(vectors[:, :p], across[:p, :p]) for p in orders]
+    first, last = np.abs(vectors[0]) ** 2, np.abs(vectors[-1]) ** 2
+    orders = np.arange(1, len(across) + 1)
+    # As the vectors are orthonormal, their products without the first or the last row differ from
+    # the identity by one of rank 1.
+    explained = np.diag((np.abs(across) ** 2).cumsum(0).cumsum(1))
+    rank_one = np.diag((np.abs((vectors[-1][:, None] * across).cumsum(0)) ** 2).cumsum(1))
+    lost = np.maximum(1.0 - np.cumsum(last), np.finfo(float).eps)
+    squares = orders - np.cumsum(first) - explained - rank_one / lost
     criterion = 1.0 / np.maximum(squares, np.finfo(float).eps)
     return int(orders[criterion >= _ESTER_FRACTION * criterion.max()][-1])
 
@@ -63,19 +70,6 @@ def _covariance(signal: Complex, rows: int) -> Complex:
     for row in range(1, rows):
         matrix[row, 1:] = matrix[row - 1, :-1] + change[row - 1]
     return matrix
-
-
-def _shift_error(vectors: Complex, across: Complex) -> float:
-    """Square of the spectral norm of what least squares leaves of the shift.
-
-    As the vectors are orthonormal, their products without the first or the last row differ from
-    the identity by one of rank 1.
-    """
-    first, last = vectors[0], vectors[-1]
-    rank_one = last @ across / np.sqrt(max(1.0 - np.vdot(last, last).real, np.finfo(float).eps))
-    explained = across.conj().T @ across + np.outer(rank_one.conj(), rank_one)
-    left = np.eye(len(across)) - np.outer(first.conj(), first) - explained
-    return float(la.eigvalsh(left, check_finite=False)[-1])
 
 
 def _rotation(vectors: Complex) -> Complex:

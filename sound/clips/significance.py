@@ -13,9 +13,9 @@ from sound.clips.damped import fitted_coefficients, inverse, normal_matrix, refi
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-FALSE_MODES = 1e-4
+FALSE_MODES = 5e-4
 """Modes that noise alone makes a clip seem to hold."""
-NEIGHBOURHOOD = 100.0
+NEIGHBOURHOOD = 150.0
 """Angular frequency on either side of a mode, in dampings, from which its noise is taken."""
 _LEAST_LEVEL = 1e-15
 """Variance of noise that is always assumed, relative to the peak: that of 24-bit samples."""

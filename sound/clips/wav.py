@@ -18,35 +18,35 @@ from sound.bounds import (
     MOST_CLIP_SAMPLES,
     require_level,
 )
+from sound.clips.clipping import CLIPPED_RUN, is_clipped
 from sound.clips.riff import missing_bytes
 from sound.outputs import require_output
 
 Array = NDArray[np.float64]
 
-FULL_SCALE = 0.9999
-"""Magnitude from which on a sample is at the end of its format's range."""
-CLIPPED_RUN = 4
-"""Equal samples in a row at full scale that no unclipped sound has, but at very low frequencies."""
 ENDINGS = (".wav",)
 """Of sound files that are written."""
 PEAK = 0.89
 """Largest magnitude of a normalised sound: 1 dB below full scale."""
 
 
-def read_wav(path: str | Path) -> tuple[Array, int]:
-    """Samples (s,) of a sound file, the mean of its channels, full scale being 1; its rate [Hz].
+def read_wav(path: str | Path, allow_clipped: bool = False) -> tuple[Array, int]:
+    """Samples (s,) of a sound file, full scale being 1, and their rate [Hz].
+
+    Of several channels the loudest that is clipped least: microphones at several places hear each
+    mode at another time, and some cancel in the mean.
 
     Raises
     ------
     UserError
-        If the file is missing, cut off or not a sound file, is empty, silent, clipped or longer
-        than `MOST_CLIP_SAMPLES`, or has samples that are not finite numbers; or if its rate, its
-        number of channels or its level is beyond `sound.bounds`.
+        If the file is missing, cut off or not a sound file, is empty, silent, clipped (unless that
+        is allowed) or longer than `MOST_CLIP_SAMPLES`, or has samples that are not finite numbers;
+        or if its rate, its number of channels or its level is beyond `sound.bounds`.
     """
     path = require_file(path, "a sound clip (WAV)")
     try:
         channels, rate = _channels(path)
-        return _mean(channels), rate
+        return _heard(channels, allow_clipped), rate
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
 
@@ -131,8 +131,8 @@ def _require_bounds(rate: int, channels: int, frames: int) -> None:
         )
 
 
-def _mean(channels: Array) -> Array:
-    """The mean (s,) of channels (s, c) that are the sound of a strike.
+def _heard(channels: Array, allow_clipped: bool) -> Array:
+    """The channel (s,) of channels (s, c) that is searched.
 
     Raises
     ------
@@ -148,26 +148,12 @@ def _mean(channels: Array) -> Array:
             "again"
         )
     require_level(float(np.abs(channels).max()))
-    clipped = _clipped(channels)
-    if clipped:
+    clipped = [int(is_clipped(channel).sum()) for channel in channels.T]
+    best = int(np.lexsort((-np.linalg.norm(channels, axis=0), clipped))[0])
+    if clipped[best] and not allow_clipped:
         raise UserError(
-            f"is clipped ({clipped} samples at full scale, in runs of {CLIPPED_RUN} or more); "
-            "record it again at a lower level"
+            f"is clipped ({clipped[best]} samples at full scale, some in runs of {CLIPPED_RUN} or "
+            "more); record it again at a lower level, or allow it (--allow-clipped), which leaves "
+            "these samples out"
         )
-    samples = channels.mean(axis=1)
-    if not samples.any():
-        raise UserError(
-            "is silent once its channels are averaged, they cancel; turn one round first"
-        )
-    return np.asarray(samples)
-
-
-def _clipped(channels: Array) -> int:
-    """Samples at full scale that are followed or preceded by enough equal ones."""
-    total = 0
-    for channel in channels.T:
-        starts = np.flatnonzero(np.diff(channel, prepend=np.nan) != 0.0)
-        lengths = np.diff(starts, append=len(channel))
-        full = np.abs(channel[starts]) >= FULL_SCALE
-        total += int(lengths[full & (lengths >= CLIPPED_RUN)].sum())
-    return total
+    return np.ascontiguousarray(channels[:, best])

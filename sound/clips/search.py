@@ -1,0 +1,106 @@
+"""All damped sinusoids that stand out of a clip, and which of them are modes.
+
+The clip is cut into bands, ESPRIT (Roy and Kailath 1989) finds the damped sinusoids of every band,
+ESTER (Badeau, David and Richard 2006) their number, and a least-squares fit to the whole clip
+refines them.  This is done for narrow bands, which tell slow and close modes apart, and then, on
+what those leave, for wide ones, in which modes that die away at once stand out.  What still stands
+out of the rest is added, see `sound.clips.pursuit`, and what does not stand out of the noise is
+dropped, which is why ESTER may be generous.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sound.clips.candidates import BAND_DECAY, BAND_SAMPLES, LEAST_DECAY, candidates, rings
+from sound.clips.damped import superposed
+from sound.clips.pursuit import further
+from sound.clips.significance import Fit, settled
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+FEWEST_PERIODS = 3.0
+"""Periods of a mode that a clip must hold; what has fewer is drift rather than a mode."""
+PURSUITS = 6
+"""Rounds in which what stands out of the rest is added."""
+WIDTH_FACTORS = (1.0, 4.0, 16.0)
+"""Widths of bands, one search after the other."""
+SETTLING_STEPS, _FINAL_STEPS = 4, 20
+"""Steps of least squares after each change of the set, and at the end."""
+SAME = 0.25
+"""Distance of two exponents, over the decay of one, below which they are one mode."""
+UNDER_PEAK, DROWNED = 2.0, 0.01
+"""Distance, over the decay of the louder one, and share of its amplitude, below which a sinusoid
+mends the fit of another and is no mode of its own."""
+
+
+def sinusoids(clip: Array, rate: int, visible: bool = False) -> Fit:
+    """All damped sinusoids that stand out of a clip of peak 1."""
+    fit = settled(np.zeros(0, complex), clip, 0)
+    first = 0.5 * BAND_SAMPLES / min(1.0, len(clip) / rate)
+    widths = [first * factor for factor in WIDTH_FACTORS]
+    for width in [width for width in widths if width < 0.5 * rate] or [0.5 * rate]:
+        is_slow = -fit.exponents.real * rate < BAND_DECAY * 2.0 * width / BAND_SAMPLES
+        slow, quick = fit.chosen(is_slow), fit.exponents[~is_slow]
+        rest = clip - superposed(slow.exponents, slow.coefficients, len(clip))
+        new = candidates(rest, rate, width, f"bands of {width:.0f} Hz", visible)
+        # Two sinusoids for one mode would fit a clean clip even better.
+        new = new[~_is_beside(new, slow.exponents)]
+        quick = quick[~_is_beside(quick, new)]
+        fit = settled(np.concatenate([slow.exponents, quick, new]), clip, SETTLING_STEPS)
+    return pursued(fit, clip, rate)
+
+
+def pursued(fit: Fit, clip: Array, rate: int) -> Fit:
+    """A fit with what still stands out of its rest, refined to the end, each mode once."""
+    for _ in range(PURSUITS):
+        rest = clip - superposed(fit.exponents, fit.coefficients, len(clip))
+        new = further(rest, rate)
+        new = new[~_is_beside(new, fit.exponents)]
+        if not len(new):
+            break
+        before = len(fit.exponents)
+        fit = settled(np.concatenate([fit.exponents, new]), clip, SETTLING_STEPS)
+        if len(fit.exponents) <= before:
+            break
+    fit = settled(fit.exponents, clip, _FINAL_STEPS)
+    return settled(fit.exponents[~_is_drowned(fit)], clip, 0)
+
+
+def _is_beside(exponents: Complex, others: Complex) -> NDArray[np.bool_]:
+    """Which exponents nobody can tell from one of the others."""
+    if not len(others):
+        return np.zeros(len(exponents), bool)
+    distance = np.abs(exponents[:, None] - others).min(axis=1)
+    return np.asarray(distance < SAME * np.abs(exponents.real))
+
+
+def _is_drowned(fit: Fit) -> NDArray[np.bool_]:
+    """Which sinusoids lie under the peak of another mode, far below it in amplitude."""
+    distance = np.abs(fit.exponents[:, None] - fit.exponents)
+    under = distance < UNDER_PEAK * np.abs(fit.exponents.real)
+    amplitudes = np.abs(fit.coefficients)
+    louder = amplitudes[None, :] * DROWNED > amplitudes[:, None]
+    return np.asarray((under & louder).any(axis=1))
+
+
+def is_mode(fit: Fit, samples: int) -> NDArray[np.bool_]:
+    """Which sinusoids decay and sound for several periods within the clip."""
+    decays = -fit.exponents.real * samples > LEAST_DECAY
+    return decays & rings(fit.exponents) & has_periods(fit, samples)
+
+
+def modes_of(fit: Fit, clip: Array) -> Fit:
+    """The modes of a fit, without what is none but may have held up one beside it."""
+    kept = is_mode(fit, len(clip))
+    if kept.all():
+        return fit
+    fit = settled(fit.exponents[kept], clip, SETTLING_STEPS)
+    return fit.chosen(is_mode(fit, len(clip)))
+
+
+def has_periods(fit: Fit, samples: int) -> NDArray[np.bool_]:
+    """Which sinusoids have enough periods within the clip."""
+    return fit.exponents.imag * samples > 2.0 * np.pi * FEWEST_PERIODS
