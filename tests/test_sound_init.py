@@ -90,7 +90,17 @@ def test_a_design_is_made_of_it_as_it_is(here):
     assert main(["design", "bar.yaml", "--evaluations", "2", "--out", "bar.h5"]) == 0
     design = read_design("bar.h5")
     assert design.settings["modes"] == len(design.frequencies) <= MOST_MODES
-    assert main(["design", "bar.yaml", "--evaluations", "1", "--out", "bar.h5"]) == 0
+
+
+def test_a_design_of_a_number_of_modes_is_gone_on_from_with_all(here):
+    text = written(here / "bar.yaml", "--clips", "wood.wav")
+    Path("three.yaml").write_text(text.replace("#modes: auto", "modes: 3"))
+    for name, count in {"three": 3, "bar": 5}.items():
+        words = ["design", f"{name}.yaml", "--evaluations", "1", "--workers", "1"]
+        assert main([*words, "--out", "bar.h5"]) == 0
+        design = read_design("bar.h5")
+        assert design.settings["modes"] == len(design.frequencies) == count
+    assert design.history["evaluations"].tolist()[-1] == 2
 
 
 def test_files_are_named_as_the_project_sees_them(here):
