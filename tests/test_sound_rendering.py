@@ -244,6 +244,10 @@ def test_the_solver_s_modes_can_be_heard(tmp_path: Path, capsys: pytest.CaptureF
     words = ["render", path, "--at", 0, 0, 0, "--damping", 5, 2e-7, "--json", "--out", out]
     assert run(words) == 0
     printed = json.loads(capsys.readouterr().out)
+    assert run([*words[:2], "--at", 0, 0, -0.1, *words[6:]]) == 0
+    moved = capsys.readouterr()
+    assert json.loads(moved.out)["position_m"] == printed["position_m"]
+    assert "is 0.1 m off the surface" in moved.err
     decay = Damping(5.0, 2e-7).decay_per_second(result.eigenvalues[RIGID_MODES:])
     np.testing.assert_allclose(printed["dampings_per_second"], decay)
     np.testing.assert_allclose(

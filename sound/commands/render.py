@@ -225,14 +225,18 @@ def _own_point(point: PointOptions, model: Any) -> tuple[Array, Array, float]:
     """Struck point of a model's own surface, inward normal there, distance from the point named."""
     import numpy as np
 
-    from solver.response.surface import surface_of
+    from solver.response.surface import REACH, surface_of
+    from sound.strikes import TOO_FAR
 
     if point.at is None:
         raise UserError(
             "a modes file knows neither targets nor the vertices of a surface; strike it --at a "
             "point, or name its design by --like"
         )
-    position, inward = surface_of(model).place(np.array(point.at), "--at")
+    surface = surface_of(model)
+    longest = float(np.ptp(surface.points, axis=0).max())
+    reach = max(TOO_FAR * longest, REACH * surface.edge)
+    position, inward = surface.place(np.array(point.at), "--at", reach)
     return position, inward, float(np.linalg.norm(position - point.at))
 
 
