@@ -24,7 +24,7 @@ Comm = Any
 
 
 def run(program: str, main: Callable[[], int | None], comm: Comm = None) -> int:
-    """Call `main` and turn errors meant for the user into one sentence and an exit status.
+    """Call `main` and turn errors meant for the user into a sentence and an exit status.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def run(program: str, main: Callable[[], int | None], comm: Comm = None) -> int:
             traceback.print_exc()
         collective = getattr(error, "collective", False)
         if sentence is not None and (comm is None or comm.rank == 0 or not collective):
-            say(f"{program}: {sentence}")
+            say("\n".join(f"{program}: {line}" for line in sentence.split("\n")))
     _drop_unwritten()
     if comm is not None and comm.size > 1 and not collective:
         comm.Abort(status)
@@ -70,6 +70,7 @@ def run(program: str, main: Callable[[], int | None], comm: Comm = None) -> int:
 def meaning(error: BaseException) -> tuple[int, str | None]:
     """Exit status of an error, and a sentence for the user; None if it is a fault of the program's.
 
+    Several faults of what the user gave are a sentence and a line each.
     What the operating system refuses (files, room, processes) is never the program's fault.
     """
     match error:

@@ -28,14 +28,21 @@ def one_line(text: str) -> str:
 class UserError(Exception):
     """Input that cannot be used: one sentence saying what was found, what was expected, what to do.
 
-    Command-line programs print the sentence and exit with status 2, without a traceback.  Under MPI
-    all ranks raise it together.
+    Of several faults that are told together each is an argument: a sentence on a line of its own.
+    Command-line programs print the sentences and exit with status 2, without a traceback.  Under
+    MPI all ranks raise it together.
+
+    Examples
+    --------
+    >>> print(UserError("no file a.wav; name another", "no file b.wav; name another"))
+    no file a.wav; name another
+    no file b.wav; name another
     """
 
     collective = True
 
     def __str__(self) -> str:
-        return one_line(super().__str__())
+        return "\n".join(one_line(str(fault)) for fault in self.args)
 
 
 class ConvergenceError(RuntimeError):

@@ -100,6 +100,14 @@ def _checked(done: subprocess.CompletedProcess[str]) -> subprocess.CompletedProc
     return done
 
 
+@pytest.fixture(scope="session", autouse=True)
+def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Tests, and the programs that they start, keep what they found in clips to themselves."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("CARILLON_CACHE", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
 @pytest.fixture(scope="session")
 def zygote() -> Iterator[Zygote]:
     """A process that has imported everything, and forks for each program that tests run."""

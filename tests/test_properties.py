@@ -161,7 +161,7 @@ def assert_project(described, clips):
         return
     numbers = [project.solid.unit, project.solid.density, project.material.young]
     assert all(0.0 < number < math.inf for number in numbers)
-    assert project.modes >= 1 and project.targets
+    assert project.targets and (project.modes == "auto" or project.modes >= 2)
     json.dumps(project.as_dict(), allow_nan=False)
 
 

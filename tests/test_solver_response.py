@@ -233,7 +233,7 @@ def test_a_place_outside_finite_cells_is_taken_to_the_nearest_inside(tilted, cap
     outside = choose_contacts(file, strike=middle + 0.02 * normal)[0]
     assert np.linalg.norm(outside.position - middle) < 0.2 * file.mesh.edge
     (said,) = caplog.messages
-    assert "strike: the point" in said and "m outside the solid" in said
+    assert "strike: the point" in said and "m off the surface" in said
     with pytest.raises(UserError, match="from the surface of the solid"):
         choose_contacts(file, strike=middle + 0.1 * normal)
 

@@ -11,6 +11,9 @@ import pytest
 import yaml
 
 from sound.__main__ import main
+from sound.clips.targets import MOST_MODES
+from sound.design.preparation import targets_of
+from sound.project.design_file import read_design
 from sound.project.project import load_project, project_of
 from sound.project.schema import project_schema, with_defaults
 
@@ -51,7 +54,7 @@ def test_what_is_not_asked_for_has_its_default(here):
     defaults = with_defaults({key: described[key] for key in ("mesh", "targets")}, SCHEMA)
     filled = load_project(here / "bar.yaml").as_dict()
     for key in SCHEMA["properties"]:
-        if key not in ("mesh", "targets", "modes", "coarsen"):
+        if key not in ("mesh", "targets", "coarsen"):
             assert filled[key] == defaults[key], key
     assert defaults["coarsen"] == "auto" and filled["coarsen"] == "ddfem"
 
@@ -68,11 +71,11 @@ def test_every_key_is_there_with_its_default_and_its_meaning(here):
             assert re.search(rf"# {re.escape(each['description'])}( \(|$)", text, re.MULTILINE)
 
 
-def test_no_more_modes_are_asked_for_than_the_clips_have(here):
+def test_the_number_of_modes_is_left_to_the_clips(here):
     main(["extract", "wood.wav", "--out", "wood.json"])
     count = len(json.loads(Path("wood.json").read_text())["frequencies_hz"])
-    written(here / "bar.yaml", "--clips", "wood.wav")
-    assert load_project(here / "bar.yaml").modes == count < 30
+    assert "#modes: auto" in written(here / "bar.yaml", "--clips", "wood.wav")
+    assert len(targets_of(load_project(here / "bar.yaml")).frequencies) == count < MOST_MODES
 
 
 def test_points_are_on_the_surface_and_apart(here):
@@ -85,7 +88,19 @@ def test_points_are_on_the_surface_and_apart(here):
 def test_a_design_is_made_of_it_as_it_is(here):
     written(here / "bar.yaml", "--clips", "metal.wav", "wood.wav")
     assert main(["design", "bar.yaml", "--evaluations", "2", "--out", "bar.h5"]) == 0
-    assert (here / "bar.h5").exists()
+    design = read_design("bar.h5")
+    assert design.settings["modes"] == len(design.frequencies) <= MOST_MODES
+
+
+def test_a_design_of_a_number_of_modes_is_gone_on_from_with_all(here):
+    text = written(here / "bar.yaml", "--clips", "wood.wav")
+    Path("three.yaml").write_text(text.replace("#modes: auto", "modes: 3"))
+    for name, count in {"three": 3, "bar": 5}.items():
+        words = ["design", f"{name}.yaml", "--evaluations", "1", "--workers", "1"]
+        assert main([*words, "--out", "bar.h5"]) == 0
+        design = read_design("bar.h5")
+        assert design.settings["modes"] == len(design.frequencies) == count
+    assert design.history["evaluations"].tolist()[-1] == 2
 
 
 def test_files_are_named_as_the_project_sees_them(here):
@@ -101,7 +116,7 @@ def test_without_a_clip_one_is_to_be_recorded(here, capsys):
     assert yaml.safe_load(written(here / "bar.yaml"))["targets"][0]["clip"] == "clip.wav"
     assert "clip.wav" in capsys.readouterr().out
     shutil.copy("metal.wav", "clip.wav")
-    assert load_project(here / "bar.yaml").modes == 30
+    assert len(targets_of(load_project(here / "bar.yaml")).frequencies) > 2
 
 
 def test_nothing_is_overwritten(here, refuses):

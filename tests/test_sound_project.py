@@ -15,9 +15,11 @@ from carillon.errors import UserError
 from carillon.fem.geometry import COMPONENTS, FILLS
 from solver.analysis.problem import DISCRETISATIONS, ProblemOptions
 from solver.coarsening.choice import METHODS as COARSENINGS
+from sound.clips.wav import write_wav
 from sound.commands.search_options import SearchOptions
 from sound.design.material import LAWS
 from sound.design.optimisers import OPTIMISERS
+from sound.design.preparation import prepare
 from sound.project import schema
 from sound.project.project import Project, load_project, with_optimiser
 
@@ -152,7 +154,6 @@ RIM = LEAST["targets"][0]
         ({"weights": {"bark": 1.0}}, "weights: there is no key 'bark', only frequency, amplitude,"),
         ({"targets": [{"name": "a", "vertex": 1}]}, r"targets\[0\]: the key clip is missing"),
         ({"targets": []}, "targets: found .*expected at least 1 of them"),
-        ({"targets": [{**RIM, "clip": "gong.wav"}]}, r"targets\[0\].clip: there is no file .*gong"),
         (
             {"targets": [{**RIM, "at": [0, 0, 0]}]},
             r"targets\[0\]: expected at or vertex, found both",
@@ -164,10 +165,12 @@ RIM = LEAST["targets"][0]
             r"\.at\[2\]: found 'x'",
         ),
         ({"targets": [{**RIM, "modes": 0}]}, r"targets\[0\].modes: found 0, expected at least 1"),
-        ({"targets": [RIM, dict(RIM)]}, r"targets\[0\] and targets\[1\] are both named 'rim'"),
         ({"targets": "rim"}, "targets: found 'rim', expected a list"),
-        ({"modes": 1}, "modes: found 1, expected at least 2: elastic modes"),
-        ({"modes": "many"}, "modes: found 'many', expected a whole number: elastic modes"),
+        ({"modes": 1}, "modes: found 1, expected at least 2, or auto: elastic modes"),
+        ({"modes": "many"}, "modes: found 'many', expected a whole number or auto: elastic modes"),
+        ({"modes": "auto\n"}, "modes: found 'auto.n', expected a whole number or auto: elastic"),
+        ({"modes": None}, "modes: found None, expected a whole number or auto: elastic modes"),
+        ({"modes": 2.5}, "modes: found 2.5, expected a whole number or auto: elastic modes"),
         ({"mesh": None}, "mesh: found None, expected a text"),
         (
             {"coarsen": "fit"},
@@ -195,8 +198,7 @@ RIM = LEAST["targets"][0]
         ({"targets": [RIM | {"name": "a\0b"}]}, r"targets\[0\].name: .*can be printed"),
         ({"targets": [RIM | {"name": " "}]}, r"targets\[0\].name: .*not blanks alone"),
         ({"targets": [RIM | {"name": "x" * 101}]}, r"targets\[0\].name: .*at most 100 characters"),
-        ({"targets": [RIM | {"clip": "x" * 300}]}, r"targets\[0\].clip: there is no file"),
-        ({"targets": [RIM | {"clip": "a\0b"}]}, r"targets\[0\].clip: there is no file"),
+        ({"targets": [RIM | {"clip": "x" * 4001}]}, r"targets\[0\].clip: .*at most 4000 char"),
         ({"targets": [RIM | {"vertex": 10**25}]}, r"targets\[0\].vertex: .*expected at most"),
         ({"targets": [dict(RIM) for _ in range(101)]}, "targets: .*expected at most 100 of them"),
         (
@@ -244,6 +246,28 @@ def test_a_file_that_is_no_project_is_answered_in_one_sentence(folder, text, say
 @pytest.mark.parametrize("name", ["a/b", "läute 鐘", "-x", "end "])
 def test_names_are_plain_text_of_any_kind(folder, name):
     assert load(folder, targets=[RIM | {"name": name}]).targets[0].name == name
+
+
+def test_faults_of_all_targets_are_told_together(folder):
+    """Before any clip is searched, which takes longer."""
+    write_wav(folder / "rim.wav", np.sin(np.arange(800.0)) / 2.0, 8000)
+    targets = [
+        {"name": "rim", "vertex": 3, "clip": "rim.wav"},
+        {"name": "rim", "vertex": 4, "clip": "rim.wav"},
+        {"name": "gone", "vertex": 5, "clip": "gong.wav"},
+        {"name": "zero", "vertex": 6, "clip": "a\0b.wav"},
+        {"name": "long", "vertex": 7, "clip": "x" * 300},
+        {"name": "empty", "vertex": 8, "clip": "top.wav"},
+        {"name": "empty too", "vertex": 9, "clip": "top.wav"},
+        {"name": "far", "at": [9.0, 0.0, 0.0], "clip": "rim.wav"},
+    ]
+    with pytest.raises(UserError) as caught:
+        prepare(load(folder, targets=targets))
+    starts = ["2 targets are named 'rim'", "target 'gone': ", "target 'zero': ", "target 'long': "]
+    starts += ["targets 'empty', 'empty too': ", "target 'far': the point (9, 0, 0) m is"]
+    lines = str(caught.value).splitlines()
+    assert len(lines) == len(starts) and all(map(str.startswith, lines, starts))
+    assert "gong.wav: no such file, expected a sound clip" in lines[1]
 
 
 def test_settings_from_elsewhere_keep_to_the_schema(folder):

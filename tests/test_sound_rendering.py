@@ -193,6 +193,24 @@ def run(arguments: list[object]) -> int:
     return main([str(argument) for argument in arguments])
 
 
+def test_a_point_is_named_in_the_coordinates_of_the_mesh(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    design = small_design()
+    write_design(tmp_path / "mm.h5", replace(design, settings={**design.settings, "unit": 1e-3}))
+    corner = design.strikes[0].position
+    words = ["render", tmp_path / "mm.h5", "--json", "--out", tmp_path / "hit.wav", "--at"]
+    assert run([*words, *(1e3 * corner)]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["position_m"] == corner.tolist() and summary["distance_m"] < 1e-12
+    assert run([*words, *(1e3 * corner + (0.0, 0.0, 50.0))]) == 0
+    said = capsys.readouterr()
+    summary = json.loads(said.out)
+    assert summary["position_m"] == corner.tolist()
+    assert summary["distance_m"] == pytest.approx(0.05)
+    assert "is 0.05 m off the surface" in said.err
+
+
 def test_partials_of_a_rendered_file_are_the_modes(
     tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
@@ -226,6 +244,10 @@ def test_the_solver_s_modes_can_be_heard(tmp_path: Path, capsys: pytest.CaptureF
     words = ["render", path, "--at", 0, 0, 0, "--damping", 5, 2e-7, "--json", "--out", out]
     assert run(words) == 0
     printed = json.loads(capsys.readouterr().out)
+    assert run([*words[:2], "--at", 0, 0, -0.1, *words[6:]]) == 0
+    moved = capsys.readouterr()
+    assert json.loads(moved.out)["position_m"] == printed["position_m"]
+    assert "is 0.1 m off the surface" in moved.err
     decay = Damping(5.0, 2e-7).decay_per_second(result.eigenvalues[RIGID_MODES:])
     np.testing.assert_allclose(printed["dampings_per_second"], decay)
     np.testing.assert_allclose(
@@ -256,7 +278,7 @@ def test_modes_too_damped_to_oscillate_are_left_out(tmp_path: Path) -> None:
     [
         (["--target", "lid"], "no such target, expected one of corner, side"),
         (["--vertex", 999_999], "there is no vertex 999999"),
-        (["--at", 9, 9, 9], "m from the surface"),
+        (["--at", 9, 9, 9], "as far from the surface"),
         (["--target", "side", "--impulse", 0, 0, 0], "not all of them 0"),
         (["--target", "side", "--seconds", 1e9], "expected at most 600"),
         (["--target", "side", "--seconds", 1e-300], "expected 1 to"),

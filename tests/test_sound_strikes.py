@@ -73,8 +73,47 @@ def test_a_struck_surface_is_fine_everywhere_and_keeps_its_vertices():
     middle = locate(fine, "plate", at=(0.05, 0.0, 0.022))  # the plain mesh has no vertex near
     assert np.linalg.norm(middle.position - (0.05, 0.0, 0.022)) < 0.02
     assert np.allclose(middle.inward, (0.0, 0.0, -1.0))
-    with pytest.raises(UserError, match=r"'plate'.* m from the surface's vertices, expected"):
-        locate(plain, "plate", at=(0.05, 0.0, 0.022))
+
+
+def test_a_point_off_the_surface_is_moved_to_it_and_that_is_told(capsys):
+    strike = locate(ball(), "top", at=(0.0, 0.0, 0.15))
+    assert np.allclose(strike.position, (0.0, 0.0, 0.1), atol=1e-2)
+    assert strike.distance == pytest.approx(np.linalg.norm(strike.position - (0, 0, 0.15)))
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "'top': the point (0, 0, 0.15) m is 0.05 m off the surface" in line
+    assert f"vertex {strike.vertex} at" in line and "unit" not in line
+
+
+def test_a_point_on_the_surface_needs_no_word(capsys):
+    surface = struck_surface(PAN)
+    for point in surface.triangles_center[::97]:
+        strike = locate(surface, "here", at=np.round(point, 4))
+        assert strike.distance == pytest.approx(np.linalg.norm(strike.position - point), abs=1e-4)
+    assert locate(surface, "here", vertex=5).distance == 0.0
+    assert not capsys.readouterr().err
+
+
+def test_points_are_in_the_unit_of_the_mesh(capsys):
+    there = locate(ball(), "top", at=(0.0, 0.0, 0.1))
+    assert locate(ball(), "top", at=(0.0, 0.0, 100.0), unit=1e-3).vertex == there.vertex
+    assert not capsys.readouterr().err
+    locate(ball(), "top", at=(0.0, 0.0, 0.1), unit=1e-3)
+    said = capsys.readouterr().err
+    assert "(0, 0, 0.1) mesh units" in said
+    assert "times 1000 it is on the surface: is it in another unit?" in said
+
+
+def test_all_places_that_cannot_be_struck_are_told_together():
+    places = [
+        Place("far", at=(1.0, 0.0, 0.0)),
+        Place("one", vertex=3),
+        Place("none", vertex=-1),
+        Place("same", vertex=3),
+    ]
+    with pytest.raises(UserError) as caught:
+        locate_all(ball(), places)
+    far, none, same = str(caught.value).splitlines()
+    assert "'far'" in far and "'none'" in none and "'one' and 'same' are both at" in same
 
 
 def test_the_unit_of_the_mesh_scales_the_surface():
@@ -85,9 +124,15 @@ def test_the_unit_of_the_mesh_scales_the_surface():
     ("place", "says"),
     [
         (
-            {"at": (0.0, 0.0, 0.15)},
-            r"'top'.*\(0, 0, 0.15\) m is 0.05 m .*nearest vertex is \d+",
+            {"at": (0.0, 0.0, 0.25)},
+            r"'top'.*\(0, 0, 0.25\) m is 0.75 times as far from the surface",
         ),
+        ({"at": (0.3, 0.3, 0.3)}, r"expected the mesh's own coordinates, from \(-0.1, .*move it"),
+        (
+            {"at": (0.0, 0.0, 100.0)},
+            r"\(0, 0, 100\) m .*times 0.001 it is on the surface: is",
+        ),
+        ({"at": (1e18, 1e18, 1e18)}, "'top'.*as far from the surface"),
         ({"at": (0.0, float("nan"), 0.1)}, "'top'.*not finite"),
         ({"vertex": 642}, r"'top'.*no vertex 642.* 642 of them, numbered from 0 to 641"),
         ({"vertex": -1}, "'top'.*no vertex -1"),

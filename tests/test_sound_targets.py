@@ -11,8 +11,9 @@ import pytest
 from carillon.errors import UserError
 from sound.__main__ import main
 from sound.clips.extraction import ModalSound
-from sound.clips.targets import share_frequencies
+from sound.clips.targets import APART, MOST_MODES, share_frequencies
 from sound.clips.wav import read_wav, write_wav
+from sound.design.objective import RESOLVED
 
 RATE = 8000
 
@@ -90,6 +91,39 @@ def test_more_modes_than_all_clips_have_cannot_be_asked_for():
     sounds = [sound([200.0, 1000.0], [1.0, 1.0]), sound([1000.5], [1.0])]
     with pytest.raises(UserError, match="3 modes asked for, more than the 2"):
         share_frequencies(["a", "b"], sounds, 3)
+
+
+def test_modes_that_nobody_hears_do_not_count():
+    loud = sound([200.0, 1000.0, 1500.0], [1.0, 9e-4, 2e-3])
+    targets = share_frequencies(["loud"], [loud], "auto")
+    np.testing.assert_allclose(targets.frequencies, [200.0, 1500.0])
+    quiet = sound([300.0, 1000.0], [1e-4, 1e-4])
+    targets = share_frequencies(["loud", "quiet"], [loud, quiet], "auto")
+    np.testing.assert_allclose(targets.frequencies, [200.0, 300.0, 1000.0, 1500.0])
+    np.testing.assert_array_equal(targets.amplitudes[:, 2], [9e-4, 1e-4])
+
+
+def test_modes_too_close_for_a_design_count_once():
+    assert APART == RESOLVED
+    beating = sound([200.0, 1000.0, 1002.9, 1006.0], [1.0, 0.5, 0.6, 0.3])
+    targets = share_frequencies(["one"], [beating], "auto")
+    np.testing.assert_allclose(targets.frequencies, [200.0, 1002.9, 1006.0])
+    np.testing.assert_array_equal(targets.amplitudes, [[1.0, 0.6, 0.3]])
+    other = sound([600.0, 1005.4], [0.5, 0.4])
+    targets = share_frequencies("ab", [beating, other], "auto")
+    assert (targets.amplitudes[1] > 0.0).sum() == 2
+
+
+def test_a_design_takes_the_strongest_modes_of_a_rich_clip():
+    rich = sound([100.0 * n for n in range(1, 41)], [1.0 / n for n in range(1, 41)])
+    targets = share_frequencies(["rich"], [rich], "auto")
+    np.testing.assert_allclose(targets.frequencies, rich.frequencies[:MOST_MODES])
+
+
+def test_clips_of_one_mode_are_no_design():
+    beating = sound([1000.0, 1001.0], [1.0, 1.0])
+    with pytest.raises(UserError, match=r"the clips \(one\) have 1 mode in all .* needs 2"):
+        share_frequencies(["one"], [beating], "auto")
 
 
 @pytest.fixture(scope="module")

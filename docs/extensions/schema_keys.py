@@ -10,6 +10,7 @@ from typing import Any
 import yaml
 
 from sound.project.schema import SCHEMA as PROJECT_SCHEMA
+from sound.project.schema import word_of
 from workflow import settings
 
 _BOUNDS = {
@@ -90,8 +91,10 @@ def _type(part: Schema) -> str:
     """Type, choices and bounds in words."""
     if "enum" in part:
         return "one of " + ", ".join(f"`{choice}`" for choice in part["enum"])
-    kind = part["type"]
+    kind, word = part["type"], word_of(part)
     words = " or ".join(kind) if isinstance(kind, list) else kind
+    if word is not None:
+        words = words.replace("string", f"`{word}`")
     items = part.get("items")
     if isinstance(items, dict) and ("enum" in items or "properties" not in items):
         words = f"{words} of ({_type(items)})"

@@ -51,49 +51,49 @@ class Surface:
     edge: float
     nodes: NDArray[np.int64] | None
 
-    def nearest(self, point: Array, what: str) -> int:
+    def nearest(self, point: Array, what: str, reach: float | None = None) -> int:
         """Number of the point nearest to `point` (3,) [m].
 
         Raises
         ------
         UserError
-            If the point, which the message calls `what`, is away from the surface.
+            If the point, which the message calls `what`, is further than `reach` [m] from the
+            surface, `REACH` unless told.
         """
+        reach = REACH * self.edge if reach is None else reach
         distance, index = cKDTree(self.points).query(point)
-        if distance > REACH * self.edge:
+        if distance > reach:
             kind = "solid" if self.nodes is None else "voxels"
             raise UserError(
                 f"{what}: the point ({_shown(point)}) m is {distance:.3g} m from the surface of "
-                f"the {kind}, expected at most {REACH:g} cells of {self.edge:.3g} m; the nearest "
-                f"one is ({_shown(self.points[index])}) m"
+                f"the {kind}, expected at most {reach:.3g} m; the nearest one is "
+                f"({_shown(self.points[index])}) m"
             )
         return int(index)
 
-    def place(self, point: Array, what: str) -> tuple[Array, Array]:
+    def place(self, point: Array, what: str, reach: float | None = None) -> tuple[Array, Array]:
         """The place (3,) [m] that is meant by `point` (3,) [m], and the inward normal (3,) there.
 
         That is the nearest node of voxels. Of finite cells it is the point itself, unless it lies
-        outside: then the nearest place that does not, and a warning says how far it is.
+        outside, or deep inside: then the nearest place of the surface. A warning says how far that
+        is from a point that is not on the surface.
 
         Raises
         ------
         UserError
             See `nearest`.
         """
-        index = self.nearest(point, what)
-        near, outward = self.points[index], self.outward[index]
-        if self.nodes is not None:
-            return near, -outward
-        beyond = float((point - near) @ outward)
-        along = point - near - beyond * outward
-        if np.linalg.norm(along) > self.edge:
-            place = near
-        else:
-            place = point if beyond <= OUTSIDE * self.edge else near + along
+        index = self.nearest(point, what, reach)
+        place, outward = self.points[index], self.outward[index]
+        beyond = float((point - place) @ outward)
+        along = point - place - beyond * outward
+        is_near = np.linalg.norm(along) <= self.edge and beyond >= -REACH * self.edge
+        if self.nodes is None and is_near:
+            place = point if beyond <= OUTSIDE * self.edge else place + along
         distance = float(np.linalg.norm(point - place))
-        if distance > OUTSIDE * self.edge:
+        if distance > self.edge * (OUTSIDE if self.nodes is None else 1.0):
             logger.warning(
-                f"{what}: the point ({_shown(point)}) m is {distance:.3g} m outside the solid; "
+                f"{what}: the point ({_shown(point)}) m is {distance:.3g} m off the surface; "
                 f"({_shown(place)}) m is taken instead"
             )
         return place, -outward

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,13 @@ SAME_HERTZ, SAME_FRACTION = 1.0, 0.002
 """Modes of different clips closer than 1 Hz or 0.2 %, whichever is more, are one: about what
 listeners can tell apart in pure tones (Moore, An Introduction to the Psychology of Hearing, ch. 6).
 """
+APART = 3e-3
+"""Relative difference of frequencies up to which a design counts two modes as one; it averages the
+amplitudes of such modes, see `sound.design.objective.RESOLVED`."""
+HEARD = 1e-3
+"""Amplitude over that of a clip's loudest mode, 60 dB below which nobody hears a mode."""
+FEWEST_MODES, MOST_MODES = 2, 30
+"""Modes of a design whose number is left to the clips."""
 
 
 @dataclass(frozen=True)
@@ -48,9 +56,15 @@ class Targets:
 
 
 def share_frequencies(
-    names: Sequence[str], sounds: Sequence[ModalSound], modes: int | None = None
+    names: Sequence[str],
+    sounds: Sequence[ModalSound],
+    modes: int | Literal["auto"] | None = None,
 ) -> Targets:
     """The `modes` modes that carry most of all clips' sound, with amplitudes per clip; all if None.
+
+    `auto` takes those that a design can use: of modes closer than `APART` the stronger one counts
+    for both, and what is below `HEARD` in every clip does not count; `MOST_MODES` at most, or one
+    for each clip where there are more clips.
 
     Modes of different clips that cannot be told apart become one, whose frequency and damping are
     means weighted by amplitude. They are chosen one by one: the clip of whose energy the least is
@@ -60,7 +74,8 @@ def share_frequencies(
     Raises
     ------
     UserError
-        If fewer modes were extracted from all clips together.
+        If fewer modes were extracted from all clips together, or `auto` finds fewer than
+        `FEWEST_MODES`.
     """
     owners = np.repeat(np.arange(len(sounds)), [len(sound.frequencies) for sound in sounds])
     frequencies = np.concatenate([sound.frequencies for sound in sounds])
@@ -70,7 +85,7 @@ def share_frequencies(
 
     groups = _groups(frequencies, owners)
     count = int(groups.max()) + 1
-    if modes is not None and modes > count:
+    if isinstance(modes, int) and modes > count:
         raise UserError(
             f"{modes} modes asked for, more than the {count} that were extracted from the clips "
             f"({', '.join(names)}); ask for fewer"
@@ -83,6 +98,15 @@ def share_frequencies(
     weights = amplitudes / loudness[owners]
     weight = np.bincount(groups, weights)
     shared = np.bincount(groups, weights * frequencies) / weight
+    if modes == "auto":
+        table, covered = _usable(shared, table, covered)
+        usable = int(covered.any(axis=0).sum())
+        if usable < FEWEST_MODES:
+            raise UserError(
+                f"the clips ({', '.join(names)}) have {usable} mode in all that stands apart and "
+                f"is heard, a design needs {FEWEST_MODES} at least; give another clip"
+            )
+        modes = min(usable, max(MOST_MODES, len(sounds)))
     chosen = _chosen(covered, count if modes is None else modes)
     chosen = chosen[np.argsort(shared[chosen])]
     return Targets(
@@ -116,6 +140,26 @@ def _groups(frequencies: Array, owners: NDArray[np.intp]) -> NDArray[np.intp]:
 def _same(frequencies: Array) -> bool:
     low, high = frequencies.min(), frequencies.max()
     return bool(high - low <= max(SAME_HERTZ, SAME_FRACTION * low))
+
+
+def _usable(frequencies: Array, amplitudes: Array, shares: Array) -> tuple[Array, Array]:
+    """Amplitudes (T, k) and shares (T, k) of modes, 0 in the columns of those that do not count.
+
+    A mode beside a stronger one counts with that one, which is as loud as the louder of the two.
+    """
+    amplitudes, shares = amplitudes.copy(), shares.copy()
+    loudest = amplitudes.max(axis=1, keepdims=True)
+    shares[:, ~(amplitudes > HEARD * loudest).any(axis=0)] = 0.0
+    kept: list[int] = []
+    for mode in np.argsort(-shares.sum(axis=0), kind="stable"):
+        near = [k for k in kept if abs(frequencies[mode] / frequencies[k] - 1.0) <= APART]
+        if not near:
+            kept.append(int(mode))
+            continue
+        amplitudes[:, near[0]] = np.maximum(amplitudes[:, near[0]], amplitudes[:, mode])
+        shares[:, near[0]] += shares[:, mode]
+        shares[:, mode] = 0.0
+    return amplitudes, shares
 
 
 def _chosen(shares: Array, modes: int) -> NDArray[np.intp]:

@@ -136,6 +136,7 @@ def summarise(design: Design) -> dict[str, Any]:
         "method": evidence["method"],
         "modes": len(design.frequencies),
         "targets": [strike.name for strike in design.strikes],
+        "target_distances_m": [strike.distance for strike in design.strikes],
         "frequency_error_median": float(np.median(off)),
         "frequency_error_max": float(off.max()),
         "young_min_pa": float(design.young.min()),

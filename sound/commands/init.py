@@ -89,7 +89,8 @@ def _values(options: InitOptions, folder: Path) -> dict[str, Any]:
         return {"mesh": mesh, "targets": _targets(options.mesh, [PLACEHOLDER])}
     clips = [_seen_from(folder, clip) for clip in options.clips]
     targets = _targets(options.mesh, clips)
-    return {"mesh": mesh, "targets": targets, **_modes(options.clips)}
+    _require_modes(options.clips)
+    return {"mesh": mesh, "targets": targets}
 
 
 def _targets(mesh: str, clips: Sequence[str]) -> list[dict[str, Any]]:
@@ -115,8 +116,8 @@ def _targets(mesh: str, clips: Sequence[str]) -> list[dict[str, Any]]:
     ]
 
 
-def _modes(clips: Sequence[str]) -> dict[str, int]:
-    """The number of modes, if the clips have fewer than a project asks for by itself.
+def _require_modes(clips: Sequence[str]) -> None:
+    """Refuse clips of which no design can be made as a project asks for by itself.
 
     Raises
     ------
@@ -125,17 +126,9 @@ def _modes(clips: Sequence[str]) -> dict[str, int]:
     """
     from sound.clips.files import clip_names, extract_file
     from sound.clips.targets import share_frequencies
-    from sound.project.schema import project_schema
 
-    part = project_schema()["properties"]["modes"]
     sounds = [extract_file(clip, visible=True) for clip in clips]
-    count = len(share_frequencies(clip_names(clips), sounds).frequencies)
-    if count < part["minimum"]:
-        raise UserError(
-            f"the clips have {count} mode in all, a design needs {part['minimum']} at least; give "
-            "another clip"
-        )
-    return {} if count >= part["default"] else {"modes": count}
+    share_frequencies(clip_names(clips), sounds, "auto")
 
 
 def _seen_from(folder: Path, path: str) -> str:

@@ -40,8 +40,9 @@ class PointOptions:
     vertex: int | None = option(None, "strike a vertex of the surface", type=whole_number(0))
     at: list[float] | None = option(
         None,
-        "strike the surface near a point [m]",
-        type=number_between(-1e9, 1e9, "m"),
+        "strike the surface near a point, in the coordinates of the mesh that was designed, as in "
+        "a project; of modes.h5 alone [m]",
+        type=number_between(-1e18, 1e18),
         nargs=3,
         metavar=("X", "Y", "Z"),
     )
@@ -97,11 +98,15 @@ class RenderOptions:
 
 @dataclass
 class _Scene:
-    """What is struck, where and how: the solid, its loudness, a point and an impulse there."""
+    """What is struck, where and how: the solid, its loudness, a point and an impulse there.
+
+    `distance` is that of the point from the one that was named [m].
+    """
 
     solid: SoundingSolid
     listening: Listening | None
     position: Array
+    distance: float
     impulse: Array
 
 
@@ -153,9 +158,9 @@ def run(arguments: argparse.Namespace) -> int:
 def _scene(options: RenderOptions, point: PointOptions, strike: ImpulseOptions) -> _Scene:
     import numpy as np
 
-    position, inward, solid, listening = _point_of_solid(options, point)
+    position, inward, distance, solid, listening = _point_of_solid(options, point)
     if strike.impulse is None:
-        return _Scene(solid, listening, position, strike.strength * inward)
+        return _Scene(solid, listening, position, distance, strike.strength * inward)
     impulse = np.array(strike.impulse)
     strength = float(np.linalg.norm(impulse))
     if strength < LEAST_IMPULSE:
@@ -163,13 +168,14 @@ def _scene(options: RenderOptions, point: PointOptions, strike: ImpulseOptions) 
             "--impulse: expected three numbers [N s], not all of them 0; "
             f"{strength:g} N s in all is less than {LEAST_IMPULSE:g}"
         )
-    return _Scene(solid, listening, position, impulse)
+    return _Scene(solid, listening, position, distance, impulse)
 
 
 def _point_of_solid(
     options: RenderOptions, point: PointOptions
-) -> tuple[Array, Array, SoundingSolid, Listening | None]:
-    """Struck point, inward normal there, the solid, and how its clips are heard if it has some."""
+) -> tuple[Array, Array, float, SoundingSolid, Listening | None]:
+    """Struck point, inward normal there, distance from the point named, the solid, and how its
+    clips are heard if it has some."""
     from carillon.files import kind_of
     from solver.files.modes_file import read_modes
     from solver.response.response import Damping
@@ -194,8 +200,8 @@ def _point_of_solid(
     return *_surface_point(point, design), solid, Listening.of_design(design, solid)
 
 
-def _surface_point(point: PointOptions, design: Design) -> tuple[Array, Array]:
-    """Struck point of a design's surface and inward normal there."""
+def _surface_point(point: PointOptions, design: Design) -> tuple[Array, Array, float]:
+    """Struck point of a design's surface, inward normal there, distance from the point named."""
     if point.target is not None:
         strikes = {strike.name: strike for strike in design.strikes}
         if point.target not in strikes:
@@ -204,29 +210,34 @@ def _surface_point(point: PointOptions, design: Design) -> tuple[Array, Array]:
                 f"{', '.join(strikes)}"
             )
         strike = strikes[point.target]
-        return strike.position, strike.inward
+        return strike.position, strike.inward, 0.0
     import trimesh
 
     from sound.strikes import locate
 
     surface = trimesh.Trimesh(design.surface_vertices, design.surface_faces, process=False)
     what = "--at" if point.vertex is None else "--vertex"
-    strike = locate(surface, what, point.at, point.vertex)
-    return strike.position, strike.inward
+    strike = locate(surface, what, point.at, point.vertex, design.unit)
+    return strike.position, strike.inward, strike.distance
 
 
-def _own_point(point: PointOptions, model: Any) -> tuple[Array, Array]:
-    """Struck point of a model's own surface and inward normal there."""
+def _own_point(point: PointOptions, model: Any) -> tuple[Array, Array, float]:
+    """Struck point of a model's own surface, inward normal there, distance from the point named."""
     import numpy as np
 
-    from solver.response.surface import surface_of
+    from solver.response.surface import REACH, surface_of
+    from sound.strikes import TOO_FAR
 
     if point.at is None:
         raise UserError(
             "a modes file knows neither targets nor the vertices of a surface; strike it --at a "
             "point, or name its design by --like"
         )
-    return surface_of(model).place(np.array(point.at), "--at")
+    surface = surface_of(model)
+    longest = float(np.ptp(surface.points, axis=0).max())
+    reach = max(TOO_FAR * longest, REACH * surface.edge)
+    position, inward = surface.place(np.array(point.at), "--at", reach)
+    return position, inward, float(np.linalg.norm(position - point.at))
 
 
 def _summary(options: RenderOptions, scene: _Scene, gain: float, peak: float) -> dict[str, Any]:
@@ -237,6 +248,7 @@ def _summary(options: RenderOptions, scene: _Scene, gain: float, peak: float) ->
         "out": str(Path(options.out)),
         "rate_hz": options.rate,
         "position_m": scene.position.tolist(),
+        "distance_m": scene.distance,
         "impulse_newton_seconds": scene.impulse.tolist(),
         "gain": gain,
         "peak": peak,

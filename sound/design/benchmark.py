@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.threads import one_thread
+from sound.clips.targets import Targets
 from sound.design.objective import fall
 from sound.design.optimise import optimise
 from sound.design.optimisers import OPTIMISERS
-from sound.design.preparation import DesignProblem, prepare, targets_of
+from sound.design.preparation import DesignProblem, prepare
 from sound.design.simulation import Evaluation
 from sound.project.design_file import Design
 from sound.project.project import Project
@@ -101,12 +102,14 @@ def time_sizes(
     report: Callable[[str], None] | None = None,
 ) -> list[dict[str, Any]]:
     """Times of evaluations of the project's solid at several resolutions, one row for each."""
-    targets, rows = targets_of(project), []
+    targets: Targets | None = None
+    rows = []
     for resolution in resolutions:
         if report is not None:
             report(f"evaluations at resolution {resolution}")
         solid = replace(project.solid, resolution=resolution)
         problem = prepare(replace(project, solid=solid), targets)
+        targets = problem.setting.objective.targets
         times = time_evaluations(problem, runs, project.optimiser.seed)
         rows.append({"resolution": resolution, **asdict(times)})
     return rows

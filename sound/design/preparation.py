@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from sound.design.objective import Objective
 from sound.design.pool import Setting
 from sound.project.design_file import Design
 from sound.project.project import Project
+from sound.project.usable import usable_strikes
 
 Array = NDArray[np.float64]
 
@@ -43,14 +44,15 @@ def targets_of(project: Project) -> Targets:
     Raises
     ------
     UserError
-        If a clip is unusable, or all together have fewer modes than the project asks for.
+        If a clip is unusable, or all together have fewer modes than the project asks for, or
+        than a design needs.
     """
     sounds = [extract_file(target.clip, target.modes, True) for target in project.targets]
     return share_frequencies([target.name for target in project.targets], sounds, project.modes)
 
 
 def prepare(project: Project, targets: Targets | None = None) -> DesignProblem:
-    """Mesh, material and objective of a project.
+    """Mesh, material and objective of a project, whose `modes` are then a number.
 
     Parameters
     ----------
@@ -60,12 +62,18 @@ def prepare(project: Project, targets: Targets | None = None) -> DesignProblem:
     Raises
     ------
     UserError
-        For anything wrong with the mesh, the points, the clips or the numbers.
+        For anything wrong with the mesh, the points, the clips or the numbers.  What is wrong
+        with targets is told of all of them, before any clip is searched.
     """
     solid = project.solid
     surface = project.surface()
-    strikes = project.strikes(surface)
-    objective = Objective(targets_of(project) if targets is None else targets, project.weights)
+    if targets is None:
+        strikes = usable_strikes(project, surface)
+        targets = targets_of(project)
+    else:
+        strikes = project.strikes(surface)
+    project = replace(project, modes=len(targets.frequencies))
+    objective = Objective(targets, project.weights)
     name = surface_name(solid.mesh)
     mesh, cells = discretised(surface, solid, name)
     material = ReducedMaterial.of_mesh(

@@ -98,6 +98,11 @@ class Design:
     provenance: dict[str, Any] = field(default_factory=dict)
 
     @property
+    def unit(self) -> float:
+        """Metres per unit of the coordinates of the mesh that was designed [m]."""
+        return float(self.settings.get("unit", 1.0))
+
+    @property
     def frequencies(self) -> Array:
         """Frequencies (N,) [Hz] of the elastic modes."""
         return frequencies(self.eigenvalues[RIGID_MODES:])

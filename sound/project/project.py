@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from carillon.documents import read_yaml
 from carillon.errors import UserError
@@ -83,11 +83,12 @@ class Project:
     """A solid, targets at points of its surface, and how a material is sought.
 
     Every key is described in `project.schema.yaml`, which also has the defaults.  Paths are
-    no longer relative to the project's file: they hold in the working directory.
+    no longer relative to the project's file: they hold in the working directory.  `modes` is a
+    number once the clips are known, see `sound.design.preparation`.
     """
 
     solid: ProblemOptions
-    modes: int
+    modes: int | Literal["auto"]
     targets: tuple[TargetEntry, ...]
     material: MaterialSettings
     weights: Weights
@@ -118,18 +119,14 @@ class Project:
         Raises
         ------
         UserError
-            If one is not on the surface, or two are at one place; see `sound.strikes`.
+            If one is far from the surface, or two are at one place; see `sound.strikes`.
         """
-        return locate_all(surface, [self._place_of(target) for target in self.targets])
-
-    def _place_of(self, target: TargetEntry) -> Place:
-        if target.at is None:
-            return Place(target.name, vertex=target.vertex)
-        return Place(target.name, at=[self.solid.unit * x for x in target.at])
+        places = [Place(target.name, target.at, target.vertex) for target in self.targets]
+        return locate_all(surface, places, self.solid.unit)
 
 
 def load_project(path: str | Path) -> Project:
-    """Read a project file (YAML).
+    """Read a project file (YAML), but none of the files that it names.
 
     Raises
     ------
@@ -155,7 +152,6 @@ def project_of(described: Mapping[str, Any], folder: Path) -> Project:
     check(described, project_schema())
     filled = with_defaults(described, project_schema())
     targets = tuple(_target(number, each, folder) for number, each in enumerate(filled["targets"]))
-    _require_distinct([target.name for target in targets])
     _require_something_to_lower(filled["weights"])
     solid = {key: filled[key] for key in _SOLID}
     if not solid["mesh"].startswith(BUILTIN_PREFIX):
@@ -196,18 +192,8 @@ def _target(number: int, entry: Mapping[str, Any], folder: Path) -> TargetEntry:
             f"targets[{number}].name: found {name!r}, expected characters that can be printed, and "
             "not blanks alone"
         )
-    clip = folder / entry["clip"]
-    if not _is_file(clip):
-        raise UserError(f"targets[{number}].clip: there is no file {clip}; name a WAV file")
-    return TargetEntry(**{**entry, "clip": str(clip), "at": None if at is None else tuple(at)})
-
-
-def _is_file(path: Path) -> bool:
-    """Whether there is such a file; a name that no file can have is not one."""
-    try:
-        return path.is_file()
-    except OSError:
-        return False
+    clip = str(folder / entry["clip"])
+    return TargetEntry(**{**entry, "clip": clip, "at": None if at is None else tuple(at)})
 
 
 def _require_something_to_lower(weights: Mapping[str, float]) -> None:
@@ -216,13 +202,3 @@ def _require_something_to_lower(weights: Mapping[str, float]) -> None:
             f"weights: found {weights['frequency']:g} for frequency and {weights['amplitude']:g} "
             f"for amplitude, expected at least one of them to be {LEAST_WEIGHT:g} or more"
         )
-
-
-def _require_distinct(names: Sequence[str]) -> None:
-    for number, name in enumerate(names):
-        if name in names[:number]:
-            first = names.index(name)
-            raise UserError(
-                f"targets[{first}] and targets[{number}] are both named {name!r}; give each a name "
-                "of its own"
-            )

@@ -114,11 +114,21 @@ def _sentence(mistake: ValidationError) -> str:
 def _expected(mistake: ValidationError) -> str:
     """What would fit the rule that was broken."""
     value = mistake.validator_value
-    if mistake.validator == "type":
-        return " or ".join(_TYPES[kind] for kind in ([value] if isinstance(value, str) else value))
+    word = word_of(mistake.schema)
+    if mistake.validator in ("type", "pattern"):
+        kinds = mistake.schema["type"]
+        named = _TYPES | ({} if word is None else {"string": word})
+        return " or ".join(named[kind] for kind in ([kinds] if isinstance(kinds, str) else kinds))
     if mistake.validator == "enum":
         return f"one of {', '.join(value)}"
-    return _RULES[mistake.validator].format(value)
+    bound = _RULES[mistake.validator].format(value)
+    return bound if word is None else f"{bound}, or {word}"
+
+
+def word_of(schema: Mapping[str, Any]) -> str | None:
+    """The one word that a key may have in place of a number, if there is one."""
+    pattern: str | None = schema.get("pattern")
+    return None if pattern is None else pattern.removeprefix("^").removesuffix(r"\Z")
 
 
 def _meaning(schema: Mapping[str, Any]) -> str:

@@ -88,7 +88,7 @@ def _points(results: SoundResults, marks: list[Mark], balance: Table) -> list[di
         {
             "name": name,
             "style": mark.style,
-            "position": np.round(mark.position / results.design.settings["unit"], DIGITS).tolist(),
+            "position": np.round(mark.position / results.design.unit, DIGITS).tolist(),
             "panels": _panels(results, name),
             "balance": inlined(plots.balance_figure(balance, name), f"balance-{number}"),
         }
@@ -130,7 +130,7 @@ def _elsewhere(results: SoundResults) -> Mark:
     surface = trimesh.Trimesh(
         results.design.surface_vertices, results.design.surface_faces, process=False
     )
-    strike = locate(surface, *results.example.elsewhere)
+    strike = locate(surface, *results.example.elsewhere, unit=results.design.unit)
     return Mark(ELSEWHERE_CLASS, strike.position, strike.inward)
 
 

@@ -1,0 +1,124 @@
+"""Clips that were searched once are not searched again, and nothing else changes."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from carillon.errors import UserError
+from sound.clips import cache, files
+from sound.clips.damped import damped_sinusoids
+from sound.clips.extraction import ModalSound, extract
+from sound.clips.files import extract_file
+from sound.clips.wav import write_wav
+
+RATE = 8000
+
+
+def written(path: Path, hertz: float = 440.0) -> Path:
+    values = (np.array([hertz, 1700.0]), np.array([8.0, 20.0]), np.array([0.5, 0.2]), np.zeros(2))
+    write_wav(path, damped_sinusoids(*values, RATE, RATE // 2), RATE)
+    return path
+
+
+@pytest.fixture
+def clip(tmp_path):
+    return written(tmp_path / "clip.wav")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """The cache's folder of clips."""
+    monkeypatch.setenv(cache.PLACE, str(tmp_path / "cache"))
+    return tmp_path / "cache" / "clips"
+
+
+@pytest.fixture
+def searches(monkeypatch):
+    """Clips that are searched, by their first samples."""
+    searched = []
+
+    def counted(samples, *rest):
+        searched.append(samples[:9].tolist())
+        return extract(samples, *rest)
+
+    monkeypatch.setattr(files, "extract", counted)
+    return searched
+
+
+def assert_same(one: ModalSound, other: ModalSound) -> None:
+    for field in fields(ModalSound):
+        np.testing.assert_equal(getattr(one, field.name), getattr(other, field.name))
+
+
+def test_what_was_found_once_is_found_at_once(clip, folder, searches, tmp_path):
+    first = extract_file(clip)
+    assert_same(extract_file(clip), first)
+    renamed = clip.rename(tmp_path / "other.wav")
+    assert_same(extract_file(renamed, visible=True), first)
+    assert len(searches) == 1
+
+
+def test_another_search_is_another_entry(clip, folder, searches, monkeypatch):
+    extract_file(clip)
+    assert len(extract_file(clip, 1).frequencies) == 1
+    extract_file(written(clip, 450.0))
+    monkeypatch.setattr(cache, "_origin", lambda: b"other code")
+    extract_file(clip)
+    assert len(searches) == 4 == len(list(folder.iterdir()))
+
+
+def test_what_cannot_be_used_is_told_every_time(clip, folder, searches):
+    for _ in range(2):
+        with pytest.raises(UserError, match="clip.wav: 9 modes asked for, more than the 2"):
+            extract_file(clip, 9)
+    assert len(searches) == 2
+
+
+@pytest.mark.parametrize("damage", [b"", b"no HDF5", None])
+def test_a_damaged_entry_is_made_anew(clip, folder, searches, damage):
+    first = extract_file(clip)
+    (entry,) = folder.iterdir()
+    whole = entry.read_bytes()
+    flipped = whole[:2000] + bytes([whole[2000] ^ 1]) + whole[2001:]
+    entry.write_bytes(flipped if damage is None else damage)
+    for _ in range(2):
+        assert_same(extract_file(clip), first)
+    assert len(searches) == 2
+
+
+@pytest.mark.parametrize("place", ["/dev/null", "/proc/nowhere", "clip.wav", "x" * 300, "~"])
+def test_without_a_cache_clips_are_searched(clip, searches, place, monkeypatch):
+    monkeypatch.chdir(clip.parent)
+    monkeypatch.setattr(cache, "_folder", lambda: Path(place))
+    extract_file(clip)
+    extract_file(clip)
+    assert len(searches) == 2
+    assert [path.name for path in clip.parent.iterdir()] == ["clip.wav"]
+
+
+def test_entries_used_least_recently_make_room(tmp_path, folder, searches, monkeypatch):
+    clips = [written(tmp_path / f"{hertz}.wav", hertz) for hertz in (300.0, 400.0, 500.0)]
+    for seconds, clip in enumerate(clips[:2]):
+        extract_file(clip)
+        for path in folder.iterdir():
+            os.utime(path, (seconds, min(seconds, path.stat().st_mtime)))
+    size = sum(path.stat().st_size for path in folder.iterdir())
+    monkeypatch.setattr(cache, "MOST_BYTES", size)
+    extract_file(clips[0])
+    extract_file(clips[2])
+    assert sum(path.stat().st_size for path in folder.iterdir()) <= size
+    extract_file(clips[0])
+    assert len(searches) == 3
+    extract_file(clips[1])
+    assert len(searches) == 4
+
+
+def test_the_cache_is_the_users_own_unless_told(monkeypatch, tmp_path):
+    monkeypatch.delenv(cache.PLACE)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert cache._folder() == tmp_path / "carillon" / "clips"
