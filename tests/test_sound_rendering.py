@@ -20,11 +20,12 @@ from solver.files.modes_file import read_modes, write_modes
 from solver.response.contact import interpolation
 from solver.response.response import Damping
 from sound.__main__ import main
+from sound.clips.noise import noise_part
 from sound.clips.wav import PEAK
 from sound.project.design_file import write_design
 from sound.rendering.bank import Bank, ring
 from sound.rendering.listening import Listening, resampled
-from sound.rendering.render import Hit, render
+from sound.rendering.render import Hit, render, rendered_parts, residual_share
 from sound.rendering.solid import SoundingSolid
 from tests.small_design import N_MODES, small_design
 from tests.solids import uniform_box
@@ -139,7 +140,7 @@ def test_weights_are_one_at_a_struck_point_and_blend_between() -> None:
     assert near.sum() == pytest.approx(1.0) and near[0] > 0.999
 
 
-def test_residual_follows_the_impulse_and_the_rate() -> None:
+def test_noise_follows_the_impulse_and_the_rate() -> None:
     design = small_design()
     solid, listening = design_solid()
     strike = design.strikes[1]
@@ -149,9 +150,39 @@ def test_residual_follows_the_impulse_and_the_rate() -> None:
         for part in (True, False)
     ]
     added = sounds[0] - sounds[1]
-    residual = design.targets.residuals[1]
-    np.testing.assert_allclose(added[2205 : 2205 + len(residual)], 3.0 * residual, atol=1e-12)
+    noise, _ = noise_part(design.targets.residuals[1], design.targets.rates[1])
+    np.testing.assert_allclose(added[2205 : 2205 + len(noise)], 3.0 * noise, atol=1e-12)
     assert not added[:2205].any()
+
+
+def test_a_partial_that_was_missed_is_heard_nowhere() -> None:
+    """Neither at the point of its clip nor between, and the share of the clip is told."""
+    design = small_design()
+    t = np.arange(RATE) / RATE
+    missed = 0.2 * partial(3210.0, 12.0, t)
+    residuals = (design.targets.residuals[0], np.zeros(0))
+    louder = (np.pad(residuals[0], (0, RATE - len(residuals[0]))) + missed, residuals[1])
+    solid = SoundingSolid.of_design(design)
+    first, second = (strike.position for strike in design.strikes)
+    peaks = []
+    for rest in (residuals, louder):
+        heard = replace(design, targets=replace(design.targets, residuals=rest))
+        listening = Listening.of_design(heard, solid)
+        for position in (first, 0.5 * (first + second)):
+            hits = [Hit(0.0, position, np.array([0.0, 0.0, -1.0]))]
+            noise = rendered_parts(solid, hits, 1.0, listening=listening)[1]
+            peaks.append(np.abs(np.fft.rfft(noise)[3190:3231]).max())
+    clip = np.abs(np.fft.rfft(missed)[3190:3231]).max()
+    assert max(peaks[2] / clip, 2.0 * peaks[3] / clip) < 10.0 ** (-20.0 / 20.0)
+    energy = float(missed @ missed)
+    assert listening.missed[0] == pytest.approx(energy / (energy + listening.energies[0]), rel=0.05)
+    assert listening.missed[1] == 0.0
+
+
+def test_share_of_the_noise_is_that_of_its_energy() -> None:
+    modes = np.sin(np.arange(1000.0))
+    assert residual_share(modes, 0.5 * modes) == pytest.approx(0.2)
+    assert residual_share(modes, 0.0 * modes) == residual_share(0.0 * modes, 0.0 * modes) == 0.0
 
 
 def test_resampling_keeps_a_tone() -> None:

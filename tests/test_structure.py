@@ -77,7 +77,8 @@ ARROWS = {
     "sound.project": "solver.files solver.analysis sound sound.clips",
     "sound.design": """solver.coarsening solver.files solver.response solver.linear solver.subspace
         solver.analysis sound sound.clips sound.project""",
-    "sound.rendering": "solver.files solver.response solver.subspace sound.project",
+    "sound.rendering": """solver.files solver.response solver.subspace sound sound.clips
+        sound.project""",
     "sound.export": """solver.files solver.response solver.assembly solver.studies sound
         sound.project sound.rendering""",
     "sound.commands": """solver.files solver.response sound sound.clips sound.project sound.design
