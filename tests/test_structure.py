@@ -106,7 +106,7 @@ ARROWS = {
     "workflow.commands": """dataset_gen.objectives solver.coarsening solver.response
         solver.analysis workflow workflow.studies.base workflow.studies.comparison workflow.estimate
         workflow.studies.report""",
-    "workflow.scripts": """solver.analysis sound.project workflow.studies.base
+    "workflow.scripts": """solver.analysis workflow.studies.base
         workflow.studies.report workflow.studies.comparison workflow.studies.sounds""",
 }
 """Packages, from the bottom to the top, with those that they import beside `EVERYBODY`."""

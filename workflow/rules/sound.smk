@@ -156,9 +156,9 @@ rule save_moduli:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/young.log",
     localrule: True
     params:
-        source=source("workflow.scripts.save_moduli"),
-    script:
-        "../scripts/save_moduli.py"
+        source=source("sound.commands.export"),
+    shell:
+        "python -m sound export {input.design:q} --out {output:q} > {log:q} 2>&1"
 
 
 rule render_before:
