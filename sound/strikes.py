@@ -98,7 +98,7 @@ def locate_all(surface: trimesh.Trimesh, places: Sequence[Place]) -> list[Strike
     UserError
         Also if two targets are at one place.
     """
-    numbers = np.array([_vertex(surface, place) for place in places], dtype=np.int64)
+    numbers = np.array([vertex_of(surface, place) for place in places], dtype=np.int64)
     positions = np.asarray(surface.vertices, dtype=float)[numbers]
     for one, other in combinations(range(len(places)), 2):
         if np.linalg.norm(positions[one] - positions[other]) <= SAME_PLACE * longest_side(surface):
@@ -157,7 +157,8 @@ def spread(candidates: Array, taken: Array, count: int) -> list[int]:
     return chosen
 
 
-def _vertex(surface: trimesh.Trimesh, place: Place) -> int:
+def vertex_of(surface: trimesh.Trimesh, place: Place) -> int:
+    """Number of the vertex that is struck, see `locate`."""
     if (place.at is None) == (place.vertex is None):
         raise UserError(f"target {place.name!r}: expected either a position or a vertex")
     if place.vertex is None:

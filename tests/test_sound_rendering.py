@@ -271,6 +271,40 @@ def test_the_solver_s_modes_can_be_heard(tmp_path: Path, capsys: pytest.CaptureF
     assert max(printed["amplitudes"]) == pytest.approx(small_design().targets.amplitudes[1].max())
 
 
+def test_modes_alone_stand_beside_the_sound(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    write_design(tmp_path / "design.h5", small_design())
+    out, alone, bare = (tmp_path / f"{name}.wav" for name in ("hit", "modes", "bare"))
+    words = ["render", tmp_path / "design.h5", "--target", "corner", "--seconds", 0.4, "--json"]
+    assert run([*words, "--out", out, "--modes-out", alone]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert run([*words, "--out", bare, "--no-residual"]) == 0
+    without = json.loads(capsys.readouterr().out)
+    whole, modes, same = (soundfile.read(path)[0] for path in (out, alone, bare))
+    np.testing.assert_array_equal(modes, same)
+    assert told["residual_share"] == pytest.approx(residual_share(modes, whole - modes), rel=1e-4)
+    assert told["residual_share"] > 0.0 and without["residual_share"] == 0.0
+    assert 0.0 <= told["missed_share"] < told["residual_share"]
+
+
+@pytest.mark.parametrize("strength", [1e-3, 100.0])
+def test_normalised_sounds_reach_full_scale_and_the_gain_is_told(
+    tmp_path: Path, strength: float, capsys: pytest.CaptureFixture
+) -> None:
+    write_design(tmp_path / "design.h5", small_design())
+    words = ["render", tmp_path / "design.h5", "--target", "side", "--strength", strength]
+    plain, scaled, alone = (tmp_path / f"{name}.wav" for name in ("plain", "scaled", "alone"))
+    assert run([*words, "--out", plain]) == 0
+    assert run([*words, "--out", scaled, "--modes-out", alone, "--normalise", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out.splitlines()[-1])
+    own, full, modes = (soundfile.read(path)[0] for path in (plain, scaled, alone))
+    assert np.abs(full).max() == pytest.approx(told["peak"])
+    assert 0.98 < told["peak"] < 1.0
+    np.testing.assert_allclose(full, told["scale"] * own, rtol=1e-5, atol=1e-9)
+    assert np.abs(modes).max() < np.abs(full).max() + 0.05
+    assert run([*words, "--out", scaled, "--normalise"]) == 0
+    assert f"scaled by {told['scale']:.4g}" in capsys.readouterr().out
+
+
 def test_modes_too_damped_to_oscillate_are_left_out(tmp_path: Path) -> None:
     model = uniform_box(4, 3, 2, 0.05)
     result = solve(model, modes=RIGID_MODES + 4, method="slepc")
@@ -285,7 +319,7 @@ def test_modes_too_damped_to_oscillate_are_left_out(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (["--target", "lid"], "no such target, expected one of corner, side"),
+        (["--target", "lid"], "no target 'lid', expected one of corner, side"),
         (["--vertex", 999_999], "there is no vertex 999999"),
         (["--at", 9, 9, 9], "m from the surface"),
         (["--target", "side", "--impulse", 0, 0, 0], "not all of them 0"),
@@ -300,6 +334,8 @@ def test_modes_too_damped_to_oscillate_are_left_out(tmp_path: Path) -> None:
         (["--at", "nan", 0, 0], "out of range"),
         (["--at", 1e300, 0, 0], "out of range"),
         (["--target", "side", "--out", "hit.mp3"], "expected a name that ends in .wav"),
+        (["--target", "side", "--modes-out", "modes.mp3"], "expected a name that ends in .wav"),
+        (["--target", "side", "--out", "x.wav", "--modes-out", "x.wav"], "name another file"),
         (["--target", "side", "--damping", 1, 0], "go with modes.h5"),
         (["--target", "side", "--like", "x.h5"], "go with modes.h5"),
     ],
