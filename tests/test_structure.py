@@ -81,8 +81,8 @@ ARROWS = {
         sound.project""",
     "sound.export": """solver.files solver.response solver.assembly solver.studies sound
         sound.project sound.rendering""",
-    "sound.commands": """sound sound.clips sound.project sound.design sound.rendering
-        sound.export""",
+    "sound.commands": """solver.response sound sound.clips sound.project sound.design
+        sound.rendering sound.export""",
     #
     "workflow": "dataset_gen dataset_gen.objectives forests forests.studies",
     "workflow.estimate": "dataset_gen.objectives workflow",
