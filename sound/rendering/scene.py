@@ -143,7 +143,7 @@ def _places_of_model(model: Solid) -> Places:
             if point.at is None:
                 raise UserError(
                     f"{name}: a modes file knows neither targets nor the vertices of a surface; "
-                    "strike it at a point, or name its design by --like"
+                    "strike it --at a point, or name its design by --like"
                 )
             found.append(surface.place(np.array(point.at), name))
         return found
