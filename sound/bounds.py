@@ -13,6 +13,10 @@ MOST_CLIP_SAMPLES = 1 << 23
 """Of a clip, in all channels: three minutes at 44.1 kHz, of which a strike needs seconds."""
 MOST_SAMPLES = 1 << 26
 """Of a sound that is made: 10 minutes at 96 kHz, half a gigabyte while it is worked out."""
+LONGEST_SOUND = 600.0
+"""Length [s] of a sound that somebody may want to hear."""
+LEAST_IMPULSE, LARGEST_IMPULSE = 1e-6, 1e6
+"""What somebody may strike with [N s]."""
 QUIETEST, LOUDEST = 1e-9, 1e6
 """Magnitude of the loudest sample of a clip, full scale being 1."""
 

@@ -120,7 +120,7 @@ def locate_all(
     faults: list[str] = []
     for place in places:
         try:
-            found.append((place.name, *_vertex(surface, place, unit)))
+            found.append((place.name, *vertex_of(surface, place, unit)))
         except UserError as error:
             faults.append(str(error))
     for (one, first, _), (other, second, _) in combinations(found, 2):
@@ -184,8 +184,8 @@ def spread(candidates: Array, taken: Array, count: int) -> list[int]:
     return chosen
 
 
-def _vertex(surface: trimesh.Trimesh, place: Place, unit: float) -> tuple[int, float]:
-    """Number of the vertex at a place, and how far that is from the position named [m]."""
+def vertex_of(surface: trimesh.Trimesh, place: Place, unit: float) -> tuple[int, float]:
+    """Number of the vertex at a place, and how far it is from the point named [m]; see `locate`."""
     if (place.at is None) == (place.vertex is None):
         raise UserError(f"target {place.name!r}: expected either a position or a vertex")
     if place.vertex is None:

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from carillon.fem.materials import young_modulus
 from carillon.fem.model import fine_model
 from solver.coarsening.choice import make_coarsening
 from solver.coarsening.model import build_model
@@ -241,6 +242,16 @@ def test_faust_s_program_names_points_and_units(folder: Path) -> None:
     assert "nPositions = 5;" in text and f"nModes = {N_MODES};" in text
     assert "'corner':0;'side':1;'vertex " in text
     assert "N s" in text and "kg^-1/2" in text
+
+
+def test_moduli_are_those_of_the_solver_s_cells_in_their_order(
+    folder: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "young.npy"
+    assert main(["export", str(folder / "design.h5"), "--out", str(out)]) == 0
+    design, cells = small_design(), box_mesh(6, 4, 2, 0.04)
+    np.testing.assert_array_equal(design.fine_grid, cells.grid)
+    np.testing.assert_array_equal(young_modulus(str(out), cells), design.young)
 
 
 def test_no_more_points_are_struck_than_there_are(folder: Path) -> None:

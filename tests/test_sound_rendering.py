@@ -20,11 +20,12 @@ from solver.files.modes_file import read_modes, write_modes
 from solver.response.contact import interpolation
 from solver.response.response import Damping
 from sound.__main__ import main
+from sound.clips.noise import noise_part
 from sound.clips.wav import PEAK
 from sound.project.design_file import write_design
 from sound.rendering.bank import Bank, ring
 from sound.rendering.listening import Listening, resampled
-from sound.rendering.render import Hit, render
+from sound.rendering.render import Hit, render, rendered_parts, residual_share
 from sound.rendering.solid import SoundingSolid
 from tests.small_design import N_MODES, small_design
 from tests.solids import uniform_box
@@ -139,7 +140,7 @@ def test_weights_are_one_at_a_struck_point_and_blend_between() -> None:
     assert near.sum() == pytest.approx(1.0) and near[0] > 0.999
 
 
-def test_residual_follows_the_impulse_and_the_rate() -> None:
+def test_noise_follows_the_impulse_and_the_rate() -> None:
     design = small_design()
     solid, listening = design_solid()
     strike = design.strikes[1]
@@ -149,9 +150,39 @@ def test_residual_follows_the_impulse_and_the_rate() -> None:
         for part in (True, False)
     ]
     added = sounds[0] - sounds[1]
-    residual = design.targets.residuals[1]
-    np.testing.assert_allclose(added[2205 : 2205 + len(residual)], 3.0 * residual, atol=1e-12)
+    noise, _ = noise_part(design.targets.residuals[1], design.targets.rates[1])
+    np.testing.assert_allclose(added[2205 : 2205 + len(noise)], 3.0 * noise, atol=1e-12)
     assert not added[:2205].any()
+
+
+def test_a_partial_that_was_missed_is_heard_nowhere() -> None:
+    """Neither at the point of its clip nor between, and the share of the clip is told."""
+    design = small_design()
+    t = np.arange(RATE) / RATE
+    missed = 0.2 * partial(3210.0, 12.0, t)
+    residuals = (design.targets.residuals[0], np.zeros(0))
+    louder = (np.pad(residuals[0], (0, RATE - len(residuals[0]))) + missed, residuals[1])
+    solid = SoundingSolid.of_design(design)
+    first, second = (strike.position for strike in design.strikes)
+    peaks = []
+    for rest in (residuals, louder):
+        heard = replace(design, targets=replace(design.targets, residuals=rest))
+        listening = Listening.of_design(heard, solid)
+        for position in (first, 0.5 * (first + second)):
+            hits = [Hit(0.0, position, np.array([0.0, 0.0, -1.0]))]
+            noise = rendered_parts(solid, hits, 1.0, listening=listening)[1]
+            peaks.append(np.abs(np.fft.rfft(noise)[3190:3231]).max())
+    clip = np.abs(np.fft.rfft(missed)[3190:3231]).max()
+    assert max(peaks[2] / clip, 2.0 * peaks[3] / clip) < 10.0 ** (-20.0 / 20.0)
+    energy = float(missed @ missed)
+    assert listening.missed[0] == pytest.approx(energy / (energy + listening.energies[0]), rel=0.05)
+    assert listening.missed[1] == 0.0
+
+
+def test_share_of_the_noise_is_that_of_its_energy() -> None:
+    modes = np.sin(np.arange(1000.0))
+    assert residual_share(modes, 0.5 * modes) == pytest.approx(0.2)
+    assert residual_share(modes, 0.0 * modes) == residual_share(0.0 * modes, 0.0 * modes) == 0.0
 
 
 def test_resampling_keeps_a_tone() -> None:
@@ -262,6 +293,40 @@ def test_the_solver_s_modes_can_be_heard(tmp_path: Path, capsys: pytest.CaptureF
     assert max(printed["amplitudes"]) == pytest.approx(small_design().targets.amplitudes[1].max())
 
 
+def test_modes_alone_stand_beside_the_sound(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    write_design(tmp_path / "design.h5", small_design())
+    out, alone, bare = (tmp_path / f"{name}.wav" for name in ("hit", "modes", "bare"))
+    words = ["render", tmp_path / "design.h5", "--target", "corner", "--seconds", 0.4, "--json"]
+    assert run([*words, "--out", out, "--modes-out", alone]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert run([*words, "--out", bare, "--no-residual"]) == 0
+    without = json.loads(capsys.readouterr().out)
+    whole, modes, same = (soundfile.read(path)[0] for path in (out, alone, bare))
+    np.testing.assert_array_equal(modes, same)
+    assert told["residual_share"] == pytest.approx(residual_share(modes, whole - modes), rel=1e-4)
+    assert told["residual_share"] > 0.0 and without["residual_share"] == 0.0
+    assert 0.0 <= told["missed_share"] < told["residual_share"]
+
+
+@pytest.mark.parametrize("strength", [1e-3, 100.0])
+def test_normalised_sounds_reach_full_scale_and_the_gain_is_told(
+    tmp_path: Path, strength: float, capsys: pytest.CaptureFixture
+) -> None:
+    write_design(tmp_path / "design.h5", small_design())
+    words = ["render", tmp_path / "design.h5", "--target", "side", "--strength", strength]
+    plain, scaled, alone = (tmp_path / f"{name}.wav" for name in ("plain", "scaled", "alone"))
+    assert run([*words, "--out", plain]) == 0
+    assert run([*words, "--out", scaled, "--modes-out", alone, "--normalise", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out.splitlines()[-1])
+    own, full, modes = (soundfile.read(path)[0] for path in (plain, scaled, alone))
+    assert np.abs(full).max() == pytest.approx(told["peak"])
+    assert 0.98 < told["peak"] < 1.0
+    np.testing.assert_allclose(full, told["scale"] * own, rtol=1e-5, atol=1e-9)
+    assert np.abs(modes).max() < np.abs(full).max() + 0.05
+    assert run([*words, "--out", scaled, "--normalise"]) == 0
+    assert f"scaled by {told['scale']:.4g}" in capsys.readouterr().out
+
+
 def test_modes_too_damped_to_oscillate_are_left_out(tmp_path: Path) -> None:
     model = uniform_box(4, 3, 2, 0.05)
     result = solve(model, modes=RIGID_MODES + 4, method="slepc")
@@ -276,7 +341,7 @@ def test_modes_too_damped_to_oscillate_are_left_out(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (["--target", "lid"], "no such target, expected one of corner, side"),
+        (["--target", "lid"], "no target 'lid', expected one of corner, side"),
         (["--vertex", 999_999], "there is no vertex 999999"),
         (["--at", 9, 9, 9], "as far from the surface"),
         (["--target", "side", "--impulse", 0, 0, 0], "not all of them 0"),
@@ -291,6 +356,8 @@ def test_modes_too_damped_to_oscillate_are_left_out(tmp_path: Path) -> None:
         (["--at", "nan", 0, 0], "out of range"),
         (["--at", 1e300, 0, 0], "out of range"),
         (["--target", "side", "--out", "hit.mp3"], "expected a name that ends in .wav"),
+        (["--target", "side", "--modes-out", "modes.mp3"], "expected a name that ends in .wav"),
+        (["--target", "side", "--out", "x.wav", "--modes-out", "x.wav"], "name another file"),
         (["--target", "side", "--damping", 1, 0], "go with modes.h5"),
         (["--target", "side", "--like", "x.h5"], "go with modes.h5"),
     ],

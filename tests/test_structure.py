@@ -77,10 +77,11 @@ ARROWS = {
     "sound.project": "solver.files solver.analysis sound sound.clips",
     "sound.design": """solver.coarsening solver.files solver.response solver.linear solver.subspace
         solver.analysis sound sound.clips sound.project""",
-    "sound.rendering": "solver.files solver.response solver.subspace sound.project",
+    "sound.rendering": """solver.files solver.response solver.subspace sound sound.clips
+        sound.project""",
     "sound.export": """solver.files solver.response solver.assembly solver.studies sound
         sound.project sound.rendering""",
-    "sound.commands": """solver.files solver.response sound sound.clips sound.project sound.design
+    "sound.commands": """solver.response sound sound.clips sound.project sound.design
         sound.rendering sound.export""",
     #
     "workflow": "dataset_gen dataset_gen.objectives forests forests.studies",
@@ -105,7 +106,7 @@ ARROWS = {
     "workflow.commands": """dataset_gen.objectives solver.coarsening solver.response
         solver.analysis workflow workflow.studies.base workflow.studies.comparison workflow.estimate
         workflow.studies.report""",
-    "workflow.scripts": """solver.analysis sound.project workflow.studies.base
+    "workflow.scripts": """solver.analysis workflow.studies.base
         workflow.studies.report workflow.studies.comparison workflow.studies.sounds""",
 }
 """Packages, from the bottom to the top, with those that they import beside `EVERYBODY`."""

@@ -19,7 +19,7 @@ from sound.clips.wav import read_wav, write_wav
 from sound.project.design_file import HISTORY_TYPE, Design, read_design, write_design
 from sound.project.project import load_project
 from sound.rendering.listening import Listening
-from sound.rendering.render import Hit, render
+from sound.rendering.render import Hit, rendered_parts
 from sound.rendering.solid import SoundingSolid
 from tests.pages import Page, assert_same_numbers, assert_self_contained
 from tests.small_design import N_MODES, SIDES, small_design
@@ -44,7 +44,7 @@ from workflow.studies.sounds.examples import (
 )
 from workflow.studies.sounds.pictures import fine_mesh
 from workflow.studies.sounds.plots import _ticks
-from workflow.studies.sounds.results import SoundResults
+from workflow.studies.sounds.results import MODES, SoundResults
 
 RATE = 22_050
 EXAMPLE = Example(
@@ -118,7 +118,7 @@ def results(tmp_path_factory) -> SoundResults:
     (root / "config.yaml").write_text(yaml.safe_dump(CONFIG))
     box = Box(root / FOLDER, EXAMPLE.name)
     folder = box.file("")
-    for name in ("edit-1", "before", "clips", "after", "fine", "tables"):
+    for name in ("edit-1", "tables", *(f"{state}/{MODES}" for state in page.STATES)):
         (folder / name).mkdir(parents=True)
     first = designed(history=history((0.1, 9.0), (1.0, 4.0)))
     final = designed(history=history((0.1, 9.0), (1.0, 4.0), (1.2, 6.0), (3.0, 0.5)))
@@ -143,10 +143,12 @@ def write_sounds(folder: Path, design: Design) -> None:
     solid = SoundingSolid.of_design(design)
     listening = Listening.of_design(design, solid)
     for strike in design.strikes:
-        sound = render(solid, [Hit(0.0, strike.position, strike.inward)], 0.3, RATE, 0.0, listening)
-        for state in page.STATES:
-            write_wav(folder / state / f"{strike.name}.wav", sound, RATE)
-    write_wav(folder / "after" / f"{ELSEWHERE}.wav", sound, RATE)
+        hits = [Hit(0.0, strike.position, strike.inward)]
+        modes, noise = rendered_parts(solid, hits, 0.3, RATE, 0.0, listening)
+        places = [(state, strike.name) for state in page.STATES] + [("after", ELSEWHERE)]
+        for state, name in places:
+            write_wav(folder / state / f"{name}.wav", modes + noise, RATE)
+            write_wav(folder / state / MODES / f"{name}.wav", modes, RATE)
 
 
 @pytest.fixture(scope="module")
@@ -161,7 +163,9 @@ def built(results: SoundResults) -> Page:
 
 def test_the_page_needs_nothing_from_elsewhere_and_can_be_heard(results, built):
     assert_self_contained(built)
-    assert built.source.count("data:audio/wav;base64,") == 2 * len(page.STATES) + 1
+    rendered = 2 * (len(page.STATES) - 1) + 1
+    assert built.source.count("data:audio/wav;base64,") == 2 * rendered + 2
+    assert built.source.count("of the energy that are noise") == rendered
     assert built.source.count("data:image/png;base64,") >= 2
     assert len(built.source) < 4e6
 

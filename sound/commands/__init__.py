@@ -12,6 +12,8 @@ COMMANDS = {
         "sound.commands.design", "optimise the material until struck points sound as clips"
     ),
     "render": Command("sound.commands.render", "the sound of a strike, as WAV"),
-    "export": Command("sound.commands.export", "modes on the mesh, glTF or Faust, for other tools"),
+    "export": Command(
+        "sound.commands.export", "modes on the mesh, glTF, Faust or moduli, for other tools"
+    ),
     "benchmark": Command("sound.commands.benchmark", "time of an evaluation, optimisers compared"),
 }

@@ -24,6 +24,7 @@ from sound.design.objective import fall
 if TYPE_CHECKING:
     from sound.design.search import Search
     from sound.project.design_file import Design
+    from sound.project.project import Project
 
 ENDINGS = (".h5", ".hdf5")
 """Of designs."""
@@ -43,6 +44,11 @@ class DesignOptions:
         None, "design of the same mesh to go on from, its targets aside", metavar="DESIGN"
     )
     restart: bool = option(False, "begin anew, even if --out exists")
+    watch: bool = option(
+        False,
+        "go on until interrupted, take up edits of the project, and write the sound of every "
+        "target beside --out whenever it gets better",
+    )
     json: bool = option(False, "print the outcome as JSON")
 
 
@@ -64,19 +70,24 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _search(options: DesignOptions, settings: SearchOptions) -> int:
     """Search, writing the design every half minute and at the end."""
+    from sound.commands.watching import EditedProject, design_on
     from sound.design.optimise import optimise
     from sound.design.preparation import prepare, require_same_voxels
     from sound.outputs import require_output
     from sound.project.design_file import read_design, write_design
-    from sound.project.project import load_project, with_optimiser
+    from sound.project.project import load_project
 
     _require_one_rank()
-    project = load_project(options.project)
+    if options.watch and (settings.seconds or settings.evaluations):
+        raise UserError("--watch goes on until interrupted; leave out --seconds and --evaluations")
+
+    def load() -> Project:
+        return _with_settings(load_project(options.project), settings, options.watch)
+
+    edited = EditedProject(options.project, load)
+    project = edited.project
     inputs = filter(None, [options.project, project.solid.mesh, project.solid.forest])
     out = require_output(options.out, ENDINGS, inputs)
-    if settings.evaluations is not None and settings.seconds is None:
-        project = replace(project, optimiser=replace(project.optimiser, seconds=None))
-    project = with_optimiser(project, **asdict(settings))
     initial = None
     if options.initial_design is not None:
         initial = read_design(options.initial_design)
@@ -87,13 +98,27 @@ def _search(options: DesignOptions, settings: SearchOptions) -> int:
         require_same_voxels(problem, initial)
         so_far = initial.history["evaluations"][-1:].sum()
         say(f"{options.initial_design or out}: going on after {so_far:,.0f} evaluations")
-    result = optimise(
-        problem, initial, keep=lambda each: write_design(out, each), watch=_SearchProgress().show
-    )
-    write_design(out, result)
+    show = _SearchProgress().show
+    if options.watch:
+        result = design_on(edited, problem, initial, out, show)
+    else:
+        result = optimise(problem, initial, lambda each: write_design(out, each), show)
+        write_design(out, result)
     summary = summarise(result)
     print(json.dumps(summary) if options.json else _sentences(out, result, summary))
     return 0
+
+
+def _with_settings(project: Project, settings: SearchOptions, endless: bool) -> Project:
+    """The project with the command's settings for its optimiser; without a budget if `endless`."""
+    from sound.project.project import with_optimiser
+
+    budget = project.optimiser
+    if endless:
+        budget = replace(budget, seconds=None, evaluations=None)
+    elif settings.evaluations is not None and settings.seconds is None:
+        budget = replace(budget, seconds=None)
+    return with_optimiser(replace(project, optimiser=budget), **asdict(settings))
 
 
 class _SearchProgress:

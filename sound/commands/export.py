@@ -5,12 +5,16 @@ from __future__ import annotations
 import argparse
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from carillon.arguments import whole_number
 from carillon.errors import UserError
 from carillon.options import REQUIRED, add_options, collect, option
 
-FORMATS = ("h5", "gltf", "glb", "dsp")
+if TYPE_CHECKING:  # Its import takes long, and `--help` needs none.
+    from sound.project.design_file import Design
+
+FORMATS = ("h5", "gltf", "glb", "dsp", "npy")
 MOST_POINTS = 10_000
 """To strike in a Faust program, each of which is an entry of its menu."""
 
@@ -22,7 +26,8 @@ class ExportOptions:
     design: str = option(REQUIRED, "design.h5")
     out: str = option(
         REQUIRED,
-        "file to write: .h5 (embedded mesh with eigenpairs), .gltf, .glb, or .dsp (Faust)",
+        "file to write: .h5 (embedded mesh with eigenpairs), .gltf, .glb, .dsp (Faust), or .npy "
+        "(Young's moduli [Pa] of the fine cells, for solver modes --material)",
     )
     format: str | None = option(None, "where --out has another ending", choices=FORMATS)
     points: int = option(
@@ -54,15 +59,24 @@ def run(arguments: argparse.Namespace) -> int:
         from sound.export.faust import write_faust
 
         write_faust(options.out, design, options.points)
+    elif kind == "npy":
+        from sound.export.moduli import write_moduli
+
+        write_moduli(options.out, design)
     else:
         from sound.export.gltf import write_gltf
 
         write_gltf(options.out, design, binary=kind == "glb")
-    print(
-        f"{options.out}: {len(design.frequencies)} modes, {design.frequencies[0]:.4g} to "
-        f"{design.frequencies[-1]:.4g} Hz, {Path(options.out).stat().st_size:,} bytes"
-    )
+    print(f"{options.out}: {_content(kind, design)}, {Path(options.out).stat().st_size:,} bytes")
     return 0
+
+
+def _content(kind: str, design: Design) -> str:
+    if kind == "npy":
+        young = design.young
+        return f"{len(young):,} moduli, {young.min() / 1e9:.3g} to {young.max() / 1e9:.3g} GPa"
+    hertz = design.frequencies
+    return f"{len(hertz)} modes, {hertz[0]:.4g} to {hertz[-1]:.4g} Hz"
 
 
 def _format(out: str, named: str | None) -> str:

@@ -1,4 +1,4 @@
-"""`python -m sound render`: the sound of a strike, as WAV."""
+"""`python -m sound render`: the sound of a strike, or of many, as WAV."""
 
 from __future__ import annotations
 
@@ -12,29 +12,34 @@ from typing import TYPE_CHECKING, Any
 from carillon.arguments import number_between, positive_number, whole_number
 from carillon.errors import UserError
 from carillon.options import REQUIRED, add_options, collect, option
-from sound.bounds import require_length, sample_rate
+from sound.bounds import (
+    LARGEST_IMPULSE,
+    LEAST_IMPULSE,
+    LONGEST_SOUND,
+    require_length,
+    sample_rate,
+)
 
 if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     import numpy as np
     from numpy.typing import NDArray
 
-    from sound.project.design_file import Design
-    from sound.rendering.listening import Listening
-    from sound.rendering.solid import SoundingSolid
+    from sound.rendering.render import Hit
+    from sound.rendering.scene import Scene
 
     Array = NDArray[np.float64]
 
-LONGEST_SECONDS = 600.0
-"""Length of a sound that somebody may want to hear."""
 LONGEST_CONTACT = 1.0
 """Duration of a force [s] that still strikes rather than pushes."""
-LEAST_IMPULSE, LARGEST_IMPULSE = 1e-6, 1e6
-"""What somebody may strike with [N s]."""
+FULL = 0.99
+"""Largest magnitude of a sound that is scaled to full scale: what rounds it does not reach 1."""
+TOLD = 1e-3
+"""Share of the clips' energy in missed tones from which on it is told."""
 
 
 @dataclass(frozen=True)
 class PointOptions:
-    """Where a solid is struck, by one of the three."""
+    """Where a solid is struck, by one of the four."""
 
     target: str | None = option(None, "strike where a target was assigned", metavar="NAME")
     vertex: int | None = option(None, "strike a vertex of the surface", type=whole_number(0))
@@ -45,6 +50,9 @@ class PointOptions:
         type=number_between(-1e18, 1e18),
         nargs=3,
         metavar=("X", "Y", "Z"),
+    )
+    strikes: str | None = option(
+        None, "strike many times, as a table says (CSV, see the documentation)", metavar="CSV"
     )
 
 
@@ -61,7 +69,8 @@ class ImpulseOptions:
     )
     strength: float = option(
         1.0,
-        "impulse along the inward normal [N s] (default 1, which sounds as loud as the clip)",
+        "impulse along the inward normal [N s] (default 1, which sounds as loud as the clip); with "
+        "--strikes that of lines without one",
         type=number_between(LEAST_IMPULSE, LARGEST_IMPULSE, "N s"),
     )
 
@@ -79,10 +88,14 @@ class RenderOptions:
         "duration of the force, half a sine (default 0: an impulse)",
         type=number_between(0.0, LONGEST_CONTACT, "s"),
     )
-    no_residual: bool = option(False, "modes only, without the rest of the clips")
+    no_residual: bool = option(False, "modes only, without the noise of the clips")
+    modes_out: str | None = option(
+        None, "file for the modes alone, just as loud (WAV)", metavar="FILE.wav"
+    )
+    normalise: bool = option(False, "scale to full scale, and say by how much")
     like: str | None = option(
         None,
-        "for modes.h5 of a designed object: dampings, points, loudness, residuals of a design",
+        "for modes.h5 of a designed object: dampings, points, loudness, noise of a design",
         metavar="DESIGN",
     )
     damping: list[float] | None = option(
@@ -96,20 +109,6 @@ class RenderOptions:
     json: bool = option(False, "print what sounds as JSON")
 
 
-@dataclass
-class _Scene:
-    """What is struck, where and how: the solid, its loudness, a point and an impulse there.
-
-    `distance` is that of the point from the one that was named [m].
-    """
-
-    solid: SoundingSolid
-    listening: Listening | None
-    position: Array
-    distance: float
-    impulse: Array
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     add_options(parser.add_mutually_exclusive_group(required=True), PointOptions)
@@ -121,46 +120,75 @@ def run(arguments: argparse.Namespace) -> int:
     """Render, write, and say what sounds."""
     import numpy as np
 
-    from sound.clips.wav import ENDINGS, PEAK, write_wav
-    from sound.outputs import require_output
-    from sound.rendering.render import Hit, render, ringing_seconds
+    from sound.clips.wav import PEAK, write_wav
+    from sound.rendering.render import rendered_parts, ringing_seconds
+    from sound.rendering.scene import open_scene
 
-    options = collect(RenderOptions, arguments)
-    require_output(options.out, ENDINGS, [options.file, options.like or options.file])
-    if options.seconds is not None and options.seconds > LONGEST_SECONDS:
-        raise UserError(f"--seconds {options.seconds:g}: expected at most {LONGEST_SECONDS:g}")
-    if options.seconds is not None:
-        require_length(options.seconds, options.rate)
-    scene = _scene(options, collect(PointOptions, arguments), collect(ImpulseOptions, arguments))
-    hit = Hit(0.0, scene.position, scene.impulse)
-    sound = render(
+    options, points = collect(RenderOptions, arguments), collect(PointOptions, arguments)
+    _require_outputs(options, points)
+    scene = open_scene(options.file, options.like, options.damping)
+    hits = _hits(scene, points, collect(ImpulseOptions, arguments))
+    seconds = options.seconds or max(hit.seconds for hit in hits) + ringing_seconds(scene.solid)
+    require_length(seconds, options.rate)
+    modes, noise = rendered_parts(
         scene.solid,
-        [hit],
-        options.seconds or ringing_seconds(scene.solid),
+        hits,
+        seconds,
         options.rate,
         options.contact_seconds,
         scene.listening,
         not options.no_residual,
     )
-    gain = 1.0 if scene.listening is None else scene.listening.gain(scene.position)
+    sound = modes + noise
     peak = float(np.abs(sound).max(initial=0.0))
-    if scene.listening is None and peak > 0.0:
-        gain = PEAK / peak
-        sound, peak = gain * sound, PEAK
-    write_wav(options.out, sound, options.rate)
-    summary = _summary(options, scene, gain, peak)
+    scale = 1.0
+    if peak > 0.0 and (options.normalise or scene.listening is None):
+        scale = (FULL if options.normalise else PEAK) / peak
+    write_wav(options.out, scale * sound, options.rate)
+    if options.modes_out is not None:
+        write_wav(options.modes_out, scale * modes, options.rate)
+    summary = _summary(options, scene, hits, scale) | _level(scale * modes, scale * noise)
     print(json.dumps(summary) if options.json else _sentence(summary))
-    if peak > 1.0:
-        print(f"sound: {peak:.2f} of full scale; lower --strength for players", file=sys.stderr)
+    if scale * peak > 1.0:
+        advice = "lower --strength for players, or --normalise"
+        print(f"sound: {scale * peak:.2f} of full scale; {advice}", file=sys.stderr)
     return 0
 
 
-def _scene(options: RenderOptions, point: PointOptions, strike: ImpulseOptions) -> _Scene:
+def _require_outputs(options: RenderOptions, points: PointOptions) -> None:
+    """Refuse names and a length that nothing can be written with, before the work."""
+    from sound.clips.wav import ENDINGS
+    from sound.outputs import require_output
+
+    inputs = [name for name in (options.file, options.like, points.strikes) if name is not None]
+    require_output(options.out, ENDINGS, inputs)
+    if options.modes_out is not None:
+        require_output(options.modes_out, ENDINGS, inputs)
+        if Path(options.modes_out).absolute() == Path(options.out).absolute():
+            raise UserError(f"--modes-out {options.modes_out}: is --out, too; name another file")
+    if options.seconds is not None and options.seconds > LONGEST_SOUND:
+        raise UserError(f"--seconds {options.seconds:g}: expected at most {LONGEST_SOUND:g}")
+    if options.seconds is not None:
+        require_length(options.seconds, options.rate)
+
+
+def _hits(scene: Scene, points: PointOptions, strike: ImpulseOptions) -> list[Hit]:
+    """The strikes that are asked for."""
     import numpy as np
 
-    position, inward, distance, solid, listening = _point_of_solid(options, point)
+    from sound.rendering.render import Hit
+    from sound.rendering.strike_list import Point, read_strikes
+
+    if points.strikes is not None:
+        if strike.impulse is not None:
+            raise UserError("--impulse goes with one strike; give strengths in the list")
+        return scene.hits(points.strikes, read_strikes(points.strikes), strike.strength)
+    given = next(name for name in ("target", "vertex", "at") if getattr(points, name) is not None)
+    at = None if points.at is None else (points.at[0], points.at[1], points.at[2])
+    point = Point(points.target, points.vertex, at)
+    ((position, inward, distance),) = scene.places([(f"--{given}", point)])
     if strike.impulse is None:
-        return _Scene(solid, listening, position, distance, strike.strength * inward)
+        return [Hit(0.0, position, strike.strength * inward, distance)]
     impulse = np.array(strike.impulse)
     strength = float(np.linalg.norm(impulse))
     if strength < LEAST_IMPULSE:
@@ -168,101 +196,70 @@ def _scene(options: RenderOptions, point: PointOptions, strike: ImpulseOptions) 
             "--impulse: expected three numbers [N s], not all of them 0; "
             f"{strength:g} N s in all is less than {LEAST_IMPULSE:g}"
         )
-    return _Scene(solid, listening, position, distance, impulse)
+    return [Hit(0.0, position, impulse, distance)]
 
 
-def _point_of_solid(
-    options: RenderOptions, point: PointOptions
-) -> tuple[Array, Array, float, SoundingSolid, Listening | None]:
-    """Struck point, inward normal there, distance from the point named, the solid, and how its
-    clips are heard if it has some."""
-    from carillon.files import kind_of
-    from solver.files.modes_file import read_modes
-    from solver.response.response import Damping
-    from sound.project.design_file import read_design
-    from sound.rendering.listening import Listening
-    from sound.rendering.solid import SoundingSolid
-
-    has_modes = kind_of(options.file, "a Carillon design or modes file (HDF5)")[0] == "modes"
-    if not has_modes and (options.damping or options.like):
-        raise UserError("--damping and --like go with modes.h5; a design has dampings of its own")
-    if options.damping and options.like:
-        raise UserError("--damping and --like exclude each other; a design tells all dampings")
-    if has_modes and not options.like:
-        file = read_modes(options.file)
-        damping = Damping(*options.damping) if options.damping else Damping()
-        return *_own_point(point, file.model), SoundingSolid.of_modes(file, damping), None
-    design = read_design(options.like or options.file)
-    if has_modes:
-        solid = SoundingSolid.of_truth(read_modes(options.file), design)
-    else:
-        solid = SoundingSolid.of_design(design)
-    return *_surface_point(point, design), solid, Listening.of_design(design, solid)
-
-
-def _surface_point(point: PointOptions, design: Design) -> tuple[Array, Array, float]:
-    """Struck point of a design's surface, inward normal there, distance from the point named."""
-    if point.target is not None:
-        strikes = {strike.name: strike for strike in design.strikes}
-        if point.target not in strikes:
-            raise UserError(
-                f"--target {point.target}: the design has no such target, expected one of "
-                f"{', '.join(strikes)}"
-            )
-        strike = strikes[point.target]
-        return strike.position, strike.inward, 0.0
-    import trimesh
-
-    from sound.strikes import locate
-
-    surface = trimesh.Trimesh(design.surface_vertices, design.surface_faces, process=False)
-    what = "--at" if point.vertex is None else "--vertex"
-    strike = locate(surface, what, point.at, point.vertex, design.unit)
-    return strike.position, strike.inward, strike.distance
-
-
-def _own_point(point: PointOptions, model: Any) -> tuple[Array, Array, float]:
-    """Struck point of a model's own surface, inward normal there, distance from the point named."""
-    import numpy as np
-
-    from solver.response.surface import REACH, surface_of
-    from sound.strikes import TOO_FAR
-
-    if point.at is None:
-        raise UserError(
-            "a modes file knows neither targets nor the vertices of a surface; strike it --at a "
-            "point, or name its design by --like"
-        )
-    surface = surface_of(model)
-    longest = float(np.ptp(surface.points, axis=0).max())
-    reach = max(TOO_FAR * longest, REACH * surface.edge)
-    position, inward = surface.place(np.array(point.at), "--at", reach)
-    return position, inward, float(np.linalg.norm(position - point.at))
-
-
-def _summary(options: RenderOptions, scene: _Scene, gain: float, peak: float) -> dict[str, Any]:
-    solid = scene.solid
-    amplitudes = gain * solid.amplitudes(scene.position[None], scene.impulse[None])[0]
+def _summary(options: RenderOptions, scene: Scene, hits: list[Hit], scale: float) -> dict[str, Any]:
+    """What sounds; of a single strike also where, how, and how loud each mode."""
+    solid, listening = scene.solid, scene.listening
     heard = solid.frequencies < options.rate / 2.0
-    return {
+    summary = {
         "out": str(Path(options.out)),
+        "modes_out": None if options.modes_out is None else str(Path(options.modes_out)),
         "rate_hz": options.rate,
-        "position_m": scene.position.tolist(),
-        "distance_m": scene.distance,
-        "impulse_newton_seconds": scene.impulse.tolist(),
-        "gain": gain,
-        "peak": peak,
+        "strikes": len(hits),
+        "scale": scale,
         "frequencies_hz": solid.frequencies[heard].tolist(),
         "dampings_per_second": solid.dampings[heard].tolist(),
-        "amplitudes": amplitudes[heard].tolist(),
         "modes_left_out": int((~heard).sum()),
+        "missed_share": None if listening is None else _missed(scene, hits),
+    }
+    if len(hits) > 1:
+        return summary
+    (hit,) = hits
+    gain = scale if listening is None else scale * listening.gain(hit.position)
+    amplitudes = gain * solid.amplitudes(hit.position[None], hit.impulse[None])[0]
+    return summary | {
+        "position_m": hit.position.tolist(),
+        "distance_m": hit.distance,
+        "impulse_newton_seconds": hit.impulse.tolist(),
+        "gain": gain,
+        "amplitudes": amplitudes[heard].tolist(),
     }
 
 
+def _missed(scene: Scene, hits: list[Hit]) -> float:
+    """Share of the clips' energy in tones that no mode has, of those clips that are struck."""
+    assert scene.listening is not None
+    weights = sum(scene.listening.weights(hit.position) for hit in hits) / len(hits)
+    return float(weights @ scene.listening.missed)
+
+
+def _level(modes: Array, noise: Array) -> dict[str, float]:
+    from numpy import abs
+
+    from sound.rendering.render import residual_share
+
+    peak = float(abs(modes + noise).max(initial=0.0))
+    return {"peak": peak, "residual_share": residual_share(modes, noise)}
+
+
 def _sentence(summary: dict[str, Any]) -> str:
+    from math import log10
+
     hertz = summary["frequencies_hz"]
     span = f", {min(hertz):.4g} to {max(hertz):.4g} Hz" if hertz else ""
     text = f"{summary['out']}: {len(hertz)} modes{span}, peak {summary['peak']:.3g} of full scale"
+    if summary["scale"] != 1.0:
+        text += f" (scaled by {summary['scale']:.4g}, {20.0 * log10(summary['scale']):+.1f} dB)"
     if summary["modes_left_out"]:
         text += f"; {summary['modes_left_out']} above half the sampling rate are left out"
+    if summary["missed_share"] is None:
+        return text
+    text += f"; {summary['residual_share']:.1%} of its energy is noise of the clips"
+    if summary["missed_share"] >= TOLD:
+        text += (
+            f"; tones with {summary['missed_share']:.1%} of the clips' energy are neither modes "
+            "nor noise and are left out"
+        )
     return text

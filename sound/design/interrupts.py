@@ -6,10 +6,12 @@ import os
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from types import FrameType
 from typing import Any
 
 STOPPING = "asked to stop: the best so far is written after this round; ask again to end at once\n"
+_interrupted: ContextVar[Callable[[], bool] | None] = ContextVar("interrupted", default=None)
 
 
 @contextmanager
@@ -29,8 +31,12 @@ def ended_by_interrupts() -> Iterator[None]:
 def interruptible() -> Iterator[Callable[[], bool]]:
     """Whether somebody asked to stop (Ctrl-C or SIGTERM); asked a second time, it is as before.
 
-    In another thread than the main one nobody can ask.
+    Within another one it tells what that does.  In another thread than the main one nobody can ask.
     """
+    outer = _interrupted.get()
+    if outer is not None:
+        yield outer
+        return
     asked = False
 
     def ask(number: int, frame: FrameType | None) -> None:
@@ -40,9 +46,11 @@ def interruptible() -> Iterator[Callable[[], bool]]:
         os.write(2, STOPPING.encode())
 
     former = _handled((signal.SIGINT, signal.SIGTERM), ask)
+    token = _interrupted.set(lambda: asked)
     try:
         yield lambda: asked
     finally:
+        _interrupted.reset(token)
         _restore(former)
 
 

@@ -23,7 +23,8 @@ def optimise(
     problem: DesignProblem,
     initial: Design | None = None,
     keep: Callable[[Design], None] | None = None,
-    watch: Callable[[Search], None] | None = None,
+    watch: Callable[[Search], bool | None] | None = None,
+    keep_seconds: float | None = None,
 ) -> Design:
     """Search for a material until the project's budget is spent, or somebody interrupts.
 
@@ -36,9 +37,11 @@ def optimise(
     initial
         Design to go on from, of the same mesh; its targets may be others.
     keep
-        Called with the design so far every `KEEP_SECONDS` of the search.
+        Called with the design so far every `KEEP_SECONDS` of the search, if there is a better one.
     watch
-        Called after every round of evaluations.
+        Called after every round of evaluations; ends the search by returning True.
+    keep_seconds : float or None [s]
+        Takes the place of `KEEP_SECONDS`.
 
     Raises
     ------
@@ -56,18 +59,19 @@ def optimise(
         before = (float(rows["seconds"][-1]), int(rows["evaluations"][-1]))
     outcome = Outcome(problem, rows)
     budget = project.optimiser
-    kept = time.monotonic()
+    every = KEEP_SECONDS if keep_seconds is None else keep_seconds
+    kept, known = time.monotonic(), None
 
     with interruptible() as interrupted:
 
         def look(search: Search) -> bool:
-            nonlocal kept
-            if watch is not None:
-                watch(search)
-            if keep is not None and time.monotonic() - kept >= KEEP_SECONDS and search.best:
+            nonlocal kept, known
+            ended = watch is not None and watch(search)
+            is_due = time.monotonic() - kept >= every and search.best is not known
+            if keep is not None and is_due and not ended:
                 keep(outcome.of(search))
-                kept = time.monotonic()
-            return interrupted()
+                kept, known = time.monotonic(), search.best
+            return bool(ended) or interrupted()
 
         search = Search(
             lambda: Pool(setting, problem.workers),

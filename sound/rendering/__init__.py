@@ -1,1 +1,1 @@
-"""Sounds of strikes: a bank of damped modes, and what of the clips is no mode."""
+"""Sounds of strikes: a bank of damped modes, and the noise of the clips."""

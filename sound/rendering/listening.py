@@ -1,13 +1,15 @@
-"""How loud a strike is heard, and what a clip holds besides its modes, anywhere on the surface."""
+"""How loud a strike is heard, and what noise goes with it, anywhere on the surface."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import gcd
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sound.clips.noise import noise_part
 from sound.project.design_file import Design
 from sound.rendering.solid import SoundingSolid
 
@@ -20,8 +22,9 @@ class Listening:
 
     A clip does not tell how hard its object was struck: it is taken for the sound of 1 N s along
     the inward normal, and the gain of its point lets the loudest mode there be as loud as the
-    clip's, which is how Eq. 2 compares them.  Elsewhere gains and residuals are averages weighted
-    by the inverse square of the distance.
+    clip's, which is how Eq. 2 compares them.  Elsewhere gains and noise are averages weighted by
+    the inverse square of the distance.  Of the residuals their noise alone is heard: partials that
+    were missed belong to the clip, not to the material.
 
     Attributes
     ----------
@@ -33,12 +36,15 @@ class Listening:
         The clips less their modes, after 1 N s.
     rates : T integers [Hz]
         Sampling rates of the residuals.
+    energies : (T,)
+        Squared samples of the clips' modes, summed over all time.
     """
 
     positions: Array
     gains: Array
     residuals: tuple[Array, ...]
     rates: tuple[int, ...]
+    energies: Array
 
     @classmethod
     def of_design(cls, design: Design, solid: SoundingSolid) -> Listening:
@@ -48,7 +54,21 @@ class Listening:
         inward = np.array([strike.inward for strike in design.strikes])
         loudest = solid.amplitudes(positions, inward).max(axis=1)
         gains = targets.amplitudes.max(axis=1) / loudest
-        return cls(positions, gains, targets.residuals, targets.rates)
+        squares = (targets.amplitudes**2 / (4.0 * targets.dampings)).sum(axis=1)
+        energies = np.array(targets.rates) * squares
+        return cls(positions, gains, targets.residuals, targets.rates, energies)
+
+    @cached_property
+    def _noise(self) -> list[tuple[Array, float]]:
+        return [noise_part(rest, rate) for rest, rate in zip(self.residuals, self.rates)]
+
+    @property
+    def missed(self) -> Array:
+        """Shares (T,) of the clips' energies in tones that are no modes, which are not heard."""
+        rests = np.array([rest @ rest for rest in self.residuals])
+        lacking = np.array([share for _, share in self._noise]) * rests
+        whole = self.energies + rests
+        return np.asarray(np.divide(lacking, whole, out=np.zeros_like(whole), where=whole > 0.0))
 
     def weights(self, position: Array) -> Array:
         """Weights (T,) of the struck points at a point (3,) [m]; 1 for the point itself."""
@@ -63,17 +83,9 @@ class Listening:
         """Gain at a point (3,) [m]."""
         return float(self.weights(position) @ self.gains)
 
-    def residual(self, position: Array, rate: int) -> Array:
-        """Residual (s,) at a point (3,) [m] after 1 N s, sampled at `rate` [Hz]."""
-        parts = [
-            weight * resampled(residual, own, rate)
-            for weight, residual, own in zip(self.weights(position), self.residuals, self.rates)
-            if weight > 0.0
-        ]
-        sound = np.zeros(max(map(len, parts)))
-        for part in parts:
-            sound[: len(part)] += part
-        return sound
+    def noise(self, rate: int) -> list[Array]:
+        """T residuals (s,) without their tones, after 1 N s, sampled at `rate` [Hz]."""
+        return [resampled(noise, own, rate) for (noise, _), own in zip(self._noise, self.rates)]
 
 
 def resampled(samples: Array, own: int, rate: int) -> Array:

@@ -22,11 +22,15 @@ LONGEST_SECONDS = 6.0
 
 @dataclass(frozen=True)
 class Hit:
-    """A strike at a time [s], at a point (3,) [m] of the surface, by an impulse (3,) [N s]."""
+    """A strike at a time [s], at a point (3,) [m] of the surface, by an impulse (3,) [N s].
+
+    `distance` is that of the point from the one that was named [m].
+    """
 
     seconds: float
     position: Array
     impulse: Array
+    distance: float = 0.0
 
 
 def render(
@@ -40,6 +44,23 @@ def render(
 ) -> Array:
     """The sound (s,) of one strike or many; strikes superpose.
 
+    The sum of `rendered_parts`, which describes the parameters.
+    """
+    parts = rendered_parts(solid, hits, seconds, rate, contact_seconds, listening, residual)
+    return np.add(*parts)
+
+
+def rendered_parts(
+    solid: SoundingSolid,
+    hits: Sequence[Hit],
+    seconds: float,
+    rate: int = SAMPLE_RATE_HERTZ,
+    contact_seconds: float = 0.0,
+    listening: Listening | None = None,
+    residual: bool = True,
+) -> tuple[Array, Array]:
+    """What modes sound (s,) after one strike or many, and the noise (s,) that goes with it.
+
     Parameters
     ----------
     solid
@@ -52,13 +73,13 @@ def render(
         Samples per second.  Modes from half of it on are left out.
     contact_seconds : float [s]
         Duration of the force, half a sine; 0 is an impulse.  A force that takes longer excites
-        high modes less.  It does not change the residuals, which come from a recording.
+        high modes less.  It does not change the noise, which comes from a recording.
     listening
-        Loudness and residuals of a design's clips: samples are then of full scale as the clips' are
-        and residuals are added in proportion to |impulse| over 1 N s.  Without it samples are the
-        plain sum of the modes' amplitudes [kg^-1/2 N s].
+        Loudness and noise of a design's clips: samples are then of full scale as the clips' are
+        and noise comes in proportion to |impulse| over 1 N s.  Without it samples are the plain
+        sum of the modes' amplitudes [kg^-1/2 N s], and there is no noise.
     residual : bool
-        Whether residuals are added.
+        Whether there is noise.
     """
     count = round(seconds * rate)
     positions = np.array([hit.position for hit in hits])
@@ -66,15 +87,21 @@ def render(
     if listening is not None:
         amplitudes *= np.array([[listening.gain(position)] for position in positions])
     bank = Bank(solid.frequencies, solid.dampings, rate)
-    sound = ring(bank, zip([hit.seconds for hit in hits], amplitudes), count)
+    modes = ring(bank, zip([hit.seconds for hit in hits], amplitudes), count)
     if contact_seconds > 0.0:
         from scipy.signal import fftconvolve  # Loaded where it is needed: it takes long.
 
-        sound = fftconvolve(sound, half_sine(contact_seconds, rate))[:count]
+        modes = fftconvolve(modes, half_sine(contact_seconds, rate))[:count]
+    noise = np.zeros(count)
     if listening is not None and residual:
-        for hit in hits:
-            _add_residual(sound, hit, listening, rate)
-    return sound
+        _add_noise(noise, hits, listening, rate)
+    return modes, noise
+
+
+def residual_share(modes: Array, noise: Array) -> float:
+    """Share of a sound's energy that is noise of its clips, no mode; 0 of silence."""
+    own, other = float(noise @ noise), float(modes @ modes)
+    return own / (own + other) if own > 0.0 else 0.0
 
 
 def ringing_seconds(solid: SoundingSolid) -> float:
@@ -83,8 +110,10 @@ def ringing_seconds(solid: SoundingSolid) -> float:
     return min(LONGEST_SECONDS, DECAY_NEPERS / slowest) if slowest > 0.0 else LONGEST_SECONDS
 
 
-def _add_residual(sound: Array, hit: Hit, listening: Listening, rate: int) -> None:
-    residual = listening.residual(hit.position, rate)
-    begin = round(hit.seconds * rate)
-    part = residual[: max(0, len(sound) - begin)]
-    sound[begin : begin + len(part)] += np.linalg.norm(hit.impulse) * part
+def _add_noise(sound: Array, hits: Sequence[Hit], listening: Listening, rate: int) -> None:
+    noises = listening.noise(rate)
+    for hit in hits:
+        begin, strength = round(hit.seconds * rate), np.linalg.norm(hit.impulse)
+        for weight, noise in zip(listening.weights(hit.position), noises):
+            part = noise[: max(0, len(sound) - begin)] if weight > 0.0 else noise[:0]
+            sound[begin : begin + len(part)] += weight * strength * part

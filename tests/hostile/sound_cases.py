@@ -358,6 +358,28 @@ each(
 hostile("nothing struck", "render ZOO/design.h5 --out o.wav", "--target")
 hostile("two things struck", f"{RENDER} --vertex 3", "--vertex")
 hostile("modes struck at a target", "render ZOO/modes.h5 --target end --out o.wav", "--at")
+STRIKES = "render ZOO/design.h5 --strikes s.csv --out o.wav"
+for name, text in {
+    "nothing": "",
+    "one word": "strike",
+    "zeros": "\0" * 4096,
+    "a long field": "time_seconds,target\n0," + "x" * 200_000 + "\n",
+    "a long number": "time_seconds,vertex\n0," + "1" * 5000 + "\n",
+    "an open quote": 'time_seconds,target\n0,"end\n',
+    "a formula": "time_seconds,target\n=1+1,end\n",
+    "another table": "a,b\n1,2\n",
+    "infinite time": "time_seconds,target\ninf,end\n",
+}.items():
+    hostile(f"strikes of {name}", STRIKES, "s.csv", files={"s.csv": text})
+for kind in ("folder", "pipe", "null"):
+    hostile(f"strikes of a {kind}", STRIKES, "s.csv", files={"s.csv": Place(kind)})
+hostile(
+    "strikes that are the sound",
+    "render ZOO/design.h5 --strikes s.wav --out s.wav",
+    "input",
+    files={"s.wav": "time_seconds,target\n0,end\n"},
+)
+hostile("modes alone over the sound", f"{RENDER} --modes-out o.wav", "--modes-out")
 hostile("damping of a design", f"{RENDER} --damping 1 1", "--damping")
 for value in ("nan 1", "-1 1", "inf 1", "1"):
     hostile(
@@ -492,6 +514,7 @@ control(
     "d.h5",
 )
 control("render", RENDER, "o.wav")
+control("strikes", STRIKES, "o.wav", files={"s.csv": "time_seconds,target\n0,end\n0.1,end\n"})
 control("render modes", "render ZOO/modes.h5 --at 0.1 0.075 0.1 --seconds 0.1 --out o.wav", "o.wav")
 for end in ("h5", "gltf", "glb", "dsp"):
     control(f"export {end}", f"export ZOO/design.h5 --out o.{end}", f"o.{end}")

@@ -60,18 +60,22 @@ def strike_of_recording(wildcards):
     return options({"at": at, "damping": damping})
 
 
-def place_arguments(wildcards):
-    """Where an example is struck for a sound."""
+def sound_arguments(wildcards, output):
+    """Where an example is struck for a sound, and where its modes alone are written."""
     if wildcards.point == ELSEWHERE:
-        return options({"at": EXAMPLES[wildcards.example].elsewhere[1]})
-    return options({"target": wildcards.point})
+        place = {"at": EXAMPLES[wildcards.example].elsewhere[1]}
+    else:
+        place = {"target": wildcards.point}
+    return options({**place, "modes_out": output.modes})
 
 
 def all_sounds(wildcards):
-    """All sounds of an example's page."""
+    """All sounds of an example's page, and their modes alone, which the clips have not."""
     names = list(targets_of(wildcards))
-    files = [f"{state}/{name}.wav" for state in ("before", "clips", "fine") for name in names]
-    files += [f"after/{name}.wav" for name in [*names, ELSEWHERE]]
+    rendered = [f"{state}/{{}}{name}.wav" for state in ("before", "fine") for name in names]
+    rendered += [f"after/{{}}{name}.wav" for name in [*names, ELSEWHERE]]
+    files = [file.format(folder) for file in rendered for folder in ("", "modes/")]
+    files += [f"clips/{name}.wav" for name in names]
     return [f"{SOUND}/{wildcards.example}/{file}" for file in files]
 
 

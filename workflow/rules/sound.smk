@@ -156,32 +156,33 @@ rule save_moduli:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/young.log",
     localrule: True
     params:
-        source=source("workflow.scripts.save_moduli"),
-    script:
-        "../scripts/save_moduli.py"
+        source=source("sound.commands.export"),
+    shell:
+        "python -m sound export {input.design:q} --out {output:q} > {log:q} 2>&1"
 
 
 rule render_before:
     input:
         f"{SOUND}/{{example}}/{START}",
     output:
-        f"{SOUND}/{{example}}/before/{{point}}.wav",
+        sound=f"{SOUND}/{{example}}/before/{{point}}.wav",
+        modes=f"{SOUND}/{{example}}/before/modes/{{point}}.wav",
     log:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/before-{{point}}.log",
     resources:
         **limits("render_before"),
     params:
         source=source("sound.commands.render"),
-        place=place_arguments,
+        how=sound_arguments,
     shell:
-        "python -m sound render {input:q} {params.place:q} --out {output:q} > {log:q} 2>&1"
+        "python -m sound render {input:q} {params.how:q} --out {output.sound:q} > {log:q} 2>&1"
 
 
 use rule render_before as record_clip with:
     input:
         f"{SOUND}/{{example}}/recorded.h5",
     output:
-        f"{SOUND}/{{example}}/clips/{{point}}.wav",
+        sound=f"{SOUND}/{{example}}/clips/{{point}}.wav",
     log:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/clip-{{point}}.log",
     wildcard_constraints:
@@ -190,14 +191,15 @@ use rule render_before as record_clip with:
         **limits("record_clip"),
     params:
         source=source("sound.commands.render"),
-        place=strike_of_recording,
+        how=strike_of_recording,
 
 
 use rule render_before as render_after with:
     input:
         f"{SOUND}/{{example}}/{DESIGN}",
     output:
-        f"{SOUND}/{{example}}/after/{{point}}.wav",
+        sound=f"{SOUND}/{{example}}/after/{{point}}.wav",
+        modes=f"{SOUND}/{{example}}/after/modes/{{point}}.wav",
     log:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/after-{{point}}.log",
 
@@ -207,17 +209,18 @@ rule render_fine:
         truth=f"{SOUND}/{{example}}/{TRUTH}",
         design=f"{SOUND}/{{example}}/{DESIGN}",
     output:
-        f"{SOUND}/{{example}}/fine/{{point}}.wav",
+        sound=f"{SOUND}/{{example}}/fine/{{point}}.wav",
+        modes=f"{SOUND}/{{example}}/fine/modes/{{point}}.wav",
     log:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/fine-{{point}}.log",
     resources:
         **limits("render_fine"),
     params:
         source=source("sound.commands.render"),
-        place=place_arguments,
+        how=sound_arguments,
     shell:
-        "python -m sound render {input.truth:q} --like {input.design:q} {params.place:q}"
-        " --out {output:q} > {log:q} 2>&1"
+        "python -m sound render {input.truth:q} --like {input.design:q} {params.how:q}"
+        " --out {output.sound:q} > {log:q} 2>&1"
 
 
 rule build_sound_page:

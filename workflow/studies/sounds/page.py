@@ -11,6 +11,9 @@ import yaml
 from numpy.typing import NDArray
 
 from solver.response.response import spectrogram
+from sound.rendering.listening import Listening
+from sound.rendering.render import residual_share
+from sound.rendering.solid import SoundingSolid
 from sound.strikes import locate
 from workflow.studies.base.media import (
     embedded,
@@ -24,7 +27,7 @@ from workflow.studies.base.table import Table
 from workflow.studies.sounds import plots
 from workflow.studies.sounds.examples import DESIGN, ELSEWHERE, PROJECT, START, TRUTH
 from workflow.studies.sounds.pictures import ELSEWHERE_CLASS, Mark, marks_of, material_pictures
-from workflow.studies.sounds.results import SoundResults
+from workflow.studies.sounds.results import MODES, SoundResults
 
 Array = NDArray[np.float64]
 Sound = tuple[Array, int]
@@ -35,9 +38,10 @@ DIGITS = 6
 """Of coordinates after the point."""
 ROOM_ABOVE = 1.5
 """Highest frequency of a spectrogram over that of the highest target."""
+CLIPS = "clips"
 STATES = {
     "before": "Before",
-    "clips": "Target",
+    CLIPS: "Target",
     "after": "After",
     "fine": "After, on the fine model",
 }
@@ -83,11 +87,14 @@ def _worst(frequencies: Table) -> dict[str, float]:
 
 def _points(results: SoundResults, marks: list[Mark], balance: Table) -> list[dict[str, Any]]:
     """Sounds and balance of every struck point."""
-    names = results.design.targets.names
+    design = results.design
+    names = design.targets.names
+    missed = Listening.of_design(design, SoundingSolid.of_design(design)).missed
     return [
         {
             "name": name,
             "style": mark.style,
+            "missed": missed[number],
             "position": np.round(mark.position / results.design.unit, DIGITS).tolist(),
             "panels": _panels(results, name),
             "balance": inlined(plots.balance_figure(balance, name), f"balance-{number}"),
@@ -103,19 +110,27 @@ def _panels(results: SoundResults, name: str) -> list[dict[str, Any]]:
 
 
 def _panel(results: SoundResults, state: str, name: str, together: list[Sound]) -> dict[str, Any]:
-    """Spectrogram and player of a sound, scaled as those that are shown `together`."""
+    """Spectrogram and players of a sound, scaled as those that are shown `together`."""
     sound, rate = results.sound(state, name)
-    target = (sound, rate) if name == ELSEWHERE else results.sound("clips", name)
+    target = (sound, rate) if name == ELSEWHERE else results.sound(CLIPS, name)
     loudest = float(spectrogram(*target)[2].max())
     seconds = min(SHOWN_SECONDS, max(len(each) / own for each, own in together))
     shown = _first(sound, rate, seconds)
     highest = min(highest_hertz(together), ROOM_ABOVE * results.design.targets.frequencies[-1])
     figure = spectrogram_figure(shown, loudest, float(highest), rate)
     peak = max(float(np.abs(each).max()) for each, _ in together)
-    return {
+    played = round(PLAYED_SECONDS * rate)
+    panel = {
         "state": STATES[state],
         "plot": inlined(figure, f"sound-{state}-{name.replace(' ', '-')}"),
-        "source": wav_uri(sound[: round(PLAYED_SECONDS * rate)], rate, peak),
+        "source": wav_uri(sound[:played], rate, peak),
+    }
+    if state == CLIPS:
+        return panel
+    modes = results.modes_alone(state, name)
+    return panel | {
+        "modes": wav_uri(modes[:played], rate, peak),
+        "residual_share": residual_share(modes, sound - modes),
     }
 
 
@@ -146,8 +161,12 @@ def _files(results: SoundResults) -> list[dict[str, Any]]:
     }
     for state, what in STATES.items():
         for name in results.design.targets.names:
-            descriptions[f"{state}/{name}.wav"] = f"{name}, {what[0].lower()}{what[1:]}"
-    descriptions[f"after/{ELSEWHERE}.wav"] = f"{results.example.elsewhere[0]}, without a target"
+            said = f"{name}, {what[0].lower()}{what[1:]}"
+            descriptions[f"{state}/{name}.wav"] = said
+            descriptions[f"{state}/{MODES}/{name}.wav"] = f"{said}, modes alone"
+    said = f"{results.example.elsewhere[0]}, without a target"
+    descriptions[f"after/{ELSEWHERE}.wav"] = said
+    descriptions[f"after/{MODES}/{ELSEWHERE}.wav"] = f"{said}, modes alone"
     for part in results.example.parts[:-1]:
         below = Path(part).name
         descriptions[f"{below}/{DESIGN}"] = f"the design after {below.replace('-', ' ')}"

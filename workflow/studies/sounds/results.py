@@ -19,6 +19,9 @@ from workflow.studies.sounds.examples import DESIGN, START, TRUTH, Example, exam
 
 Array = NDArray[np.float64]
 
+MODES = "modes"
+"""Folder of modes alone below that of the sounds."""
+
 
 @dataclass(frozen=True)
 class SoundResults(Results):
@@ -92,3 +95,7 @@ class SoundResults(Results):
     def sound(self, state: str, name: str) -> tuple[Array, int]:
         """Samples (s,) and rate [Hz] of a rendered sound, or of a clip."""
         return read_wav(self.file(f"{state}/{name}.wav"))
+
+    def modes_alone(self, state: str, name: str) -> Array:
+        """Samples (s,) of a rendered sound without the noise of the clips."""
+        return read_wav(self.file(f"{state}/{MODES}/{name}.wav"))[0]

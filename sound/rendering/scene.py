@@ -1,0 +1,159 @@
+"""A solid that can be struck: of a design or of modes, with its loudness and its surface."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.errors import UserError
+from carillon.fem.model import Solid
+from carillon.files import kind_of
+from solver.files.modes_file import read_modes
+from solver.response.response import Damping
+from sound.project.design_file import Design, read_design
+from sound.rendering.listening import Listening
+from sound.rendering.render import Hit
+from sound.rendering.solid import SoundingSolid
+from sound.rendering.strike_list import ListedStrike, Point
+
+Array = NDArray[np.float64]
+Places = Callable[[Iterable[tuple[str, Point]]], list[tuple[Array, Array, float]]]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A solid and how it is heard.
+
+    Attributes
+    ----------
+    solid
+        What sounds.
+    listening
+        Loudness and noise of a design's clips; None for modes of no design.
+    places
+        Position (3,) [m], inward normal (3,) and distance from what was named [m] of points of the
+        surface, each given with what messages call it.
+    """
+
+    solid: SoundingSolid
+    listening: Listening | None
+    places: Places
+
+    def hits(self, path: str | Path, strikes: Sequence[ListedStrike], strength: float) -> list[Hit]:
+        """The strikes of a list, read from `path`; `strength` [N s] where a line names none.
+
+        Raises
+        ------
+        UserError
+            If a point cannot be struck, with the line.
+        """
+        points = {strike.point: f"line {strike.line}" for strike in reversed(strikes)}
+        try:
+            places = self.places((name, point) for point, name in points.items())
+        except UserError as error:
+            raise UserError(f"{path}: {error}") from None
+        found = dict(zip(points, places, strict=True))
+        hits = []
+        for strike in strikes:
+            position, inward, distance = found[strike.point]
+            impulse = (strength if strike.strength is None else strike.strength) * inward
+            hits.append(Hit(strike.seconds, position, impulse, distance))
+        return hits
+
+
+def open_scene(
+    file: str | Path, like: str | Path | None = None, damping: Sequence[float] | None = None
+) -> Scene:
+    """The scene of a file.
+
+    Parameters
+    ----------
+    file
+        A design, or modes of the solver.
+    like
+        For modes of a designed object: the design.
+    damping : (2,) or None
+        For modes of no design: Rayleigh's coefficients of mass [1/s] and stiffness [s].
+
+    Raises
+    ------
+    UserError
+        If a file is unusable, or what is given does not go with its kind.
+    """
+    has_modes = kind_of(file, "a Carillon design or modes file (HDF5)")[0] == "modes"
+    if not has_modes and (damping or like):
+        raise UserError("--damping and --like go with modes.h5; a design has dampings of its own")
+    if damping and like:
+        raise UserError("--damping and --like exclude each other; a design tells all dampings")
+    if has_modes and not like:
+        modes = read_modes(file)
+        solid = SoundingSolid.of_modes(modes, Damping(*damping) if damping else Damping())
+        return Scene(solid, None, _places_of_model(modes.model))
+    design = read_design(like or file)
+    if has_modes:
+        solid = SoundingSolid.of_truth(read_modes(file), design)
+    else:
+        solid = SoundingSolid.of_design(design)
+    return Scene(solid, Listening.of_design(design, solid), _places_of_design(design))
+
+
+def _places_of_design(design: Design) -> Places:
+    """Targets, and vertices of the surface."""
+    targets = {strike.name: (strike.position, strike.inward, 0.0) for strike in design.strikes}
+
+    def places(points: Iterable[tuple[str, Point]]) -> list[tuple[Array, Array, float]]:
+        import trimesh
+
+        from sound.strikes import Place, inward_normals, vertex_of
+
+        surface = trimesh.Trimesh(design.surface_vertices, design.surface_faces, process=False)
+        found: list[tuple[Array, Array, float] | None] = []
+        vertices, distances = [], []
+        for name, point in points:
+            if point.target is None:
+                place = Place(name, point.at, point.vertex)
+                vertex, distance = vertex_of(surface, place, design.unit)
+                vertices.append(vertex)
+                distances.append(distance)
+                found.append(None)
+            elif point.target in targets:
+                found.append(targets[point.target])
+            else:
+                raise UserError(
+                    f"{name}: the design has no target {point.target!r}, expected one of "
+                    f"{', '.join(targets)}"
+                )
+        positions = design.surface_vertices[vertices]
+        inward = inward_normals(surface, positions) if vertices else positions
+        struck = zip(positions, inward, distances, strict=True)
+        return [next(struck) if place is None else place for place in found]
+
+    return places
+
+
+def _places_of_model(model: Solid) -> Places:
+    """Points of a model's own surface."""
+
+    def places(points: Iterable[tuple[str, Point]]) -> list[tuple[Array, Array, float]]:
+        from solver.response.surface import REACH, surface_of
+        from sound.strikes import TOO_FAR
+
+        surface = surface_of(model)
+        longest = float(np.ptp(surface.points, axis=0).max())
+        reach = max(TOO_FAR * longest, REACH * surface.edge)
+        found = []
+        for name, point in points:
+            if point.at is None:
+                raise UserError(
+                    f"{name}: a modes file knows neither targets nor the vertices of a surface; "
+                    "strike it --at a point, or name its design by --like"
+                )
+            position, inward = surface.place(np.array(point.at), name, reach)
+            found.append((position, inward, float(np.linalg.norm(position - point.at))))
+        return found
+
+    return places
