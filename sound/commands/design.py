@@ -42,6 +42,11 @@ class DesignOptions:
     initial_design: str | None = option(
         None, "design of the same mesh to go on from, its targets aside", metavar="DESIGN"
     )
+    fine_check: bool | None = option(
+        None,
+        "check on the fine solid what the coarse search finds, and let it aim at what is right "
+        "there, not as the project says",
+    )
     restart: bool = option(False, "begin anew, even if --out exists")
     json: bool = option(False, "print the outcome as JSON")
 
@@ -76,7 +81,7 @@ def _search(options: DesignOptions, settings: SearchOptions) -> int:
     out = require_output(options.out, ENDINGS, inputs)
     if settings.evaluations is not None and settings.seconds is None:
         project = replace(project, optimiser=replace(project.optimiser, seconds=None))
-    project = with_optimiser(project, **asdict(settings))
+    project = with_optimiser(project, **asdict(settings), fine_check=options.fine_check)
     initial = None
     if options.initial_design is not None:
         initial = read_design(options.initial_design)
@@ -116,13 +121,21 @@ class _SearchProgress:
             f"cost {cost.total:9.4g} ({fall(first.cost.total, cost.total):.1%} less)  "
             f"E_f {cost.frequency:8.3g}  E_a {cost.amplitude:8.3g}"
         )
+        if search.checks:
+            best = min(search.checks, key=lambda check: check.cost)
+            text += (
+                f"  rms {best.coarse_rms_cents:.1f} cents coarse, {best.fine_rms_cents:.1f} fine"
+            )
         say(text, end="\r" if self._terminal else "\n")
 
 
 def summarise(design: Design) -> dict[str, Any]:
     """The outcome as plain values."""
+    from sound.design.cents import rms_cents
+
     evidence = design.evidence
-    off = np.abs(design.frequencies / design.targets.frequencies - 1.0)
+    wanted = design.targets.frequencies
+    off = np.abs(design.frequencies / wanted - 1.0)
     return {
         "cost_start": evidence["cost_start"],
         "cost": evidence["cost"],
@@ -138,6 +151,9 @@ def summarise(design: Design) -> dict[str, Any]:
         "targets": [strike.name for strike in design.strikes],
         "frequency_error_median": float(np.median(off)),
         "frequency_error_max": float(off.max()),
+        "coarse_rms_cents": rms_cents(design.coarse_frequencies, wanted),
+        "fine_rms_cents": None if design.fine is None else rms_cents(design.frequencies, wanted),
+        "checks": evidence["checks"],
         "young_min_pa": float(design.young.min()),
         "young_max_pa": float(design.young.max()),
         "residual_max": evidence["residual_max"],
@@ -153,9 +169,21 @@ def _sentences(out: Path, design: Design, summary: dict[str, Any]) -> str:
             f"frequencies of {summary['modes']} modes: median error "
             f"{summary['frequency_error_median']:.2%}, worst {summary['frequency_error_max']:.2%}; "
             f"residuals of the modes up to {summary['residual_max']:.1e}",
+            _rms_sentence(summary),
             f"Young's modulus {design.young.min() / 1e9:.3g} to {design.young.max() / 1e9:.3g} GPa",
             f"design: {out}",
         ]
+    )
+
+
+def _rms_sentence(summary: dict[str, Any]) -> str:
+    """How far frequencies are from the targets, with the moduli scaled so that it is least."""
+    coarse, fine = summary["coarse_rms_cents"], summary["fine_rms_cents"]
+    if fine is None:
+        return f"from their targets (rms): {coarse:.1f} cents"
+    return (
+        f"from their targets (rms): {coarse:.1f} cents on the coarse solid, {fine:.1f} on the fine "
+        f"one, by {len(summary['checks'])} checks"
     )
 
 

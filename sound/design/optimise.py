@@ -9,10 +9,11 @@ import numpy as np
 
 from sound.design.interrupts import interruptible
 from sound.design.optimisers import OPTIMISERS
-from sound.design.outcome import Outcome, require_modes
+from sound.design.outcome import Outcome
 from sound.design.pool import Pool, Task
 from sound.design.preparation import DesignProblem, coordinates_of
-from sound.design.search import BudgetSpentError, Search
+from sound.design.search import BudgetSpentError, Search, require_modes
+from sound.design.space_mapping import SpaceMapping
 from sound.project.design_file import HISTORY_TYPE, Design
 
 KEEP_SECONDS = 30.0
@@ -27,7 +28,8 @@ def optimise(
 ) -> Design:
     """Search for a material until the project's budget is spent, or somebody interrupts.
 
-    What is found is never worse than what the search starts from, by analyses to `FINAL_TOLERANCE`.
+    What is found is never worse than what the search starts from, by analyses to `FINAL_TOLERANCE`;
+    where a coarse solid is searched on and the project wants checks, by its cost on the fine one.
 
     Parameters
     ----------
@@ -56,6 +58,16 @@ def optimise(
         before = (float(rows["seconds"][-1]), int(rows["evaluations"][-1]))
     outcome = Outcome(problem, rows)
     budget = project.optimiser
+    mapping = None
+    if budget.fine_check and setting.is_coarsened:
+        mapping = SpaceMapping(setting.objective, outcome.checked)
+
+    def design_of(search: Search) -> Design:
+        if mapping is None:
+            return outcome.of(search)
+        assert mapping.best is not None
+        return outcome.of_checked(search, mapping.best)
+
     kept = time.monotonic()
 
     with interruptible() as interrupted:
@@ -64,8 +76,9 @@ def optimise(
             nonlocal kept
             if watch is not None:
                 watch(search)
-            if keep is not None and time.monotonic() - kept >= KEEP_SECONDS and search.best:
-                keep(outcome.of(search))
+            there = search.best if mapping is None else mapping.best
+            if keep is not None and time.monotonic() - kept >= KEEP_SECONDS and there:
+                keep(design_of(search))
                 kept = time.monotonic()
             return interrupted()
 
@@ -77,10 +90,14 @@ def optimise(
             before,
         )
         with search:
+            optimiser = OPTIMISERS[budget.method]
             try:
                 search.run([Task(z)])
                 require_modes(search)
-                OPTIMISERS[budget.method](search, z, budget.seed, budget.population)
+                if mapping is None:
+                    optimiser(search, z, budget.seed, budget.population)
             except BudgetSpentError:
                 pass
-        return outcome.of(search)
+            if mapping is not None:
+                mapping.run(search, optimiser, budget.seed, budget.population)
+        return design_of(search)

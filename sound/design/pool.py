@@ -57,6 +57,15 @@ class Setting:
     objective: Objective
     cells: FiniteCells | None = None
 
+    @property
+    def is_coarsened(self) -> bool:
+        """Whether what is analysed stands for a finer solid."""
+        return self.cells is None and self.options.coarsen != "none"
+
+    def fine(self) -> Setting:
+        """The same without coarsening."""
+        return replace(self, options=replace(self.options, coarsen="none"))
+
     def simulation(self, tolerance: float = TOLERANCE) -> Simulation:
         """Its simulation, on as many threads as this process is allowed."""
         modes = len(self.objective.targets.frequencies)
@@ -79,6 +88,8 @@ class Task:
         Whether the gradient of the cost is asked for.
     options, steps, damping, limits
         Of a descent, see `descend`; an evaluation alone if there are no options.
+    objective
+        What is lowered in place of the setting's.
     """
 
     z: Array
@@ -88,6 +99,7 @@ class Task:
     steps: int = 0
     damping: tuple[float, ...] | None = None
     limits: DescentLimits = DescentLimits()
+    objective: Objective | None = None
 
 
 @dataclass(frozen=True)
@@ -211,7 +223,7 @@ def _run(task: Task) -> Trial:
 
 
 def _descent(task: Task, options: StepOptions | LimitedMemory) -> DesignDescent:
-    parts = (_simulation, _objective, task.z, task.start)
+    parts = (_simulation, task.objective or _objective, task.z, task.start)
     if isinstance(options, LimitedMemory):
         return descend_by_gradients(*parts, task.steps * options.evaluations, task.limits)
     return descend(*parts, options, task.steps, task.damping, task.limits)
@@ -229,9 +241,10 @@ def _done(task: Task) -> Trial:
             descent=replace(descent, last=None),
             start=last.modes.start(),
         )
+    objective = task.objective or _objective
     evaluation = _simulation.evaluate(task.z, task.start, task.gradient)
-    cost = cost_of(_objective, _simulation.material, evaluation)
+    cost = cost_of(objective, _simulation.material, evaluation)
     if not task.gradient:
         return Trial(task.z, cost, 1)
-    gradient = squares_of(_objective, _simulation.material, evaluation).gradient
+    gradient = squares_of(objective, _simulation.material, evaluation).gradient
     return Trial(task.z, cost, 1, gradient, start=evaluation.modes.start())
