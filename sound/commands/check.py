@@ -77,8 +77,8 @@ def _lines(content: dict[str, Any]) -> list[str]:
         lines.append("  ".join([f"{mode:4}", *columns]))
     coarse, fine = content["coarse_rms_cents"], content["fine_rms_cents"]
     lines.append(
-        f"from their targets, but for a common factor (rms): {coarse:.1f} cents on the coarse solid "
-        f"of {content['coarse_cells']:,} cells, {fine:.1f} on the fine one of "
+        f"from their targets, but for a common factor (rms): {coarse:.1f} cents on the coarse "
+        f"solid of {content['coarse_cells']:,} cells, {fine:.1f} on the fine one of "
         f"{content['voxels']:,} voxels"
     )
     return lines

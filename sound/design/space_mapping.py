@@ -26,11 +26,11 @@ from sound.design.simulation import Evaluation
 
 Array = NDArray[np.float64]
 
-FIRST_SHARE, SHARE = 0.35, 0.3
-"""Of what is left of the budget: of the first leg, and of each that follows."""
-SHORTER = 0.5
-"""Factor of a leg's share after one that led to nothing better on the fine solid: the errors of the
-coarse model there are known near the best material alone."""
+FIRST_SHARE, LEAST_SHARE, LARGEST_SHARE = 0.2, 0.1, 0.35
+"""Of what is left of the budget: of the first leg, and of any."""
+LONGER, SHORTER = 1.5, 0.5
+"""Factors of a leg's share after one that led to something better on the fine solid, and after one
+that did not: the errors of the coarse solid are known near the best material alone."""
 
 Optimiser = Callable[..., None]
 
@@ -106,7 +106,8 @@ class SpaceMapping:
             if search.best is None:
                 continue
             better, reserve = self._checked(search, search.best)
-            share = SHARE if better else SHORTER * share
+            share *= LONGER if better else SHORTER
+            share = min(max(share, LEAST_SHARE), LARGEST_SHARE)
             seed += 1
 
     def _checked(self, search: Search, trial: Trial) -> tuple[bool, float]:
