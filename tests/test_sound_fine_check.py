@@ -15,10 +15,12 @@ from carillon.fem.model import fine_model
 from solver import solve
 from sound.__main__ import main
 from sound.design.cents import cents, common_factor, rms_cents
+from sound.design.descent import DescentLimits
 from sound.design.fine_check import ShapeMatch, fine_frequencies
 from sound.design.optimise import optimise
 from sound.design.outcome import Outcome
 from sound.design.preparation import prepare
+from sound.design.reduced_model import ReducedModel, descend_by_model
 from sound.project.design_file import FineFrequencies, read_design, write_design
 from tests import small_project
 from tests.edited_files import edited
@@ -84,6 +86,32 @@ def test_result_does_not_depend_on_the_number_of_workers(problem, checked):
     again = optimise(with_options(problem, workers=2))
     np.testing.assert_array_equal(again.coordinates, checked.coordinates)
     np.testing.assert_array_equal(again.frequencies, checked.frequencies)
+
+
+def test_descents_by_a_reduced_model_lower_the_cost(problem):
+    simulation = problem.setting.fine().simulation()
+    objective, limits = problem.setting.objective, DescentLimits()
+    descent = descend_by_model(
+        simulation, objective, np.zeros(problem.setting.material.dimensions), None, 6, 0.3, limits
+    )
+    costs = [point.cost.total for point in descent.costs]
+    assert costs == sorted(costs, reverse=True)
+    assert costs[-1] < 0.05 * costs[0]
+
+
+def test_a_reduced_model_is_right_at_its_centre_and_to_first_order(problem):
+    simulation = problem.setting.fine().simulation(1e-10)
+    size = simulation.material.dimensions
+    move = 1e-3 * np.random.default_rng(1).standard_normal(size)
+    here = simulation.differentiate(simulation.evaluate(np.zeros(size)), whole=True)
+    model = ReducedModel(here)
+    there = simulation.evaluate(move, here.modes)
+    moved = model.at(move)
+    np.testing.assert_allclose(model.at(0.0 * move).eigenvalues, here.eigenvalues)
+    change = np.abs(there.eigenvalues - here.eigenvalues)
+    assert (np.abs(moved.eigenvalues - there.eigenvalues) < 0.05 * change.max()).all()
+    own = np.abs(np.abs(there.pushed) - np.abs(here.pushed)).max()
+    assert np.abs(np.abs(moved.pushed) - np.abs(there.pushed)).max() < 0.05 * own
 
 
 def test_somebody_who_interrupts_gets_the_best_checked_so_far(problem):

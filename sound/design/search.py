@@ -140,8 +140,8 @@ class Search:
         """Evaluations of this search."""
         return self._done
 
-    def begin_leg(self, objective: Objective, share: float, reserve: float) -> None:
-        """Give a share of what is left of the budget to a search with another objective.
+    def begin_leg(self, objective: Objective | None, share: float, reserve: float) -> None:
+        """Give a share of what is left of the budget to a search, perhaps with another objective.
 
         From now on `best` is that of this leg.  `reserve` seconds are kept for what follows it; a
         leg that would leave too little for another one is the last.

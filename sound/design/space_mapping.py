@@ -20,17 +20,17 @@ from carillon.errors import ConvergenceError
 from sound.design.cents import rms_cents
 from sound.design.fine_check import FineModes
 from sound.design.objective import Objective
+from sound.design.optimisers import descend_finely
 from sound.design.pool import Trial
 from sound.design.search import BudgetSpentError, CheckEntry, Search, require_modes
 from sound.design.simulation import Evaluation
 
 Array = NDArray[np.float64]
 
-FIRST_SHARE, LEAST_SHARE, LARGEST_SHARE = 0.2, 0.1, 0.35
-"""Of what is left of the budget: of the first leg, and of any."""
-LONGER, SHORTER = 1.5, 0.5
-"""Factors of a leg's share after one that led to something better on the fine solid, and after one
-that did not: the errors of the coarse solid are known near the best material alone."""
+FIRST_SHARE, LARGEST_SHARE = 0.2, 0.35
+"""Of what is left of the budget: of the first leg on the coarse solid, and of any."""
+LONGER = 1.5
+"""Factor of a leg's share to the next one's."""
 
 Optimiser = Callable[..., None]
 
@@ -91,23 +91,28 @@ class SpaceMapping:
         """Search from the first material of a search until its budget is spent.
 
         Every leg begins at the best material so far, and aims at the targets less the errors of the
-        coarse solid there.
+        coarse solid there.  Where these lead no further, one descends on the fine solid itself.
         """
-        share = FIRST_SHARE
-        reserve = self._checked(search, require_modes(search))[1]
+        share, finely = FIRST_SHARE, False
+        _, reserve = self._checked(search, require_modes(search))
         while not search.spent:
             assert self.best is not None
-            best = self.best
-            search.begin_leg(aimed(self._objective, best.fine), share, reserve)
+            best, z = self.best, self.best.evaluation.z
             try:
-                optimiser(search, best.evaluation.z, seed, population)
+                if finely:
+                    search.begin_leg(None, 1.0, reserve)
+                    descend_finely(search, z)
+                else:
+                    search.begin_leg(aimed(self._objective, best.fine), share, reserve)
+                    optimiser(search, z, seed, population)
             except BudgetSpentError:
                 pass
             if search.best is None:
                 continue
-            better, reserve = self._checked(search, search.best)
-            share *= LONGER if better else SHORTER
-            share = min(max(share, LEAST_SHARE), LARGEST_SHARE)
+            # Modes to start from are rows of one of the two solids.
+            better, reserve = self._checked(search, replace(search.best, start=None))
+            finely = not better and not finely
+            share = min(LONGER * share, LARGEST_SHARE)
             seed += 1
 
     def _checked(self, search: Search, trial: Trial) -> tuple[bool, float]:
