@@ -32,6 +32,10 @@ FIRST_SHARE, LARGEST_SHARE = 0.2, 0.35
 LONGER = 1.5
 """Factor of a leg's share to the next one's."""
 
+WORTHWHILE = 0.5
+"""Share of the cost on the fine solid that a leg on the coarse one has to come down to, or the next
+leg is on the fine solid."""
+
 Optimiser = Callable[..., None]
 
 
@@ -91,10 +95,10 @@ class SpaceMapping:
         """Search from the first material of a search until its budget is spent.
 
         Every leg begins at the best material so far, and aims at the targets less the errors of the
-        coarse solid there.  Where these lead no further, one descends on the fine solid itself.
+        coarse solid there.  Where these gain little, one descends on the fine solid itself.
         """
         share, finely = FIRST_SHARE, False
-        _, reserve = self._checked(search, require_modes(search))
+        reserve = self._checked(search, require_modes(search))
         while not search.spent:
             assert self.best is not None
             best, z = self.best, self.best.evaluation.z
@@ -110,25 +114,24 @@ class SpaceMapping:
             if search.best is None:
                 continue
             # Modes to start from are rows of one of the two solids.
-            better, reserve = self._checked(search, replace(search.best, start=None))
-            finely = not better and not finely
+            reserve = self._checked(search, replace(search.best, start=None))
+            finely = not finely and self.best.total > WORTHWHILE * best.total
             share = min(LONGER * share, LARGEST_SHARE)
             seed += 1
 
-    def _checked(self, search: Search, trial: Trial) -> tuple[bool, float]:
-        """Check a material: whether it is the best one, and how long that took [s]."""
+    def _checked(self, search: Search, trial: Trial) -> float:
+        """Check a material, and remember it if it is the best one; how long that took [s]."""
         begin = time.monotonic()
         try:
             checked = self._check(trial)
         except ConvergenceError:  # modes to be had coarsely alone
             if self.best is None:
                 raise
-            return False, time.monotonic() - begin
+            return time.monotonic() - begin
         search.checks.append(self._entry(search, checked))
-        better = self.best is None or checked.total < self.best.total
-        if better:
+        if self.best is None or checked.total < self.best.total:
             self.best = checked
-        return better, time.monotonic() - begin
+        return time.monotonic() - begin
 
     def _entry(self, search: Search, checked: Checked) -> CheckEntry:
         fine, wanted = checked.fine, self._objective.targets.frequencies
