@@ -265,9 +265,9 @@ def test_the_chord_is_on_the_bunny_where_its_mesh_is_and_on_a_bell_otherwise(tmp
 def test_all_examples_are_planned_without_any_mesh_file(tmp_path):
     jobs = planned(snakemake(tmp_path, "sounds", "--dry-run", "--cores", 2))
     chosen = examples(CONFIG).values()
-    assert jobs["design_sound"] == sum(example.edits for example in chosen) == 6
-    assert jobs["begin_design"] == jobs["check_design"] == jobs["build_sound_page"] == 4
-    assert jobs["record_clip"] == 2 and jobs["synthesise_clip"] == 9
+    assert jobs["design_sound"] == sum(example.edits for example in chosen) == 9
+    assert jobs["begin_design"] == jobs["check_design"] == jobs["build_sound_page"] == 7
+    assert jobs["record_clip"] == 8 and jobs["synthesise_clip"] == 9
     assert jobs["build_sounds_index"] == 1 and jobs["compare_optimisers"] == 2
 
 
@@ -280,7 +280,7 @@ def test_a_tiny_design_is_made_from_synthesised_clips_and_sounds(tmp_path):
     assert done.returncode == 0, done.stderr + (log.read_text() if log.exists() else "")
     design = read_design(tmp_path / folder / DESIGN)
     assert design.targets.names == ("plate", "handle")
-    assert design.frequencies[0] == pytest.approx(design.targets.frequencies[0])
-    assert (np.diff(design.history["cost"]) <= 0.0).all()
+    assert np.log(design.frequencies / design.targets.frequencies).mean() == pytest.approx(0.0)
+    assert design.evidence["cost"] <= design.evidence["cost_start"]
     sound, rate = read_wav(tmp_path / target)
     assert rate == 44_100 and len(sound) > 0.1 * rate

@@ -11,6 +11,9 @@ COMMANDS = {
     "design": Command(
         "sound.commands.design", "optimise the material until struck points sound as clips"
     ),
+    "check": Command(
+        "sound.commands.check", "frequencies of a design on the fine solid, beside its targets"
+    ),
     "render": Command("sound.commands.render", "the sound of a strike, as WAV"),
     "export": Command(
         "sound.commands.export", "modes on the mesh, glTF, Faust or moduli, for other tools"

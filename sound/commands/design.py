@@ -43,6 +43,11 @@ class DesignOptions:
     initial_design: str | None = option(
         None, "design of the same mesh to go on from, its targets aside", metavar="DESIGN"
     )
+    fine_check: bool | None = option(
+        None,
+        "check on the fine solid what the coarse search finds, and let it aim at what is right "
+        "there, not as the project says",
+    )
     restart: bool = option(False, "begin anew, even if --out exists")
     watch: bool = option(
         False,
@@ -82,7 +87,7 @@ def _search(options: DesignOptions, settings: SearchOptions) -> int:
         raise UserError("--watch goes on until interrupted; leave out --seconds and --evaluations")
 
     def load() -> Project:
-        return _with_settings(load_project(options.project), settings, options.watch)
+        return _with_settings(load_project(options.project), settings, options)
 
     edited = EditedProject(options.project, load)
     project = edited.project
@@ -109,16 +114,17 @@ def _search(options: DesignOptions, settings: SearchOptions) -> int:
     return 0
 
 
-def _with_settings(project: Project, settings: SearchOptions, endless: bool) -> Project:
-    """The project with the command's settings for its optimiser; without a budget if `endless`."""
+def _with_settings(project: Project, settings: SearchOptions, options: DesignOptions) -> Project:
+    """The project with the command's settings for its optimiser; without a budget if it watches."""
     from sound.project.project import with_optimiser
 
     budget = project.optimiser
-    if endless:
+    if options.watch:
         budget = replace(budget, seconds=None, evaluations=None)
     elif settings.evaluations is not None and settings.seconds is None:
         budget = replace(budget, seconds=None)
-    return with_optimiser(replace(project, optimiser=budget), **asdict(settings))
+    project = replace(project, optimiser=budget)
+    return with_optimiser(project, **asdict(settings), fine_check=options.fine_check)
 
 
 class _SearchProgress:
@@ -141,13 +147,21 @@ class _SearchProgress:
             f"cost {cost.total:9.4g} ({fall(first.cost.total, cost.total):.1%} less)  "
             f"E_f {cost.frequency:8.3g}  E_a {cost.amplitude:8.3g}"
         )
+        if search.checks:
+            best = min(search.checks, key=lambda check: check.cost)
+            text += (
+                f"  rms {best.coarse_rms_cents:.1f} cents coarse, {best.fine_rms_cents:.1f} fine"
+            )
         say(text, end="\r" if self._terminal else "\n")
 
 
 def summarise(design: Design) -> dict[str, Any]:
     """The outcome as plain values."""
+    from sound.design.cents import rms_cents
+
     evidence = design.evidence
-    off = np.abs(design.frequencies / design.targets.frequencies - 1.0)
+    wanted = design.targets.frequencies
+    off = np.abs(design.frequencies / wanted - 1.0)
     return {
         "cost_start": evidence["cost_start"],
         "cost": evidence["cost"],
@@ -164,6 +178,9 @@ def summarise(design: Design) -> dict[str, Any]:
         "target_distances_m": [strike.distance for strike in design.strikes],
         "frequency_error_median": float(np.median(off)),
         "frequency_error_max": float(off.max()),
+        "coarse_rms_cents": rms_cents(design.coarse_frequencies, wanted),
+        "fine_rms_cents": None if design.fine is None else rms_cents(design.frequencies, wanted),
+        "checks": evidence["checks"],
         "young_min_pa": float(design.young.min()),
         "young_max_pa": float(design.young.max()),
         "residual_max": evidence["residual_max"],
@@ -179,9 +196,21 @@ def _sentences(out: Path, design: Design, summary: dict[str, Any]) -> str:
             f"frequencies of {summary['modes']} modes: median error "
             f"{summary['frequency_error_median']:.2%}, worst {summary['frequency_error_max']:.2%}; "
             f"residuals of the modes up to {summary['residual_max']:.1e}",
+            _rms_sentence(summary),
             f"Young's modulus {design.young.min() / 1e9:.3g} to {design.young.max() / 1e9:.3g} GPa",
             f"design: {out}",
         ]
+    )
+
+
+def _rms_sentence(summary: dict[str, Any]) -> str:
+    """How far frequencies are from the targets, with the moduli scaled so that it is least."""
+    coarse, fine = summary["coarse_rms_cents"], summary["fine_rms_cents"]
+    if fine is None:
+        return f"from their targets (rms): {coarse:.1f} cents"
+    return (
+        f"from their targets (rms): {coarse:.1f} cents on the coarse solid, {fine:.1f} on the fine "
+        f"one, by {len(summary['checks'])} checks"
     )
 
 

@@ -75,14 +75,18 @@ class Objective:
         What the points shall sound like.
     weights
         w_f, w_a and w_r.
+    shift : (T, N)
+        Added to the targets' balances of amplitudes, none if not given.
     """
 
-    def __init__(self, targets: Targets, weights: Weights) -> None:
+    def __init__(self, targets: Targets, weights: Weights, shift: Array | None = None) -> None:
         self.targets = targets
         self.weights = weights
         self._bark = bark(targets.frequencies)
         energies = _average(targets.frequencies, targets.amplitudes**2)
         self._target = np.sqrt(energies / np.maximum(energies.max(axis=1, keepdims=True), TINY))
+        if shift is not None:
+            self._target = self._target + shift
 
     def frequency_residual(self, eigenvalues: Array) -> Array:
         """Bark differences (N - 1,) of the second mode to the last (Eq. 1)."""
@@ -90,7 +94,7 @@ class Objective:
 
     def amplitude_residual(self, eigenvalues: Array, pushed: Array) -> Array:
         """Differences (T, N - 1) of the balances, of the second mode to the last (Eq. 2)."""
-        return np.asarray(self._balance(eigenvalues, pushed) - self._target)[:, 1:]
+        return np.asarray(self.balance(eigenvalues, pushed) - self._target)[:, 1:]
 
     def cost(self, eigenvalues: Array, pushed: Array, regulariser: float) -> DesignCost:
         """Eq. (4).
@@ -135,7 +139,8 @@ class Objective:
         """s_f f_i with s_f = F_1 / f_1."""
         return np.asarray(self.targets.frequencies[0] * np.sqrt(eigenvalues / eigenvalues[0]))
 
-    def _balance(self, eigenvalues: Array, pushed: Array) -> Array:
+    def balance(self, eigenvalues: Array, pushed: Array) -> Array:
+        """Amplitudes (T, N) of modes as shares of the loudest at each point, see `cost`."""
         energies = _average(np.sqrt(eigenvalues), pushed**2)
         return np.asarray(np.sqrt(energies / energies.max(axis=1, keepdims=True)))
 

@@ -9,10 +9,11 @@ import numpy as np
 
 from sound.design.interrupts import interruptible
 from sound.design.optimisers import OPTIMISERS
-from sound.design.outcome import Outcome, require_modes
+from sound.design.outcome import Outcome
 from sound.design.pool import Pool, Task
 from sound.design.preparation import DesignProblem, coordinates_of
-from sound.design.search import BudgetSpentError, Search
+from sound.design.search import BudgetSpentError, Search, require_modes
+from sound.design.space_mapping import SpaceMapping
 from sound.project.design_file import HISTORY_TYPE, Design
 
 KEEP_SECONDS = 30.0
@@ -28,7 +29,8 @@ def optimise(
 ) -> Design:
     """Search for a material until the project's budget is spent, or somebody interrupts.
 
-    What is found is never worse than what the search starts from, by analyses to `FINAL_TOLERANCE`.
+    What is found is never worse than what the search starts from, by analyses to `FINAL_TOLERANCE`;
+    where a coarse solid is searched on and the project wants checks, by its cost on the fine one.
 
     Parameters
     ----------
@@ -60,17 +62,29 @@ def optimise(
     outcome = Outcome(problem, rows)
     budget = project.optimiser
     every = KEEP_SECONDS if keep_seconds is None else keep_seconds
-    kept, known = time.monotonic(), None
+    mapping = None
+    if budget.fine_check and setting.is_coarsened:
+        mapping = SpaceMapping(setting.objective, outcome.checked)
+
+    def design_of(search: Search) -> Design:
+        if mapping is None:
+            return outcome.of(search)
+        assert mapping.best is not None
+        return outcome.of_checked(search, mapping.best)
+
+    kept: float = time.monotonic()
+    known: object = None
 
     with interruptible() as interrupted:
 
         def look(search: Search) -> bool:
             nonlocal kept, known
             ended = watch is not None and watch(search)
-            is_due = time.monotonic() - kept >= every and search.best is not known
+            best = search.best if mapping is None else mapping.best
+            is_due = time.monotonic() - kept >= every and best is not known
             if keep is not None and is_due and not ended:
-                keep(outcome.of(search))
-                kept, known = time.monotonic(), search.best
+                keep(design_of(search))
+                kept, known = time.monotonic(), best
             return bool(ended) or interrupted()
 
         search = Search(
@@ -81,10 +95,14 @@ def optimise(
             before,
         )
         with search:
+            optimiser = OPTIMISERS[budget.method]
             try:
                 search.run([Task(z)])
                 require_modes(search)
-                OPTIMISERS[budget.method](search, z, budget.seed, budget.population)
+                if mapping is None:
+                    optimiser(search, z, budget.seed, budget.population)
             except BudgetSpentError:
                 pass
-        return outcome.of(search)
+            if mapping is not None:
+                mapping.run(search, optimiser, budget.seed, budget.population)
+        return design_of(search)

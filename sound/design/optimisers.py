@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sound.design.descent import LimitedMemory, StepOptions
 from sound.design.pool import Task, Trial
+from sound.design.reduced_model import TrustRegion
 from sound.design.search import Search
 
 Array = NDArray[np.float64]
@@ -24,6 +25,9 @@ DESCENTS = (
     LimitedMemory(evaluations=2),
 )
 """How the descents go that run side by side: none is the best for all solids."""
+FINE_DESCENTS = (TrustRegion(radius=0.3), TrustRegion(radius=0.03))
+FINE_STEPS = 3
+"""The same on the fine solid, and fewer steps, as each takes longer."""
 STEPS = 6
 """Steps that a descent takes before all are compared."""
 WORTHWHILE = 0.01
@@ -91,6 +95,16 @@ def quasi_newton(search: Search, z: Array, seed: int, population: int | None) ->
 
     while True:
         z = minimize(value, z, jac=True, method="L-BFGS-B").x
+
+
+def descend_finely(search: Search, z: Array) -> None:
+    """Descents on the fine solid, until all of them have stalled."""
+    lanes = [Task(z, options=options, steps=FINE_STEPS, fine=True) for options in FINE_DESCENTS]
+    while True:
+        trials = search.run(lanes)
+        if all(_is_stalled(trial) for trial in trials):
+            return
+        lanes = [_continued(lane, trial) for lane, trial in zip(lanes, trials)]
 
 
 OPTIMISERS = {"hybrid": hybrid, "cma": evolution, "bfgs": quasi_newton}

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.errors import ConvergenceError, UserError
+from carillon.errors import ConvergenceError
 from carillon.threads import one_thread
 from solver.files.modes_file import frequencies
+from sound.design.cents import common_factor
 from sound.design.descent import cost_of
+from sound.design.fine_check import FineModes, FineSolid
 from sound.design.objective import DesignCost
 from sound.design.pool import Trial
 from sound.design.preparation import DesignProblem
-from sound.design.search import HistoryEntry, Search
+from sound.design.search import HistoryEntry, Search, require_modes
 from sound.design.simulation import Evaluation, Simulation
-from sound.project.design_file import HISTORY_TYPE, Design
+from sound.design.space_mapping import Checked
+from sound.project.design_file import HISTORY_TYPE, Design, FineFrequencies
 
 FINAL_TOLERANCE = 1e-12
 """Relative error of the eigenvalues that a design is written with; its root is that of the modes,
@@ -28,10 +31,11 @@ and so of the terms of the cost."""
 
 @dataclass(frozen=True)
 class _Analysed:
-    """A trial's material, analysed to `FINAL_TOLERANCE`, and its cost."""
+    """A material's modes to `FINAL_TOLERANCE`, its cost, and its modes on the fine solid."""
 
     evaluation: Evaluation
     cost: DesignCost
+    fine: FineModes | None = None
 
 
 class Outcome:
@@ -49,8 +53,12 @@ class Outcome:
     def _simulation(self) -> Simulation:
         return self._problem.setting.simulation(FINAL_TOLERANCE)
 
+    @cached_property
+    def _fine_solid(self) -> FineSolid:
+        return FineSolid(self._problem.setting, self._simulation)
+
     def of(self, search: Search) -> Design:
-        """The design that a search has found so far.
+        """The design that a search has found so far, by analyses of the solid that it works with.
 
         Raises
         ------
@@ -65,7 +73,23 @@ class Outcome:
                 chosen = min(self._analysed(best), start, key=lambda each: each.cost.total)
             except ConvergenceError:  # modes to be had coarsely alone
                 pass
-        return self._design(search, chosen, start.cost)
+        return self._design(search, chosen, start.cost.total)
+
+    def checked(self, trial: Trial) -> Checked:
+        """A trial's material, analysed on the solid of the search and on the fine one.
+
+        Raises
+        ------
+        ConvergenceError
+            If it has no modes on one of them.
+        """
+        evaluation = self._analysed(trial).evaluation
+        return Checked(evaluation, self._fine_solid.modes(evaluation))
+
+    def of_checked(self, search: Search, best: Checked) -> Design:
+        """The design of the best material by checks on the fine solid."""
+        chosen = _Analysed(best.evaluation, best.fine.cost, best.fine)
+        return self._design(search, chosen, search.checks[0].cost)
 
     def _analysed(self, trial: Trial) -> _Analysed:
         setting = self._problem.setting
@@ -74,16 +98,19 @@ class Outcome:
             evaluation = self._simulation.evaluate(trial.z, trial.start)
             return _Analysed(evaluation, cost_of(setting.objective, setting.material, evaluation))
 
-    def _design(self, search: Search, chosen: _Analysed, cost_start: DesignCost) -> Design:
+    def _design(self, search: Search, chosen: _Analysed, cost_start: float) -> Design:
         problem, setting, simulation = self._problem, self._problem.setting, self._simulation
         evaluation, cost, targets = chosen.evaluation, chosen.cost, setting.objective.targets
-        factor = float((targets.frequencies[0] / frequencies(evaluation.eigenvalues)[0]) ** 2)
+        fine = chosen.fine
+        hertz = frequencies(evaluation.eigenvalues) if fine is None else fine.frequencies
+        stretch = common_factor(hertz, targets.frequencies)
+        factor = stretch**2
         moduli = setting.material.moduli(evaluation.z)
         seconds, evaluations = search.own_seconds, search.own_evaluations
         evidence: dict[str, Any] = {
             "method": problem.project.optimiser.method,
             "workers": problem.workers,
-            "cost_start": cost_start.total,
+            "cost_start": cost_start,
             "cost": cost.total,
             "frequency_cost": cost.frequency,
             "amplitude_cost": cost.amplitude,
@@ -95,6 +122,7 @@ class Outcome:
             "orthogonality": evaluation.modes.evidence["orthogonality"],
             "eigenvalue_error_estimate": evaluation.modes.evidence["eigenvalue_error_estimate"],
             "n_dofs": simulation.model.n_dofs,
+            "checks": [asdict(entry) for entry in search.checks],
         }
         return Design(
             strikes=list(setting.strikes),
@@ -112,17 +140,8 @@ class Outcome:
             history=np.concatenate([self._former_rows, history_rows(search.history)]),
             settings=problem.project.as_dict(),
             evidence=evidence,
+            fine=None if fine is None else FineFrequencies(stretch * hertz, fine.order),
         )
-
-
-def require_modes(search: Search) -> Trial:
-    """The trial that a search began with."""
-    if search.start is None or not np.isfinite(search.start.cost.total):
-        raise UserError(
-            "the material to start from has no modes that could be computed; expected a solid "
-            "whose parts hang together, raise resolution"
-        )
-    return search.start
 
 
 def history_rows(history: Sequence[HistoryEntry]) -> NDArray[np.void]:

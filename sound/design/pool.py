@@ -13,6 +13,7 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
+from functools import cache
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import wait
 from threading import Thread
@@ -37,6 +38,7 @@ from sound.design.descent import (
 )
 from sound.design.material import ReducedMaterial
 from sound.design.objective import DesignCost, Objective
+from sound.design.reduced_model import TrustRegion, descend_by_model
 from sound.design.simulation import TOLERANCE, Simulation
 from sound.strikes import Strike
 
@@ -56,6 +58,15 @@ class Setting:
     strikes: Sequence[Strike]
     objective: Objective
     cells: FiniteCells | None = None
+
+    @property
+    def is_coarsened(self) -> bool:
+        """Whether what is analysed stands for a finer solid."""
+        return self.cells is None and self.options.coarsen != "none"
+
+    def fine(self) -> Setting:
+        """The same without coarsening."""
+        return replace(self, options=replace(self.options, coarsen="none"))
 
     def simulation(self, tolerance: float = TOLERANCE) -> Simulation:
         """Its simulation, on as many threads as this process is allowed."""
@@ -79,15 +90,21 @@ class Task:
         Whether the gradient of the cost is asked for.
     options, steps, damping, limits
         Of a descent, see `descend`; an evaluation alone if there are no options.
+    objective
+        What is lowered in place of the setting's.
+    fine : bool
+        Whether the fine solid is meant, not the one of the search.
     """
 
     z: Array
     start: Array | None = None
     gradient: bool = False
-    options: StepOptions | LimitedMemory | None = None
+    options: StepOptions | LimitedMemory | TrustRegion | None = None
     steps: int = 0
     damping: tuple[float, ...] | None = None
     limits: DescentLimits = DescentLimits()
+    objective: Objective | None = None
+    fine: bool = False
 
 
 @dataclass(frozen=True)
@@ -162,8 +179,8 @@ class Pool:
             self._executor.shutdown(cancel_futures=True)
 
 
+_setting: Setting
 _simulation: Simulation
-_objective: Objective
 _for_good = ExitStack()
 
 
@@ -196,8 +213,15 @@ def _end_with_parent() -> None:
 
 
 def _prepare(setting: Setting) -> None:
-    global _simulation, _objective
-    _simulation, _objective = setting.simulation(), setting.objective
+    global _setting, _simulation
+    _setting, _simulation = setting, setting.simulation()
+    _fine_simulation.cache_clear()
+
+
+@cache
+def _fine_simulation() -> Simulation:
+    """That of the fine solid, which not every search looks at."""
+    return _setting.fine().simulation()
 
 
 def _run(task: Task) -> Trial:
@@ -210,10 +234,14 @@ def _run(task: Task) -> Trial:
     return Trial(task.z, FAILED, 1)
 
 
-def _descent(task: Task, options: StepOptions | LimitedMemory) -> DesignDescent:
-    parts = (_simulation, _objective, task.z, task.start)
+def _descent(task: Task, options: StepOptions | LimitedMemory | TrustRegion) -> DesignDescent:
+    simulation = _fine_simulation() if task.fine else _simulation
+    parts = (simulation, task.objective or _setting.objective, task.z, task.start)
     if isinstance(options, LimitedMemory):
         return descend_by_gradients(*parts, task.steps * options.evaluations, task.limits)
+    if isinstance(options, TrustRegion):
+        radius = task.damping[0] if task.damping else options.radius
+        return descend_by_model(*parts, task.steps, radius, task.limits)
     return descend(*parts, options, task.steps, task.damping, task.limits)
 
 
@@ -229,9 +257,10 @@ def _done(task: Task) -> Trial:
             descent=replace(descent, last=None),
             start=last.modes.start(),
         )
+    objective = task.objective or _setting.objective
     evaluation = _simulation.evaluate(task.z, task.start, task.gradient)
-    cost = cost_of(_objective, _simulation.material, evaluation)
+    cost = cost_of(objective, _simulation.material, evaluation)
     if not task.gradient:
         return Trial(task.z, cost, 1)
-    gradient = squares_of(_objective, _simulation.material, evaluation).gradient
+    gradient = squares_of(objective, _simulation.material, evaluation).gradient
     return Trial(task.z, cost, 1, gradient, start=evaluation.modes.start())

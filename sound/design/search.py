@@ -5,12 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.errors import UserError
 from sound.design.descent import DescentLimits
-from sound.design.objective import DesignCost
+from sound.design.objective import DesignCost, Objective
 from sound.design.pool import Pool, Task, Trial
 
 Array = NDArray[np.float64]
@@ -18,6 +20,15 @@ Array = NDArray[np.float64]
 
 FEWEST = 2
 """Evaluations that a descent needs: that of its start, and one to find something better."""
+
+
+LEAST_LEG = 8
+"""Evaluations of a leg: those of four descents, which run side by side."""
+LEAST_LEG_SECONDS = 2.0
+"""The same as a multiple of the time that is reserved for what follows a leg."""
+
+ENDLESS_SECONDS = 60.0
+"""What legs are shares of where nothing but somebody's word ends a search."""
 
 
 class BudgetSpentError(Exception):
@@ -31,6 +42,31 @@ class HistoryEntry:
     seconds: float
     evaluations: int
     cost: DesignCost
+
+
+@dataclass(frozen=True)
+class CheckEntry:
+    """What a check on the fine solid found of a material.
+
+    Attributes
+    ----------
+    seconds, evaluations
+        Of the search so far.
+    coarse_rms_cents, fine_rms_cents : float [cents]
+        Root mean square distances of coarse and fine frequencies from the targets, each with the
+        moduli scaled so that it is least.
+    foretold_rms_cents : float [cents]
+        That of the fine frequencies from those that the search expected.
+    cost : float
+        Eq. (4) of the fine solid.
+    """
+
+    seconds: float
+    evaluations: int
+    coarse_rms_cents: float
+    fine_rms_cents: float
+    foretold_rms_cents: float
+    cost: float
 
 
 class Search:
@@ -53,11 +89,15 @@ class Search:
     Attributes
     ----------
     best
-        The best trial so far.
+        The best trial so far, of the present leg.
     start
-        The first one.
+        The first one of all.
     history
-        Its cost over time.
+        The cost of the best one over time; it may rise where a leg begins.
+    spent
+        Whether the whole budget is used up, or somebody asked to stop.
+    checks
+        What checks on the fine solid found, see `sound.design.space_mapping`.
     """
 
     def __init__(
@@ -71,12 +111,17 @@ class Search:
         self.best: Trial | None = None
         self.start: Trial | None = None
         self.history: list[HistoryEntry] = []
-        self._most = evaluations
+        self.spent = False
+        self.checks: list[CheckEntry] = []
+        self._objective: Objective | None = None
+        self._is_last = True
+        self._most = self._leg_most = evaluations
         self._watch = watch
         self._before = before
         self._done = 0
         self._begin = time.monotonic()
         self.deadline = np.inf if seconds is None else self._begin + seconds
+        self._leg_deadline = self.deadline
         self._pool = make_pool()
 
     def __enter__(self) -> Search:
@@ -95,34 +140,63 @@ class Search:
         """Evaluations of this search."""
         return self._done
 
+    def begin_leg(self, objective: Objective | None, share: float, reserve: float) -> None:
+        """Give a share of what is left of the budget to a search, perhaps with another objective.
+
+        From now on `best` is that of this leg.  `reserve` seconds are kept for what follows it; a
+        leg that would leave too little for another one is the last.
+        """
+        self.best, self._objective = None, objective
+        self._is_last = False
+        now, left = time.monotonic(), self.deadline - time.monotonic()
+        if np.isfinite(left):
+            seconds = max(share * left, LEAST_LEG_SECONDS * reserve)
+            self._is_last = left - seconds <= (LEAST_LEG_SECONDS + 2.0) * reserve
+            self._leg_deadline = now + (left - reserve if self._is_last else seconds)
+        elif self._most is None:
+            self._leg_deadline = now + share * ENDLESS_SECONDS
+        if self._most is not None:
+            evaluations = max(round(share * (self._most - self._done)), LEAST_LEG)
+            if self._most - self._done - evaluations < LEAST_LEG:
+                self._is_last = True
+            self._leg_most = self._most if self._is_last else self._done + evaluations
+
     def run(self, tasks: Sequence[Task]) -> list[Trial]:
         """What becomes of the tasks.
 
         Raises
         ------
         BudgetSpentError
-            If the budget is spent, before or after: what was found is in `best` then.  Where it is
-            enough for some of the tasks only, these are run.
+            If the budget of the leg is spent, before or after: what was found is in `best` then.
+            Where it is enough for some of the tasks only, these are run.
         """
         affordable = self._affordable(tasks)
-        if not affordable:
-            raise BudgetSpentError
+        if not affordable or time.monotonic() >= self._leg_deadline:
+            self._end()
         trials = self._pool.run(affordable)
         self._record(trials)
-        stopped = self._watch is not None and self._watch(self)
-        if stopped or time.monotonic() >= self.deadline or len(trials) < len(tasks):
-            raise BudgetSpentError
+        if self._watch is not None and self._watch(self):
+            self._is_last = True
+            self._end()
+        if time.monotonic() >= self._leg_deadline or len(trials) < len(tasks):
+            self._end()
         return trials
+
+    def _end(self) -> NoReturn:
+        self.spent = self._is_last
+        raise BudgetSpentError
 
     def _affordable(self, tasks: Sequence[Task]) -> list[Task]:
         """The first tasks that enough evaluations are left for, with their limits."""
-        if self._most is None:
-            return [replace(task, limits=DescentLimits(self.deadline)) for task in tasks]
-        left = self._most - self._done
+        tasks = [replace(task, objective=self._objective) for task in tasks]
+        deadline = self._leg_deadline
+        if self._leg_most is None:
+            return [replace(task, limits=DescentLimits(deadline)) for task in tasks]
+        left = self._leg_most - self._done
         needed = 1 if all(task.options is None for task in tasks) else FEWEST
         count = min(len(tasks), left // needed)
         return [
-            replace(task, limits=DescentLimits(self.deadline, left // count + (k < left % count)))
+            replace(task, limits=DescentLimits(deadline, left // count + (k < left % count)))
             for k, task in enumerate(tasks[:count])
         ]
 
@@ -130,6 +204,7 @@ class Search:
         """Add what was found, in the order of the clock, to the history."""
         now = time.monotonic()
         costs = []
+        lowest = np.inf if self.best is None else self.history[-1].cost.total
         for trial in trials:
             points = [] if trial.descent is None else trial.descent.costs
             counted = 0
@@ -144,10 +219,21 @@ class Search:
                 self.best = trial
         for clock, evaluations, cost in sorted(costs, key=lambda each: each[0]):
             self._done += evaluations
-            if not self.history or cost.total < self.history[-1].cost.total:
+            if cost.total < lowest or not self.history:
+                lowest = cost.total
                 self._note(clock, cost)
         self._note(now, self.history[-1].cost)
 
     def _note(self, clock: float, cost: DesignCost) -> None:
         seconds = self._before[0] + clock - self._begin
         self.history.append(HistoryEntry(seconds, self._before[1] + self._done, cost))
+
+
+def require_modes(search: Search) -> Trial:
+    """The trial that a search began with."""
+    if search.start is None or not np.isfinite(search.start.cost.total):
+        raise UserError(
+            "the material to start from has no modes that could be computed; expected a solid "
+            "whose parts hang together, raise resolution"
+        )
+    return search.start

@@ -71,10 +71,14 @@ def projected_stiffness(
 
 def close_pairs(values: Array) -> Index:
     """Numbers (P, 2) of eigenvalues (N,) that differ by `CLOSE` at most, first each with itself."""
-    own = np.arange(len(values))
-    i, j = np.triu_indices(len(values), 1)
-    close = _are_close(values[i], values[j])
-    return np.concatenate([np.stack([own, own], 1), np.stack([i[close], j[close]], 1)])
+    pairs = all_pairs(len(values))
+    return np.asarray(pairs[_are_close(values[pairs[:, 0]], values[pairs[:, 1]])])
+
+
+def all_pairs(count: int) -> Index:
+    """Numbers (P, 2) of pairs of `count` modes, first each with itself."""
+    own = np.arange(count)
+    return np.concatenate([np.stack([own, own], 1), np.stack(np.triu_indices(count, 1), 1)])
 
 
 def inside_response(elastic: Array, values: Array, pushed: Array) -> Array:

@@ -23,7 +23,7 @@ from sound.design.elements import analysed_elements
 from sound.design.material import ReducedMaterial
 from sound.design.objective import Sensitivity
 from sound.design.outside import lies_between, outside_response, shift_between
-from sound.design.sensitivity import close_pairs, inside_response, projected_stiffness
+from sound.design.sensitivity import all_pairs, close_pairs, inside_response, projected_stiffness
 from sound.strikes import Strike
 
 Array = NDArray[np.float64]
@@ -132,8 +132,8 @@ class Simulation:
         evaluation = Evaluation(z, modes.values[RIGID_MODES:], pushed, modes, inverse=own)
         return self.differentiate(evaluation) if derivatives else evaluation
 
-    def differentiate(self, evaluation: Evaluation) -> Evaluation:
-        """The same evaluation with derivatives.
+    def differentiate(self, evaluation: Evaluation, whole: bool = False) -> Evaluation:
+        """The same evaluation with derivatives, `whole` those of all pairs of modes one by one.
 
         Its modes then have the inverse of their own material, for an analysis that starts there.
         """
@@ -141,14 +141,14 @@ class Simulation:
         inverse = evaluation.inverse
         if inverse is None or not lies_between(values, inverse.shift):
             inverse = self.solver.inverse(modes, shift_between(values))
-        sensitivity = self._sensitivity(evaluation, inverse)
+        sensitivity = self._sensitivity(evaluation, inverse, whole)
         if isinstance(inverse, Lasting):
             modes = replace(modes, inverse=inverse)
         else:
             inverse.destroy()
         return replace(evaluation, sensitivity=sensitivity, modes=modes)
 
-    def _sensitivity(self, evaluation: Evaluation, inverse: Inverse) -> Sensitivity:
+    def _sensitivity(self, evaluation: Evaluation, inverse: Inverse, whole: bool) -> Sensitivity:
         young = self.material.moduli(evaluation.z)
         elastic = np.ascontiguousarray(evaluation.modes.vectors[:, RIGID_MODES:])
         directions = self.material.slopes(young)[:, None] * self.material.basis
@@ -157,10 +157,12 @@ class Simulation:
         outside = outside_response(
             evaluation.modes, inverse, elastic, values, self._pushes, self._accuracy
         )
-        outside += inside_response(elastic, values, evaluation.pushed)
+        if not whole:
+            outside += inside_response(elastic, values, evaluation.pushed)
         vectors, others = np.empty_like(elastic), np.empty_like(outside)
         vectors[self._order], others[self._order] = elastic, outside
-        nodes, pairs = self.model.connectivity, close_pairs(values)
+        nodes = self.model.connectivity
+        pairs = all_pairs(len(values)) if whole else close_pairs(values)
         inside, beyond = projected_stiffness(nodes, self._strains, vectors, pairs, others, slopes)
         return Sensitivity(pairs, inside, beyond)
 

@@ -39,6 +39,22 @@ HISTORY = {
 HISTORY_TYPE = np.dtype([(name, float) for name in HISTORY])
 
 
+@dataclass(frozen=True)
+class FineFrequencies:
+    """What the fine solid of a design sounds at.
+
+    Attributes
+    ----------
+    hertz : (N,) [Hz]
+        Of its elastic modes, ascending.
+    order : (N,)
+        Number of the coarse elastic mode that has the shape of each.
+    """
+
+    hertz: Array
+    order: Integers
+
+
 @dataclass
 class Design:
     """A material that lets struck points sound as their clips do.
@@ -52,8 +68,8 @@ class Design:
     coordinates : (m,)
         z of the reduced material Y = Phi z (§6), dimensionless: of a reference modulus.
     young : (M,) [Pa]
-        Young's modulus of the fine cells, scaled so that the first elastic mode sounds at the first
-        target frequency.
+        Young's modulus of the fine cells, scaled so that the frequencies come nearest to the
+        targets (least squares of cents).
     model
         The coarse solid that was analysed, with its moduli.
     eigenvalues : (6 + N,) [rad^2/s^2]
@@ -78,6 +94,8 @@ class Design:
         How the result was come by and how good it is.
     provenance : dict
         Origin of the numbers; filled in on reading.
+    fine
+        Frequencies of the fine solid; None if they were not looked for.
     """
 
     strikes: list[Strike]
@@ -96,6 +114,7 @@ class Design:
     settings: dict[str, Any]
     evidence: dict[str, Any]
     provenance: dict[str, Any] = field(default_factory=dict)
+    fine: FineFrequencies | None = None
 
     @property
     def unit(self) -> float:
@@ -104,13 +123,19 @@ class Design:
 
     @property
     def frequencies(self) -> Array:
-        """Frequencies (N,) [Hz] of the elastic modes."""
+        """Frequencies (N,) [Hz] of the elastic modes: of the fine solid, where they are known."""
+        return self.coarse_frequencies if self.fine is None else self.fine.hertz
+
+    @property
+    def coarse_frequencies(self) -> Array:
+        """Frequencies (N,) [Hz] of the elastic modes of the coarse solid."""
         return frequencies(self.eigenvalues[RIGID_MODES:])
 
     @property
     def elastic_modes(self) -> Array:
-        """Elastic modes (n_dofs, N) [kg^-1/2]."""
-        return self.modes[:, RIGID_MODES:]
+        """Elastic modes (n_dofs, N) [kg^-1/2] in the order of `frequencies`, on coarse nodes."""
+        elastic = self.modes[:, RIGID_MODES:]
+        return elastic if self.fine is None else elastic[:, self.fine.order]
 
 
 def write_design(path: str | Path, design: Design) -> None:
@@ -149,6 +174,9 @@ def put_object(file: h5py.File, design: Design) -> None:
     put(file, "fine/young", design.young, "Pa", "Young's modulus of the fine cells")
     put(file, "fine/origin", design.fine_origin, "m", "position of grid coordinates (0, 0, 0)")
     put(file, "fine/edge", np.array([design.fine_edge]), "m", "edge of a fine cell")
+    if design.fine is not None:
+        put(file, "fine/frequencies", design.fine.hertz, "Hz", "elastic modes of the fine solid")
+        put(file, "fine/order", design.fine.order, "1", "coarse elastic mode of the same shape")
 
 
 def read_design(path: str | Path) -> Design:
@@ -178,11 +206,19 @@ def read_design(path: str | Path) -> Design:
             json.loads(file["settings"].asstr()[()]),
             json.loads(file["evidence"].asstr()[()]),
             provenance.read(file),
+            _get_fine(file["fine"]),
         )
     fault = _fault(design)
     if fault:
         raise UserError(f"{path}: {fault}; make the design again")
     return design
+
+
+def _get_fine(group: h5py.Group) -> FineFrequencies | None:
+    """Of the fine solid, which not every design tells."""
+    if "frequencies" not in group:
+        return None
+    return FineFrequencies(group["frequencies"][()], group["order"][()])
 
 
 def _fault(design: Design) -> str:
@@ -204,6 +240,11 @@ def _fault(design: Design) -> str:
         ("surface vertices", design.surface_vertices, (None, 3)),
         ("surface faces", design.surface_faces, (None, 3)),
     ]
+    if design.fine is not None:
+        expected += [
+            ("fine frequencies", design.fine.hertz, (N,)),
+            ("order of fine modes", design.fine.order, (N,)),
+        ]
     for name, data, shape in expected:
         own = (len(data),) if isinstance(data, (list, tuple)) else data.shape
         if not _matches(own, shape):
@@ -213,6 +254,8 @@ def _fault(design: Design) -> str:
     for name, data in [*numbers, ("frequencies", targets.frequencies), ("moduli", design.young)]:
         if data.dtype.kind not in "fiu" or not np.isfinite(data).all():
             return f"holds {name} that are no finite real numbers"
+    if design.fine is not None and sorted(design.fine.order) != list(range(N)):
+        return "names other coarse modes of its fine ones than each once"
     count = len(design.surface_vertices)
     named = [design.surface_faces.min(), design.surface_faces.max()]
     for vertex in (*named, *(strike.vertex for strike in design.strikes)):

@@ -76,6 +76,7 @@ class OptimiserSettings:
     seed: int
     population: int | None
     workers: int | None
+    fine_check: bool
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,10 @@ class SoundingSolid:
 
     @classmethod
     def of_design(cls, design: Design) -> SoundingSolid:
-        """The coarse solid of a design, its modes damped as the clips' (§5)."""
+        """A design: shapes of its coarse solid, frequencies of the fine one where they are known.
+
+        Its modes are damped as the clips' (§5).
+        """
         return cls(design.frequencies, design.targets.dampings, design.model, design.elastic_modes)
 
     @classmethod

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -85,6 +85,8 @@ class Example:
         Whether the optimisers are compared on it.
     recorded
         What its clips are strikes of; None if they are synthesised.
+    weights
+        Of the cost, those that are not as usual.
     """
 
     name: str
@@ -101,6 +103,7 @@ class Example:
     elsewhere: tuple[str, tuple[float, float, float]]
     compared: bool
     recorded: Recording | None = None
+    weights: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def edits(self) -> int:
@@ -154,6 +157,7 @@ def project(example: Example, part: str, config: Mapping[str, Any]) -> dict[str,
             for target in example.targets_of(part)
         ],
         "material": {"dimensions": example.dimensions},
+        "weights": dict(example.weights),
         "optimiser": {"seconds": example.seconds, "seed": config["sound"]["seed"]},
     }
 
@@ -188,6 +192,7 @@ def _example(name: str, config: Mapping[str, Any]) -> Example:
         elsewhere=(solid["elsewhere"]["name"], tuple(solid["elsewhere"]["at"])),
         compared=described.get("compared", False),
         recorded=Recording(**described["recorded"]) if "recorded" in described else None,
+        weights=described.get("weights", {}),
     )
 
 

@@ -68,7 +68,8 @@ class SoundResults(Results):
     @property
     def absent(self) -> tuple[str, ...]:
         """Tables that there is nothing for."""
-        return () if self.optimisers else ("optimisers", "evaluation")
+        checked = () if self.design.evidence.get("checks") else ("checks",)
+        return checked if self.optimisers else (*checked, "optimisers", "evaluation")
 
     @property
     def origins(self) -> dict[str, Record]:

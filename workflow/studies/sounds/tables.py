@@ -66,11 +66,17 @@ def truth(results: SoundResults) -> Iterator[Row]:
     hertz = results.truth.frequencies[RIGID_MODES : RIGID_MODES + len(targets)]
     return _by_mode(
         target=targets,
-        found=design.frequencies,
+        found=design.coarse_frequencies,
         truth=hertz,
-        error=design.frequencies / hertz - 1.0,
+        error=design.coarse_frequencies / hertz - 1.0,
         bark=_bark_difference(hertz, targets),
     )
+
+
+def checks(results: SoundResults) -> Iterator[Row]:
+    """What the checks on the fine solid found, one after the other, in the last edit."""
+    for number, entry in enumerate(results.design.evidence.get("checks", []), 1):
+        yield {"check": number, **entry}
 
 
 def amplitudes(results: SoundResults) -> Iterator[Row]:

@@ -1,0 +1,84 @@
+"""`python -m sound check`: what a design sounds like on the fine solid, beside its targets.
+
+The search of `design` works with a coarse solid. Here the material that it found is solved on all
+voxels, and the frequencies of both stand beside those of the targets.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from carillon.options import REQUIRED, add_options, collect, option
+
+if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
+    from sound.project.design_file import Design, FineFrequencies
+
+
+@dataclass(frozen=True)
+class CheckOptions:
+    """What is checked."""
+
+    design: str = option(REQUIRED, "design.h5")
+    json: bool = option(False, "print as JSON")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command line."""
+    add_options(parser, CheckOptions, positional=("design",))
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Solve and print."""
+    from sound.design.fine_check import fine_frequencies
+    from sound.project.design_file import read_design
+
+    options = collect(CheckOptions, arguments)
+    design = read_design(options.design)
+    content = comparison(design, fine_frequencies(design))
+    print(json.dumps(content) if options.json else "\n".join(_lines(content)))
+    return 0
+
+
+def comparison(design: Design, fine: FineFrequencies) -> dict[str, Any]:
+    """Targets, coarse and fine frequencies of a design, mode by mode.
+
+    Coarse frequencies are those of the coarse modes that have the shapes of the fine ones.
+    """
+    from sound.design.bark import bark
+    from sound.design.cents import cents, rms_cents
+
+    targets = design.targets.frequencies
+    coarse = design.coarse_frequencies[fine.order]
+    return {
+        "target_hz": targets.tolist(),
+        "coarse_hz": coarse.tolist(),
+        "fine_hz": fine.hertz.tolist(),
+        "coarse_cents": cents(coarse, targets).tolist(),
+        "fine_cents": cents(fine.hertz, targets).tolist(),
+        "fine_bark": (bark(fine.hertz) - bark(targets)).tolist(),
+        "coarse_rms_cents": rms_cents(design.coarse_frequencies, targets),
+        "fine_rms_cents": rms_cents(fine.hertz, targets),
+        "voxels": len(design.young),
+        "coarse_cells": design.model.mesh.n_cells,
+    }
+
+
+def _lines(content: dict[str, Any]) -> list[str]:
+    """A line for each mode, and one for all."""
+    names = ("target_hz", "coarse_hz", "fine_hz", "coarse_cents", "fine_cents", "fine_bark")
+    heads = ("target Hz", "coarse Hz", "fine Hz", "coarse cents", "fine cents", "fine bark")
+    lines = ["  ".join(["mode", *(f"{head:>12}" for head in heads)])]
+    for mode, row in enumerate(zip(*(content[name] for name in names)), 1):
+        digits = (2, 2, 2, 1, 1, 3)
+        columns = [f"{value:12.{places}f}" for value, places in zip(row, digits)]
+        lines.append("  ".join([f"{mode:4}", *columns]))
+    coarse, fine = content["coarse_rms_cents"], content["fine_rms_cents"]
+    lines.append(
+        f"from their targets, but for a common factor (rms): {coarse:.1f} cents on the coarse "
+        f"solid of {content['coarse_cells']:,} cells, {fine:.1f} on the fine one of "
+        f"{content['voxels']:,} voxels"
+    )
+    return lines
