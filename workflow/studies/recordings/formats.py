@@ -82,14 +82,14 @@ def compare(clip: Path, modes: Path, out: Path) -> None:
     clip, modes
         The recording, and what was extracted from it.
     out
-        JSON file of rows, see `differences`.
+        JSON file of rows, see `differences`; of none if the recording itself was refused.
     """
     channels, rate = soundfile.read(clip, always_2d=True)
-    reference = json.loads(modes.read_text())
+    reference = json.loads(modes.read_text()) if modes.is_file() else {}
     rows: list[Row] = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        for form in formats(rate):
+        for form in formats(rate) if reference else []:
             written = folder / "clip.wav"
             write_as(form, channels.mean(axis=1), rate, written)
             extraction = extract(written, folder)

@@ -169,7 +169,6 @@ class RecordingResults(Results):
             "tonal": "yes" if recording.tonal else "no",
             "seconds": self.seconds,
             "cpu": cpu,
-            "cpu_rate": max(0.0, cpu - self.read_json(START)["cpu_seconds"]) / self.seconds,
             "said": self.run["said"],
         }
         if self.refused:
@@ -182,6 +181,7 @@ class RecordingResults(Results):
             "before": self.before,
             "peaks": len(self.missed),
             "missed": int(self.missed.sum()),
+            "cpu_rate": max(0.0, cpu - self.read_json(START)["cpu_seconds"]) / self.seconds,
         }
 
     def _left(self, whole: Array) -> float:
