@@ -16,7 +16,7 @@ from tests.hostile import summary
 from tests.hostile.fixtures import suite, tried, zoo  # noqa: F401
 from tests.patience import HANG_SECONDS
 from tests.zygote import Job, Limits, Zygote
-from workflow.studies.recordings.recordings import package_folders
+from workflow.studies.recordings.packages import SOUNDS
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 MESH_FILES = ("stanford-bunny.obj", "teapot.obj")
@@ -199,7 +199,7 @@ def recordings_folder() -> Path:
     """Folder of the packages with real recordings; skips the test where it is absent."""
     named = os.environ.get("CARILLON_RECORDINGS")
     folder = Path(named) if named else CHECKOUT / "results" / "recordings" / "packages"
-    if not all((folder / package).is_dir() for package in package_folders()):
+    if not all((folder / package).is_dir() for package in SOUNDS):
         pytest.skip(
             f"no recordings in {folder}; `carillon recordings --out FOLDER` brings them, and "
             "CARILLON_RECORDINGS names another folder"

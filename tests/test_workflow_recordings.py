@@ -26,7 +26,7 @@ from workflow.studies.catalogue import RECORDING, RECORDINGS
 from workflow.studies.recordings import index, page
 from workflow.studies.recordings.formats import FORMATS, Format, differences, formats, write_as
 from workflow.studies.recordings.measurement import MODES, RESIDUAL, RUN, extract, measure
-from workflow.studies.recordings.packages import CONTROL, bring
+from workflow.studies.recordings.packages import CONTROL, SOUNDS, bring
 from workflow.studies.recordings.peaks import strong_peaks
 from workflow.studies.recordings.recordings import (
     CALIBRATION,
@@ -34,7 +34,6 @@ from workflow.studies.recordings.recordings import (
     HELD_BACK,
     PACKAGES,
     SPLITS,
-    package_folders,
     recordings,
 )
 from workflow.studies.recordings.results import START, RecordingResults
@@ -64,7 +63,7 @@ def test_recordings_are_many_of_several_kinds_and_both_splits():
         assert len(own) >= 15 and len({each.kind for each in own}) >= 5
         assert {each.tonal for each in own} == {True, False}
     assert all(re.fullmatch(r"[a-z0-9-]+", each.name) for each in listed)
-    assert {each.package for each in listed} == set(package_folders())
+    assert {each.package for each in listed} == set(SOUNDS)
 
 
 def test_real_recordings_are_where_the_list_says(recordings_folder):
@@ -138,7 +137,7 @@ def test_machines_without_apt_are_told_so(tmp_path, monkeypatch, refuses):
     monkeypatch.setenv("PATH", str(tmp_path))
     line = refuses(main, "recordings", "--out", tmp_path / "o")
     assert "no apt-get and no dpkg-deb" in line
-    assert all(package in line for package in package_folders())
+    assert all(package in line for package in SOUNDS)
 
 
 def test_without_a_network_nothing_is_left(tmp_path, monkeypatch, capsys):
@@ -153,7 +152,7 @@ def test_without_a_network_nothing_is_left(tmp_path, monkeypatch, capsys):
 
 @pytest.mark.skipif(shutil.which("dpkg-deb") is None, reason="no dpkg-deb, which makes a package")
 def test_packages_are_unpacked_once_and_kept(tmp_path, monkeypatch):
-    for package, folder in package_folders().items():
+    for package, folder in SOUNDS.items():
         content = tmp_path / "made" / package
         (content / folder).mkdir(parents=True)
         (content / folder / "a.wav").write_text(package)
@@ -169,8 +168,8 @@ def test_packages_are_unpacked_once_and_kept(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     out = Path("o")
     out.mkdir()
-    assert bring(out) == [out / package for package in package_folders()]
-    for package, folder in package_folders().items():
+    assert bring(out) == [out / package for package in SOUNDS]
+    for package, folder in SOUNDS.items():
         assert (out / package / folder / "a.wav").read_text() == package
         assert "Version: 1.0" in (out / package / CONTROL).read_text()
     program(tmp_path, "apt-get", "exit 1")

@@ -52,7 +52,7 @@ rule time_extraction_start:
 # A clip may be refused, so that its folder holds more or less.
 rule extract_recording:
     input:
-        ancient(rules.bring_recordings.output),
+        rules.bring_recordings.output,
     output:
         directory(f"{RECORDINGS}/{{recording}}/{EXTRACTED}"),
     log:
@@ -68,7 +68,6 @@ rule extract_recording:
 
 rule compare_formats:
     input:
-        packages=ancient(rules.bring_recordings.output),
         extracted=f"{RECORDINGS}/{recording_formats.RECORDING}/{EXTRACTED}",
     output:
         f"{RECORDINGS}/{recording_formats.FORMATS}",
@@ -86,7 +85,6 @@ rule compare_formats:
 rule build_recording_page:
     input:
         config=f"{RESULTS}/config.yaml",
-        packages=ancient(rules.bring_recordings.output),
         extracted=f"{RECORDINGS}/{{recording}}/{EXTRACTED}",
         start=EXTRACTION_START,
         templates=templates("recordings", "page.html.j2", "tables.yaml"),
@@ -111,7 +109,6 @@ rule build_recording_page:
 rule build_recordings_index:
     input:
         config=f"{RESULTS}/config.yaml",
-        packages=ancient(rules.bring_recordings.output),
         extracted=expand(f"{RECORDINGS}/{{recording}}/{EXTRACTED}", recording=REAL),
         start=EXTRACTION_START,
         formats=f"{RECORDINGS}/{recording_formats.FORMATS}",

@@ -11,8 +11,12 @@ from pathlib import Path
 from carillon.errors import UserError
 from carillon.files import cause
 from carillon.progress import say
-from workflow.studies.recordings.recordings import package_folders
 
+SOUNDS = {
+    "hydrogen-drumkits": "usr/share/hydrogen/data/drumkits",
+    "sonic-pi-samples": "usr/share/sonic-pi/samples",
+}
+"""The packages, and where their sounds lie."""
 CONTROL = "control"
 """File in the folder of an unpacked package that tells its name and version."""
 _PROGRAMS = ("apt-get", "dpkg-deb")
@@ -29,8 +33,7 @@ def bring(folder: Path) -> list[Path]:
     UserError
         If this machine has no apt-get or dpkg-deb, a package cannot be had, or not be unpacked.
     """
-    packages = list(package_folders())
-    missing = [package for package in packages if not (folder / package / CONTROL).is_file()]
+    missing = [package for package in SOUNDS if not (folder / package / CONTROL).is_file()]
     if missing:
         _require_programs(missing, folder)
     for package in missing:
@@ -41,7 +44,7 @@ def bring(folder: Path) -> list[Path]:
             raise UserError(
                 f"{folder}: {package} cannot be put there ({cause(error)}); name another folder"
             ) from None
-    return [folder / package for package in packages]
+    return [folder / package for package in SOUNDS]
 
 
 def _require_programs(missing: Sequence[str], folder: Path) -> None:

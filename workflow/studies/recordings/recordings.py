@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from carillon.documents import read_own_yaml
+from workflow.studies.recordings.packages import SOUNDS
 
 LIST = Path(__file__).with_name("recordings.yaml")
 FOLDER = "recordings"
@@ -50,21 +50,10 @@ class RecordedStrike:
 
     def path(self, packages: Path) -> Path:
         """The file below a folder that holds the unpacked packages."""
-        return packages / self.package / package_folders()[self.package] / self.file
+        return packages / self.package / SOUNDS[self.package] / self.file
 
 
 @cache
 def recordings() -> dict[str, RecordedStrike]:
     """All recordings by name."""
-    return {name: RecordedStrike(name, **each) for name, each in _listed()["recordings"].items()}
-
-
-def package_folders() -> dict[str, str]:
-    """The folder of sounds in each package, by the package's name."""
-    folders: dict[str, str] = _listed()["packages"]
-    return folders
-
-
-@cache
-def _listed() -> dict[str, Any]:
-    return read_own_yaml(LIST)
+    return {name: RecordedStrike(name, **each) for name, each in read_own_yaml(LIST).items()}
