@@ -49,6 +49,7 @@ include: f"{RULES}/default_forest.smk"
 include: f"{RULES}/forests_study.smk"
 include: f"{RULES}/examples.smk"
 include: f"{RULES}/sound.smk"
+include: f"{RULES}/recordings.smk"
 include: f"{RULES}/compare.smk"
 
 

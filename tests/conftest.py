@@ -16,6 +16,7 @@ from tests.hostile import summary
 from tests.hostile.fixtures import suite, tried, zoo  # noqa: F401
 from tests.patience import HANG_SECONDS
 from tests.zygote import Job, Limits, Zygote
+from workflow.studies.recordings.packages import SOUNDS
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 MESH_FILES = ("stanford-bunny.obj", "teapot.obj")
@@ -197,6 +198,19 @@ def meshes() -> Path:
     if missing:
         pytest.skip(
             f"no {' and '.join(missing)} in {folder}; set CARILLON_MESHES to a folder that has them"
+        )
+    return folder
+
+
+@pytest.fixture(scope="session")
+def recordings_folder() -> Path:
+    """Folder of the packages with real recordings; skips the test where it is absent."""
+    named = os.environ.get("CARILLON_RECORDINGS")
+    folder = Path(named) if named else CHECKOUT / "results" / "recordings" / "packages"
+    if not all((folder / package).is_dir() for package in SOUNDS):
+        pytest.skip(
+            f"no recordings in {folder}; `carillon recordings --out FOLDER` brings them, and "
+            "CARILLON_RECORDINGS names another folder"
         )
     return folder
 

@@ -100,14 +100,17 @@ ARROWS = {
     "workflow.studies.accuracy": "workflow.studies.base",
     "workflow.studies.sounds": """solver.files solver.response sound sound.clips sound.project
         sound.design sound.rendering workflow workflow.studies.base""",
+    "workflow.studies.recordings": """solver.response sound.clips sound.commands
+        workflow.studies.base""",
     "workflow.studies.validation": """solver.files solver.refinement solver.response
         solver.studies workflow workflow.studies.base workflow.studies.report""",
     "workflow.studies.comparison": "workflow workflow.studies.base",
     "workflow.commands": """dataset_gen.objectives solver.coarsening solver.response
         solver.analysis workflow workflow.studies.base workflow.studies.comparison workflow.estimate
-        workflow.studies.report""",
+        workflow.studies.report workflow.studies.recordings""",
     "workflow.scripts": """solver.analysis workflow.studies.base
-        workflow.studies.report workflow.studies.comparison workflow.studies.sounds""",
+        workflow.studies.report workflow.studies.comparison workflow.studies.sounds
+        workflow.studies.recordings""",
 }
 """Packages, from the bottom to the top, with those that they import beside `EVERYBODY`."""
 

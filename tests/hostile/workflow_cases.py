@@ -228,6 +228,15 @@ hostile(
     plain=True,
 )
 
+# recordings ---------------------------------------------------------------------------------------
+
+each(
+    "out",
+    "recordings --out VALUE",
+    ["ZOO/modes.h5", "ZOO/odd/pipe.h5", "/proc/o", "/dev/null", "x" * 300, "ZOO/modes.h5/o"],
+)
+hostile("recordings without a place", "recordings", "--out")
+
 control("estimate", "estimate --preset tiny")
 control("estimate of a file", "estimate --configfile ZOO/config.yaml --json")
 control("estimate of a file marked", "estimate --configfile ZOO/config-marked.yaml")

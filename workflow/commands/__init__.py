@@ -21,6 +21,10 @@ COMMANDS = {
         "workflow.commands.digest",
         "what result files say, as one number: equal for runs that found the same bits",
     ),
+    "recordings": Command(
+        "workflow.commands.recordings",
+        "real recordings of strikes, on which the extraction of modes is measured",
+    ),
     "validate": Command(
         "workflow.commands.validate",
         "one solid against ground truth, ending at a page that says how far to trust it",

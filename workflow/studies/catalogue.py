@@ -27,6 +27,8 @@ ALL = {
     VALIDATION,
     SOUND,
     SOUNDS,
+    RECORDING,
+    RECORDINGS,
 ) = ALL.values()
 STUDIES = (REPORT, FIGURES, OBJECTIVES, COARSENING, DISCRETISATION, ACCURACY, FORESTS)
 """Those whose tables, figures and page are made one after the other."""
