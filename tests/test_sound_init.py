@@ -18,7 +18,7 @@ from sound.project.project import load_project, project_of
 from sound.project.schema import project_schema, with_defaults
 
 SCHEMA = project_schema()
-_KEY_BEHIND_A_MARK = re.compile(r"^( *)#( *[a-z]+:)", re.MULTILINE)
+_KEY_BEHIND_A_MARK = re.compile(r"^( *)#( *[a-z_]+:)", re.MULTILINE)
 
 
 @pytest.fixture(scope="module")

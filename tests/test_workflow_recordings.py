@@ -229,16 +229,6 @@ def test_what_is_measured_of_a_clip_is_what_extract_says(folder):
     assert row["cpu"] > 0.1 and row["cpu_rate"] == pytest.approx((row["cpu"] - 0.5) / 1.05)
 
 
-def test_the_channel_that_was_searched_is_the_one_that_fits(folder, tmp_path):
-    place = tmp_path / FOLDER
-    shutil.copytree(folder, place)
-    results = RecordingResults(place, RINGS)
-    other = np.random.default_rng(3).standard_normal(len(results.channels)) * 0.1
-    soundfile.write(results.clip, np.stack([other, results.whole], 1), RATE, "PCM_24")
-    again = RecordingResults(place, RINGS)
-    np.testing.assert_allclose(again.whole, results.whole, atol=1e-6)
-
-
 def test_the_page_of_a_recording_needs_nothing_and_can_be_heard(folder):
     results = RecordingResults(folder, RINGS)
     built, made = build(results)

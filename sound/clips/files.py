@@ -11,12 +11,15 @@ from sound.clips.extraction import ModalSound, extract
 from sound.clips.wav import read_wav
 
 
-def extract_file(path: str | Path, modes: int | None = None, visible: bool = False) -> ModalSound:
+def extract_file(
+    path: str | Path, modes: int | None = None, visible: bool = False, allow_clipped: bool = False
+) -> ModalSound:
     """Modes of the clip in a WAV file, see `extract`, whose errors then name the file.
 
-    They come from the user's cache if the clip was searched before.
+    They come from the user's cache if the clip was searched before.  A clip that is clipped is
+    refused unless that is allowed.
     """
-    samples, rate = read_wav(path)
+    samples, rate = read_wav(path, allow_clipped)
     try:
         return remembered(samples, rate, modes, lambda: extract(samples, rate, modes, visible))
     except UserError as error:

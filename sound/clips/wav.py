@@ -153,7 +153,7 @@ def _heard(channels: Array, allow_clipped: bool) -> Array:
     if clipped[best] and not allow_clipped:
         raise UserError(
             f"is clipped ({clipped[best]} samples at full scale, some in runs of {CLIPPED_RUN} or "
-            "more); record it again at a lower level, or allow it (--allow-clipped), which leaves "
-            "these samples out"
+            "more); record it again at a lower level, or leave these samples out: --allow-clipped, "
+            "in a project allow_clipped: true"
         )
     return np.ascontiguousarray(channels[:, best])

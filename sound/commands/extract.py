@@ -31,6 +31,7 @@ class ExtractOptions:
         "modes to keep, shared by all clips, those that carry most (default: all)",
         type=whole_number(1),
     )
+    allow_clipped: bool = option(False, "leave out samples at full scale, rather than refuse")
     json: bool = option(False, "print JSON instead of tables")
     out: str | None = option(None, "write the same JSON to a file, too", metavar="FILE.json")
     residual: str | None = option(
@@ -60,7 +61,10 @@ def run(arguments: argparse.Namespace) -> int:
         require_output(options.out, (".json",), options.clips)
     if options.residual is not None:
         require_output(options.residual, ENDINGS, options.clips)
-    sounds = [extract_file(clip, visible=sys.stderr.isatty()) for clip in options.clips]
+    visible, allow_clipped = sys.stderr.isatty(), options.allow_clipped
+    sounds = [
+        extract_file(clip, visible=visible, allow_clipped=allow_clipped) for clip in options.clips
+    ]
     targets = share_frequencies(clip_names(options.clips), sounds, options.modes)
     if options.residual is not None:
         write_wav(options.residual, sounds[0].residual, sounds[0].rate)

@@ -41,6 +41,7 @@ class InitOptions:
     clips: list[str] | None = option(
         None, "a strike each, at points spread over the surface", nargs="+", metavar="CLIP.wav"
     )
+    allow_clipped: bool = option(False, "leave out samples of clips at full scale")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -89,7 +90,9 @@ def _values(options: InitOptions, folder: Path) -> dict[str, Any]:
         return {"mesh": mesh, "targets": _targets(options.mesh, [PLACEHOLDER])}
     clips = [_seen_from(folder, clip) for clip in options.clips]
     targets = _targets(options.mesh, clips)
-    _require_modes(options.clips)
+    if options.allow_clipped:
+        targets = [target | {"allow_clipped": True} for target in targets]
+    _require_modes(options.clips, options.allow_clipped)
     return {"mesh": mesh, "targets": targets}
 
 
@@ -116,7 +119,7 @@ def _targets(mesh: str, clips: Sequence[str]) -> list[dict[str, Any]]:
     ]
 
 
-def _require_modes(clips: Sequence[str]) -> None:
+def _require_modes(clips: Sequence[str], allow_clipped: bool) -> None:
     """Refuse clips of which no design can be made as a project asks for by itself.
 
     Raises
@@ -127,7 +130,7 @@ def _require_modes(clips: Sequence[str]) -> None:
     from sound.clips.files import clip_names, extract_file
     from sound.clips.targets import share_frequencies
 
-    sounds = [extract_file(clip, visible=True) for clip in clips]
+    sounds = [extract_file(clip, visible=True, allow_clipped=allow_clipped) for clip in clips]
     share_frequencies(clip_names(clips), sounds, "auto")
 
 

@@ -47,7 +47,10 @@ def targets_of(project: Project) -> Targets:
         If a clip is unusable, or all together have fewer modes than the project asks for, or
         than a design needs.
     """
-    sounds = [extract_file(target.clip, target.modes, True) for target in project.targets]
+    sounds = [
+        extract_file(target.clip, target.modes, True, target.allow_clipped)
+        for target in project.targets
+    ]
     return share_frequencies([target.name for target in project.targets], sounds, project.modes)
 
 

@@ -38,7 +38,8 @@ LEAST_WEIGHT = 1e-12
 class TargetEntry:
     """A struck point, `at` a position (3,) [mesh unit] or a `vertex`, and the clip it sounds like.
 
-    `modes` are taken from the clip, its strongest; None takes all that it has.
+    `modes` are taken from the clip, its strongest; None takes all that it has.  It may be clipped
+    if that is allowed.
     """
 
     name: str
@@ -46,6 +47,7 @@ class TargetEntry:
     at: tuple[float, float, float] | None
     vertex: int | None
     modes: int | None
+    allow_clipped: bool
 
 
 @dataclass(frozen=True)

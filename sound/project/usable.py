@@ -44,11 +44,13 @@ def _shared_names(project: Project) -> list[str]:
 
 def _unreadable_clips(project: Project) -> list[str]:
     """A sentence for each clip that is no sound; several targets may have the same."""
+    clips: dict[tuple[str, bool], list[str]] = {}
+    for target in project.targets:
+        clips.setdefault((target.clip, target.allow_clipped), []).append(repr(target.name))
     faults = []
-    for clip in dict.fromkeys(target.clip for target in project.targets):
+    for (clip, allow_clipped), names in clips.items():
         try:
-            read_wav(clip)
+            read_wav(clip, allow_clipped)
         except UserError as error:
-            names = [repr(target.name) for target in project.targets if target.clip == clip]
             faults.append(f"target{'s' * (len(names) > 1)} {', '.join(names)}: {error}")
     return faults

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.signal import resample_poly
 
 from carillon.files import atomic_path
+from sound.clips.wav import read_wav
 from workflow.studies.base.entry import Row
 from workflow.studies.recordings.measurement import MODES, extract
 
@@ -31,7 +32,7 @@ SPAN_DECIBELS = 40.0
 SAME_CENTS = 1.0
 """Difference of two frequencies that are the same mode's."""
 LEVELS = (1.2, 0.8)
-"""Of two channels; their mean is the sound itself."""
+"""Of two channels; the louder one is searched."""
 SUBTYPES = {"PCM_U8": "8 bit", "PCM_16": "16 bit", "PCM_24": "24 bit", "FLOAT": "float"}
 """Formats of samples, and what people call them."""
 RATES = (22_050, 44_100, 48_000, 96_000, 192_000)
@@ -84,14 +85,14 @@ def compare(clip: Path, modes: Path, out: Path) -> None:
     out
         JSON file of rows, see `differences`; of none if the recording itself was refused.
     """
-    channels, rate = soundfile.read(clip, always_2d=True)
+    samples, rate = read_wav(clip, allow_clipped=True)
     reference = json.loads(modes.read_text()) if modes.is_file() else {}
     rows: list[Row] = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for form in formats(rate) if reference else []:
             written = folder / "clip.wav"
-            write_as(form, channels.mean(axis=1), rate, written)
+            write_as(form, samples, rate, written)
             extraction = extract(written, folder)
             row = {"format": form.title, "said": extraction.said}
             if not extraction.said:

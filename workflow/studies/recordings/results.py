@@ -11,6 +11,7 @@ import numpy as np
 import soundfile
 from numpy.typing import NDArray
 
+from sound.clips.wav import read_wav
 from workflow.studies.base.conditions import Record
 from workflow.studies.base.entry import Row
 from workflow.studies.base.results import Results
@@ -85,16 +86,10 @@ class RecordingResults(Results):
         """Samples of the recording per second [Hz]."""
         return int(soundfile.info(self.clip).samplerate)
 
-    @cached_property
-    def channels(self) -> Array:
-        """Samples (s, c) of the recording."""
-        samples: Array = soundfile.read(self.clip, always_2d=True)[0]
-        return samples
-
     @property
     def seconds(self) -> float:
         """Length of the recording."""
-        return len(self.channels) / self.rate
+        return len(self.whole) / self.rate
 
     @property
     def begins(self) -> int:
@@ -111,16 +106,10 @@ class RecordingResults(Results):
 
     @cached_property
     def whole(self) -> Array:
-        """The one channel (s,) that was searched, or else the mean of all.
-
-        Which it was is not told, but by the share of its energy that the modes explain.
-        """
-        mean = self.channels.mean(axis=1)
+        """The one channel (s,) that is searched; the mean of all of a clip that was refused."""
         if self.refused:
-            return np.asarray(mean)
-        told = self.found["clips"][0]["explained_by_all"]
-        candidates = [mean, *self.channels.T]
-        return np.asarray(min(candidates, key=lambda each: abs(1.0 - self._left(each) - told)))
+            return np.asarray(soundfile.read(self.clip, always_2d=True)[0].mean(axis=1))
+        return read_wav(self.clip, allow_clipped=True)[0]
 
     @property
     def searched(self) -> Array:
