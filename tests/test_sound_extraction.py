@@ -18,8 +18,9 @@ from sound.clips.damped import (
 )
 from sound.clips.esprit import esprit
 from sound.clips.extraction import ModalSound, extract
+from sound.clips.glide import glide
 from sound.clips.instruments import synthesised
-from sound.clips.onset import strike_sample
+from sound.clips.onset import second_strike, strike_sample
 from sound.clips.pursuit import further
 from sound.clips.ringing import LONGEST_BLOW
 from sound.clips.wav import read_wav
@@ -315,3 +316,43 @@ def test_modes_of_a_clean_clip_are_found_once():
     sound = extract(clip.astype(np.float32), 44_100)
     assert len(sound.frequencies) == len(frequencies)
     np.testing.assert_allclose(sound.frequencies, frequencies, rtol=1e-6)
+
+
+@pytest.mark.parametrize("gain", [1.0, 0.3])
+def test_of_two_strikes_the_first_is_taken_and_the_second_told(gain):
+    true = modes(5, 3000.0, seed=5)
+    clip = sampled(true, RATE, 1.0, 60.0)
+    later = round(0.4 * RATE)
+    twice = np.pad(clip, (0, later))
+    twice[later:] += gain * clip
+    assert second_strike(clip, RATE) is None
+    sound = extract(twice, RATE)
+    assert 0.37 < sound.evidence["second_strike_seconds"] <= 0.4
+    assert len(sound.residual) < later
+    np.testing.assert_allclose(sound.frequencies, true.frequencies, rtol=FREQUENCY_TOLERANCE)
+
+
+def test_modes_that_beat_are_no_second_strike():
+    beats = single(400.0, 3.0, 1.0) + 0.95 * single(404.0, 3.0, 1.0)
+    assert second_strike(beats, RATE) is None
+
+
+@pytest.mark.parametrize("cents", [-150.0, 100.0, 400.0])
+def test_a_tone_that_glides_is_told(cents):
+    hertz, seconds = 120.0, 0.08
+    t = np.arange(RATE) / RATE
+    rise = hertz * (2.0 ** (cents / 1200.0) - 1.0)
+    phase = 2.0 * np.pi * (hertz * t - rise * seconds * np.expm1(-t / seconds))
+    clip = np.exp(-12.0 * t) * np.sin(phase) + 0.2 * single(310.0, 10.0, 1.0)
+    clip += 1e-3 * np.random.default_rng(0).standard_normal(len(clip))
+    found = glide(clip, RATE)
+    assert found is not None and found.hertz == pytest.approx(hertz, rel=0.04)
+    assert found.cents == pytest.approx(cents, rel=0.15)
+
+
+def test_steady_modes_do_not_glide():
+    random = np.random.default_rng(7)
+    for each in range(6):
+        clip = sampled(modes(5, 1000.0, seed=each), RATE, 1.0, 30.0)
+        assert glide(clip + 1e-3 * random.standard_normal(len(clip)), RATE) is None
+    assert glide(single(400.0, 3.0, 1.0) + 0.95 * single(404.0, 5.0, 1.0), RATE) is None

@@ -44,7 +44,7 @@ def bands(clip: Array, rate: int, width: float, samples: int) -> Iterator[Band]:
     from scipy.fft import next_fast_len  # Slow to load.
 
     factor = max(1, int(rate / (2.0 * width)))
-    taps = _low_pass(rate, width)
+    taps = low_pass(rate, width)
     length = next_fast_len(-(-(len(clip) + len(taps)) // factor))
     spectrum = np.fft.fft(clip, factor * length)
     offsets = np.arange(length) - length // 2
@@ -58,7 +58,7 @@ def bands(clip: Array, rate: int, width: float, samples: int) -> Iterator[Band]:
         yield Band(centre * rate / (factor * length), width, rate / factor, signal)
 
 
-def _low_pass(rate: int, width: float) -> Array:
+def low_pass(rate: int, width: float) -> Array:
     """Taps of a filter that passes up to half the width and stops from one and a half widths on."""
     from scipy.signal import firwin, kaiserord  # Slow to load.
 

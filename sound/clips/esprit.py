@@ -21,8 +21,16 @@ def esprit(signal: Complex) -> Complex:
     (Roy and Kailath 1989), which is found by total least squares.
     """
     vectors = _subspace(signal)
-    order = ester(vectors)
-    poles = la.eigvals(_rotation(vectors[:, :order]))
+    return _exponents(vectors[:, : ester(vectors)])
+
+
+def exponents_of_order(signal: Complex, order: int) -> Complex:
+    """The same, where their number is known."""
+    return _exponents(_subspace(signal)[:, :order])
+
+
+def _exponents(vectors: Complex) -> Complex:
+    poles = la.eigvals(_rotation(vectors))
     return np.log(poles[np.abs(poles) > 0.0])
 
 

@@ -11,7 +11,7 @@ are what the noise makes inevitable.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,8 @@ from sound.bounds import require_level
 from sound.clips.candidates import LEAST_DECAY
 from sound.clips.clipping import is_clipped, restored
 from sound.clips.damped import damped_sinusoids, superposed
-from sound.clips.onset import strike_sample
+from sound.clips.glide import glide
+from sound.clips.onset import second_strike, strike_sample
 from sound.clips.ringing import SHORTEST_SAMPLES, ringing
 from sound.clips.search import FEWEST_PERIODS, has_periods, is_mode
 from sound.clips.significance import Fit
@@ -51,7 +52,8 @@ class ModalSound:
     phases : (n,) [rad]
         theta.
     residual : (s,)
-        The clip from the strike on minus all modes found, those not asked for included.
+        The clip from where its modes ring on, up to a second strike, minus all modes found, those
+        not asked for included.
     rate : int [Hz]
         Samples per second.
     evidence : dict
@@ -80,7 +82,7 @@ class ModalSound:
 def extract(
     samples: Array, rate: int, modes: int | None = None, visible: bool = False
 ) -> ModalSound:
-    """Modes of the one contact sound that a clip holds.
+    """Modes of the contact sound that a clip holds; of several strikes, of the first.
 
     Parameters
     ----------
@@ -112,13 +114,15 @@ def extract(
     clip = np.asarray(samples, dtype=float)
     _require_sound(clip)
     strike = strike_sample(clip)
-    clip = clip[strike:].copy()
+    second = second_strike(clip[strike:], rate)
+    clip = clip[strike:][:second].copy()
     if len(clip) < SHORTEST_SAMPLES:
         raise UserError(
             f"the clip ends {len(clip)} samples after its strike, expected {SHORTEST_SAMPLES} at "
             "least; give a longer recording"
         )
     _require_no_steady_tone(clip, rate)
+    bend = glide(clip, rate)
     scale = float(np.abs(clip).max())
     searched = clip[: round(LONGEST_SECONDS * rate)] / scale
     clipped = is_clipped(clip)[: len(searched)]
@@ -136,6 +140,8 @@ def extract(
         blow_seconds=start / rate,
         blow_share=float(clip[:start] @ clip[:start]) / float(clip @ clip),
         clipped_samples=int(clipped.sum()),
+        second_strike_seconds=None if second is None else (strike + second) / rate,
+        glide=None if bend is None else asdict(bend),
     )
     return sound
 

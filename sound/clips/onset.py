@@ -1,4 +1,4 @@
-"""Where in a clip the strike is."""
+"""Where in a clip the strike is, and where a second one."""
 
 from __future__ import annotations
 
@@ -9,6 +9,19 @@ Array = NDArray[np.float64]
 
 _QUIETER = 10.0
 """Mean power after the strike over that before it, from which on there is a strike to be found."""
+
+_FRAME_SECONDS, _HOPS = 0.01, 4
+"""Length of a short-time spectrum, and how many begin within it."""
+_LOWEST_BAND, _HIGHEST_FRACTION = 200.0, 0.9
+"""Where bands of a third of an octave begin [Hz], and where they end, in half sampling rates."""
+_AFTER, _GAP, _BEFORE = 4, 4, 8
+"""Spectra after a strike, at it, and before it."""
+_LATER_SECONDS = 0.05
+"""Time after the strike up to which what rises belongs to its blow."""
+_RISE, _AUDIBLE = 4.0, 1e-3
+"""Power of a band after a strike over that before it, and over that of its loudest spectrum."""
+_SHARE = 0.5
+"""Share of the bands that a strike makes rise at once; beats and swells raise fewer."""
 
 
 def strike_sample(clip: Array) -> int:
@@ -30,3 +43,34 @@ def strike_sample(clip: Array) -> int:
     cost = splits * np.log(before) + (len(part) - splits) * np.log(after)
     best = int(np.argmin(cost))
     return int(splits[best]) if after[best] > _QUIETER * before[best] else 0
+
+
+def second_strike(clip: Array, rate: int) -> int | None:
+    """Number of a sample shortly before a second strike, in a clip (s,) that begins with the first.
+
+    A strike is where the power of most bands, of a third of an octave each, rises by 6 dB at once.
+    """
+    from scipy.signal import stft
+
+    frame = max(16, round(_FRAME_SECONDS * rate))
+    hop = frame // _HOPS
+    if len(clip) < frame + (_BEFORE + _GAP + _AFTER) * hop:
+        return None
+    hertz, _, spectra = stft(
+        clip, rate, nperseg=frame, noverlap=frame - hop, boundary=None, padded=False
+    )
+    highest = _HIGHEST_FRACTION * 0.5 * rate
+    edges = _LOWEST_BAND * 2.0 ** (np.arange(3.0 * np.log2(highest / _LOWEST_BAND)) / 3.0)
+    band = np.digitize(hertz, edges)
+    inside = [band == number for number in np.unique(band[(band > 0) & (band < len(edges))])]
+    if not inside:
+        return None
+    power = np.array([(np.abs(spectra[which]) ** 2).sum(axis=0) for which in inside])
+    sums = np.pad(power.cumsum(axis=1), ((0, 0), (1, 0)))
+    strikes = np.arange(_BEFORE + _GAP, power.shape[1] - _AFTER)
+    after = (sums[:, strikes + _AFTER] - sums[:, strikes]) / _AFTER
+    early = strikes - _GAP
+    before = (sums[:, early] - sums[:, early - _BEFORE]) / _BEFORE
+    rises = (after > _RISE * before) & (after > _AUDIBLE * power.max(axis=1, keepdims=True))
+    is_strike = (rises.mean(axis=0) > _SHARE) & (strikes * hop > _LATER_SECONDS * rate)
+    return int(strikes[is_strike][0]) * hop if is_strike.any() else None

@@ -96,9 +96,19 @@ def _line(clip: dict[str, Any]) -> str:
         f"{clip['file']}: strike at {clip['strike_seconds']:.4f} s, {clip['order']} modes found, "
         f"which explain {100.0 * clip['explained']:.2f} % of the energy"
     )
-    if clip["explained"] >= MOSTLY_MODES:
-        return line
-    return f"{line}; the rest is noise, or tones that do not fade evenly, and no material has it"
+    if clip["explained"] < MOSTLY_MODES:
+        line += "; the rest is noise, or tones that do not fade evenly, and no material has it"
+    if clip["clipped_samples"]:
+        line += f"; {clip['clipped_samples']} samples at full scale are left out"
+    if clip["second_strike_seconds"] is not None:
+        line += f"; there is another strike at {clip['second_strike_seconds']:.2f} s, left out"
+    if clip["glide"] is not None:
+        bend = clip["glide"]
+        line += (
+            f"; its loudest tone glides from {bend['cents']:+.0f} cents to {bend['hertz']:.1f} Hz "
+            f"within {bend['seconds']:.2f} s, which no material does"
+        )
+    return line
 
 
 def _lines(content: dict[str, Any]) -> list[str]:

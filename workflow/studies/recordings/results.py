@@ -113,13 +113,15 @@ class RecordingResults(Results):
 
     @property
     def searched(self) -> Array:
-        """The clip (s,) from where the modes were fitted on."""
-        return self.whole[self.begins :]
+        """The clip (s,) from where the modes were fitted on, up to a second strike."""
+        clip = self.whole[self.begins :]
+        return clip if self.refused else clip[: len(self.residual)]
 
     @property
     def left(self) -> float:
         """Share of the energy of `searched` that no mode explains."""
-        return self._left(self.whole)
+        left, clip = self.residual, self.searched
+        return float(left @ left) / max(float(clip @ clip), _LEAST)
 
     @property
     def left_to_hear(self) -> float:
@@ -172,7 +174,3 @@ class RecordingResults(Results):
             "missed": int(self.missed.sum()),
             "cpu_rate": max(0.0, cpu - self.read_json(START)["cpu_seconds"]) / self.seconds,
         }
-
-    def _left(self, whole: Array) -> float:
-        clip = whole[self.begins :]
-        return float(self.residual @ self.residual) / max(float(clip @ clip), _LEAST)
