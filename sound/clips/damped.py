@@ -88,11 +88,20 @@ def _turns(exponents: Complex, count: int) -> tuple[Array, Array, Complex]:
     The value at any sample is a product of the two.
     """
     size = min(_BLOCK, max(count, 1))
-    starts = np.outer(np.arange(0, count, size), exponents)
-    # Numbers too small for the processor's normal format would slow the products down.
-    starts = np.where(starts.real > _SILENT, np.exp(starts), 0.0)
-    within = np.exp(np.outer(np.arange(size), exponents))
+    within = _powers(exponents, size)
+    starts = _powers(size * exponents, -(-count // size))
     return _real(within), _real(-1j * within), starts
+
+
+def _powers(exponents: Complex, count: int) -> Complex:
+    """exp(lambda_k n) (count, k) for n = 0 .. count - 1, each from one half as far."""
+    powers = np.ones((1, len(exponents)), complex)
+    while len(powers) < count:
+        turn = len(powers) * exponents
+        # Numbers too small for the processor's normal format would slow the products down.
+        turn = np.where(turn.real > _SILENT, np.exp(turn), 0.0)
+        powers = np.concatenate([powers, turn * powers[: count - len(powers)]])
+    return powers
 
 
 def _real(values: Complex) -> Array:

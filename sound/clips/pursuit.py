@@ -23,12 +23,9 @@ def further(rest: Array, rate: int) -> Complex:
     Under a window exp(-d n) the power of a sinusoid that decays as fast is largest compared to that
     of the noise, which is the median around.
     """
-    from scipy.fft import next_fast_len
-
-    size = next_fast_len(2 * len(rest), real=True)
     decay, found, scores = 1.0 / len(rest), [], []
     while decay < np.pi / (4.0 * LEAST_QUALITY):
-        power = power_under(rest, decay, size)
+        power, size = power_under(rest, decay, padding=2.0)
         reach = max(16, round(NEIGHBOURHOOD * decay / (2.0 * np.pi) * size))
         level = _medians(power, reach) / np.log(2.0)
         score = 2.0 * power / np.maximum(level, np.finfo(float).tiny)
@@ -47,10 +44,11 @@ def further(rest: Array, rate: int) -> Complex:
 
 def _medians(power: Array, reach: int) -> Array:
     """Median of the power around each frequency, between medians of stretches."""
-    stretches = max(1, len(power) // reach)
-    parts = np.array_split(power, stretches)
-    middles = np.cumsum([len(part) for part in parts]) - 0.5 * len(parts[0])
-    return np.interp(np.arange(len(power)), middles, [np.median(part) for part in parts])
+    count = max(1, len(power) // reach)
+    length = len(power) // count
+    middles = length * (np.arange(count) + 0.5)
+    medians = np.median(power[: count * length].reshape(count, length), axis=1)
+    return np.interp(np.arange(len(power)), middles, medians)
 
 
 def _apart(exponents: Complex, scores: Array) -> Complex:

@@ -15,8 +15,14 @@ Complex = NDArray[np.complex128]
 
 FALSE_MODES = 5e-4
 """Modes that noise alone makes a clip seem to hold."""
+FALSE_STRONG_MODES, STRONG = 1e-2, 1e-2
+"""The same of those whose peaks are within 40 dB of the highest, in a clip that has modes at all:
+to miss one of these is worse."""
+_LENIENCE = 2.0 * np.log(FALSE_STRONG_MODES / FALSE_MODES)
 NEIGHBOURHOOD = 150.0
 """Angular frequency on either side of a mode, in dampings, from which its noise is taken."""
+_SILENCED = 10.0
+"""Nepers by which a window dies away until what it still lets through is left out."""
 _LEAST_LEVEL = 1e-15
 """Variance of noise that is always assumed, relative to the peak: that of 24-bit samples."""
 
@@ -73,10 +79,19 @@ def _pruned(exponents: Complex, clip: Array) -> Fit:
         prominence = _gain(exponents, coefficients, len(clip)) / level
         padded = np.pad(prominence, 1, constant_values=np.inf)
         least = (prominence <= padded[:-2]) & (prominence <= padded[2:])
-        weak = least & (prominence < threshold(exponents, len(clip)))
+        needed = threshold(exponents, len(clip))
+        if (prominence >= needed).any():
+            needed = needed - _LENIENCE * _is_strong(exponents, coefficients, len(clip))
+        weak = least & (prominence < needed)
         if not weak.any():
             return Fit(exponents, coefficients, prominence, level)
         exponents = exponents[~weak]
+
+
+def _is_strong(exponents: Complex, coefficients: Complex, samples: int) -> NDArray[np.bool_]:
+    """Which sinusoids have peaks in the spectrum that are not far below the highest."""
+    peaks = np.abs(coefficients) / np.maximum(-exponents.real, 1.0 / samples)
+    return np.asarray(peaks >= STRONG * peaks.max(initial=0.0))
 
 
 def threshold(exponents: Complex, samples: int) -> Array:
@@ -106,15 +121,12 @@ def _level(exponents: Complex, rest: Array) -> Array:
     It is the median, over frequencies around the sinusoid's, of the rest's correlation with
     sinusoids that die away as fast to the nearest power of 2.
     """
-    from scipy.fft import next_fast_len
-
-    size = next_fast_len(len(rest), real=True)
     slowest = 1.0 / len(rest)
     octaves = np.round(np.log2(np.maximum(-exponents.real, slowest) / slowest))
     level = np.empty(len(exponents))
     for octave in np.unique(octaves):
         rate = slowest * 2.0**octave
-        power = power_under(rest, rate, size)
+        power, size = power_under(rest, rate)
         reach = round(NEIGHBOURHOOD * rate / (2.0 * np.pi) * size)
         for k in np.flatnonzero(octaves == octave):
             bin_number = round(exponents[k].imag / (2.0 * np.pi) * size)
@@ -123,12 +135,16 @@ def _level(exponents: Complex, rest: Array) -> Array:
     return np.maximum(level, _LEAST_LEVEL)
 
 
-def power_under(rest: Array, decay: float, size: int) -> Array:
-    """Power spectrum of a rest, padded to `size`, under a window exp(-decay n).
+def power_under(rest: Array, decay: float, padding: float = 1.0) -> tuple[Array, int]:
+    """Power spectrum of a rest under a window exp(-decay n), and the length that it belongs to.
 
-    That of white noise is its variance.
+    That of white noise is its variance.  What the window silences is left out, and zeros are added
+    up to `padding` times the length.
     """
-    from scipy.fft import rfft
+    from scipy.fft import next_fast_len, rfft
 
-    window = np.exp(-decay * np.arange(len(rest)))
-    return np.asarray(np.abs(rfft(rest * window, size)) ** 2 / (window @ window))
+    kept = rest[: int(_SILENCED / decay) + 1]
+    size = next_fast_len(int(padding * len(kept)), real=True)
+    window = np.exp(-decay * np.arange(len(kept)))
+    spectrum = rfft(kept * window, size)
+    return np.asarray((spectrum.real**2 + spectrum.imag**2) / (window @ window)), size
