@@ -16,6 +16,7 @@ from sound.clips.damped import (
     normal_matrix,
     refined,
 )
+from sound.clips.ending import ending
 from sound.clips.esprit import esprit
 from sound.clips.extraction import ModalSound, extract
 from sound.clips.glide import glide
@@ -240,11 +241,11 @@ def noise(count: int = 4000) -> np.ndarray:
         (np.zeros(4000), "is silent"),
         (np.full(4000, np.nan), "has 4000 samples that are not finite"),
         (noise(), "no modes that stand out"),
-        (np.eye(1, 4000)[0], "no modes that stand out"),
+        (np.eye(1, 4000)[0], "falls silent 1 samples after its strike"),
         (single(440.0, 0.0, 1.0) + 1e-3 * noise(RATE), "does not decay"),
         (single(440.0, -3.0, 1.0), "does not decay"),
         (single(30.0, 5.0, 0.06), "less than 3 periods of its lowest mode"),
-        (single(400.0, 5.0, 0.02), "ends .* samples after its strike"),
+        (single(400.0, 5.0, 0.02), "ends or falls silent .* samples after its strike"),
     ],
 )
 def test_clips_that_are_no_strike_are_answered_in_one_sentence(clip, message):
@@ -356,3 +357,23 @@ def test_steady_modes_do_not_glide():
         clip = sampled(modes(5, 1000.0, seed=each), RATE, 1.0, 30.0)
         assert glide(clip + 1e-3 * random.standard_normal(len(clip)), RATE) is None
     assert glide(single(400.0, 3.0, 1.0) + 0.95 * single(404.0, 5.0, 1.0), RATE) is None
+
+
+@pytest.mark.parametrize("fade", [0.0, 0.05, 0.15])
+def test_silence_and_fades_at_either_end_do_not_matter(fade):
+    true = modes(6, 3000.0, seed=5)
+    clip = sampled(true, RATE, 1.0, 40.0)[:5000]
+    faded = round(fade * RATE)
+    clip[len(clip) - faded :] *= np.linspace(1.0, 0.0, faded)
+    sound = extract(np.pad(clip, (800, 4000)), RATE)
+    np.testing.assert_allclose(sound.frequencies, true.frequencies, rtol=FREQUENCY_TOLERANCE)
+    np.testing.assert_allclose(sound.dampings, true.dampings, rtol=DAMPING_TOLERANCE)
+    end = (800 + len(clip) - faded) / RATE
+    assert end - 0.3 * fade - 0.002 <= sound.evidence["end_seconds"] <= end + 0.05 * fade
+
+
+def test_a_clip_that_is_not_faded_is_searched_to_its_end():
+    for seed in range(6):
+        clip = sampled(modes(6, 3000.0, seed=seed), RATE, 1.0, 40.0)
+        assert ending(clip, RATE) >= 0.99 * len(clip)
+        assert ending(clip[:3000], RATE) >= 2970

@@ -23,6 +23,7 @@ from sound.bounds import require_level
 from sound.clips.candidates import LEAST_DECAY
 from sound.clips.clipping import is_clipped, restored
 from sound.clips.damped import damped_sinusoids, superposed
+from sound.clips.ending import ending
 from sound.clips.glide import glide
 from sound.clips.onset import second_strike, strike_sample
 from sound.clips.ringing import SHORTEST_SAMPLES, ringing
@@ -52,8 +53,8 @@ class ModalSound:
     phases : (n,) [rad]
         theta.
     residual : (s,)
-        The clip from where its modes ring on, up to a second strike, minus all modes found, those
-        not asked for included.
+        The clip from where its modes ring on, up to a second strike or to where it is
+        faded out, minus all modes found, those not asked for included.
     rate : int [Hz]
         Samples per second.
     evidence : dict
@@ -115,11 +116,12 @@ def extract(
     _require_sound(clip)
     strike = strike_sample(clip)
     second = second_strike(clip[strike:], rate)
-    clip = clip[strike:][:second].copy()
+    clip = clip[strike:][:second]
+    clip = clip[: ending(clip, rate)].copy()
     if len(clip) < SHORTEST_SAMPLES:
         raise UserError(
-            f"the clip ends {len(clip)} samples after its strike, expected {SHORTEST_SAMPLES} at "
-            "least; give a longer recording"
+            f"the clip ends or falls silent {len(clip)} samples after its strike, expected "
+            f"{SHORTEST_SAMPLES} at least; give a longer recording"
         )
     _require_no_steady_tone(clip, rate)
     bend = glide(clip, rate)
@@ -140,6 +142,7 @@ def extract(
         blow_seconds=start / rate,
         blow_share=float(clip[:start] @ clip[:start]) / float(clip @ clip),
         clipped_samples=int(clipped.sum()),
+        end_seconds=(strike + len(clip)) / rate,
         second_strike_seconds=None if second is None else (strike + second) / rate,
         glide=None if bend is None else asdict(bend),
     )
