@@ -16,6 +16,7 @@ from carillon.fem.geometry import COMPONENTS, FILLS
 from solver.analysis.problem import DISCRETISATIONS, ProblemOptions
 from solver.coarsening.choice import METHODS as COARSENINGS
 from sound.clips.wav import write_wav
+from sound.commands.damping_options import DampingOptions
 from sound.commands.search_options import SearchOptions
 from sound.design.material import LAWS
 from sound.design.optimisers import OPTIMISERS
@@ -76,6 +77,9 @@ def test_choices_of_the_schema_are_those_of_the_code():
     assert material["properties"]["law"]["enum"] == list(LAWS)
     methods = optimiser["properties"]["method"]["enum"]
     assert methods == list(OPTIMISERS)
+    (whose,) = dataclasses.fields(DampingOptions)
+    sources = SCHEMA["properties"]["damping"]["properties"]["source"]["enum"]
+    assert sources == list(whose.metadata["choices"])
     choices = {each.name: each.metadata["choices"] for each in dataclasses.fields(SearchOptions)}
     assert methods == list(choices["method"])
     assert set(SCHEMA["properties"]["coarsen"]["enum"]) - {"auto"} < set(COARSENINGS)

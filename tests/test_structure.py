@@ -75,8 +75,8 @@ ARROWS = {
     "sound": "",
     "sound.clips": "sound",
     "sound.project": "solver.files solver.analysis sound sound.clips",
-    "sound.design": """solver.coarsening solver.files solver.response solver.linear solver.subspace
-        solver.analysis sound sound.clips sound.project""",
+    "sound.design": """solver.coarsening solver.distribution solver.files solver.response
+        solver.linear solver.subspace solver.analysis sound sound.clips sound.project""",
     "sound.rendering": """solver.files solver.response solver.subspace sound sound.clips
         sound.project""",
     "sound.export": """solver.files solver.response solver.assembly solver.studies sound

@@ -162,6 +162,8 @@ def summarise(design: Design) -> dict[str, Any]:
     evidence = design.evidence
     wanted = design.targets.frequencies
     off = np.abs(design.frequencies / wanted - 1.0)
+    assert design.damping is not None
+    ratios = design.damping.dampings / design.targets.dampings
     return {
         "cost_start": evidence["cost_start"],
         "cost": evidence["cost"],
@@ -183,6 +185,9 @@ def summarise(design: Design) -> dict[str, Any]:
         "checks": evidence["checks"],
         "young_min_pa": float(design.young.min()),
         "young_max_pa": float(design.young.max()),
+        "damping_ratios": ratios.tolist(),
+        "loss_factors": np.unique(design.damping.loss_factors).tolist(),
+        "mass_damping_per_second": design.damping.mass_per_second,
         "residual_max": evidence["residual_max"],
     }
 
@@ -198,6 +203,7 @@ def _sentences(out: Path, design: Design, summary: dict[str, Any]) -> str:
             f"residuals of the modes up to {summary['residual_max']:.1e}",
             _rms_sentence(summary),
             f"Young's modulus {design.young.min() / 1e9:.3g} to {design.young.max() / 1e9:.3g} GPa",
+            _damping_sentence(summary),
             f"design: {out}",
         ]
     )
@@ -211,6 +217,16 @@ def _rms_sentence(summary: dict[str, Any]) -> str:
     return (
         f"from their targets (rms): {coarse:.1f} cents on the coarse solid, {fine:.1f} on the fine "
         f"one, by {len(summary['checks'])} checks"
+    )
+
+
+def _damping_sentence(summary: dict[str, Any]) -> str:
+    """How near loss factors bring the dampings to the clips'."""
+    low, median, high = np.quantile(summary["damping_ratios"], (0.25, 0.5, 0.75))
+    factors = summary["loss_factors"]
+    return (
+        f"dampings by loss factors of {min(factors):.2g} to {max(factors):.2g}: {median:.2f} of "
+        f"the clips' (median), half of them {low:.2f} to {high:.2f}"
     )
 
 

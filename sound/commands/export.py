@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from carillon.arguments import whole_number
 from carillon.errors import UserError
 from carillon.options import REQUIRED, add_options, collect, option
+from sound.commands.damping_options import DampingOptions
 
 if TYPE_CHECKING:  # Its import takes long, and `--help` needs none.
     from sound.project.design_file import Design
@@ -40,6 +41,7 @@ class ExportOptions:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     add_options(parser, ExportOptions, positional=("design",))
+    add_options(parser, DampingOptions)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -50,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
     options = collect(ExportOptions, arguments)
     kind = _format(options.out, options.format)
     require_output(options.out, [Path(options.out).suffix.lower()], [options.design])
-    design = read_design(options.design)
+    design = read_design(options.design).damped_by(collect(DampingOptions, arguments).damping_from)
     if kind == "h5":
         from sound.export.embedded import write_embedded  # Loaded if needed: some take long.
 

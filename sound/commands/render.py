@@ -19,6 +19,7 @@ from sound.bounds import (
     require_length,
     sample_rate,
 )
+from sound.commands.damping_options import DampingOptions
 
 if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     import numpy as np
@@ -114,6 +115,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_options(parser.add_mutually_exclusive_group(required=True), PointOptions)
     add_options(parser.add_mutually_exclusive_group(), ImpulseOptions)
     add_options(parser, RenderOptions, positional=("file",))
+    add_options(parser, DampingOptions)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -126,7 +128,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     options, points = collect(RenderOptions, arguments), collect(PointOptions, arguments)
     _require_outputs(options, points)
-    scene = open_scene(options.file, options.like, options.damping)
+    source = collect(DampingOptions, arguments).damping_from
+    scene = open_scene(options.file, options.like, options.damping, source)
     hits = _hits(scene, points, collect(ImpulseOptions, arguments))
     seconds = options.seconds or max(hit.seconds for hit in hits) + ringing_seconds(scene.solid)
     require_length(seconds, options.rate)

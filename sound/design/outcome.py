@@ -14,6 +14,7 @@ from carillon.errors import ConvergenceError
 from carillon.threads import one_thread
 from solver.files.modes_file import frequencies
 from sound.design.cents import common_factor
+from sound.design.damping import material_damping
 from sound.design.descent import cost_of
 from sound.design.fine_check import FineModes, FineSolid
 from sound.design.objective import DesignCost
@@ -106,6 +107,17 @@ class Outcome:
         stretch = common_factor(hertz, targets.frequencies)
         factor = stretch**2
         moduli = setting.material.moduli(evaluation.z)
+        # As in the search: sums shared among threads round differently.
+        with one_thread():
+            damping = material_damping(
+                simulation,
+                evaluation,
+                setting.mesh,
+                problem.project.damping.regions,
+                stretch * hertz,
+                np.arange(len(hertz)) if fine is None else fine.order,
+                targets.dampings,
+            )
         seconds, evaluations = search.own_seconds, search.own_evaluations
         evidence: dict[str, Any] = {
             "method": problem.project.optimiser.method,
@@ -141,6 +153,7 @@ class Outcome:
             settings=problem.project.as_dict(),
             evidence=evidence,
             fine=None if fine is None else FineFrequencies(stretch * hertz, fine.order),
+            damping=damping,
         )
 
 

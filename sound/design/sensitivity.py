@@ -66,7 +66,7 @@ def projected_stiffness(
         energies = np.empty((points * len(cells), total.shape[1]))
         _pair_energies(cells, flat, columns, pairs, count, energies)
         total += slopes[points * first : points * (first + len(cells))].T @ energies
-    return total[:, : len(pairs)], total[:, len(pairs) :].reshape(-1, struck, count)
+    return total[:, : len(pairs)], total[:, len(pairs) :].reshape(len(total), struck, count)
 
 
 def close_pairs(values: Array) -> Index:

@@ -166,6 +166,37 @@ class Simulation:
         inside, beyond = projected_stiffness(nodes, self._strains, vectors, pairs, others, slopes)
         return Sensitivity(pairs, inside, beyond)
 
+    def energy_shares(self, evaluation: Evaluation, regions: NDArray[np.integer]) -> Array:
+        """Shares (N, R) of the modes' strain energies that R regions of the solid hold.
+
+        That of a region is d log(lambda) by the logarithm of a factor of its moduli.  The stiffness
+        grows with a factor of all moduli, through any coarsening, so the shares of a mode add up
+        to 1; where elements reach over several regions, one may be a little below 0.
+
+        Parameters
+        ----------
+        regions : (M,)
+            Region of each voxel, from 0 to R - 1.
+
+        Raises
+        ------
+        UserError
+            If the coarsening has no derivatives.
+        """
+        young = self.material.moduli(evaluation.z)
+        own = young[:, None] * (regions[:, None] == np.arange(regions.max() + 1))
+        vectors = self.mesh_rows(evaluation.modes.vectors[:, RIGID_MODES:])
+        count = vectors.shape[1]
+        energies, _ = projected_stiffness(
+            self.model.connectivity,
+            self._strains,
+            vectors,
+            all_pairs(count)[:count],
+            np.empty((len(vectors), 0, count)),
+            self.elements.slopes(young, own),
+        )
+        return np.asarray((energies / evaluation.eigenvalues).T)
+
     def mesh_rows(self, vectors: Array) -> Array:
         """Vectors (n_dofs, k) in mesh node order from those in the order of an analysis."""
         rows = np.empty_like(vectors)

@@ -72,5 +72,5 @@ def _put_more(file: h5py.File, design: Design) -> None:
     put_object(file, design)
     put(file, "surface/cell", cells, "1", "row of the element that the vertex lies in or next to")
     put(file, "surface/weights", weights, "1", "weights of that element's nodes")
-    put(file, "dampings", design.targets.dampings, "1/s", "d of the elastic modes, exp(-d t)")
+    put(file, "dampings", design.dampings, "1/s", "d of the elastic modes, exp(-d t)")
     put(file, "strikes/gains", listening.gains, "kg^1/2/(N s)", "samples of full scale per a_k")

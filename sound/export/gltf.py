@@ -180,7 +180,7 @@ def _mass_properties(design: Design) -> dict[str, Any]:
 
 
 def _material(design: Design) -> dict[str, Any]:
-    """Constants of the solid; dampings come from clips, so there is neither alpha nor beta."""
+    """Constants of the solid; every mode has a damping, so there is neither alpha nor beta."""
     return {
         "name": "designed",
         "density": design.model.density,

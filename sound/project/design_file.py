@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from carillon.measurement import measured
 from solver.files.model_group import get_model, put, put_model
 from solver.files.modes_file import frequencies, put_eigenvalues, put_modes
 from sound.clips.targets import Targets
+from sound.project.material_damping import MaterialDamping, get_damping, put_damping
 from sound.strikes import Strike
 
 Array = NDArray[np.float64]
@@ -64,7 +65,7 @@ class Design:
     strikes
         The T struck points.
     targets
-        What they shall sound like; its dampings are those of the elastic modes, too (§5).
+        What they shall sound like.
     coordinates : (m,)
         z of the reduced material Y = Phi z (§6), dimensionless: of a reference modulus.
     young : (M,) [Pa]
@@ -96,6 +97,8 @@ class Design:
         Origin of the numbers; filled in on reading.
     fine
         Frequencies of the fine solid; None if they were not looked for.
+    damping
+        Loss factors of the material, and what they make of the modes; None in designs of before.
     """
 
     strikes: list[Strike]
@@ -115,6 +118,7 @@ class Design:
     evidence: dict[str, Any]
     provenance: dict[str, Any] = field(default_factory=dict)
     fine: FineFrequencies | None = None
+    damping: MaterialDamping | None = None
 
     @property
     def unit(self) -> float:
@@ -136,6 +140,32 @@ class Design:
         """Elastic modes (n_dofs, N) [kg^-1/2] in the order of `frequencies`, on coarse nodes."""
         elastic = self.modes[:, RIGID_MODES:]
         return elastic if self.fine is None else elastic[:, self.fine.order]
+
+    @property
+    def dampings(self) -> Array:
+        """Dampings (N,) [1/s] that the elastic modes sound with: the clips' (§5), or own ones."""
+        source = self.settings.get("damping", {}).get("source", "clips")
+        if self.damping is None or source == "clips":
+            return self.targets.dampings
+        return self.damping.dampings
+
+    def damped_by(self, source: str | None) -> Design:
+        """The same design that sounds with dampings of `clips`, of the `material`, or as it is.
+
+        Raises
+        ------
+        UserError
+            If it does not tell loss factors of its material.
+        """
+        if source is None:
+            return self
+        if source == "material" and self.damping is None:
+            raise UserError(
+                "the design holds no loss factors of its material, as it was made before there "
+                "were any; go on with it by design, and they are found"
+            )
+        settings = self.settings.get("damping", {}) | {"source": source}
+        return replace(self, settings={**self.settings, "damping": settings})
 
 
 def write_design(path: str | Path, design: Design) -> None:
@@ -177,6 +207,8 @@ def put_object(file: h5py.File, design: Design) -> None:
     if design.fine is not None:
         put(file, "fine/frequencies", design.fine.hertz, "Hz", "elastic modes of the fine solid")
         put(file, "fine/order", design.fine.order, "1", "coarse elastic mode of the same shape")
+    if design.damping is not None:
+        put_damping(file["fine"], design.damping)
 
 
 def read_design(path: str | Path) -> Design:
@@ -207,6 +239,7 @@ def read_design(path: str | Path) -> Design:
             json.loads(file["evidence"].asstr()[()]),
             provenance.read(file),
             _get_fine(file["fine"]),
+            get_damping(file["fine"]),
         )
     fault = _fault(design)
     if fault:
@@ -244,6 +277,11 @@ def _fault(design: Design) -> str:
         expected += [
             ("fine frequencies", design.fine.hertz, (N,)),
             ("order of fine modes", design.fine.order, (N,)),
+        ]
+    if design.damping is not None:
+        expected += [
+            ("loss factors", design.damping.loss_factors, (len(design.young),)),
+            ("dampings of the material", design.damping.dampings, (N,)),
         ]
     for name, data, shape in expected:
         own = (len(data),) if isinstance(data, (list, tuple)) else data.shape

@@ -60,6 +60,14 @@ class MaterialSettings:
 
 
 @dataclass(frozen=True)
+class DampingSettings:
+    """What modes are damped by when they sound, and regions that have loss factors of their own."""
+
+    source: str
+    regions: int
+
+
+@dataclass(frozen=True)
 class Weights:
     """Weights of the parts of the cost (Eq. 4)."""
 
@@ -94,6 +102,7 @@ class Project:
     modes: int | Literal["auto"]
     targets: tuple[TargetEntry, ...]
     material: MaterialSettings
+    damping: DampingSettings
     weights: Weights
     optimiser: OptimiserSettings
 
@@ -166,6 +175,7 @@ def project_of(described: Mapping[str, Any], folder: Path) -> Project:
         filled["modes"],
         targets,
         MaterialSettings(**filled["material"]),
+        DampingSettings(**filled["damping"]),
         Weights(**filled["weights"]),
         OptimiserSettings(**filled["optimiser"]),
     )

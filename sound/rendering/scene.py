@@ -66,7 +66,10 @@ class Scene:
 
 
 def open_scene(
-    file: str | Path, like: str | Path | None = None, damping: Sequence[float] | None = None
+    file: str | Path,
+    like: str | Path | None = None,
+    damping: Sequence[float] | None = None,
+    damping_from: str | None = None,
 ) -> Scene:
     """The scene of a file.
 
@@ -78,6 +81,8 @@ def open_scene(
         For modes of a designed object: the design.
     damping : (2,) or None
         For modes of no design: Rayleigh's coefficients of mass [1/s] and stiffness [s].
+    damping_from : str or None
+        Of a design: see `Design.damped_by`.
 
     Raises
     ------
@@ -90,10 +95,12 @@ def open_scene(
     if damping and like:
         raise UserError("--damping and --like exclude each other; a design tells all dampings")
     if has_modes and not like:
+        if damping_from:
+            raise UserError("--damping-from goes with a design; modes.h5 takes --damping")
         modes = read_modes(file)
         solid = SoundingSolid.of_modes(modes, Damping(*damping) if damping else Damping())
         return Scene(solid, None, _places_of_model(modes.model))
-    design = read_design(like or file)
+    design = read_design(like or file).damped_by(damping_from)
     if has_modes:
         solid = SoundingSolid.of_truth(read_modes(file), design)
     else:

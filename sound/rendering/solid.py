@@ -44,9 +44,9 @@ class SoundingSolid:
     def of_design(cls, design: Design) -> SoundingSolid:
         """A design: shapes of its coarse solid, frequencies of the fine one where they are known.
 
-        Its modes are damped as the clips' (§5).
+        Its modes are damped as the clips' (§5), or as its material says.
         """
-        return cls(design.frequencies, design.targets.dampings, design.model, design.elastic_modes)
+        return cls(design.frequencies, design.dampings, design.model, design.elastic_modes)
 
     @classmethod
     def of_modes(cls, file: ModesFile, damping: Damping) -> SoundingSolid:
@@ -88,8 +88,7 @@ class SoundingSolid:
             )
         _require_same_object(file.mesh, design.model.mesh)
         kept = slice(RIGID_MODES, RIGID_MODES + count)
-        dampings = design.targets.dampings
-        return cls(file.frequencies[kept], dampings, file.model, file.modes[:, kept])
+        return cls(file.frequencies[kept], design.dampings, file.model, file.modes[:, kept])
 
     def motion(self, positions: Array) -> Array:
         """Displacement (p, 3, k) [kg^-1/2] of points (p, 3) [m] of the surface in each mode."""
