@@ -23,12 +23,15 @@ from sound.design.objective import DesignCost, Objective
 from sound.design.optimise import optimise
 from sound.design.optimisers import OPTIMISERS
 from sound.design.outcome import Outcome
+from sound.design.plausible import weight
 from sound.design.pool import Pool, Task, Trial
 from sound.design.preparation import prepare, targets_of
 from sound.design.search import HistoryEntry
 from sound.design.simulation import Simulation
 from sound.project.design_file import HISTORY_TYPE, read_design, write_design
 from sound.project.project import Weights, project_of
+from sound.rendering.listening import Listening
+from sound.rendering.solid import SoundingSolid
 from tests import small_project
 from tests.patience import HANG_SECONDS, words_of
 
@@ -87,6 +90,33 @@ def test_written_modes_are_those_of_the_written_model(designed, tmp_path):
     read = read_design(tmp_path / "design.h5")
     truth = solve(read.model, modes=6 + len(read.frequencies), method="slepc")
     np.testing.assert_allclose(truth.frequencies[6:], read.frequencies, rtol=1e-6)
+
+
+@pytest.mark.parametrize("discretisation", ["voxel", "finite-cell"])
+def test_density_gives_way_to_bounds_of_the_moduli(tmp_path, discretisation):
+    """Frequencies stay, as do the gains of the struck points times the modes there."""
+    made = small_project.project(tmp_path, evaluations=1)
+    made = replace(made, solid=replace(made.solid, discretisation=discretisation))
+    targets = small_project.targets(made)
+    free = optimise(prepare(made, targets))
+    bounds = [1e3 * free.young.max(), 1e6 * free.young.max()]
+    made = replace(made, material=replace(made.material, young_bounds=bounds))
+    bound = optimise(prepare(made, targets))
+    factor = bound.model.density / made.solid.density
+    assert bounds[0] * (1.0 - 1e-9) <= bound.young.min()
+    np.testing.assert_allclose(bound.young, factor * free.young)
+    np.testing.assert_array_equal(bound.frequencies, free.frequencies)
+    test_written_modes_are_those_of_the_written_model(bound, tmp_path)
+    heard = [Listening.of_design(each, SoundingSolid.of_design(each)) for each in (free, bound)]
+    np.testing.assert_allclose(heard[1].gains, np.sqrt(factor) * heard[0].gains)
+
+
+def test_bounds_narrower_than_the_moduli_have_their_middle():
+    moduli = np.array([1e8, 1e9, 1e10])
+    factor = weight(moduli, 1000.0, (1e6, 1e6 + 1.0))
+    assert factor * 1e9 == pytest.approx(1e6)
+    assert weight(moduli, 1000.0, None) == 1.0
+    assert weight(moduli, 1000.0, (1e15, 2e15)) == 1e3  # what a solid may weigh
 
 
 @pytest.mark.parametrize("method", sorted(set(OPTIMISERS) - {"hybrid"}))

@@ -198,6 +198,8 @@ RIM = LEAST["targets"][0]
         ({"optimiser": {"seed": 2**64}}, "optimiser.seed: .*expected at most 4294967294"),
         ({"optimiser": {"population": 10**9}}, "optimiser.population: .*expected at most 10000"),
         ({"material": {"young": 1e300}}, "material.young: .*expected at most"),
+        ({"material": {"young_bounds": [1e9]}}, "material.young_bounds: .*at least 2 of them"),
+        ({"material": {"young_bounds": [2e9, 1e9]}}, "young_bounds: .*the lower one first"),
         ({"material": {"dimensions": 10**9}}, "material.dimensions: .*expected at most 10000"),
         ({"targets": [RIM | {"name": "a\0b"}]}, r"targets\[0\].name: .*can be printed"),
         ({"targets": [RIM | {"name": " "}]}, r"targets\[0\].name: .*not blanks alone"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Self, TypedDict, Unpack
+from typing import Any, Self, TypedDict, Unpack, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +85,10 @@ class Solid(ABC):
     @abstractmethod
     def with_young(self, young: Array) -> Self:
         """The same solid with other moduli [Pa], likewise."""
+
+    def with_density(self, density: float) -> Self:
+        """The same solid with another mass density [kg/m^3]."""
+        return replace(cast(Any, self), density=density)  # Every kind of solid is a dataclass.
 
     @property
     @abstractmethod

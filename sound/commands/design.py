@@ -185,6 +185,7 @@ def summarise(design: Design) -> dict[str, Any]:
         "checks": evidence["checks"],
         "young_min_pa": float(design.young.min()),
         "young_max_pa": float(design.young.max()),
+        "density_kg_per_m3": design.model.density,
         "damping_ratios": ratios.tolist(),
         "loss_factors": np.unique(design.damping.loss_factors).tolist(),
         "mass_damping_per_second": design.damping.mass_per_second,
@@ -202,7 +203,7 @@ def _sentences(out: Path, design: Design, summary: dict[str, Any]) -> str:
             f"{summary['frequency_error_median']:.2%}, worst {summary['frequency_error_max']:.2%}; "
             f"residuals of the modes up to {summary['residual_max']:.1e}",
             _rms_sentence(summary),
-            f"Young's modulus {design.young.min() / 1e9:.3g} to {design.young.max() / 1e9:.3g} GPa",
+            _material_sentence(design),
             _damping_sentence(summary),
             f"design: {out}",
         ]
@@ -218,6 +219,18 @@ def _rms_sentence(summary: dict[str, Any]) -> str:
         f"from their targets (rms): {coarse:.1f} cents on the coarse solid, {fine:.1f} on the fine "
         f"one, by {len(summary['checks'])} checks"
     )
+
+
+def _material_sentence(design: Design) -> str:
+    """Moduli and density; bounds of the former that could not be kept to."""
+    low, high = design.young.min(), design.young.max()
+    text = (
+        f"Young's modulus {low / 1e9:.3g} to {high / 1e9:.3g} GPa, density "
+        f"{design.model.density:.4g} kg/m^3"
+    )
+    least, most = design.settings["material"]["young_bounds"] or (low, high)
+    beyond = np.mean((design.young < 0.999 * least) | (design.young > 1.001 * most))
+    return f"{text}; {beyond:.1%} of the voxels are beyond young_bounds" if beyond else text
 
 
 def _damping_sentence(summary: dict[str, Any]) -> str:

@@ -18,6 +18,7 @@ from sound.design.damping import material_damping
 from sound.design.descent import cost_of
 from sound.design.fine_check import FineModes, FineSolid
 from sound.design.objective import DesignCost
+from sound.design.plausible import weight
 from sound.design.pool import Trial
 from sound.design.preparation import DesignProblem
 from sound.design.search import HistoryEntry, Search, require_modes
@@ -105,8 +106,10 @@ class Outcome:
         fine = chosen.fine
         hertz = frequencies(evaluation.eigenvalues) if fine is None else fine.frequencies
         stretch = common_factor(hertz, targets.frequencies)
-        factor = stretch**2
-        moduli = setting.material.moduli(evaluation.z)
+        moduli = stretch**2 * setting.material.moduli(evaluation.z)
+        density = problem.project.solid.density
+        heavier = weight(moduli, density, problem.project.material.young_bounds)
+        young = heavier * moduli
         # As in the search: sums shared among threads round differently.
         with one_thread():
             damping = material_damping(
@@ -129,7 +132,7 @@ class Outcome:
             "seconds": seconds,
             "evaluations": evaluations,
             "evaluations_per_minute": 60.0 * evaluations / seconds,
-            "scale_of_moduli": factor,
+            "scale_of_moduli": heavier * stretch**2,
             "residual_max": evaluation.modes.evidence["residual_max"],
             "orthogonality": evaluation.modes.evidence["orthogonality"],
             "eigenvalue_error_estimate": evaluation.modes.evidence["eigenvalue_error_estimate"],
@@ -140,10 +143,10 @@ class Outcome:
             strikes=list(setting.strikes),
             targets=targets,
             coordinates=evaluation.z,
-            young=factor * moduli,
-            model=simulation.elements.with_young(factor * moduli),
-            eigenvalues=factor * evaluation.modes.values,
-            modes=simulation.mesh_rows(evaluation.modes.vectors),
+            young=young,
+            model=simulation.elements.with_young(young).with_density(heavier * density),
+            eigenvalues=stretch**2 * evaluation.modes.values,
+            modes=simulation.mesh_rows(evaluation.modes.vectors) / np.sqrt(heavier),
             surface_vertices=problem.vertices,
             surface_faces=problem.faces,
             fine_grid=setting.mesh.grid,

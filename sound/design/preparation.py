@@ -113,7 +113,7 @@ def coordinates_of(problem: DesignProblem, initial: Design) -> Array:
     """
     require_same_voxels(problem, initial)
     material = problem.setting.material
-    same = initial.settings.get("material") == problem.project.as_dict()["material"]
+    same = initial.settings.get("material", {}).get("law") == material.law
     if same and len(initial.coordinates) == material.dimensions:
         return initial.coordinates
     return material.coordinates(initial.young)

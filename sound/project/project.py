@@ -52,11 +52,15 @@ class TargetEntry:
 
 @dataclass(frozen=True)
 class MaterialSettings:
-    """Modulus to start from [Pa], eigenvectors that make the field, and how they do."""
+    """Modulus to start from [Pa], eigenvectors that make the field, and how they do.
+
+    `young_bounds` [Pa] are those that moduli are brought into by another density; None leaves it.
+    """
 
     young: float
     dimensions: int
     law: str
+    young_bounds: list[float] | None
 
 
 @dataclass(frozen=True)
@@ -165,6 +169,7 @@ def project_of(described: Mapping[str, Any], folder: Path) -> Project:
     filled = with_defaults(described, project_schema())
     targets = tuple(_target(number, each, folder) for number, each in enumerate(filled["targets"]))
     _require_something_to_lower(filled["weights"])
+    _require_ascending("material.young_bounds", filled["material"]["young_bounds"])
     solid = {key: filled[key] for key in _SOLID}
     if not solid["mesh"].startswith(BUILTIN_PREFIX):
         solid["mesh"] = str(folder / solid["mesh"])
@@ -207,6 +212,11 @@ def _target(number: int, entry: Mapping[str, Any], folder: Path) -> TargetEntry:
         )
     clip = str(folder / entry["clip"])
     return TargetEntry(**{**entry, "clip": clip, "at": None if at is None else tuple(at)})
+
+
+def _require_ascending(key: str, bounds: list[float] | None) -> None:
+    if bounds is not None and not bounds[0] < bounds[1]:
+        raise UserError(f"{key}: found {bounds}, expected the lower one first")
 
 
 def _require_something_to_lower(weights: Mapping[str, float]) -> None:
