@@ -25,7 +25,7 @@ from sound.design.optimisers import OPTIMISERS
 from sound.design.outcome import Outcome
 from sound.design.plausible import weight
 from sound.design.pool import Pool, Task, Trial
-from sound.design.preparation import prepare, targets_of
+from sound.design.preparation import coordinates_of, prepare, targets_of
 from sound.design.search import HistoryEntry
 from sound.design.simulation import Simulation
 from sound.project.design_file import HISTORY_TYPE, read_design, write_design
@@ -109,6 +109,28 @@ def test_density_gives_way_to_bounds_of_the_moduli(tmp_path, discretisation):
     test_written_modes_are_those_of_the_written_model(bound, tmp_path)
     heard = [Listening.of_design(each, SoundingSolid.of_design(each)) for each in (free, bound)]
     np.testing.assert_allclose(heard[1].gains, np.sqrt(factor) * heard[0].gains)
+
+
+@pytest.mark.parametrize("discretisation", ["voxel", "finite-cell"])
+def test_poissons_ratio_is_found_and_gone_on_from(tmp_path, discretisation):
+    """Targets of a bar whose Poisson's ratio is another than that of the start."""
+    made = small_project.project(tmp_path, evaluations=60)
+    resolution = 16 if discretisation == "voxel" else 12
+    solid = replace(made.solid, discretisation=discretisation, resolution=resolution)
+    made = replace(made, solid=solid)
+    targets = small_project.targets(replace(made, solid=replace(solid, poisson=0.42)))
+    fixed = optimise(prepare(made, targets))
+    free = replace(made, material=replace(made.material, poisson_bounds=[0.0, 0.45]))
+    designed = optimise(prepare(free, targets))
+    assert designed.evidence["cost"] < fixed.evidence["cost"]
+    assert 0.25 < designed.model.poisson < 0.45 and fixed.model.poisson == 0.25
+    test_written_modes_are_those_of_the_written_model(designed, tmp_path)
+    kept = coordinates_of(prepare(free, targets), designed)
+    np.testing.assert_array_equal(kept, designed.coordinates)
+    narrow = replace(free, material=replace(free.material, poisson_bounds=[0.2, 0.48]))
+    other = prepare(narrow, targets)
+    z = coordinates_of(other, designed)
+    assert other.setting.material.poisson(z) == pytest.approx(designed.model.poisson)
 
 
 def test_bounds_narrower_than_the_moduli_have_their_middle():

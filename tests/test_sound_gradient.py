@@ -14,6 +14,7 @@ from sound.design.bark import bark, bark_slope
 from sound.design.material import LAWS, ReducedMaterial
 from sound.design.objective import Objective
 from sound.design.outside import lies_between, shift_between
+from sound.design.poisson import FreePoisson
 from sound.design.simulation import Simulation
 from sound.project.project import Weights
 from sound.strikes import Strike
@@ -36,9 +37,9 @@ def strikes(shape):
     ]
 
 
-def simulation(shape, coarsen, law):
+def simulation(shape, coarsen, law, free_poisson=None):
     mesh = block_mesh(shape)
-    material = ReducedMaterial.of_mesh(mesh, SIZE, 1e9, law)
+    material = ReducedMaterial.of_mesh(mesh, SIZE, 1e9, law, free_poisson)
     options = ProblemOptions("block", 8, coarsen=coarsen)
     return Simulation(mesh, options, material, strikes(shape), MODES, tolerance=1e-13)
 
@@ -72,6 +73,7 @@ def exact(simulation, z):
     difference over a step of 1e-6 that would be 3e-3.
     """
     model = simulation.elements.with_young(simulation.material.moduli(z))
+    model = model.with_constants(simulation.poisson(z), model.density)
     K, M = assembled(model)
     shift = -1e-2 * model.young.max() / (model.density * EDGE**2)
     start = np.random.default_rng(0).standard_normal(K.shape[0])
@@ -124,17 +126,44 @@ def test_gradient_with_clustered_modes(coarsen):
     assert relative(amplitude, by_amplitude) < 1e-4
 
 
-def test_gradient_through_finite_cells():
+@pytest.mark.parametrize("coarsen", ["none", "average"])
+@pytest.mark.parametrize("coordinate", [-2.0, 0.0, 1.5])
+def test_gradient_by_poissons_ratio(coarsen, coordinate):
+    shape = (8, 6, 4)
+    solid = simulation(shape, coarsen, "exponential", FreePoisson(-0.2, 0.45, 0.25))
+    objective = random_objective()
+    z = np.append(0.2 * np.random.default_rng(0).standard_normal(SIZE), coordinate)
+    frequency, amplitude, evaluation = gradients(solid, objective, z)
+    by_frequency, by_amplitude = differences(solid, objective, z, 1e-5)
+    assert relative(frequency, by_frequency) < 1e-4
+    assert relative(amplitude, by_amplitude) < 1e-4
+    assert abs(frequency[-1] / by_frequency[-1] - 1.0) < 1e-3
+    np.testing.assert_allclose(evaluation.eigenvalues, exact(solid, z)[0], rtol=1e-8)
+
+
+def test_poissons_ratio_stays_between_its_bounds_and_has_a_slope():
+    free = FreePoisson(0.0, 0.45, 0.3)
+    at = [free.at(each) for each in (-40.0, -1.0, 0.0, 1.0, 40.0)]
+    assert at == sorted(at) and 0.0 <= at[0] and at[-1] <= 0.45 and at[2] == pytest.approx(0.3)
+    for poisson, coordinate in zip(at[1:-1], (-1.0, 0.0, 1.0)):
+        assert free.coordinate(poisson) == pytest.approx(coordinate, abs=1e-12)
+        difference = (free.at(coordinate + 1e-6) - free.at(coordinate - 1e-6)) / 2e-6
+        assert free.slope(poisson) == pytest.approx(difference)
+
+
+@pytest.mark.parametrize("free_poisson", [None, FreePoisson(0.0, 0.45, 0.25)])
+def test_gradient_through_finite_cells(free_poisson):
     """The stiffness is linear in the moduli, so that there is no kink anywhere."""
     sides = (0.08, 0.06, 0.03)
     surface = cut_solids.turned(cut_solids.box(*sides))
     cells = cut_solids.spaced(surface, EDGE)
     struck = [Strike("a", 0, surface.vertices[1], -surface.vertex_normals[1])]
     struck.append(Strike("b", 1, surface.vertices[6], -surface.vertex_normals[6]))
-    material = ReducedMaterial.of_mesh(cells.mesh, SIZE, 1e9, "exponential")
+    material = ReducedMaterial.of_mesh(cells.mesh, SIZE, 1e9, "exponential", free_poisson)
     options = ProblemOptions("block", 8, discretisation="finite-cell")
     solid = Simulation(cells.mesh, options, material, struck, MODES, 1e-13, cells)
-    objective, z = random_objective(), 0.2 * np.random.default_rng(0).standard_normal(SIZE)
+    objective = random_objective()
+    z = 0.2 * np.random.default_rng(0).standard_normal(material.dimensions)
     frequency, amplitude, _ = gradients(solid, objective, z)
     by_frequency, by_amplitude = differences(solid, objective, z, 1e-5)
     assert relative(frequency, by_frequency) < 1e-4

@@ -200,6 +200,12 @@ RIM = LEAST["targets"][0]
         ({"material": {"young": 1e300}}, "material.young: .*expected at most"),
         ({"material": {"young_bounds": [1e9]}}, "material.young_bounds: .*at least 2 of them"),
         ({"material": {"young_bounds": [2e9, 1e9]}}, "young_bounds: .*the lower one first"),
+        ({"material": {"poisson_bounds": [0, 0.5]}}, "poisson_bounds.*found 0.5, expected at most"),
+        ({"material": {"poisson_bounds": [0, 0.4]}}, "coarsen ddfem, whose forests hold for one"),
+        (
+            {"coarsen": "none", "material": {"poisson_bounds": [0.3, 0.4]}},
+            "expected poisson, which the search starts from, between them; it is 0.25",
+        ),
         ({"material": {"dimensions": 10**9}}, "material.dimensions: .*expected at most 10000"),
         ({"targets": [RIM | {"name": "a\0b"}]}, r"targets\[0\].name: .*can be printed"),
         ({"targets": [RIM | {"name": " "}]}, r"targets\[0\].name: .*not blanks alone"),

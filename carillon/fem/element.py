@@ -6,7 +6,7 @@ along (x, y, z); degree of freedom `3 c + i` is the displacement of corner `c` a
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,9 @@ CORNERS: NDArray[np.int64] = np.array([[c & 1, c >> 1 & 1, c >> 2 & 1] for c in 
 
 DEFAULT_POISSON = 0.25
 """Poisson's ratio of all experiments in the paper (section 8.1)."""
+
+KEPT = 8
+"""Poisson's ratios whose matrices are kept; searches may go through thousands."""
 
 GAUSS_POINTS: Array = 0.5 + (CORNERS - 0.5) / np.sqrt(3.0)
 """(8, 3) points of the 2x2x2 Gauss rule on the unit cube; each has weight 1/8."""
@@ -64,7 +67,7 @@ def strain_displacement(gradients: Array) -> Array:
     return matrices.reshape(len(gradients), 6, -1)
 
 
-@cache
+@lru_cache(KEPT)
 def quadrature_stiffness(poisson: float = DEFAULT_POISSON) -> Array:
     """Stiffness contributions K_q (8, 24, 24) of the quadrature points for unit edge and modulus.
 
@@ -87,7 +90,7 @@ def quadrature_stiffness(poisson: float = DEFAULT_POISSON) -> Array:
     return matrices
 
 
-@cache
+@lru_cache(KEPT)
 def uniform_stiffness(poisson: float = DEFAULT_POISSON) -> Array:
     """Stiffness (24, 24) of the element with uniform unit modulus and unit edge."""
     matrix = quadrature_stiffness(poisson).sum(axis=0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +26,13 @@ class Elements(ABC):
         Moduli [Pa] at the points of each element, which its stiffness is linear in.
     edge
         Spacing of the lattice that the nodes lie on [m].
+    poisson
+        Poisson's ratio.
     """
 
     young: Array
     edge: float
+    poisson: float
 
     @property
     @abstractmethod
@@ -70,6 +73,10 @@ class Elements(ABC):
     def with_young(self, young: Array) -> Self:
         """The same elements with other moduli."""
         return self.of(young, *self.arrays()[1:])
+
+    def with_poisson(self, poisson: float) -> Self:
+        """The same elements with another Poisson's ratio."""
+        return replace(cast(Any, self), poisson=poisson)  # Every kind is a dataclass.
 
     def __len__(self) -> int:
         return len(self.young)

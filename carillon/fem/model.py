@@ -86,9 +86,10 @@ class Solid(ABC):
     def with_young(self, young: Array) -> Self:
         """The same solid with other moduli [Pa], likewise."""
 
-    def with_density(self, density: float) -> Self:
-        """The same solid with another mass density [kg/m^3]."""
-        return replace(cast(Any, self), density=density)  # Every kind of solid is a dataclass.
+    def with_constants(self, poisson: float, density: float) -> Self:
+        """The same solid with another Poisson's ratio and mass density [kg/m^3]."""
+        # Every kind of solid is a dataclass.
+        return replace(cast(Any, self), poisson=poisson, density=density)
 
     @property
     @abstractmethod

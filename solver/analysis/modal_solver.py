@@ -25,7 +25,7 @@ from solver.correction.cold import Approximation, Cold, from_nothing
 from solver.correction.correct import correct
 from solver.correction.correction import EIGENVALUE_TOLERANCE, carried, resolved
 from solver.distribution.collective import bcast_from_root, compute_on_root, ranks_of_machine
-from solver.distribution.local_mesh import LocalMesh, distribute, scatter_moduli
+from solver.distribution.local_mesh import LocalMesh, distribute, scatter_moduli, with_poisson
 from solver.linear import Inverse, Lasting, LinearSolver
 from solver.reference.truth import SPARE_MODES, Truth, can_count
 from solver.subspace.rayleigh_ritz import rigid_pairs
@@ -119,7 +119,12 @@ class ModalSolver:
                 self._components = ComponentModes(self.local_mesh, options, self._together, comm)
         self.seconds = phases.seconds
 
-    def solve(self, young: Array | None = None, initial_modes: Initial | None = None) -> Modes:
+    def solve(
+        self,
+        young: Array | None = None,
+        initial_modes: Initial | None = None,
+        poisson: float | None = None,
+    ) -> Modes:
         """Compute the lowest modes.
 
         All ranks call it and get the same values.
@@ -132,6 +137,8 @@ class ModalSolver:
         initial_modes
             Modes of a similar material on the same mesh, or this rank's rows (local, k) of such,
             or those of a coarser mesh, see `solver.analysis.coarse_start`: they are corrected.
+        poisson
+            Poisson's ratio, the same on every rank; that of the model if not given.
 
         Raises
         ------
@@ -141,9 +148,16 @@ class ModalSolver:
             If a tolerance was missed, the modes are not orthonormal, or the body does not have six
             zero-frequency modes.
         """
-        return self._solve(young, initial_modes, lambda model, given: model.element_moduli(given))
+        return self._solve(
+            young, initial_modes, poisson, lambda model, given: model.element_moduli(given)
+        )
 
-    def solve_coarse(self, moduli: Array | None, initial_modes: Initial | None = None) -> Modes:
+    def solve_coarse(
+        self,
+        moduli: Array | None,
+        initial_modes: Initial | None = None,
+        poisson: float | None = None,
+    ) -> Modes:
         """The same with the moduli (m, 8) [Pa] that a coarsening made, on rank 0.
 
         They may lie beyond the limits of those that users give.
@@ -158,6 +172,7 @@ class ModalSolver:
         return self._solve(
             moduli,
             initial_modes,
+            poisson,
             lambda model, given: require_coarse_moduli(given, model.mesh.n_cells),
         )
 
@@ -165,6 +180,7 @@ class ModalSolver:
         self,
         young: Array | None,
         initial_modes: Initial | None,
+        poisson: float | None,
         moduli_of: Callable[[Solid, Array], Array],
     ) -> Modes:
         phases = Phases(self.comm, self._verbose)
@@ -175,6 +191,8 @@ class ModalSolver:
                     self.comm, lambda: moduli_of(cast(Solid, self._model), cast(Array, young))
                 )
                 local_mesh = scatter_moduli(local_mesh, moduli, self.comm)
+            if poisson is not None:
+                local_mesh = with_poisson(local_mesh, poisson)
             elements = local_mesh.cells.elements
             like = initial_modes.system if self._is_of_same_mesh(initial_modes) else None
             system = assemble(local_mesh, self.comm, self._layout, elements, self._threads, like)

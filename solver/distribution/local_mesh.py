@@ -172,6 +172,12 @@ def scatter_moduli(local_mesh: LocalMesh, young: Array | None, comm: MPI.Comm) -
     return replace(local_mesh, cells=cells)
 
 
+def with_poisson(local_mesh: LocalMesh, poisson: float) -> LocalMesh:
+    """A rank's part of the solid with another Poisson's ratio."""
+    cells = replace(local_mesh.cells, elements=local_mesh.cells.elements.with_poisson(poisson))
+    return replace(local_mesh, cells=cells)
+
+
 def _scatter(
     model: Solid, decomposition: Decomposition, order: NDArray[np.int64], comm: MPI.Comm
 ) -> tuple[NDArray[np.int64], Array, NDArray[np.int64], Cells]:

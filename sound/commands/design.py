@@ -186,6 +186,7 @@ def summarise(design: Design) -> dict[str, Any]:
         "young_min_pa": float(design.young.min()),
         "young_max_pa": float(design.young.max()),
         "density_kg_per_m3": design.model.density,
+        "poisson": design.model.poisson,
         "damping_ratios": ratios.tolist(),
         "loss_factors": np.unique(design.damping.loss_factors).tolist(),
         "mass_damping_per_second": design.damping.mass_per_second,
@@ -226,7 +227,7 @@ def _material_sentence(design: Design) -> str:
     low, high = design.young.min(), design.young.max()
     text = (
         f"Young's modulus {low / 1e9:.3g} to {high / 1e9:.3g} GPa, density "
-        f"{design.model.density:.4g} kg/m^3"
+        f"{design.model.density:.4g} kg/m^3, Poisson's ratio {design.model.poisson:.3g}"
     )
     least, most = design.settings["material"]["young_bounds"] or (low, high)
     beyond = np.mean((design.young < 0.999 * least) | (design.young > 1.001 * most))

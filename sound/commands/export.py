@@ -75,10 +75,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _content(kind: str, design: Design) -> str:
     if kind == "npy":
-        young = design.young
+        young, model = design.young, design.model
         return (
-            f"{len(young):,} moduli, {young.min() / 1e9:.3g} to {young.max() / 1e9:.3g} GPa, for a "
-            f"density of {design.model.density:.4g} kg/m^3"
+            f"{len(young):,} moduli, {young.min() / 1e9:.3g} to {young.max() / 1e9:.3g} GPa, for "
+            f"--density {model.density:.6g} --poisson {model.poisson:.6g}"
         )
     hertz = design.frequencies
     return f"{len(hertz)} modes, {hertz[0]:.4g} to {hertz[-1]:.4g} Hz"

@@ -41,7 +41,13 @@ class AnalysedElements(ABC):
         """The solid with these moduli."""
 
     @abstractmethod
-    def solve(self, solver: ModalSolver, young: Array, start: Modes | Array | None) -> Modes:
+    def solve(
+        self,
+        solver: ModalSolver,
+        young: Array,
+        start: Modes | Array | None,
+        poisson: float | None = None,
+    ) -> Modes:
         """Its modes by a solver of `model`, see `ModalSolver.solve`."""
 
     @abstractmethod
@@ -56,9 +62,8 @@ class AnalysedElements(ABC):
             If the coarsening has no derivatives.
         """
 
-    @property
     @abstractmethod
-    def strains(self) -> Array:
+    def strains(self, poisson: float) -> Array:
         """B (p, 6, 3 k): a unit of modulus at point p has the stiffness B_p^T B_p."""
 
 
@@ -94,15 +99,20 @@ class _FineElements(AnalysedElements):
     def with_young(self, young: Array) -> Solid:
         return self.model.with_young(young)
 
-    def solve(self, solver: ModalSolver, young: Array, start: Modes | Array | None) -> Modes:
-        return solver.solve(young, start)
+    def solve(
+        self,
+        solver: ModalSolver,
+        young: Array,
+        start: Modes | Array | None,
+        poisson: float | None = None,
+    ) -> Modes:
+        return solver.solve(young, start, poisson)
 
     def slopes(self, young: Array, directions: Array) -> Array:
         return np.repeat(directions, 8, axis=0)
 
-    @property
-    def strains(self) -> Array:
-        values, vectors = np.linalg.eigh(quadrature_stiffness(self.model.poisson))
+    def strains(self, poisson: float) -> Array:
+        values, vectors = np.linalg.eigh(quadrature_stiffness(poisson))
         factors = np.sqrt(np.maximum(values, 0.0))[:, None, :] * vectors
         factors = np.sqrt(self.model.mesh.edge) * factors[:, :, -STRAINS:]
         return np.ascontiguousarray(factors.transpose(0, 2, 1))
@@ -126,8 +136,14 @@ class _CoarseElements(_FineElements):
     def with_young(self, young: Array) -> Solid:
         return self._model(self._moduli(young))
 
-    def solve(self, solver: ModalSolver, young: Array, start: Modes | Array | None) -> Modes:
-        return solver.solve_coarse(self._moduli(young), start)
+    def solve(
+        self,
+        solver: ModalSolver,
+        young: Array,
+        start: Modes | Array | None,
+        poisson: float | None = None,
+    ) -> Modes:
+        return solver.solve_coarse(self._moduli(young), start, poisson)
 
     def slopes(self, young: Array, directions: Array) -> Array:
         blocks = self._blocks
@@ -147,13 +163,18 @@ class _CellElements(AnalysedElements):
     def with_young(self, young: Array) -> Solid:
         return self.model.with_young(young)
 
-    def solve(self, solver: ModalSolver, young: Array, start: Modes | Array | None) -> Modes:
-        return solver.solve(young, start)
+    def solve(
+        self,
+        solver: ModalSolver,
+        young: Array,
+        start: Modes | Array | None,
+        poisson: float | None = None,
+    ) -> Modes:
+        return solver.solve(young, start, poisson)
 
     def slopes(self, young: Array, directions: Array) -> Array:
         columns = [self._cells.point_values(along).ravel() for along in directions.T]
         return np.stack(columns, axis=1)
 
-    @property
-    def strains(self) -> Array:
-        return np.sqrt(2.0 * self.model.mesh.edge) * strain_factors(self.model.poisson)
+    def strains(self, poisson: float) -> Array:
+        return np.sqrt(2.0 * self.model.mesh.edge) * strain_factors(poisson)

@@ -11,6 +11,7 @@ from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
 from carillon.fem.laplacian import laplacian_modes
 from carillon.fem.moduli import require_moduli
+from sound.design.poisson import FreePoisson
 
 Array = NDArray[np.float64]
 
@@ -48,16 +49,27 @@ class ReducedMaterial:
         Modulus Y0.
     law : str
         One of `LAWS`.
+    free_poisson
+        Poisson's ratio as a function of the last coordinate, which moduli do not depend on: its
+        column of the basis is zero, as its eigenvalue.  None if there is no such coordinate.
     """
 
     basis: Array
     laplacian: Array
     young: float
     law: str
+    free_poisson: FreePoisson | None = None
 
     @classmethod
-    def of_mesh(cls, mesh: HexMesh, dimensions: int, young: float, law: str) -> ReducedMaterial:
-        """Reduction of the moduli of a mesh to `dimensions` coordinates.
+    def of_mesh(
+        cls,
+        mesh: HexMesh,
+        dimensions: int,
+        young: float,
+        law: str,
+        free_poisson: FreePoisson | None = None,
+    ) -> ReducedMaterial:
+        """Reduction of the moduli of a mesh to `dimensions` coordinates, beside Poisson's ratio.
 
         Raises
         ------
@@ -74,7 +86,10 @@ class ReducedMaterial:
         require_moduli(np.full(mesh.n_cells, young), mesh.n_cells, "material to start from")
         values, modes = laplacian_modes(mesh, dimensions + 1)
         basis = np.sqrt(mesh.n_cells) * modes[:, 1:]
-        return cls(np.ascontiguousarray(basis), np.maximum(values[1:], 0.0), young, law)
+        values = np.maximum(values[1:], 0.0)
+        if free_poisson is not None:
+            basis, values = np.pad(basis, ((0, 0), (0, 1))), np.append(values, 0.0)
+        return cls(np.ascontiguousarray(basis), values, young, law, free_poisson)
 
     @property
     def dimensions(self) -> int:
@@ -90,15 +105,25 @@ class ReducedMaterial:
         bent = KNEE * np.exp(np.minimum(x, KNEE) / KNEE - 1.0)
         return np.asarray(self.young * np.where(x > KNEE, x, bent))
 
-    def coordinates(self, moduli: Array) -> Array:
-        """Coordinates (m,) whose moduli come nearest to a multiple of given ones (M,) [Pa]."""
+    def poisson(self, z: Array) -> float | None:
+        """Poisson's ratio, if it is free."""
+        return None if self.free_poisson is None else self.free_poisson.at(z[-1])
+
+    def coordinates(self, moduli: Array, poisson: float | None = None) -> Array:
+        """Coordinates (m,) whose moduli come nearest to a multiple of given ones (M,) [Pa].
+
+        `poisson` is used if it is free.
+        """
         if self.law == "exponential":
             level = np.log(moduli) - np.log(moduli).mean()
             reach = 0.999 * REACH
             field = REACH * np.arctanh(np.clip(level, -reach, reach) / REACH)
         else:
             field = moduli / moduli.mean() - 1.0
-        return np.asarray(np.linalg.lstsq(self.basis, field, rcond=None)[0])
+        z = np.linalg.lstsq(self.basis, field, rcond=None)[0]
+        if self.free_poisson is not None and poisson is not None:
+            z[-1] = self.free_poisson.coordinate(poisson)
+        return np.asarray(z)
 
     def slopes(self, moduli: Array) -> Array:
         """Derivatives (M,) [Pa] of the moduli with respect to Phi z, at given `moduli`."""

@@ -144,7 +144,9 @@ class Outcome:
             targets=targets,
             coordinates=evaluation.z,
             young=young,
-            model=simulation.elements.with_young(young).with_density(heavier * density),
+            model=simulation.elements.with_young(young).with_constants(
+                simulation.poisson(evaluation.z), heavier * density
+            ),
             eigenvalues=stretch**2 * evaluation.modes.values,
             modes=simulation.mesh_rows(evaluation.modes.vectors) / np.sqrt(heavier),
             surface_vertices=problem.vertices,

@@ -15,6 +15,7 @@ from sound.clips.files import extract_file
 from sound.clips.targets import Targets, share_frequencies
 from sound.design.material import ReducedMaterial
 from sound.design.objective import Objective
+from sound.design.poisson import FreePoisson
 from sound.design.pool import Setting
 from sound.project.design_file import Design
 from sound.project.project import Project
@@ -79,8 +80,10 @@ def prepare(project: Project, targets: Targets | None = None) -> DesignProblem:
     objective = Objective(targets, project.weights)
     name = surface_name(solid.mesh)
     mesh, cells = discretised(surface, solid, name)
+    wanted, bounds = project.material, project.material.poisson_bounds
+    free_poisson = None if bounds is None else FreePoisson(bounds[0], bounds[1], solid.poisson)
     material = ReducedMaterial.of_mesh(
-        mesh, project.material.dimensions, project.material.young, project.material.law
+        mesh, wanted.dimensions, wanted.young, wanted.law, free_poisson
     )
     whole = None if cells is None else cells.cells
     setting = Setting(mesh, solid, material, strikes, objective, whole)
@@ -113,7 +116,9 @@ def coordinates_of(problem: DesignProblem, initial: Design) -> Array:
     """
     require_same_voxels(problem, initial)
     material = problem.setting.material
-    same = initial.settings.get("material", {}).get("law") == material.law
+    before = initial.settings.get("material", {})
+    wanted = problem.project.material
+    same = (before.get("law"), before.get("poisson_bounds")) == (wanted.law, wanted.poisson_bounds)
     if same and len(initial.coordinates) == material.dimensions:
         return initial.coordinates
-    return material.coordinates(initial.young)
+    return material.coordinates(initial.young, initial.model.poisson)

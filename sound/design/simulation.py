@@ -23,6 +23,7 @@ from sound.design.elements import analysed_elements
 from sound.design.material import ReducedMaterial
 from sound.design.objective import Sensitivity
 from sound.design.outside import lies_between, outside_response, shift_between
+from sound.design.poisson import FIRST, SECOND, elasticity_slope
 from sound.design.sensitivity import all_pairs, close_pairs, inside_response, projected_stiffness
 from sound.strikes import Strike
 
@@ -103,7 +104,6 @@ class Simulation:
         # Rows of the analysis are in the order of its partition.
         self._order = degrees_of_freedom(self.solver.local_mesh.nodes)
         self._pushes = pushes(self.model, strikes)[self._order]
-        self._strains = self.elements.strains
         self._accuracy = RESPONSE * np.sqrt(tolerance)
 
     @property
@@ -124,7 +124,7 @@ class Simulation:
             Whether their derivatives are asked for.
         """
         young = self.material.moduli(z)
-        modes = self.elements.solve(self.solver, young, start)
+        modes = self.elements.solve(self.solver, young, start, self.material.poisson(z))
         elastic = modes.vectors[:, RIGID_MODES:]
         similar = start.inverse if isinstance(start, Modes) else None
         own = None if modes.inverse is similar else modes.inverse
@@ -163,8 +163,36 @@ class Simulation:
         vectors[self._order], others[self._order] = elastic, outside
         nodes = self.model.connectivity
         pairs = all_pairs(len(values)) if whole else close_pairs(values)
-        inside, beyond = projected_stiffness(nodes, self._strains, vectors, pairs, others, slopes)
+        strains = self.elements.strains(self.poisson(evaluation.z))
+        if self.material.free_poisson is not None:
+            strains, slopes = self._with_slope_of_poisson(evaluation.z, strains, slopes)
+        inside, beyond = projected_stiffness(nodes, strains, vectors, pairs, others, slopes)
         return Sensitivity(pairs, inside, beyond)
+
+    def poisson(self, z: Array) -> float:
+        """Poisson's ratio at the coordinates z."""
+        own = self.material.poisson(z)
+        return self.model.poisson if own is None else own
+
+    def _with_slope_of_poisson(
+        self, z: Array, strains: Array, slopes: Array
+    ) -> tuple[Array, Array]:
+        """Strains and slopes, to which those of Poisson's ratio are added.
+
+        Its derivative of the stiffness is a sum of the stiffnesses at two other ratios, whose
+        strains count as further points.
+        """
+        poisson, free = self.poisson(z), self.material.free_poisson
+        assert free is not None
+        young = self.material.moduli(z)
+        # The moduli at the points are linear in a factor of all.
+        moduli = self.elements.slopes(young, young[:, None]).reshape(-1, len(strains))
+        by_cell = np.zeros((len(moduli), 3, len(strains), slopes.shape[1]))
+        by_cell[:, 0] = slopes.reshape(len(moduli), len(strains), -1)
+        for place, weight in enumerate(elasticity_slope(poisson), start=1):
+            by_cell[:, place, :, -1] = free.slope(poisson) * weight * moduli
+        further = [self.elements.strains(ratio) for ratio in (FIRST, SECOND)]
+        return np.concatenate([strains, *further]), by_cell.reshape(-1, slopes.shape[1])
 
     def energy_shares(self, evaluation: Evaluation, regions: NDArray[np.integer]) -> Array:
         """Shares (N, R) of the modes' strain energies that R regions of the solid hold.
@@ -189,7 +217,7 @@ class Simulation:
         count = vectors.shape[1]
         energies, _ = projected_stiffness(
             self.model.connectivity,
-            self._strains,
+            self.elements.strains(self.poisson(evaluation.z)),
             vectors,
             all_pairs(count)[:count],
             np.empty((len(vectors), 0, count)),

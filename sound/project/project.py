@@ -54,13 +54,15 @@ class TargetEntry:
 class MaterialSettings:
     """Modulus to start from [Pa], eigenvectors that make the field, and how they do.
 
-    `young_bounds` [Pa] are those that moduli are brought into by another density; None leaves it.
+    `young_bounds` [Pa] are those that moduli are brought into by another density, `poisson_bounds`
+    those that Poisson's ratio is sought between; None leaves these as they are.
     """
 
     young: float
     dimensions: int
     law: str
     young_bounds: list[float] | None
+    poisson_bounds: list[float] | None
 
 
 @dataclass(frozen=True)
@@ -169,14 +171,17 @@ def project_of(described: Mapping[str, Any], folder: Path) -> Project:
     filled = with_defaults(described, project_schema())
     targets = tuple(_target(number, each, folder) for number, each in enumerate(filled["targets"]))
     _require_something_to_lower(filled["weights"])
-    _require_ascending("material.young_bounds", filled["material"]["young_bounds"])
+    for key in ("young_bounds", "poisson_bounds"):
+        _require_ascending(f"material.{key}", filled["material"][key])
     solid = {key: filled[key] for key in _SOLID}
     if not solid["mesh"].startswith(BUILTIN_PREFIX):
         solid["mesh"] = str(folder / solid["mesh"])
     if solid["forest"] is not None:
         solid["forest"] = str(folder / solid["forest"])
+    options = ProblemOptions(**solid)
+    _require_free(options, filled["material"]["poisson_bounds"])
     return Project(
-        ProblemOptions(**solid),
+        options,
         filled["modes"],
         targets,
         MaterialSettings(**filled["material"]),
@@ -217,6 +222,22 @@ def _target(number: int, entry: Mapping[str, Any], folder: Path) -> TargetEntry:
 def _require_ascending(key: str, bounds: list[float] | None) -> None:
     if bounds is not None and not bounds[0] < bounds[1]:
         raise UserError(f"{key}: found {bounds}, expected the lower one first")
+
+
+def _require_free(solid: ProblemOptions, bounds: list[float] | None) -> None:
+    """Refuse bounds of a Poisson's ratio that the forests fix, or that is not between them."""
+    if bounds is None:
+        return
+    if solid.coarsen == "ddfem":
+        raise UserError(
+            "material.poisson_bounds: found coarsen ddfem, whose forests hold for one Poisson's "
+            "ratio; choose coarsen none or average, or discretisation finite-cell"
+        )
+    if not bounds[0] < solid.poisson < bounds[1]:
+        raise UserError(
+            f"material.poisson_bounds: found {bounds}, expected poisson, which the search starts "
+            f"from, between them; it is {solid.poisson:g}"
+        )
 
 
 def _require_something_to_lower(weights: Mapping[str, float]) -> None:

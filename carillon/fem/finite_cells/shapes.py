@@ -9,13 +9,13 @@ the points' Lagrange polynomials over that part, which are its moments in anothe
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from carillon.fem.block import NODES
-from carillon.fem.element import CORNERS, elasticity_matrix, strain_displacement
+from carillon.fem.element import CORNERS, KEPT, elasticity_matrix, strain_displacement
 
 Array = NDArray[np.float64]
 
@@ -105,7 +105,7 @@ def octant_weights() -> Array:
     return _kept(np.array(octants))
 
 
-@cache
+@lru_cache(KEPT)
 def strain_factors(poisson: float) -> Array:
     """B (125, 6, 81): strains at the points, times a root of the elasticity, for a unit edge.
 
@@ -115,7 +115,7 @@ def strain_factors(poisson: float) -> Array:
     return _kept(root @ strain_displacement(shape_gradients(points())))
 
 
-@cache
+@lru_cache(KEPT)
 def point_stiffness(poisson: float) -> Array:
     """B_p^T B_p (125, 81 * 81), see `strain_factors`."""
     factors = strain_factors(poisson)
