@@ -9,6 +9,7 @@ import pytest
 
 from carillon.errors import ConvergenceError
 from sound.design import pool
+from sound.design.benchmark import _medians, compare_optimisers
 from sound.design.descent import DescentLimits, StepOptions, cost_of
 from sound.design.optimise import optimise
 from sound.design.optimisers import OPTIMISERS
@@ -125,3 +126,30 @@ def test_going_on_from_another_sound_is_never_for_the_worse(
 def cost_on(setting, coordinates):
     evaluation = setting.simulation(1e-9).evaluate(coordinates)
     return cost_of(setting.objective, setting.material, evaluation).total
+
+
+@pytest.mark.parametrize("fine_check", [False, True])
+def test_optimisers_are_compared_by_medians_over_seeds(problem, fine_check):
+    rows = compare_optimisers(with_options(problem, evaluations=30), 3, fine_check)
+    assert [row["method"] for row in rows] == list(OPTIMISERS)
+    for row in rows:
+        assert row["seeds"] == 3 and 29 <= row["evaluations"] <= 30
+        assert row["cost_end_min"] <= row["cost_end"] <= row["cost_end_max"] <= row["cost_start"]
+        assert row["fall_percent"] == pytest.approx(100 * (1 - row["cost_end"] / row["cost_start"]))
+        assert row["cost_end"] == pytest.approx(row["curve"][-1][1], rel=0.02)
+        assert (row["fine_rms_cents"] is None) == (not fine_check)
+    by_name = {row["method"]: row for row in rows}
+    assert by_name["cma"]["cost_end_min"] < by_name["cma"]["cost_end_max"]
+    if not fine_check:  # which L-BFGS has no chance in
+        assert by_name["bfgs"]["cost_end_min"] == by_name["bfgs"]["cost_end_max"]
+
+
+def test_what_some_searches_did_not_come_to_is_larger_than_all():
+    found = [
+        {"cost_end": cost, "seconds_to_90_percent": after, "curve": [[0.0, cost]], "workers": 1}
+        for cost, after in ((1.0, 2.0), (3.0, None), (2.0, 5.0))
+    ]
+    row = _medians(found)
+    assert (row["cost_end"], row["cost_end_min"], row["cost_end_max"]) == (2.0, 1.0, 3.0)
+    assert (row["seconds_to_90_percent"], row["seconds_to_90_percent_max"]) == (5.0, None)
+    assert row["curve"] == [[0.0, 2.0]]
