@@ -125,6 +125,8 @@ class Trial:
         How a descent went; its modes stay behind.
     start : (3 n, k) or None
         Modes for others to begin from, of a descent or with the gradient.
+    eigenvalues : (N,) [rad^2/s^2] or None
+        Of the elastic modes, if there are any to be had.
     """
 
     z: Array
@@ -133,6 +135,7 @@ class Trial:
     gradient: Array | None = None
     descent: DesignDescent | None = None
     start: Array | None = None
+    eigenvalues: Array | None = None
 
 
 class Pool:
@@ -265,11 +268,13 @@ def _done(simulation: Simulation, task: Task) -> Trial:
             descent.evaluations,
             descent=replace(descent, last=None),
             start=last.modes.start(),
+            eigenvalues=last.eigenvalues,
         )
     objective = task.objective or _setting.objective
     evaluation = simulation.evaluate(task.z, task.start, task.gradient)
     cost = cost_of(objective, simulation.material, evaluation)
     if not task.gradient:
-        return Trial(task.z, cost, 1)
+        return Trial(task.z, cost, 1, eigenvalues=evaluation.eigenvalues)
     gradient = squares_of(objective, simulation.material, evaluation).gradient
-    return Trial(task.z, cost, 1, gradient, start=evaluation.modes.start())
+    start = evaluation.modes.start()
+    return Trial(task.z, cost, 1, gradient, start=start, eigenvalues=evaluation.eigenvalues)
