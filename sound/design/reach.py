@@ -90,11 +90,14 @@ class Reach:
         Modes, counted from the first one, that one of the materials looked at has all of.
     seconds : float [s]
         Time that it took.
+    had_cents : float [cents]
+        Distance up to which a mode is had.
     """
 
     modes: list[ModeReach]
     together: int
     seconds: float
+    had_cents: float = HAD_CENTS
 
 
 class SomeModes(Objective):
