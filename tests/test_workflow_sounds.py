@@ -244,7 +244,7 @@ def test_optimisers_are_set_beside_each_other_on_the_recorded_solids(tmp_path):
         numbers = ("cost_end", "fall_percent", "evaluations", "fine_rms_cents", "seconds")
         row["fine_rms_cents"] = 8.0
         row |= {f"{key}_{end}": row[key] for key in numbers for end in ("min", "max")}
-    results = comparison.Comparison(tmp_path / FOLDER)
+    results = comparison.ComparedSounds(tmp_path / FOLDER)
     results.__dict__["config"] = CONFIG
     results.__dict__["compared"] = dict.fromkeys(("recorded-bar", "recorded-bell"), found)
     table = COMPARED_SOUNDS.entries["comparison"](results)

@@ -15,7 +15,7 @@ from workflow.studies.sounds.examples import COMPARISON, examples
 from workflow.studies.sounds.tables import METHODS
 
 
-class Comparison(Results):
+class ComparedSounds(Results):
     """The folder of all examples, those whose clips are strikes of a known material."""
 
     @cached_property
@@ -36,7 +36,7 @@ COMPARED = measured(
 )
 
 
-def comparison(results: Comparison) -> Iterator[Row]:
+def comparison(results: ComparedSounds) -> Iterator[Row]:
     """Medians and spreads of every optimiser on every solid."""
     for name, compared in results.compared.items():
         title = examples(results.config)[name].title
@@ -47,7 +47,7 @@ def comparison(results: Comparison) -> Iterator[Row]:
             yield {**row, **falls, "example": name, "title": title, "method": method}
 
 
-def page(results: Comparison, tables: dict[str, Table]) -> str:
+def page(results: ComparedSounds, tables: dict[str, Table]) -> str:
     """Build the page from its table."""
     return rendered(
         "sounds/comparison.html.j2", title="Optimisers by several seeds", table=tables["comparison"]
