@@ -18,7 +18,7 @@ import pytest
 import yaml
 
 from carillon.errors import ConvergenceError, UserError
-from sound.design import pool
+from solver.analysis.modal_solver import ModalSolver
 from sound.design.objective import DesignCost, Objective
 from sound.design.optimise import optimise
 from sound.design.optimisers import OPTIMISERS
@@ -27,7 +27,6 @@ from sound.design.plausible import weight
 from sound.design.pool import Pool, Task, Trial
 from sound.design.preparation import coordinates_of, prepare, targets_of
 from sound.design.search import HistoryEntry
-from sound.design.simulation import Simulation
 from sound.project.design_file import HISTORY_TYPE, read_design, write_design
 from sound.project.project import Weights, project_of
 from sound.rendering.listening import Listening
@@ -154,24 +153,6 @@ def test_result_does_not_depend_on_the_number_of_workers(problem):
     assert one.evidence["cost"] == two.evidence["cost"]
 
 
-@pytest.mark.parametrize("method", sorted(OPTIMISERS))
-@pytest.mark.parametrize("most", [1, 2, 3, 12])
-def test_no_more_evaluations_are_made_than_asked_for(problem, monkeypatch, method, most):
-    looked_at = []
-    evaluate = Simulation.evaluate
-
-    def counted(simulation, *arguments, **options):
-        if simulation is pool._simulation:  # not that which analyses what was found
-            looked_at.append(arguments)
-        return evaluate(simulation, *arguments, **options)
-
-    monkeypatch.setattr(Simulation, "evaluate", counted)
-    design = optimise(with_options(problem, method=method, evaluations=most))
-    assert len(looked_at) == design.evidence["evaluations"] == design.history["evaluations"][-1]
-    assert most - 1 <= len(looked_at) <= most
-    assert design.evidence["cost"] <= design.evidence["cost_start"]
-
-
 def test_a_worse_material_than_that_of_the_start_is_not_saved(problem):
     """Though the coarse analyses of a search may take it for a better one."""
     start = np.zeros(problem.setting.material.dimensions)
@@ -198,7 +179,7 @@ def test_a_start_without_modes_is_refused_at_once(problem, monkeypatch):
     def fail(*_, **__):
         raise ConvergenceError("no modes")
 
-    monkeypatch.setattr(Simulation, "evaluate", fail)
+    monkeypatch.setattr(ModalSolver, "solve", fail)
     with pytest.raises(UserError, match="to start from has no modes"):
         optimise(with_options(problem, evaluations=None))
 

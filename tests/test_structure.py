@@ -100,8 +100,7 @@ ARROWS = {
     "workflow.studies.accuracy": "workflow.studies.base",
     "workflow.studies.sounds": """solver.files solver.response sound sound.clips sound.project
         sound.design sound.rendering workflow workflow.studies.base""",
-    "workflow.studies.recordings": """solver.response sound.clips sound.commands
-        workflow.studies.base""",
+    "workflow.studies.recordings": "solver.response sound.clips workflow.studies.base",
     "workflow.studies.validation": """solver.files solver.refinement solver.response
         solver.studies workflow workflow.studies.base workflow.studies.report""",
     "workflow.studies.comparison": "workflow workflow.studies.base",

@@ -27,14 +27,15 @@ from tests.workflow_runs import TINY, planned, snakemake
 from workflow import settings
 from workflow.commands.estimate import CONFIGURATIONS, load
 from workflow.studies.base.table import write_table
-from workflow.studies.catalogue import SOUND, SOUNDS
-from workflow.studies.sounds import index, page, tables
+from workflow.studies.catalogue import COMPARED_SOUNDS, SOUND, SOUNDS
+from workflow.studies.sounds import comparison, index, page, tables
 from workflow.studies.sounds.examples import (
     DESIGN,
     ELSEWHERE,
     EXAMPLES,
     FOLDER,
     PROJECT,
+    REACHED,
     START,
     TRUTH,
     Example,
@@ -111,6 +112,23 @@ def compared() -> dict:
     }
 
 
+def reached(*verdicts: str) -> dict:
+    """Output of `sound reach`."""
+    modes = [
+        {
+            "mode": number,
+            "target_hz": 100.0 * number,
+            "cents": 20.0,
+            "alone_cents": 0.0,
+            "beside_cents": 5.5,
+            "verdict": verdict,
+        }
+        for number, verdict in enumerate(verdicts, 2)
+    ]
+    answer = {"modes": modes, "together": 3, "seconds": 9.0, "had_cents": 15.0} if modes else {}
+    return {"fall": 0.5, **answer, "provenance": record({"seed": 0})}
+
+
 @pytest.fixture(scope="module")
 def results(tmp_path_factory) -> SoundResults:
     """Results of an example, made without optimisation."""
@@ -129,6 +147,7 @@ def results(tmp_path_factory) -> SoundResults:
     write_truth(folder / TRUTH, final)
     write_sounds(folder, final)
     (folder / "optimisers.json").write_text(json.dumps(compared()))
+    (folder / REACHED).write_text(json.dumps(reached("had", "not with all others")))
     return box
 
 
@@ -178,7 +197,16 @@ def test_files_that_the_page_leads_to_are_there(results, built):
 
 @pytest.mark.parametrize(
     "name",
-    ["designs", "frequencies", "truth", "amplitudes", "optimisers", "evaluation", "provenance"],
+    [
+        "designs",
+        "frequencies",
+        "truth",
+        "reach",
+        "amplitudes",
+        "optimisers",
+        "evaluation",
+        "provenance",
+    ],
 )
 def test_tables_of_the_page_are_those_of_the_files(results, built, name):
     assert_same_numbers(built, results.file("tables"), name)
@@ -198,6 +226,40 @@ def test_the_fine_model_is_set_beside_the_coarse_one(results):
     for row in rows:
         assert row["error"] == pytest.approx(row["found"] / row["truth"] - 1.0)
     assert max(abs(row["error"]) for row in rows) > 0.0
+
+
+def test_the_page_says_which_modes_the_solid_can_have_where_the_search_fell_short(results, built):
+    assert "first 3 modes were had together" in built.source and REACHED in built.led
+    assert "reach" not in results.absent
+    enough = Box(results.folder, results.name)
+    enough.__dict__["reached"] = reached()
+    assert "reach" in enough.absent
+
+
+def test_optimisers_are_set_beside_each_other_on_the_recorded_solids(tmp_path):
+    (tmp_path / "tables").mkdir()
+    (tmp_path / "config.yaml").write_text(yaml.safe_dump(CONFIG))
+    found = compared()
+    for row in found["rows"]:
+        numbers = ("cost_end", "fall_percent", "evaluations", "fine_rms_cents", "seconds")
+        row["fine_rms_cents"] = 8.0
+        row |= {f"{key}_{end}": row[key] for key in numbers for end in ("min", "max")}
+    results = comparison.ComparedSounds(tmp_path / FOLDER)
+    results.__dict__["config"] = CONFIG
+    results.__dict__["compared"] = dict.fromkeys(("recorded-bar", "recorded-bell"), found)
+    table = COMPARED_SOUNDS.entries["comparison"](results)
+    write_table(table, tmp_path / "tables")
+    assert len(table.rows) == 6 and table.rows[0]["fall_max"] == pytest.approx(1.0 - 0.5 / 9.0)
+    (tmp_path / "page.html").write_text(comparison.page(results, {"comparison": table}), "utf-8")
+    read = Page(tmp_path / "page.html")
+    assert_self_contained(read)
+    assert_same_numbers(read, tmp_path / "tables", "comparison")
+
+
+def test_the_comparison_is_planned_for_recorded_solids_alone(tmp_path):
+    jobs = planned(snakemake(tmp_path, "compared_sounds", "--dry-run", "--cores", 2))
+    assert jobs["compare_optimisers_by_seeds"] == 4 and jobs["compared_sounds"] == 1
+    assert "design_sound" not in jobs
 
 
 def test_the_index_leads_to_the_page(results, built, tmp_path):
@@ -268,6 +330,7 @@ def test_all_examples_are_planned_without_any_mesh_file(tmp_path):
     assert jobs["design_sound"] == sum(example.edits for example in chosen) == 9
     assert jobs["begin_design"] == jobs["check_design"] == jobs["build_sound_page"] == 7
     assert jobs["record_clip"] == 8 and jobs["synthesise_clip"] == 9
+    assert jobs["find_reach"] == 7 and "compare_optimisers_by_seeds" not in jobs
     assert jobs["build_sounds_index"] == 1 and jobs["compare_optimisers"] == 2
 
 

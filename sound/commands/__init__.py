@@ -14,6 +14,7 @@ COMMANDS = {
     "check": Command(
         "sound.commands.check", "frequencies of a design on the fine solid, beside its targets"
     ),
+    "reach": Command("sound.commands.reach", "which modes that a design misses its solid can have"),
     "render": Command("sound.commands.render", "the sound of a strike, as WAV"),
     "export": Command(
         "sound.commands.export", "modes on the mesh, glTF, Faust or moduli, for other tools"

@@ -27,6 +27,15 @@ class DesignBenchmarkOptions:
         nargs="+",
         metavar="N",
     )
+    seeds: int = option(
+        1,
+        "searches by each optimiser, their seeds from the project's on, of which medians and "
+        "spreads are told",
+        type=whole_number(1, 1000),
+    )
+    fine_check: bool = option(
+        False, "compare searches with checks on the fine solid, by their costs there"
+    )
     json: bool = option(False, "print everything as JSON")
 
 
@@ -51,7 +60,9 @@ def run(arguments: argparse.Namespace) -> int:
 
     results: dict[str, Any]
     if options.resolutions is None:
-        results = benchmark(prepare(project), options.runs, report)
+        results = benchmark(
+            prepare(project), options.runs, options.seeds, options.fine_check, report
+        )
     else:
         results = {"evaluations": time_sizes(project, options.resolutions, options.runs, report)}
     if options.json:
@@ -77,13 +88,33 @@ def _sentence(times: dict[str, Any]) -> str:
 def _table(rows: list[dict[str, Any]]) -> str:
     lines = [
         f"{'method':8} {'cost':>19} {'fall':>7} {'90 % after':>11} {'evaluations':>12} "
-        f"{'a minute':>9} {'seconds':>8}",
+        f"{'a minute':>9} {'seconds':>8} {'fine cents':>11}",
     ]
     for row in rows:
-        after = row["seconds_to_90_percent"]
+        after, rms = row["seconds_to_90_percent"], row["fine_rms_cents"]
         lines.append(
             f"{row['method']:8} {row['cost_start']:8.4g} -> {row['cost_end']:7.4g} "
             f"{row['fall_percent']:6.2f}% {'-' if after is None else f'{after:.1f} s':>11} "
-            f"{row['evaluations']:12,} {row['evaluations_per_minute']:9,.0f} {row['seconds']:8.1f}"
+            f"{row['evaluations']:12,.0f} {row['evaluations_per_minute']:9,.0f} "
+            f"{row['seconds']:8.1f} {'-' if rms is None else f'{rms:.1f}':>11}"
         )
+    if rows[0]["seeds"] > 1:
+        lines.append(f"medians of {rows[0]['seeds']} seeds; smallest and largest:")
+        lines += [_spread(row) for row in rows]
     return "\n".join(lines)
+
+
+def _spread(row: dict[str, Any]) -> str:
+    """From the smallest to the largest value of what seeds change."""
+    words = {
+        "cost": ("cost_end", ".4g", ""),
+        "fall": ("fall_percent", ".2f", "%"),
+        "evaluations": ("evaluations", ",.0f", ""),
+        "fine": ("fine_rms_cents", ".1f", " cents"),
+    }
+    spreads = [
+        f"{word} {row[f'{key}_min']:{form}} to {row[f'{key}_max']:{form}}{unit}"
+        for word, (key, form, unit) in words.items()
+        if row[key] is not None
+    ]
+    return f"{row['method']:8} {', '.join(spreads)}"

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from carillon.threads import one_thread
 from sound.clips.targets import Targets
+from sound.design.cents import rms_cents
 from sound.design.objective import fall
 from sound.design.optimise import optimise
 from sound.design.optimisers import OPTIMISERS
@@ -82,21 +83,33 @@ def time_evaluations(problem: DesignProblem, runs: int = 7, seed: int = 0) -> Ev
 
 
 def compare_optimisers(
-    problem: DesignProblem, report: Callable[[str], None] | None = None
+    problem: DesignProblem,
+    seeds: int = 1,
+    fine_check: bool = False,
+    report: Callable[[str], None] | None = None,
 ) -> list[dict[str, Any]]:
-    """One row for each optimiser, all with the project's budget, seed and workers.
+    """One row for each optimiser, all with the project's budget and workers.
 
-    Their costs are those of the solid that is searched on, without checks on a finer one.
+    Parameters
+    ----------
+    seeds
+        Searches by each, with as many seeds from the project's on.  Rows hold medians of them, and
+        the smallest and largest values under names that end in `_min` and `_max`.
+    fine_check
+        Whether the searches check on the fine solid, whose costs are told then.
     """
     rows = []
+    project = problem.project
     for method in OPTIMISERS:
-        if report is not None:
-            report(method)
-        project = problem.project
-        chosen = replace(
-            project, optimiser=replace(project.optimiser, method=method, fine_check=False)
-        )
-        rows.append(_row(method, optimise(replace(problem, project=chosen))))
+        found = []
+        for number in range(seeds):
+            seed = project.optimiser.seed + number
+            if report is not None:
+                report(method if seeds == 1 else f"{method}, seed {seed}")
+            chosen = replace(project.optimiser, method=method, seed=seed, fine_check=fine_check)
+            own = replace(problem, project=replace(project, optimiser=chosen))
+            found.append(_outcome(optimise(own)))
+        rows.append({"method": method, "seeds": seeds, **_medians(found)})
     return rows
 
 
@@ -121,33 +134,56 @@ def time_sizes(
 
 
 def benchmark(
-    problem: DesignProblem, runs: int, report: Callable[[str], None] | None = None
+    problem: DesignProblem,
+    runs: int,
+    seeds: int = 1,
+    fine_check: bool = False,
+    report: Callable[[str], None] | None = None,
 ) -> dict[str, Any]:
-    """Times of evaluations, and the optimisers' rows."""
+    """Times of evaluations, and the optimisers' rows, see `compare_optimisers`."""
     if report is not None:
         report("evaluations")
     times = time_evaluations(problem, runs, problem.project.optimiser.seed)
-    return {"evaluation": asdict(times), "rows": compare_optimisers(problem, report)}
+    rows = compare_optimisers(problem, seeds, fine_check, report)
+    return {"evaluation": asdict(times), "rows": rows}
 
 
-def _row(method: str, design: Design) -> dict[str, Any]:
+def _outcome(design: Design) -> dict[str, Any]:
+    """What one search came to; its curve is that of the checks, where there are any."""
     evidence, history = design.evidence, design.history
-    start, end = float(history["cost"][0]), float(history["cost"][-1])
-    low = np.flatnonzero(history["cost"] <= 0.1 * start)
+    start, end = evidence["cost_start"], evidence["cost"]
+    seconds, costs = history["seconds"], history["cost"]
+    if evidence["checks"]:
+        seconds = np.array([check["seconds"] for check in evidence["checks"]])
+        costs = np.minimum.accumulate([check["cost"] for check in evidence["checks"]])
+    low = np.flatnonzero(costs <= 0.1 * start)
+    wanted = design.targets.frequencies
     return {
-        "method": method,
         "cost_start": start,
         "cost_end": end,
         "fall_percent": 100.0 * fall(start, end),
-        "seconds_to_90_percent": float(history["seconds"][low[0]]) if len(low) else None,
+        "seconds_to_90_percent": float(seconds[low[0]]) if len(low) else None,
         "evaluations": evidence["evaluations"],
         "evaluations_per_minute": evidence["evaluations_per_minute"],
         "seconds": evidence["seconds"],
+        "fine_rms_cents": None if design.fine is None else rms_cents(design.frequencies, wanted),
         "workers": evidence["workers"],
-        "curve": [
-            [float(s), float(c)] for s, c in zip(history["seconds"], history["cost"], strict=True)
-        ],
+        "curve": [[float(s), float(c)] for s, c in zip(seconds, costs, strict=True)],
     }
+
+
+def _medians(found: list[dict[str, Any]]) -> dict[str, Any]:
+    """Medians, smallest and largest values of outcomes, and the curve of the one in the middle.
+
+    What some did not come to is larger than all.
+    """
+    middle = sorted(found, key=lambda each: each["cost_end"])[(len(found) - 1) // 2]
+    row = {"workers": middle["workers"], "curve": middle["curve"]}
+    for name in middle.keys() - row.keys():
+        values = [np.inf if each[name] is None else each[name] for each in found]
+        told = {name: median(values), f"{name}_min": min(values), f"{name}_max": max(values)}
+        row |= {key: value if np.isfinite(value) else None for key, value in told.items()}
+    return row
 
 
 def _timed(work: Callable[[int], Evaluation], runs: int) -> tuple[list[float], list[float]]:

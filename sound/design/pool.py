@@ -125,6 +125,8 @@ class Trial:
         How a descent went; its modes stay behind.
     start : (3 n, k) or None
         Modes for others to begin from, of a descent or with the gradient.
+    eigenvalues : (N,) [rad^2/s^2] or None
+        Of the elastic modes, if there are any to be had.
     """
 
     z: Array
@@ -133,6 +135,7 @@ class Trial:
     gradient: Array | None = None
     descent: DesignDescent | None = None
     start: Array | None = None
+    eigenvalues: Array | None = None
 
 
 class Pool:
@@ -225,17 +228,26 @@ def _fine_simulation() -> Simulation:
 
 
 def _run(task: Task) -> Trial:
-    """Do a task; from nothing if its start leads nowhere."""
+    """Do a task; from nothing if its start leads nowhere and an evaluation is left for that."""
+    simulation = _fine_simulation() if task.fine else _simulation
+    before, most = simulation.evaluations, task.limits.evaluations
+    trial = Trial(task.z, FAILED, 0)
     for start in (task.start, None) if task.start is not None else (None,):
+        left = most - (simulation.evaluations - before)
+        if left < 1:
+            break
+        limits = replace(task.limits, evaluations=left)
         try:
-            return _done(replace(task, start=start))
+            trial = _done(simulation, replace(task, start=start, limits=limits))
+            break
         except ConvergenceError:
             continue
-    return Trial(task.z, FAILED, 1)
+    return replace(trial, evaluations=simulation.evaluations - before)
 
 
-def _descent(task: Task, options: StepOptions | LimitedMemory | TrustRegion) -> DesignDescent:
-    simulation = _fine_simulation() if task.fine else _simulation
+def _descent(
+    simulation: Simulation, task: Task, options: StepOptions | LimitedMemory | TrustRegion
+) -> DesignDescent:
     parts = (simulation, task.objective or _setting.objective, task.z, task.start)
     if isinstance(options, LimitedMemory):
         return descend_by_gradients(*parts, task.steps * options.evaluations, task.limits)
@@ -245,9 +257,9 @@ def _descent(task: Task, options: StepOptions | LimitedMemory | TrustRegion) -> 
     return descend(*parts, options, task.steps, task.damping, task.limits)
 
 
-def _done(task: Task) -> Trial:
+def _done(simulation: Simulation, task: Task) -> Trial:
     if task.options is not None:
-        descent = _descent(task, task.options)
+        descent = _descent(simulation, task, task.options)
         last = descent.last
         assert last is not None
         return Trial(
@@ -256,11 +268,13 @@ def _done(task: Task) -> Trial:
             descent.evaluations,
             descent=replace(descent, last=None),
             start=last.modes.start(),
+            eigenvalues=last.eigenvalues,
         )
     objective = task.objective or _setting.objective
-    evaluation = _simulation.evaluate(task.z, task.start, task.gradient)
-    cost = cost_of(objective, _simulation.material, evaluation)
+    evaluation = simulation.evaluate(task.z, task.start, task.gradient)
+    cost = cost_of(objective, simulation.material, evaluation)
     if not task.gradient:
-        return Trial(task.z, cost, 1)
-    gradient = squares_of(objective, _simulation.material, evaluation).gradient
-    return Trial(task.z, cost, 1, gradient, start=evaluation.modes.start())
+        return Trial(task.z, cost, 1, eigenvalues=evaluation.eigenvalues)
+    gradient = squares_of(objective, simulation.material, evaluation).gradient
+    start = evaluation.modes.start()
+    return Trial(task.z, cost, 1, gradient, start=start, eigenvalues=evaluation.eigenvalues)

@@ -84,6 +84,11 @@ class Simulation:
         Relative error of the eigenvalues.
     cells
         The finite cells that have these voxels, if it is one of them.
+
+    Attributes
+    ----------
+    evaluations : int
+        Modal analyses made so far, those that found no modes included.
     """
 
     def __init__(
@@ -99,6 +104,7 @@ class Simulation:
         self.material = material
         self.elements = analysed_elements(mesh, options, cells)
         self.modes = modes
+        self.evaluations = 0
         analysis = SolverOptions(modes=RIGID_MODES + modes, tolerance=tolerance)
         self.solver = ModalSolver(self.model, analysis, MPI.COMM_SELF)
         # Rows of the analysis are in the order of its partition.
@@ -123,6 +129,7 @@ class Simulation:
         derivatives
             Whether their derivatives are asked for.
         """
+        self.evaluations += 1
         young = self.material.moduli(z)
         modes = self.elements.solve(self.solver, young, start, self.material.poisson(z))
         elastic = modes.vectors[:, RIGID_MODES:]

@@ -2,7 +2,15 @@
 from dataclasses import asdict
 
 from workflow.studies.sounds import examples as sound_examples
-from workflow.studies.sounds.examples import DESIGN, ELSEWHERE, PROJECT, START, TRUTH
+from workflow.studies.sounds.examples import (
+    COMPARISON,
+    DESIGN,
+    ELSEWHERE,
+    PROJECT,
+    REACHED,
+    START,
+    TRUTH,
+)
 
 SOUND_FOLDER = sound_examples.FOLDER
 SOUND = f"{RESULTS}/{SOUND_FOLDER}"

@@ -141,9 +141,78 @@ rule compare_optimisers:
         **limits("compare_optimisers"),
     params:
         source=source("sound.commands.benchmark"),
-        seconds=config["sound"]["compare_seconds"],
+        how=options({"seconds": config["sound"]["compare_seconds"]}),
     shell:
-        "python -m sound benchmark {input.project:q} --seconds {params.seconds:q}"
+        "python -m sound benchmark {input.project:q} {params.how:q}"
+        " --json > {output:q}.partial 2> {log:q} && mv {output:q}.partial {output:q}"
+
+
+# Solids that have what is sought, by several seeds and with checks: no part of `sounds`, as it takes an
+# hour.
+use rule compare_optimisers as compare_optimisers_by_seeds with:
+    output:
+        f"{SOUND}/{{example}}/{COMPARISON}",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/{{example}}/comparison.log",
+    benchmark:
+        f"{BENCHMARKS}/{SOUND_FOLDER}/{{example}}/comparison.tsv"
+    wildcard_constraints:
+        example=RECORDED,
+    params:
+        source=source("sound.commands.benchmark"),
+        how=options(
+            {
+                "seconds": config["sound"]["compare_seconds"],
+                "seeds": config["sound"]["compare_seeds"],
+            }
+        )
+        + ["--fine-check"],
+
+
+rule compared_sounds:
+    input:
+        config=f"{RESULTS}/config.yaml",
+        found=[f"{SOUND}/{name}/{COMPARISON}" for name in EXAMPLES if EXAMPLES[name].recorded],
+        templates=templates("sounds", "comparison.html.j2", "comparison.yaml"),
+    output:
+        marks.page(
+            catalogue.COMPARED_SOUNDS, f"{SOUND}/comparison.html", "Sounds", example="comparison"
+        ),
+        table=f"{SOUND}/tables/comparison.json",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/comparison.log",
+    localrule: True
+    params:
+        source=made_by("page", *pages_of(catalogue.COMPARED_SOUNDS)),
+        study=told(catalogue.COMPARED_SOUNDS, "tables", "page"),
+    script:
+        "../scripts/page.py"
+
+
+rule find_reach:
+    input:
+        project=f"{SOUND}/{{example}}/{PROJECT}",
+        design=f"{SOUND}/{{example}}/{DESIGN}",
+        mesh=mesh_files,
+        clips=example_clips,
+        forests=settings.forest_files(),
+    output:
+        f"{SOUND}/{{example}}/{REACHED}",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/{{example}}/reach.log",
+    threads: SOLVER_CORES
+    resources:
+        **limits("find_reach"),
+    params:
+        source=source("sound.commands.reach"),
+        how=options(
+            {
+                "seconds": config["sound"]["reach_seconds"],
+                "unless_fall": sound_examples.SATISFYING_FALL,
+            }
+        ),
+    shell:
+        "python -m sound reach {input.project:q} {input.design:q} {params.how:q}"
         " --json > {output:q}.partial 2> {log:q} && mv {output:q}.partial {output:q}"
 
 
@@ -231,6 +300,7 @@ rule build_sound_page:
         truth=f"{SOUND}/{{example}}/{TRUTH}",
         sounds=all_sounds,
         optimisers=comparison,
+        reached=f"{SOUND}/{{example}}/{REACHED}",
         templates=templates("sounds", "page.html.j2", "tables.yaml"),
     output:
         marks.page(catalogue.SOUND, f"{SOUND}/{{example}}/page.html", "Sounds", example="{example}"),

@@ -27,6 +27,7 @@ ALL = {
     VALIDATION,
     SOUND,
     SOUNDS,
+    COMPARED_SOUNDS,
     RECORDING,
     RECORDINGS,
 ) = ALL.values()

@@ -25,7 +25,7 @@ from workflow.studies.base.media import (
 from workflow.studies.base.page import rendered
 from workflow.studies.base.table import Table
 from workflow.studies.sounds import plots
-from workflow.studies.sounds.examples import DESIGN, ELSEWHERE, PROJECT, START, TRUTH
+from workflow.studies.sounds.examples import DESIGN, ELSEWHERE, PROJECT, REACHED, START, TRUTH
 from workflow.studies.sounds.pictures import ELSEWHERE_CLASS, Mark, marks_of, material_pictures
 from workflow.studies.sounds.results import MODES, SoundResults
 
@@ -158,6 +158,7 @@ def _files(results: SoundResults) -> list[dict[str, Any]]:
         TRUTH: "modes of the fine model with the material found",
         "young.npy": "Young’s modulus [Pa] of every voxel, for solver modes --material",
         "optimisers.json": "the optimisers beside each other",
+        REACHED: "which modes the solid can have",
     }
     for state, what in STATES.items():
         for name in results.design.targets.names:

@@ -15,7 +15,14 @@ from sound.clips.wav import read_wav
 from sound.project.design_file import Design, read_design
 from workflow.studies.base.conditions import Record
 from workflow.studies.base.results import Results
-from workflow.studies.sounds.examples import DESIGN, START, TRUTH, Example, examples
+from workflow.studies.sounds.examples import (
+    DESIGN,
+    REACHED,
+    START,
+    TRUTH,
+    Example,
+    examples,
+)
 
 Array = NDArray[np.float64]
 
@@ -65,11 +72,21 @@ class SoundResults(Results):
             return {}
         return self.read_json(f"{self.name}/optimisers.json")
 
+    @cached_property
+    def reached(self) -> dict[str, Any]:
+        """Output of `sound reach`; without `modes` where the search was good enough."""
+        return self.read_json(f"{self.name}/{REACHED}")
+
     @property
     def absent(self) -> tuple[str, ...]:
         """Tables that there is nothing for."""
-        checked = () if self.design.evidence.get("checks") else ("checks",)
-        return checked if self.optimisers else (*checked, "optimisers", "evaluation")
+        there = {
+            "checks": self.design.evidence.get("checks"),
+            "reach": "modes" in self.reached,
+            "optimisers": self.optimisers,
+            "evaluation": self.optimisers,
+        }
+        return tuple(name for name, is_there in there.items() if not is_there)
 
     @property
     def origins(self) -> dict[str, Record]:
@@ -79,6 +96,7 @@ class SoundResults(Results):
             **{f"{part}/{DESIGN}": each.provenance for part, each in self.designs.items()},
             f"{name}/{START}": self.start.provenance,
             f"{name}/{TRUTH}": self.truth.provenance,
+            f"{name}/{REACHED}": self.reached["provenance"],
             **({f"{name}/optimisers.json": compared["provenance"]} if compared else {}),
         }
 

@@ -79,6 +79,11 @@ def checks(results: SoundResults) -> Iterator[Row]:
         yield {"check": number, **entry}
 
 
+def reach(results: SoundResults) -> list[Row]:
+    """Which modes the solid can have."""
+    return list(results.reached["modes"])
+
+
 def amplitudes(results: SoundResults) -> Iterator[Row]:
     """Balance of the modes' amplitudes at every struck point."""
     targets = results.design.targets
@@ -101,6 +106,7 @@ def shares(amplitudes: Array) -> Array:
     return np.asarray(amplitudes / amplitudes.max(axis=1, keepdims=True))
 
 
+REACHED = measured(lambda results: {"all": results.reached["provenance"]}, ONE_COLD_RUN)
 COMPARED = measured(lambda results: {"all": results.optimisers["provenance"]}, ONE_COLD_RUN)
 
 

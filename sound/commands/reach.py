@@ -1,0 +1,95 @@
+"""`python -m sound reach`: which frequencies a solid can have, where a design misses some.
+
+For every mode that a design misses: whether a material has it by itself, whether one has it beside
+its neighbours, and how near it was brought where none was found. All on the fine solid, relative to
+the first mode.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from carillon.arguments import number_between, number_of_workers, positive_number, whole_number
+from carillon.errors import UserError
+from carillon.measurement import measured
+from carillon.options import REQUIRED, add_options, collect, option
+
+if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
+    from sound.design.reach import Reach
+    from sound.project.design_file import Design
+
+
+@dataclass(frozen=True)
+class ReachOptions:
+    """What is asked, and how long an answer may take."""
+
+    project: str = option(REQUIRED, "project file (YAML)")
+    design: str = option(REQUIRED, "its design.h5")
+    seconds: float = option(120.0, "wall time in which descents begin", type=positive_number)
+    descents: int = option(3, "descents for each question at most", type=whole_number(1, 1000))
+    workers: int | None = option(None, "processes, not the project's", type=number_of_workers)
+    unless_fall: float | None = option(
+        None,
+        "ask nothing of a design whose cost fell by this share or more",
+        type=number_between(0.0, 1.0),
+        metavar="SHARE",
+    )
+    json: bool = option(False, "print as JSON")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command line."""
+    add_options(parser, ReachOptions, positional=("project", "design"))
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Search and print."""
+    from sound.design.objective import fall
+    from sound.design.preparation import prepare, require_same_voxels
+    from sound.design.reach import reach
+    from sound.project.design_file import read_design
+    from sound.project.project import load_project, with_optimiser
+
+    options = collect(ReachOptions, arguments)
+    project = with_optimiser(load_project(options.project), workers=options.workers)
+    design = read_design(options.design)
+    _require_same_targets(options, [target.name for target in project.targets], design)
+    content: dict[str, Any] = {"fall": fall(design.evidence["cost_start"], design.evidence["cost"])}
+    if options.unless_fall is None or content["fall"] < options.unless_fall:
+        problem = prepare(project, design.targets)
+        require_same_voxels(problem, design)
+        found = reach(problem, design, options.seconds, options.descents)
+        content |= asdict(found)
+    if options.json:
+        print(json.dumps({**content, "provenance": measured(project.as_dict())}))
+    elif "modes" in content:
+        print("\n".join(_lines(found)))
+    else:
+        print(f"{options.design}: cost fell by {content['fall']:.1%}, nothing is asked")
+    return 0
+
+
+def _require_same_targets(options: ReachOptions, names: list[str], design: Design) -> None:
+    if names != list(design.targets.names):
+        raise UserError(
+            f"{options.design} is a design for {', '.join(design.targets.names)}, expected one for "
+            f"the targets of {options.project}: {', '.join(names)}; design it anew"
+        )
+
+
+def _lines(found: Reach) -> list[str]:
+    """A line for each mode, and one for all."""
+    heads = ("target Hz", "cents", "alone", "beside")
+    lines = ["  ".join(["mode", *(f"{head:>10}" for head in heads), "verdict"])]
+    for each in found.modes:
+        values = (each.cents, each.alone_cents, each.beside_cents)
+        columns = [f"{each.target_hz:10.2f}", *(f"{value:10.1f}" for value in values)]
+        lines.append("  ".join([f"{each.mode:4}", *columns, each.verdict]))
+    lines.append(
+        f"the first {found.together} of {len(found.modes) + 1} modes were had together, amplitudes "
+        f"aside; {found.seconds:.1f} s"
+    )
+    return lines
