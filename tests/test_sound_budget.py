@@ -87,11 +87,11 @@ def test_an_analysis_that_found_no_modes_counts(problem, monkeypatch, descends, 
     evaluate = pool._simulation.elements.solve
     made = []
 
-    def fails_from_there(solver, young, start):
+    def fails_from_there(solver, young, start, *rest):
         made.append(start)
         if start is not None and len(made) == 1:
             raise ConvergenceError("no modes")
-        return evaluate(solver, young, start)
+        return evaluate(solver, young, start, *rest)
 
     monkeypatch.setattr(pool._simulation.elements, "solve", fails_from_there)
     options = StepOptions(((True, True),), 1e-2, 0.5) if descends else None
