@@ -18,6 +18,7 @@ import pytest
 import yaml
 
 from carillon.errors import ConvergenceError, UserError
+from solver.analysis.problem import ProblemOptions, build_problem
 from sound.design import pool
 from sound.design.objective import DesignCost, Objective
 from sound.design.optimise import optimise
@@ -190,6 +191,14 @@ def test_design_of_other_voxels_is_refused(problem, designed):
     other = replace(designed, fine_grid=designed.fine_grid[:-1])
     with pytest.raises(UserError, match="begin a new design"):
         optimise(problem, initial=other)
+
+
+def test_voxels_are_those_that_the_solver_fills(problem):
+    # A resolution at which the middle of a voxel lies on the surface.
+    solid = replace(problem.project.solid, resolution=36)
+    made = prepare(replace(problem.project, solid=solid), problem.setting.objective.targets)
+    filled = build_problem(ProblemOptions(solid.mesh, solid.resolution)).fine
+    np.testing.assert_array_equal(made.setting.mesh.grid, filled.grid)
 
 
 def test_designs_are_kept_on_the_way(problem, monkeypatch):
