@@ -27,6 +27,7 @@ ALL = {
     VALIDATION,
     SOUND,
     SOUNDS,
+    SOUNDS_OF_RECORDINGS,
     RECORDING,
     RECORDINGS,
 ) = ALL.values()
