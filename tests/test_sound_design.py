@@ -227,6 +227,18 @@ def test_cost_vanishes_at_the_targets_and_knows_no_scale_nor_sign(problem):
     assert other.total == pytest.approx(cost.total, rel=1e-12)
 
 
+def test_the_amplitude_of_every_mode_counts(problem):
+    objective = problem.setting.objective
+    targets = objective.targets
+    values = targets.frequencies**2
+    heard = Objective(targets, Weights(1.0, 10.0, 0.0))
+    assert heard.cost(values, targets.amplitudes, 0.0).total < 1e-20
+    for mode in range(len(values)):
+        pushed = targets.amplitudes.copy()
+        pushed[:, mode] *= 0.5
+        assert heard.cost(values, pushed, 0.0).amplitude > 1e-4, mode
+
+
 def test_mixed_modes_of_a_cluster_cost_the_same(problem):
     objective = problem.setting.objective
     random = np.random.default_rng(0)
