@@ -38,6 +38,8 @@ DIGITS = 6
 """Of coordinates after the point."""
 ROOM_ABOVE = 1.5
 """Highest frequency of a spectrogram over that of the highest target."""
+SHOWN_HERTZ = 8000.0
+"""Up to which the spectrograms of modes alone show those of the clip at least."""
 STATES = {
     "before": "Before",
     CLIPS: "Target",
@@ -119,7 +121,8 @@ def _panel(results: SoundResults, state: str, name: str, together: list[Sound]) 
     """Spectrogram and players of a sound, scaled as those that are shown `together`."""
     sound, rate = results.sound(state, name)
     target = (sound, rate) if name == ELSEWHERE else results.sound(CLIPS, name)
-    seen = _seen(results, f"{state}-{name}", (sound, rate), target, together)
+    highest = min(highest_hertz(together), ROOM_ABOVE * results.design.targets.frequencies[-1])
+    seen = _seen(f"{state}-{name}", (sound, rate), target, together, float(highest))
     panel = {"state": STATES[state], **seen}
     if state == CLIPS:
         return panel
@@ -136,25 +139,28 @@ def _modes_panels(results: SoundResults, name: str) -> list[dict[str, Any]]:
     rate = results.sound("fine", name)[1]
     target = results.target(name, rate)
     sounds = dict(zip(ALONE, ((part, rate) for part in (target.modes, target.wanted, fine))))
-    together = [(target.clip, rate), *sounds.values()]
+    clip = (target.clip, rate)
+    together = [clip, *sounds.values()]
+    # Modes that are not designed may lie above those that are.
+    enough = max(SHOWN_HERTZ, ROOM_ABOVE * results.design.targets.frequencies[-1])
+    highest = float(min(highest_hertz([clip]), enough))
     return [
         {
             "state": ALONE[state],
-            **_seen(results, f"alone-{state}-{name}", sound, together[0], together),
+            **_seen(f"alone-{state}-{name}", sound, clip, together, highest),
         }
         for state, sound in sounds.items()
     ]
 
 
 def _seen(
-    results: SoundResults, label: str, own: Sound, target: Sound, together: list[Sound]
+    label: str, own: Sound, target: Sound, together: list[Sound], highest: float
 ) -> dict[str, Any]:
-    """Spectrogram below the loudest of the target, and player, of a sound shown `together`."""
+    """Spectrogram up to `highest` [Hz], below the loudest of the target, and player of a sound."""
     sound, rate = own
     loudest = float(spectrogram(*target)[2].max())
     seconds = min(SHOWN_SECONDS, max(len(each) / rate for each, rate in together))
-    highest = min(highest_hertz(together), ROOM_ABOVE * results.design.targets.frequencies[-1])
-    figure = spectrogram_figure(_first(sound, rate, seconds), loudest, float(highest), rate)
+    figure = spectrogram_figure(_first(sound, rate, seconds), loudest, highest, rate)
     return {
         "plot": inlined(figure, f"sound-{label.replace(' ', '-')}"),
         "source": wav_uri(sound[: round(PLAYED_SECONDS * rate)], rate, _peak(together)),
