@@ -47,9 +47,9 @@ include: f"{RULES}/discretisation.smk"
 include: f"{RULES}/accuracy.smk"
 include: f"{RULES}/default_forest.smk"
 include: f"{RULES}/forests_study.smk"
+include: f"{RULES}/recordings.smk"
 include: f"{RULES}/examples.smk"
 include: f"{RULES}/sound.smk"
-include: f"{RULES}/recordings.smk"
 include: f"{RULES}/compare.smk"
 
 

@@ -19,6 +19,7 @@ import yaml
 
 from carillon.errors import ConvergenceError, UserError
 from solver.analysis.modal_solver import ModalSolver
+from solver.analysis.problem import ProblemOptions, build_problem
 from sound.design.objective import DesignCost, Objective
 from sound.design.optimise import optimise
 from sound.design.optimisers import OPTIMISERS
@@ -225,6 +226,14 @@ def test_design_of_other_voxels_is_refused(problem, designed):
         optimise(problem, initial=other)
 
 
+def test_voxels_are_those_that_the_solver_fills(problem):
+    # A resolution at which the middle of a voxel lies on the surface.
+    solid = replace(problem.project.solid, resolution=36)
+    made = prepare(replace(problem.project, solid=solid), problem.setting.objective.targets)
+    filled = build_problem(ProblemOptions(solid.mesh, solid.resolution)).fine
+    np.testing.assert_array_equal(made.setting.mesh.grid, filled.grid)
+
+
 def test_designs_are_kept_on_the_way(problem, monkeypatch):
     monkeypatch.setattr("sound.design.optimise.KEEP_SECONDS", 0.0)
     kept = []
@@ -249,6 +258,18 @@ def test_cost_vanishes_at_the_targets_and_knows_no_scale_nor_sign(problem):
     signs = np.where(np.arange(len(evaluation.eigenvalues)) % 2, 1.0, -1.0)
     other = objective.cost(3.0 * evaluation.eigenvalues, 2.0 * signs * evaluation.pushed, 0.0)
     assert other.total == pytest.approx(cost.total, rel=1e-12)
+
+
+def test_the_amplitude_of_every_mode_counts(problem):
+    objective = problem.setting.objective
+    targets = objective.targets
+    values = targets.frequencies**2
+    heard = Objective(targets, Weights(1.0, 10.0, 0.0))
+    assert heard.cost(values, targets.amplitudes, 0.0).total < 1e-20
+    for mode in range(len(values)):
+        pushed = targets.amplitudes.copy()
+        pushed[:, mode] *= 0.5
+        assert heard.cost(values, pushed, 0.0).amplitude > 1e-4, mode
 
 
 def test_mixed_modes_of_a_cluster_cost_the_same(problem):

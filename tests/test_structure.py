@@ -107,7 +107,7 @@ ARROWS = {
     "workflow.commands": """dataset_gen.objectives solver.coarsening solver.response
         solver.analysis workflow workflow.studies.base workflow.studies.comparison workflow.estimate
         workflow.studies.report workflow.studies.recordings""",
-    "workflow.scripts": """solver.analysis workflow.studies.base
+    "workflow.scripts": """solver.analysis sound.clips workflow.studies.base
         workflow.studies.report workflow.studies.comparison workflow.studies.sounds
         workflow.studies.recordings""",
 }

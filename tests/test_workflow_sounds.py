@@ -28,12 +28,15 @@ from workflow import settings
 from workflow.commands.estimate import CONFIGURATIONS, load
 from workflow.studies.base.table import write_table
 from workflow.studies.catalogue import COMPARED_SOUNDS, SOUND, SOUNDS
+from workflow.studies.recordings.recordings import recordings
 from workflow.studies.sounds import comparison, index, page, tables
 from workflow.studies.sounds.examples import (
     DESIGN,
     ELSEWHERE,
     EXAMPLES,
     FOLDER,
+    LISTS,
+    OF_RECORDINGS,
     PROJECT,
     REACHED,
     START,
@@ -183,7 +186,8 @@ def built(results: SoundResults) -> Page:
 def test_the_page_needs_nothing_from_elsewhere_and_can_be_heard(results, built):
     assert_self_contained(built)
     rendered = 2 * (len(page.STATES) - 1) + 1
-    assert built.source.count("data:audio/wav;base64,") == 2 * rendered + 2
+    alone = len(page.ALONE) * len(EXAMPLE.targets)
+    assert built.source.count("data:audio/wav;base64,") == 2 * rendered + 2 + alone
     assert built.source.count("of the energy that are noise") == rendered
     assert built.source.count("data:image/png;base64,") >= 2
     assert len(built.source) < 4e6
@@ -199,6 +203,8 @@ def test_files_that_the_page_leads_to_are_there(results, built):
     "name",
     [
         "designs",
+        "nearness",
+        "distances",
         "frequencies",
         "truth",
         "reach",
@@ -262,16 +268,45 @@ def test_the_comparison_is_planned_for_recorded_solids_alone(tmp_path):
     assert "design_sound" not in jobs
 
 
-def test_the_index_leads_to_the_page(results, built, tmp_path):
+def test_a_common_factor_does_not_count_as_distance_of_frequencies(results):
+    rows = {row["solid"]: row for row in tables.nearness(results)}
+    design = results.design
+    apart = np.log2(design.coarse_frequencies / design.targets.frequencies)
+    expected = 1200.0 * np.std(apart)
+    assert rows["coarse"]["rms_cents"] == pytest.approx(expected)
+    for row in rows.values():
+        assert 0.0 < row["rms_cents"] <= row["worst_cents"]
+        assert 0.0 < row["rms_bark"] <= row["worst_bark"]
+
+
+def test_what_is_compared_begins_where_the_modes_of_the_clip_do(results):
+    target = results.target("corner", RATE)
+    rest = results.design.targets.residuals[0]
+    assert len(target.clip) == len(target.modes) == len(target.wanted)
+    clip, own = results.sound(page.CLIPS, "corner")
+    assert len(target.clip) == pytest.approx(min(len(clip), len(rest)) * RATE / own, abs=1)
+
+
+def test_silence_is_farther_from_a_clip_than_what_is_known_of_it(results):
+    for row in tables.distances(results):
+        assert row["modes"] < row["silence"]
+
+
+@pytest.mark.parametrize("listed", [index.Examples, index.OfRecordings])
+def test_the_index_leads_to_the_page(results, built, tmp_path, listed):
     (tmp_path / "tables").mkdir()
-    examples = SimpleNamespace(examples=[results])
-    table = SOUNDS.entries["sounds"](examples)
-    write_table(table, tmp_path / "tables")
-    html = index.page(examples, {"sounds": table})
+    examples = SimpleNamespace(
+        examples=[results], title=listed.title, about=listed.about, prefix=listed.prefix
+    )
+    made = {name: make(examples) for name, make in SOUNDS.entries.items()}
+    for table in made.values():
+        write_table(table, tmp_path / "tables")
+    html = index.page(examples, made)
     (tmp_path / "index.html").write_text(html, encoding="utf-8")
     read = Page(tmp_path / "index.html")
     assert_self_contained(read)
-    assert_same_numbers(read, tmp_path / "tables", "sounds")
+    for name in made:
+        assert_same_numbers(read, tmp_path / "tables", f"{listed.prefix}{name}")
     assert "box/page.html" in read.led
     assert read.source.count("data:audio/wav;base64,") == 2
 
@@ -285,7 +320,17 @@ def test_a_colour_bar_has_round_ticks_within_its_range(low, high):
 
 def test_the_schema_names_the_examples():
     section = settings.schema()["properties"]["sound"]["properties"]
-    assert section["examples"]["items"]["enum"] == list(yaml.safe_load(EXAMPLES.read_text()))
+    listed = [name for key in LISTS for name in section[key]["items"]["enum"]]
+    assert listed == list(yaml.safe_load(EXAMPLES.read_text()))
+
+
+def test_clips_are_recordings_in_the_examples_that_are_listed_so_and_in_no_other():
+    asked = examples(CONFIG)
+    for key in LISTS:
+        for name in CONFIG["sound"][key]:
+            given = [target.recording for target in asked[name].targets]
+            assert all(given) if key == OF_RECORDINGS else not any(given)
+            assert {*given} - {""} <= {each.name for each in recordings().values() if each.tonal}
 
 
 def test_projects_of_all_examples_are_valid_and_their_points_on_the_surface(tmp_path):
@@ -326,12 +371,20 @@ def test_the_chord_is_on_the_bunny_where_its_mesh_is_and_on_a_bell_otherwise(tmp
 
 def test_all_examples_are_planned_without_any_mesh_file(tmp_path):
     jobs = planned(snakemake(tmp_path, "sounds", "--dry-run", "--cores", 2))
-    chosen = examples(CONFIG).values()
+    chosen = [examples(CONFIG)[name] for name in CONFIG["sound"]["examples"]]
     assert jobs["design_sound"] == sum(example.edits for example in chosen) == 9
     assert jobs["begin_design"] == jobs["check_design"] == jobs["build_sound_page"] == 7
     assert jobs["record_clip"] == 8 and jobs["synthesise_clip"] == 9
     assert jobs["find_reach"] == 7 and "compare_optimisers_by_seeds" not in jobs
     assert jobs["build_sounds_index"] == 1 and jobs["compare_optimisers"] == 2
+
+
+def test_examples_of_recordings_are_planned_and_need_no_other(tmp_path):
+    jobs = planned(snakemake(tmp_path, "sounds_of_recordings", "--dry-run", "--cores", 2))
+    count = len(CONFIG["sound"]["recordings"])
+    assert jobs["take_recording"] == jobs["design_sound"] == jobs["build_sound_page"] == count
+    assert jobs["bring_recordings"] == jobs["build_sounds_of_recordings_index"] == 1
+    assert "synthesise_clip" not in jobs and "build_sounds_index" not in jobs
 
 
 @pytest.mark.slow

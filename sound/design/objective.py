@@ -7,6 +7,9 @@ has: what a strike excites within the width that the ear resolves is averaged,
     b_k = sum_i w((f_i - f_k) / f_k) a_i^2 / sum_i w((f_i - f_k) / f_k),   w a Gaussian,
 
 which for a mode on its own is a_k^2.  The targets' amplitudes are averaged likewise.
+
+Eq. (2) leaves the first mode out, as Eq. (1) has to.  Here it counts as the others: it would
+otherwise be as loud as the loudest wherever that is of use to them.
 """
 
 from __future__ import annotations
@@ -93,8 +96,8 @@ class Objective:
         return np.asarray(bark(self._scaled(eigenvalues)) - self._bark)[1:]
 
     def amplitude_residual(self, eigenvalues: Array, pushed: Array) -> Array:
-        """Differences (T, N - 1) of the balances, of the second mode to the last (Eq. 2)."""
-        return np.asarray(self.balance(eigenvalues, pushed) - self._target)[:, 1:]
+        """Differences (T, N) of the balances (Eq. 2, and the first mode)."""
+        return np.asarray(self.balance(eigenvalues, pushed) - self._target)
 
     def cost(self, eigenvalues: Array, pushed: Array, regulariser: float) -> DesignCost:
         """Eq. (4).
@@ -124,7 +127,7 @@ class Objective:
     def amplitude_jacobian(
         self, eigenvalues: Array, pushed: Array, sensitivity: Sensitivity
     ) -> Array:
-        """Derivatives (T, N - 1, m) of `amplitude_residual`."""
+        """Derivatives (T, N, m) of `amplitude_residual`."""
         energies, slopes = _average_slopes(eigenvalues, pushed, sensitivity)
         largest = energies.argmax(axis=1)
         points = np.arange(len(energies))
@@ -132,8 +135,7 @@ class Objective:
         balance = np.sqrt(energies / peak)
         relative = slopes / np.maximum(energies, TINY * peak)[:, :, None]
         relative_peak = slopes[points, largest] / peak
-        rows = 0.5 * balance[:, :, None] * (relative - relative_peak[:, None, :])
-        return np.asarray(rows[:, 1:])
+        return np.asarray(0.5 * balance[:, :, None] * (relative - relative_peak[:, None, :]))
 
     def _scaled(self, eigenvalues: Array) -> Array:
         """s_f f_i with s_f = F_1 / f_1."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from carillon.fem.geometry.surface import surface_name
+from carillon.fem.geometry.surface import load_surface, surface_name
 from carillon.runtime import allowed_cores
 from solver.analysis.problem import discretised
 from sound.clips.files import extract_file
@@ -79,7 +79,8 @@ def prepare(project: Project, targets: Targets | None = None) -> DesignProblem:
     project = replace(project, modes=len(targets.frequencies))
     objective = Objective(targets, project.weights)
     name = surface_name(solid.mesh)
-    mesh, cells = discretised(surface, solid, name)
+    # Not the struck surface, whose cuts round: the voxels shall be those of the solver.
+    mesh, cells = discretised(load_surface(solid.mesh, solid.unit), solid, name)
     wanted, bounds = project.material, project.material.poisson_bounds
     free_poisson = None if bounds is None else FreePoisson(bounds[0], bounds[1], solid.poisson)
     material = ReducedMaterial.of_mesh(

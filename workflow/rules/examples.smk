@@ -16,15 +16,21 @@ SOUND_FOLDER = sound_examples.FOLDER
 SOUND = f"{RESULTS}/{SOUND_FOLDER}"
 EXAMPLES = sound_examples.examples(config)
 
-NO_EXAMPLE = "-"
-RECORDED = "|".join(name for name in EXAMPLES if EXAMPLES[name].recorded) or NO_EXAMPLE
-SYNTHESISED = "|".join(name for name in EXAMPLES if not EXAMPLES[name].recorded) or NO_EXAMPLE
+RECORDED = [name for name in EXAMPLES if EXAMPLES[name].recorded]
+OF_RECORDINGS = config["sound"][sound_examples.OF_RECORDINGS]
+WITHOUT_RECORDINGS = config["sound"][sound_examples.WITHOUT_RECORDINGS]
+SYNTHESISED = [name for name in WITHOUT_RECORDINGS if not EXAMPLES[name].recorded]
 
 
 wildcard_constraints:
     example="|".join(EXAMPLES),
     part="|".join(part for example in EXAMPLES.values() for part in example.parts),
     point=r"[a-z][a-z0-9-]*",
+
+
+def only(names):
+    """Pattern of the names of some examples, or of none."""
+    return "|".join(names) or "-"
 
 
 def example_of(wildcards):
@@ -49,6 +55,12 @@ def design_before(wildcards):
     example = example_of(wildcards)
     edit = example.edit_of(wildcards.part)
     return [] if edit == 1 else [f"{SOUND}/{example.part(edit - 1)}/{DESIGN}"]
+
+
+def clip_file(wildcards):
+    """File of the real recording that a target has."""
+    recording = targets_of(wildcards)[wildcards.point].recording
+    return REAL[recording].path(Path(RECORDINGS, PACKAGES))
 
 
 def recording_of(wildcards):

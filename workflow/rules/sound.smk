@@ -7,13 +7,19 @@ rule sounds:
         f"{SOUND}/index.html",
 
 
+# The same from real recordings, which a network brings: no part of `sounds`.
+rule sounds_of_recordings:
+    input:
+        f"{SOUND}/recordings.html",
+
+
 rule synthesise_clip:
     output:
         f"{SOUND}/{{example}}/clips/{{point}}.wav",
     log:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/clip-{{point}}.log",
     wildcard_constraints:
-        example=SYNTHESISED,
+        example=only(SYNTHESISED),
     resources:
         **limits("synthesise_clip"),
     params:
@@ -21,6 +27,24 @@ rule synthesise_clip:
         how=lambda wildcards: targets_of(wildcards)[wildcards.point].clip.split(),
     shell:
         "python -m sound clip {params.how:q} --out {output:q} > {log:q} 2>&1"
+
+
+# Of several channels the one that is searched.
+rule take_recording:
+    input:
+        f"{RECORDINGS}/packages.txt",
+    output:
+        f"{SOUND}/{{example}}/clips/{{point}}.wav",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/{{example}}/clip-{{point}}.log",
+    wildcard_constraints:
+        example=only(OF_RECORDINGS),
+    localrule: True
+    params:
+        source=source("workflow.scripts.take_recording"),
+        recording=clip_file,
+    script:
+        "../scripts/take_recording.py"
 
 
 rule check_design:
@@ -48,7 +72,7 @@ rule save_recorded_moduli:
     log:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/recorded-young.log",
     wildcard_constraints:
-        example=RECORDED,
+        example=only(RECORDED),
     localrule: True
     params:
         source=source("workflow.scripts.save_recorded_moduli"),
@@ -157,7 +181,7 @@ use rule compare_optimisers as compare_optimisers_by_seeds with:
     benchmark:
         f"{BENCHMARKS}/{SOUND_FOLDER}/{{example}}/comparison.tsv"
     wildcard_constraints:
-        example=RECORDED,
+        example=only(RECORDED),
     params:
         source=source("sound.commands.benchmark"),
         how=options(
@@ -172,7 +196,7 @@ use rule compare_optimisers as compare_optimisers_by_seeds with:
 rule compared_sounds:
     input:
         config=f"{RESULTS}/config.yaml",
-        found=[f"{SOUND}/{name}/{COMPARISON}" for name in EXAMPLES if EXAMPLES[name].recorded],
+        found=[f"{SOUND}/{name}/{COMPARISON}" for name in RECORDED],
         templates=templates("sounds", "comparison.html.j2", "comparison.yaml"),
     output:
         marks.page(
@@ -255,7 +279,7 @@ use rule render_before as record_clip with:
     log:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/clip-{{point}}.log",
     wildcard_constraints:
-        example=RECORDED,
+        example=only(RECORDED),
     resources:
         **limits("record_clip"),
     params:
@@ -304,7 +328,10 @@ rule build_sound_page:
         templates=templates("sounds", "page.html.j2", "tables.yaml"),
     output:
         marks.page(catalogue.SOUND, f"{SOUND}/{{example}}/page.html", "Sounds", example="{example}"),
-        found=[f"{SOUND}/{{example}}/tables/{name}.json" for name in ("designs", "frequencies")],
+        found=[
+            f"{SOUND}/{{example}}/tables/{name}.json"
+            for name in ("designs", "frequencies", "nearness", "distances")
+        ],
     log:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/page.log",
     localrule: True
@@ -318,12 +345,12 @@ rule build_sound_page:
 rule build_sounds_index:
     input:
         config=f"{RESULTS}/config.yaml",
-        pages=expand(f"{SOUND}/{{example}}/page.html", example=EXAMPLES),
-        found=expand(rules.build_sound_page.output.found, example=EXAMPLES),
+        pages=expand(f"{SOUND}/{{example}}/page.html", example=WITHOUT_RECORDINGS),
+        found=expand(rules.build_sound_page.output.found, example=WITHOUT_RECORDINGS),
         templates=templates("sounds", "index.html.j2", "index.yaml"),
     output:
         marks.page(catalogue.SOUNDS, f"{SOUND}/index.html", "Sounds", example="all"),
-        table=f"{SOUND}/tables/sounds.json",
+        tables=[f"{SOUND}/tables/{name}.json" for name in catalogue.SOUNDS.entries],
     log:
         f"{LOGS}/{SOUND_FOLDER}/index.log",
     localrule: True
@@ -332,3 +359,27 @@ rule build_sounds_index:
         study=told(catalogue.SOUNDS, "tables", "page"),
     script:
         "../scripts/page.py"
+
+
+use rule build_sounds_index as build_sounds_of_recordings_index with:
+    input:
+        config=f"{RESULTS}/config.yaml",
+        pages=expand(f"{SOUND}/{{example}}/page.html", example=OF_RECORDINGS),
+        found=expand(rules.build_sound_page.output.found, example=OF_RECORDINGS),
+        templates=templates("sounds", "index.html.j2", "index.yaml"),
+    output:
+        marks.page(
+            catalogue.SOUNDS_OF_RECORDINGS,
+            f"{SOUND}/recordings.html",
+            "Sounds",
+            example="all of recordings",
+        ),
+        tables=[
+            f"{SOUND}/tables/{sound_examples.OF_RECORDINGS}-{name}.json"
+            for name in catalogue.SOUNDS_OF_RECORDINGS.entries
+        ],
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/recordings.log",
+    params:
+        source=made_by("page", *pages_of(catalogue.SOUNDS_OF_RECORDINGS)),
+        study=told(catalogue.SOUNDS_OF_RECORDINGS, "tables", "page"),

@@ -28,6 +28,7 @@ ALL = {
     SOUND,
     SOUNDS,
     COMPARED_SOUNDS,
+    SOUNDS_OF_RECORDINGS,
     RECORDING,
     RECORDINGS,
 ) = ALL.values()

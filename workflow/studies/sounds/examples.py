@@ -29,6 +29,8 @@ SATISFYING_FALL = 0.9
 """Share that a search has to take off a cost for nobody to ask which modes the solid can have."""
 ELSEWHERE = "elsewhere"
 """Name of the sound at a point without a target."""
+WITHOUT_RECORDINGS, OF_RECORDINGS = LISTS = ("examples", "recordings")
+"""Lists of examples in the configuration: without clips of real strikes, and with such clips."""
 BUNNY = "bunny"
 RIGID_MODES = 6
 
@@ -37,13 +39,15 @@ RIGID_MODES = 6
 class Target:
     """A place, the arguments of `sound clip` for its clip, and the edit that it joins in.
 
-    The clips of a recorded solid have no arguments.
+    A `recording` of the list of real ones takes the place of the arguments; the clips of a recorded
+    solid have neither.
     """
 
     name: str
     at: tuple[float, float, float]
     clip: str = ""
     edit: int = 1
+    recording: str = ""
 
 
 @dataclass(frozen=True)
@@ -139,8 +143,8 @@ class Example:
 
 
 def examples(config: Mapping[str, Any]) -> dict[str, Example]:
-    """The examples that a configuration asks for, by name."""
-    return {name: _example(name, config) for name in config["sound"]["examples"]}
+    """The examples that the lists of a configuration ask for, by name."""
+    return {name: _example(name, config) for key in LISTS for name in config["sound"][key]}
 
 
 def project(example: Example, part: str, config: Mapping[str, Any]) -> dict[str, Any]:

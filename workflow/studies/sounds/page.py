@@ -27,7 +27,7 @@ from workflow.studies.base.table import Table
 from workflow.studies.sounds import plots
 from workflow.studies.sounds.examples import DESIGN, ELSEWHERE, PROJECT, REACHED, START, TRUTH
 from workflow.studies.sounds.pictures import ELSEWHERE_CLASS, Mark, marks_of, material_pictures
-from workflow.studies.sounds.results import MODES, SoundResults
+from workflow.studies.sounds.results import CLIPS, MODES, SoundResults
 
 Array = NDArray[np.float64]
 Sound = tuple[Array, int]
@@ -38,7 +38,8 @@ DIGITS = 6
 """Of coordinates after the point."""
 ROOM_ABOVE = 1.5
 """Highest frequency of a spectrogram over that of the highest target."""
-CLIPS = "clips"
+SHOWN_HERTZ = 8000.0
+"""Up to which the spectrograms of modes alone show those of the clip at least."""
 STATES = {
     "before": "Before",
     CLIPS: "Target",
@@ -46,6 +47,12 @@ STATES = {
     "fine": "After, on the fine model",
 }
 """Folders of sounds, and their names for people."""
+ALONE = {
+    "modes": "All modes of the clip",
+    "wanted": "Modes designed",
+    "fine": "The same modes of the design, on the fine model",
+}
+"""What is shown of modes alone, and names for people."""
 
 
 def page(results: SoundResults, tables: dict[str, Table]) -> str:
@@ -97,6 +104,7 @@ def _points(results: SoundResults, marks: list[Mark], balance: Table) -> list[di
             "missed": missed[number],
             "position": np.round(mark.position / results.design.unit, DIGITS).tolist(),
             "panels": _panels(results, name),
+            "alone": _modes_panels(results, name),
             "balance": inlined(plots.balance_figure(balance, name), f"balance-{number}"),
         }
         for number, (name, mark) in enumerate(zip(names, marks))
@@ -113,25 +121,54 @@ def _panel(results: SoundResults, state: str, name: str, together: list[Sound]) 
     """Spectrogram and players of a sound, scaled as those that are shown `together`."""
     sound, rate = results.sound(state, name)
     target = (sound, rate) if name == ELSEWHERE else results.sound(CLIPS, name)
-    loudest = float(spectrogram(*target)[2].max())
-    seconds = min(SHOWN_SECONDS, max(len(each) / own for each, own in together))
-    shown = _first(sound, rate, seconds)
     highest = min(highest_hertz(together), ROOM_ABOVE * results.design.targets.frequencies[-1])
-    figure = spectrogram_figure(shown, loudest, float(highest), rate)
-    peak = max(float(np.abs(each).max()) for each, _ in together)
-    played = round(PLAYED_SECONDS * rate)
-    panel = {
-        "state": STATES[state],
-        "plot": inlined(figure, f"sound-{state}-{name.replace(' ', '-')}"),
-        "source": wav_uri(sound[:played], rate, peak),
-    }
+    seen = _seen(f"{state}-{name}", (sound, rate), target, together, float(highest))
+    panel = {"state": STATES[state], **seen}
     if state == CLIPS:
         return panel
     modes = results.modes_alone(state, name)
     return panel | {
-        "modes": wav_uri(modes[:played], rate, peak),
+        "modes": wav_uri(modes[: round(PLAYED_SECONDS * rate)], rate, _peak(together)),
         "residual_share": residual_share(modes, sound - modes),
     }
+
+
+def _modes_panels(results: SoundResults, name: str) -> list[dict[str, Any]]:
+    """Modes alone at a point: those of its clip, those designed, and those of the design."""
+    fine = results.modes_alone("fine", name)
+    rate = results.sound("fine", name)[1]
+    target = results.target(name, rate)
+    sounds = dict(zip(ALONE, ((part, rate) for part in (target.modes, target.wanted, fine))))
+    clip = (target.clip, rate)
+    together = [clip, *sounds.values()]
+    # Modes that are not designed may lie above those that are.
+    enough = max(SHOWN_HERTZ, ROOM_ABOVE * results.design.targets.frequencies[-1])
+    highest = float(min(highest_hertz([clip]), enough))
+    return [
+        {
+            "state": ALONE[state],
+            **_seen(f"alone-{state}-{name}", sound, clip, together, highest),
+        }
+        for state, sound in sounds.items()
+    ]
+
+
+def _seen(
+    label: str, own: Sound, target: Sound, together: list[Sound], highest: float
+) -> dict[str, Any]:
+    """Spectrogram up to `highest` [Hz], below the loudest of the target, and player of a sound."""
+    sound, rate = own
+    loudest = float(spectrogram(*target)[2].max())
+    seconds = min(SHOWN_SECONDS, max(len(each) / rate for each, rate in together))
+    figure = spectrogram_figure(_first(sound, rate, seconds), loudest, highest, rate)
+    return {
+        "plot": inlined(figure, f"sound-{label.replace(' ', '-')}"),
+        "source": wav_uri(sound[: round(PLAYED_SECONDS * rate)], rate, _peak(together)),
+    }
+
+
+def _peak(together: list[Sound]) -> float:
+    return max(float(np.abs(sound).max()) for sound, _ in together)
 
 
 def _first(sound: Array, rate: int, seconds: float) -> Array:

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from solver.files.modes_file import ModesFile, read_modes
 from sound.clips.wav import read_wav
 from sound.project.design_file import Design, read_design
+from sound.rendering.bank import Bank, ring
+from sound.rendering.listening import resampled
 from workflow.studies.base.conditions import Record
 from workflow.studies.base.results import Results
 from workflow.studies.sounds.examples import (
@@ -28,6 +30,27 @@ Array = NDArray[np.float64]
 
 MODES = "modes"
 """Folder of modes alone below that of the sounds."""
+CLIPS = "clips"
+"""Folder of the clips."""
+
+
+@dataclass(frozen=True)
+class TargetSounds:
+    """A clip from where its modes ring freely on, and what is known of it.
+
+    Attributes
+    ----------
+    clip : (s,)
+        Its samples.
+    modes : (s,)
+        All modes that were found in it.
+    wanted : (s,)
+        Those that are designed, as a material sounds that has them all.
+    """
+
+    clip: Array
+    modes: Array
+    wanted: Array
 
 
 @dataclass(frozen=True)
@@ -118,3 +141,16 @@ class SoundResults(Results):
     def modes_alone(self, state: str, name: str) -> Array:
         """Samples (s,) of a rendered sound without the noise of the clips."""
         return read_wav(self.file(f"{state}/{MODES}/{name}.wav"))[0]
+
+    def target(self, name: str, rate: int) -> TargetSounds:
+        """A clip and its modes, sampled at `rate` [Hz]."""
+        targets = self.design.targets
+        point = targets.names.index(name)
+        clip, own = self.sound(CLIPS, name)
+        rest = targets.residuals[point]
+        # What comes before is the blow, which modes do not tell of.
+        ringing = clip[max(0, len(clip) - len(rest)) :]
+        bank = Bank(targets.frequencies, targets.dampings, own)
+        wanted = ring(bank, [(0.0, targets.amplitudes[point])], len(ringing))
+        parts = (ringing, ringing - rest[: len(ringing)], wanted)
+        return TargetSounds(*(resampled(part, own, rate) for part in parts))

@@ -9,17 +9,24 @@ from numpy.typing import NDArray
 
 from carillon.fem.model import RIGID_MODES
 from sound.design.bark import bark
+from sound.design.cents import cents, common_factor
 from sound.project.design_file import Design
 from sound.rendering.solid import SoundingSolid
 from workflow.studies.base.conditions import ONE_COLD_RUN, measured
 from workflow.studies.base.entry import Row
+from workflow.studies.sounds import spectral_distance
 from workflow.studies.sounds.results import SoundResults
 
 Array = NDArray[np.float64]
 
 METHODS = {"hybrid": "Hybrid", "cma": "CMA-ES alone", "bfgs": "L-BFGS alone"}
 """Names of optimisers for people."""
-
+SOLIDS = {
+    "before": "Uniform material",
+    "coarse": "Design, coarse solid",
+    "fine": "Design, fine solid",
+}
+"""Names of solids whose frequencies are compared with the targets, for people."""
 
 DESIGNED = measured(
     lambda results: {
@@ -73,6 +80,42 @@ def truth(results: SoundResults) -> Iterator[Row]:
     )
 
 
+def nearness(results: SoundResults) -> Iterator[Row]:
+    """How far all frequencies are from their targets, with the factor that is best for them."""
+    design, targets = results.design, results.design.targets.frequencies
+    solved = results.truth.frequencies[RIGID_MODES : RIGID_MODES + len(targets)]
+    states = {
+        "before": results.start.frequencies,
+        "coarse": design.coarse_frequencies,
+        "fine": solved,
+    }
+    for state, hertz in states.items():
+        scaled = common_factor(hertz, targets) * hertz
+        apart, steps = cents(scaled, targets), _bark_difference(scaled, targets)
+        yield {
+            "solid": state,
+            "title": SOLIDS[state],
+            "rms_cents": _rms(apart),
+            "worst_cents": float(np.abs(apart).max()),
+            "rms_bark": _rms(steps),
+            "worst_bark": float(np.abs(steps).max()),
+        }
+
+
+def distances(results: SoundResults) -> Iterator[Row]:
+    """How far modes alone sound from the clip, at every struck point."""
+    for name in results.design.targets.names:
+        _, rate = results.sound("fine", name)
+        target = results.target(name, rate)
+        sounds = {state: results.modes_alone(state, name) for state in ("before", "after", "fine")}
+        sounds |= {"wanted": target.wanted, "modes": target.modes, "silence": np.zeros(1)}
+        apart = {
+            state: spectral_distance.log_spectral_distance(sound, target.clip, rate)
+            for state, sound in sounds.items()
+        }
+        yield {"point": name, **apart}
+
+
 def checks(results: SoundResults) -> Iterator[Row]:
     """What the checks on the fine solid found, one after the other, in the last edit."""
     for number, entry in enumerate(results.design.evidence.get("checks", []), 1):
@@ -124,6 +167,10 @@ def evaluation(results: SoundResults) -> list[Row]:
 def _bark_difference(hertz: Array, target: Array) -> Array:
     """Differences [bark] of frequencies [Hz], without rounding errors."""
     return np.round(bark(hertz) - bark(target), 9) + 0.0
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _by_mode(**columns: Array) -> Iterator[Row]:
