@@ -12,7 +12,7 @@ from solver import solve
 from solver.coarsening.choice import make_coarsening
 from solver.coarsening.model import build_model
 from sound.clips.targets import Targets
-from sound.project.design_file import HISTORY_TYPE, Design
+from sound.project.design import HISTORY_TYPE, Design
 from sound.strikes import Strike
 from tests.solids import box_mesh
 

@@ -28,7 +28,8 @@ from sound.design.plausible import weight
 from sound.design.pool import Pool, Task, Trial
 from sound.design.preparation import coordinates_of, prepare, targets_of
 from sound.design.search import HistoryEntry
-from sound.project.design_file import HISTORY_TYPE, read_design, write_design
+from sound.project.design import HISTORY_TYPE
+from sound.project.design_file import read_design, write_design
 from sound.project.project import Weights, project_of
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid

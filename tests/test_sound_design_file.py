@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from carillon.errors import UserError
-from sound.project.design_file import Design, read_design, write_design
+from sound.project.design import Design
+from sound.project.design_file import read_design, write_design
 from tests.edited_files import edited
 from tests.small_design import small_design
 

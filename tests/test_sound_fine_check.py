@@ -21,7 +21,9 @@ from sound.design.optimise import optimise
 from sound.design.outcome import Outcome
 from sound.design.preparation import prepare
 from sound.design.reduced_model import ReducedModel, descend_by_model
-from sound.project.design_file import FineFrequencies, read_design, write_design
+from sound.design.space_mapping import MET_CENTS
+from sound.project.design import FineFrequencies
+from sound.project.design_file import read_design, write_design
 from tests import small_project
 from tests.edited_files import edited
 from tests.small_design import small_design
@@ -194,3 +196,9 @@ def test_the_command_says_what_the_file_says(checked, tmp_path, capsys):
     assert main(["check", str(tmp_path / "design.h5")]) == 0
     out = capsys.readouterr().out
     assert f"{found['fine_rms_cents']:.1f} on the fine one" in out
+
+
+def test_a_search_ends_where_frequencies_are_met_and_nothing_gets_better(problem):
+    design = optimise(with_options(problem, evaluations=4000))
+    assert fine_cents(design) < MET_CENTS
+    assert design.evidence["evaluations"] < 3900

@@ -16,7 +16,8 @@ from carillon.provenance import record
 from solver import solve
 from solver.files.modes_file import write_modes
 from sound.clips.wav import read_wav, write_wav
-from sound.project.design_file import HISTORY_TYPE, Design, read_design, write_design
+from sound.project.design import HISTORY_TYPE, Design
+from sound.project.design_file import read_design, write_design
 from sound.project.project import load_project
 from sound.rendering.listening import Listening
 from sound.rendering.render import Hit, rendered_parts

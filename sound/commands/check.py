@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from carillon.options import REQUIRED, add_options, collect, option
 
 if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
-    from sound.project.design_file import Design, FineFrequencies
+    from sound.project.design import Design, FineFrequencies
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from sound.design.objective import fall
 
 if TYPE_CHECKING:
     from sound.design.search import Search
-    from sound.project.design_file import Design
+    from sound.project.design import Design
     from sound.project.project import Project
 
 ENDINGS = (".h5", ".hdf5")

@@ -13,7 +13,7 @@ from carillon.options import REQUIRED, add_options, collect, option
 from sound.commands.damping_options import DampingOptions
 
 if TYPE_CHECKING:  # Its import takes long, and `--help` needs none.
-    from sound.project.design_file import Design
+    from sound.project.design import Design
 
 FORMATS = ("h5", "gltf", "glb", "dsp", "npy")
 MOST_POINTS = 10_000

@@ -19,7 +19,7 @@ from carillon.options import REQUIRED, add_options, collect, option
 
 if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     from sound.design.reach import Reach
-    from sound.project.design_file import Design
+    from sound.project.design import Design
 
 
 @dataclass(frozen=True)

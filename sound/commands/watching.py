@@ -18,7 +18,8 @@ from sound.design.optimise import optimise
 from sound.design.preparation import DesignProblem, prepare
 from sound.design.search import Search
 from sound.outputs import require_output
-from sound.project.design_file import Design, write_design
+from sound.project.design import Design
+from sound.project.design_file import write_design
 from sound.project.project import Project
 from sound.rendering.listening import Listening
 from sound.rendering.render import Hit, render, ringing_seconds

@@ -19,7 +19,7 @@ from sound.design.optimise import optimise
 from sound.design.optimisers import OPTIMISERS
 from sound.design.preparation import DesignProblem, prepare
 from sound.design.simulation import Evaluation
-from sound.project.design_file import Design
+from sound.project.design import Design
 from sound.project.project import Project
 
 Array = NDArray[np.float64]

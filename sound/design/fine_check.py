@@ -22,7 +22,7 @@ from sound.design.descent import cost_of
 from sound.design.objective import DesignCost
 from sound.design.pool import Setting
 from sound.design.simulation import Evaluation, Simulation
-from sound.project.design_file import Design, FineFrequencies
+from sound.project.design import Design, FineFrequencies
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -14,7 +14,7 @@ from sound.design.pool import Pool, Task
 from sound.design.preparation import DesignProblem, coordinates_of
 from sound.design.search import BudgetSpentError, Search, require_modes
 from sound.design.space_mapping import SpaceMapping
-from sound.project.design_file import HISTORY_TYPE, Design
+from sound.project.design import HISTORY_TYPE, Design
 
 KEEP_SECONDS = 30.0
 """Time between two designs that are kept while a search goes on [s]."""

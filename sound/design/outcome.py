@@ -24,7 +24,7 @@ from sound.design.preparation import DesignProblem
 from sound.design.search import HistoryEntry, Search, require_modes
 from sound.design.simulation import Evaluation, Simulation
 from sound.design.space_mapping import Checked
-from sound.project.design_file import HISTORY_TYPE, Design, FineFrequencies
+from sound.project.design import HISTORY_TYPE, Design, FineFrequencies
 
 FINAL_TOLERANCE = 1e-12
 """Relative error of the eigenvalues that a design is written with; its root is that of the modes,

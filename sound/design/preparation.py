@@ -17,7 +17,7 @@ from sound.design.material import ReducedMaterial
 from sound.design.objective import Objective
 from sound.design.poisson import FreePoisson
 from sound.design.pool import Setting
-from sound.project.design_file import Design
+from sound.project.design import Design
 from sound.project.project import Project
 from sound.project.usable import usable_strikes
 

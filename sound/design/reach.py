@@ -24,7 +24,7 @@ from sound.design.objective import Objective, Sensitivity
 from sound.design.pool import Pool, Task, Trial
 from sound.design.preparation import DesignProblem, coordinates_of
 from sound.design.reduced_model import TrustRegion
-from sound.project.design_file import Design
+from sound.project.design import Design
 from sound.project.project import Weights
 
 Array = NDArray[np.float64]

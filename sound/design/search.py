@@ -136,6 +136,11 @@ class Search:
         return time.monotonic() - self._begin
 
     @property
+    def endless(self) -> bool:
+        """Whether nothing but somebody's word ends the search."""
+        return self._most is None and not np.isfinite(self.deadline)
+
+    @property
     def own_evaluations(self) -> int:
         """Evaluations of this search."""
         return self._done

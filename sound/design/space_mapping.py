@@ -36,6 +36,12 @@ WORTHWHILE = 0.5
 """Share of the cost on the fine solid that a leg on the coarse one has to come down to, or the next
 leg is on the fine solid."""
 
+MET_CENTS = 5.0
+"""Distance of fine frequencies from their targets (rms) that hardly anybody hears."""
+GAIN, FRUITLESS = 0.01, 2
+"""Share by which the cost has to fall for a leg not to be fruitless, and how many fruitless ones in
+a row, one on each solid, end a search whose frequencies are met."""
+
 Optimiser = Callable[..., None]
 
 
@@ -95,11 +101,12 @@ class SpaceMapping:
         """Search from the first material of a search until its budget is spent.
 
         Every leg begins at the best material so far, and aims at the targets less the errors of the
-        coarse solid there.  Where these gain little, one descends on the fine solid itself.
+        coarse solid there.  Where these gain little, one descends on the fine solid itself.  A
+        search with a budget also ends where frequencies are met and legs have been fruitless.
         """
-        share, finely = FIRST_SHARE, False
+        share, finely, fruitless = FIRST_SHARE, False, 0
         reserve = self._checked(search, require_modes(search))
-        while not search.spent:
+        while not search.spent and (fruitless < FRUITLESS or search.endless or not self._met):
             assert self.best is not None
             best, z = self.best, self.best.evaluation.z
             try:
@@ -116,8 +123,16 @@ class SpaceMapping:
             # Modes to start from are rows of one of the two solids.
             reserve = self._checked(search, replace(search.best, start=None))
             finely = not finely and self.best.total > WORTHWHILE * best.total
+            fruitless = fruitless + 1 if self.best.total > (1.0 - GAIN) * best.total else 0
             share = min(LONGER * share, LARGEST_SHARE)
             seed += 1
+
+    @property
+    def _met(self) -> bool:
+        """Whether the best material's frequencies are near enough to their targets."""
+        assert self.best is not None
+        off = rms_cents(self.best.fine.frequencies, self._objective.targets.frequencies)
+        return off <= MET_CENTS
 
     def _checked(self, search: Search, trial: Trial) -> float:
         """Check a material, and remember it if it is the best one; how long that took [s]."""

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from carillon import __version__
 from carillon.files import atomic_path
 from sound.export.rigid import mass_properties
-from sound.project.design_file import Design
+from sound.project.design import Design
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
 

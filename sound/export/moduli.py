@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from carillon.files import atomic_path
-from sound.project.design_file import Design
+from sound.project.design import Design
 
 
 def write_moduli(path: str | Path, design: Design) -> None:

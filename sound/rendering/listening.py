@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sound.clips.noise import noise_part
-from sound.project.design_file import Design
+from sound.project.design import Design
 from sound.rendering.solid import SoundingSolid
 
 Array = NDArray[np.float64]

@@ -14,7 +14,8 @@ from carillon.fem.model import Solid
 from carillon.files import kind_of
 from solver.files.modes_file import read_modes
 from solver.response.response import Damping
-from sound.project.design_file import Design, read_design
+from sound.project.design import Design
+from sound.project.design_file import read_design
 from sound.rendering.listening import Listening
 from sound.rendering.render import Hit
 from sound.rendering.solid import SoundingSolid

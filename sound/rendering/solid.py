@@ -14,7 +14,7 @@ from solver.files.modes_file import ModesFile
 from solver.response.contact import interpolation
 from solver.response.response import Damping
 from solver.subspace.spectrum import clusters
-from sound.project.design_file import Design
+from sound.project.design import Design
 
 Array = NDArray[np.float64]
 

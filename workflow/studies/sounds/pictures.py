@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from carillon.fem.geometry import HexMesh, hexmesh_from_grid
 from carillon.fem.geometry.picture import guess_up, looks_at, view_of
-from sound.project.design_file import Design
+from sound.project.design import Design
 from workflow.studies.base.colours import COLOURS
 from workflow.studies.base.media import COLOUR_MAP, Pixels, cropped, marked_picture
 from workflow.studies.sounds.plots import limits

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from solver.files.modes_file import ModesFile, read_modes
 from sound.clips.wav import read_wav
-from sound.project.design_file import Design, read_design
+from sound.project.design import Design
+from sound.project.design_file import read_design
 from sound.rendering.bank import Bank, ring
 from sound.rendering.listening import resampled
 from workflow.studies.base.conditions import Record

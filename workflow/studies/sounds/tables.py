@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from carillon.fem.model import RIGID_MODES
 from sound.design.bark import bark
 from sound.design.cents import cents, common_factor
-from sound.project.design_file import Design
+from sound.project.design import Design
 from sound.rendering.solid import SoundingSolid
 from workflow.studies.base.conditions import ONE_COLD_RUN, measured
 from workflow.studies.base.entry import Row

@@ -1,0 +1,215 @@
+"""A design: the material found for a set of targets, and the modes it gives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.errors import UserError
+from carillon.fem.model import RIGID_MODES, ElasticModel, Solid
+from solver.files.modes_file import frequencies
+from sound.clips.targets import Targets
+from sound.project.material_damping import MaterialDamping
+from sound.strikes import Strike
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.integer]
+
+HISTORY = {
+    "seconds": ("s", "wall time since the optimisation began"),
+    "evaluations": ("1", "modal analyses made so far"),
+    "cost": ("1", "w_f E_f + w_a E_a + w_r R of the best material so far (Eq. 4)"),
+    "frequency_cost": ("bark^2", "its E_f (Eq. 1)"),
+    "amplitude_cost": ("1", "its E_a (Eq. 2)"),
+    "regulariser": ("1", "its R = z^T Q z / 2 (Eq. 4)"),
+}
+"""Columns of a design's history: unit and meaning."""
+HISTORY_TYPE = np.dtype([(name, float) for name in HISTORY])
+
+
+@dataclass(frozen=True)
+class FineFrequencies:
+    """What the fine solid of a design sounds at.
+
+    Attributes
+    ----------
+    hertz : (N,) [Hz]
+        Of its elastic modes, ascending.
+    order : (N,)
+        Number of the coarse elastic mode that has the shape of each.
+    """
+
+    hertz: Array
+    order: Integers
+
+
+@dataclass
+class Design:
+    """A material that lets struck points sound as their clips do.
+
+    Attributes
+    ----------
+    strikes
+        The T struck points.
+    targets
+        What they shall sound like.
+    coordinates : (m,)
+        z of the reduced material Y = Phi z (§6), dimensionless: of a reference modulus.
+    young : (M,) [Pa]
+        Young's modulus of the fine cells, scaled so that the frequencies come nearest to the
+        targets (least squares of cents).
+    model
+        The coarse solid that was analysed, with its moduli.
+    eigenvalues : (6 + N,) [rad^2/s^2]
+        Ascending, those of the rigid motions first.
+    modes : (n_dofs, 6 + N) [kg^-1/2]
+        Of the coarse model, mass-normalised.
+    surface_vertices : (V, 3) [m]
+        Of the surface that was voxelised.
+    surface_faces : (F, 3)
+        Vertices of its triangles.
+    fine_grid : (M, 3)
+        Integer coordinates of the fine cells.
+    fine_origin : (3,) [m]
+        Position of their origin.
+    fine_edge : float [m]
+        Edge of a fine cell.
+    history
+        Rows of `HISTORY_TYPE`, see `HISTORY`.
+    settings : dict
+        The project as resolved.
+    evidence : dict
+        How the result was come by and how good it is.
+    provenance : dict
+        Origin of the numbers; filled in on reading.
+    fine
+        Frequencies of the fine solid; None if they were not looked for.
+    damping
+        Loss factors of the material, and what they make of the modes; None in designs of before.
+    """
+
+    strikes: list[Strike]
+    targets: Targets
+    coordinates: Array
+    young: Array
+    model: Solid
+    eigenvalues: Array
+    modes: Array
+    surface_vertices: Array
+    surface_faces: Integers
+    fine_grid: Integers
+    fine_origin: Array
+    fine_edge: float
+    history: NDArray[np.void]
+    settings: dict[str, Any]
+    evidence: dict[str, Any]
+    provenance: dict[str, Any] = field(default_factory=dict)
+    fine: FineFrequencies | None = None
+    damping: MaterialDamping | None = None
+
+    @property
+    def unit(self) -> float:
+        """Metres per unit of the coordinates of the mesh that was designed [m]."""
+        return float(self.settings.get("unit", 1.0))
+
+    @property
+    def frequencies(self) -> Array:
+        """Frequencies (N,) [Hz] of the elastic modes: of the fine solid, where they are known."""
+        return self.coarse_frequencies if self.fine is None else self.fine.hertz
+
+    @property
+    def coarse_frequencies(self) -> Array:
+        """Frequencies (N,) [Hz] of the elastic modes of the coarse solid."""
+        return frequencies(self.eigenvalues[RIGID_MODES:])
+
+    @property
+    def elastic_modes(self) -> Array:
+        """Elastic modes (n_dofs, N) [kg^-1/2] in the order of `frequencies`, on coarse nodes."""
+        elastic = self.modes[:, RIGID_MODES:]
+        return elastic if self.fine is None else elastic[:, self.fine.order]
+
+    @property
+    def dampings(self) -> Array:
+        """Dampings (N,) [1/s] that the elastic modes sound with: the clips' (§5), or own ones."""
+        source = self.settings.get("damping", {}).get("source", "clips")
+        if self.damping is None or source == "clips":
+            return self.targets.dampings
+        return self.damping.dampings
+
+    def damped_by(self, source: str | None) -> Design:
+        """The same design that sounds with dampings of `clips`, of the `material`, or as it is.
+
+        Raises
+        ------
+        UserError
+            If it does not tell loss factors of its material.
+        """
+        if source is None:
+            return self
+        if source == "material" and self.damping is None:
+            raise UserError(
+                "the design holds no loss factors of its material, as it was made before there "
+                "were any; go on with it by design, and they are found"
+            )
+        settings = self.settings.get("damping", {}) | {"source": source}
+        return replace(self, settings={**self.settings, "damping": settings})
+
+
+def fault(design: Design) -> str:
+    """What does not fit together in a design, in a few words; nothing if all does."""
+    targets = design.targets
+    T, N = len(targets.names), len(targets.frequencies)
+    kept = RIGID_MODES + N
+    expected: list[tuple[str, Any, tuple[int | None, ...]]] = [
+        ("strikes", design.strikes, (T,)),
+        ("dampings", targets.dampings, (N,)),
+        ("amplitudes", targets.amplitudes, (T, N)),
+        ("residuals", targets.residuals, (T,)),
+        ("rates", targets.rates, (T,)),
+        ("eigenvalues", design.eigenvalues, (kept,)),
+        ("modes", design.modes, (design.model.n_dofs, kept)),
+        ("moduli of the coarse cells", design.model.young, _shape_of_moduli(design.model)),
+        ("coordinates", design.coordinates, (None,)),
+        ("fine cells", design.fine_grid, (len(design.young), 3)),
+        ("surface vertices", design.surface_vertices, (None, 3)),
+        ("surface faces", design.surface_faces, (None, 3)),
+    ]
+    if design.fine is not None:
+        expected += [
+            ("fine frequencies", design.fine.hertz, (N,)),
+            ("order of fine modes", design.fine.order, (N,)),
+        ]
+    if design.damping is not None:
+        expected += [
+            ("loss factors", design.damping.loss_factors, (len(design.young),)),
+            ("dampings of the material", design.damping.dampings, (N,)),
+        ]
+    for name, data, shape in expected:
+        own = (len(data),) if isinstance(data, (list, tuple)) else data.shape
+        if not _matches(own, shape):
+            any_shape = str(shape).replace("None", "any")
+            return f"holds {name} of shape {own}, expected {any_shape}"
+    numbers = [(name, data) for name, data, _ in expected if isinstance(data, np.ndarray)]
+    for name, data in [*numbers, ("frequencies", targets.frequencies), ("moduli", design.young)]:
+        if data.dtype.kind not in "fiu" or not np.isfinite(data).all():
+            return f"holds {name} that are no finite real numbers"
+    if design.fine is not None and sorted(design.fine.order) != list(range(N)):
+        return "names other coarse modes of its fine ones than each once"
+    count = len(design.surface_vertices)
+    named = [design.surface_faces.min(), design.surface_faces.max()]
+    for vertex in (*named, *(strike.vertex for strike in design.strikes)):
+        if not 0 <= vertex < count:
+            return f"names the surface's vertex {vertex}, of which there are {count}"
+    return ""
+
+
+def _shape_of_moduli(model: Solid) -> tuple[int, ...]:
+    points = (8,) if isinstance(model, ElasticModel) else ()
+    return (model.mesh.n_cells, *points)
+
+
+def _matches(own: tuple[int, ...], expected: tuple[int | None, ...]) -> bool:
+    return len(own) == len(expected) and all(b in (a, None) for a, b in zip(own, expected))
