@@ -2,15 +2,8 @@
 from dataclasses import asdict
 
 from workflow.studies.sounds import examples as sound_examples
-from workflow.studies.sounds.examples import (
-    COMPARISON,
-    DESIGN,
-    ELSEWHERE,
-    PROJECT,
-    REACHED,
-    START,
-    TRUTH,
-)
+from workflow.studies.sounds.examples import COMPARISON, DESIGN, ELSEWHERE, PROJECT
+from workflow.studies.sounds.examples import REACHED, START, TRUTH
 
 SOUND_FOLDER = sound_examples.FOLDER
 SOUND = f"{RESULTS}/{SOUND_FOLDER}"
