@@ -241,6 +241,8 @@ def test_the_page_says_which_modes_the_solid_can_have_where_the_search_fell_shor
     enough = Box(results.folder, results.name)
     enough.__dict__["reached"] = reached()
     assert "reach" in enough.absent
+    made = {name: make(enough) for name, make in SOUND.entries.items() if name != "reach"}
+    assert "What the solid can have" not in page.page(enough, made)
 
 
 def test_optimisers_are_set_beside_each_other_on_the_recorded_solids(tmp_path):
