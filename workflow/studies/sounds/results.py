@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.files.modes_file import ModesFile, read_modes
+from sound.clips.files import extract_file
 from sound.clips.wav import read_wav
 from sound.project.design import Design
 from sound.project.design_file import read_design
@@ -148,10 +149,10 @@ class SoundResults(Results):
         targets = self.design.targets
         point = targets.names.index(name)
         clip, own = self.sound(CLIPS, name)
-        rest = targets.residuals[point]
-        # What comes before is the blow, which modes do not tell of.
-        ringing = clip[max(0, len(clip) - len(rest)) :]
+        # The design does not hold where in its clip the modes begin; the user's cache does.
+        found = extract_file(self.file(f"{CLIPS}/{name}.wav"))
+        begin, count = round(found.evidence["strike_seconds"] * own), len(found.residual)
         bank = Bank(targets.frequencies, targets.dampings, own)
-        wanted = ring(bank, [(0.0, targets.amplitudes[point])], len(ringing))
-        parts = (ringing, ringing - rest[: len(ringing)], wanted)
+        wanted = ring(bank, [(0.0, targets.amplitudes[point])], count)
+        parts = (clip[begin : begin + count], found.modal_part(), wanted)
         return TargetSounds(*(resampled(part, own, rate) for part in parts))
