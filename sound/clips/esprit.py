@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 import scipy.linalg as la
 from numpy.typing import NDArray
@@ -24,9 +26,10 @@ def esprit(signal: Complex) -> Complex:
     return _exponents(vectors[:, : ester(vectors)])
 
 
-def exponents_of_order(signal: Complex, order: int) -> Complex:
-    """The same, where their number is known."""
-    return _exponents(_subspace(signal)[:, :order])
+def exponents_of_orders(signal: Complex, orders: Iterable[int]) -> list[Complex]:
+    """The same for each of some numbers of sinusoids."""
+    vectors = _subspace(signal)
+    return [_exponents(vectors[:, :order]) for order in orders]
 
 
 def _exponents(vectors: Complex) -> Complex:

@@ -85,7 +85,7 @@ def _band(clip: Array, rate: int, centre: float) -> tuple[Complex, float, float]
 
 def _left_by_two(band: Complex) -> float:
     """Energy that the best of one or two damped sinusoids leave."""
-    from sound.clips.esprit import exponents_of_order
+    from sound.clips.esprit import exponents_of_orders
 
     time = np.arange(len(band))
 
@@ -93,7 +93,7 @@ def _left_by_two(band: Complex) -> float:
         decays, frequencies = np.split(values, 2)
         return np.exp(np.outer(time, -np.abs(decays) + 1j * frequencies))
 
-    found = (exponents_of_order(band, order) for order in (1, 2))
+    found = exponents_of_orders(band, (1, 2))
     starts = [np.concatenate([np.abs(each.real), each.imag]) for each in found]
     return min(_fitted(band, waves, start)[0] for start in starts)
 

@@ -36,11 +36,10 @@ class AnalysedElements(ABC):
 
     model: Solid
 
-    @abstractmethod
     def with_young(self, young: Array) -> Solid:
         """The solid with these moduli."""
+        return self.model.with_young(young)
 
-    @abstractmethod
     def solve(
         self,
         solver: ModalSolver,
@@ -49,6 +48,7 @@ class AnalysedElements(ABC):
         poisson: float | None = None,
     ) -> Modes:
         """Its modes by a solver of `model`, see `ModalSolver.solve`."""
+        return solver.solve(young, start, poisson)
 
     @abstractmethod
     def slopes(self, young: Array, directions: Array) -> Array:
@@ -95,18 +95,6 @@ class _FineElements(AnalysedElements):
 
     def __init__(self, mesh: HexMesh, constants: Constants) -> None:
         self.model = fine_model(mesh, np.ones(mesh.n_cells), **constants)
-
-    def with_young(self, young: Array) -> Solid:
-        return self.model.with_young(young)
-
-    def solve(
-        self,
-        solver: ModalSolver,
-        young: Array,
-        start: Modes | Array | None,
-        poisson: float | None = None,
-    ) -> Modes:
-        return solver.solve(young, start, poisson)
 
     def slopes(self, young: Array, directions: Array) -> Array:
         return np.repeat(directions, 8, axis=0)
@@ -159,18 +147,6 @@ class _CellElements(AnalysedElements):
         self._cells = cells
         ones = np.ones(cells.mesh.n_cells)
         self.model = finite_cell_model(cells, ones, constants["poisson"], constants["density"])
-
-    def with_young(self, young: Array) -> Solid:
-        return self.model.with_young(young)
-
-    def solve(
-        self,
-        solver: ModalSolver,
-        young: Array,
-        start: Modes | Array | None,
-        poisson: float | None = None,
-    ) -> Modes:
-        return solver.solve(young, start, poisson)
 
     def slopes(self, young: Array, directions: Array) -> Array:
         columns = [self._cells.point_values(along).ravel() for along in directions.T]
