@@ -22,6 +22,8 @@ def orthonormal(gram: Array) -> tuple[Array, float]:
     Also returns the least diagonal entry of the Cholesky factor of the scaled matrix, 0 if there is
     none.
     """
+    if not gram.size:  # of which LAPACK complains on standard output, where results are printed
+        return gram, 1.0
     size = np.diag(gram)
     usable = size > 0.0
     scale = np.where(usable, 1.0 / np.sqrt(np.where(usable, size, 1.0)), 0.0)
