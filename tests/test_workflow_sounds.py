@@ -81,6 +81,12 @@ def history(*rows: tuple[float, float]) -> np.ndarray:
     return np.array([(s, 10 * s + 1, c, 0.5 * c, 0.05 * c, 0.0) for s, c in rows], HISTORY_TYPE)
 
 
+def costs(before: float, after: float) -> dict:
+    """What a design tells of its search."""
+    parts = {"frequency_cost": 0.5 * after, "amplitude_cost": 0.05 * after}
+    return {"cost_start": before, "cost": after, **parts}
+
+
 def designed(**parts: object) -> Design:
     resolved = {
         "mesh": "builtin:box",
@@ -142,8 +148,9 @@ def results(tmp_path_factory) -> SoundResults:
     folder = box.file("")
     for name in ("edit-1", "tables", *(f"{state}/{MODES}" for state in page.STATES)):
         (folder / name).mkdir(parents=True)
-    first = designed(history=history((0.1, 9.0), (1.0, 4.0)))
-    final = designed(history=history((0.1, 9.0), (1.0, 4.0), (1.2, 6.0), (3.0, 0.5)))
+    first = designed(history=history((0.1, 9.0), (1.0, 4.0)), evidence=costs(9.0, 4.0))
+    rows = history((0.1, 9.0), (1.0, 4.0), (1.2, 6.0), (3.0, 0.5))
+    final = designed(history=rows, evidence=costs(6.0, 0.5))
     write_design(folder / "edit-1" / DESIGN, first)
     write_design(folder / DESIGN, final)
     write_design(folder / START, designed(history=history((0.1, 9.0))))

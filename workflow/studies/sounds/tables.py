@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from carillon.fem.model import RIGID_MODES
 from sound.design.bark import bark
 from sound.design.cents import cents, common_factor
+from sound.design.objective import fall
 from sound.project.design import Design
 from sound.rendering.solid import SoundingSolid
 from workflow.studies.base.conditions import ONE_COLD_RUN, measured
@@ -38,16 +39,18 @@ DESIGNED = measured(
 
 def designs(results: SoundResults) -> Iterator[Row]:
     """Cost before and after every edit, and how long it took."""
-    parts = {"cost": "cost", "frequency": "frequency_cost", "amplitude": "amplitude_cost"}
     for number, part in enumerate(results.example.parts, 1):
-        rows = results.history(part)
-        first, last = rows[0], rows[-1]
+        last, evidence = results.history(part)[-1], results.designs[part].evidence
+        # Not of the history, which has what the coarse solid foretold.
+        before, after = float(evidence["cost_start"]), float(evidence["cost"])
         yield {
             "edit": number,
             "points": ", ".join(results.designs[part].targets.names),
-            **{f"{key}_before": float(first[name]) for key, name in parts.items()},
-            **{key: float(last[name]) for key, name in parts.items()},
-            "fall": float(1.0 - last["cost"] / first["cost"]),
+            "cost_before": before,
+            "cost": after,
+            "fall": fall(before, after),
+            "frequency": float(evidence["frequency_cost"]),
+            "amplitude": float(evidence["amplitude_cost"]),
             "evaluations": int(last["evaluations"]),
             "seconds": float(last["seconds"]),
             "per_minute": float(60.0 * last["evaluations"] / max(last["seconds"], 1e-9)),
@@ -123,8 +126,11 @@ def checks(results: SoundResults) -> Iterator[Row]:
 
 
 def reach(results: SoundResults) -> list[Row]:
-    """Which modes the solid can have."""
-    return list(results.reached["modes"])
+    """Which modes the solid can have, to a hundredth of a cent."""
+    return [
+        {key: round(value, 2) if key.endswith("_cents") else value for key, value in row.items()}
+        for row in results.reached["modes"]
+    ]
 
 
 def amplitudes(results: SoundResults) -> Iterator[Row]:
