@@ -1,0 +1,1 @@
+"""Processes that compute for the studio, and what they do."""

@@ -1,0 +1,1 @@
+"""Who may ask the studio for what, and its answers."""

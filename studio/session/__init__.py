@@ -1,0 +1,1 @@
+"""State of the studio: what is designed, undo and redo, files."""
