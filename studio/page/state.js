@@ -1,0 +1,122 @@
+/**
+ * What the page knows: the last state of the server, and what the page alone chooses.
+ */
+
+/** @typedef {import("./types.js").State} State */
+/** @typedef {import("./connection.js").Connection} Connection */
+
+/**
+ * A value and who wants to know of its changes.
+ *
+ * @template T
+ */
+class Observed {
+  /** @param {T} first */
+  constructor(first) {
+    this.current = first;
+    /** @type {Set<(now: T, before: T) => void>} */
+    this.functions = new Set();
+  }
+
+  /** @param {T} next */
+  become(next) {
+    const before = this.current;
+    this.current = next;
+    for (const wanted of this.functions) {
+      try {
+        wanted(next, before);
+      } catch (error) {
+        console.error(error); // one part's fault must not keep the others from hearing
+      }
+    }
+  }
+}
+
+/**
+ * The last state of the server, null until there is one.
+ *
+ * @extends {Observed<State | null>}
+ */
+export class ServerState extends Observed {
+  /** @param {Connection} connection */
+  constructor(connection) {
+    super(null);
+    connection.onEvent("state", (state) => this.become(state));
+  }
+
+  /**
+   * Wants to know of states: told at once if there is one, and at every change.
+   *
+   * @param {(state: State, before: State | null) => void} wanted
+   * @returns {() => void} what ends it
+   */
+  onChange(wanted) {
+    /** @type {(now: State | null, before: State | null) => void} */
+    const told = (now, before) => now && wanted(now, before);
+    this.functions.add(told);
+    if (this.current) wanted(this.current, null);
+    return () => this.functions.delete(told);
+  }
+}
+
+/**
+ * What the page alone knows.
+ *
+ * `target` is the name of the selected target; `mode` the number of the mode under the pointer, from 0;
+ * `vertex` was struck last; `strength` is that of a strike, 0 to 1; `tool` is what a click on the solid
+ * does; `holding` says that a strike is the stronger the longer the pointer was down.
+ *
+ * @typedef {object} Choices
+ * @property {string | null} target
+ * @property {number | null} mode
+ * @property {number | null} vertex
+ * @property {number} strength
+ * @property {"strike" | "place"} tool
+ * @property {boolean} holding
+ */
+
+/** @extends {Observed<Choices>} */
+export class Selection extends Observed {
+  constructor() {
+    super({ target: null, mode: null, vertex: null, strength: 1, tool: "strike", holding: false });
+  }
+
+  /** @param {Partial<Choices>} changes */
+  set(changes) {
+    const next = { ...this.current, ...changes };
+    const keys = /** @type {(keyof Choices)[]} */ (Object.keys(next));
+    if (keys.some((key) => next[key] !== this.current[key])) this.become(next);
+  }
+
+  /**
+   * Wants to know of choices: told at once, and at every change.
+   *
+   * @param {(now: Choices, before: Choices) => void} wanted
+   * @returns {() => void} what ends it
+   */
+  onChange(wanted) {
+    this.functions.add(wanted);
+    wanted(this.current, this.current);
+    return () => this.functions.delete(wanted);
+  }
+
+  /**
+   * Keeps to targets that there are: one that is gone gives way to the first one.
+   *
+   * @param {ServerState} state
+   */
+  follow(state) {
+    state.onChange((now, before) => {
+      const names = now.targets.map((target) => target.name);
+      const chosen = this.current.target;
+      if (chosen !== null && names.includes(chosen)) return;
+      const known = (before?.targets ?? []).map((target) => target.name);
+      const fresh = names.filter((name) => !known.includes(name));
+      // A renamed target keeps its place in the list.
+      const renamed = chosen === null ? undefined : names[known.indexOf(chosen)];
+      if (renamed !== undefined && fresh.includes(renamed)) this.set({ target: renamed });
+      else if (chosen !== null || before === null) this.set({ target: names[0] ?? null });
+      else if (fresh.length > 0) this.set({ target: fresh[0] });
+    });
+  }
+}
