@@ -1,0 +1,77 @@
+"""What the studio's server asks of whoever holds the state: the answers to the page's requests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from carillon.errors import UserError
+from studio.feed import Feed
+
+CLIP_PARTS = ("sound", "modes", "rest", "noise")
+"""What of a clip can be heard."""
+EXPORTS = ("h5", "gltf", "glb", "dsp", "npy", "wav", "html")
+"""Kinds of files that a design can be taken home as."""
+
+
+class NotFoundError(UserError):
+    """Something that the page names and that is not there, or not any more."""
+
+
+@dataclass(frozen=True)
+class Download:
+    """A file for the browser to save.
+
+    Attributes
+    ----------
+    name
+        Proposed to the person, with its ending.
+    media_type
+        As in HTTP: `audio/wav`.
+    """
+
+    name: str
+    media_type: str
+    content: bytes
+
+
+class Studio(Protocol):
+    """State of the studio as its server sees it; all is called in the thread of the event loop.
+
+    Faults of what the page sends or asks for are raised as `UserError`, one sentence each.  What is
+    named and not there is a `NotFoundError`.
+    """
+
+    def state(self) -> dict[str, Any]:
+        """The event `state`, as docs/contributing/studio.md describes it."""
+
+    def subscribe(self) -> Feed:
+        """A feed of all events from now on, that begins with `state`, `history` and the bank."""
+
+    def unsubscribe(self, feed: Feed) -> None:
+        """Send nothing more to a feed, whose page is gone."""
+
+    async def call(self, name: str, arguments: Mapping[str, Any]) -> None:
+        """Do what the page asks for; names and keys of arguments are checked, values are not."""
+
+    async def take_mesh(self, name: str, content: bytes) -> str:
+        """Take up an uploaded mesh; its identifier. `name` is a plain file name."""
+
+    async def take_clip(self, name: str, content: bytes) -> str:
+        """Take up an uploaded clip; its identifier. `name` is a plain file name."""
+
+    async def surface(self, number: int) -> bytes:
+        """The surface as a binary message, see `studio.binary`."""
+
+    async def clip_sound(self, clip: str, part: str) -> bytes:
+        """A clip, or a part of it (`CLIP_PARTS`), as the content of a WAV file."""
+
+    async def clip_spectrum(self, clip: str) -> dict[str, list[float]]:
+        """Spectrum of a clip: `hertz`, and `decibels` below the loudest."""
+
+    async def export(self, kind: str, target: str | None) -> Download:
+        """The design in another form (`EXPORTS`); sounds are those of a strike at a target."""
+
+    async def close(self) -> None:
+        """Save what is to be saved and end all processes."""
