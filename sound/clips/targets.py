@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -117,6 +117,37 @@ def share_frequencies(
         residuals=tuple(sound.residual for sound in sounds),
         rates=tuple(sound.rate for sound in sounds),
     )
+
+
+def without_modes(sound: ModalSound, hertz: Sequence[float]) -> ModalSound:
+    """A clip without its modes at some frequencies [Hz]: for each the nearest, if it is the same.
+
+    The residual, which has no modes of the clip anyway, stays as it is.
+
+    Raises
+    ------
+    UserError
+        If none is left.
+
+    Examples
+    --------
+    >>> one = np.ones(3)
+    >>> sound = ModalSound(np.array([440.0, 440.5, 990.0]), one, one, one, one, 8000, {})
+    >>> without_modes(sound, [440.1, 500.0]).frequencies.tolist()
+    [440.5, 990.0]
+    """
+    kept = np.ones(len(sound.frequencies), dtype=bool)
+    for each in hertz:
+        nearest = int(np.argmin(np.abs(sound.frequencies - each)))
+        if _same(np.array([each, sound.frequencies[nearest]])):
+            kept[nearest] = False
+    if not kept.any():
+        raise UserError(
+            f"all {len(kept)} modes of the clip are left out (without), expected one at least to "
+            "be kept"
+        )
+    names = ("frequencies", "dampings", "amplitudes", "phases")
+    return replace(sound, **{name: getattr(sound, name)[kept] for name in names})
 
 
 def _groups(frequencies: Array, owners: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -7,6 +7,7 @@ quasi-Newton methods have to learn from gradients one by one; damped as Levenber
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -89,7 +90,7 @@ class Squares:
 
 @dataclass(frozen=True)
 class DescentLimits:
-    """When a descent ends in any case.
+    """When a descent ends in any case, and who is told how far it is.
 
     Attributes
     ----------
@@ -97,10 +98,13 @@ class DescentLimits:
         Monotonic clock from which no material is looked at.
     evaluations : float
         Materials that are looked at, at most; that of the start always is.
+    tell
+        Called with every material that lowers the cost.
     """
 
     deadline: float = np.inf
     evaluations: float = np.inf
+    tell: Callable[[Evaluation, DesignCost], None] | None = None
 
     def reached(self, evaluations: int) -> bool:
         """Whether one is reached after so many evaluations."""
@@ -143,6 +147,13 @@ class DesignDescent:
     def cost(self) -> DesignCost:
         """Cost of the last material."""
         return self.costs[-1].cost
+
+    def come_to(self, evaluation: Evaluation, cost: DesignCost, limits: DescentLimits) -> None:
+        """Take up a material that lowers the cost."""
+        self.last = evaluation
+        self.costs.append(CostPoint(time.monotonic(), self.evaluations, cost))
+        if limits.tell is not None:
+            limits.tell(evaluation, cost)
 
 
 def cost_of(objective: Objective, material: ReducedMaterial, evaluation: Evaluation) -> DesignCost:
@@ -249,8 +260,7 @@ def descend_by_gradients(
             return LARGE, np.zeros(len(point))
         cost = cost_of(objective, simulation.material, tried)
         if cost.total < here.cost.total:
-            here.last = tried
-            here.costs.append(CostPoint(time.monotonic(), here.evaluations, cost))
+            here.come_to(tried, cost, limits)
         return cost.total, squares_of(objective, simulation.material, tried).gradient
 
     try:
@@ -295,8 +305,7 @@ def _step(
         if here.cost.total - cost.total > FORETOLD * foretold:
             damping *= SOFTER
         here.damping = _replaced(here.damping, part, damping)
-        here.last = simulation.differentiate(tried)
-        here.costs.append(CostPoint(time.monotonic(), here.evaluations, cost))
+        here.come_to(simulation.differentiate(tried), cost, limits)
         return True
     here.damping = _replaced(here.damping, part, options.damping)
     return False

@@ -10,7 +10,7 @@ from contextvars import ContextVar
 from types import FrameType
 from typing import Any
 
-STOPPING = "asked to stop: the best so far is written after this round; ask again to end at once\n"
+STOPPING = "asked to stop: the best so far is written now; ask again to end without it\n"
 _interrupted: ContextVar[Callable[[], bool] | None] = ContextVar("interrupted", default=None)
 
 

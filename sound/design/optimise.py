@@ -6,15 +6,19 @@ import time
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
+from solver.files.modes_file import frequencies
 from sound.design.interrupts import interruptible
 from sound.design.optimisers import OPTIMISERS
 from sound.design.outcome import Outcome
-from sound.design.pool import Pool, Task
+from sound.design.pool import Pool, Step, Task
 from sound.design.preparation import DesignProblem, coordinates_of
 from sound.design.search import BudgetSpentError, Search, require_modes
 from sound.design.space_mapping import SpaceMapping
 from sound.project.design import HISTORY_TYPE, Design
+
+Array = NDArray[np.float64]
 
 KEEP_SECONDS = 30.0
 """Time between two designs that are kept while a search goes on [s]."""
@@ -26,6 +30,8 @@ def optimise(
     keep: Callable[[Design], None] | None = None,
     watch: Callable[[Search], bool | None] | None = None,
     keep_seconds: float | None = None,
+    follow: Callable[[Step, Array], None] | None = None,
+    coordinates: Array | None = None,
 ) -> Design:
     """Search for a material until the project's budget is spent, or somebody interrupts.
 
@@ -44,6 +50,11 @@ def optimise(
         Called after every round of evaluations; ends the search by returning True.
     keep_seconds : float or None [s]
         Takes the place of `KEEP_SECONDS`.
+    follow
+        Called from another thread with every step of a descent and the frequencies (N,) [Hz] that
+        the design then has, in the order of the modes that are searched with.
+    coordinates : (m,) or None
+        Of the material to start from, in place of the initial design's.
 
     Raises
     ------
@@ -59,6 +70,8 @@ def optimise(
         rows = initial.history
     if len(rows):
         before = (float(rows["seconds"][-1]), int(rows["evaluations"][-1]))
+    if coordinates is not None:
+        z = coordinates
     outcome = Outcome(problem, rows)
     budget = project.optimiser
     every = KEEP_SECONDS if keep_seconds is None else keep_seconds
@@ -71,6 +84,15 @@ def optimise(
             return outcome.of(search)
         assert mapping.best is not None
         return outcome.of_checked(search, mapping.best)
+
+    def pool(tell: Callable[[Step], None]) -> Pool:
+        def told(step: Step) -> None:
+            tell(step)
+            if follow is not None:
+                own = frequencies(step.eigenvalues)
+                follow(step, own if mapping is None else mapping.foretold(step))
+
+        return Pool(setting, problem.workers, told)
 
     kept: float = time.monotonic()
     known: object = None
@@ -88,11 +110,12 @@ def optimise(
             return bool(ended) or interrupted()
 
         search = Search(
-            lambda: Pool(setting, problem.workers),
+            pool,
             budget.seconds,
             budget.evaluations,
             look,
             before,
+            interrupted,
         )
         with search:
             optimiser = OPTIMISERS[budget.method]

@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_EXCEPTION, ProcessPoolExecutor
+from concurrent.futures import wait as futures_wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import wait
+from multiprocessing.queues import SimpleQueue
 from threading import Thread
 
 import numpy as np
@@ -39,11 +41,13 @@ from sound.design.descent import (
 from sound.design.material import ReducedMaterial
 from sound.design.objective import DesignCost, Objective
 from sound.design.reduced_model import TrustRegion, descend_by_model
-from sound.design.simulation import TOLERANCE, Simulation
+from sound.design.simulation import TOLERANCE, Evaluation, Simulation
 from sound.strikes import Strike
 
 Array = NDArray[np.float64]
 
+LISTEN_SECONDS = 0.1
+"""Time between two looks whether somebody asked to stop, while processes work."""
 FAILED = DesignCost(np.inf, np.inf, np.inf, np.inf)
 """Cost of a material whose modes could not be found."""
 
@@ -138,35 +142,85 @@ class Trial:
     eigenvalues: Array | None = None
 
 
-class Pool:
-    """Processes that evaluate materials; this one alone if `workers` is 1."""
+@dataclass(frozen=True)
+class Step:
+    """A material that a descent has come to, told while it goes on.
 
-    def __init__(self, setting: Setting, workers: int) -> None:
+    Attributes
+    ----------
+    z : (m,)
+        Coordinates.
+    cost
+        By what the descent lowers.
+    eigenvalues : (N,) [rad^2/s^2]
+        Of the elastic modes.
+    fine : bool
+        Whether the fine solid was looked at.
+    """
+
+    z: Array
+    cost: DesignCost
+    eigenvalues: Array
+    fine: bool
+
+
+class InterruptedRoundError(Exception):
+    """Somebody asked to stop in the middle of a round: its processes are gone."""
+
+
+class Pool:
+    """Processes that evaluate materials; this one alone if `workers` is 1.
+
+    Parameters
+    ----------
+    tell
+        Called with every step of a descent, from another thread if there are several processes.
+    """
+
+    def __init__(
+        self, setting: Setting, workers: int, tell: Callable[[Step], None] | None = None
+    ) -> None:
         self._executor: ProcessPoolExecutor | None = None
         self._alone = ExitStack()
         if workers == 1:
             self._alone.enter_context(one_thread())
-            _prepare(setting)
+            _prepare(setting, tell)
             return
         # Not forked, as MPI and threads do not survive that.
-        self._executor = ProcessPoolExecutor(
-            workers, get_context("spawn"), _prepare_apart, (setting,)
-        )
+        context = get_context("spawn")
+        told = None
+        if tell is not None:
+            told = context.SimpleQueue()
+            Thread(target=_pass_on, args=(told, tell), daemon=True).start()
+        self._executor = ProcessPoolExecutor(workers, context, _prepare_apart, (setting, told))
 
-    def run(self, tasks: Sequence[Task]) -> list[Trial]:
+    def run(
+        self, tasks: Sequence[Task], interrupted: Callable[[], bool] | None = None
+    ) -> list[Trial]:
         """What becomes of the tasks, in their order.
+
+        Parameters
+        ----------
+        interrupted
+            Asked now and then where there are several processes.
 
         Raises
         ------
+        InterruptedRoundError
+            If `interrupted` says so before all is done.
         UserError
             If a process died.
         """
         if self._executor is None:
             return [_run(task) for task in tasks]
         try:
-            with _signals_held():
-                trials = self._executor.map(_run, tasks)  # starts the processes
-            return list(trials)
+            with _signals_held():  # submitting starts the processes
+                futures = [self._executor.submit(_run, task) for task in tasks]
+            while futures_wait(futures, LISTEN_SECONDS, FIRST_EXCEPTION).not_done:
+                if interrupted is not None and interrupted():
+                    self.close()
+                    raise InterruptedRoundError
+            return [future.result() for future in futures]
         except BrokenProcessPool:
             raise UserError(
                 "a process that evaluates materials died, perhaps for lack of memory; run the same "
@@ -184,6 +238,7 @@ class Pool:
 
 _setting: Setting
 _simulation: Simulation
+_tell: Callable[[Step], None] | None
 _for_good = ExitStack()
 
 
@@ -201,10 +256,16 @@ def _signals_held() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, former)
 
 
-def _prepare_apart(setting: Setting) -> None:
+def _pass_on(told: SimpleQueue[Step], tell: Callable[[Step], None]) -> None:
+    """Tell what processes put into a queue, for as long as this one lives."""
+    while True:
+        tell(told.get())
+
+
+def _prepare_apart(setting: Setting, told: SimpleQueue[Step] | None) -> None:
     Thread(target=_end_with_parent, daemon=True).start()
     _for_good.enter_context(one_thread())
-    _prepare(setting)
+    _prepare(setting, None if told is None else told.put)
 
 
 def _end_with_parent() -> None:
@@ -215,9 +276,9 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-def _prepare(setting: Setting) -> None:
-    global _setting, _simulation
-    _setting, _simulation = setting, setting.simulation()
+def _prepare(setting: Setting, tell: Callable[[Step], None] | None) -> None:
+    global _setting, _simulation, _tell
+    _setting, _simulation, _tell = setting, setting.simulation(), tell
     _fine_simulation.cache_clear()
 
 
@@ -245,10 +306,23 @@ def _run(task: Task) -> Trial:
     return replace(trial, evaluations=simulation.evaluations - before)
 
 
+def _telling(fine: bool) -> Callable[[Evaluation, DesignCost], None] | None:
+    """What a descent calls with the materials that it comes to."""
+    tell = _tell
+    if tell is None:
+        return None
+
+    def told(evaluation: Evaluation, cost: DesignCost) -> None:
+        tell(Step(evaluation.z, cost, evaluation.eigenvalues, fine))
+
+    return told
+
+
 def _descent(
     simulation: Simulation, task: Task, options: StepOptions | LimitedMemory | TrustRegion
 ) -> DesignDescent:
     parts = (simulation, task.objective or _setting.objective, task.z, task.start)
+    task = replace(task, limits=replace(task.limits, tell=_telling(task.fine)))
     if isinstance(options, LimitedMemory):
         return descend_by_gradients(*parts, task.steps * options.evaluations, task.limits)
     if isinstance(options, TrustRegion):

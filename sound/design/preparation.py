@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
+from carillon.fem.finite_cells.cells import FiniteCells
+from carillon.fem.geometry import HexMesh
 from carillon.fem.geometry.surface import load_surface, surface_name
 from carillon.runtime import allowed_cores
-from solver.analysis.problem import discretised
+from solver.analysis.problem import ProblemOptions, discretised
 from sound.clips.files import extract_file
-from sound.clips.targets import Targets, share_frequencies
+from sound.clips.targets import Targets, share_frequencies, without_modes
 from sound.design.material import ReducedMaterial
 from sound.design.objective import Objective
 from sound.design.poisson import FreePoisson
 from sound.design.pool import Setting
 from sound.project.design import Design
-from sound.project.project import Project
+from sound.project.project import MaterialSettings, Project
 from sound.project.usable import usable_strikes
+
+if TYPE_CHECKING:
+    import trimesh
 
 Array = NDArray[np.float64]
 
@@ -49,19 +55,68 @@ def targets_of(project: Project) -> Targets:
         than a design needs.
     """
     sounds = [
-        extract_file(target.clip, target.modes, True, target.allow_clipped)
+        without_modes(
+            extract_file(target.clip, target.modes, True, target.allow_clipped), target.without
+        )
         for target in project.targets
     ]
     return share_frequencies([target.name for target in project.targets], sounds, project.modes)
 
 
-def prepare(project: Project, targets: Targets | None = None) -> DesignProblem:
+@dataclass(frozen=True)
+class PreparedSolid:
+    """What a search needs of the solid alone, whatever it shall sound like.
+
+    Attributes
+    ----------
+    surface
+        That is struck.
+    mesh
+        Its voxels.
+    material
+        Their moduli as a function of coordinates.
+    cells
+        The finite cells that have these voxels, if it is one of them.
+    """
+
+    surface: trimesh.Trimesh
+    mesh: HexMesh
+    material: ReducedMaterial
+    cells: FiniteCells | None
+
+
+def prepared_solid(
+    solid: ProblemOptions, material: MaterialSettings, surface: trimesh.Trimesh
+) -> PreparedSolid:
+    """Voxels and reduced material of a solid whose `surface` is struck.
+
+    Raises
+    ------
+    UserError
+        For anything wrong with the mesh or the numbers.
+    """
+    # Not the struck surface, whose cuts round: the voxels shall be those of the solver.
+    loaded = load_surface(solid.mesh, solid.unit)
+    mesh, cells = discretised(loaded, solid, surface_name(solid.mesh))
+    bounds = material.poisson_bounds
+    free_poisson = None if bounds is None else FreePoisson(bounds[0], bounds[1], solid.poisson)
+    reduced = ReducedMaterial.of_mesh(
+        mesh, material.dimensions, material.young, material.law, free_poisson
+    )
+    return PreparedSolid(surface, mesh, reduced, None if cells is None else cells.cells)
+
+
+def prepare(
+    project: Project, targets: Targets | None = None, solid: PreparedSolid | None = None
+) -> DesignProblem:
     """Mesh, material and objective of a project, whose `modes` are then a number.
 
     Parameters
     ----------
     targets
         What its points shall sound like; from its clips if not given.
+    solid
+        Of the project, if it is prepared already.
 
     Raises
     ------
@@ -69,8 +124,7 @@ def prepare(project: Project, targets: Targets | None = None) -> DesignProblem:
         For anything wrong with the mesh, the points, the clips or the numbers.  What is wrong
         with targets is told of all of them, before any clip is searched.
     """
-    solid = project.solid
-    surface = project.surface()
+    surface = project.surface() if solid is None else solid.surface
     if targets is None:
         strikes = usable_strikes(project, surface)
         targets = targets_of(project)
@@ -78,16 +132,8 @@ def prepare(project: Project, targets: Targets | None = None) -> DesignProblem:
         strikes = project.strikes(surface)
     project = replace(project, modes=len(targets.frequencies))
     objective = Objective(targets, project.weights)
-    name = surface_name(solid.mesh)
-    # Not the struck surface, whose cuts round: the voxels shall be those of the solver.
-    mesh, cells = discretised(load_surface(solid.mesh, solid.unit), solid, name)
-    wanted, bounds = project.material, project.material.poisson_bounds
-    free_poisson = None if bounds is None else FreePoisson(bounds[0], bounds[1], solid.poisson)
-    material = ReducedMaterial.of_mesh(
-        mesh, wanted.dimensions, wanted.young, wanted.law, free_poisson
-    )
-    whole = None if cells is None else cells.cells
-    setting = Setting(mesh, solid, material, strikes, objective, whole)
+    solid = solid or prepared_solid(project.solid, project.material, surface)
+    setting = Setting(solid.mesh, project.solid, solid.material, strikes, objective, solid.cells)
     return DesignProblem(project, np.asarray(surface.vertices), np.asarray(surface.faces), setting)
 
 

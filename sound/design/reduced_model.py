@@ -155,7 +155,7 @@ def descend_by_model(
         if here.last.sensitivity is None:
             here.last = simulation.differentiate(here.last, whole=True)
             model = ReducedModel(here.last)
-        radius = _step(simulation, objective, here, model, radius)
+        radius = _step(simulation, objective, here, model, radius, limits)
         here.damping = (radius,)
         here.stalled = radius < SMALLEST
         if here.stalled:
@@ -169,6 +169,7 @@ def _step(
     here: DesignDescent,
     model: ReducedModel,
     radius: float,
+    limits: DescentLimits,
 ) -> float:
     """Try one step, and take it if it lowers the cost; the radius of the next."""
     before = here.cost.total
@@ -184,8 +185,7 @@ def _step(
         return NARROWER * length
     fall = before - cost.total
     if fall > 0.0:
-        here.last = tried
-        here.costs.append(CostPoint(time.monotonic(), here.evaluations, cost))
+        here.come_to(tried, cost, limits)
     if fall < POOR * (before - foretold):
         return NARROWER * length
     return max(radius, WIDER * length) if fall > GOOD * (before - foretold) else radius

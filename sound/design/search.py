@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from carillon.errors import UserError
 from sound.design.descent import DescentLimits
 from sound.design.objective import DesignCost, Objective
-from sound.design.pool import Pool, Task, Trial
+from sound.design.pool import InterruptedRoundError, Pool, Step, Task, Trial
 
 Array = NDArray[np.float64]
 
@@ -75,7 +75,8 @@ class Search:
     Parameters
     ----------
     make_pool
-        Makes the processes that run them; their start counts as time of the search.
+        Makes the processes that run them, which tell of their steps; their start counts as time of
+        the search.
     seconds : float or None [s]
         Budget; None sets no limit.
     evaluations : int or None
@@ -85,6 +86,9 @@ class Search:
         Called after every round of tasks; ends the search by returning True.
     before : (float [s], int)
         Seconds and evaluations of former searches that this one goes on from.
+    interrupted
+        Asked while a round goes on.  One that is broken off leaves the best of its steps, and its
+        evaluations do not count.
 
     Attributes
     ----------
@@ -102,11 +106,12 @@ class Search:
 
     def __init__(
         self,
-        make_pool: Callable[[], Pool],
+        make_pool: Callable[[Callable[[Step], None]], Pool],
         seconds: float | None,
         evaluations: int | None,
         watch: Callable[[Search], bool] | None = None,
         before: tuple[float, int] = (0.0, 0),
+        interrupted: Callable[[], bool] | None = None,
     ) -> None:
         self.best: Trial | None = None
         self.start: Trial | None = None
@@ -118,11 +123,13 @@ class Search:
         self._most = self._leg_most = evaluations
         self._watch = watch
         self._before = before
+        self._interrupted = interrupted
+        self._step: Step | None = None
         self._done = 0
         self._begin = time.monotonic()
         self.deadline = np.inf if seconds is None else self._begin + seconds
         self._leg_deadline = self.deadline
-        self._pool = make_pool()
+        self._pool = make_pool(self._told)
 
     def __enter__(self) -> Search:
         return self
@@ -178,7 +185,12 @@ class Search:
         affordable = self._affordable(tasks)
         if not affordable or time.monotonic() >= self._leg_deadline:
             self._end()
-        trials = self._pool.run(affordable)
+        self._step = None
+        try:
+            # Without a first material there would be no design to be written.
+            trials = self._pool.run(affordable, self._interrupted if self.start else None)
+        except InterruptedRoundError:
+            self._break_off()
         self._record(trials)
         if self._watch is not None and self._watch(self):
             self._is_last = True
@@ -186,6 +198,18 @@ class Search:
         if time.monotonic() >= self._leg_deadline or len(trials) < len(tasks):
             self._end()
         return trials
+
+    def _told(self, step: Step) -> None:
+        if self._step is None or step.cost.total < self._step.cost.total:
+            self._step = step
+
+    def _break_off(self) -> NoReturn:
+        """End in the middle of a round, with the best of its steps."""
+        step = self._step
+        if step is not None:
+            self._record([Trial(step.z, step.cost, 0, eigenvalues=step.eigenvalues)])
+        self._is_last = True
+        self._end()
 
     def _end(self) -> NoReturn:
         self.spent = self._is_last

@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
+from solver.files.modes_file import frequencies
 from sound.design.cents import rms_cents
 from sound.design.fine_check import FineModes
 from sound.design.objective import Objective
 from sound.design.optimisers import descend_finely
-from sound.design.pool import Trial
+from sound.design.pool import Step, Trial
 from sound.design.search import BudgetSpentError, CheckEntry, Search, require_modes
 from sound.design.simulation import Evaluation
 
@@ -126,6 +127,15 @@ class SpaceMapping:
             fruitless = fruitless + 1 if self.best.total > (1.0 - GAIN) * best.total else 0
             share = min(LONGER * share, LARGEST_SHARE)
             seed += 1
+
+    def foretold(self, step: Step) -> Array:
+        """What the fine solid is likely to sound at (N,) [Hz], in the order of the coarse modes."""
+        hertz = frequencies(step.eigenvalues)
+        if self.best is None:
+            return hertz
+        ratios = self.best.fine.ratios
+        order = np.argsort(self._objective.targets.frequencies * ratios, kind="stable")
+        return np.asarray(hertz[order] if step.fine else hertz / ratios[order])
 
     @property
     def _met(self) -> bool:

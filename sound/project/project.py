@@ -38,8 +38,8 @@ LEAST_WEIGHT = 1e-12
 class TargetEntry:
     """A struck point, `at` a position (3,) [mesh unit] or a `vertex`, and the clip it sounds like.
 
-    `modes` are taken from the clip, its strongest; None takes all that it has.  It may be clipped
-    if that is allowed.
+    `modes` are taken from the clip, its strongest; None takes all that it has.  Of these, modes at
+    the frequencies `without` [Hz] are left out.  It may be clipped if that is allowed.
     """
 
     name: str
@@ -48,6 +48,7 @@ class TargetEntry:
     vertex: int | None
     modes: int | None
     allow_clipped: bool
+    without: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -119,6 +120,7 @@ class Project:
         described["targets"] = [asdict(target) for target in self.targets]
         for target in described["targets"]:
             target["at"] = None if target["at"] is None else list(target["at"])
+            target["without"] = list(target["without"])
         return {key: solid[key] for key in _SOLID} | described
 
     def surface(self) -> trimesh.Trimesh:
@@ -216,7 +218,8 @@ def _target(number: int, entry: Mapping[str, Any], folder: Path) -> TargetEntry:
             "not blanks alone"
         )
     clip = str(folder / entry["clip"])
-    return TargetEntry(**{**entry, "clip": clip, "at": None if at is None else tuple(at)})
+    places = {"at": None if at is None else tuple(at), "without": tuple(entry["without"])}
+    return TargetEntry(**{**entry, "clip": clip, **places})
 
 
 def _require_ascending(key: str, bounds: list[float] | None) -> None:
