@@ -1,0 +1,191 @@
+/**
+ * What parts of the page share: the server's state, the header of a bank, what an AudioWorklet knows.
+ * Only types: nothing of this is loaded.
+ */
+
+export interface ModeOfClip {
+  hertz: number;
+  damping_per_second: number;
+  amplitude: number;
+}
+
+export interface Clip {
+  clip: string;
+  name: string;
+  phase: "waiting" | "listening" | "ready" | "failed";
+  message: string | null;
+  seconds: number;
+  rate_hz: number;
+  explained_decibels: number;
+  says: string[];
+  modes: ModeOfClip[];
+}
+
+export interface Target {
+  name: string;
+  vertex: number;
+  position_m: [number, number, number];
+  clip: string | null;
+  modes: number | null;
+  allow_clipped: boolean;
+  /** Frequencies [Hz] of the clip's modes that are left out. */
+  without: number[];
+}
+
+export interface SolidState {
+  mesh: string;
+  name: string;
+  phase: "reading" | "preparing" | "ready" | "failed";
+  /** Between 0 and 1. */
+  progress: number | null;
+  message: string | null;
+  /** Number of the surface at `/surface/N`. */
+  surface: number | null;
+  vertices: number;
+  triangles: number;
+  voxels: number;
+  unknowns: number;
+  longest_side_m: number;
+}
+
+export interface Wanted {
+  hertz: number[];
+  dampings_per_second: number[];
+  /** A row for each target, in the order of the targets. */
+  amplitudes: number[][];
+}
+
+/** The event `state` of the server. */
+export interface State {
+  event: "state";
+  revision: number;
+  name: string;
+  saved: boolean;
+  workspace: string;
+  undo: string | null;
+  redo: string | null;
+  solid: SolidState | null;
+  targets: Target[];
+  clips: Clip[];
+  wanted: Wanted | null;
+  settings: { [key: string]: any };
+  search: { phase: "idle" | "starting" | "running" | "stopping"; message: string | null };
+  fine: { on: boolean; phase: "none" | "working" | "ready"; message: string | null };
+  /** Whether there is another material to swap with. */
+  kept: boolean;
+  builtins: string[];
+  examples: { project: string; name: string; says: string }[];
+  projects: { project: string; name: string }[];
+}
+
+/** The event `progress`, and a row of `history`. */
+export interface Progress {
+  seconds: number;
+  evaluations: number;
+  cost: number;
+  frequency_cost: number;
+  amplitude_cost: number;
+  regulariser: number;
+}
+
+export interface ArrayHeader {
+  name: string;
+  type: "f4" | "f8" | "u4";
+  shape: number[];
+}
+
+/** Header of the binary event `bank`. */
+export interface BankHeader {
+  event: "bank";
+  number: number;
+  surface: number;
+  fine: boolean;
+  cost: number | null;
+  rms_cents: number | null;
+  targets: string[];
+  wanted_hertz: number[] | null;
+  cents: number[] | null;
+  bark: number[] | null;
+  arrays?: ArrayHeader[];
+}
+
+/** Arrays of the binary event `bank`: V vertices, N modes, T targets. */
+export interface BankArrays {
+  /** (N) [Hz] */
+  hertz: Float64Array;
+  /** (N) [1/s] */
+  dampings: Float64Array;
+  /** (V, N) [full scale per N s] */
+  gains: Float32Array;
+  /** (V) [Pa] */
+  young: Float32Array;
+  /** (T, N) [full scale per N s] */
+  struck: Float64Array;
+}
+
+/** Header of the binary answer to `/surface/N`. */
+export interface SurfaceHeader {
+  event: "surface";
+  number: number;
+  unit: number;
+  arrays?: ArrayHeader[];
+}
+
+/** Arrays of a surface: V vertices, F triangles. */
+export interface SurfaceArrays {
+  /** (V, 3) [m] */
+  positions: Float32Array;
+  /** (V, 3) unit vectors into the solid */
+  inward: Float32Array;
+  /** (F, 3) */
+  triangles: Uint32Array;
+}
+
+/** A strike for the processor of `bank-processor.js`. */
+export interface StrikeMessage {
+  do: "strike";
+  /** (N) what each mode sounds with [full scale]. */
+  gains: ArrayLike<number>;
+  /** Duration of the force, half a sine; 0 is an impulse. */
+  contact_seconds?: number;
+  /** Time of the context; without it at once. */
+  at_seconds?: number;
+}
+
+/** What the processor of `bank-processor.js` is told. */
+export type BankMessage =
+  | { do: "bank"; hertz: ArrayLike<number>; dampings: ArrayLike<number> }
+  | StrikeMessage
+  | { do: "heard"; solo: number[] | null; muted: number[] }
+  | { do: "volume"; volume: number }
+  | { do: "silence" };
+
+/** What it tells, some thirty times a second while anything sounds. */
+export interface BankReport {
+  /** Largest magnitude since the last report, before the limiter. */
+  peak: number;
+  /** Modes that ring, those of former materials with them. */
+  ringing: number;
+  /** Whether the limiter has held anything back since. */
+  limited: boolean;
+}
+
+// An AudioWorklet has a scope of its own, of which TypeScript's library of the page says nothing.
+declare global {
+  const sampleRate: number;
+  const currentFrame: number;
+  const currentTime: number;
+  abstract class AudioWorkletProcessor {
+    readonly port: MessagePort;
+    constructor(options?: any);
+    abstract process(
+      inputs: Float32Array[][],
+      outputs: Float32Array[][],
+      parameters: Record<string, Float32Array>,
+    ): boolean;
+  }
+  function registerProcessor(
+    name: string,
+    processor: new (options?: any) => AudioWorkletProcessor,
+  ): void;
+}
