@@ -10,7 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-TYPES = {"f4": np.dtype("<f4"), "f8": np.dtype("<f8"), "u4": np.dtype("<u4")}
+TYPES: dict[str, np.dtype[Any]] = {
+    "f4": np.dtype("<f4"),
+    "f8": np.dtype("<f8"),
+    "u4": np.dtype("<u4"),
+}
 """Of arrays, by the names that headers have for them."""
 _ALIGNED = 8
 """Bytes at whose multiples arrays begin; views of 8-byte numbers need that."""

@@ -1,0 +1,159 @@
+"""The routes: what is answered to which request, see docs/contributing/studio.md."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+from urllib.parse import quote
+
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket
+
+from carillon.errors import UserError
+from sound.project.schema import project_schema
+from studio.interface import CLIP_PARTS, EXPORTS, NotFoundError, Studio
+from studio.server.answers import fault
+from studio.server.guard import Guard, Keys
+from studio.server.page_files import page_table, send_file, send_page
+from studio.server.socket import OWN_FAULT, sentence_of, talk
+from studio.server.uploads import Limits, UploadError, plain_name, read_upload
+
+LONGEST_NUMBER = 15
+"""Digits of a number in a path."""
+
+
+def make_app(
+    studio: Studio, keys: Keys, host: str, port: int, limits: Limits | None = None
+) -> Guard:
+    """The studio as an ASGI application, guarded.
+
+    Parameters
+    ----------
+    keys
+        Secrets of this run.
+    host, port
+        Where the server listens.
+    limits
+        What it bears.
+    """
+    routes = _Routes(studio, limits or Limits())
+    app = Starlette(
+        routes=[
+            Route("/", routes.page, methods=["GET"]),
+            Route("/page/{rest:path}", routes.file, methods=["GET"]),
+            Route("/schema.json", routes.schema, methods=["GET"]),
+            Route("/mesh", routes.mesh, methods=["POST"]),
+            Route("/clip", routes.clip, methods=["POST"]),
+            Route("/surface/{number}", routes.surface, methods=["GET"]),
+            Route("/clip/{clip}/spectrum", routes.spectrum, methods=["GET"]),
+            Route("/clip/{clip}/{part}", routes.sound, methods=["GET"]),
+            Route("/export/{kind}", routes.export, methods=["GET"]),
+            WebSocketRoute("/socket", routes.socket),
+        ],
+        exception_handlers=_HANDLERS,
+    )
+    app.router.redirect_slashes = False
+    return Guard(app, keys, host, port)
+
+
+class _Routes:
+    """Answers, made from what the studio says."""
+
+    def __init__(self, studio: Studio, limits: Limits) -> None:
+        self._studio, self._limits = studio, limits
+        self._table = page_table()
+        self._uploads = 0
+
+    async def page(self, request: Request) -> Response:
+        return send_page()
+
+    async def file(self, request: Request) -> Response:
+        found = send_file(request, self._table)
+        return fault("the page has no such file", 404) if found is None else found
+
+    async def schema(self, request: Request) -> Response:
+        return JSONResponse(project_schema())
+
+    async def mesh(self, request: Request) -> Response:
+        content, name = await self._upload(request, self._limits.mesh_bytes, "a mesh")
+        return JSONResponse({"mesh": await self._studio.take_mesh(name, content)})
+
+    async def clip(self, request: Request) -> Response:
+        content, name = await self._upload(request, self._limits.clip_bytes, "a clip")
+        return JSONResponse({"clip": await self._studio.take_clip(name, content)})
+
+    async def _upload(self, request: Request, most: int, what: str) -> tuple[bytes, str]:
+        if self._uploads >= self._limits.uploads:
+            raise UploadError(503, f"{self._uploads} files are being sent already; wait for them")
+        self._uploads += 1
+        try:
+            content = await read_upload(request, most, self._limits, what)
+        finally:
+            self._uploads -= 1
+        return content, plain_name(request.query_params.get("name", ""), what.split()[-1])
+
+    async def surface(self, request: Request) -> Response:
+        text = request.path_params["number"]
+        if not (text.isascii() and text.isdigit() and len(text) <= LONGEST_NUMBER):
+            raise NotFoundError(f"surface {text:.100} is no number")
+        content = await self._studio.surface(int(text))
+        return Response(content, media_type="application/octet-stream")
+
+    async def spectrum(self, request: Request) -> Response:
+        return JSONResponse(await self._studio.clip_spectrum(request.path_params["clip"]))
+
+    async def sound(self, request: Request) -> Response:
+        part = request.path_params["part"]
+        if part not in CLIP_PARTS:
+            raise NotFoundError(f"a clip has no {part!r:.100}; expected {', '.join(CLIP_PARTS)}")
+        content = await self._studio.clip_sound(request.path_params["clip"], part)
+        return Response(content, media_type="audio/wav")
+
+    async def export(self, request: Request) -> Response:
+        kind = request.path_params["kind"]
+        if kind not in EXPORTS:
+            raise NotFoundError(f"there is no export {kind!r:.100}; expected {', '.join(EXPORTS)}")
+        file = await self._studio.export(kind, request.query_params.get("target"))
+        name = plain_name(file.name, f"design.{kind}")
+        headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(name, safe='')}"}
+        return Response(file.content, media_type=file.media_type, headers=headers)
+
+    async def socket(self, page: WebSocket) -> None:
+        await talk(page, self._studio)
+
+
+async def _refused(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    words = {404: "there is nothing at this address", 405: f"{request.method} is not for this"}
+    return fault(words.get(error.status_code, str(error.detail)), error.status_code)
+
+
+async def _told(request: Request, error: Exception) -> Response:
+    status = 404 if isinstance(error, NotFoundError) else 400
+    return fault(sentence_of(error), status)
+
+
+async def _not_taken(request: Request, error: Exception) -> Response:
+    assert isinstance(error, UploadError)
+    answer = fault(str(error), error.status)
+    # What is still being sent is not another request.
+    answer.headers["Connection"] = "close"
+    return answer
+
+
+async def _failed(request: Request, error: Exception) -> Response:
+    return fault(OWN_FAULT, 500)
+
+
+_HANDLERS: Mapping[Any, Any] = {
+    HTTPException: _refused,
+    UploadError: _not_taken,
+    UserError: _told,
+    OSError: _told,
+    MemoryError: _told,
+    Exception: _failed,
+}

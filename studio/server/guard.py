@@ -1,0 +1,200 @@
+"""Who may ask: the right Host, Origin and cookie on every request and WebSocket, or nothing."""
+
+from __future__ import annotations
+
+import hmac
+import ipaddress
+import re
+import secrets
+import socket
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from http.cookies import CookieError, SimpleCookie
+from urllib.parse import parse_qs
+
+from starlette.datastructures import MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from studio.server.answers import entrance, refusal
+
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+"""Names of this machine that no other one can take on."""
+SAFE_METHODS = ("GET", "HEAD")
+"""Methods that change nothing; they need no Origin, as browsers send none with some of them."""
+NEAR = ("same-origin", "none")
+"""Values of Sec-Fetch-Site of what the page itself, or the person, asks for."""
+HEADERS = {
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Permissions-Policy": "camera=(), geolocation=(), microphone=(self)",
+}
+"""Of all answers."""
+
+_HOST = re.compile(
+    r"(?P<name>[A-Za-z0-9.-]{1,253}|\[[0-9A-Fa-f:.]{2,45}\])(:(?P<port>[0-9]{1,5}))?"
+)
+
+
+@dataclass(frozen=True)
+class Keys:
+    """Secrets of one run.
+
+    Attributes
+    ----------
+    token
+        Stands in the address that is printed, and is good for a cookie.
+    cookie
+        What the cookie holds.
+    """
+
+    token: str = field(default_factory=lambda: secrets.token_urlsafe(32), repr=False)
+    cookie: str = field(default_factory=lambda: secrets.token_urlsafe(32), repr=False)
+
+
+class Guard:
+    """Lets through what comes from the studio's own page; an ASGI application around another.
+
+    Names that others can point at this machine (DNS rebinding) are refused by their Host, pages of
+    other origins by their Origin, everybody else by the lack of the cookie.
+
+    Parameters
+    ----------
+    app
+        What is guarded.
+    keys
+        Secrets of this run.
+    host
+        Address that the server listens on.
+    port
+        Port that it listens on; the cookie is named after it, as cookies are the same for all.
+    """
+
+    def __init__(self, app: ASGIApp, keys: Keys, host: str, port: int) -> None:
+        self._app, self._keys = app, keys
+        self._names = host_names(host)
+        self._addresses = not _is_loopback(host)
+        self._cookie = f"carillon_studio_{port}"
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        send = _with_headers(send)
+        said = self._fault(scope)
+        if scope["type"] == "http" and said is None and self._is_entrance(scope):
+            answer = entrance(self._cookie, self._keys.cookie)
+            await answer(scope, receive, send)
+        elif said is None and not self._has_cookie(scope):
+            await refusal(scope, receive, send, 403, _NO_COOKIE)
+        elif said is not None:
+            await refusal(scope, receive, send, 403, said)
+        else:
+            await self._app(scope, receive, send)
+
+    def _fault(self, scope: Scope) -> str | None:
+        """What is wrong with where a request is sent, or with where it comes from."""
+        hosts, origins = _values(scope, b"host"), _values(scope, b"origin")
+        if len(hosts) != 1 or not self._is_own(hosts[0]):
+            return (
+                f"the Host {hosts[0] if hosts else '(none)'} is not this studio's; open the "
+                "address that the command printed"
+            )
+        changes = scope["type"] == "websocket" or scope["method"] not in SAFE_METHODS
+        if (changes or origins) and origins != [f"http://{hosts[0]}"]:
+            return (
+                f"the Origin {', '.join(origins) or '(none)'} is not this studio's; only its own "
+                "page may ask for this"
+            )
+        if not self._is_near(scope):
+            return "another site asks for this; only the studio's own page may"
+        return None
+
+    def _is_own(self, host: str) -> bool:
+        found = _HOST.fullmatch(host)
+        if found is None or int(found["port"] or 80) > 65535:
+            return False
+        name = found["name"].strip("[]").lower()
+        if self._addresses and _is_address(name):
+            return not ipaddress.ip_address(name).is_unspecified
+        return name in self._names
+
+    def _is_near(self, scope: Scope) -> bool:
+        """Whether a browser that tells so says that no other site asks; a link to the page may."""
+        if scope["type"] == "http" and scope["path"] == "/":
+            return True
+        return all(value in NEAR for value in _values(scope, b"sec-fetch-site"))
+
+    def _is_entrance(self, scope: Scope) -> bool:
+        if scope["path"] != "/" or scope["method"] != "GET":
+            return False
+        given = parse_qs(scope["query_string"].decode("latin-1"), max_num_fields=8).get("token", [])
+        return len(given) == 1 and _same(given[0], self._keys.token)
+
+    def _has_cookie(self, scope: Scope) -> bool:
+        found = False
+        for header in _values(scope, b"cookie"):
+            try:
+                morsel = SimpleCookie(header).get(self._cookie)
+            except CookieError:
+                continue
+            found = found or (morsel is not None and _same(morsel.value, self._keys.cookie))
+        return found
+
+
+_NO_COOKIE = (
+    "this browser has not been let in yet, or the studio was started anew; open the address that "
+    "the command printed, all of it"
+)
+
+
+def host_names(host: str) -> frozenset[str]:
+    """Names under which a server that listens on `host` may be asked."""
+    names = {*LOOPBACK}
+    if not _is_loopback(host):
+        names |= {socket.gethostname().lower(), socket.getfqdn().lower()}
+        if not _is_address(host) or not ipaddress.ip_address(host).is_unspecified:
+            names.add(host.lower())
+    return frozenset(names)
+
+
+def _is_loopback(host: str) -> bool:
+    return host in LOOPBACK or (_is_address(host) and ipaddress.ip_address(host).is_loopback)
+
+
+def _is_address(name: str) -> bool:
+    """Whether a name is an address in digits, which no name server has a say in."""
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def _same(given: str, secret: str) -> bool:
+    return hmac.compare_digest(given.encode(errors="surrogateescape"), secret.encode())
+
+
+def _values(scope: Scope, name: bytes) -> list[str]:
+    """Values of all headers of a name, as they were sent."""
+    headers: Iterable[tuple[bytes, bytes]] = scope["headers"]
+    return [value.decode("latin-1") for key, value in headers if key.lower() == name]
+
+
+def _with_headers(send: Send) -> Send:
+    """`send` that adds what all answers say."""
+
+    async def sending(message: Message) -> None:
+        if message["type"] in ("http.response.start", "websocket.http.response.start"):
+            headers = MutableHeaders(scope=message)
+            for name, value in HEADERS.items():
+                headers.setdefault(name, value)
+            headers.setdefault("Cache-Control", "no-store")
+            headers.setdefault(
+                "Content-Security-Policy", "default-src 'none'; frame-ancestors 'none'"
+            )
+        await send(message)
+
+    return sending

@@ -1,0 +1,132 @@
+"""Files that the page sends: read with a limit and a clock, under names that are only names."""
+
+from __future__ import annotations
+
+import asyncio
+import unicodedata
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from pathlib import PurePosixPath
+
+from starlette.requests import ClientDisconnect, Request
+
+LONGEST_NAME = 100
+"""Characters of a file's name; the ending is kept."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the server bears.
+
+    Attributes
+    ----------
+    mesh_bytes, clip_bytes
+        Of uploaded files.
+    message_bytes
+        Of what the page says on its WebSocket.
+    idle_seconds
+        Time in which an upload has to go on.
+    upload_seconds
+        Time in which it has to end.
+    uploads
+        How many may go on at a time.
+    """
+
+    mesh_bytes: int = 64 << 20
+    clip_bytes: int = 16 << 20
+    message_bytes: int = 1 << 18
+    idle_seconds: float = 10.0
+    upload_seconds: float = 120.0
+    uploads: int = 4
+
+
+class UploadError(Exception):
+    """An upload that is refused: an HTTP status and a sentence."""
+
+    def __init__(self, status: int, sentence: str) -> None:
+        super().__init__(sentence)
+        self.status = status
+
+
+async def read_upload(request: Request, most: int, limits: Limits, what: str) -> bytes:
+    """The body of a request.
+
+    Of one that is too large as much again is read and dropped, as browsers listen to an answer only
+    when they have sent all.
+
+    Parameters
+    ----------
+    most
+        Bytes that are accepted.
+    what
+        What is uploaded, for messages: "a mesh".
+
+    Raises
+    ------
+    UploadError
+        If it is empty (400), too large (413), or too slow (408).
+    """
+    too_large = UploadError(
+        413, f"the file is larger than {most / (1 << 20):g} MiB, which is the most for {what}"
+    )
+    declared = request.headers.get("content-length")
+    if declared is not None and int(declared) > 2 * most:
+        raise too_large
+    content, size = bytearray(), 0
+    try:
+        async with asyncio.timeout(limits.upload_seconds):
+            async for piece in _pieces(request, limits.idle_seconds):
+                size += len(piece)
+                if size <= most:
+                    content += piece
+                else:
+                    content.clear()
+                if size > 2 * most:
+                    break
+    except TimeoutError:
+        raise UploadError(
+            408, f"{what} was sent too slowly, {size:,} bytes came; send it again"
+        ) from None
+    except ClientDisconnect:
+        raise UploadError(400, f"{what} was not sent to its end; send it again") from None
+    if size > most:
+        raise too_large
+    if not content:
+        raise UploadError(400, f"the file is empty, expected {what}")
+    return bytes(content)
+
+
+async def _pieces(request: Request, idle_seconds: float) -> AsyncIterator[bytes]:
+    stream = request.stream()
+    while True:
+        async with asyncio.timeout(idle_seconds):
+            piece = await anext(stream, None)
+        if piece is None:
+            return
+        yield piece
+
+
+def plain_name(name: str, otherwise: str) -> str:
+    """The last part of a path as a name that is safe on any system.
+
+    Parameters
+    ----------
+    otherwise
+        Name if nothing is left.
+
+    Examples
+    --------
+    >>> plain_name("../../etc/pass\\0wd", "mesh")
+    'passwd'
+    >>> plain_name("C:\\\\sounds\\\\glass 2.wav", "clip")
+    'glass 2.wav'
+    >>> plain_name("/..", "mesh")
+    'mesh'
+    """
+    last = name.replace("\\", "/").rsplit("/", 1)[-1]
+    kept = "".join(c for c in unicodedata.normalize("NFC", last) if c.isprintable())
+    kept = kept.strip(" .~")
+    if len(kept) > LONGEST_NAME:
+        ending = PurePosixPath(kept).suffix[:10]
+        kept = kept[: LONGEST_NAME - len(ending)] + ending
+    return kept or otherwise
