@@ -7,6 +7,9 @@ import os
 import signal
 import subprocess
 from collections.abc import Callable, Mapping, Sequence
+from multiprocessing import parent_process
+from multiprocessing.connection import wait
+from threading import Thread
 
 PATIENCE_SECONDS = 10.0
 """Time that a program gets to end its own children, once it has been told to end."""
@@ -38,6 +41,21 @@ def run_child(
             _end(child)
             raise
     return subprocess.CompletedProcess(child.args, child.returncode, out, said)
+
+
+def end_with_parent() -> None:
+    """Let this process, which `multiprocessing` started, end when its parent is gone, however.
+
+    From a thread of its own, so that it ends in the midst of whatever it does.
+    """
+    parent = parent_process()
+    if parent is not None:
+        Thread(target=_end_after, args=(parent.sentinel,), daemon=True).start()
+
+
+def _end_after(sentinel: int) -> None:
+    wait([sentinel])
+    os._exit(1)
 
 
 def _tied_to(parent: int) -> Callable[[], None]:

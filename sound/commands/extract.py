@@ -17,10 +17,6 @@ if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     from sound.clips.targets import Targets
 
 
-MOSTLY_MODES = 0.8
-"""Share of a clip's energy in modes below which that is said."""
-
-
 @dataclass(frozen=True)
 class ExtractOptions:
     """Clips whose modes are extracted, and what is written of them."""
@@ -92,23 +88,13 @@ def _content(clips: list[str], sounds: list[ModalSound], targets: Targets) -> di
 
 def _line(clip: dict[str, Any]) -> str:
     """What was found in one clip, and whether that is the most of it."""
+    from sound.clips.remarks import remarks
+
     line = (
         f"{clip['file']}: strike at {clip['strike_seconds']:.4f} s, {clip['order']} modes found, "
         f"which explain {100.0 * clip['explained']:.2f} % of the energy"
     )
-    if clip["explained"] < MOSTLY_MODES:
-        line += "; the rest is noise, or tones that do not fade evenly, and no material has it"
-    if clip["clipped_samples"]:
-        line += f"; {clip['clipped_samples']} samples at full scale are left out"
-    if clip["second_strike_seconds"] is not None:
-        line += f"; there is another strike at {clip['second_strike_seconds']:.2f} s, left out"
-    if clip["glide"] is not None:
-        bend = clip["glide"]
-        line += (
-            f"; its loudest tone glides from {bend['cents']:+.0f} cents to {bend['hertz']:.1f} Hz "
-            f"within {bend['seconds']:.2f} s, which no material does"
-        )
-    return line
+    return "; ".join([line, *remarks(clip)])
 
 
 def _lines(content: dict[str, Any]) -> list[str]:

@@ -6,23 +6,21 @@ nothing that another task has done.  So results do not depend on how many proces
 
 from __future__ import annotations
 
-import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_EXCEPTION, ProcessPoolExecutor
-from concurrent.futures import wait as futures_wait
+from concurrent.futures import FIRST_EXCEPTION, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
-from multiprocessing import get_context, parent_process
-from multiprocessing.connection import wait
+from multiprocessing import get_context
 from multiprocessing.queues import SimpleQueue
 from threading import Thread
 
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.children import end_with_parent
 from carillon.errors import ConvergenceError, UserError
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.geometry import HexMesh
@@ -216,7 +214,7 @@ class Pool:
         try:
             with _signals_held():  # submitting starts the processes
                 futures = [self._executor.submit(_run, task) for task in tasks]
-            while futures_wait(futures, LISTEN_SECONDS, FIRST_EXCEPTION).not_done:
+            while wait(futures, LISTEN_SECONDS, FIRST_EXCEPTION).not_done:
                 if interrupted is not None and interrupted():
                     self.close()
                     raise InterruptedRoundError
@@ -263,17 +261,9 @@ def _pass_on(told: SimpleQueue[Step], tell: Callable[[Step], None]) -> None:
 
 
 def _prepare_apart(setting: Setting, told: SimpleQueue[Step] | None) -> None:
-    Thread(target=_end_with_parent, daemon=True).start()
+    end_with_parent()
     _for_good.enter_context(one_thread())
     _prepare(setting, None if told is None else told.put)
-
-
-def _end_with_parent() -> None:
-    """End this process when the one that started it is gone, however that came to be."""
-    parent = parent_process()
-    if parent is not None:
-        wait([parent.sentinel])
-        os._exit(1)
 
 
 def _prepare(setting: Setting, tell: Callable[[Step], None] | None) -> None:

@@ -72,12 +72,7 @@ class Listening:
 
     def weights(self, position: Array) -> Array:
         """Weights (T,) of the struck points at a point (3,) [m]; 1 for the point itself."""
-        square = ((self.positions - position) ** 2).sum(axis=1)
-        nearest = square.min()
-        if nearest == 0.0:
-            return np.asarray((square == 0.0).astype(float))
-        inverse = nearest / square
-        return np.asarray(inverse / inverse.sum())
+        return near_weights(self.positions, position)
 
     def gain(self, position: Array) -> float:
         """Gain at a point (3,) [m]."""
@@ -86,6 +81,21 @@ class Listening:
     def noise(self, rate: int) -> list[Array]:
         """T residuals (s,) without their tones, after 1 N s, sampled at `rate` [Hz]."""
         return [resampled(noise, own, rate) for (noise, _), own in zip(self._noise, self.rates)]
+
+
+def near_weights(points: Array, positions: Array) -> Array:
+    """Weights (..., T) of points (T, 3) at positions (..., 3), as the inverse square of distances.
+
+    Examples
+    --------
+    >>> near_weights(np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0]]), np.array([1.0, 0.0, 0.0]))
+    array([0.8, 0.2])
+    """
+    square = ((points - positions[..., None, :]) ** 2).sum(axis=-1)
+    nearest = square.min(axis=-1, keepdims=True)
+    at = square == 0.0
+    inverse = np.where(nearest == 0.0, at, nearest / np.where(at, 1.0, square))
+    return np.asarray(inverse / inverse.sum(axis=-1, keepdims=True))
 
 
 def resampled(samples: Array, own: int, rate: int) -> Array:

@@ -99,17 +99,25 @@ class SoundingSolid:
     def amplitudes(self, positions: Array, impulses: Array) -> Array:
         """Amplitudes a_k (p, k) [kg^-1/2 N s] after impulses (p, 3) [N s] at points (p, 3) [m].
 
-        a_k = |u_k^T f|: every mode sets out in the direction that it is pushed to, so its sign does
-        not matter.  Within a cluster of equal frequencies it is (u_k^T f)^2 over the root of the
-        sum of these squares: together the cluster then is as loud as |U^T f|, however its modes are
-        mixed.
+        See `struck_amplitudes`.
         """
         pushed = np.einsum("pik,pi->pk", self.motion(positions), impulses)
-        groups = clusters(self.frequencies**2)
-        square = pushed**2
-        joint = np.sqrt(np.add.reduceat(square, [group.start for group in groups], axis=1))
-        joint = np.repeat(joint, [group.stop - group.start for group in groups], axis=1)
-        return np.asarray(np.divide(square, joint, out=np.zeros_like(square), where=joint > 0.0))
+        return struck_amplitudes(pushed, self.frequencies)
+
+
+def struck_amplitudes(pushed: Array, frequencies: Array) -> Array:
+    """Amplitudes a_k (p, k) of modes that impulses f push by u_k^T f (p, k) [kg^-1/2 N s].
+
+    a_k = |u_k^T f|: every mode sets out in the direction that it is pushed to, so its sign does
+    not matter.  Within a cluster of equal frequencies (k,) [Hz], which ascend, it is (u_k^T f)^2
+    over the root of the sum of these squares: together the cluster then is as loud as |U^T f|,
+    however its modes are mixed.
+    """
+    groups = clusters(frequencies**2)
+    square = pushed**2
+    joint = np.sqrt(np.add.reduceat(square, [group.start for group in groups], axis=1))
+    joint = np.repeat(joint, [group.stop - group.start for group in groups], axis=1)
+    return np.asarray(np.divide(square, joint, out=np.zeros_like(square), where=joint > 0.0))
 
 
 def _require_same_object(mesh: HexMesh, designed: HexMesh) -> None:

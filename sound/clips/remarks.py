@@ -1,0 +1,29 @@
+"""What is worth telling of how a clip was searched."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+MOSTLY_MODES = 0.8
+"""Share of a clip's energy in its modes below which somebody should know of it."""
+
+
+def remarks(evidence: Mapping[str, Any]) -> list[str]:
+    """Sentences without an end on the evidence of a `ModalSound` that are out of the ordinary."""
+    found = []
+    if evidence["explained"] < MOSTLY_MODES:
+        found.append("the rest is noise, or tones that do not fade evenly, and no material has it")
+    if evidence["clipped_samples"]:
+        found.append(f"{evidence['clipped_samples']} samples at full scale are left out")
+    if evidence["second_strike_seconds"] is not None:
+        found.append(
+            f"there is another strike at {evidence['second_strike_seconds']:.2f} s, left out"
+        )
+    if evidence["glide"] is not None:
+        bend = evidence["glide"]
+        found.append(
+            f"its loudest tone glides from {bend['cents']:+.0f} cents to {bend['hertz']:.1f} Hz "
+            f"within {bend['seconds']:.2f} s, which no material does"
+        )
+    return found

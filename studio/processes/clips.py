@@ -1,0 +1,89 @@
+"""Modes of clips, and their parts as sounds."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sound.clips.files import extract_file
+from sound.clips.noise import noise_part
+from sound.clips.remarks import remarks
+from sound.clips.wav import read_wav
+
+Array = NDArray[np.float64]
+
+LEAST_SHARE = 1e-12
+"""Of energy that is left, so that what is explained stays a number of decibels."""
+SPECTRUM_POINTS = 2000
+"""Of a spectrum that is drawn: each tells the loudest of its part."""
+LOWEST_HERTZ, FLOOR_DECIBELS = 20.0, -100.0
+"""Where spectra begin, and how far they go down."""
+
+
+@dataclass(frozen=True)
+class ClipFile:
+    """A clip by the name of its file, and whether it may be clipped."""
+
+    path: str
+    allow_clipped: bool = False
+
+
+class Clips:
+    """What the process for clips does."""
+
+    def listen(self, clip: ClipFile) -> dict[str, Any]:
+        """Modes of a clip, and what is to be said of them, as the page gets it."""
+        found = extract_file(clip.path, allow_clipped=clip.allow_clipped)
+        left = max(LEAST_SHARE, 1.0 - found.evidence["explained"])
+        modes = zip(found.frequencies, found.dampings, found.amplitudes)
+        return {
+            "seconds": len(found.residual) / found.rate,
+            "rate_hz": found.rate,
+            "explained_decibels": float(-10.0 * np.log10(left)),
+            "says": remarks(found.evidence),
+            "modes": [
+                {"hertz": float(f), "damping_per_second": float(d), "amplitude": float(a)}
+                for f, d, a in modes
+            ],
+        }
+
+    def part(self, clip: ClipFile, part: str) -> bytes:
+        """The clip itself (`sound`), its `modes`, its `rest` or the `noise` of that, as WAV."""
+        if part == "sound":
+            return as_wav(*read_wav(clip.path, clip.allow_clipped))
+        found = extract_file(clip.path, allow_clipped=clip.allow_clipped)
+        if part == "modes":
+            return as_wav(found.modal_part(), found.rate)
+        rest = found.residual
+        return as_wav(rest if part == "rest" else noise_part(rest, found.rate)[0], found.rate)
+
+    def spectrum(self, clip: ClipFile) -> dict[str, list[float]]:
+        """Levels of a clip's spectrum below its loudest, by ascending frequencies."""
+        samples, rate = read_wav(clip.path, clip.allow_clipped)
+        magnitudes = np.abs(np.fft.rfft(samples))
+        hertz = np.fft.rfftfreq(len(samples), 1.0 / rate)
+        edges = np.geomspace(LOWEST_HERTZ, rate / 2.0, SPECTRUM_POINTS + 1)
+        first = np.unique(np.searchsorted(hertz, edges))
+        first = first[first < len(hertz)]
+        loudest = np.maximum.reduceat(magnitudes, first)
+        # Where the loudest one stands, so that narrow peaks are drawn at their frequency.
+        ends = np.append(first[1:], len(hertz))
+        at = [a + int(np.argmax(magnitudes[a:b])) for a, b in zip(first, ends)]
+        levels = 20.0 * np.log10(np.maximum(loudest / magnitudes.max(), 1e-10))
+        return {
+            "hertz": hertz[at].tolist(),
+            "decibels": np.maximum(levels, FLOOR_DECIBELS).tolist(),
+        }
+
+
+def as_wav(samples: Array, rate: int) -> bytes:
+    """A sound (s,) at `rate` [Hz] as the content of a WAV file of 32-bit floats."""
+    import soundfile
+
+    content = io.BytesIO()
+    soundfile.write(content, samples, rate, format="WAV", subtype="FLOAT")
+    return content.getvalue()

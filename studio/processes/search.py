@@ -1,0 +1,137 @@
+"""The search behind the page: it tells what it has found several times a second."""
+
+from __future__ import annotations
+
+import pickle
+import time
+from collections.abc import Callable, Sequence
+from threading import Event, Lock, Thread
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sound.design.optimise import optimise
+from sound.design.pool import Step
+from sound.design.preparation import DesignProblem
+from sound.design.search import HistoryEntry, Search
+from sound.project.design import Design
+from sound.project.design_file import read_design, write_design
+
+Array = NDArray[np.float64]
+Tell = Callable[[dict[str, Any]], None]
+
+TOLD_SECONDS = 0.25
+"""Time between two pieces of news."""
+KEPT_SECONDS = 10.0
+"""Time between two designs that are written, if there is a better one."""
+
+
+class SearchBench:
+    """What the process for the search does."""
+
+    def run(
+        self,
+        tell: Tell,
+        problem: bytes,
+        initial: str | None,
+        coordinates: Sequence[float] | None,
+        out: str,
+    ) -> dict[str, Any]:
+        """Search from given coordinates until the budget is spent, or a SIGTERM; write to `out`.
+
+        `initial` is a design whose history goes on.
+        """
+        prepared: DesignProblem = pickle.loads(problem)
+        news = _News(tell)
+        with news:
+            design = optimise(
+                prepared,
+                None if initial is None else read_design(initial),
+                lambda kept: news.keep(kept, out),
+                news.watch,
+                KEPT_SECONDS,
+                news.follow,
+                None if coordinates is None else np.asarray(coordinates),
+            )
+        write_design(out, design)
+        return {"design": out, **found(design)}
+
+
+def found(design: Design) -> dict[str, Any]:
+    """Coordinates of a design, and its history as the page gets it."""
+    rows = design.history
+    columns = {name: rows[name].tolist() for name in rows.dtype.names or ()}
+    return {
+        "z": design.coordinates.tolist(),
+        "rows": [dict(zip(columns, row, strict=True)) for row in zip(*columns.values())],
+    }
+
+
+class _News:
+    """Tells the best material of a leg as it gets better, and how long the search goes on."""
+
+    def __init__(self, tell: Tell) -> None:
+        self._send = tell
+        self._lock = Lock()
+        self._ended = Event()
+        self._search: Search | None = None
+        self._checks = 0
+        self._best: tuple[Step, Array] | None = None
+        self._is_new = False
+        self._begin = time.monotonic()
+
+    def __enter__(self) -> _News:
+        self._thread = Thread(target=self._tell_on, daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        self._thread.join()
+
+    def follow(self, step: Step, hertz: Array) -> None:
+        """Take up a step; costs of steps can be compared between two checks alone."""
+        with self._lock:
+            checks = 0 if self._search is None else len(self._search.checks)
+            best = None if checks != self._checks else self._best
+            self._checks = checks
+            if best is None or step.cost.total < best[0].cost.total:
+                self._best, self._is_new = (step, hertz), True
+
+    def watch(self, search: Search) -> None:
+        """Look at the search after a round."""
+        self._search = search
+
+    def keep(self, design: Design, out: str) -> None:
+        """Write a design while the search goes on."""
+        write_design(out, design)
+
+    def _tell_on(self) -> None:
+        while not self._ended.wait(TOLD_SECONDS):
+            with self._lock:
+                best, is_new, search = self._best, self._is_new, self._search
+                self._is_new = False
+            if search is None or not search.history:
+                continue
+            entry = search.history[-1]
+            self._send(_row(entry, best, is_new, time.monotonic() - self._begin))
+
+
+def _row(
+    entry: HistoryEntry, best: tuple[Step, Array] | None, is_new: bool, seconds: float
+) -> dict[str, Any]:
+    """News: the cost, and the material if there is another one."""
+    cost = entry.cost if best is None else best[0].cost
+    news: dict[str, Any] = {
+        "seconds": max(entry.seconds, seconds),
+        "evaluations": entry.evaluations,
+        "cost": cost.total,
+        "frequency_cost": cost.frequency,
+        "amplitude_cost": cost.amplitude,
+        "regulariser": cost.regulariser,
+    }
+    if best is not None and is_new:
+        step, hertz = best
+        news |= {"z": step.z.tolist(), "hertz": hertz.tolist()}
+    return news

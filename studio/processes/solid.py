@@ -1,0 +1,269 @@
+"""The solid on the studio's bench: its surface, voxels and modes, and what it sounds like."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.spatial import cKDTree
+
+from carillon.fem.model import RIGID_MODES, Solid
+from carillon.threads import one_thread
+from solver.analysis.modes import Modes
+from solver.analysis.problem import ProblemOptions
+from solver.files.modes_file import frequencies
+from solver.response.contact import interpolation
+from solver.response.response import Damping
+from sound.design.cents import common_factor
+from sound.design.descent import cost_of
+from sound.design.fine_check import FINE_TOLERANCE
+from sound.design.pool import Setting
+from sound.design.preparation import (
+    DesignProblem,
+    PreparedSolid,
+    coordinates_of,
+    prepare,
+    prepared_solid,
+)
+from sound.design.simulation import Evaluation, Simulation
+from sound.project.design_file import read_design
+from sound.project.project import MaterialSettings, Project
+from sound.strikes import Place, Strike, inward_normals, locate_all
+from sound.surface import longest_side, struck_surface
+from studio.binary import pack
+from studio.processes.bank import Aim, Heard, bank
+
+Array = NDArray[np.float64]
+
+MODES = 30
+"""Of a solid that has no targets yet."""
+
+
+@dataclass(frozen=True)
+class SurfaceNews:
+    """A surface as the page gets it, and how large it is."""
+
+    message: bytes
+    vertices: int
+    triangles: int
+    longest_side_m: float
+
+
+class SolidBench:
+    """What the process for the solid does, step by step: `read`, `prepare`, `aim`, then banks."""
+
+    def __init__(self) -> None:
+        self._surface: trimesh.Trimesh
+        self._inward: Array
+        self._prepared: PreparedSolid
+        self._solid: ProblemOptions
+        self._problem: DesignProblem | None = None
+        self._own: _Sounding | None = None
+        self._fine: _Sounding | None = None
+
+    def read(self, mesh: str, unit: float, number: int) -> SurfaceNews:
+        """The surface of a mesh, whose message has a `number`."""
+        surface = struck_surface(mesh, unit)
+        positions = np.asarray(surface.vertices, dtype=float)
+        self._surface, self._inward = surface, inward_normals(surface, positions)
+        faces = np.asarray(surface.faces)
+        message = pack(
+            {"event": "surface", "number": number, "unit": unit},
+            {
+                "positions": ("f4", positions),
+                "inward": ("f4", self._inward),
+                "triangles": ("u4", faces),
+            },
+        )
+        return SurfaceNews(message, len(positions), len(faces), longest_side(surface))
+
+    def prepare(self, solid: ProblemOptions, material: MaterialSettings) -> dict[str, int]:
+        """Voxels, material and modes of the solid whose surface was read; how many of them."""
+        self._prepared = prepared_solid(solid, material, self._surface)
+        self._solid, self._problem = solid, None
+        self._own = self._fine = None
+        return {"voxels": self._prepared.mesh.n_cells, "unknowns": self._sounding().model.n_dofs}
+
+    def place(self, places: Sequence[Place]) -> list[Strike]:
+        """Struck points of the surface."""
+        return locate_all(self._surface, places, self._solid.unit)
+
+    def aim(self, project: Project | None) -> dict[str, Any] | None:
+        """Take up what the solid shall sound like; the modes that all clips share."""
+        self._problem = None
+        self._own = self._fine = None
+        if project is None:
+            return None
+        self._problem = prepare(project, solid=self._prepared)
+        targets = self._problem.setting.objective.targets
+        return {
+            "hertz": targets.frequencies.tolist(),
+            "dampings_per_second": targets.dampings.tolist(),
+            "amplitudes": targets.amplitudes.tolist(),
+        }
+
+    def problem(self) -> bytes:
+        """What a search needs, for its process."""
+        return pickle.dumps(self._problem)
+
+    def converted(self, design: str) -> list[float]:
+        """Coordinates of a design's material, by the law and dimensions that hold now."""
+        assert self._problem is not None
+        return coordinates_of(self._problem, read_design(design)).tolist()
+
+    def bank(
+        self,
+        z: Sequence[float] | None,
+        header: dict[str, Any],
+        hertz: Array | None = None,
+    ) -> bytes:
+        """The bank of a material; of the uniform one if z is None.
+
+        Parameters
+        ----------
+        hertz : (N,) [Hz] or None
+            What its modes are known to sound at, in their order.
+        """
+        return self._bank(self._sounding(), z, header, hertz)
+
+    def fine_bank(self, z: Sequence[float] | None, header: dict[str, Any]) -> bytes:
+        """The bank of a material on the solid that the coarse one stands for."""
+        if self._fine is None:
+            setting = self._setting()
+            fine = setting.fine() if setting.is_coarsened else setting
+            self._fine = _Sounding(self._simulation(fine, FINE_TOLERANCE), self._surface)
+        return self._bank(self._fine, z, header, None)
+
+    def bank_of(self, design: str, header: dict[str, Any]) -> bytes:
+        """The bank of a design in a file, by its own modes."""
+        found = read_design(design)
+        sounding = self._sounding()
+        heard = Heard(
+            found.frequencies,
+            found.dampings,
+            sounding.pushed(found.model, found.elastic_modes, self._inward),
+            self._at_vertices(found.young),
+        )
+        cost = {"cost": found.evidence["cost"]}
+        return bank(heard, self._positions, self._aimed(), {**cost, **header})
+
+    def _bank(
+        self,
+        sounding: _Sounding,
+        z: Sequence[float] | None,
+        header: dict[str, Any],
+        hertz: Array | None,
+    ) -> bytes:
+        material = self._prepared.material
+        at = np.zeros(material.dimensions) if z is None else np.asarray(z)
+        with one_thread():
+            evaluation = sounding.evaluate(at)
+        own = frequencies(evaluation.eigenvalues) if hertz is None else np.asarray(hertz)
+        elastic = sounding.elastic(evaluation)
+        aim, young, told = self._aimed(), material.moduli(at), dict(header)
+        dampings = None
+        if aim is None:
+            dampings = Damping().decay_per_second(evaluation.eigenvalues)
+        else:
+            assert self._problem is not None
+            stretch = common_factor(np.sort(own), aim.targets.frequencies)
+            own, young = stretch * own, stretch**2 * young
+            objective = self._problem.setting.objective
+            told.setdefault("cost", cost_of(objective, material, evaluation).total)
+        pushed = sounding.pushed(sounding.model, elastic, self._inward)
+        heard = Heard(own, dampings, pushed, self._at_vertices(young))
+        return bank(heard, self._positions, aim, {"cost": None, **told})
+
+    @property
+    def _positions(self) -> Array:
+        return np.asarray(self._surface.vertices, dtype=float)
+
+    def _aimed(self) -> Aim | None:
+        if self._problem is None:
+            return None
+        setting = self._problem.setting
+        vertices = np.array([strike.vertex for strike in setting.strikes])
+        return Aim(setting.objective.targets, vertices)
+
+    def _at_vertices(self, young: Array) -> Array:
+        """Moduli (V,) [Pa] of the voxels that are nearest to the vertices."""
+        return np.asarray(young[self._sounding().nearest])
+
+    def _sounding(self) -> _Sounding:
+        if self._own is None:
+            simulation = self._simulation(self._setting(), None)
+            self._own = _Sounding(simulation, self._surface, self._prepared)
+        return self._own
+
+    def _setting(self) -> Setting:
+        """Of the search; one that aims at nothing before there are targets."""
+        if self._problem is not None:
+            return self._problem.setting
+        parts = self._prepared
+        anywhere = Strike("", 0, self._positions[0], self._inward[0])
+        nothing: Any = None
+        return Setting(parts.mesh, self._solid, parts.material, [anywhere], nothing, parts.cells)
+
+    def _simulation(self, setting: Setting, tolerance: float | None) -> Simulation:
+        with one_thread():
+            if self._problem is not None:
+                return setting.simulation() if tolerance is None else setting.simulation(tolerance)
+            return Simulation(
+                setting.mesh,
+                setting.options,
+                setting.material,
+                setting.strikes,
+                MODES,
+                **({} if tolerance is None else {"tolerance": tolerance}),
+                cells=setting.cells,
+            )
+
+
+class _Sounding:
+    """A simulation that is followed from one material to the next, seen at all vertices."""
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        surface: trimesh.Trimesh,
+        prepared: PreparedSolid | None = None,
+    ) -> None:
+        self._simulation = simulation
+        self._vertices = np.asarray(surface.vertices, dtype=float)
+        self._values = interpolation(simulation.model, self._vertices)
+        self._last: Modes | None = None
+        if prepared is not None:
+            mesh = prepared.mesh
+            centres = mesh.origin + mesh.edge * (mesh.grid + 0.5)
+            self.nearest = cKDTree(centres).query(self._vertices)[1]
+
+    @property
+    def model(self) -> Solid:
+        """The solid that is analysed."""
+        return self._simulation.model
+
+    def evaluate(self, z: Array) -> Evaluation:
+        """Modes at the coordinates z."""
+        evaluation = self._simulation.evaluate(z, self._last)
+        self._last = evaluation.modes
+        return evaluation
+
+    def elastic(self, evaluation: Evaluation) -> Array:
+        """Its elastic modes (3 n, N) on the nodes of the model."""
+        return self._simulation.mesh_rows(evaluation.modes.vectors[:, RIGID_MODES:])
+
+    def pushed(self, model: Solid, elastic: Array, inward: Array) -> Array:
+        """What unit impulses (V, 3) at all vertices push the modes (3 n, N) of a model by."""
+        values: csr_matrix = self._values
+        if model.mesh.n_nodes != self.model.mesh.n_nodes:
+            values = interpolation(model, self._vertices)
+        modes = elastic.reshape(model.mesh.n_nodes, 3, -1)
+        return np.asarray(
+            sum(inward[:, axis, None] * (values @ modes[:, axis]) for axis in range(3))
+        )

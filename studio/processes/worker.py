@@ -1,0 +1,200 @@
+"""A process that computes for the studio: asked by name, it answers in order, and may be ended."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Callable
+from importlib import import_module
+from itertools import count
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
+from threading import Thread
+from typing import Any
+
+from carillon.children import end_with_parent
+from carillon.cli import meaning
+from carillon.errors import UserError, one_line
+
+NICER = 5
+"""Added to the niceness of these processes: the page's sound comes first."""
+GONE = (
+    "the process that worked on this has ended, perhaps for lack of memory; try again, with a "
+    "lower resolution or fewer modes"
+)
+
+Tell = Callable[[Any], None]
+
+
+class Worker:
+    """A process that does one thing after another, started when there is something to do.
+
+    Parameters
+    ----------
+    work
+        Module and class, such as `studio.processes.clips:Clips`, whose methods are called in the
+        process, on one object as long as the process lives.  A method that has news takes `tell` as
+        its first argument, a function of one value.
+    """
+
+    def __init__(self, work: str) -> None:
+        self._work = work
+        self._numbers = count()
+        self._process: SpawnProcess | None = None
+        self._pipe: Connection | None = None
+        self._waiting: dict[int, tuple[asyncio.Future[Any], Tell | None]] = {}
+
+    @property
+    def pid(self) -> int | None:
+        """Number of the process, if there is one."""
+        return None if self._process is None else self._process.pid
+
+    async def call(
+        self, name: str, *arguments: Any, seconds: float | None = None, tell: Tell | None = None
+    ) -> Any:
+        """What a method returns.
+
+        Parameters
+        ----------
+        seconds
+            After which the process is ended.
+        tell
+            Called with news of a method that has some.
+
+        Raises
+        ------
+        UserError
+            What the method raises, in one sentence; or if it took too long, or the process ended.
+        """
+        if self._process is None:
+            self._start()
+        assert self._pipe is not None
+        number = next(self._numbers)
+        future: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
+        self._waiting[number] = (future, tell)
+        self._pipe.send((number, name, arguments, tell is not None))
+        try:
+            return await asyncio.wait_for(future, seconds)
+        except TimeoutError:
+            self.end()
+            raise UserError(
+                f"this took longer than {seconds:g} s and was ended; expected something smaller or "
+                "simpler"
+            ) from None
+
+    def signal_stop(self) -> None:
+        """Ask what is under way to come to an end."""
+        if self.pid is not None:
+            os.kill(self.pid, signal.SIGTERM)
+
+    def end(self) -> None:
+        """End the process at once; what waits for it gets an error, and the next call another one.
+
+        Its own children end with it.
+        """
+        process, pipe = self._process, self._pipe
+        self._process = self._pipe = None
+        if process is not None and pipe is not None:
+            process.kill()
+            process.join()
+        self._give_up()
+
+    def _start(self) -> None:
+        loop = asyncio.get_running_loop()
+        context = get_context("spawn")
+        self._pipe, other = context.Pipe()
+        process = context.Process(target=_serve, args=(other, self._work), daemon=False)
+        process.start()
+        other.close()
+        self._process = process
+        Thread(target=self._listen, args=(loop, self._pipe, process), daemon=True).start()
+
+    def _listen(
+        self, loop: asyncio.AbstractEventLoop, pipe: Connection, process: SpawnProcess
+    ) -> None:
+        """Bring what the process says into the loop, until it is gone."""
+        try:
+            while True:
+                loop.call_soon_threadsafe(self._take, pipe.recv())
+        except (EOFError, OSError):
+            pass
+        except RuntimeError:  # the loop is closed
+            return
+        pipe.close()
+        try:
+            loop.call_soon_threadsafe(self._ended, process)
+        except RuntimeError:
+            return
+
+    def _take(self, message: tuple[int, str, Any]) -> None:
+        number, kind, value = message
+        if number not in self._waiting:
+            return
+        future, tell = self._waiting[number]
+        if kind == "news":
+            if tell is not None:
+                tell(value)
+            return
+        del self._waiting[number]
+        if future.done():
+            return
+        if kind == "done":
+            future.set_result(value)
+        else:
+            future.set_exception(UserError(*value))
+
+    def _ended(self, process: SpawnProcess) -> None:
+        if self._process is process:
+            self._process = self._pipe = None
+            self._give_up()
+
+    def _give_up(self) -> None:
+        waiting, self._waiting = self._waiting, {}
+        for future, _ in waiting.values():
+            if not future.done():
+                future.set_exception(UserError(GONE))
+
+
+def _serve(pipe: Connection, work: str) -> None:
+    """What the process does: it calls methods until its parent is gone."""
+    end_with_parent()
+    # Ctrl-C is for the server, which ends this process when it is time.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+    os.nice(NICER)
+    os.environ["OMP_NUM_THREADS"] = "1"
+    module, name = work.split(":")
+    done = getattr(import_module(module), name)()
+    while True:
+        try:
+            number, method, arguments, has_news = pipe.recv()
+        except EOFError:
+            return
+        tell = [_teller(pipe, number)] if has_news else []
+        try:
+            pipe.send((number, "done", getattr(done, method)(*tell, *arguments)))
+        except Exception as error:
+            pipe.send((number, "failed", _sentences(error)))
+
+
+def _teller(pipe: Connection, number: int) -> Tell:
+    return lambda value: pipe.send((number, "news", value))
+
+
+def _sentences(error: Exception) -> tuple[str, ...]:
+    """What to tell of an error; of a fault of the program, where to look."""
+    if isinstance(error, UserError):
+        return tuple(str(each) for each in error.args)
+    sentence = meaning(error)[1]
+    if sentence is not None:
+        return (sentence,)
+    traceback.print_exc()
+    sys.stderr.flush()
+    return (
+        one_line(f"this failed for a fault of the program ({type(error).__name__}: {error})")
+        + "; the terminal where the studio was started tells more",
+    )
