@@ -59,10 +59,11 @@ torture: env  ## all hostile inputs, many more random ones, fifty kills; a quart
 	@CARILLON_TORTURE=1 $(PYTHON_OF_VENV) -m pytest -q -n $(TORTURE_PROCESSES) --dist loadfile \
 		$(wildcard tests/test_hostile_*.py tests/test_properties*.py tests/test_kills.py) $(PYTEST_OPTIONS)
 
-check: env  ## lint, formatting, types, Snakemake rules
+check: env  ## lint, formatting, types (of the page, too), Snakemake rules
 	@ruff check --quiet
 	@ruff format --check --quiet || { ruff format --diff --quiet; exit 1; }
 	@mypy $(PACKAGES)
+	@.ci/page/check
 	@if [ -n "$(RULES)" ]; then snakefmt --check $(RULES); python .ci/lint_rules.py; fi
 
 # All pages are read anew: they depend on sources that Sphinx does not know of, and a warning would

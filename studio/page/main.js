@@ -20,9 +20,10 @@ import { Selection, ServerState } from "./state.js";
  * @property {Selection} selection
  * @property {Keys} keys
  * @property {(text: string, kind?: "note" | "error") => void} say
- * @property {any} bank
- * @property {any} player
- * @property {any} recorder
+ * @property {import("./sound/bank.js").Bank} bank
+ * @property {import("./sound/player.js").Player} player
+ * @property {import("./sound/recorder.js").Recorder} recorder
+ * @property {import("./sound/noise.js").Noise} noise
  * @property {any} view
  * @property {any} tour
  * @property {any} shortcuts
@@ -46,6 +47,7 @@ const SOUNDS = {
   bank: ["sound/bank.js", "makeBank"],
   player: ["sound/player.js", "makePlayer"],
   recorder: ["sound/recorder.js", "makeRecorder"],
+  noise: ["sound/noise.js", "makeNoise"],
 };
 
 /**
@@ -77,6 +79,7 @@ async function main() {
   const state = new ServerState(connection);
   const selection = new Selection();
   selection.follow(state);
+  const later = /** @type {any} */ (null);
   /** @type {Parts} */
   const parts = {
     connection,
@@ -84,9 +87,10 @@ async function main() {
     selection,
     keys: new Keys(),
     say: (text, kind = "note") => connection.listeners.tell("event said", { text, kind }),
-    bank: null,
-    player: null,
-    recorder: null,
+    bank: later,
+    player: later,
+    recorder: later,
+    noise: later,
     view: null,
     tour: null,
     shortcuts: null,

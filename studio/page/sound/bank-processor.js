@@ -503,7 +503,9 @@ class BankProcessor extends AudioWorkletProcessor {
     this.solo = null;
     /** @type {Set<number>} */
     this.muted = new Set();
-    this.resize(128);
+    this.samples = new Float64Array(128);
+    this.force = new Float64Array(128);
+    this.otherForce = new Float64Array(128);
     this.peak = 0;
     this.limited = false;
     this.sinceReport = 0;

@@ -26,11 +26,12 @@ export const NO_SOUND =
  * Makes the sound of the page.  It may be struck from the first moment; before the browser lets
  * pages sound, which is at the first click or key, strikes are kept.
  *
+ * @param {{connection?: import("../connection.js").Connection}} [parts] Where banks come from.
  * @param {object} [options]
  * @param {string} [options.processorUrl] Where `bank-processor.js` is.
  * @param {AudioContextLatencyCategory | number} [options.latencyHint]
  */
-export function makeBank(options = {}) {
+export function makeBank(parts = {}, options = {}) {
   const { latencyHint = 0 } = options;
   const processorUrl = options.processorUrl ?? new URL("bank-processor.js", import.meta.url).href;
   const context = "AudioContext" in window ? new AudioContext({ latencyHint }) : null;
@@ -110,6 +111,24 @@ export function makeBank(options = {}) {
     for (const listener of strikeListeners) listener({ vertex, strength, atSeconds });
   }
 
+  /**
+   * Takes a new material; what rings of the old one rings out.
+   *
+   * @param {BankHeader} header
+   * @param {BankArrays} arrays
+   */
+  function take(header, arrays) {
+    const before = current?.arrays;
+    current = { header, arrays };
+    const same =
+      before && equal(before.hertz, arrays.hertz) && equal(before.dampings, arrays.dampings);
+    if (!same) tell({ do: "bank", hertz: arrays.hertz, dampings: arrays.dampings });
+  }
+
+  parts.connection?.onBinary("bank", (header, arrays) =>
+    take(header, /** @type {BankArrays} */ (/** @type {unknown} */ (arrays))),
+  );
+
   return {
     context,
     input,
@@ -126,19 +145,7 @@ export function makeBank(options = {}) {
       return failure;
     },
 
-    /**
-     * Takes a new material; what rings of the old one rings out.
-     *
-     * @param {BankHeader} header
-     * @param {BankArrays} arrays
-     */
-    take(header, arrays) {
-      const before = current?.arrays;
-      current = { header, arrays };
-      const same =
-        before && equal(before.hertz, arrays.hertz) && equal(before.dampings, arrays.dampings);
-      if (!same) tell({ do: "bank", hertz: arrays.hertz, dampings: arrays.dampings });
-    },
+    take,
 
     /**
      * Strikes a vertex along its inward normal.

@@ -34,11 +34,15 @@ export function weightsAt(points, position) {
  *
  * @param {object} parts
  * @param {import("./bank.js").Bank} parts.bank
- * @param {(vertex: number) => ArrayLike<number> | null} parts.positionOf Position (3) of a vertex [m].
- * @param {(clip: string) => string} [parts.urlOf] Where the noise of a clip is.
+ * @param {import("../state.js").ServerState} parts.state
+ * @param {import("../connection.js").Connection} parts.connection
  */
-export function makeNoise({ bank, positionOf, urlOf = (clip) => `/clip/${clip}/noise` }) {
+export function makeNoise({ bank, state, connection }) {
   let on = false;
+  /** @type {number | null} The surface whose vertices these are. */
+  let surface = null;
+  /** @type {Float32Array | null} (V, 3) [m] */
+  let positions = null;
   /** @type {Source[]} */
   let sources = [];
   /** @type {Map<string, Promise<AudioBuffer | null>>} */
@@ -48,12 +52,27 @@ export function makeNoise({ bank, positionOf, urlOf = (clip) => `/clip/${clip}/n
   /** @type {string} What the clips are made of; noise is fetched anew when it changes. */
   let made = "";
 
+  async function fetchPositions() {
+    const wanted = state.current?.solid?.surface ?? null;
+    if (wanted === surface) return;
+    surface = wanted;
+    positions = null;
+    if (wanted === null) return;
+    try {
+      const { arrays } = await connection.binary(`/surface/${wanted}`);
+      if (surface === wanted) positions = /** @type {Float32Array} */ (arrays.positions);
+    } catch {
+      if (surface === wanted) surface = null;
+    }
+  }
+
   function fetchAll() {
     const { context } = bank;
     if (!on || !context) return;
+    fetchPositions();
     for (const { clip } of sources) {
       if (noises.has(clip)) continue;
-      const fetched = fetchSound(context, urlOf(clip)).then(
+      const fetched = fetchSound(context, `/clip/${clip}/noise`).then(
         (buffer) => {
           if (noises.get(clip) === fetched) there.set(clip, buffer);
           return buffer;
@@ -68,11 +87,31 @@ export function makeNoise({ bank, positionOf, urlOf = (clip) => `/clip/${clip}/n
     }
   }
 
+  /** @param {State} now */
+  function follow(now) {
+    const ready = new Map(
+      now.clips.filter((clip) => clip.phase === "ready").map((clip) => [clip.clip, clip.modes]),
+    );
+    sources = now.targets.flatMap(({ position_m, clip }) =>
+      clip !== null && ready.has(clip) ? [{ position_m, clip }] : [],
+    );
+    const without = now.targets.map((target) => target.without);
+    const next = JSON.stringify([[...ready], without]);
+    if (next !== made) {
+      made = next;
+      noises.clear();
+      there.clear();
+    }
+    fetchAll();
+  }
+
+  state.onChange(follow);
+
   bank.onStrike(({ vertex, strength, atSeconds }) => {
-    const position = vertex === null ? null : positionOf(vertex);
-    if (!on || !position || sources.length === 0) return;
     const { context, input } = bank;
+    if (!on || vertex === null || !positions || sources.length === 0) return;
     if (!context || !input) return;
+    const position = positions.subarray(3 * vertex, 3 * vertex + 3);
     const weights = weightsAt(sources.map((source) => source.position_m), position);
     for (const [number, { clip }] of sources.entries()) {
       const buffer = there.get(clip);
@@ -92,23 +131,6 @@ export function makeNoise({ bank, positionOf, urlOf = (clip) => `/clip/${clip}/n
     },
     set on(value) {
       on = value;
-      fetchAll();
-    },
-
-    /** @param {State} state The server's; targets and clips are taken from it. */
-    follow(state) {
-      const ready = new Map(
-        state.clips.filter((clip) => clip.phase === "ready").map((clip) => [clip.clip, clip]),
-      );
-      sources = state.targets.flatMap(({ position_m, clip }) =>
-        clip !== null && ready.has(clip) ? [{ position_m, clip }] : [],
-      );
-      const now = JSON.stringify([...ready.values()].map((clip) => [clip.clip, clip.modes]));
-      if (now !== made) {
-        made = now;
-        noises.clear();
-        there.clear();
-      }
       fetchAll();
     },
 

@@ -15,9 +15,9 @@ const FADE_SECONDS = 0.01;
 /**
  * Makes a player whose sounds go through the bank's limiter and volume.
  *
- * @param {import("./bank.js").Bank} bank
+ * @param {{bank: import("./bank.js").Bank}} parts
  */
-export function makePlayer(bank) {
+export function makePlayer({ bank }) {
   /** @type {{stop: () => void} | null} */
   let present = null;
   /** @type {((name: string | null) => void)[]} */

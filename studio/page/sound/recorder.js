@@ -17,10 +17,11 @@ const REASONS = {
 /**
  * Makes a recorder.
  *
+ * @param {object} [_parts] Others of the page, of which it needs none.
  * @param {object} [options]
  * @param {string} [options.processorUrl] Where `recorder-processor.js` is.
  */
-export function makeRecorder(options = {}) {
+export function makeRecorder(_parts = {}, options = {}) {
   const processorUrl =
     options.processorUrl ?? new URL("recorder-processor.js", import.meta.url).href;
   /** @type {{context: AudioContext, stream: MediaStream} | null} */
