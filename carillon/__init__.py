@@ -16,5 +16,5 @@ _step.start_without_daemon(_os.environ)
 
 __version__ = "0.1.0"
 
-ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "workflow")
+ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "studio", "workflow")
 """Packages of the project; each imports those before it."""

@@ -43,6 +43,9 @@ class Studio(Protocol):
     named and not there is a `NotFoundError`.
     """
 
+    async def start(self) -> None:
+        """Begin, once the event loop runs; called first, and once."""
+
     def state(self) -> dict[str, Any]:
         """The event `state`, as docs/contributing/studio.md describes it."""
 

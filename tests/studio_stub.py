@@ -52,6 +52,9 @@ class StubStudio:
         self.closed = False
         self._add(int(np.argmin(mesh.vertices[:, 2])), "rim", "c1")
 
+    async def start(self) -> None:
+        pass
+
     def _clip(self, identifier: str, name: str) -> dict[str, Any]:
         modes = [
             {"hertz": hertz, "damping_per_second": 3.0 + k, "amplitude": 0.5 / (k + 1)}

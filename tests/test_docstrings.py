@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 CHECKOUT = Path(__file__).resolve().parent.parent
-ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "workflow")
+ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "studio", "workflow")
 """Packages whose docstrings keep to it."""
 
 SECTIONS = ("Parameters", "Returns", "Yields", "Raises", "Attributes")

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 CHECKOUT = Path(__file__).resolve().parent.parent
-ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "workflow")
+ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "studio", "workflow")
 
 EVERYBODY = ("carillon", "carillon.fem", "carillon.fem.geometry", "carillon.fem.finite_cells")
 """Packages that all others may import."""
@@ -83,6 +83,13 @@ ARROWS = {
         sound.project sound.rendering""",
     "sound.commands": """solver.response sound sound.clips sound.project sound.design
         sound.rendering sound.export""",
+    #
+    "studio": "",
+    "studio.processes": "",
+    "studio.session": "",
+    "studio.standalone": "",
+    "studio.server": "sound.project studio",
+    "studio.commands": "sound sound.project studio.server studio.session studio.standalone",
     #
     "workflow": "dataset_gen dataset_gen.objectives forests forests.studies",
     "workflow.estimate": "dataset_gen.objectives workflow",

@@ -15,7 +15,7 @@ from tests.patience import HANG_SECONDS
 from tests.workflow_runs import CHECKOUT, planned
 from workflow import source_files, sources
 
-PACKAGES = ("carillon", "dataset_gen", "forests", "solver", "sound", "workflow")
+PACKAGES = ("carillon", "dataset_gen", "forests", "solver", "sound", "studio", "workflow")
 CONFIG = """\
 results_dir: results
 models: {{bar: {{mesh: 'builtin:bar', resolution: 8}}}}

@@ -29,7 +29,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 CHECKOUT = Path(__file__).resolve().parent.parent
-ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "workflow")
+ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "studio", "workflow")
 WITHOUT_MPI = ("dataset_gen", "forests", "tests.hostile.configure")
 """Programs that import no MPI unless they are started on several ranks."""
 MARK = "CARILLON_HOSTILE_JOB"

@@ -75,7 +75,7 @@ class Guard:
     def __init__(self, app: ASGIApp, keys: Keys, host: str, port: int) -> None:
         self._app, self._keys = app, keys
         self._names = host_names(host)
-        self._addresses = not _is_loopback(host)
+        self._addresses = not is_loopback(host)
         self._cookie = f"carillon_studio_{port}"
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -153,14 +153,15 @@ _NO_COOKIE = (
 def host_names(host: str) -> frozenset[str]:
     """Names under which a server that listens on `host` may be asked."""
     names = {*LOOPBACK}
-    if not _is_loopback(host):
+    if not is_loopback(host):
         names |= {socket.gethostname().lower(), socket.getfqdn().lower()}
         if not _is_address(host) or not ipaddress.ip_address(host).is_unspecified:
             names.add(host.lower())
     return frozenset(names)
 
 
-def _is_loopback(host: str) -> bool:
+def is_loopback(host: str) -> bool:
+    """Whether only this machine can reach an address to listen on."""
     return host in LOOPBACK or (_is_address(host) and ipaddress.ip_address(host).is_loopback)
 
 

@@ -123,6 +123,7 @@ async def _serve_and_close(
     ready: Callable[[], None] | None,
 ) -> None:
     try:
+        await studio.start()
         await _serve(server, listener, ready)
     finally:
         # However often somebody asks to end: what is not saved is saved here.

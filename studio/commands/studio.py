@@ -1,0 +1,182 @@
+"""`carillon studio`: design a sound in the browser.
+
+Opens a page on this machine on which points of a solid are picked, clips dropped on them, and any
+point is struck while a material is sought that sounds like the clips. It ends with Ctrl-C; what
+was designed is kept in the workspace.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from carillon.arguments import whole_number
+from carillon.errors import UserError, one_line
+from carillon.options import add_options, collect, option
+from carillon.progress import say
+
+if TYPE_CHECKING:
+    import socket
+
+    from studio.server.guard import Keys
+
+EXAMPLES = """examples:
+  carillon studio
+  carillon studio builtin:bell
+  carillon studio pan.yaml --port 8620 --no-browser
+  carillon studio --export page.html design.h5
+"""
+PACKAGES = ("starlette", "uvicorn", "websockets")
+"""What the server stands on, and nothing else of the project does."""
+REQUIREMENTS = "workflow/envs/requirements-studio.txt"
+WORKSPACE = "carillon-studio"
+"""Folder of projects where no file is opened whose own folder it is."""
+BUILTIN = "builtin:"
+LOOPBACK_HOST = "127.0.0.1"
+
+
+@dataclass(frozen=True)
+class StudioOptions:
+    """What is opened, and where it is served."""
+
+    what: str | None = option(
+        None,
+        "project (YAML), mesh, design (.h5) or builtin:NAME to begin with (default: choose there)",
+        nargs="?",
+        metavar="FILE",
+    )
+    workspace: str | None = option(
+        None,
+        "folder of projects, made if it is not there (default: that of FILE, else "
+        f"{WORKSPACE}); no other is read or written",
+        metavar="FOLDER",
+    )
+    port: int | None = option(
+        None,
+        "port to listen on (default: the first free one from 8620 on)",
+        type=whole_number(1, 65535),
+    )
+    host: str = option(
+        LOOPBACK_HOST,
+        "address to listen on (default 127.0.0.1, which other machines cannot reach)",
+        metavar="ADDRESS",
+    )
+    no_browser: bool = option(False, "open no browser, only say where the page is")
+    export: str | None = option(
+        None,
+        "serve nothing: write a finished design (FILE) as a page that needs no server",
+        metavar="PAGE.html",
+    )
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command line."""
+    add_options(parser, StudioOptions, positional=("what",))
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Serve the page, or write one."""
+    options = collect(StudioOptions, arguments)
+    if options.export is not None:
+        return _export(options.export, options.what)
+    _require_packages()
+    from studio.server.guard import Keys
+    from studio.server.serve import listen, serve
+    from studio.session import open_studio
+
+    # Before the work: a port in use is told at once.
+    listener = listen(options.host, options.port)
+    with listener:
+        workspace = _workspace(options)
+        studio = open_studio(options.what, workspace)
+        keys = Keys()
+        launch = _Launch(options, listener, keys, workspace)
+        try:
+            serve(studio, listener, options.host, keys, ready=launch.tell)
+        finally:
+            launch.clear()
+    say("the studio has ended")
+    return 0
+
+
+class _Launch:
+    """Tells where the page is, and opens it."""
+
+    def __init__(
+        self, options: StudioOptions, listener: socket.socket, keys: Keys, workspace: Path
+    ) -> None:
+        from studio.server.guard import is_loopback
+        from studio.server.serve import address_of
+
+        self._url = f"{address_of(listener, options.host)}?token={keys.token}"
+        self._browser = not options.no_browser
+        self._local = is_loopback(options.host)
+        self._workspace = workspace
+        self._file: Path | None = None
+
+    def tell(self) -> None:
+        """Say where the page is; called once it is there."""
+        if not self._local:
+            say(
+                "other machines can reach this studio, and what is sent is not encrypted; from "
+                "such an address browsers give no sound, either; a tunnel to this machine (ssh -L) "
+                "needs no --host"
+            )
+        # Standard output, for programs that start the studio.
+        print(self._url, flush=True)
+        say(f"the studio is at this address, its projects are in {self._workspace}; Ctrl-C ends it")
+        if self._browser:
+            from studio.server.browser import open_page
+
+            self._file = open_page(self._url, self._workspace)
+
+    def clear(self) -> None:
+        """Remove what led the browser to the page."""
+        if self._file is not None:
+            self._file.unlink(missing_ok=True)
+
+
+def _workspace(options: StudioOptions) -> Path:
+    """The folder of projects, made if it is not there."""
+    named = options.workspace
+    if named is None:
+        is_file = options.what is not None and not options.what.startswith(BUILTIN)
+        folder = Path(options.what).parent if is_file and options.what else Path(WORKSPACE)
+    else:
+        folder = Path(named)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder.resolve(strict=True)
+    except (OSError, ValueError) as error:
+        said = one_line(str(error))
+        raise UserError(
+            f"{folder}: is no folder for projects ({said}); name another by --workspace"
+        ) from None
+
+
+def _export(page: str, design: str | None) -> int:
+    """Write a page of a design."""
+    if design is None:
+        raise UserError(f"--export {page}: name the design to write: --export {page} design.h5")
+    from sound.outputs import require_output
+    from sound.project.design_file import read_design
+    from studio.standalone import write_page
+
+    out = require_output(page, (".html", ".htm"), [design])
+    write_page(out, read_design(design))
+    print(f"{out}: {out.stat().st_size / 1e6:.1f} MB, opens in any browser")
+    return 0
+
+
+def _require_packages() -> None:
+    for package in PACKAGES:
+        try:
+            import_module(package)
+        except ImportError as error:
+            raise UserError(
+                f"{package} cannot be loaded ({one_line(str(error))}); install what the studio "
+                f"needs by pip install -r {REQUIREMENTS}, or 'carillon[studio]'"
+            ) from None
