@@ -1,0 +1,122 @@
+/** The selected target, its clip, and what is asked of the server and of the sound for it. */
+
+/** @typedef {import("../main.js").Parts} Parts */
+/** @typedef {import("../types.js").State} State */
+/** @typedef {import("../types.js").Target} Target */
+/** @typedef {import("../types.js").Clip} Clip */
+/** @typedef {"sound" | "modes" | "rest" | "noise"} ClipPart */
+
+/**
+ * The target that is selected.
+ *
+ * @param {Parts} parts
+ * @returns {Target | null}
+ */
+export function chosenTarget(parts) {
+  const name = parts.selection.current.target;
+  return parts.state.current?.targets.find((target) => target.name === name) ?? null;
+}
+
+/**
+ * The clip of a target.
+ *
+ * @param {State | null} state
+ * @param {Target | null} target
+ * @returns {Clip | null}
+ */
+export function clipOf(state, target) {
+  if (!state || !target || target.clip === null) return null;
+  return state.clips.find((clip) => clip.clip === target.clip) ?? null;
+}
+
+/**
+ * Asks the server; what it refuses is told to the person.
+ *
+ * @param {Parts} parts
+ * @param {string} name of the call
+ * @param {Record<string, unknown>} [values]
+ * @returns {Promise<boolean>} whether it was done
+ */
+export async function ask(parts, name, values) {
+  return attempt(parts, () => parts.connection.call(name, values));
+}
+
+/**
+ * Does something; what goes wrong is told to the person.
+ *
+ * @param {Parts} parts
+ * @param {() => unknown} doIt
+ * @returns {Promise<boolean>} whether it was done
+ */
+export async function attempt(parts, doIt) {
+  try {
+    await doIt();
+    return true;
+  } catch (error) {
+    parts.say(error instanceof Error ? error.message : String(error), "error");
+    return false;
+  }
+}
+
+/**
+ * Sounds a part of a target's clip.
+ *
+ * @param {Parts} parts
+ * @param {Target | null} target
+ * @param {ClipPart} part
+ * @returns {Promise<boolean>} when it is over; whether it could be played
+ */
+export async function playClip(parts, target, part) {
+  if (!target || target.clip === null) {
+    parts.say(target ? `${target.name} has no clip yet: choose a file or record one.` : "Select a target first.");
+    return false;
+  }
+  if (!parts.player) {
+    parts.say("This browser plays no clips: it lacks what sound needs.", "error");
+    return false;
+  }
+  return attempt(parts, () => parts.player.play(clipPath(target, part)));
+}
+
+/**
+ * Address of a part of a target's clip.
+ *
+ * @param {Target} target
+ * @param {ClipPart} part
+ */
+export function clipPath(target, part) {
+  return `/clip/${encodeURIComponent(target.clip ?? "")}/${part}`;
+}
+
+/**
+ * Strikes the solid at a target.
+ *
+ * @param {Parts} parts
+ * @param {Target | null} target
+ */
+export function strikeTarget(parts, target) {
+  if (!target) {
+    parts.say("Select a target first.");
+    return;
+  }
+  if (!parts.bank) {
+    parts.say("This browser makes no sound: it lacks what sound needs.", "error");
+    return;
+  }
+  parts.bank.strike(target.vertex, parts.selection.current.strength);
+}
+
+/**
+ * Sends a sound to the server and makes it a target's clip.
+ *
+ * @param {Parts} parts
+ * @param {string} target its name
+ * @param {string} name of the file
+ * @param {Blob} sound
+ */
+export async function giveClip(parts, target, name, sound) {
+  return attempt(parts, async () => {
+    const clip = await parts.connection.upload("clip", name, sound);
+    await parts.connection.call("change_target", { target, clip });
+  });
+}

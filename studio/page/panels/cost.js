@@ -1,0 +1,135 @@
+/** The cost over the time of the search, with its parts. */
+
+import { make, setAttribute, setText } from "./dom.js";
+import { makeLegend } from "./legend.js";
+import { fixed, significant, withSeconds } from "./numbers.js";
+import { axis, colour, makePlot } from "./plots.js";
+
+/** @typedef {import("../types.js").Progress} Progress */
+/** @typedef {import("./legend.js").Sign} Sign */
+
+const HEIGHT = 200;
+/** Parts this far below the cost say nothing, and would squeeze what does. */
+const LEAST_SHARE = 1e-4;
+
+/** @type {{ key: keyof Progress, text: string, sign: Sign, kind: string, dash: number[], width: number }[]} */
+const SERIES = [
+  { key: "cost", text: "cost", sign: "line", kind: "cost-all", dash: [], width: 2 },
+  { key: "frequency_cost", text: "frequencies", sign: "dashed", kind: "cost-frequency", dash: [6, 3], width: 1.5 },
+  { key: "amplitude_cost", text: "amplitudes", sign: "dotted", kind: "cost-amplitude", dash: [2, 3], width: 1.5 },
+  { key: "regulariser", text: "roughness", sign: "dash-dotted", kind: "cost-rough", dash: [8, 3, 2, 3], width: 1.5 },
+];
+
+/**
+ * Makes the plot of the cost.
+ *
+ * @param {HTMLElement} element
+ * @param {import("../main.js").Parts} parts
+ */
+export function makeCost(element, parts) {
+  const { connection } = parts;
+  /** @type {Progress[]} */
+  let rows = [];
+  /** @type {import("uplot") | null} */
+  let plot = null;
+  let isWaiting = false;
+
+  const none = make("p", { class: "hint" }, "Optimise, and the cost is drawn here while it falls.");
+  const value = make("p", { class: "figure-line" });
+  const picture = make("div", { class: "plot", role: "img" });
+  const body = make(
+    "div",
+    { hidden: true },
+    value,
+    makeLegend(SERIES.map(({ sign, text, kind }) => ({ sign, text, kind }))),
+    picture,
+  );
+  element.append(none, body);
+
+  function show() {
+    isWaiting = false;
+    none.hidden = rows.length > 0;
+    body.hidden = rows.length === 0;
+    const first = rows[0];
+    const last = rows[rows.length - 1];
+    if (!first || !last) return;
+    const fall = first.cost > 0 ? 100 * (1 - last.cost / first.cost) : 0;
+    const changed = fall < 0 ? `${fixed(-fall, 1)} % above` : `${fixed(fall, fall > 99 ? 2 : 1)} % below`;
+    const compared = rows.length > 1 ? `, ${changed} the first one` : "";
+    const effort = `${last.evaluations} ${last.evaluations === 1 ? "evaluation" : "evaluations"} in ${withSeconds(last.seconds)}`;
+    setText(value, `${significant(last.cost, 4)}${compared}; ${effort}`);
+    setAttribute(
+      picture,
+      "aria-label",
+      `Cost over ${withSeconds(last.seconds)}: from ${significant(first.cost)} to ${significant(last.cost)}; of ` +
+        `frequencies ${significant(last.frequency_cost)}, of amplitudes ${significant(last.amplitude_cost)}, ` +
+        `of roughness ${significant(last.regulariser)}.`,
+    );
+    plot ??= create();
+    plot.setData([rows.map((row) => row.seconds), ...SERIES.map(({ key }) => rows.map((row) => positive(row[key])))]);
+  }
+
+  function create() {
+    return makePlot(
+      picture,
+      HEIGHT,
+      {
+        scales: {
+          x: { time: false, range: (_one, low, high) => [low, high > low ? high : low + 1] },
+          y: { distr: 3, range: costRange },
+        },
+        axes: [
+          axis("Time [s]", { size: 34 }),
+          axis("Cost", {
+            size: 54,
+            values: (_one, splits) => splits.map((split) => (split === null ? "" : significant(split, 1))),
+          }),
+        ],
+        series: [
+          {},
+          ...SERIES.map(({ text, kind, dash, width }) => ({
+            label: text,
+            stroke: () => colour(`--plot-${kind}`),
+            width,
+            dash,
+            // The first value alone is no line.
+            points: { show: (/** @type {import("uplot")} */ one) => one.data[0].length < 2 },
+          })),
+        ],
+      },
+      [[0], ...SERIES.map(() => [null])],
+    );
+  }
+
+  /** @param {import("uplot")} one @returns {[number, number]} */
+  function costRange(one) {
+    const costs = Array.from(one.data[1] ?? [], Number).filter((cost) => cost > 0);
+    if (costs.length === 0) return [0.1, 1];
+    const least = Math.min(...costs) * LEAST_SHARE;
+    const there = one.data.slice(1).flatMap((column) => Array.from(column, Number).filter((each) => each > least));
+    return [Math.min(...there) / 1.5, Math.max(...there) * 1.5];
+  }
+
+  function later() {
+    if (isWaiting) return;
+    isWaiting = true;
+    requestAnimationFrame(show);
+  }
+
+  connection.onEvent("history", (event) => {
+    rows = [...event.rows];
+    later();
+  });
+  connection.onEvent("progress", (event) => {
+    const last = rows[rows.length - 1];
+    // Time runs one way: a row from before the last one is of another search.
+    if (last && event.seconds < last.seconds) rows = [];
+    rows.push(event);
+    later();
+  });
+}
+
+/** @param {unknown} value @returns {number | null} as logarithms need it */
+function positive(value) {
+  return typeof value === "number" && value > 0 ? value : null;
+}

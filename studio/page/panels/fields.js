@@ -1,0 +1,358 @@
+/** Fields of a form that are made from a schema: labels, help, bounds, and what was typed. */
+
+import { identifier, make, setAttribute, setText } from "./dom.js";
+
+/**
+ * @typedef {object} Schema what is used of a JSON schema
+ * @property {string} [description]
+ * @property {string | string[]} [type]
+ * @property {string[]} [enum]
+ * @property {unknown} [default]
+ * @property {number} [minimum]
+ * @property {number} [maximum]
+ * @property {number} [exclusiveMinimum]
+ * @property {number} [exclusiveMaximum]
+ * @property {string} [pattern] of one word that stands in place of a number
+ * @property {Schema} [items]
+ * @property {Record<string, Schema>} [properties]
+ */
+
+/**
+ * @typedef {object} Field
+ * @property {string[]} path keys that lead to its value
+ * @property {HTMLElement} element
+ * @property {() => unknown} read what was typed; throws `FieldError`
+ * @property {(value: unknown) => void} write shows a value
+ * @property {(sentence: string) => void} complain shows what is wrong; nothing if empty
+ * @property {(changed: boolean) => void} mark shows whether it waits to be applied
+ * @property {() => void} focus
+ */
+
+/** What is wrong with a field, in one sentence. */
+export class FieldError extends Error {}
+
+/** @type {Record<string, string>} */
+const NAMES = {
+  resolution: "Resolution",
+  coarsen: "Coarse solid",
+  modes: "Modes",
+  "optimiser.seconds": "Time of a search",
+  density: "Density",
+  "material.young": "Young's modulus at the start",
+  "weights.frequency": "Weight of frequencies",
+  "weights.amplitude": "Weight of amplitudes",
+  "weights.regulariser": "Weight of roughness",
+  poisson: "Poisson's ratio",
+  fill: "Filling of voxels",
+  "material.law": "Law of the field",
+  "material.dimensions": "Dimensions of the field",
+  "material.young_bounds": "Bounds of the modulus",
+  "material.poisson_bounds": "Bounds of Poisson's ratio",
+  "damping.source": "Source of dampings",
+  "damping.regions": "Regions of loss factors",
+  "optimiser.fine_check": "Check on the fine solid",
+  "optimiser.evaluations": "Evaluations at most",
+  "optimiser.population": "Offspring of a generation",
+};
+
+/**
+ * Whether a page may show a setting: files are the server's own.
+ *
+ * @param {Schema} schema
+ */
+export function isShown(schema) {
+  const kinds = typesOf(schema);
+  return Boolean(schema.enum || schema.pattern) || !kinds.includes("string");
+}
+
+/**
+ * Makes the field of a setting.
+ *
+ * @param {string[]} path
+ * @param {Schema} schema
+ * @param {() => void} changed is told when somebody types
+ * @returns {Field}
+ */
+export function makeField(path, schema, changed) {
+  const frame = frameOf(path, schema);
+  const kinds = typesOf(schema);
+  if (schema.enum) return choiceField(frame, schema.enum, changed);
+  if (kinds.includes("boolean")) return switchField(frame, changed);
+  if (kinds.includes("array")) return pairField(frame, schema, changed);
+  return numberField(frame, schema, changed);
+}
+
+/**
+ * The range that a number may have, in words; empty if it has none.
+ *
+ * @param {Schema} schema
+ */
+export function boundsOf(schema) {
+  const low = schema.minimum ?? schema.exclusiveMinimum;
+  const high = schema.maximum ?? schema.exclusiveMaximum;
+  const parts = [];
+  if (low !== undefined) parts.push(`${schema.minimum === undefined ? "above" : "at least"} ${written(low)}`);
+  if (high !== undefined) parts.push(`${schema.maximum === undefined ? "below" : "at most"} ${written(high)}`);
+  return parts.join(", ");
+}
+
+/**
+ * Reads a number that somebody typed.
+ *
+ * @param {string} text
+ * @param {Schema} schema
+ * @param {string} name for the sentence
+ * @returns {number | string | null}
+ */
+export function readNumber(text, schema, name) {
+  const kinds = typesOf(schema);
+  const trimmed = text.trim();
+  const word = wordOf(schema);
+  if (trimmed === "" && kinds.includes("null")) return null;
+  if (word && trimmed === word) return word;
+  const expected = `expected ${kinds.includes("integer") ? "a whole number" : "a number"}`;
+  const bounds = boundsOf(schema);
+  const others = (word ? ` or ${word}` : "") + (kinds.includes("null") ? " or nothing" : "");
+  const wrong = () =>
+    new FieldError(`${name}: found ${trimmed || "nothing"}, ${expected}${bounds ? ` of ${bounds}` : ""}${others}.`);
+  if (!/^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(trimmed)) throw wrong();
+  const value = Number(trimmed);
+  const fits =
+    Number.isFinite(value) &&
+    (!kinds.includes("integer") || Number.isInteger(value)) &&
+    value >= (schema.minimum ?? -Infinity) &&
+    value <= (schema.maximum ?? Infinity) &&
+    value > (schema.exclusiveMinimum ?? -Infinity) &&
+    value < (schema.exclusiveMaximum ?? Infinity);
+  if (!fits) throw wrong();
+  return value;
+}
+
+/**
+ * @typedef {object} Frame what all fields have in common
+ * @property {string[]} path
+ * @property {string} name
+ * @property {string} control identifier of the control
+ * @property {string} describedBy
+ * @property {HTMLElement} element
+ * @property {HTMLElement} place of the control
+ * @property {(sentence: string) => void} complain
+ * @property {(changed: boolean) => void} mark
+ */
+
+/**
+ * @param {string[]} path
+ * @param {Schema} schema
+ * @returns {Frame}
+ */
+function frameOf(path, schema) {
+  const name = nameOf(path);
+  const [said, unit] = divided(schema.description ?? "");
+  const control = identifier("field");
+  const help = identifier("help");
+  const error = identifier("error");
+  const bounds = typesOf(schema).includes("array") ? "" : boundsOf(schema);
+  const facts = [bounds && `${sentence(bounds)}.`, `Default: ${shown(schema.default, schema)}.`];
+  const place = make("div", { class: "field-control" });
+  const mistake = make("p", { class: "field-error", id: error, hidden: true });
+  const isPair = typesOf(schema).includes("array");
+  const label = isPair
+    ? make("span", { class: "field-label", id: `${control}-label` }, name)
+    : make("label", { class: "field-label", for: control }, name);
+  if (unit && unit !== "1") label.append(make("span", { class: "field-unit" }, ` [${unit}]`));
+  const element = make(
+    "div",
+    { class: "field", ...(isPair && { role: "group", "aria-labelledby": `${control}-label` }) },
+    label,
+    place,
+    make("p", { class: "field-help", id: help }, `${said}. ${facts.filter(Boolean).join(" ")}`),
+    mistake,
+  );
+  return {
+    path,
+    name,
+    control,
+    describedBy: `${error} ${help}`,
+    element,
+    place,
+    complain: (text) => {
+      setText(mistake, text);
+      mistake.hidden = text === "";
+      for (const input of place.querySelectorAll("input, select")) {
+        setAttribute(input, "aria-invalid", text ? "true" : null);
+      }
+    },
+    mark: (changed) => element.classList.toggle("field-changed", changed),
+  };
+}
+
+/**
+ * @param {Frame} frame
+ * @param {string[]} choices
+ * @param {() => void} changed
+ * @returns {Field}
+ */
+function choiceField(frame, choices, changed) {
+  const select = make(
+    "select",
+    { id: frame.control, "aria-describedby": frame.describedBy, onchange: changed },
+    ...choices.map((choice) => make("option", { value: choice }, choice)),
+  );
+  frame.place.append(select);
+  return {
+    ...frame,
+    read: () => select.value,
+    write: (value) => {
+      select.value = String(value);
+    },
+    focus: () => select.focus(),
+  };
+}
+
+/**
+ * @param {Frame} frame
+ * @param {() => void} changed
+ * @returns {Field}
+ */
+function switchField(frame, changed) {
+  const box = make("input", {
+    type: "checkbox",
+    id: frame.control,
+    "aria-describedby": frame.describedBy,
+    onchange: changed,
+  });
+  frame.place.append(box);
+  return {
+    ...frame,
+    read: () => box.checked,
+    write: (value) => {
+      box.checked = value === true;
+    },
+    focus: () => box.focus(),
+  };
+}
+
+/**
+ * @param {Frame} frame
+ * @param {Schema} schema
+ * @param {() => void} changed
+ * @returns {Field}
+ */
+function numberField(frame, schema, changed) {
+  const input = numberInput(frame, schema, changed, { id: frame.control });
+  frame.place.append(input);
+  return {
+    ...frame,
+    read: () => readNumber(input.value, schema, frame.name),
+    write: (value) => {
+      input.value = written(value);
+    },
+    focus: () => input.focus(),
+  };
+}
+
+/**
+ * Two numbers, the lower one first, or none.
+ *
+ * @param {Frame} frame
+ * @param {Schema} schema
+ * @param {() => void} changed
+ * @returns {Field}
+ */
+function pairField(frame, schema, changed) {
+  const item = schema.items ?? {};
+  const low = numberInput(frame, item, changed, { "aria-label": `${frame.name}, lowest`, placeholder: "lowest" });
+  const high = numberInput(frame, item, changed, { "aria-label": `${frame.name}, highest`, placeholder: "highest" });
+  frame.place.append(low, make("span", { "aria-hidden": "true" }, "to"), high);
+  return {
+    ...frame,
+    read: () => {
+      if (low.value.trim() === "" && high.value.trim() === "") return null;
+      const pair = [low, high].map((input) => readNumber(input.value, item, frame.name));
+      if (!(Number(pair[0]) < Number(pair[1]))) {
+        throw new FieldError(`${frame.name}: found ${written(pair[0])} to ${written(pair[1])}, expected the lower one first.`);
+      }
+      return pair;
+    },
+    write: (value) => {
+      const pair = Array.isArray(value) ? value : [null, null];
+      low.value = written(pair[0]);
+      high.value = written(pair[1]);
+    },
+    focus: () => low.focus(),
+  };
+}
+
+/**
+ * @param {Frame} frame
+ * @param {Schema} schema
+ * @param {() => void} changed
+ * @param {Record<string, unknown>} attributes
+ */
+function numberInput(frame, schema, changed, attributes) {
+  return make("input", {
+    type: "text",
+    inputmode: typesOf(schema).includes("integer") && !schema.pattern ? "numeric" : "text",
+    autocomplete: "off",
+    spellcheck: "false",
+    size: 9,
+    "aria-describedby": frame.describedBy,
+    oninput: changed,
+    ...attributes,
+  });
+}
+
+/** @param {string[]} path */
+export function nameOf(path) {
+  return NAMES[path.join(".")] ?? sentence((path[path.length - 1] ?? "").replaceAll("_", " "));
+}
+
+/**
+ * A description without the unit at its end, and the unit.
+ *
+ * @param {string} description
+ * @returns {[string, string | null]}
+ */
+function divided(description) {
+  const found = /^(.*?)\s*\[([^\]]+)\]$/s.exec(description.trim());
+  return found ? [found[1] ?? "", found[2] ?? null] : [description.trim(), null];
+}
+
+/** @param {Schema} schema */
+function typesOf(schema) {
+  if (schema.type === undefined) return [];
+  return Array.isArray(schema.type) ? schema.type : [schema.type];
+}
+
+/** @param {Schema} schema */
+function wordOf(schema) {
+  return schema.pattern ? schema.pattern.replace(/^\^/, "").replace(/(\\Z|\$)$/, "") : null;
+}
+
+/** @param {string} text */
+function sentence(text) {
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}
+
+/**
+ * @param {unknown} value
+ * @param {Schema} schema
+ */
+function shown(value, schema) {
+  if (value === null || value === undefined) return "nothing";
+  if (typesOf(schema).includes("boolean")) return value ? "on" : "off";
+  return Array.isArray(value) ? value.map(written).join(" to ") : written(value);
+}
+
+/**
+ * A number as it is typed; those that are long with an exponent.
+ *
+ * @param {unknown} value
+ */
+function written(value) {
+  if (value === null || value === undefined) return "";
+  if (typeof value !== "number") return String(value);
+  const size = Math.abs(value);
+  const isLong = size !== 0 && (size >= 1e6 || size < 1e-3);
+  return isLong ? value.toExponential().replace("e+", "e") : String(value);
+}

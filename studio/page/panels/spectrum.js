@@ -1,0 +1,172 @@
+/** The spectrum at the selected target: what is wanted against what the solid has now. */
+
+import { chosenTarget } from "./chosen.js";
+import { make, setAttribute, setText } from "./dom.js";
+import { makeLegend } from "./legend.js";
+import { fixed, withHertz } from "./numbers.js";
+import { levelDifference, pairsOf } from "./pairs.js";
+import {
+  axis,
+  colour,
+  drawRing,
+  drawStems,
+  hertzAxis,
+  hertzRange,
+  joinPairs,
+  makePlot,
+  nearestMark,
+} from "./plots.js";
+
+/** @typedef {import("./pairs.js").Pair} Pair */
+/** @typedef {import("./plots.js").Mark} Mark */
+
+const HEIGHT = 240;
+const LOWEST_DECIBELS = -60;
+
+/**
+ * Makes the plot of both spectra.
+ *
+ * @param {HTMLElement} element
+ * @param {import("../main.js").Parts} parts
+ */
+export function makeSpectrum(element, parts) {
+  const { connection, state, selection } = parts;
+  /** @type {[any, any] | null} */
+  let bank = null;
+  /** @type {Pair[]} */
+  let pairs = [];
+  /** @type {import("uplot") | null} */
+  let plot = null;
+
+  const none = make("p", { class: "hint" }, "Open a solid and add a target to see its spectrum.");
+  const caption = make("p", { class: "hint" });
+  const picture = make("div", { class: "plot", role: "img" });
+  const readout = make("p", { class: "readout" });
+  const body = make(
+    "div",
+    { hidden: true },
+    caption,
+    makeLegend([
+      { sign: "disc", text: "wanted", kind: "wanted" },
+      { sign: "diamond", text: "now", kind: "now" },
+    ]),
+    picture,
+    readout,
+  );
+  element.append(none, body);
+
+  function show() {
+    const target = chosenTarget(parts);
+    pairs = bank ? pairsOf(bank[0], bank[1], state.current, target?.name ?? null) : [];
+    const isThere = pairs.length > 0 && pairs.some((pair) => pair.decibels !== null);
+    none.hidden = isThere;
+    body.hidden = !isThere;
+    if (!isThere) return;
+    setText(caption, `At ${target?.name}; levels below the loudest mode there.`);
+    const hertz = [...new Set([...pairs.map((pair) => pair.hertz), ...pairs.flatMap(wantedHertz)])];
+    hertz.sort((one, other) => one - other);
+    plot ??= create();
+    // Marks are drawn by hand: what uPlot gets only says how wide its axis is.
+    plot.setData([hertz, hertz.map(() => null)], true);
+    setAttribute(picture, "aria-label", summary(target?.name ?? ""));
+    showMode();
+  }
+
+  function create() {
+    return makePlot(
+      picture,
+      HEIGHT,
+      {
+        scales: {
+          x: { time: false, distr: 3, range: (one) => hertzRange(Array.from(one.data[0])) },
+          y: { range: [LOWEST_DECIBELS, 4] },
+        },
+        axes: [hertzAxis(), axis("Level [dB]", { size: 42 })],
+        series: [{}, { show: true }],
+        cursor: { y: false },
+        hooks: {
+          draw: [draw],
+          setCursor: [
+            (one) => {
+              const near = nearestMark(one, pairs.flatMap((pair) => [markOf(pair), wantedMark(pair) ?? undefined]));
+              selection.set({ mode: near === null ? null : (pairs[near >> 1]?.mode ?? null) });
+            },
+          ],
+        },
+      },
+      [[100, 1000], [null, null]],
+    );
+  }
+
+  /** @param {import("uplot")} one */
+  function draw(one) {
+    const wanted = pairs.filter((pair) => wantedMark(pair) !== null);
+    const wantedMarks = wanted.map((pair) => /** @type {Mark} */ (wantedMark(pair)));
+    joinPairs(one, wantedMarks, wanted.map(markOf), colour("--plot-pair"));
+    drawStems(one, wantedMarks, "disc", colour("--wanted"));
+    drawStems(one, pairs.map(markOf), "diamond", colour("--now"));
+    const chosen = pairs.find((pair) => pair.mode === selection.current.mode);
+    if (chosen) drawRing(one, markOf(chosen));
+  }
+
+  function showMode() {
+    const chosen = pairs.find((pair) => pair.mode === selection.current.mode);
+    setText(readout, chosen ? spoken(chosen) : "Point at a mode to read it.");
+    plot?.redraw(false);
+  }
+
+  /** @param {string} target */
+  function summary(target) {
+    const wanted = pairs.filter((pair) => pair.wantedHertz !== null);
+    const first = `Spectrum at ${target}: ${pairs.length} modes of the solid from ${range(pairs.map((pair) => pair.hertz))}`;
+    if (wanted.length === 0) return `${first}; none is wanted yet.`;
+    return `${first}, ${wanted.length} wanted from ${range(wanted.flatMap(wantedHertz))}. The table of errors has the numbers.`;
+  }
+
+  connection.onBinary("bank", (header, arrays) => {
+    bank = [header, arrays];
+    show();
+  });
+  state.onChange((now, before) => {
+    if (!now.solid) bank = null;
+    if (!before || now.wanted !== before.wanted || now.targets !== before.targets) show();
+  });
+  selection.onChange((now, before) => {
+    if (now.target !== before.target) show();
+    else if (now.mode !== before.mode) showMode();
+  });
+}
+
+/**
+ * A mode in a sentence.
+ *
+ * @param {Pair} pair
+ */
+function spoken(pair) {
+  const start = `Mode ${pair.mode + 1}: ${withHertz(pair.hertz)}, ${fixed(pair.decibels, 1)} dB`;
+  if (pair.wantedHertz === null) return `${start}.`;
+  const level = levelDifference(pair);
+  const more = level === null ? "" : `, ${fixed(level, 1, true)} dB`;
+  return `${start}; wanted ${withHertz(pair.wantedHertz)}: ${fixed(pair.cents, 1, true)} cents${more}.`;
+}
+
+/** @param {Pair} pair @returns {Mark} */
+function markOf(pair) {
+  return { hertz: pair.hertz, decibels: pair.decibels ?? LOWEST_DECIBELS };
+}
+
+/** @param {Pair} pair @returns {Mark | null} */
+function wantedMark(pair) {
+  if (pair.wantedHertz === null) return null;
+  return { hertz: pair.wantedHertz, decibels: pair.wantedDecibels ?? LOWEST_DECIBELS };
+}
+
+/** @param {Pair} pair @returns {number[]} */
+function wantedHertz(pair) {
+  return pair.wantedHertz === null ? [] : [pair.wantedHertz];
+}
+
+/** @param {number[]} hertz */
+function range(hertz) {
+  return `${withHertz(Math.min(...hertz))} to ${withHertz(Math.max(...hertz))}`;
+}
