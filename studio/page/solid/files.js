@@ -1,0 +1,109 @@
+/** Files that come to the page: meshes and clips, dropped or chosen. */
+
+/** @typedef {import("../main.js").Parts} Parts */
+
+/**
+ * Metres per unit of a file, and what people call it.
+ *
+ * @type {[number, string][]}
+ */
+export const UNITS = [
+  [1, "1 m"],
+  [0.01, "1 cm"],
+  [0.001, "1 mm"],
+  [0.0254, "1 inch"],
+];
+
+const CLIPS = /\.(wav|wave|flac|ogg|oga|aif|aiff|mp3)$/i;
+const MESHES = /\.(obj|stl|ply|off|glb|gltf|3mf|dae|msh)$/i;
+
+/** @param {File} file @returns {"mesh" | "clip" | null} what it is taken for */
+export function kindOf(file) {
+  if (CLIPS.test(file.name) || file.type.startsWith("audio/")) return "clip";
+  if (MESHES.test(file.name) || file.type.startsWith("model/")) return "mesh";
+  return null;
+}
+
+/**
+ * Sends a mesh and opens it.
+ *
+ * @param {Parts} parts
+ * @param {File} file
+ * @param {number} unit metres per unit of the file
+ * @returns {Promise<void>}
+ */
+export async function openMesh({ connection, say }, file, unit) {
+  try {
+    say(`Sending ${file.name}.`);
+    const mesh = await connection.upload("mesh", file.name, file);
+    await connection.call("open_mesh", { mesh, unit });
+  } catch (error) {
+    say(/** @type {Error} */ (error).message, "error");
+  }
+}
+
+/**
+ * Sends a clip and gives it to a target: a new one at a vertex, or the selected one.
+ *
+ * @param {Parts} parts
+ * @param {File} file
+ * @param {number | null} vertex of a new target
+ * @returns {Promise<void>}
+ */
+export async function takeClip({ connection, selection, say }, file, vertex) {
+  const target = selection.current.target;
+  if (vertex === null && target === null) {
+    say(`${file.name} needs a target: drop it on the solid, where it was struck.`, "error");
+    return;
+  }
+  try {
+    say(`Sending ${file.name}.`);
+    const clip = await connection.upload("clip", file.name, file);
+    if (vertex !== null) await connection.call("add_target", { vertex, clip });
+    else await connection.call("change_target", { target, clip });
+  } catch (error) {
+    say(/** @type {Error} */ (error).message, "error");
+  }
+}
+
+/**
+ * Takes what is dropped on the page.
+ *
+ * @param {Parts} parts
+ * @param {HTMLElement} solid where a clip becomes a target
+ * @param {(x: number, y: number) => number | null} vertexAt which vertex is at pixels of the page
+ * @param {(vertex: number | null) => void} hover told where a clip would become a target
+ */
+export function acceptDrops(parts, solid, vertexAt, hover) {
+  /** @param {DragEvent} event @returns {boolean} */
+  const carriesFiles = (event) => event.dataTransfer?.types.includes("Files") ?? false;
+  /** @param {DragEvent} event @returns {number | null} */
+  const under = (event) =>
+    event.target instanceof Node && solid.contains(event.target) ? vertexAt(event.clientX, event.clientY) : null;
+  const end = () => {
+    delete document.body.dataset.dropping;
+    hover(null);
+  };
+  document.addEventListener("dragover", (event) => {
+    if (!carriesFiles(event)) return;
+    event.preventDefault();
+    document.body.dataset.dropping = "";
+    hover(under(event));
+  });
+  document.addEventListener("dragleave", (event) => {
+    if (event.relatedTarget === null) end();
+  });
+  document.addEventListener("drop", (event) => {
+    if (!carriesFiles(event)) return;
+    event.preventDefault(); // or the browser would leave the page for the file
+    const vertex = under(event);
+    end();
+    const files = [...(event.dataTransfer?.files ?? [])];
+    for (const file of files) {
+      const kind = kindOf(file);
+      if (kind === "mesh") openMesh(parts, file, 1);
+      else if (kind === "clip") takeClip(parts, file, files.length === 1 ? vertex : (vertex ?? null));
+      else parts.say(`${file.name}: expected a mesh (obj, stl, ply, ...) or a clip (wav, flac, ...).`, "error");
+    }
+  });
+}

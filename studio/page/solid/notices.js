@@ -1,0 +1,76 @@
+/** What lies over the view: how far preparation is, what failed, what to do with an empty page. */
+
+import { fillChooser } from "./chooser.js";
+
+/** @typedef {import("../main.js").Parts} Parts */
+/** @typedef {import("../types.js").State} State */
+
+/** @type {Record<string, string>} */
+const PHASES = {
+  reading: "Reading the solid",
+  preparing: "Preparing the solid: it becomes voxels, then its modes are computed",
+};
+
+/**
+ * @param {HTMLElement} element
+ * @param {Parts} parts
+ * @returns {{graphics: (sentence: string | null) => void}} tells what keeps the solid from being drawn
+ */
+export function makeNotices(element, parts) {
+  element.className = "notices";
+  element.innerHTML = `
+    <div class="empty" hidden>
+      <h2>Design what a solid sounds like</h2>
+      <p>Open a solid, strike it anywhere and hear it. Put clips where they were struck, press optimise,
+        and its material comes to sound like them.</p>
+      <div class="chooser"></div>
+    </div>
+    <div class="notice progress" hidden>
+      <p id="progress-says" role="status"></p>
+      <progress aria-labelledby="progress-says"></progress>
+    </div>
+    <div class="notice fault" role="alert" hidden>
+      <p></p>
+      <button type="button">Open another solid</button>
+    </div>
+    <div class="notice graphics" role="alert" hidden><p></p></div>`;
+  /** @param {string} selector @returns {HTMLElement} */
+  const part = (selector) => /** @type {HTMLElement} */ (element.querySelector(selector));
+  const [empty, progress, fault, graphics] = [".empty", ".progress", ".fault", ".graphics"].map(part);
+  const bar = /** @type {HTMLProgressElement} */ (element.querySelector("progress"));
+  part(".fault button").onclick = () => parts.view?.openChooser();
+
+  /** What the chooser offers; it is made anew only when this changes, for the sake of the focus. */
+  let offered = "";
+  /** @param {State} now */
+  const show = (now) => {
+    const { solid } = now;
+    empty.hidden = solid !== null;
+    const offers = JSON.stringify([now.builtins, now.examples, now.projects]);
+    if (!solid && offers !== offered) {
+      offered = offers;
+      fillChooser(part(".empty .chooser"), parts, () => parts.say("Opening."));
+    }
+    const underway = solid !== null && solid.phase in PHASES;
+    progress.hidden = !underway;
+    if (solid && underway) {
+      const says = solid.message ?? PHASES[solid.phase];
+      if (part("#progress-says").textContent !== says) part("#progress-says").textContent = says;
+      if (solid.progress === null) bar.removeAttribute("value");
+      else bar.value = solid.progress;
+    }
+    fault.hidden = solid?.phase !== "failed";
+    if (solid?.phase === "failed") {
+      const says = solid.message ?? "The solid could not be prepared: try another one.";
+      if (part(".fault p").textContent !== says) part(".fault p").textContent = says;
+    }
+  };
+  parts.state.onChange(show);
+
+  return {
+    graphics(sentence) {
+      graphics.hidden = sentence === null;
+      part(".graphics p").textContent = sentence ?? "";
+    },
+  };
+}
