@@ -1,18 +1,23 @@
 /**
  * Makes the parts of the page and hands them to each other.
  *
- * Every part is made by one function `makeX(element, parts)`; parts of sound have no element and are made
- * by `makeX(parts)`. Parts know the others by `parts` alone, when they are used, not when they are made.
+ * Every part is made by one function: `makeX(element, parts)` of what is seen. Parts know the others by
+ * `parts` alone, which they ask when they need them: some are made later. Parts of sound know nothing of all
+ * this, as a page without a server uses them, too.
  */
 
 import { Connection } from "./connection.js";
 import { makeHeader } from "./header.js";
 import { Keys } from "./keys.js";
+import { makeSolid } from "./solid/solid.js";
+import { makeBank } from "./sound/bank.js";
+import { makeNoise } from "./sound/noise.js";
+import { makePlayer } from "./sound/player.js";
+import { makeRecorder } from "./sound/recorder.js";
 import { Selection, ServerState } from "./state.js";
 
 /**
- * `say` tells a sentence to the person: panels/messages.js shows it. `bank`, `player` and `recorder` are of
- * sound/, `view` is of solid/.
+ * `say` tells a sentence to the person: panels/messages.js shows it.
  *
  * @typedef {object} Parts
  * @property {Connection} connection
@@ -21,10 +26,10 @@ import { Selection, ServerState } from "./state.js";
  * @property {Keys} keys
  * @property {(text: string, kind?: "note" | "error") => void} say
  * @property {import("./sound/bank.js").Bank} bank
+ * @property {import("./sound/noise.js").Noise} noise
  * @property {import("./sound/player.js").Player} player
  * @property {import("./sound/recorder.js").Recorder} recorder
- * @property {import("./sound/noise.js").Noise} noise
- * @property {any} view
+ * @property {import("./solid/solid.js").Solid | null} view null until it is made
  * @property {any} tour
  * @property {any} shortcuts
  */
@@ -41,13 +46,6 @@ const PANELS = {
   compare: ["panels/compare.js", "makeCompare", "#panel-compare .panel-body"],
   shortcuts: ["panels/shortcuts.js", "makeShortcuts", "#shortcuts"],
   tour: ["panels/tour.js", "makeTour", "#tour"],
-};
-
-const SOUNDS = {
-  bank: ["sound/bank.js", "makeBank"],
-  player: ["sound/player.js", "makePlayer"],
-  recorder: ["sound/recorder.js", "makeRecorder"],
-  noise: ["sound/noise.js", "makeNoise"],
 };
 
 /**
@@ -74,12 +72,26 @@ function place(selector) {
   return element;
 }
 
+/**
+ * Parts of sound, fed by the server.
+ *
+ * @param {Connection} connection
+ * @param {ServerState} state
+ * @param {(vertex: number) => ArrayLike<number> | null} positionOf of a vertex [m]
+ */
+function makeSounds(connection, state, positionOf) {
+  const bank = makeBank();
+  const noise = makeNoise({ bank, positionOf });
+  connection.onBinary("bank", (header, arrays) => bank.take(header, /** @type {any} */ (arrays)));
+  state.onChange((now) => noise.follow(now));
+  return { bank, noise, player: makePlayer(bank), recorder: makeRecorder() };
+}
+
 async function main() {
   const connection = new Connection();
   const state = new ServerState(connection);
   const selection = new Selection();
   selection.follow(state);
-  const later = /** @type {any} */ (null);
   /** @type {Parts} */
   const parts = {
     connection,
@@ -87,20 +99,14 @@ async function main() {
     selection,
     keys: new Keys(),
     say: (text, kind = "note") => connection.listeners.tell("event said", { text, kind }),
-    bank: later,
-    player: later,
-    recorder: later,
-    noise: later,
+    ...makeSounds(connection, state, (vertex) => parts.view?.positionOf(vertex) ?? null),
     view: null,
     tour: null,
     shortcuts: null,
   };
   Object.assign(window, { studio: parts });
   makeHeader(place(".bar"), parts);
-  for (const [part, [path, name]] of Object.entries(SOUNDS)) {
-    Object.assign(parts, { [part]: await made(path, name, parts) });
-  }
-  parts.view = await made("solid/solid.js", "makeSolid", place("#view"), parts);
+  parts.view = makeSolid(place("#view"), parts);
   for (const [part, [path, name, selector]] of Object.entries(PANELS)) {
     const panel = await made(path, name, place(selector), parts);
     if (part === "tour" || part === "shortcuts") parts[part] = panel;

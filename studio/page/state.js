@@ -52,7 +52,9 @@ export class ServerState extends Observed {
    */
   onChange(wanted) {
     /** @type {(now: State | null, before: State | null) => void} */
-    const told = (now, before) => now && wanted(now, before);
+    const told = (now, before) => {
+      if (now) wanted(now, before);
+    };
     this.functions.add(told);
     if (this.current) wanted(this.current, null);
     return () => this.functions.delete(told);

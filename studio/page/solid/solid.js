@@ -147,7 +147,7 @@ export class Solid {
       say(NO_BANK);
       return;
     }
-    bank?.strike(vertex, strength);
+    bank.strike(vertex, strength);
     selection.set({ vertex });
     this.drawing?.wave(vertex, strength);
   }
@@ -171,6 +171,11 @@ export class Solid {
    */
   project(vertex) {
     return this.drawing?.project(vertex) ?? null;
+  }
+
+  /** @param {number} vertex @returns {ArrayLike<number> | null} where it is [m] */
+  positionOf(vertex) {
+    return this.drawing?.surface?.at(vertex).toArray() ?? null;
   }
 
   /** @param {number} x pixels of the page @param {number} y @returns {number | null} the vertex there */
