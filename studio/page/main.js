@@ -1,9 +1,8 @@
 /**
  * Makes the parts of the page and hands them to each other.
  *
- * Every part is made by one function: `makeX(element, parts)` of what is seen. Parts know the others by
- * `parts` alone, which they ask when they need them: some are made later. Parts of sound know nothing of all
- * this, as a page without a server uses them, too.
+ * Every part is made by one function, `makeX(element, parts)` of what is seen and `makeX(parts)` of what is
+ * heard. Parts ask `parts` for others when they need them, since some are made later.
  */
 
 import { Connection } from "./connection.js";
@@ -72,26 +71,12 @@ function place(selector) {
   return element;
 }
 
-/**
- * Parts of sound, fed by the server.
- *
- * @param {Connection} connection
- * @param {ServerState} state
- * @param {(vertex: number) => ArrayLike<number> | null} positionOf of a vertex [m]
- */
-function makeSounds(connection, state, positionOf) {
-  const bank = makeBank();
-  const noise = makeNoise({ bank, positionOf });
-  connection.onBinary("bank", (header, arrays) => bank.take(header, /** @type {any} */ (arrays)));
-  state.onChange((now) => noise.follow(now));
-  return { bank, noise, player: makePlayer(bank), recorder: makeRecorder() };
-}
-
 async function main() {
   const connection = new Connection();
   const state = new ServerState(connection);
   const selection = new Selection();
   selection.follow(state);
+  const bank = makeBank({ connection });
   /** @type {Parts} */
   const parts = {
     connection,
@@ -99,7 +84,10 @@ async function main() {
     selection,
     keys: new Keys(),
     say: (text, kind = "note") => connection.listeners.tell("event said", { text, kind }),
-    ...makeSounds(connection, state, (vertex) => parts.view?.positionOf(vertex) ?? null),
+    bank,
+    player: makePlayer({ bank }),
+    recorder: makeRecorder(),
+    noise: makeNoise({ bank, state, connection }),
     view: null,
     tour: null,
     shortcuts: null,

@@ -173,11 +173,6 @@ export class Solid {
     return this.drawing?.project(vertex) ?? null;
   }
 
-  /** @param {number} vertex @returns {ArrayLike<number> | null} where it is [m] */
-  positionOf(vertex) {
-    return this.drawing?.surface?.at(vertex).toArray() ?? null;
-  }
-
   /** @param {number} x pixels of the page @param {number} y @returns {number | null} the vertex there */
   pick(x, y) {
     return this.drawing?.pick(x, y)?.vertex ?? null;
