@@ -52,7 +52,7 @@ export function makeClip(element, parts) {
         heading("Damping", "1/s"),
         heading("60 dB in", "s"),
         heading("Level", "dB"),
-        make("th", { scope: "col" }, "Alone"),
+        make("th", { scope: "col" }, make("span", { class: "hidden" }, "Hear it alone")),
       ),
     ),
     rows,
@@ -99,7 +99,7 @@ export function makeClip(element, parts) {
         }),
     });
     const figures = ["hertz", "damping", "decay", "level"].map((name) => make("td", { class: `number ${name}` }));
-    const sound = button("\u25b6", () => void playMode(mode), {
+    const sound = button("\u25b6\ufe0e", () => void playMode(mode), {
       class: "small",
       "aria-label": `${withHertz(mode.hertz)} alone`,
     });

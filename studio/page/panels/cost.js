@@ -75,7 +75,7 @@ export function makeCost(element, parts) {
       HEIGHT,
       {
         scales: {
-          x: { time: false, range: (_one, low, high) => [low, high > low ? high : low + 1] },
+          x: { time: false, range: (_one, _low, high) => [0, high > 0 ? high : 1] },
           y: { distr: 3, range: costRange },
         },
         axes: [

@@ -45,7 +45,7 @@ export function makeErrors(element, parts) {
         heading("Off", "cents"),
         heading("Off", "bark"),
         level,
-        make("th", { scope: "col" }, "Alone"),
+        make("th", { scope: "col" }, make("span", { class: "hidden" }, "Hear it alone")),
       ),
     ),
     rows,
@@ -83,7 +83,7 @@ export function makeErrors(element, parts) {
       make(
         "td",
         {},
-        button("\u25b6", () => soundAlone(alone === mode ? null : mode), {
+        button("\u25b6\ufe0e", () => soundAlone(alone === mode ? null : mode), {
           class: "small",
           onfocus: () => selection.set({ mode }),
           "aria-label": `Mode ${mode + 1} alone`,

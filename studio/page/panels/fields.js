@@ -153,6 +153,8 @@ function frameOf(path, schema) {
   const error = identifier("error");
   const bounds = typesOf(schema).includes("array") ? "" : boundsOf(schema);
   const facts = [bounds && `${sentence(bounds)}.`, `Default: ${shown(schema.default, schema)}.`];
+  // Files write null where a form has an empty field.
+  const meaning = said.replaceAll("if null", "if left empty");
   const place = make("div", { class: "field-control" });
   const mistake = make("p", { class: "field-error", id: error, hidden: true });
   const isPair = typesOf(schema).includes("array");
@@ -165,7 +167,7 @@ function frameOf(path, schema) {
     { class: "field", ...(isPair && { role: "group", "aria-labelledby": `${control}-label` }) },
     label,
     place,
-    make("p", { class: "field-help", id: help }, `${said}. ${facts.filter(Boolean).join(" ")}`),
+    make("p", { class: "field-help", id: help }, `${meaning}. ${facts.filter(Boolean).join(" ")}`),
     mistake,
   );
   return {
@@ -315,7 +317,8 @@ export function nameOf(path) {
  */
 function divided(description) {
   const found = /^(.*?)\s*\[([^\]]+)\]$/s.exec(description.trim());
-  return found ? [found[1] ?? "", found[2] ?? null] : [description.trim(), null];
+  if (!found) return [description.trim(), null];
+  return [found[1] ?? "", (found[2] ?? "").replace("^3", "\u00b3").replace("^2", "\u00b2")];
 }
 
 /** @param {Schema} schema */
@@ -339,20 +342,20 @@ function sentence(text) {
  * @param {Schema} schema
  */
 function shown(value, schema) {
-  if (value === null || value === undefined) return "nothing";
+  if (value === null || value === undefined) return "empty";
   if (typesOf(schema).includes("boolean")) return value ? "on" : "off";
   return Array.isArray(value) ? value.map(written).join(" to ") : written(value);
 }
 
 /**
- * A number as it is typed; those that are long with an exponent.
+ * A number as it is typed, with an exponent where that is shorter.
  *
  * @param {unknown} value
  */
 function written(value) {
   if (value === null || value === undefined) return "";
   if (typeof value !== "number") return String(value);
-  const size = Math.abs(value);
-  const isLong = size !== 0 && (size >= 1e6 || size < 1e-3);
-  return isLong ? value.toExponential().replace("e+", "e") : String(value);
+  const plain = String(value);
+  const short = value.toExponential().replace("e+", "e");
+  return plain.length > 6 && short.length < plain.length ? short : plain;
 }

@@ -7,6 +7,7 @@ import uPlot from "uplot";
 
 const FONT = "12px system-ui, sans-serif";
 const NEAR_PIXELS = 24;
+const LABEL_PIXELS = 30;
 
 /**
  * A colour of the page, or another custom property.
@@ -79,10 +80,54 @@ export function hertzAxis() {
   return axis("Frequency [Hz]", {
     scale: "x",
     size: 34,
-    space: 34,
+    splits: (_plot, _axis, low, high) => roundNumbers(low, high),
+    filter: labelled,
     values: (_plot, splits) =>
       splits.map((hertz) => (hertz === null ? "" : hertz >= 1000 ? `${hertz / 1000}k` : String(hertz))),
   });
+}
+
+/**
+ * All numbers of one significant digit between two others.
+ *
+ * @param {number} low
+ * @param {number} high
+ * @returns {number[]}
+ */
+function roundNumbers(low, high) {
+  const found = [];
+  for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power += 1) {
+    for (let digit = 1; digit < 10; digit += 1) {
+      const value = Number(`${digit}e${power}`);
+      if (value >= low && value <= high) found.push(value);
+    }
+  }
+  return found;
+}
+
+/**
+ * Leaves those numbers of an axis that have place for a label: of a decade 1, then 2 and 5, then all.
+ *
+ * @param {uPlot} plot
+ * @param {number[]} splits
+ * @returns {(number | null)[]}
+ */
+function labelled(plot, splits) {
+  const { min, max } = plot.scales.x ?? {};
+  if (!min || !max) return splits;
+  const pixels = plot.bbox.width / uPlot.pxRatio / Math.log10(max / min);
+  const [digits = "1"] = ["123456789", "12357", "125"].filter((each) => closest(each) * pixels > LABEL_PIXELS);
+  return splits.map((value) => (digits.includes(value.toExponential().charAt(0)) ? value : null));
+}
+
+/**
+ * The smallest distance of numbers with some first digits, as a share of a decade.
+ *
+ * @param {string} digits ascending
+ */
+function closest(digits) {
+  const values = [...digits, "10"].map(Number);
+  return Math.min(...values.slice(1).map((value, k) => Math.log10(value / (values[k] ?? 1))));
 }
 
 /**

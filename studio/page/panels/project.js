@@ -144,6 +144,7 @@ export function makeProject(element, parts) {
       stopping: message ?? "What was found last is being taken over.",
     };
     setText(searchState, said[phase]);
+    searchState.hidden = said[phase] === "";
   }
 
   state.onChange((now, before) => {

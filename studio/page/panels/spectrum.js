@@ -21,7 +21,7 @@ import {
 /** @typedef {import("./plots.js").Mark} Mark */
 
 const HEIGHT = 240;
-const LOWEST_DECIBELS = -60;
+const LOWEST_DECIBELS = -80;
 
 /**
  * Makes the plot of both spectra.
@@ -79,7 +79,7 @@ export function makeSpectrum(element, parts) {
       {
         scales: {
           x: { time: false, distr: 3, range: (one) => hertzRange(Array.from(one.data[0])) },
-          y: { range: [LOWEST_DECIBELS, 4] },
+          y: { range: () => [floorOf(pairs), 4] },
         },
         axes: [hertzAxis(), axis("Level [dB]", { size: 42 })],
         series: [{}, { show: true }],
@@ -135,6 +135,17 @@ export function makeSpectrum(element, parts) {
     if (now.target !== before.target) show();
     else if (now.mode !== before.mode) showMode();
   });
+}
+
+/**
+ * Where the axis of levels begins: in steps, so that it does not move with every improvement.
+ *
+ * @param {Pair[]} pairs
+ */
+function floorOf(pairs) {
+  const levels = pairs.flatMap((pair) => [pair.decibels, pair.wantedDecibels]).filter((level) => level !== null);
+  const least = Math.min(0, ...levels.filter((level) => level > LOWEST_DECIBELS));
+  return Math.max(LOWEST_DECIBELS, Math.min(-40, 20 * Math.floor((least - 5) / 20)));
 }
 
 /**
