@@ -132,6 +132,11 @@ export function makeBank(parts = {}, options = {}) {
   return {
     context,
     input,
+    /** Where all that sounds comes out; null before `ready`. */
+    get output() {
+      return node;
+    },
+
     /** Resolves when the processor is there, or failed to be. */
     ready,
 

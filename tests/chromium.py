@@ -1,0 +1,81 @@
+"""A browser and a server of files for tests of pages (test support)."""
+
+from __future__ import annotations
+
+import functools
+import http.server
+import shutil
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
+ARGUMENTS = (
+    "--no-sandbox",
+    "--enable-unsafe-swiftshader",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--autoplay-policy=no-user-gesture-required",
+    "--use-fake-device-for-media-stream",
+    "--use-fake-ui-for-media-stream",
+)
+BLANK = b"<!doctype html><html lang=en><title>test</title><link rel=icon href=data:,><body></body>"
+
+
+@contextmanager
+def chromium(*arguments: str) -> Iterator[Any]:
+    """A browser of playwright's; skips the test where there is none."""
+    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    program = next(filter(None, map(shutil.which, PROGRAMS)), None)
+    if program is None:
+        pytest.skip(f"no browser is installed, expected one of {', '.join(PROGRAMS)}")
+    with api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program, args=[*ARGUMENTS, *arguments])
+        try:
+            yield browser
+        finally:
+            browser.close()
+
+
+class _Files(http.server.SimpleHTTPRequestHandler):
+    """Files of the studio below /page/, files of a folder below /more/, an empty page at /."""
+
+    more: Path
+
+    def do_GET(self) -> None:
+        if self.path == "/":
+            self.send_response(200)
+            self.send_header("Content-Type", "text/html; charset=utf-8")
+            self.end_headers()
+            self.wfile.write(BLANK)
+        else:
+            super().do_GET()
+
+    def translate_path(self, path: str) -> str:
+        name = path.split("?")[0]
+        for begin, folder in (("/page/", CHECKOUT / "studio/page"), ("/more/", self.more)):
+            if name.startswith(begin):
+                return str(folder / name.removeprefix(begin))
+        return str(CHECKOUT / "nothing")
+
+    def log_message(self, *_: Any) -> None:
+        pass
+
+
+@contextmanager
+def served(more: Path) -> Iterator[str]:
+    """Address of a server of the page's modules, and of files of a folder."""
+    handler = type("Files", (_Files,), {"more": more})
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(handler))
+    thread = threading.Thread(target=server.serve_forever, daemon=True)
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}"
+    finally:
+        server.shutdown()
+        server.server_close()
