@@ -179,8 +179,8 @@ export class Gestures {
       this.view.move({ nearer: NEARER });
     } else if (event.key === "-") {
       this.view.move({ nearer: 1 / NEARER });
-    } else if (event.key === "0" || event.key === "Home") {
-      this.view.fit();
+    } else if (event.key === "Home") {
+      this.view.reset();
     } else if (event.key === " ") {
       if (!event.repeat) this.#middle();
     } else {
@@ -191,8 +191,8 @@ export class Gestures {
 
   /** What a press on the middle of the view does, where the cross is. */
   #middle() {
-    const box = this.view.canvas.getBoundingClientRect();
-    const picked = this.view.pick(box.left + box.width / 2, box.top + box.height / 2);
+    const { x, y } = this.view.middle();
+    const picked = this.view.pick(x, y);
     if (!picked) return;
     if (this.selection.current.tool === "place") this.deeds.place(picked.vertex);
     else this.deeds.strike(picked.vertex, this.selection.current.strength);

@@ -38,7 +38,7 @@ export function ticks([low, high]) {
  *     tells what the ends of the map stand for, `point` which modulus is under the pointer
  */
 export function makeLegend(element) {
-  element.className = "legend";
+  element.className = "stage-legend";
   element.hidden = true;
   element.innerHTML = `
     <p class="legend-title">Young's modulus [GPa] <output class="legend-value"></output></p>

@@ -11,6 +11,7 @@ import { Gestures } from "./gestures.js";
 import { makeLegend } from "./legend.js";
 import { Marks } from "./marks.js";
 import { makeNotices } from "./notices.js";
+import { makeSounding } from "./sounding.js";
 import { makeToolbar } from "./toolbar.js";
 import { View } from "./view.js";
 
@@ -43,9 +44,11 @@ export class Solid {
     const gauge = layer("gauge");
     gauge.hidden = true;
     gauge.ariaHidden = "true";
-    this.legend = makeLegend(layer("legend"));
-    const toolbar = layer("toolbar");
-    this.hint = layer("hint");
+    const bottom = layer("stage-bottom");
+    this.legend = makeLegend(bottom.appendChild(document.createElement("div")));
+    makeSounding(bottom.appendChild(document.createElement("div")), parts);
+    const toolbar = layer("stage-toolbar");
+    this.hint = layer("stage-hint");
     this.notices = makeNotices(layer("notices"), parts);
     this.openChooser = makeChooser(element, parts);
 
@@ -68,7 +71,13 @@ export class Solid {
     } catch (error) {
       this.notices.graphics(/** @type {Error} */ (error).message);
     }
-    if (this.drawing) this.#prepare(this.drawing, labels, gauge, toolbar);
+    if (this.drawing) {
+      const { drawing } = this;
+      drawing.margins = () => [toolbar.offsetHeight, bottom.offsetHeight];
+      const margins = new ResizeObserver(() => drawing.resize());
+      for (const part of [toolbar, bottom]) margins.observe(part);
+      this.#prepare(drawing, labels, gauge, toolbar);
+    }
     acceptDrops(
       parts,
       element,

@@ -9,7 +9,7 @@
  * @param {View} view
  */
 export function makeToolbar(element, { selection, keys }, view) {
-  element.className = "toolbar";
+  element.className = "stage-toolbar";
   element.setAttribute("role", "toolbar");
   element.setAttribute("aria-label", "Strike, place, look");
   element.innerHTML = `

@@ -14,6 +14,8 @@ const NO_GRAPHICS =
 // From the front, a little from the left and from above; z points up.
 const FROM = new THREE.Vector3(-0.45, -1, 0.55).normalize();
 const FIELD_DEGREES = 32;
+// Around the solid stays some of the view, as arrows stand out of it.
+const ROOM = 1.15;
 const NEITHER = /** @type {any} */ (-1);
 
 export class View {
@@ -63,6 +65,8 @@ export class View {
     this.picking = null;
     /** Called before each drawing. @type {Set<() => void>} */
     this.beforeDrawing = new Set();
+    /** Pixels at the top and at the bottom that something lies over. @type {() => [number, number]} */
+    this.margins = () => [0, 0];
     this.drawings = 0;
     this.lost = false;
     this.waiting = 0;
@@ -102,19 +106,20 @@ export class View {
     const alike =
       then && now.center.distanceTo(then.center) < 0.1 * now.radius && Math.abs(now.radius / then.radius - 1) < 0.1;
     // The fine solid and the coarse one are looked at from the same place.
-    if (!alike) this.fit();
+    if (!alike) this.reset();
     this.invalidate();
   }
 
-  /** Moves the camera to where it sees all of the solid. */
-  fit() {
+  /**
+   * Moves the camera to where it sees all of the solid.
+   *
+   * @param {THREE.Vector3} [from] unit vector towards the camera; it looks from where it did without
+   */
+  fit(from = this.camera.position.clone().sub(this.controls.target).normalize()) {
     if (!this.surface) return;
     const { center, radius } = this.surface.sphere;
-    const half = (this.camera.fov * Math.PI) / 360;
-    const narrow = Math.min(half, Math.atan(Math.tan(half) * this.camera.aspect));
-    const away = (1.05 * radius) / Math.sin(narrow);
     this.controls.target.copy(center);
-    this.camera.position.copy(center).addScaledVector(FROM, away);
+    this.camera.position.copy(center).addScaledVector(from, this.#distance(from));
     this.camera.near = radius / 50;
     this.camera.far = 60 * radius;
     this.controls.minDistance = 0.3 * radius;
@@ -123,6 +128,48 @@ export class View {
     this.controls.update();
     this.fitted = true;
     this.invalidate();
+  }
+
+  /** Looks at all of the solid from where it was seen first. */
+  reset() {
+    this.fit(FROM);
+  }
+
+  /** @param {THREE.Vector3} from unit vector towards the camera @returns {number} least distance that shows all [m] */
+  #distance(from) {
+    const surface = /** @type {Surface} */ (this.surface);
+    const { clientWidth: width, clientHeight: height } = this.element;
+    const [top, bottom] = this.#shift();
+    const slope = Math.tan((this.camera.fov * Math.PI) / 360) / height;
+    const steep = slope * Math.max(0.4 * height, height - top - bottom);
+    const wide = slope * width;
+    const right = new THREE.Vector3().crossVectors(this.camera.up, from).normalize();
+    const up = new THREE.Vector3().crossVectors(from, right);
+    const [point, { center, radius }] = [new THREE.Vector3(), surface.sphere];
+    let distance = 0.5 * radius;
+    for (let i = 0; i < surface.positions.length; i += 3) {
+      point.fromArray(surface.positions, i).sub(center);
+      const beside = Math.max(Math.abs(point.dot(right)) / wide, Math.abs(point.dot(up)) / steep);
+      distance = Math.max(distance, ROOM * beside + point.dot(from));
+    }
+    return distance;
+  }
+
+  /** @returns {[number, number]} the margins, between which the camera's middle now is */
+  #shift() {
+    const { clientWidth: width, clientHeight: height } = this.element;
+    const margins = this.margins();
+    const up = Math.round((margins[1] - margins[0]) / 2);
+    this.camera.setViewOffset(width, height, 0, up, width, height);
+    this.element.style.setProperty("--middle", `${height / 2 - up}px`);
+    return margins;
+  }
+
+  /** @returns {{x: number, y: number}} pixels of the page of what the camera looks at */
+  middle() {
+    const box = this.canvas.getBoundingClientRect();
+    const [top, bottom] = this.margins();
+    return { x: box.left + box.width / 2, y: box.top + (box.height + Math.round(top - bottom)) / 2 };
   }
 
   /** Lets the left button, or one finger, turn the solid or not, from the next press on. @param {boolean} turns */
@@ -205,7 +252,7 @@ export class View {
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
+    this.#shift();
     if (this.fitted) this.fit();
     this.invalidate();
   }
