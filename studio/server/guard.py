@@ -130,7 +130,11 @@ class Guard:
     def _is_entrance(self, scope: Scope) -> bool:
         if scope["path"] != "/" or scope["method"] != "GET":
             return False
-        given = parse_qs(scope["query_string"].decode("latin-1"), max_num_fields=8).get("token", [])
+        try:
+            words = parse_qs(scope["query_string"].decode("latin-1"), max_num_fields=8)
+        except ValueError:
+            return False
+        given = words.get("token", [])
         return len(given) == 1 and _same(given[0], self._keys.token)
 
     def _has_cookie(self, scope: Scope) -> bool:

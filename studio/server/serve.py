@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import signal
 import socket
 import threading
@@ -96,7 +97,16 @@ def serve(
     ready
         Called once requests are answered.
     """
-    limits = limits or Limits()
+    server = make_server(studio, listener, host, keys, limits or Limits())
+    with _ended_by_signals():
+        asyncio.run(serve_and_close(server, listener, studio, ready))
+
+
+def make_server(
+    studio: Studio, listener: socket.socket, host: str, keys: Keys, limits: Limits
+) -> uvicorn.Server:
+    """The server, which has not begun yet."""
+    logging.getLogger("uvicorn").setLevel(logging.ERROR)
     config = uvicorn.Config(
         make_app(studio, keys, host, listener.getsockname()[1], limits),
         http="h11",
@@ -112,16 +122,16 @@ def serve(
         ws_per_message_deflate=False,
         timeout_graceful_shutdown=ENDING_SECONDS,
     )
-    with _ended_by_signals():
-        asyncio.run(_serve_and_close(uvicorn.Server(config), listener, studio, ready))
+    return uvicorn.Server(config)
 
 
-async def _serve_and_close(
+async def serve_and_close(
     server: uvicorn.Server,
     listener: socket.socket,
     studio: Studio,
-    ready: Callable[[], None] | None,
+    ready: Callable[[], None] | None = None,
 ) -> None:
+    """Start the studio, serve until the server is told to end, and close the studio."""
     try:
         await studio.start()
         await _serve(server, listener, ready)
