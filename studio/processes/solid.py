@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from solver.response.response import Damping
 from sound.design.cents import common_factor
 from sound.design.descent import cost_of
 from sound.design.fine_check import FINE_TOLERANCE
+from sound.design.optimise import optimise
 from sound.design.pool import Setting
 from sound.design.preparation import (
     DesignProblem,
@@ -32,7 +33,8 @@ from sound.design.preparation import (
     prepared_solid,
 )
 from sound.design.simulation import Evaluation, Simulation
-from sound.project.design_file import read_design
+from sound.project.design import Design
+from sound.project.design_file import read_design, write_design
 from sound.project.project import MaterialSettings, Project
 from sound.strikes import Place, Strike, inward_normals, locate_all
 from sound.surface import longest_side, struck_surface
@@ -112,10 +114,14 @@ class SolidBench:
         """What a search needs, for its process."""
         return pickle.dumps(self._problem)
 
-    def converted(self, design: str) -> list[float]:
-        """Coordinates of a design's material, by the law and dimensions that hold now."""
+    def design(self, z: Sequence[float] | None, out: str) -> None:
+        """Write the design of a material that no search has written."""
         assert self._problem is not None
-        return coordinates_of(self._problem, read_design(design)).tolist()
+        project = self._problem.project
+        once = replace(project.optimiser, seconds=None, evaluations=1, workers=1)
+        problem = replace(self._problem, project=replace(project, optimiser=once))
+        at = None if z is None else np.asarray(z)
+        write_design(out, optimise(problem, coordinates=at))
 
     def bank(
         self,
@@ -141,8 +147,10 @@ class SolidBench:
         return self._bank(self._fine, z, header, None)
 
     def bank_of(self, design: str, header: dict[str, Any]) -> bytes:
-        """The bank of a design in a file, by its own modes."""
+        """The bank of a design in a file: by its own modes, if it is of the present targets."""
         found = read_design(design)
+        if not self._is_of_targets(found):
+            return self.bank(self._coordinates(found), header)
         sounding = self._sounding()
         heard = Heard(
             found.frequencies,
@@ -152,6 +160,25 @@ class SolidBench:
         )
         cost = {"cost": found.evidence["cost"]}
         return bank(heard, self._positions, self._aimed(), {**cost, **header})
+
+    def fine_bank_of(self, design: str, header: dict[str, Any]) -> bytes:
+        """The bank of a design's material on the solid that the coarse one stands for."""
+        return self.fine_bank(self._coordinates(read_design(design)), header)
+
+    def _is_of_targets(self, design: Design) -> bool:
+        if self._problem is None:
+            return False
+        wanted = self._problem.setting.objective.targets
+        return design.targets.names == wanted.names and np.array_equal(
+            design.targets.frequencies, wanted.frequencies
+        )
+
+    def _coordinates(self, design: Design) -> list[float] | None:
+        """Coordinates of a design's material, by the law and dimensions that hold now."""
+        if self._problem is not None:
+            return coordinates_of(self._problem, design).tolist()
+        own = design.coordinates
+        return own.tolist() if len(own) == self._prepared.material.dimensions else None
 
     def _bank(
         self,

@@ -1,0 +1,180 @@
+"""The solid in its process, kept as a document describes it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from carillon.errors import UserError
+from carillon.fem.geometry.surface import surface_name
+from sound.project.project import Project
+from sound.strikes import Place, Strike
+from studio.processes.worker import Worker
+from studio.session.document import Document, Target
+
+READ_SECONDS = 60.0
+"""That a mesh may take to be read."""
+PREPARED_SECONDS = 1800.0
+"""That a solid may take to be prepared: that of the finest resolution takes minutes."""
+
+
+@dataclass(frozen=True)
+class SolidNews:
+    """The solid as the page gets it, see docs/contributing/studio.md."""
+
+    mesh: str
+    name: str
+    phase: str
+    progress: float | None = None
+    message: str | None = None
+    surface: int | None = None
+    vertices: int | None = None
+    triangles: int | None = None
+    voxels: int | None = None
+    unknowns: int | None = None
+    longest_side_m: float | None = None
+
+
+class Bench:
+    """What is known of the solid, and its process.
+
+    Parameters
+    ----------
+    folder
+        That paths of documents begin at.
+    changed
+        Called when there is something else to be shown.
+
+    Attributes
+    ----------
+    news
+        What is shown of the solid; None if there is none.
+    surface
+        Its surface as a binary message, and the number of that.
+    strikes
+        Struck points, by the names of targets.
+    wanted
+        Modes that all clips share, if there are targets.
+    project
+        That the solid aims at, if there are targets.
+    """
+
+    def __init__(self, folder: Path, changed: Callable[[], None]) -> None:
+        self._folder, self._changed = folder, changed
+        self._worker = Worker("studio.processes.solid:SolidBench")
+        self._numbers = 0
+        self._forget()
+
+    def _forget(self) -> None:
+        self.news: SolidNews | None = None
+        self.surface: tuple[int, bytes] | None = None
+        self.strikes: dict[str, Strike] = {}
+        self.wanted: dict[str, Any] | None = None
+        self.project: Project | None = None
+        self._read: tuple[str, float] | None = None
+        self._prepared: Any = None
+        self._aimed: Any = None
+        self._placed: tuple[Target, ...] | None = None
+
+    @property
+    def aimed(self) -> Any:
+        """What the solid is, and what it aims at: another value whenever that changes."""
+        return (self._read, self._prepared, self._aimed)
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether the solid can be struck."""
+        return self.news is not None and self.news.phase == "ready"
+
+    def end(self) -> None:
+        """End the process, whatever it does."""
+        self._worker.end()
+        self._forget()
+
+    async def bring(self, document: Document, heard: Sequence[Target]) -> bool:
+        """Bring the solid to what a document describes; whether it sounds other than before.
+
+        Parameters
+        ----------
+        heard
+            Targets whose clips have been listened to.
+
+        Raises
+        ------
+        UserError
+            If it cannot be: the news then tell it, too.
+        """
+        if document.mesh is None:
+            self.end()
+            return False
+        if self._worker.pid is None:  # which knew all that was brought
+            self._forget()
+        try:
+            project = document.solid(self._folder)
+            solid, material = project.solid, project.material
+            await self._bring_surface(document.mesh, solid.mesh, solid.unit)
+            changed = await self._bring_voxels(solid, material)
+            await self._bring_strikes(document)
+            return await self._bring_aim(document, heard) or changed
+        except UserError as error:
+            self._tell(phase="failed", message=str(error), progress=None)
+            self._prepared = self._aimed = None
+            raise
+
+    async def ask(self, name: str, *arguments: Any) -> Any:
+        """Call the process, see `studio.processes.solid.SolidBench`."""
+        return await self._worker.call(name, *arguments)
+
+    async def _bring_surface(self, mesh: str, path: str, unit: float) -> None:
+        if self._read == (mesh, unit):
+            return
+        self._forget()
+        self.news = SolidNews(mesh, surface_name(mesh), "reading")
+        self._changed()
+        self._numbers += 1
+        found = await self._worker.call("read", path, unit, self._numbers, seconds=READ_SECONDS)
+        self.surface, self._read = (self._numbers, found.message), (mesh, unit)
+        self._tell(
+            surface=self._numbers,
+            vertices=found.vertices,
+            triangles=found.triangles,
+            longest_side_m=found.longest_side_m,
+        )
+
+    async def _bring_voxels(self, solid: Any, material: Any) -> bool:
+        if self._prepared == (solid, material):
+            return False
+        self._aimed = self._placed = None
+        self.project = self.wanted = None
+        self._tell(phase="preparing", message=None)
+        found = await self._worker.call("prepare", solid, material, seconds=PREPARED_SECONDS)
+        self._prepared = (solid, material)
+        self._tell(phase="ready", message=None, progress=None, **found)
+        return True
+
+    async def _bring_strikes(self, document: Document) -> None:
+        if self._placed == document.targets:
+            return
+        places = [Place(each.name, each.at, each.vertex) for each in document.targets]
+        strikes = await self._worker.call("place", places) if places else []
+        self.strikes = {strike.name: strike for strike in strikes}
+        self._placed = document.targets
+        self._changed()
+
+    async def _bring_aim(self, document: Document, heard: Sequence[Target]) -> bool:
+        project = None
+        if heard:
+            project = replace(document, targets=tuple(heard)).project(self._folder)
+        if self._aimed == (project,):
+            return False
+        self.wanted = await self._worker.call("aim", project)
+        self.project, self._aimed = project, (project,)
+        self._changed()
+        return True
+
+    def _tell(self, **changes: Any) -> None:
+        if self.news is not None:
+            self.news = replace(self.news, **changes)
+            self._changed()

@@ -1,0 +1,189 @@
+"""What is designed, as one immutable value: snapshots of it are what undo goes back to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from carillon.errors import UserError
+from carillon.fem.geometry.surface import BUILTIN_PREFIX
+from sound.project.project import Project, project_of
+
+NO_CLIP = "none"
+_ANYWHERE = {"name": "anywhere", "vertex": 0, "clip": NO_CLIP}
+"""Stands for targets where a solid has none yet."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """A struck point and its clip; keys of a project's target, but the clip may be lacking yet."""
+
+    name: str
+    vertex: int | None = None
+    at: tuple[float, float, float] | None = None
+    clip: str | None = None
+    modes: int | None = None
+    allow_clipped: bool = False
+    without: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Material:
+    """A material by its coordinates, and the file of its design if there is one."""
+
+    z: tuple[float, ...]
+    design: str | None = None
+
+
+@dataclass(frozen=True)
+class Document:
+    """A project under way.
+
+    Attributes
+    ----------
+    settings
+        Keys of a project but `targets`, as its file has them: paths from the workspace's folder.
+        Empty while there is no mesh.
+    targets
+        Struck points.
+    material
+        The present one; None is the uniform one.
+    kept
+        The other one of A and B, if one was kept.
+    """
+
+    settings: Mapping[str, Any]
+    targets: tuple[Target, ...] = ()
+    material: Material | None = None
+    kept: Material | None = None
+
+    @property
+    def mesh(self) -> str | None:
+        """As in the project: `builtin:NAME`, or a path."""
+        mesh: str | None = self.settings.get("mesh")
+        return mesh
+
+    def target(self, name: str) -> Target:
+        """The target of a name.
+
+        Raises
+        ------
+        UserError
+            If there is none.
+        """
+        for target in self.targets:
+            if target.name == name:
+                return target
+        raise UserError(f"there is no target {name!r}; it may have been removed or renamed")
+
+    def with_target(self, name: str, changed: Target | None) -> Document:
+        """The same with another target in the place of `name`, or without it."""
+        self.target(name)
+        targets = [changed if each.name == name else each for each in self.targets]
+        return replace(self, targets=tuple(each for each in targets if each is not None))
+
+    def described(self) -> dict[str, Any]:
+        """The project as its file has it: targets without a clip are left out."""
+        targets = [_described(target) for target in self.targets if target.clip is not None]
+        return {**self.settings, "targets": targets}
+
+    def project(self, folder: Path) -> Project:
+        """The project, in a workspace's folder.
+
+        Raises
+        ------
+        UserError
+            With one sentence about the first thing that is wrong, if only that there is no clip.
+        """
+        return project_of(self.described(), folder)
+
+    def solid(self, folder: Path) -> Project:
+        """The project with a target that stands for those that it may have; errors likewise."""
+        return project_of({**self.settings, "targets": [_ANYWHERE]}, folder)
+
+    def require_sound(self, folder: Path) -> Document:
+        """The same, if it can be a project once every target has a clip.
+
+        Raises
+        ------
+        UserError
+            With one sentence about the first thing that is wrong.
+        """
+        named = [replace(target, clip=target.clip or NO_CLIP) for target in self.targets]
+        targets = [_described(target) for target in named] or [_ANYWHERE]
+        project_of({**self.settings, "targets": targets}, folder)
+        names = [target.name for target in self.targets]
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise UserError(f"there is a target {twice!r} already; give this one another name")
+        return self
+
+
+def document_of(described: Mapping[str, Any]) -> Document:
+    """The document that the keys and values of a project's file describe."""
+    settings = {key: value for key, value in described.items() if key != "targets"}
+    targets = []
+    for entry in described["targets"]:
+        known = {key: entry[key] for key in Target.__dataclass_fields__ if key in entry}
+        if known.get("at") is not None:
+            known["at"] = tuple(known["at"])
+        known["without"] = tuple(known.get("without", ()))
+        targets.append(Target(**known))
+    return Document(settings, tuple(targets))
+
+
+def merged(settings: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings with others on top, section by section.
+
+    Examples
+    --------
+    >>> merged({"weights": {"frequency": 1.0}}, {"weights": {"amplitude": 2.0}, "modes": 8})
+    {'weights': {'frequency': 1.0, 'amplitude': 2.0}, 'modes': 8}
+    """
+    result = dict(settings)
+    for key, value in changes.items():
+        known = result.get(key)
+        both = isinstance(value, Mapping) and isinstance(known, Mapping)
+        result[key] = {**(known or {}), **value} if both else value
+    return result
+
+
+def as_json(document: Document) -> dict[str, Any]:
+    """A document as plain values, for `from_json`."""
+    return asdict(document)
+
+
+def from_json(values: Mapping[str, Any]) -> Document:
+    """The document that `as_json` gave.
+
+    Raises
+    ------
+    LookupError, TypeError, ValueError
+        If it is none.
+    """
+    document = document_of({**values["settings"], "targets": values["targets"]})
+    material, kept = (_material(values[name]) for name in ("material", "kept"))
+    return replace(document, material=material, kept=kept)
+
+
+def files_of(document: Document) -> list[str]:
+    """Paths of all files that a document names."""
+    named = [document.mesh, document.settings.get("forest")]
+    named += [target.clip for target in document.targets]
+    return [name for name in named if name is not None and not name.startswith(BUILTIN_PREFIX)]
+
+
+def _material(values: Mapping[str, Any] | None) -> Material | None:
+    if values is None:
+        return None
+    return Material(tuple(float(x) for x in values["z"]), values["design"])
+
+
+def _described(target: Target) -> dict[str, Any]:
+    """A target's keys, without those that have their default."""
+    values = {key: value for key, value in asdict(target).items() if value not in (None, (), False)}
+    return {
+        key: list(value) if isinstance(value, tuple) else value for key, value in values.items()
+    }

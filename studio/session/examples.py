@@ -1,0 +1,85 @@
+"""Examples that open with one click: built-in solids, and clips that are synthesised for them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from carillon.fem.geometry.surface import BUILTIN_PREFIX
+from sound.clips.instruments import synthesised
+from sound.clips.wav import PEAK
+from studio.processes.clips import as_wav
+from studio.session.document import Document, Target
+from studio.session.workspace import Workspace
+
+RATE_HERTZ = 44_100
+Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class ExampleClip:
+    """A synthesised clip, and the point [m] that it is given to."""
+
+    target: str
+    at: Point
+    instrument: str
+    pitch_hz: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Example:
+    """A solid and its clips; `modes` are designed."""
+
+    name: str
+    says: str
+    mesh: str
+    resolution: int
+    modes: int
+    clips: tuple[ExampleClip, ...]
+
+    def open(self, workspace: Workspace) -> Document:
+        """The example as a document; its clips are written to the workspace."""
+        targets = []
+        for number, clip in enumerate(self.clips):
+            sound = synthesised(clip.instrument, clip.pitch_hz, clip.seconds, RATE_HERTZ, number)
+            samples = sound.modal_part() + sound.residual
+            content = as_wav(samples * (PEAK / abs(samples).max()), RATE_HERTZ)
+            file = workspace.put(f"{self.name}-{clip.target}.wav", content)
+            targets.append(Target(clip.target, at=clip.at, clip=file))
+        settings = {
+            "mesh": f"{BUILTIN_PREFIX}{self.mesh}",
+            "resolution": self.resolution,
+            "modes": self.modes,
+        }
+        return Document(settings, tuple(targets))
+
+
+EXAMPLES = (
+    Example(
+        "wooden-plate",
+        "a plate that sounds like a wooden bar when it is struck at its rim",
+        "plate",
+        32,
+        6,
+        (ExampleClip("rim", (0.12, 0.0, 0.03), "wood", 520.0, 1.0),),
+    ),
+    Example(
+        "metal-bell",
+        "a bell that sounds like a metal plate",
+        "bell",
+        24,
+        8,
+        (ExampleClip("rim", (0.06, 0.0, 0.0), "metal", 420.0, 1.5),),
+    ),
+    Example(
+        "pan-of-two",
+        "a frying pan of metal whose handle is of wood: nobody can have all of it, see how near",
+        "frying-pan",
+        32,
+        10,
+        (
+            ExampleClip("plate", (0.0, 0.0, 0.01), "metal", 420.0, 1.5),
+            ExampleClip("handle", (0.3, 0.0, 0.02), "wood", 520.0, 1.0),
+        ),
+    ),
+)

@@ -1,0 +1,152 @@
+"""Clips of a workspace: who they are, and what was heard in them."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from carillon.errors import UserError
+from studio.interface import NotFoundError
+from studio.processes.clips import ClipFile
+from studio.processes.worker import Worker
+from studio.session.document import Target
+
+LISTENING_SECONDS = 180.0
+"""That the modes of a clip may take to be found."""
+
+
+_NOTHING: dict[str, Any] = {
+    "seconds": None,
+    "rate_hz": None,
+    "explained_decibels": None,
+    "says": [],
+    "modes": [],
+}
+"""Of a clip that was not listened to yet."""
+
+
+@dataclass
+class Clip:
+    """A clip and what is known of it.
+
+    Attributes
+    ----------
+    identifier
+        That the page names it by.
+    file
+        Its path from the workspace's folder.
+    phase
+        `waiting`, `listening`, `ready` or `failed`.
+    message
+        Why it failed.
+    found
+        Its modes, as the page gets them.
+    allow_clipped
+        Whether it may be clipped, for which it was listened to.
+    """
+
+    identifier: str
+    file: str
+    phase: str = "waiting"
+    message: str | None = None
+    found: dict[str, Any] | None = None
+    allow_clipped: bool = False
+
+
+class Clips:
+    """All clips that a studio knows, and the process that listens to them.
+
+    Parameters
+    ----------
+    path
+        Of a file of the workspace.
+    changed
+        Called when something else is known of a clip.
+    """
+
+    def __init__(self, path: Callable[[str], Path], changed: Callable[[], None]) -> None:
+        self._path, self._changed = path, changed
+        self._worker = Worker("studio.processes.clips:Clips")
+        self._known: dict[str, Clip] = {}
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    def end(self) -> None:
+        """End the process."""
+        for task in self._tasks:
+            task.cancel()
+        self._worker.end()
+
+    def add(self, file: str) -> Clip:
+        """The clip in a file, known from now on."""
+        if file not in self._known:
+            self._known[file] = Clip(f"c{len(self._known) + 1}", file)
+        return self._known[file]
+
+    def named(self, identifier: str) -> Clip:
+        """The clip that the page names.
+
+        Raises
+        ------
+        NotFoundError
+            If there is none.
+        """
+        for clip in self._known.values():
+            if clip.identifier == identifier:
+                return clip
+        raise NotFoundError(f"there is no clip {identifier!r}; add it again")
+
+    def listen(self, targets: Iterable[Target]) -> list[Target]:
+        """Targets whose clips have been listened to; begin with those that have not."""
+        heard = []
+        for target in targets:
+            if target.clip is None:
+                continue
+            clip = self.add(target.clip)
+            if clip.phase == "waiting" or clip.allow_clipped != target.allow_clipped:
+                clip.phase, clip.allow_clipped = "listening", target.allow_clipped
+                task = asyncio.ensure_future(self._listen(clip))
+                self._tasks.add(task)
+                task.add_done_callback(self._tasks.discard)
+            if clip.phase == "ready":
+                heard.append(target)
+        return heard
+
+    async def _listen(self, clip: Clip) -> None:
+        try:
+            clip.found = await self._worker.call(
+                "listen", self._file(clip), seconds=LISTENING_SECONDS
+            )
+            clip.phase, clip.message = "ready", None
+        except UserError as error:
+            clip.phase, clip.message, clip.found = "failed", str(error), None
+        self._changed()
+
+    async def part(self, identifier: str, part: str) -> bytes:
+        """A clip's part as the content of a WAV file."""
+        content: bytes = await self._worker.call("part", self._file(self.named(identifier)), part)
+        return content
+
+    async def spectrum(self, identifier: str) -> dict[str, list[float]]:
+        """A clip's spectrum."""
+        found: dict[str, list[float]]
+        found = await self._worker.call("spectrum", self._file(self.named(identifier)))
+        return found
+
+    def state(self) -> list[dict[str, Any]]:
+        """All clips, as the page gets them."""
+        return [
+            {
+                "clip": clip.identifier,
+                "name": Path(clip.file).name,
+                "phase": clip.phase,
+                "message": clip.message,
+                **(clip.found or _NOTHING),
+            }
+            for clip in self._known.values()
+        ]
+
+    def _file(self, clip: Clip) -> ClipFile:
+        return ClipFile(str(self._path(clip.file)), clip.allow_clipped)

@@ -1,0 +1,114 @@
+"""The search: its process, what it has told, and how it is stopped."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from carillon.errors import UserError
+from studio.processes.worker import Worker
+from studio.session.document import Material
+
+ASKED_SECONDS, PATIENCE_SECONDS = 0.2, 30.0
+"""Time between two times that a search is asked to stop, and after which it is ended."""
+MOST_ROWS = 4000
+"""Of a history that is shown; of more every second one is left out."""
+
+
+@dataclass(frozen=True)
+class Live:
+    """The best material of a search that goes on, and what it is likely to sound at [Hz]."""
+
+    material: Material
+    hertz: list[float]
+    cost: float
+
+
+class Searching:
+    """A search at a time.
+
+    Parameters
+    ----------
+    told
+        Called with every piece of news, the event `progress`.
+    found
+        Called with every better material.
+
+    Attributes
+    ----------
+    phase
+        `idle`, `starting`, `running` or `stopping`.
+    rows
+        History of the present material.
+    """
+
+    def __init__(
+        self, told: Callable[[dict[str, Any]], None], found: Callable[[Live], None]
+    ) -> None:
+        self._told, self._found = told, found
+        self._worker = Worker("studio.processes.search:SearchBench")
+        self._is_broken_off = False
+        self.phase = "idle"
+        self.rows: list[dict[str, float]] = []
+
+    async def run(self, problem: bytes, material: Material | None, out: Path) -> Material | None:
+        """Search from a material until the budget is spent or it is stopped.
+
+        Returns
+        -------
+        Material or None
+            What was found, with its design in `out`; None if the search was broken off.
+
+        Raises
+        ------
+        UserError
+            If there was nothing to search from, or the process ended.
+        """
+        self.phase, self._is_broken_off = "starting", False
+        initial = None if material is None else material.design
+        z = None if material is None or material.design is not None else list(material.z)
+        try:
+            result = await self._worker.call("run", problem, initial, z, str(out), tell=self._take)
+        except UserError:
+            if self._is_broken_off:
+                return None
+            raise
+        finally:
+            self.phase = "idle"
+        self.rows = _thinned(result["rows"])
+        return Material(tuple(result["z"]), result["design"])
+
+    async def stop(self) -> None:
+        """Ask the search to stop until it does; one that does not is ended."""
+        if self.phase == "idle":
+            return
+        self.phase = "stopping"
+        for _ in range(round(PATIENCE_SECONDS / ASKED_SECONDS)):
+            self._worker.signal_stop()
+            await asyncio.sleep(ASKED_SECONDS)
+            if self.phase == "idle":
+                return
+        self.break_off()
+
+    def break_off(self) -> None:
+        """End the search at once; what it has told is all there is of it."""
+        self._is_broken_off = True
+        self._worker.end()
+
+    def _take(self, news: dict[str, Any]) -> None:
+        if self._is_broken_off:
+            return
+        if self.phase == "starting":
+            self.phase = "running"
+        z, hertz = news.pop("z", None), news.pop("hertz", None)
+        self.rows = _thinned([*self.rows, news])
+        self._told(news)
+        if z is not None:
+            self._found(Live(Material(tuple(z)), hertz, news["cost"]))
+
+
+def _thinned(rows: list[dict[str, float]]) -> list[dict[str, float]]:
+    return rows if len(rows) <= MOST_ROWS else rows[::2]
