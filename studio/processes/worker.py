@@ -70,8 +70,7 @@ class Worker:
         UserError
             What the method raises, in one sentence; or if it took too long, or the process ended.
         """
-        if self._process is None:
-            self._start()
+        self.start()
         assert self._pipe is not None
         number = next(self._numbers)
         future: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
@@ -103,7 +102,10 @@ class Worker:
             process.join()
         self._give_up()
 
-    def _start(self) -> None:
+    def start(self) -> None:
+        """Start the process, if there is none."""
+        if self._process is not None:
+            return
         loop = asyncio.get_running_loop()
         context = get_context("spawn")
         self._pipe, other = context.Pipe()

@@ -78,6 +78,10 @@ class Bench:
         self._aimed: Any = None
         self._placed: tuple[Target, ...] | None = None
 
+    def warm(self) -> None:
+        """Start the process, so that a solid is there sooner."""
+        self._worker.start()
+
     @property
     def aimed(self) -> Any:
         """What the solid is, and what it aims at: another value whenever that changes."""
@@ -93,8 +97,8 @@ class Bench:
         self._worker.end()
         self._forget()
 
-    async def bring(self, document: Document, heard: Sequence[Target]) -> bool:
-        """Bring the solid to what a document describes; whether it sounds other than before.
+    async def bring(self, document: Document, heard: Sequence[Target]) -> None:
+        """Bring the solid to what a document describes.
 
         Parameters
         ----------
@@ -104,24 +108,24 @@ class Bench:
         Raises
         ------
         UserError
-            If it cannot be: the news then tell it, too.
+            If it cannot be.  The news then tell it, too, or the solid is there without an aim.
         """
         if document.mesh is None:
             self.end()
-            return False
+            return
         if self._worker.pid is None:  # which knew all that was brought
             self._forget()
         try:
             project = document.solid(self._folder)
             solid, material = project.solid, project.material
             await self._bring_surface(document.mesh, solid.mesh, solid.unit)
-            changed = await self._bring_voxels(solid, material)
-            await self._bring_strikes(document)
-            return await self._bring_aim(document, heard) or changed
+            await self._bring_voxels(solid, material)
         except UserError as error:
             self._tell(phase="failed", message=str(error), progress=None)
             self._prepared = self._aimed = None
             raise
+        await self._bring_strikes(document)
+        await self._bring_aim(document, heard)
 
     async def ask(self, name: str, *arguments: Any) -> Any:
         """Call the process, see `studio.processes.solid.SolidBench`."""
@@ -143,16 +147,15 @@ class Bench:
             longest_side_m=found.longest_side_m,
         )
 
-    async def _bring_voxels(self, solid: Any, material: Any) -> bool:
+    async def _bring_voxels(self, solid: Any, material: Any) -> None:
         if self._prepared == (solid, material):
-            return False
+            return
         self._aimed = self._placed = None
         self.project = self.wanted = None
         self._tell(phase="preparing", message=None)
         found = await self._worker.call("prepare", solid, material, seconds=PREPARED_SECONDS)
         self._prepared = (solid, material)
         self._tell(phase="ready", message=None, progress=None, **found)
-        return True
 
     async def _bring_strikes(self, document: Document) -> None:
         if self._placed == document.targets:
@@ -163,16 +166,18 @@ class Bench:
         self._placed = document.targets
         self._changed()
 
-    async def _bring_aim(self, document: Document, heard: Sequence[Target]) -> bool:
+    async def _bring_aim(self, document: Document, heard: Sequence[Target]) -> None:
         project = None
         if heard:
             project = replace(document, targets=tuple(heard)).project(self._folder)
         if self._aimed == (project,):
-            return False
-        self.wanted = await self._worker.call("aim", project)
-        self.project, self._aimed = project, (project,)
-        self._changed()
-        return True
+            return
+        self.wanted = self.project = self._aimed = None
+        try:
+            self.wanted = await self._worker.call("aim", project)
+            self.project, self._aimed = project, (project,)
+        finally:
+            self._changed()
 
     def _tell(self, **changes: Any) -> None:
         if self.news is not None:

@@ -11,10 +11,10 @@ from carillon.errors import UserError
 from carillon.fem.geometry.surface import BUILTIN_PREFIX, surface_name
 from sound.project.schema import check, project_schema
 from studio.interface import NotFoundError
-from studio.session.document import Document, Target, document_of, files_of, merged
+from studio.session.document import Document, Material, Target, document_of, files_of, merged
 from studio.session.examples import EXAMPLES
 from studio.session.files import save
-from studio.session.workspace import require_name
+from studio.session.workspace import Workspace, require_name
 
 if TYPE_CHECKING:
     from studio.session.studio import DesignStudio
@@ -45,7 +45,7 @@ class Calls:
         settings: dict[str, Any] = {"mesh": file}
         if unit != 1.0:
             settings["unit"] = unit
-        self._studio.open(_fit(surface_name(file)), Document(settings))
+        self._studio.open(fit_name(surface_name(file)), Document(settings))
 
     def _open_project(self, project: str) -> None:
         kind, number = project[:1], project[1:]
@@ -58,7 +58,7 @@ class Calls:
             self._studio.open(example.name, example.open(workspace))
             return
         name = workspace.projects()[int(number) - 1]
-        document = opened(self._studio, name)
+        document = opened(workspace, name)
         self._studio.open(name, document)
         self._studio.saved = self._studio.document
 
@@ -148,7 +148,7 @@ class Calls:
                 raise UserError(f"the target {name!r} is at this point; choose another")
 
 
-def opened(studio: DesignStudio, name: str) -> Document:
+def opened(workspace: Workspace, name: str) -> Document:
     """The document of a project of the workspace, with its design if there is one.
 
     Raises
@@ -156,7 +156,6 @@ def opened(studio: DesignStudio, name: str) -> Document:
     UserError
         If it is none, or names files outside of the workspace.
     """
-    workspace = studio.workspace
     described = workspace.read_project(name)
     check(described, project_schema())
     document = document_of(described)
@@ -167,8 +166,6 @@ def opened(studio: DesignStudio, name: str) -> Document:
 
 def with_design(document: Document, design: Path) -> Document:
     """The document with the material of a design's file, if there is one."""
-    from studio.session.document import Material
-
     return replace(document, material=Material((), str(design)) if design.is_file() else None)
 
 
@@ -177,7 +174,7 @@ def _free_name(document: Document) -> str:
     return next(name for k in range(1, 1000) if (name := f"target {k}") not in names)
 
 
-def _fit(name: str) -> str:
+def fit_name(name: str) -> str:
     """A name of a project, from any text."""
     plain = "".join(c if c.isascii() and (c.isalnum() or c in "-_") else "-" for c in name)
     return plain.strip("-")[:40] or "solid"

@@ -28,13 +28,12 @@ class ExampleClip:
 
 @dataclass(frozen=True)
 class Example:
-    """A solid and its clips; `modes` are designed."""
+    """A solid and its clips."""
 
     name: str
     says: str
     mesh: str
     resolution: int
-    modes: int
     clips: tuple[ExampleClip, ...]
 
     def open(self, workspace: Workspace) -> Document:
@@ -49,7 +48,6 @@ class Example:
         settings = {
             "mesh": f"{BUILTIN_PREFIX}{self.mesh}",
             "resolution": self.resolution,
-            "modes": self.modes,
         }
         return Document(settings, tuple(targets))
 
@@ -60,7 +58,6 @@ EXAMPLES = (
         "a plate that sounds like a wooden bar when it is struck at its rim",
         "plate",
         32,
-        6,
         (ExampleClip("rim", (0.12, 0.0, 0.03), "wood", 520.0, 1.0),),
     ),
     Example(
@@ -68,7 +65,6 @@ EXAMPLES = (
         "a bell that sounds like a metal plate",
         "bell",
         24,
-        8,
         (ExampleClip("rim", (0.06, 0.0, 0.0), "metal", 420.0, 1.5),),
     ),
     Example(
@@ -76,7 +72,6 @@ EXAMPLES = (
         "a frying pan of metal whose handle is of wood: nobody can have all of it, see how near",
         "frying-pan",
         32,
-        10,
         (
             ExampleClip("plate", (0.0, 0.0, 0.01), "metal", 420.0, 1.5),
             ExampleClip("handle", (0.3, 0.0, 0.02), "wood", 520.0, 1.0),

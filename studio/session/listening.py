@@ -79,6 +79,11 @@ class Clips:
             task.cancel()
         self._worker.end()
 
+    @property
+    def are_listened_to(self) -> bool:
+        """Whether the modes of some clip are being found."""
+        return any(clip.phase == "listening" for clip in self._known.values())
+
     def add(self, file: str) -> Clip:
         """The clip in a file, known from now on."""
         if file not in self._known:

@@ -18,6 +18,10 @@ MOST_ROWS = 4000
 """Of a history that is shown; of more every second one is left out."""
 
 
+_COUNTED = ("cost", "evaluations")
+"""What of a row is news; time alone is not."""
+
+
 @dataclass(frozen=True)
 class Live:
     """The best material of a search that goes on, and what it is likely to sound at [Hz]."""
@@ -53,6 +57,10 @@ class Searching:
         self._is_broken_off = False
         self.phase = "idle"
         self.rows: list[dict[str, float]] = []
+
+    def warm(self) -> None:
+        """Start the process, so that a search begins sooner."""
+        self._worker.start()
 
     async def run(self, problem: bytes, material: Material | None, out: Path) -> Material | None:
         """Search from a material until the budget is spent or it is stopped.
@@ -104,7 +112,9 @@ class Searching:
         if self.phase == "starting":
             self.phase = "running"
         z, hertz = news.pop("z", None), news.pop("hertz", None)
-        self.rows = _thinned([*self.rows, news])
+        same = self.rows and all(self.rows[-1][key] == news[key] for key in _COUNTED)
+        rows = self.rows[:-1] if same else self.rows
+        self.rows = _thinned([*rows, news])
         self._told(news)
         if z is not None:
             self._found(Live(Material(tuple(z)), hertz, news["cost"]))

@@ -42,7 +42,7 @@ logger = logging.getLogger(__name__)
 
 
 class DesignStudio:
-    """State of the studio, see `studio.interface.Studio`; to be made in a running event loop.
+    """State of the studio, see `studio.interface.Studio`.
 
     Attributes
     ----------
@@ -77,12 +77,8 @@ class DesignStudio:
         self._wake, self._lively = asyncio.Event(), asyncio.Event()
         self._search_task: asyncio.Task[None] | None = None
         self._autosave = Autosave(self._session, workspace.write_session)
-        self._tasks = [
-            asyncio.ensure_future(each)
-            for each in (self._keep_up(), self._follow(), self._autosave.run())
-        ]
+        self._tasks: list[asyncio.Future[None]] = []
         self._calls = Calls(self)
-        self._wake.set()
 
     @property
     def document(self) -> Document:
@@ -90,6 +86,13 @@ class DesignStudio:
         return self.history.document
 
     # What the server asks.
+
+    async def start(self) -> None:
+        """Begin to keep up with the document."""
+        work = (self._keep_up(), self._follow(), self._autosave.run())
+        self._tasks = [asyncio.ensure_future(each) for each in work]
+        self.bench.warm()
+        self._wake.set()
 
     def state(self) -> dict[str, Any]:
         """The event `state`."""
@@ -338,15 +341,22 @@ class DesignStudio:
 
     async def _bring(self, document: Document) -> None:
         heard = self.clips.listen(document.targets)
-        await self.bench.bring(document, heard)
-        if document is not self.document:
+        try:
+            await self.bench.bring(document, heard)
+        except UserError as error:
+            # Of the solid alone there is something to hear, even where the clips are no good.
+            if document is self.document and not self.clips.are_listened_to:
+                self._end_search(str(error))
+            if not self.bench.is_ready:
+                return
+        if document is not self.document or heard != self.clips.listen(document.targets):
             self._wake.set()
             return
-        is_listening = any(each["phase"] == "listening" for each in self.clips.state())
-        if self.is_searching and not is_listening:
+        if self.is_searching and not self.clips.are_listened_to:
             self._start_search()
         if self.search.phase == "idle":
             await self._show(document)
+            self.search.warm()
 
     async def _show(self, document: Document) -> None:
         """Send the bank of the document's material, unless it is the last one that was sent."""
@@ -360,12 +370,13 @@ class DesignStudio:
         if fine:
             self._changed()
         try:
+            name = "fine_bank" if fine else "bank"
+            given: str | list[float] | None = None
             if material is not None and material.design is not None:
-                name, arguments = ("fine_bank_of" if fine else "bank_of"), (material.design,)
-            else:
-                z = None if material is None else list(material.z)
-                name, arguments = ("fine_bank" if fine else "bank"), (z,)
-            message = await self.bench.ask(name, *arguments, self._header(fine))
+                name, given = f"{name}_of", material.design
+            elif material is not None:
+                given = list(material.z)
+            message = await self.bench.ask(name, given, self._header(fine))
         finally:
             self._fine_phase = "ready" if fine else "none"
         self._publish_bank(shown, message)
@@ -380,9 +391,8 @@ class DesignStudio:
         if self._search_task is not None and not self._search_task.done():
             return
         if self.bench.project is None:
-            self.is_searching = False
-            self._changed()
-            raise UserError("no clip could be listened to; see what its target says")
+            self._end_search("no clip could be listened to; see what its target says")
+            return
         self._search_task = asyncio.ensure_future(self._search())
 
     async def _search(self) -> None:
@@ -392,8 +402,7 @@ class DesignStudio:
             running = self.search.run(problem, self.document.material, self.workspace.new_design())
             found = await running
         except UserError as error:
-            self.is_searching, self._search_message = False, str(error)
-            self.say(str(error), "error")
+            self._end_search(str(error))
         else:
             if found is not None:
                 self.is_searching = False
@@ -402,6 +411,13 @@ class DesignStudio:
         self._publish(self._history_event())
         self._changed()
         self._wake.set()
+
+    def _end_search(self, sentence: str) -> None:
+        """Tell why there is no search, and want none any more."""
+        if self.is_searching:
+            self.is_searching, self._search_message = False, sentence
+        self._changed()
+        self.say(sentence, "error")
 
     def _told(self, news: dict[str, Any]) -> None:
         if len(self.search.rows) == 1:
@@ -480,7 +496,6 @@ class DesignStudio:
         self.history, self.saved = history, None
         self.is_searching = bool(session["searching"])
         self.fine = bool(session["fine"])
-        self._wake.set()
 
 
 _OF_VOXELS = ("mesh", "unit", "resolution", "fill", "components", "discretisation")

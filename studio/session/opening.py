@@ -1,0 +1,111 @@
+"""What a studio begins with: a file, a solid, or what it was left with."""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+
+from carillon.errors import UserError
+from carillon.fem.geometry.surface import BUILTIN_PREFIX, surface_name
+from carillon.files import kind_of
+from sound.project.design_file import read_design
+from studio.session.calls import fit_name, opened, with_design
+from studio.session.document import Document, document_of, files_of
+from studio.session.studio import DesignStudio
+from studio.session.workspace import PROJECT_ENDINGS, Workspace
+
+DESIGN_ENDINGS = (".h5", ".hdf5")
+UNTITLED = "untitled"
+
+
+def open_studio(what: str | None, folder: Path) -> DesignStudio:
+    """A studio in a folder.
+
+    It goes on with what it was left with there, if that is what is asked for.
+
+    Parameters
+    ----------
+    what
+        A project, a mesh or a design in the folder, or `builtin:NAME`; None for what it was left
+        with.
+    folder
+        The workspace.
+
+    Raises
+    ------
+    UserError
+        If it cannot be opened, or another studio works in the folder.
+    """
+    workspace = Workspace(folder)
+    try:
+        name, document = _begun(what, workspace)
+        session = workspace.read_session()
+        if session is not None and (what is None or session.get("name") == name):
+            with contextlib.suppress(LookupError, TypeError, ValueError, UserError):
+                studio = DesignStudio(workspace, str(session["name"]), document)
+                studio.restore(session)
+                return studio
+        studio = DesignStudio(workspace, name, document)
+        return studio
+    except BaseException:
+        workspace.close()
+        raise
+
+
+def _begun(what: str | None, workspace: Workspace) -> tuple[str, Document]:
+    """Name and document of what is asked for."""
+    if what is None:
+        return UNTITLED, Document({})
+    if what.startswith(BUILTIN_PREFIX):
+        name = surface_name(what)
+        return fit_name(name), Document({"mesh": what}).require_sound(workspace.folder)
+    path = Path(what)
+    if not path.is_file():
+        raise UserError(
+            f"{what}: no such file, expected a project (YAML), a mesh, a design (.h5) or "
+            f"{BUILTIN_PREFIX}NAME"
+        )
+    file = _inside(path, workspace)
+    if path.suffix.lower() in PROJECT_ENDINGS:
+        return path.stem, opened(workspace, path.stem)
+    if path.suffix.lower() in DESIGN_ENDINGS:
+        return path.stem, _of_design(path, workspace)
+    return fit_name(path.stem), Document({"mesh": file}).require_sound(workspace.folder)
+
+
+def _inside(path: Path, workspace: Workspace) -> str:
+    """The path of a file from the workspace's folder, in which it is copied if it is elsewhere."""
+    resolved = path.resolve()
+    if resolved.is_relative_to(workspace.folder):
+        return str(resolved.relative_to(workspace.folder))
+    if path.suffix.lower() in (*PROJECT_ENDINGS, *DESIGN_ENDINGS):
+        raise UserError(
+            f"{path}: lies outside of the workspace {workspace.folder}, expected a file in it; "
+            "leave --workspace out, or copy it and what it names"
+        )
+    return workspace.put(path.name, path.read_bytes())
+
+
+def _of_design(path: Path, workspace: Workspace) -> Document:
+    """The project that a design was made for, with its material."""
+    if kind_of(path, "a Carillon design (HDF5)")[0] != "design":
+        raise UserError(f"{path}: is no design, expected one that carillon design wrote")
+    settings = dict(read_design(path).settings)
+    folder = workspace.folder
+    for entry in (settings, *settings["targets"]):
+        for key in ("mesh", "forest", "clip"):
+            if entry.get(key) is not None and not str(entry[key]).startswith(BUILTIN_PREFIX):
+                entry[key] = _relative(str(entry[key]), folder)
+    document = document_of(settings)
+    for file in files_of(document):
+        workspace.path(file)
+    return with_design(document.require_sound(folder), path.resolve())
+
+
+def _relative(name: str, folder: Path) -> str:
+    """The path of a file from a folder, where a design names it from where it was made."""
+    for path in (Path(name), folder / name, folder / Path(name).name):
+        resolved = path.resolve()
+        if resolved.is_file() and resolved.is_relative_to(folder):
+            return str(resolved.relative_to(folder))
+    return name
