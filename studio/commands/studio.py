@@ -85,11 +85,11 @@ def run(arguments: argparse.Namespace) -> int:
     _require_packages()
     from studio.server.guard import Keys
     from studio.server.serve import listen, serve
-    from studio.session import open_studio
 
-    # Before the work: a port in use is told at once.
-    listener = listen(options.host, options.port)
-    with listener:
+    # Before all else: a port in use is told at once.
+    with listen(options.host, options.port) as listener:
+        from studio.session import open_studio
+
         workspace = _workspace(options)
         studio = open_studio(options.what, workspace)
         keys = Keys()
@@ -163,10 +163,12 @@ def _export(page: str, design: str | None) -> int:
         raise UserError(f"--export {page}: name the design to write: --export {page} design.h5")
     from sound.outputs import require_output
     from sound.project.design_file import read_design
-    from studio.standalone import write_page
 
     out = require_output(page, (".html", ".htm"), [design])
-    write_page(out, read_design(design))
+    finished = read_design(design)
+    from studio.standalone import write_page
+
+    write_page(out, finished)
     print(f"{out}: {out.stat().st_size / 1e6:.1f} MB, opens in any browser")
     return 0
 
