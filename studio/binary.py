@@ -14,6 +14,7 @@ TYPES: dict[str, np.dtype[Any]] = {
     "f4": np.dtype("<f4"),
     "f8": np.dtype("<f8"),
     "u4": np.dtype("<u4"),
+    "u2": np.dtype("<u2"),
 }
 """Of arrays, by the names that headers have for them."""
 _ALIGNED = 8

@@ -4,7 +4,8 @@
  * It is opened anew, at growing intervals, whenever it breaks.
  */
 
-/** @typedef {Record<string, Float32Array | Float64Array | Uint32Array>} Arrays */
+/** @typedef {Float32Array | Float64Array | Uint32Array | Uint16Array} Numbers */
+/** @typedef {Record<string, Numbers>} Arrays */
 /** @typedef {"connecting" | "open" | "lost"} Status */
 
 const FIRST_WAIT_SECONDS = 0.5;
@@ -12,14 +13,15 @@ const LONGEST_WAIT_SECONDS = 8;
 const NO_ANSWER =
   "The studio's server does not answer: see whether it still runs, and wait or start it again.";
 
-/** @type {Record<string, (buffer: ArrayBuffer, from: number, length: number) => Float32Array | Float64Array | Uint32Array>} */
+/** @type {Record<string, (buffer: ArrayBuffer, from: number, length: number) => Numbers>} */
 const VIEWS = {
   f4: (buffer, from, length) => new Float32Array(buffer, from, length),
   f8: (buffer, from, length) => new Float64Array(buffer, from, length),
   u4: (buffer, from, length) => new Uint32Array(buffer, from, length),
+  u2: (buffer, from, length) => new Uint16Array(buffer, from, length),
 };
 /** @type {Record<string, number>} */
-const BYTES = { f4: 4, f8: 8, u4: 4 };
+const BYTES = { f4: 4, f8: 8, u4: 4, u2: 2 };
 
 /** @param {number} offset @returns {number} */
 const padded = (offset) => Math.ceil(offset / 8) * 8;

@@ -90,7 +90,7 @@ export interface Progress {
 
 export interface ArrayHeader {
   name: string;
-  type: "f4" | "f8" | "u4";
+  type: "f4" | "f8" | "u4" | "u2";
   shape: number[];
 }
 

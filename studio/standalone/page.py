@@ -1,0 +1,72 @@
+"""Writes the page of a design: one file that opens in any browser, without a server or a network."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import html
+import json
+from pathlib import Path
+from string import Template
+
+from carillon import __version__
+from carillon.files import atomic_path
+from carillon.progress import say
+from sound.project.design import Design
+from studio.standalone.content import content, name_of
+from studio.standalone.modules import PAGE, gathered
+
+HERE = Path(__file__).resolve().parent
+STYLES = (PAGE / "studio.css", PAGE / "solid.css", HERE / "standalone.css")
+PROCESSOR = PAGE / "sound/bank-processor.js"
+LICENCES = (PAGE / "vendor/three/LICENSE", PAGE / "vendor/three-mesh-bvh/LICENSE")
+MANY_TRIANGLES = 20_000
+"""From which on it is told what they cost."""
+
+
+def write_page(path: str | Path, design: Design) -> None:
+    """Write a design as one page: turned and struck anywhere, beside the modes of its clips.
+
+    Of the clips it holds the modes, not what is left without them.  Gains have half precision, see
+    `studio.standalone.content`.  A line of progress says how large the file is where the surface
+    has more than `MANY_TRIANGLES`.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be written.
+    """
+    text = page_of(design)
+    with atomic_path(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    count = len(design.surface_faces)
+    if count > MANY_TRIANGLES:
+        say(
+            f"{path}: {len(text) / 1e6:.1f} MB for a surface of {count:,} triangles; with a mesh of "
+            f"{MANY_TRIANGLES:,} or fewer it would look alike and open faster"
+        )
+
+
+def page_of(design: Design) -> str:
+    """The page as text."""
+    modules = gathered(HERE / "main.js")
+    programs = {
+        "modules": modules,
+        "entry": list(modules)[-1],
+        "processor": PROCESSOR.read_text(encoding="utf-8"),
+    }
+    template = Template((HERE / "template.html").read_text(encoding="utf-8"))
+    return template.substitute(
+        title=html.escape(f"{name_of(design)} - Carillon"),
+        version=html.escape(__version__),
+        styles="\n".join(each.read_text(encoding="utf-8") for each in STYLES),
+        licences="\n\n".join(html.escape(each.read_text(encoding="utf-8")) for each in LICENCES),
+        programs=_packed(json.dumps(programs).encode()),
+        design=_packed(content(design)),
+        start=(HERE / "start.js").read_text(encoding="utf-8"),
+    )
+
+
+def _packed(data: bytes) -> str:
+    """Bytes as text that is no markup, whatever they are."""
+    return base64.b64encode(gzip.compress(data, mtime=0)).decode()
