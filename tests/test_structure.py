@@ -85,9 +85,10 @@ ARROWS = {
         sound.rendering sound.export""",
     #
     "studio": "",
-    "studio.processes": "",
-    "studio.session": "",
     "studio.standalone": "",
+    "studio.processes": """solver.files solver.response solver.analysis sound sound.clips
+        sound.project sound.design sound.rendering sound.export studio studio.standalone""",
+    "studio.session": "sound sound.clips sound.project studio studio.processes",
     "studio.server": "sound.project studio",
     "studio.commands": "sound sound.project studio.server studio.session studio.standalone",
     #
