@@ -51,10 +51,12 @@ function makeMap() {
     lengths.push(lengths[i - 1] + Math.hypot(q[0] - p[0], q[1] - p[1], q[2] - p[2]));
   }
   const map = new Float32Array(3 * STEPS);
-  for (let step = 0, i = 0; step < STEPS; step++) {
+  for (let step = 0, i = 1; step < STEPS; step++) {
     const wanted = (step / (STEPS - 1)) * lengths[lengths.length - 1];
     while (i < fine.length - 1 && lengths[i] < wanted) i++;
-    map.set(linear(...fine[i]).map((value) => Math.min(1, Math.max(0, value))), 3 * step);
+    const share = (wanted - lengths[i - 1]) / (lengths[i] - lengths[i - 1]);
+    const [l, a, b] = [0, 1, 2].map((j) => fine[i - 1][j] + share * (fine[i][j] - fine[i - 1][j]));
+    map.set(linear(l, a, b).map((value) => Math.min(1, Math.max(0, value))), 3 * step);
   }
   return map;
 }

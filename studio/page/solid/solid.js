@@ -187,6 +187,11 @@ export class Solid {
     return this.drawing?.pick(x, y)?.vertex ?? null;
   }
 
+  /** @returns {boolean} whether the solid and its material are as the server told them last */
+  get settled() {
+    return this.shown !== null && this.shown === this.wanted && this.#painted && (this.drawing?.drawings ?? 0) > 0;
+  }
+
   /** @returns {boolean} whether the material is that of the surface that is shown */
   get #painted() {
     return this.material !== null && this.material.surface === this.shown;

@@ -118,6 +118,7 @@ export class View {
   fit(from = this.camera.position.clone().sub(this.controls.target).normalize()) {
     if (!this.surface) return;
     const { center, radius } = this.surface.sphere;
+    this.#halt();
     this.controls.target.copy(center);
     this.camera.position.copy(center).addScaledVector(from, this.#distance(from));
     this.camera.near = radius / 50;
@@ -133,6 +134,14 @@ export class View {
   /** Looks at all of the solid from where it was seen first. */
   reset() {
     this.fit(FROM);
+  }
+
+  /** Ends what is left of a turn that was let go. */
+  #halt() {
+    const { enableDamping } = this.controls;
+    this.controls.enableDamping = false;
+    this.controls.update();
+    this.controls.enableDamping = enableDamping;
   }
 
   /** @param {THREE.Vector3} from unit vector towards the camera @returns {number} least distance that shows all [m] */
