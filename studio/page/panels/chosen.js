@@ -71,10 +71,6 @@ export async function playClip(parts, target, part) {
     parts.say(target ? `${target.name} has no clip yet: choose a file or record one.` : "Select a target first.");
     return false;
   }
-  if (!parts.player) {
-    parts.say("This browser plays no clips: it lacks what sound needs.", "error");
-    return false;
-  }
   return attempt(parts, () => parts.player.play(clipPath(target, part)));
 }
 
@@ -99,8 +95,8 @@ export function strikeTarget(parts, target) {
     parts.say("Select a target first.");
     return;
   }
-  if (!parts.bank) {
-    parts.say("This browser makes no sound: it lacks what sound needs.", "error");
+  if (parts.bank.failure !== null) {
+    parts.say(parts.bank.failure, "error");
     return;
   }
   parts.bank.strike(target.vertex, parts.selection.current.strength);

@@ -30,6 +30,8 @@ export function makeClip(element, parts) {
   let plot = null;
   /** @type {string | null} identifier of the clip that is drawn */
   let drawn = null;
+  /** What was shown last: states come often while a search runs, and clips hardly change. */
+  let shown = "";
 
   const none = make("p", { class: "hint" });
   const title = make("p", { class: "figure-line" });
@@ -108,16 +110,14 @@ export function makeClip(element, parts) {
 
   /** @param {ModeOfClip} mode */
   async function playMode(mode) {
-    await attempt(parts, async () => {
-      if (!parts.player) throw new Error("This browser plays no clips: it lacks what sound needs.");
-      await parts.player.play(soundOfMode(mode));
-    });
+    await attempt(parts, () => parts.player.play(soundOfMode(mode)));
   }
 
   function show() {
     const target = chosenTarget(parts);
     const clip = clipOf(state.current, target);
     const isReady = clip?.phase === "ready";
+    shown = JSON.stringify([target, clip]);
     none.hidden = isReady;
     body.hidden = !isReady;
     if (!clip || !target || !isReady) {
@@ -213,8 +213,9 @@ export function makeClip(element, parts) {
     });
   }
 
-  state.onChange((now, before) => {
-    if (!before || now.clips !== before.clips || now.targets !== before.targets) show();
+  state.onChange((now) => {
+    const target = chosenTarget(parts);
+    if (shown !== JSON.stringify([target, clipOf(now, target)])) show();
   });
   selection.onChange((now, before) => {
     if (now === before || now.target !== before.target) show();

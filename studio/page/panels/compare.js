@@ -35,7 +35,7 @@ export function makeCompare(element, parts) {
 
   async function inTurn() {
     const target = now();
-    if (!target || clipOf(state.current, target) === null || !parts.player) {
+    if (!target || clipOf(state.current, target) === null) {
       await playClip(parts, target, "sound");
       return;
     }

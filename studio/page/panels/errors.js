@@ -64,7 +64,7 @@ export function makeErrors(element, parts) {
   /** @param {number | null} mode */
   function soundAlone(mode) {
     alone = mode;
-    parts.bank?.solo?.(mode === null ? null : [mode]);
+    parts.bank.solo(mode === null ? null : [mode]);
     if (mode !== null) strikeTarget(parts, chosenTarget(parts));
     show();
   }

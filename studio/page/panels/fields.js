@@ -1,21 +1,9 @@
-/** Fields of a form that are made from a schema: labels, help, bounds, and what was typed. */
+/** Fields of a form that are made from a schema: labels, help, what was typed and what is wrong with it. */
 
 import { identifier, make, setAttribute, setText } from "./dom.js";
+import { boundsOf, divided, FieldError, readNumber, shown, typesOf, written } from "./values.js";
 
-/**
- * @typedef {object} Schema what is used of a JSON schema
- * @property {string} [description]
- * @property {string | string[]} [type]
- * @property {string[]} [enum]
- * @property {unknown} [default]
- * @property {number} [minimum]
- * @property {number} [maximum]
- * @property {number} [exclusiveMinimum]
- * @property {number} [exclusiveMaximum]
- * @property {string} [pattern] of one word that stands in place of a number
- * @property {Schema} [items]
- * @property {Record<string, Schema>} [properties]
- */
+/** @typedef {import("./values.js").Schema} Schema */
 
 /**
  * @typedef {object} Field
@@ -27,9 +15,6 @@ import { identifier, make, setAttribute, setText } from "./dom.js";
  * @property {(changed: boolean) => void} mark shows whether it waits to be applied
  * @property {() => void} focus
  */
-
-/** What is wrong with a field, in one sentence. */
-export class FieldError extends Error {}
 
 /** @type {Record<string, string>} */
 const NAMES = {
@@ -80,52 +65,6 @@ export function makeField(path, schema, changed) {
   if (kinds.includes("boolean")) return switchField(frame, changed);
   if (kinds.includes("array")) return pairField(frame, schema, changed);
   return numberField(frame, schema, changed);
-}
-
-/**
- * The range that a number may have, in words; empty if it has none.
- *
- * @param {Schema} schema
- */
-export function boundsOf(schema) {
-  const low = schema.minimum ?? schema.exclusiveMinimum;
-  const high = schema.maximum ?? schema.exclusiveMaximum;
-  const parts = [];
-  if (low !== undefined) parts.push(`${schema.minimum === undefined ? "above" : "at least"} ${written(low)}`);
-  if (high !== undefined) parts.push(`${schema.maximum === undefined ? "below" : "at most"} ${written(high)}`);
-  return parts.join(", ");
-}
-
-/**
- * Reads a number that somebody typed.
- *
- * @param {string} text
- * @param {Schema} schema
- * @param {string} name for the sentence
- * @returns {number | string | null}
- */
-export function readNumber(text, schema, name) {
-  const kinds = typesOf(schema);
-  const trimmed = text.trim();
-  const word = wordOf(schema);
-  if (trimmed === "" && kinds.includes("null")) return null;
-  if (word && trimmed === word) return word;
-  const expected = `expected ${kinds.includes("integer") ? "a whole number" : "a number"}`;
-  const bounds = boundsOf(schema);
-  const others = (word ? ` or ${word}` : "") + (kinds.includes("null") ? " or nothing" : "");
-  const wrong = () =>
-    new FieldError(`${name}: found ${trimmed || "nothing"}, ${expected}${bounds ? ` of ${bounds}` : ""}${others}.`);
-  if (!/^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(trimmed)) throw wrong();
-  const value = Number(trimmed);
-  const fits =
-    Number.isFinite(value) &&
-    (!kinds.includes("integer") || Number.isInteger(value)) &&
-    value >= (schema.minimum ?? -Infinity) &&
-    value <= (schema.maximum ?? Infinity) &&
-    value > (schema.exclusiveMinimum ?? -Infinity) &&
-    value < (schema.exclusiveMaximum ?? Infinity);
-  if (!fits) throw wrong();
-  return value;
 }
 
 /**
@@ -309,53 +248,7 @@ export function nameOf(path) {
   return NAMES[path.join(".")] ?? sentence((path[path.length - 1] ?? "").replaceAll("_", " "));
 }
 
-/**
- * A description without the unit at its end, and the unit.
- *
- * @param {string} description
- * @returns {[string, string | null]}
- */
-function divided(description) {
-  const found = /^(.*?)\s*\[([^\]]+)\]$/s.exec(description.trim());
-  if (!found) return [description.trim(), null];
-  return [found[1] ?? "", (found[2] ?? "").replace("^3", "\u00b3").replace("^2", "\u00b2")];
-}
-
-/** @param {Schema} schema */
-function typesOf(schema) {
-  if (schema.type === undefined) return [];
-  return Array.isArray(schema.type) ? schema.type : [schema.type];
-}
-
-/** @param {Schema} schema */
-function wordOf(schema) {
-  return schema.pattern ? schema.pattern.replace(/^\^/, "").replace(/(\\Z|\$)$/, "") : null;
-}
-
 /** @param {string} text */
 function sentence(text) {
   return text.charAt(0).toUpperCase() + text.slice(1);
-}
-
-/**
- * @param {unknown} value
- * @param {Schema} schema
- */
-function shown(value, schema) {
-  if (value === null || value === undefined) return "empty";
-  if (typesOf(schema).includes("boolean")) return value ? "on" : "off";
-  return Array.isArray(value) ? value.map(written).join(" to ") : written(value);
-}
-
-/**
- * A number as it is typed, with an exponent where that is shorter.
- *
- * @param {unknown} value
- */
-function written(value) {
-  if (value === null || value === undefined) return "";
-  if (typeof value !== "number") return String(value);
-  const plain = String(value);
-  const short = value.toExponential().replace("e+", "e");
-  return plain.length > 6 && short.length < plain.length ? short : plain;
 }

@@ -38,10 +38,6 @@ export function makeRecording(parts) {
   /** @param {string} name of the target that gets the clip */
   async function start(name) {
     if (timer !== null) return;
-    if (!parts.recorder) {
-      parts.say("This browser records nothing: choose a file instead.", "error");
-      return;
-    }
     if (!(await attempt(parts, () => parts.recorder.start()))) return;
     target = name;
     element.hidden = false;
@@ -80,7 +76,7 @@ export function makeRecording(parts) {
     });
   }
 
-  parts.recorder?.onFull((/** @type {Blob} */ sound) => void finish(async () => sound));
+  parts.recorder.onFull((sound) => void finish(async () => sound));
 
   return { element: frame, start };
 }

@@ -1,10 +1,11 @@
 /** The project's settings: a form made from the schema of projects, which sends what was changed. */
 
 import { button, make, setText } from "./dom.js";
-import { FieldError, isShown, makeField } from "./fields.js";
+import { isShown, makeField } from "./fields.js";
+import { FieldError } from "./values.js";
 
 /** @typedef {import("./fields.js").Field} Field */
-/** @typedef {import("./fields.js").Schema} Schema */
+/** @typedef {import("./values.js").Schema} Schema */
 
 const IMPORTANT = [
   "resolution",

@@ -123,7 +123,7 @@ function makeDetails(parts) {
   const said = make("p", { class: "hint", role: "status" });
   const listen = PARTS.map(([part, text, title]) => button(text, () => void playClip(parts, now(), part), { title }));
   const struck = button("Solid", () => strikeTarget(parts, now()), { title: "The solid, struck there" });
-  const stop = button("Stop", () => parts.player?.stop(), { class: "quiet", title: "Stop the clip that plays" });
+  const stop = button("Stop", () => parts.player.stop(), { class: "quiet", title: "Stop the clip that plays" });
   const modes = make("input", {
     type: "text",
     inputmode: "numeric",

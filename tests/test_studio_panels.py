@@ -1,0 +1,637 @@
+"""The studio's panels in a real browser: what they show of a state, and what they ask for."""
+
+from __future__ import annotations
+
+import importlib.util
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.chromium import chromium
+from tests.panels_page import NOW, WANTED, bank, progress, ready_clip, state, target, window
+
+PATIENCE_SECONDS = 10.0
+INK = """(place) => {
+  const canvas = document.querySelector(place + " canvas");
+  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  const found = { green: 0, red: 0, all: 0, sum: 0 };
+  for (let k = 0; k < data.length; k += 4) {
+    const [r, g, b, a] = data.subarray(k, k + 4);
+    if (a < 128) continue;
+    found.all += 1;
+    found.sum = (found.sum * 31 + k + r + g + b) % 1000000007;
+    if (g > r + 40 && g > b + 40) found.green += 1;
+    if (r > g + 60 && r > b + 60) found.red += 1;
+  }
+  return found;
+}"""
+"""What is drawn in a plot: pixels by colour, and a sum that differs where any pixel does."""
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as browser:
+        yield browser
+
+
+@pytest.fixture(scope="module")
+def wide(browser):
+    """A window of a desktop."""
+    with window(browser) as wide:
+        yield wide
+
+
+@pytest.fixture
+def panels(wide):
+    """The page with a bell, a target that has a clip and one that has none."""
+    wide.open()
+    yield wide
+    assert wide.faults == []
+
+
+def until(panels, holds) -> None:
+    """Wait until something holds, while the page goes on."""
+    end = time.monotonic() + PATIENCE_SECONDS
+    while not holds():
+        assert time.monotonic() < end, f"calls so far: {panels.calls}"
+        panels.page.wait_for_timeout(20)
+
+
+def last_call(panels, count: int = 1):
+    until(panels, lambda: len(panels.calls) >= count)
+    return panels.calls[-1]
+
+
+def expect(locator):
+    from playwright.sync_api import expect
+
+    return expect(locator, "the page")
+
+
+def ink(panels, place: str) -> dict[str, int]:
+    # Plots are drawn in the next frame.
+    panels.page.wait_for_timeout(60)
+    return panels.page.evaluate(INK, place)
+
+
+# Targets
+
+
+def test_targets_are_listed_with_their_clips(panels):
+    rows = panels.page.locator(".target-list > li")
+    expect(rows).to_have_text(["rimplate.wav, 4 modes", "handleno clip"])
+    expect(panels.page.get_by_label("Name").first).to_have_value("pan")
+    expect(panels.page.locator("#target-name")).to_have_value("rim")
+
+
+def test_the_arrow_keys_choose_a_target(panels):
+    page = panels.page
+    page.locator(".target-list input").first.focus()
+    page.keyboard.press("ArrowDown")
+    expect(page.locator("#target-name")).to_have_value("handle")
+    assert page.evaluate("studio.selection.current.target") == "handle"
+    expect(page.locator("#panel-clip")).to_contain_text("handle has no clip yet")
+
+
+def test_a_target_is_renamed_moved_and_removed(panels):
+    page = panels.page
+    page.fill("#target-name", "bell's rim")
+    page.keyboard.press("Enter")
+    assert last_call(panels) == ("change_target", {"target": "rim", "name": "bell's rim"})
+    move = page.get_by_role("button", name="Move to the point struck last")
+    expect(move).to_be_disabled()
+    page.evaluate("studio.selection.set({ vertex: 0 })")
+    move.click()
+    assert last_call(panels, 2) == ("change_target", {"target": "rim", "vertex": 0})
+    page.get_by_role("button", name="Remove").click()
+    assert last_call(panels, 3) == ("remove_target", {"target": "rim"})
+
+
+def test_a_name_that_is_refused_goes_back(panels):
+    panels.refused["change_target"] = "There is a target handle already; choose another name."
+    panels.page.fill("#target-name", "handle")
+    panels.page.keyboard.press("Enter")
+    expect(panels.page.locator(".message.error")).to_contain_text("There is a target handle")
+    expect(panels.page.locator("#target-name")).to_have_value("rim")
+
+
+def test_the_point_struck_last_becomes_a_target(panels):
+    add = panels.page.get_by_role("button", name="Add the point struck last")
+    expect(add).to_be_disabled()
+    panels.page.evaluate("studio.selection.set({ vertex: 2 })")
+    add.click()
+    assert last_call(panels) == ("add_target", {"vertex": 2})
+
+
+def test_every_part_of_a_clip_can_be_heard_and_the_solid(panels):
+    page = panels.page
+    group = page.get_by_role("group", name="Listen")
+    for name in ("Clip", "Modes", "Rest", "Noise", "Solid"):
+        group.get_by_role("button", name=name).click()
+    parts = [["play", f"/clip/c1/{part}"] for part in ("sound", "modes", "rest", "noise")]
+    assert panels.heard() == [*parts, ["strike", 1, 1]]
+
+
+def test_of_a_clip_that_is_being_listened_to_only_the_clip_is_heard(panels):
+    clip = ready_clip() | {"phase": "listening", "modes": []}
+    panels.open(state(clips=[clip], wanted=None))
+    group = panels.page.get_by_role("group", name="Listen")
+    expect(group.get_by_role("button", name="Clip")).to_be_enabled()
+    expect(group.get_by_role("button", name="Modes")).to_be_disabled()
+    expect(panels.page.locator("#panel-clip")).to_contain_text("being found")
+    expect(panels.page.locator("#search-state")).to_contain_text("handle a clip first")
+
+
+def test_a_clip_is_chosen_taken_from_a_file_and_recorded(panels):
+    page = panels.page
+    page.select_option("#target-clip", "")
+    assert last_call(panels) == ("change_target", {"target": "rim", "clip": None})
+    sound = {"name": "a b.wav", "mimeType": "audio/wav", "buffer": b"RIFF"}
+    page.set_input_files("#target-file", sound)
+    assert last_call(panels, 2) == ("change_target", {"target": "rim", "clip": "c10"})
+    page.click("#record-clip")
+    expect(page.locator(".recording")).to_contain_text("7.5 s left")
+    assert page.locator(".recording meter").evaluate("each => each.value") == pytest.approx(
+        -6.02, abs=0.01
+    )
+    # Whoever records by keyboard is where it ends.
+    expect(page.get_by_role("button", name="Stop and keep")).to_be_focused()
+    page.keyboard.press("Enter")
+    assert last_call(panels, 3) == ("change_target", {"target": "rim", "clip": "c11"})
+    assert panels.uploads == ["a b.wav", "recording-1.wav"]
+    expect(page.locator("#record-clip")).to_be_focused()
+
+
+def test_a_recording_is_discarded_or_ends_by_itself(panels):
+    page = panels.page
+    page.click("#record-clip")
+    page.get_by_role("button", name="Discard", exact=True).first.click()
+    expect(page.locator(".recording")).to_be_hidden()
+    assert panels.heard() == [["cancel"]] and panels.uploads == []
+    page.click("#record-clip")
+    expect(page.locator(".recording")).to_be_visible()
+    page.evaluate("studio.recorder.fill()")
+    assert last_call(panels) == ("change_target", {"target": "rim", "clip": "c10"})
+
+
+def test_modes_taken_are_a_number_or_all(panels):
+    page = panels.page
+    page.fill("#target-modes", "3")
+    page.keyboard.press("Tab")
+    assert last_call(panels) == ("change_target", {"target": "rim", "modes": 3})
+    page.fill("#target-modes", "three")
+    page.keyboard.press("Tab")
+    expect(page.locator(".message.error")).to_contain_text("found three, expected a whole number")
+    expect(page.locator("#target-modes")).to_have_value("")
+    assert len(panels.calls) == 1
+
+
+def test_a_clip_may_be_said_to_be_clipped(panels):
+    panels.page.check("#target-clipped")
+    assert last_call(panels) == ("change_target", {"target": "rim", "allow_clipped": True})
+
+
+# Clip
+
+
+def test_modes_of_a_clip_are_told(panels):
+    page = panels.page
+    expect(page.locator("#panel-clip .figure-line")).to_have_text(
+        "plate.wav: 4 of 4 modes used; they explain 13.6 dB"
+    )
+    expect(page.locator("#panel-clip .says")).to_have_text("its first 12 ms are left out")
+    page.get_by_text("Modes of the clip").first.click()
+    first = page.locator("#panel-clip tbody tr").nth(1).locator("td.number")
+    # 6.02 dB below the loudest, and ln 1000 / 8 s until it has fallen by 60 dB
+    expect(first).to_have_text(["660.0", "8.0", "0.86", "\u22126.0"])
+
+
+def test_a_mode_is_left_out_and_taken_back(panels):
+    page = panels.page
+    page.get_by_text("Modes of the clip").first.click()
+    page.get_by_label("Use 990.0 Hz").uncheck()
+    assert last_call(panels) == ("change_target", {"target": "rim", "without": [990.0]})
+    before = ink(panels, "#panel-clip")
+    left = [target("rim", 1, "c1") | {"without": [990.0]}, target("handle", 2, None)]
+    panels.change(targets=left)
+    expect(page.locator("#panel-clip .figure-line")).to_contain_text("3 of 4 modes used")
+    expect(page.get_by_label("Use 990.0 Hz")).not_to_be_checked()
+    assert ink(panels, "#panel-clip")["green"] < before["green"]
+    page.get_by_role("button", name="Use all").click()
+    assert last_call(panels, 2) == ("change_target", {"target": "rim", "without": []})
+
+
+def test_a_mode_that_cannot_be_left_out_stays(panels):
+    panels.refused["change_target"] = "Two modes have to stay."
+    panels.page.get_by_text("Modes of the clip").first.click()
+    panels.page.get_by_label("Use 990.0 Hz").click()
+    expect(panels.page.locator(".message.error")).to_contain_text("Two modes have to stay.")
+    expect(panels.page.get_by_label("Use 990.0 Hz")).to_be_checked()
+
+
+def test_a_mode_of_a_clip_is_heard_alone(panels):
+    panels.page.get_by_text("Modes of the clip").first.click()
+    panels.page.get_by_role("button", name="990.0 Hz alone").click()
+    [[what, seconds]] = panels.heard()
+    assert what == "play"
+    assert seconds == pytest.approx(np.log(1000) / 8, abs=1e-3)
+
+
+def test_a_clip_that_failed_says_why(panels):
+    clip = ready_clip() | {"phase": "failed", "message": "plate.wav is silent.", "modes": []}
+    panels.open(state(clips=[clip], targets=[target("rim", 1, "c1")]))
+    expect(panels.page.locator("#panel-clip")).to_contain_text("plate.wav is silent.")
+    expect(panels.page.locator("#optimise")).to_be_disabled()
+    expect(panels.page.locator("#search-state")).to_contain_text("plate.wav cannot be used")
+
+
+# Spectrum and errors
+
+
+def test_both_spectra_are_drawn_and_follow_the_solid(panels):
+    before = ink(panels, "#panel-spectrum")
+    assert before["green"] > 100 and before["red"] > 100
+    panels.tell(bank(NOW * 1.05, 2))
+    after = ink(panels, "#panel-spectrum")
+    assert after["sum"] != before["sum"] and after["green"] > 100
+
+
+def test_without_clips_only_the_solid_is_drawn(panels):
+    panels.open(state(targets=[target("rim", 1, None)], clips=[], wanted=None))
+    panels.tell(bank(wanted=False))
+    found = ink(panels, "#panel-spectrum")
+    assert found["red"] > 100 and found["green"] == 0
+    expect(panels.page.locator("#panel-errors .hint").first).to_be_visible()
+
+
+def test_a_mode_under_the_pointer_is_read_out(panels):
+    page = panels.page
+    over = page.locator("#panel-spectrum .u-over")
+    over.scroll_into_view_if_needed()
+    box = over.bounding_box()
+    low, high = WANTED[0] / 1.2, WANTED[-1] * 1.2
+    share = np.log(WANTED[2] / low) / np.log(high / low)
+    page.mouse.move(box["x"] + share * box["width"], box["y"] + 0.5 * box["height"])
+    expect(page.locator("#panel-spectrum .readout")).to_contain_text("Mode 3: 945.3 Hz")
+    expect(page.locator("#panel-spectrum .readout")).to_contain_text("\u221280.0 cents, +6.0 dB")
+    expect(page.locator("#panel-errors tr.pointed th")).to_contain_text("3")
+
+
+def test_errors_are_told_and_the_worst_are_marked(panels):
+    rows = panels.page.locator("#panel-errors tbody tr")
+    expect(rows.nth(2).locator("td.number")).to_have_text(
+        ["990.0", "945.3", "\u221280.0", "\u22120.45", "+6.0"]
+    )
+    rms = np.sqrt((30.0**2 + 80.0**2 + 3.0**2) / 4)
+    expect(panels.page.locator("#panel-errors .figure-line")).to_have_text(
+        f"{rms:.1f} cents rms over 4 modes"
+    )
+    # Those that are not heard to be off are not marked.
+    marks = panels.page.get_by_label("among the farthest off")
+    expect(marks).to_have_count(2)
+
+
+def test_levels_are_those_at_the_selected_target(panels):
+    # At the handle all are wanted as loud: the second one is 6 dB softer there.
+    panels.page.evaluate("studio.selection.set({ target: 'handle' })")
+    levels = panels.page.locator("#panel-errors td.level")
+    expect(levels).to_have_text(["0.0", "\u22126.0", "\u22128.0", "\u221234.0"])
+
+
+def test_a_mode_of_the_solid_is_heard_alone(panels):
+    page = panels.page
+    alone = page.get_by_role("button", name="Mode 2 alone")
+    alone.click()
+    expect(alone).to_have_attribute("aria-pressed", "true")
+    page.get_by_role("button", name="All modes again").click()
+    expect(alone).to_have_attribute("aria-pressed", "false")
+    assert panels.heard() == [["solo", [1]], ["strike", 1, 1], ["solo", None]]
+
+
+# Cost
+
+
+def test_the_cost_is_drawn_and_told(panels):
+    page = panels.page
+    panels.tell(progress(0.5, 2.0))
+    panels.tell(progress(1.0, 1.0))
+    line = page.locator("#panel-cost .figure-line")
+    expect(line).to_have_text("1, 50.0 % below the first one; 11 evaluations in 1.0 s")
+    before = ink(panels, "#panel-cost")
+    panels.tell(progress(1.5, 0.1))
+    expect(line).to_contain_text("0.1, 95.0 % below")
+    assert ink(panels, "#panel-cost")["sum"] != before["sum"]
+    panels.tell({"event": "history", "rows": []})
+    expect(page.locator("#panel-cost .plot")).to_be_hidden()
+
+
+# Settings
+
+
+def test_only_what_was_changed_is_sent(panels):
+    page = panels.page
+    page.get_by_label("Resolution").fill("40")
+    page.get_by_label("Weight of amplitudes").fill("2.5e1")
+    page.get_by_label("Density").fill("1000")
+    page.get_by_text("More settings").click()
+    page.get_by_label("Bounds of the modulus, lowest").fill("1e7")
+    page.get_by_label("Bounds of the modulus, highest").fill("4e11")
+    page.get_by_label("Check on the fine solid").uncheck()
+    page.get_by_role("button", name="Apply").click()
+    assert last_call(panels) == (
+        "change_settings",
+        {
+            "settings": {
+                "resolution": 40,
+                "weights": {"amplitude": 25},
+                "material": {"young_bounds": [1e7, 4e11]},
+                "optimiser": {"fine_check": False},
+            }
+        },
+    )
+
+
+@pytest.mark.parametrize(
+    ("label", "typed", "said"),
+    [
+        ("Resolution", "3", "Resolution: found 3, expected a whole number of at least 4"),
+        ("Resolution", "ten", "found ten, expected a whole number"),
+        ("Modes", "1", "expected a whole number of at least 2, at most 10000 or auto."),
+        ("Density", "", "Density: found nothing, expected a number"),
+        ("Time of a search", "0", "found 0, expected a number of above 0"),
+    ],
+)
+def test_what_does_not_fit_is_refused_with_a_sentence(panels, label, typed, said):
+    page = panels.page
+    field = page.get_by_label(label, exact=label == "Modes").first
+    field.fill(typed)
+    page.get_by_role("button", name="Apply").click()
+    error = page.locator("#panel-settings .field-error:visible")
+    expect(error).to_contain_text(said)
+    expect(field).to_be_focused()
+    expect(field).to_have_attribute("aria-invalid", "true")
+    assert panels.calls == []
+
+
+def test_empty_fields_and_words_are_sent_as_such(panels):
+    page = panels.page
+    page.get_by_label("Time of a search").fill("")
+    page.get_by_label("Coarse solid").select_option("none")
+    page.keyboard.press("Tab")
+    page.get_by_role("button", name="Apply").click()
+    sent = {"settings": {"coarsen": "none", "optimiser": {"seconds": None}}}
+    assert last_call(panels) == ("change_settings", sent)
+
+
+def test_what_is_typed_outlives_a_new_state_and_can_be_discarded(panels):
+    page = panels.page
+    page.get_by_label("Resolution").fill("40")
+    settings = panels.state["settings"] | {"resolution": 20, "density": 7800.0}
+    panels.change(settings=settings)
+    expect(page.get_by_label("Density")).to_have_value("7800")
+    expect(page.get_by_label("Resolution")).to_have_value("40")
+    page.locator("#panel-settings").get_by_role("button", name="Discard").click()
+    expect(page.get_by_label("Resolution")).to_have_value("20")
+
+
+# The design as a whole
+
+
+def test_a_search_is_started_and_stopped(panels):
+    panels.open(state(targets=[target("rim", 1, "c1")]))
+    button = panels.page.locator("#optimise")
+    button.click()
+    assert last_call(panels) == ("optimise", {})
+    panels.change(search={"phase": "running", "message": None})
+    expect(button).to_have_text("Stop")
+    panels.tell(progress(12.0, 0.3))
+    expect(panels.page.locator("#search-state")).to_have_text(
+        "The material is being sought for 12 s."
+    )
+    button.click()
+    assert last_call(panels, 2) == ("stop", {})
+    panels.change(search={"phase": "stopping", "message": None})
+    expect(button).to_be_disabled()
+
+
+def test_without_a_solid_it_says_what_is_missing(panels):
+    empty = state(solid=None, targets=[], clips=[], wanted=None, name="")
+    panels.open(empty)
+    expect(panels.page.locator("#search-state")).to_have_text("Open a solid first.")
+    expect(panels.page.locator("#optimise")).to_be_disabled()
+
+
+def test_the_fine_solid_is_asked_for(panels):
+    panels.page.get_by_label("Fine solid:").check()
+    assert last_call(panels) == ("fine", {"on": True})
+    panels.change(fine={"on": True, "phase": "working", "message": None})
+    expect(panels.page.locator("#panel-project")).to_contain_text("It is being computed")
+
+
+def test_a_project_is_saved_and_opened(panels):
+    page = panels.page
+    page.get_by_text("Save, open, export").click()
+    page.fill("#project-name-input", "pan 2")
+    page.keyboard.press("Enter")
+    expect(page.locator("#project-name-help")).to_contain_text("found pan 2, expected up to 64")
+    assert panels.calls == []
+    page.fill("#project-name-input", "pan-2")
+    page.keyboard.press("Enter")
+    assert last_call(panels) == ("save", {"name": "pan-2"})
+    page.select_option("#project-choice", label="recorded-bell")
+    page.locator("#panel-project").get_by_role("button", name="Open").click()
+    assert last_call(panels, 2) == ("open_project", {"project": "e1"})
+
+
+def test_exports_are_downloads_and_refusals_are_told(panels):
+    page = panels.page
+    page.get_by_text("Save, open, export").click()
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Design (HDF5)").click()
+    assert download.value.suggested_filename == "pan design.h5"
+    assert Path(download.value.path()).read_bytes() == b"design"
+    page.get_by_role("button", name="Faust (DSP)").click()
+    expect(page.locator(".message.error")).to_contain_text("There is no design yet")
+    # The browser itself notes an answer of status 400.
+    panels.faults.clear()
+
+
+def test_the_material_is_forgotten(panels):
+    panels.page.get_by_text("Save, open, export").click()
+    panels.page.get_by_role("button", name="Forget the material").click()
+    assert last_call(panels) == ("forget_material", {})
+
+
+# Comparing
+
+
+def test_clip_and_solid_are_heard_in_turn(panels):
+    panels.page.get_by_role("button", name="Clip, then solid").click()
+    until(panels, lambda: panels.page.evaluate("window.heard.length") == 2)
+    assert panels.heard() == [["play", "/clip/c1/sound"], ["strike", 1, 1]]
+
+
+def test_a_swapped_material_is_heard_once_it_is_there(panels):
+    page = panels.page
+    swap = page.get_by_role("button", name="Swap")
+    expect(swap).to_be_disabled()
+    page.keyboard.press("k")
+    assert last_call(panels) == ("keep", {})
+    panels.change(kept=True)
+    swap.click()
+    assert last_call(panels, 2) == ("swap", {})
+    page.wait_for_timeout(100)
+    assert panels.heard() == []
+    panels.tell(bank(WANTED, 2))
+    until(panels, lambda: page.evaluate("window.heard.length") == 1)
+    assert panels.heard() == [["strike", 1, 1]]
+
+
+def test_keys_compare_but_steal_no_typing(panels):
+    page = panels.page
+    panels.change(kept=True)
+    page.locator("body").click(position={"x": 5, "y": 300})
+    for key in "cbx":
+        page.keyboard.press(key)
+    assert last_call(panels) == ("swap", {})
+    assert panels.heard()[:2] == [["play", "/clip/c1/sound"]] * 2
+    page.focus("#target-name")
+    page.keyboard.type("kxcb?")
+    page.wait_for_timeout(100)
+    assert len(panels.calls) == 1
+    expect(page.locator("dialog[open]")).to_have_count(0)
+
+
+# Messages, keys, tour
+
+
+def test_errors_stay_until_dismissed_and_all_are_listed(panels):
+    page = panels.page
+    panels.tell({"event": "said", "text": "Saved <b>here</b>.", "kind": "note"})
+    panels.tell({"event": "said", "text": "The disk is full; free some space.", "kind": "error"})
+    expect(page.get_by_role("status").filter(has_text="Saved <b>here</b>.").first).to_be_visible()
+    error = page.locator(".message.error")
+    expect(error).to_have_text("Error: The disk is full; free some space.\u00d7")
+    error.get_by_role("button", name="Dismiss").click()
+    expect(error).to_have_count(0)
+    page.get_by_role("button", name="2 messages").click()
+    expect(page.locator(".message-list li")).to_have_count(2)
+    page.keyboard.press("Escape")
+    expect(page.locator("dialog[open]")).to_have_count(0)
+
+
+def test_all_keys_are_listed(panels):
+    page = panels.page
+    page.locator("body").click(position={"x": 5, "y": 300})
+    page.keyboard.press("?")
+    listed = page.locator("table.keys tbody tr")
+    expect(listed).to_have_count(page.evaluate("studio.keys.list.length"))
+    expect(listed.filter(has_text="Redo")).to_contain_text("Ctrl+Shift+Z or Ctrl+Y")
+    page.get_by_role("button", name="Close").click()
+    expect(page.locator("dialog[open]")).to_have_count(0)
+
+
+def test_the_tour_begins_by_itself_once(browser):
+    with window(browser, tour=True) as panels:
+        panels.open()
+        page = panels.page
+        card = page.get_by_role("dialog", name="Open a solid")
+        expect(card).to_be_visible()
+        expect(page.locator("#tour-title")).to_be_focused()
+        titles = []
+        for step in range(1, 6):
+            expect(page.locator(".tour-count")).to_have_text(f"Step {step} of 5")
+            titles.append(page.locator("#tour-title").inner_text())
+            expect(page.locator(".tour-here")).to_have_count(1)
+            page.get_by_role("button", name="Done" if step == 5 else "Next").click()
+        assert len(set(titles)) == 5
+        expect(page.locator(".tour-card")).to_be_hidden()
+        expect(page.locator(".tour-here")).to_have_count(0)
+        page.reload()
+        page.wait_for_selector("#panel-compare button")
+        page.wait_for_timeout(200)
+        expect(page.locator(".tour-card")).to_be_hidden()
+
+
+def test_escape_ends_the_tour_and_the_focus_goes_back(panels):
+    page = panels.page
+    page.focus("#help")
+    page.keyboard.press("Enter")
+    expect(page.locator("#tour-title")).to_be_focused()
+    page.keyboard.press("Escape")
+    expect(page.locator(".tour-card")).to_be_hidden()
+    expect(page.locator("#help")).to_be_focused()
+
+
+# For everybody
+
+
+def show_all(panels) -> None:
+    """Unfold what is folded, and draw what is drawn."""
+    panels.tell(progress(0.5, 2.0))
+    panels.tell(progress(1.0, 1.0))
+    panels.tell({"event": "said", "text": "A sentence.", "kind": "error"})
+    panels.page.evaluate("document.querySelectorAll('details').forEach((each) => each.open = true)")
+    panels.page.wait_for_timeout(100)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [1280, 390])
+def test_axe_finds_nothing_serious(browser, width, scheme):
+    package = importlib.util.find_spec("axe_playwright_python")
+    if package is None or package.origin is None:
+        pytest.skip("axe-playwright-python is not installed")
+    axe = (Path(package.origin).parent / "axe.min.js").read_text(encoding="utf-8")
+    with window(browser, width=width, scheme=scheme) as panels:
+        panels.open()
+        show_all(panels)
+        panels.page.evaluate(axe)
+        for opening in ("", "studio.shortcuts.open()", "studio.tour.open()"):
+            panels.page.evaluate(opening)
+            found = panels.page.evaluate("axe.run(document, { resultTypes: ['violations'] })")
+            serious = [
+                (each["id"], [node["html"] for node in each["nodes"]])
+                for each in found["violations"]
+                if each["impact"] in ("serious", "critical")
+            ]
+            assert serious == []
+            panels.page.evaluate("document.querySelector('dialog[open]')?.close()")
+
+
+def test_nothing_is_wider_than_a_narrow_window(browser):
+    with window(browser, width=360, height=740) as panels:
+        panels.open()
+        show_all(panels)
+        assert panels.page.evaluate("document.documentElement.scrollWidth") <= 360
+        wide = panels.page.evaluate(
+            "[...document.querySelectorAll('.panel-body *')]"
+            ".filter((each) => !each.closest('.scroll')"
+            " && each.getClientRects().length && each.getBoundingClientRect().right > 361)"
+            ".map((each) => each.outerHTML.slice(0, 100))"
+        )
+        assert wide == []
+
+
+def test_the_tab_key_reaches_every_control(panels):
+    show_all(panels)
+    page = panels.page
+    enabled = page.evaluate(
+        "[...document.querySelectorAll('.side button, .side select, .side summary, .side input')]"
+        ".filter((each) => !each.disabled && each.tabIndex >= 0 && each.checkVisibility()"
+        " && !(each.type === 'radio' && !each.checked)).length"
+    )
+    page.focus("#help")
+    reached = 0
+    for _ in range(3 * enabled):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement === document.body"):
+            break
+        reached += page.evaluate(
+            "document.activeElement.closest('.side') !== null"
+            " && document.activeElement.matches('button, select, summary, input')"
+        )
+        if reached == enabled:
+            break
+    assert reached == enabled
