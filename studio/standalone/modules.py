@@ -19,7 +19,7 @@ _INDENTED = re.compile(r"^\s+", re.M)
 
 
 def gathered(entry: Path) -> dict[str, str]:
-    """Sources by number of a module, which is the last one, and of all that it imports.
+    """Sources by number of all that a module imports, and of itself, the last one.
 
     Specifiers are numbers, too; comments are left out but those of licences.
     """
@@ -40,8 +40,8 @@ def gathered(entry: Path) -> dict[str, str]:
         sources[name] = _IMPORTED.sub(renamed, shortened(path.read_text(encoding="utf-8")))
         return name
 
-    last = take(entry)
-    return {**{name: text for name, text in sources.items() if name != last}, last: sources[last]}
+    take(entry)
+    return sources
 
 
 def shortened(source: str) -> str:

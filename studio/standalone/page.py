@@ -1,4 +1,4 @@
-"""Writes the page of a design: one file that opens in any browser, without a server or a network."""
+"""Writes the page of a design: one file that opens in any browser, without server or network."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ def write_page(path: str | Path, design: Design) -> None:
     count = len(design.surface_faces)
     if count > MANY_TRIANGLES:
         say(
-            f"{path}: {len(text) / 1e6:.1f} MB for a surface of {count:,} triangles; with a mesh of "
-            f"{MANY_TRIANGLES:,} or fewer it would look alike and open faster"
+            f"{path}: {len(text) / 1e6:.1f} MB for a surface of {count:,} triangles; with a mesh "
+            f"of {MANY_TRIANGLES:,} or fewer it would look alike and open faster"
         )
 
 

@@ -64,11 +64,11 @@ export function showSolid(element, page) {
       page.strike(selection.current.vertex, digit / 9);
     });
   }
-  /** @param {string} className @returns {HTMLElement} */
-  const layer = (className) => {
+  /** @param {string} className @param {HTMLElement} [within] @returns {HTMLElement} */
+  const layer = (className, within = element) => {
     const made = document.createElement("div");
     made.className = className;
-    element.append(made);
+    within.append(made);
     return made;
   };
   layer("crosshair").ariaHidden = "true";
@@ -76,7 +76,7 @@ export function showSolid(element, page) {
   const gauge = layer("gauge");
   gauge.hidden = true;
   gauge.ariaHidden = "true";
-  const legend = makeLegend(layer("legend"));
+  const legend = makeLegend(layer("", layer("standalone-legend")));
   let view;
   try {
     view = new View(element);
