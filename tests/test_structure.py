@@ -85,7 +85,7 @@ ARROWS = {
         sound.rendering sound.export""",
     #
     "studio": "",
-    "studio.standalone": "",
+    "studio.standalone": "sound sound.project sound.design sound.rendering studio",
     "studio.processes": """solver.files solver.response solver.analysis sound sound.clips
         sound.project sound.design sound.rendering sound.export studio studio.standalone""",
     "studio.session": "sound sound.clips sound.project studio studio.processes",
