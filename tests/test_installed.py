@@ -87,3 +87,16 @@ def test_rules_are_found_and_planned(site, installed):
 def test_a_configuration_is_estimated(installed):
     found = installed("-m", "carillon", "estimate", "--preset", "tiny", "--json").stdout
     assert json.loads(found)
+
+
+def test_the_page_of_the_studio_is_whole(site):
+    """With the licences of its libraries, and without what only its makers need."""
+    made = {
+        str(path.relative_to(CHECKOUT))
+        for path in (CHECKOUT / "studio" / "page").rglob("*")
+        if path.suffix in (".js", ".css", ".svg", ".html")
+        or path.name in ("LICENSE", "vendor.json")
+    }
+    page = site / "studio" / "page"
+    found = {str(path.relative_to(site)) for path in page.rglob("*") if path.is_file()}
+    assert len(made) > 40 and made == found
