@@ -12,7 +12,7 @@ from PIL import Image
 from tests.chromium import chromium
 from tests.studio_pages import ToldStudio, open_page, serving, until, until_page
 
-BELL_MIDDLE = "studio.view.drawing.middle()"
+MIDDLE = "studio.view.drawing.middle()"
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +59,7 @@ def page(opened):
 def pixels(page) -> np.ndarray:
     """The solid's view as (height, width, 3), once nothing moves."""
     page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    until_page(page, "studio.view.drawing.waiting === 0")
     return np.asarray(
         Image.open(io.BytesIO(page.locator("#view canvas").screenshot())).convert("RGB"), float
     )
@@ -292,7 +293,7 @@ def test_the_view_is_used_by_keys_alone(page, studio):
     page.keyboard.press("Tab")
     page.keyboard.press("Shift+Tab")
     assert page.locator(".crosshair").is_visible()
-    middle = page.evaluate(f"(({{ x, y }}) => studio.view.pick(x, y))({BELL_MIDDLE})")
+    middle = page.evaluate(f"(({{ x, y }}) => studio.view.pick(x, y))({MIDDLE})")
     page.keyboard.press(" ")
     assert strikes(page) == [[middle, 1]]
     start = direction(page)

@@ -81,6 +81,25 @@ export function creased(positions, triangles) {
   return { sources: Uint32Array.from(sources), index, normals };
 }
 
+/**
+ * Volume of a closed surface; negative if its triangles face inwards.
+ *
+ * @param {Float32Array} positions
+ * @param {Uint32Array} triangles
+ * @returns {number}
+ */
+function volume(positions, triangles) {
+  let sum = 0;
+  for (let i = 0; i < triangles.length; i += 3) {
+    const [a, b, c] = [3 * triangles[i], 3 * triangles[i + 1], 3 * triangles[i + 2]];
+    const [x, y, z] = [positions[a], positions[a + 1], positions[a + 2]];
+    const [u, v, w] = [positions[b], positions[b + 1], positions[b + 2]];
+    const [r, s, t] = [positions[c], positions[c + 1], positions[c + 2]];
+    sum += x * (v * t - w * s) + y * (w * r - u * t) + z * (u * s - v * r);
+  }
+  return sum / 6;
+}
+
 /** Waves that run over the surface from where it was struck, as a part of its material. */
 class Waves {
   constructor() {
@@ -89,6 +108,7 @@ class Waves {
     this.strengths = new Float32Array(WAVES);
     this.next = 0;
     this.size = { value: 1 };
+    this.running = { value: 0 };
   }
 
   /** @param {THREE.Vector3} point @param {number} strength */
@@ -96,12 +116,15 @@ class Waves {
     this.strikes[this.next].set(point.x, point.y, point.z, 0);
     this.strengths[this.next] = strength;
     this.next = (this.next + 1) % WAVES;
+    this.running.value = WAVES;
   }
 
   /** @param {number} seconds since the last drawing @returns {boolean} whether any still runs */
   advance(seconds) {
     for (const strike of this.strikes) strike.w += seconds;
-    return this.strikes.some((strike) => strike.w < WAVE_SECONDS);
+    const running = this.strikes.some((strike) => strike.w < WAVE_SECONDS);
+    this.running.value = running ? WAVES : 0;
+    return running;
   }
 
   /** @param {THREE.Material} material whose shader gets them */
@@ -111,6 +134,7 @@ class Waves {
         strikes: { value: this.strikes },
         strengths: { value: this.strengths },
         size: this.size,
+        running: this.running,
       });
       shader.vertexShader = shader.vertexShader
         .replace("#include <common>", "#include <common>\nvarying vec3 here;")
@@ -122,11 +146,12 @@ class Waves {
           varying vec3 here;
           uniform vec4 strikes[${WAVES}];
           uniform float strengths[${WAVES}];
-          uniform float size;`,
+          uniform float size;
+          uniform int running;`,
         )
         .replace(
           "#include <opaque_fragment>",
-          `for (int i = 0; i < ${WAVES}; i++) {
+          `for (int i = 0; i < running; i++) {
             float age = strikes[i].w / ${WAVE_SECONDS.toFixed(2)};
             if (age < 1.0) {
               float reach = size * (0.02 + 0.22 * sqrt(age)) * (0.5 + 0.5 * strengths[i]);
@@ -166,7 +191,8 @@ export class Surface {
     this.geometry.computeBoundingSphere();
     this.waves = new Waves();
     this.waves.size.value = this.sphere.radius;
-    this.material = new THREE.MeshLambertMaterial({ vertexColors: true, side: THREE.DoubleSide });
+    const side = volume(positions, triangles) < 0 ? THREE.BackSide : THREE.FrontSide;
+    this.material = new THREE.MeshLambertMaterial({ vertexColors: true, side });
     this.waves.attach(this.material);
     this.mesh = new THREE.Mesh(this.geometry, this.material);
   }

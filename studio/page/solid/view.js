@@ -16,7 +16,24 @@ const FROM = new THREE.Vector3(-0.45, -1, 0.55).normalize();
 const FIELD_DEGREES = 32;
 // Around the solid stays some of the view, as arrows stand out of it.
 const ROOM = 1.15;
+// Slower than this while something moves, and it is drawn coarser until it stands still.
+const SLOW_SECONDS = 1 / 30;
+const COARSEST = 0.35;
 const NEITHER = /** @type {any} */ (-1);
+
+/**
+ * Whether the browser draws without a graphics card, where smooth edges take three times as long.
+ *
+ * @returns {boolean}
+ */
+function drawnBySoftware() {
+  const context = document.createElement("canvas").getContext("webgl2");
+  if (!context) return false;
+  const told = context.getExtension("WEBGL_debug_renderer_info");
+  const name = told ? String(context.getParameter(told.UNMASKED_RENDERER_WEBGL)) : "";
+  context.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+}
 
 export class View {
   /**
@@ -28,9 +45,10 @@ export class View {
     const canvas = document.createElement("canvas");
     this.canvas = canvas;
     // three would write its own error to the console, and several lines of it.
-    const context = canvas.getContext("webgl2", { antialias: true, alpha: true });
+    const antialias = !drawnBySoftware();
+    const context = canvas.getContext("webgl2", { antialias, alpha: true });
     if (!context) throw new Error(NO_GRAPHICS);
-    this.renderer = new THREE.WebGLRenderer({ canvas, context, alpha: true, antialias: true });
+    this.renderer = new THREE.WebGLRenderer({ canvas, context, alpha: true, antialias });
     this.renderer.setClearColor(0, 0);
     canvas.tabIndex = 0;
     element.prepend(canvas);
@@ -71,6 +89,10 @@ export class View {
     this.lost = false;
     this.waiting = 0;
     this.last = 0;
+    // Share of the pixels' number along each side, and how long drawings take of late.
+    this.sharpness = 1;
+    this.pace = 0;
+    this.moved = false;
     /** @type {(lost: boolean) => void} */
     this.onLost = () => {};
     canvas.addEventListener("webglcontextlost", (event) => {
@@ -258,25 +280,52 @@ export class View {
   resize() {
     const { clientWidth: width, clientHeight: height } = this.element;
     if (width === 0 || height === 0) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-    this.renderer.setSize(width, height, false);
+    this.#setPixels();
     this.camera.aspect = width / height;
     this.#shift();
     if (this.fitted) this.fit();
     this.invalidate();
   }
 
+  #setPixels() {
+    this.renderer.setPixelRatio(this.sharpness * Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(this.element.clientWidth, this.element.clientHeight, false);
+  }
+
   /** @param {number} time [ms] */
   #draw(time) {
     this.waiting = 0;
     if (this.lost) return;
-    const moves = this.controls.update();
-    const seconds = Math.max(0, Math.min(0.1, (time - this.last) / 1000));
+    const turns = this.controls.update();
+    const seconds = Math.max(0, (time - this.last) / 1000);
     this.last = time;
-    const runs = this.surface?.waves.advance(seconds) ?? false;
+    const runs = this.surface?.waves.advance(Math.min(0.1, seconds)) ?? false;
+    this.#choose(turns || runs, seconds);
     for (const called of this.beforeDrawing) called();
     this.renderer.render(this.scene, this.camera);
     this.drawings++;
-    if (moves || runs) this.invalidate();
+    // What was drawn coarser is drawn once more when it stands still.
+    if (turns || runs || this.sharpness < 1) this.invalidate();
+  }
+
+  /**
+   * Chooses how sharp the next drawing is.
+   *
+   * @param {boolean} moves
+   * @param {number} seconds since the last one
+   */
+  #choose(moves, seconds) {
+    const before = this.sharpness;
+    if (!moves) {
+      this.sharpness = 1;
+    } else if (this.moved) {
+      this.pace = Math.min(0.5, 0.7 * this.pace + 0.3 * seconds);
+      if (this.pace > 1.3 * SLOW_SECONDS) this.sharpness = Math.max(COARSEST, 0.7 * this.sharpness);
+      if (this.sharpness !== before) this.pace = SLOW_SECONDS; // it takes some drawings to tell again
+    } else if (this.pace > 1.3 * SLOW_SECONDS) {
+      this.sharpness = COARSEST; // it was slow the last time
+    }
+    this.moved = moves;
+    if (this.sharpness !== before) this.#setPixels();
   }
 }
