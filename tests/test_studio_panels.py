@@ -296,7 +296,7 @@ def test_errors_are_told_and_the_worst_are_marked(panels):
 def test_levels_are_those_at_the_selected_target(panels):
     # At the handle all are wanted as loud: the second one is 6 dB softer there.
     panels.page.evaluate("studio.selection.set({ target: 'handle' })")
-    levels = panels.page.locator("#panel-errors td.level")
+    levels = panels.page.locator("#panel-errors td.loudness")
     expect(levels).to_have_text(["0.0", "\u22126.0", "\u22128.0", "\u221234.0"])
 
 

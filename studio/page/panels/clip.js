@@ -100,7 +100,7 @@ export function makeClip(element, parts) {
           return box.checked ? others : [...others, mode.hertz];
         }),
     });
-    const figures = ["hertz", "damping", "decay", "level"].map((name) => make("td", { class: `number ${name}` }));
+    const figures = ["hertz", "damping", "decay", "loudness"].map((name) => make("td", { class: `number ${name}` }));
     const sound = button("\u25b6\ufe0e", () => void playMode(mode), {
       class: "small",
       "aria-label": `${withHertz(mode.hertz)} alone`,
@@ -152,7 +152,7 @@ export function makeClip(element, parts) {
     setText(find(row, ".hertz", HTMLElement), fixed(mode.hertz, 1));
     setText(find(row, ".damping", HTMLElement), fixed(mode.damping_per_second, 1));
     setText(find(row, ".decay", HTMLElement), fixed(decaySeconds(mode.damping_per_second), 2));
-    setText(find(row, ".level", HTMLElement), fixed(decibels(mode.amplitude, loudest), 1));
+    setText(find(row, ".loudness", HTMLElement), fixed(decibels(mode.amplitude, loudest), 1));
   }
 
   /** @param {Clip} clip */

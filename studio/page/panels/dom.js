@@ -150,3 +150,19 @@ export function find(parent, selector, kind) {
   if (!(found instanceof kind)) throw new Error(`there is no ${selector}`);
   return found;
 }
+
+/**
+ * Title of a dialog and the button that closes it, which is first so that nothing is scrolled away.
+ *
+ * @param {string} id of the title
+ * @param {string} text
+ * @returns {HTMLElement}
+ */
+export function sheetHead(id, text) {
+  return make(
+    "form",
+    { method: "dialog", class: "sheet-head" },
+    make("h2", { id }, text),
+    make("button", {}, "Close"),
+  );
+}

@@ -72,7 +72,7 @@ export function makeErrors(element, parts) {
   /** @param {Pair} pair */
   function create(pair) {
     const { mode } = pair;
-    const figures = ["wanted", "now", "cents", "bark", "level"].map((name) =>
+    const figures = ["wanted", "now", "cents", "bark", "loudness"].map((name) =>
       make("td", { class: `number ${name}` }),
     );
     return make(
@@ -119,7 +119,7 @@ export function makeErrors(element, parts) {
       [".now", fixed(pair.hertz, 1)],
       [".cents", fixed(pair.cents, 1, true)],
       [".bark", fixed(pair.bark, 2, true)],
-      [".level", fixed(levelDifference(pair), 1, true)],
+      [".loudness", fixed(levelDifference(pair), 1, true)],
     ];
     for (const [selector, text] of texts) setText(find(row, selector, HTMLElement), text);
     const isWorst = worst.has(pair.mode);

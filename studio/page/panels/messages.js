@@ -1,6 +1,6 @@
 /** Sentences for the person: the latest ones for a while, all of the last ones on demand. */
 
-import { button, make, setText } from "./dom.js";
+import { button, make, setText, sheetHead } from "./dom.js";
 
 /** @typedef {"note" | "error"} Kind */
 
@@ -19,15 +19,15 @@ export function makeMessages(element, parts) {
   const dialog = make(
     "dialog",
     { class: "sheet", "aria-labelledby": "messages-title" },
-    make("h2", { id: "messages-title" }, "Messages"),
+    sheetHead("messages-title", "Messages"),
     list,
-    make("form", { method: "dialog" }, make("button", { class: "main" }, "Close")),
   );
   const count = button("", () => dialog.showModal(), { class: "message-count", hidden: true });
   const shown = make("div", { class: "message-stack" });
   // Only what is new is read out: neither how many there are nor the list.
   element.append(shown);
-  element.after(make("div", { class: "message-corner" }, count), dialog);
+  element.after(dialog);
+  document.getElementById("side")?.append(count);
 
   parts.connection.onEvent("said", (event) => tell(event.text, event.kind === "error" ? "error" : "note"));
 

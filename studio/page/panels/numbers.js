@@ -107,7 +107,7 @@ export function significant(value, digits = 3) {
  * @param {number | null | undefined} hertz
  */
 export function withHertz(hertz) {
-  return `${fixed(hertz, hertz && hertz < 1000 ? 1 : 0)} Hz`;
+  return `${fixed(hertz, hertz && hertz < 10_000 ? 1 : 0)} Hz`;
 }
 
 /**

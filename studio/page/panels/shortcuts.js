@@ -1,6 +1,6 @@
 /** The list of keys. */
 
-import { make } from "./dom.js";
+import { make, sheetHead } from "./dom.js";
 
 /** @typedef {import("../keys.js").Key} Key */
 
@@ -27,7 +27,7 @@ export function makeShortcuts(element, parts) {
   const dialog = make(
     "dialog",
     { class: "sheet", "aria-labelledby": "shortcuts-title" },
-    make("h2", { id: "shortcuts-title" }, "Keys"),
+    sheetHead("shortcuts-title", "Keys"),
     make("p", { class: "hint" }, "They hold wherever nobody is typing into a field."),
     make(
       "table",
@@ -35,7 +35,6 @@ export function makeShortcuts(element, parts) {
       make("thead", {}, make("tr", {}, make("th", { scope: "col" }, "Key"), make("th", { scope: "col" }, "Does"))),
       body,
     ),
-    make("form", { method: "dialog" }, make("button", { class: "main" }, "Close")),
   );
   element.append(dialog);
 
@@ -51,7 +50,12 @@ export function makeShortcuts(element, parts) {
 
 /** @param {Key} key */
 function row(key) {
-  const names = key.keys.flatMap((name, index) => [index > 0 && " or ", ...written(name)]);
+  const digits = key.keys.filter((name) => /^\d$/.test(name));
+  const isRun = digits.length > 2 && digits.length === key.keys.length;
+  const [first = "", last = ""] = [digits[0], digits[digits.length - 1]];
+  const names = isRun
+    ? [...written(first), " to ", ...written(last)]
+    : key.keys.flatMap((name, index) => [index > 0 && " or ", ...written(name)]);
   return make("tr", {}, make("td", {}, ...names), make("td", {}, key.says));
 }
 

@@ -11,8 +11,8 @@ const STEPS = [
     title: "Open a solid",
     text:
       "Drop a mesh onto the page, choose one that comes along, or open an example. It is prepared by " +
-      "itself. Drag beside it to turn it, and strike it wherever you like: a click strikes, longer or " +
-      "harder by the strength below.",
+      "itself. Drag beside it to turn it, and press anywhere on it to strike it, as hard as the strength " +
+      "above it says.",
   },
   {
     place: "#panel-targets",

@@ -125,12 +125,11 @@ export class Solid {
 
   #keys() {
     const { keys, selection } = this.parts;
-    for (let digit = 1; digit <= 9; digit++) {
-      keys.add(String(digit), `Strike the last point again, with strength ${digit}/9`, () => {
-        if (selection.current.vertex === null) return false;
-        this.strike(selection.current.vertex, digit / 9);
-      });
-    }
+    const digits = Array.from("123456789");
+    keys.add(digits, "Strike the last point again, with a strength of 1/9 to 9/9", ({ key }) => {
+      if (selection.current.vertex === null) return false;
+      this.strike(selection.current.vertex, Number(key) / 9);
+    });
     keys.add("Enter", "Strike the selected target", () => {
       const name = selection.current.target;
       return name === null ? false : this.strikeTarget(name);
