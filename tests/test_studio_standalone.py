@@ -134,7 +134,9 @@ def test_holds_what_it_says_to_a_stated_error() -> None:
     header, arrays = unpack(content(design))
     solid = SoundingSolid.of_design(design)
     listening = Listening.of_design(design, solid)
-    shares = arrays["halves"].view("<f2").astype(float).T
+    low, high = arrays["halves"].view("u1").reshape(2, -1)
+    halves = np.column_stack([low, high]).ravel().view("<f2")
+    shares = halves.astype(float).reshape(N_MODES, -1).T
     gains = shares * arrays["loudest"]
     for strike in design.strikes:
         amplitudes = solid.amplitudes(strike.position[None], strike.inward[None])[0]

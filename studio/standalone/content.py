@@ -54,8 +54,8 @@ def content(design: Design) -> bytes:
         "young_log10_pa": [float(young.min()), wide / STEPS],
     }
     small = "u2" if len(positions) <= STEPS else "u4"
-    # A mode after the other: neighbours are alike then, which takes fewer bytes.
-    halves = np.ascontiguousarray(shares.T).astype("<f2").view("<u2")
+    # One mode after the other, and all high bytes together: what is alike takes fewer bytes.
+    halves = np.ascontiguousarray(shares.T).astype("<f2").view("u1").reshape(-1, 2).T
     return pack(
         header,
         {
@@ -64,7 +64,7 @@ def content(design: Design) -> bytes:
             "wanted_hertz": ("f8", targets.frequencies),
             "wanted_dampings": ("f8", targets.dampings),
             "loudest": ("f8", loudest),
-            "halves": ("u2", halves),
+            "halves": ("u2", np.ascontiguousarray(halves).ravel().view("<u2")),
             "places": ("u2", np.rint((positions - low) / side * STEPS).T),
             "young": ("u2", np.rint((young - young.min()) / wide * STEPS)),
             "triangles": (small, design.surface_faces),

@@ -31,10 +31,15 @@ export function readDesign(header, arrays) {
   const hertz = /** @type {Float64Array} */ (arrays.hertz);
   const [modes, vertices] = [hertz.length, arrays.young.length];
   const gains = new Float32Array(vertices * modes);
+  // All low bytes come first, then all high ones.
+  const { buffer, byteOffset, byteLength } = arrays.halves;
+  const bytes = new Uint8Array(buffer, byteOffset, byteLength);
+  const count = modes * vertices;
   const positions = new Float32Array(3 * vertices);
   for (let mode = 0; mode < modes; mode++) {
     for (let vertex = 0; vertex < vertices; vertex++) {
-      const share = fromHalf(arrays.halves[mode * vertices + vertex]);
+      const at = mode * vertices + vertex;
+      const share = fromHalf(bytes[at] | (bytes[count + at] << 8));
       gains[vertex * modes + mode] = share * arrays.loudest[mode];
     }
   }

@@ -89,6 +89,7 @@ export function makeSpectrum(element, { design, selection }) {
     svg.append(drawn("text", { x: middle, y: HEIGHT - 3, "text-anchor": "middle" }, caption));
     const foot = down(FLOOR_DECIBELS);
     for (const [mode, amplitude] of wanted.entries()) {
+      if (decibels(amplitude) < FLOOR_DECIBELS) continue;
       const [x, y] = [across(design.wanted.hertz[mode]), down(decibels(amplitude))];
       svg.append(
         drawn("line", { x1: x, x2: x, y1: foot, y2: y, class: "stem wanted" }),
@@ -96,6 +97,7 @@ export function makeSpectrum(element, { design, selection }) {
       );
     }
     for (const [mode, amplitude] of now.entries()) {
+      if (decibels(amplitude) < FLOOR_DECIBELS) continue;
       const [x, y] = [across(design.bank.hertz[mode]), down(decibels(amplitude))];
       svg.append(
         drawn("line", { x1: x, x2: x, y1: foot, y2: y, class: "stem now" }),
@@ -127,14 +129,12 @@ function fill(table, design, wanted, now, decibels) {
   const body = table.createTBody();
   for (const [mode, amplitude] of wanted.entries()) {
     const row = body.insertRow();
-    for (const value of [
-      design.wanted.hertz[mode],
-      design.bank.hertz[mode],
-      design.cents[mode],
-      decibels(amplitude),
-      decibels(now[mode]),
-    ]) {
+    const hertz = [design.wanted.hertz[mode], design.bank.hertz[mode]];
+    for (const value of [...hertz, design.cents[mode]]) {
       row.insertCell().textContent = value.toFixed(1);
+    }
+    for (const level of [amplitude, now[mode]]) {
+      row.insertCell().textContent = level > 0 ? decibels(level).toFixed(1) : "none";
     }
   }
 }
