@@ -141,7 +141,7 @@ def test_of_a_clip_that_is_being_listened_to_only_the_clip_is_heard(panels):
     expect(group.get_by_role("button", name="Clip")).to_be_enabled()
     expect(group.get_by_role("button", name="Modes")).to_be_disabled()
     expect(panels.page.locator("#panel-clip")).to_contain_text("being found")
-    expect(panels.page.locator("#search-state")).to_contain_text("handle a clip first")
+    expect(panels.page.locator("#search-state")).to_contain_text("handle does not count")
 
 
 def test_a_clip_is_chosen_taken_from_a_file_and_recorded(panels):
@@ -294,10 +294,20 @@ def test_errors_are_told_and_the_worst_are_marked(panels):
 
 
 def test_levels_are_those_at_the_selected_target(panels):
-    # At the handle all are wanted as loud: the second one is 6 dB softer there.
+    # At the handle all are wanted as loud; the solid has 0.5, 0.25, 0.2 and 0.01 everywhere.
     panels.page.evaluate("studio.selection.set({ target: 'handle' })")
     levels = panels.page.locator("#panel-errors td.loudness")
     expect(levels).to_have_text(["0.0", "\u22126.0", "\u22128.0", "\u221234.0"])
+
+
+def test_without_a_target_the_spectrum_is_that_of_the_point_struck_last(panels):
+    panels.open(state(targets=[], clips=[], wanted=None))
+    panels.tell(bank(wanted=False))
+    spectrum = panels.page.locator("#panel-spectrum")
+    expect(spectrum).to_contain_text("At the first point")
+    panels.page.evaluate("studio.selection.set({ vertex: 2 })")
+    expect(spectrum).to_contain_text("At the point struck last")
+    assert ink(panels, "#panel-spectrum")["red"] > 100
 
 
 def test_a_mode_of_the_solid_is_heard_alone(panels):

@@ -18,6 +18,18 @@ export function chosenTarget(parts) {
 }
 
 /**
+ * The point whose spectrum is looked at: the selected target, or else the point struck last.
+ *
+ * @param {Parts} parts
+ * @returns {{ name: string | null, vertex: number }}
+ */
+export function chosenPoint(parts) {
+  const target = chosenTarget(parts);
+  if (target) return target;
+  return { name: null, vertex: parts.selection.current.vertex ?? 0 };
+}
+
+/**
  * The clip of a target.
  *
  * @param {State | null} state

@@ -1,6 +1,6 @@
 /** How far every mode is from what is wanted, in a table. */
 
-import { chosenTarget, strikeTarget } from "./chosen.js";
+import { chosenPoint, chosenTarget, strikeTarget } from "./chosen.js";
 import { button, find, keepList, make, setAttribute, setText } from "./dom.js";
 import { fixed, rootMeanSquare } from "./numbers.js";
 import { levelDifference, pairsOf } from "./pairs.js";
@@ -94,7 +94,7 @@ export function makeErrors(element, parts) {
 
   function show() {
     const target = chosenTarget(parts);
-    const pairs = bank ? pairsOf(bank[0], bank[1], state.current, target?.name ?? null) : [];
+    const pairs = bank ? pairsOf(bank[0], bank[1], state.current, chosenPoint(parts)) : [];
     const wanted = pairs.filter((pair) => pair.wantedHertz !== null);
     none.hidden = wanted.length > 0;
     body.hidden = wanted.length === 0;

@@ -7,13 +7,13 @@ import { bark, cents, decibels, largest } from "./numbers.js";
 /** @typedef {import("../types.js").State} State */
 
 /**
- * A mode of the solid; levels are below the loudest of all at the target, as the cost has them. What is
- * `null` is not wanted of it, or nobody knows.
+ * A mode of the solid; levels are below the loudest of all at the point, as the cost has them. What is
+ * `null` is not wanted of it, or not there.
  *
  * @typedef {object} Pair
  * @property {number} mode its number, from 0
  * @property {number} hertz
- * @property {number | null} decibels
+ * @property {number} decibels
  * @property {number | null} wantedHertz
  * @property {number | null} wantedDecibels
  * @property {number | null} cents above what is wanted
@@ -24,31 +24,32 @@ import { bark, cents, decibels, largest } from "./numbers.js";
 const SILENT = -200;
 
 /**
- * Modes of a bank and what is wanted of them at a target.
+ * Modes of a bank and what is wanted of them at a point.
  *
  * @param {BankHeader} header
  * @param {BankArrays} arrays
  * @param {State | null} state
- * @param {string | null} target its name
- * @returns {Pair[]}
+ * @param {{ name: string | null, vertex: number }} point a target, or any vertex
+ * @returns {Pair[]} none if the solid has no such vertex
  */
-export function pairsOf(header, arrays, state, target) {
+export function pairsOf(header, arrays, state, { name, vertex }) {
   const count = arrays.hertz.length;
-  const row = target === null ? -1 : header.targets.indexOf(target);
-  const gains = row < 0 ? null : arrays.struck.subarray(row * count, (row + 1) * count);
-  const levels = gains && levelsOf(gains);
+  const gains = arrays.gains.subarray(vertex * count, (vertex + 1) * count);
+  if (gains.length !== count) return [];
+  const levels = levelsOf(gains);
   const wanted = header.wanted_hertz;
-  const place = state?.targets.findIndex((each) => each.name === target) ?? -1;
-  const amplitudes = wanted && place >= 0 ? (state?.wanted?.amplitudes[place] ?? null) : null;
+  // Amplitudes are wanted of those targets alone that have a clip: the bank names them in their order.
+  const row = name === null ? -1 : header.targets.indexOf(name);
+  const amplitudes = wanted && row >= 0 ? (state?.wanted?.amplitudes[row] ?? null) : null;
   const wantedLevels = amplitudes && levelsOf(amplitudes);
   return Array.from(arrays.hertz, (hertz, mode) => {
     const wantedHertz = wanted?.[mode] ?? null;
     return {
       mode,
       hertz,
-      decibels: levels?.[mode] ?? null,
+      decibels: levels[mode] ?? SILENT,
       wantedHertz,
-      wantedDecibels: wantedHertz === null ? null : (wantedLevels?.[mode] ?? null),
+      wantedDecibels: wantedLevels?.[mode] ?? null,
       cents: wantedHertz === null ? null : (header.cents?.[mode] ?? cents(hertz, wantedHertz)),
       bark: wantedHertz === null ? null : (header.bark?.[mode] ?? bark(hertz) - bark(wantedHertz)),
     };
@@ -56,12 +57,13 @@ export function pairsOf(header, arrays, state, target) {
 }
 
 /**
- * How much louder a mode is than wanted [dB]; `null` if one of both is not known.
+ * How much louder a mode is than wanted [dB]; `null` if nothing is wanted there.
  *
  * @param {Pair} pair
+ * @returns {number | null}
  */
 export function levelDifference(pair) {
-  if (pair.decibels === null || pair.wantedDecibels === null) return null;
+  if (pair.wantedDecibels === null) return null;
   if (pair.decibels <= SILENT && pair.wantedDecibels <= SILENT) return 0;
   return pair.decibels - pair.wantedDecibels;
 }

@@ -138,7 +138,7 @@ export function makeProject(element, parts) {
     search.disabled = phase === "stopping" || (phase === "idle" && why !== "");
     const time = seconds === null ? "" : ` for ${withSeconds(seconds)}`;
     const said = {
-      idle: message ?? why,
+      idle: message ?? (why || noteOn(now)),
       starting: message ?? "The search is being prepared \u2026",
       running: message ?? `The material is being sought${time}.`,
       stopping: message ?? "What was found last is being taken over.",
@@ -173,20 +173,39 @@ function isSearching(state) {
 }
 
 /**
- * Why nothing can be sought yet; empty if it can.
+ * Why nothing can be sought yet; empty if it can. What is still being prepared is waited for.
  *
  * @param {State} state
  */
 function whyNot(state) {
   if (!state.solid) return "Open a solid first.";
   if (state.solid.phase === "failed") return state.solid.message ?? "The solid could not be prepared.";
-  if (state.solid.phase !== "ready") return "The solid is being prepared \u2026";
   if (state.targets.length === 0) return "Add a target first: a point and the clip that it shall sound like.";
-  const bare = state.targets.filter((target) => target.clip === null);
-  if (bare.length > 0) return `Give ${bare.map((target) => target.name).join(" and ")} a clip first, or remove it.`;
-  const clips = state.targets.map((target) => state.clips.find((clip) => clip.clip === target.clip));
-  const failed = clips.find((clip) => clip?.phase === "failed");
-  if (failed) return `${failed.name} cannot be used: choose another clip, or remove its target.`;
-  if (clips.some((clip) => clip?.phase !== "ready")) return "Clips are being listened to \u2026";
-  return "";
+  if (usedTargets(state).length > 0) return "";
+  const failed = state.clips.find((clip) => clip.phase === "failed");
+  if (failed) return `${failed.name} cannot be used: choose another clip.`;
+  return `Give ${state.targets[0]?.name ?? "the target"} a clip first.`;
+}
+
+/**
+ * What a search has to wait for, or leaves out; empty if nothing.
+ *
+ * @param {State} state
+ */
+function noteOn(state) {
+  if (state.solid?.phase !== "ready") return "The solid is being prepared \u2026";
+  const used = usedTargets(state);
+  const idle = state.targets.filter((target) => !used.includes(target)).map((target) => target.name);
+  if (idle.length === 0) return "";
+  return `Without a clip that can be used, ${idle.join(" and ")} ${idle.length > 1 ? "do" : "does"} not count.`;
+}
+
+/**
+ * Targets with a clip that did not fail.
+ *
+ * @param {State} state
+ */
+function usedTargets(state) {
+  const good = state.clips.filter((clip) => clip.phase !== "failed").map((clip) => clip.clip);
+  return state.targets.filter((target) => target.clip !== null && good.includes(target.clip));
 }

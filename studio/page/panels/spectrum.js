@@ -1,6 +1,6 @@
 /** The spectrum at the selected target: what is wanted against what the solid has now. */
 
-import { chosenTarget } from "./chosen.js";
+import { chosenPoint } from "./chosen.js";
 import { make, setAttribute, setText } from "./dom.js";
 import { makeLegend } from "./legend.js";
 import { fixed, withHertz } from "./numbers.js";
@@ -38,7 +38,7 @@ export function makeSpectrum(element, parts) {
   /** @type {import("uplot") | null} */
   let plot = null;
 
-  const none = make("p", { class: "hint" }, "Open a solid and add a target to see its spectrum.");
+  const none = make("p", { class: "hint" }, "Open a solid to see its spectrum.");
   const caption = make("p", { class: "hint" });
   const picture = make("div", { class: "plot", role: "img" });
   const readout = make("p", { class: "readout" });
@@ -56,19 +56,19 @@ export function makeSpectrum(element, parts) {
   element.append(none, body);
 
   function show() {
-    const target = chosenTarget(parts);
-    pairs = bank ? pairsOf(bank[0], bank[1], state.current, target?.name ?? null) : [];
-    const isThere = pairs.length > 0 && pairs.some((pair) => pair.decibels !== null);
-    none.hidden = isThere;
-    body.hidden = !isThere;
-    if (!isThere) return;
-    setText(caption, `At ${target?.name}; levels below the loudest mode there.`);
+    const point = chosenPoint(parts);
+    const name = point.name ?? (selection.current.vertex === null ? "the first point" : "the point struck last");
+    pairs = bank ? pairsOf(bank[0], bank[1], state.current, point) : [];
+    none.hidden = pairs.length > 0;
+    body.hidden = pairs.length === 0;
+    if (pairs.length === 0) return;
+    setText(caption, `At ${name}; levels below the loudest mode there.`);
     const hertz = [...new Set([...pairs.map((pair) => pair.hertz), ...pairs.flatMap(wantedHertz)])];
     hertz.sort((one, other) => one - other);
     plot ??= create();
     // Marks are drawn by hand: what uPlot gets only says how wide its axis is.
     plot.setData([hertz, hertz.map(() => null)], true);
-    setAttribute(picture, "aria-label", summary(target?.name ?? ""));
+    setAttribute(picture, "aria-label", summary(name));
     showMode();
   }
 
@@ -115,10 +115,10 @@ export function makeSpectrum(element, parts) {
     plot?.redraw(false);
   }
 
-  /** @param {string} target */
-  function summary(target) {
+  /** @param {string} place */
+  function summary(place) {
     const wanted = pairs.filter((pair) => pair.wantedHertz !== null);
-    const first = `Spectrum at ${target}: ${pairs.length} modes of the solid from ${range(pairs.map((pair) => pair.hertz))}`;
+    const first = `Spectrum at ${place}: ${pairs.length} modes of the solid from ${range(pairs.map((pair) => pair.hertz))}`;
     if (wanted.length === 0) return `${first}; none is wanted yet.`;
     return `${first}, ${wanted.length} wanted from ${range(wanted.flatMap(wantedHertz))}. The table of errors has the numbers.`;
   }
@@ -132,7 +132,7 @@ export function makeSpectrum(element, parts) {
     if (!before || now.wanted !== before.wanted || now.targets !== before.targets) show();
   });
   selection.onChange((now, before) => {
-    if (now.target !== before.target) show();
+    if (now.target !== before.target || (now.target === null && now.vertex !== before.vertex)) show();
     else if (now.mode !== before.mode) showMode();
   });
 }
@@ -143,7 +143,7 @@ export function makeSpectrum(element, parts) {
  * @param {Pair[]} pairs
  */
 function floorOf(pairs) {
-  const levels = pairs.flatMap((pair) => [pair.decibels, pair.wantedDecibels]).filter((level) => level !== null);
+  const levels = pairs.flatMap((pair) => [pair.decibels, pair.wantedDecibels ?? 0]);
   const least = Math.min(0, ...levels.filter((level) => level > LOWEST_DECIBELS));
   return Math.max(LOWEST_DECIBELS, Math.min(-40, 20 * Math.floor((least - 5) / 20)));
 }
@@ -163,7 +163,7 @@ function spoken(pair) {
 
 /** @param {Pair} pair @returns {Mark} */
 function markOf(pair) {
-  return { hertz: pair.hertz, decibels: pair.decibels ?? LOWEST_DECIBELS };
+  return { hertz: pair.hertz, decibels: pair.decibels };
 }
 
 /** @param {Pair} pair @returns {Mark | null} */
