@@ -65,7 +65,7 @@ EXAMPLES = (
         "a bell that sounds like a metal plate",
         "bell",
         24,
-        (ExampleClip("rim", (0.06, 0.0, 0.0), "metal", 420.0, 1.5),),
+        (ExampleClip("rim", (0.068, 0.0, 0.007), "metal", 420.0, 1.5),),
     ),
     Example(
         "pan-of-two",

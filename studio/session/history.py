@@ -65,6 +65,12 @@ class History:
         self.document = document
         return True
 
+    def designs(self) -> set[str]:
+        """Files of all designs that one may come back to."""
+        documents = [self.document, *(each for _, each in (*self.before, *self.after))]
+        materials = [each for document in documents for each in (document.material, document.kept)]
+        return {each.design for each in materials if each is not None and each.design is not None}
+
     def as_json(self) -> dict[str, Any]:
         """All of it as plain values."""
         return {

@@ -204,6 +204,7 @@ class DesignStudio:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         self._autosave.save()
+        self.workspace.forget_designs(self.history.designs())
         self.search.break_off()
         if self._search_task is not None:
             await asyncio.gather(self._search_task, return_exceptions=True)

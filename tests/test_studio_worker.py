@@ -1,0 +1,133 @@
+"""Processes that compute for the studio: what they answer, and how they end."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import time
+
+import pytest
+
+from carillon.errors import UserError
+from studio.processes.worker import Worker
+from tests.patience import HANG_SECONDS
+
+BENCH = "tests.test_studio_worker:Bench"
+
+
+class Bench:
+    """Something to call in another process."""
+
+    def __init__(self):
+        self.count = 0
+
+    def add(self, number):
+        self.count += number
+        return self.count
+
+    def fail(self, *sentences):
+        raise UserError(*sentences)
+
+    def go_wrong(self):
+        return {}["what"]
+
+    def sleep(self, seconds):
+        time.sleep(seconds)
+
+    def tell_on(self, tell, count):
+        for number in range(count):
+            tell(number)
+        return "told"
+
+    def pid(self):
+        return os.getpid()
+
+    def until_asked(self):
+        asked = []
+        signal.signal(signal.SIGTERM, lambda *_: asked.append(1))
+        while not asked:
+            time.sleep(0.01)
+        return "asked"
+
+
+@pytest.fixture
+def worker():
+    made = Worker(BENCH)
+    yield made
+    made.end()
+
+
+def test_calls_are_answered_in_order_by_one_object(worker):
+    async def call():
+        return await asyncio.gather(*(worker.call("add", number) for number in (1, 2, 3)))
+
+    assert asyncio.run(call()) == [1, 3, 6]
+
+
+def test_news_come_before_the_answer(worker):
+    news = []
+
+    async def call():
+        return await worker.call("tell_on", 5, tell=news.append)
+
+    assert asyncio.run(call()) == "told"
+    assert news == [0, 1, 2, 3, 4]
+
+
+def test_errors_are_the_same_sentences(worker):
+    async def call():
+        with pytest.raises(UserError) as caught:
+            await worker.call("fail", "no file a", "no file b")
+        assert caught.value.args == ("no file a", "no file b")
+        with pytest.raises(UserError, match="fault of the program .KeyError") as caught:
+            await worker.call("go_wrong")
+        assert "\n" not in str(caught.value)
+        return await worker.call("add", 1)
+
+    assert asyncio.run(call()) == 1
+
+
+def test_what_takes_too_long_is_ended_and_the_next_call_answered(worker):
+    async def call():
+        with pytest.raises(UserError, match="longer than 0.1 s"):
+            await worker.call("sleep", HANG_SECONDS, seconds=0.1)
+        return await worker.call("add", 1)
+
+    begin = time.monotonic()
+    assert asyncio.run(call()) == 1
+    assert time.monotonic() - begin < HANG_SECONDS
+
+
+def test_a_process_that_is_killed_fails_what_waits_and_nothing_else(worker):
+    async def call():
+        waiting = asyncio.ensure_future(worker.call("sleep", HANG_SECONDS))
+        await asyncio.sleep(0)
+        os.kill(worker.pid, signal.SIGKILL)
+        with pytest.raises(UserError, match="has ended"):
+            await waiting
+        return await worker.call("add", 2)
+
+    assert asyncio.run(call()) == 2
+
+
+def test_what_is_under_way_can_be_asked_to_end(worker):
+    async def call():
+        await worker.call("pid")
+        waiting = asyncio.ensure_future(worker.call("until_asked"))
+        while not waiting.done():
+            worker.signal_stop()
+            await asyncio.sleep(0.05)
+        return waiting.result()
+
+    assert asyncio.run(call()) == "asked"
+
+
+def test_ctrl_c_is_for_the_server(worker):
+    async def call():
+        pid = await worker.call("pid")
+        os.kill(pid, signal.SIGINT)
+        return pid, await worker.call("pid")
+
+    first, second = asyncio.run(call())
+    assert first == second
