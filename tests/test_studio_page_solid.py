@@ -363,8 +363,11 @@ def test_files_are_dropped(page, studio):
     call = until(lambda: next((c for c in studio.calls if c[0] == "change_target"), None))
     assert call[1] == {"target": "rim", "clip": "c3"}
     page.evaluate(DROP, [x, y, "cup.stl", "solid", ""])
+    dialog = page.get_by_role("dialog", name="Open cup.stl")
+    dialog.get_by_label("One unit of the file").select_option(label="mm")
+    dialog.get_by_role("button", name="Open").click()
     call = until(lambda: next((c for c in studio.calls if c[0] == "open_mesh"), None))
-    assert call[1] == {"mesh": "m3", "unit": 1}
+    assert call[1] == {"mesh": "m3", "unit": 0.001}
     page.evaluate(DROP, [x, y, "ding.wav", "none", "audio/wav"])
     until(lambda: "expected WAV" in page.locator("#messages").inner_text())
     page.evaluate(DROP, [x, y, "letter.pdf", "none", ""])

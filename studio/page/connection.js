@@ -6,7 +6,7 @@
 
 /** @typedef {Float32Array | Float64Array | Uint32Array | Uint16Array} Numbers */
 /** @typedef {Record<string, Numbers>} Arrays */
-/** @typedef {"connecting" | "open" | "lost"} Status */
+/** @typedef {"connecting" | "open" | "lost" | "refused"} Status `refused` by a server that was started anew */
 
 const FIRST_WAIT_SECONDS = 0.5;
 const LONGEST_WAIT_SECONDS = 8;
@@ -99,9 +99,9 @@ export class Connection {
     socket.onmessage = (message) => this.#take(message.data);
     socket.onclose = () => {
       this.socket = null;
+      this.#explain();
       for (const { reject } of this.waiting.values()) reject(new Error(NO_ANSWER));
       this.waiting.clear();
-      this.#become("lost");
       setTimeout(() => this.open(), this.wait * 1000);
       this.wait = Math.min(2 * this.wait, LONGEST_WAIT_SECONDS);
     };
@@ -191,6 +191,12 @@ export class Connection {
   onStatus(wanted) {
     wanted(this.status);
     return this.listeners.add("status", wanted);
+  }
+
+  /** Tells why there is no connection; a WebSocket does not know. */
+  async #explain() {
+    const response = await fetch("/schema.json").catch(() => null);
+    if (this.socket?.readyState !== WebSocket.OPEN) this.#become(response?.status === 403 ? "refused" : "lost");
   }
 
   /** @param {Status} status */

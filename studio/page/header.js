@@ -2,6 +2,14 @@
 
 /** @typedef {import("./main.js").Parts} Parts */
 
+/** @type {Record<import("./connection.js").Status, string>} */
+const STATUS = {
+  connecting: "Connecting",
+  open: "",
+  lost: "The server does not answer; strikes still sound.",
+  refused: "The server was started anew: open the address that it printed.",
+};
+
 /**
  * @param {HTMLElement} element the header
  * @param {Parts} parts
@@ -53,8 +61,5 @@ export function makeHeader(element, parts) {
     }
     save.disabled = now.solid === null;
   });
-  connection.onStatus((now) => {
-    status.textContent =
-      now === "lost" ? "The server does not answer; strikes still sound." : now === "open" ? "" : "Connecting";
-  });
+  connection.onStatus((now) => (status.textContent = STATUS[now]));
 }

@@ -31,6 +31,15 @@ function choices(title, entries) {
   return element("div", { className: described(entries) }, element("h3", {}, title), list);
 }
 
+/** @returns {HTMLSelectElement} units of length, whose values are metres */
+function unitSelect() {
+  return element(
+    "select",
+    { name: "unit" },
+    ...UNITS.map(([metres, name]) => element("option", { value: String(metres) }, name)),
+  );
+}
+
 /** @param {{says?: string}[]} entries @returns {string} */
 const described = (entries) => (entries.some((entry) => entry.says) ? "told" : "untold");
 
@@ -49,8 +58,7 @@ export function fillChooser(place, parts, chosen) {
     chosen();
     parts.connection.call(what, values).catch((error) => parts.say(error.message, "error"));
   };
-  const unit = element("select", { name: "unit" });
-  unit.append(...UNITS.map(([metres, name]) => element("option", { value: String(metres) }, name)));
+  const unit = unitSelect();
   const file = element("input", { type: "file", name: "mesh", accept: ".obj,.stl,.ply,.off,.glb,.gltf,.3mf" });
   file.onchange = () => {
     const taken = file.files?.[0];
@@ -99,9 +107,10 @@ export function fillChooser(place, parts, chosen) {
  */
 export function makeChooser(place, parts) {
   const content = element("div", { className: "chooser" });
-  const close = element("button", { type: "button", textContent: "Cancel" });
+  const close = element("button", { type: "button" }, "Cancel");
   const title = element("h2", { id: "chooser-title" }, "Open");
-  const dialog = element("dialog", { className: "dialog" }, title, content, close);
+  const buttons = element("div", { className: "buttons" }, close);
+  const dialog = element("dialog", { className: "dialog" }, title, content, buttons);
   dialog.setAttribute("aria-labelledby", "chooser-title");
   close.onclick = () => dialog.close();
   place.append(dialog);
@@ -109,5 +118,43 @@ export function makeChooser(place, parts) {
     if (dialog.open) return;
     fillChooser(content, parts, () => dialog.close());
     dialog.showModal();
+  };
+}
+
+/**
+ * A dialog that asks for the unit of a mesh that was dropped, which most files do not tell.
+ *
+ * @param {HTMLElement} place where it is put
+ * @param {Parts} parts
+ * @returns {(file: File) => void} what opens it
+ */
+export function makeUnitDialog(place, parts) {
+  const title = element("h2", { id: "unit-title" });
+  const unit = unitSelect();
+  const open = element("button", { type: "submit", className: "main" }, "Open");
+  const cancel = element("button", { type: "button" }, "Cancel");
+  const form = element(
+    "form",
+    { method: "dialog" },
+    element("label", {}, "One unit of the file is ", unit),
+    element("div", { className: "buttons" }, open, cancel),
+  );
+  const dialog = element("dialog", { className: "dialog" }, title, form);
+  dialog.setAttribute("aria-labelledby", "unit-title");
+  place.append(dialog);
+  /** @type {File | null} */
+  let dropped = null;
+  cancel.onclick = () => dialog.close();
+  form.onsubmit = () => {
+    if (dropped) openMesh(parts, dropped, Number(unit.value));
+  };
+  return (file) => {
+    if (/\.(glb|gltf)$/i.test(file.name)) {
+      openMesh(parts, file, 1); // in metres, as its standard demands
+      return;
+    }
+    dropped = file;
+    title.textContent = `Open ${file.name}`;
+    if (!dialog.open) dialog.showModal();
   };
 }

@@ -8,10 +8,10 @@
  * @type {[number, string][]}
  */
 export const UNITS = [
-  [1, "1 m"],
-  [0.01, "1 cm"],
-  [0.001, "1 mm"],
-  [0.0254, "1 inch"],
+  [1, "m"],
+  [0.01, "cm"],
+  [0.001, "mm"],
+  [0.0254, "inch"],
 ];
 
 const CLIPS = /\.(wav|wave|flac|ogg|oga|aif|aiff|mp3)$/i;
@@ -73,8 +73,9 @@ export async function takeClip({ connection, selection, say }, file, vertex) {
  * @param {HTMLElement} solid where a clip becomes a target
  * @param {(x: number, y: number) => number | null} vertexAt which vertex is at pixels of the page
  * @param {(vertex: number | null) => void} hover told where a clip would become a target
+ * @param {(file: File) => void} openFile opens a mesh
  */
-export function acceptDrops(parts, solid, vertexAt, hover) {
+export function acceptDrops(parts, solid, vertexAt, hover, openFile) {
   /** @param {DragEvent} event @returns {boolean} */
   const carriesFiles = (event) => event.dataTransfer?.types.includes("Files") ?? false;
   /** @param {DragEvent} event @returns {number | null} */
@@ -101,8 +102,8 @@ export function acceptDrops(parts, solid, vertexAt, hover) {
     const files = [...(event.dataTransfer?.files ?? [])];
     for (const file of files) {
       const kind = kindOf(file);
-      if (kind === "mesh") openMesh(parts, file, 1);
-      else if (kind === "clip") takeClip(parts, file, files.length === 1 ? vertex : (vertex ?? null));
+      if (kind === "mesh") openFile(file);
+      else if (kind === "clip") takeClip(parts, file, vertex);
       else parts.say(`${file.name}: expected a mesh (obj, stl, ply, ...) or a clip (wav, flac, ...).`, "error");
     }
   });

@@ -14,7 +14,7 @@ const PHASES = {
 /**
  * @param {HTMLElement} element
  * @param {Parts} parts
- * @returns {{graphics: (sentence: string | null) => void}} tells what keeps the solid from being drawn
+ * @returns {{graphics: (sentence: string | null) => void}} told what keeps the solid from being drawn
  */
 export function makeNotices(element, parts) {
   element.className = "notices";

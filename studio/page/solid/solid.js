@@ -4,7 +4,7 @@
  */
 
 import { Color } from "three";
-import { makeChooser } from "./chooser.js";
+import { makeChooser, makeUnitDialog } from "./chooser.js";
 import { span } from "./colours.js";
 import { acceptDrops } from "./files.js";
 import { Gestures } from "./gestures.js";
@@ -51,6 +51,7 @@ export class Solid {
     this.hint = layer("stage-hint");
     this.notices = makeNotices(layer("notices"), parts);
     this.openChooser = makeChooser(element, parts);
+    const askUnit = makeUnitDialog(element, parts);
 
     /** Number of the surface that is shown. @type {number | null} */
     this.shown = null;
@@ -83,10 +84,12 @@ export class Solid {
       element,
       (x, y) => this.pick(x, y),
       (vertex) => this.marks?.showGhost(vertex),
+      askUnit,
     );
     this.#keys();
     parts.state.onChange((now) => {
       if (this.wanted !== (now.solid?.surface ?? null)) this.#fetch(now.solid?.surface ?? null);
+      element.dataset.solid = now.solid === null ? "none" : now.solid.surface === null ? "awaited" : "shown";
       this.#mark();
     });
     parts.selection.onChange(() => this.#mark());
@@ -199,7 +202,13 @@ export class Solid {
   /** @param {number | null} number of the surface that the server has now */
   async #fetch(number) {
     this.wanted = number;
-    if (number === null || !this.drawing) return;
+    if (!this.drawing) return;
+    if (number === null) {
+      this.drawing.clear();
+      this.shown = null;
+      this.legend.show(null);
+      return;
+    }
     try {
       const { arrays } = await this.parts.connection.binary(`/surface/${number}`);
       if (this.wanted !== number) return; // another one is on its way

@@ -117,10 +117,7 @@ export class View {
    */
   setSurface(positions, triangles) {
     const before = this.surface;
-    if (before) {
-      this.scene.remove(before.mesh);
-      before.dispose();
-    }
+    this.clear();
     this.surface = new Surface(positions, triangles);
     this.picking = new Picking(this.surface);
     this.scene.add(this.surface.mesh);
@@ -129,6 +126,17 @@ export class View {
       then && now.center.distanceTo(then.center) < 0.1 * now.radius && Math.abs(now.radius / then.radius - 1) < 0.1;
     // The fine solid and the coarse one are looked at from the same place.
     if (!alike) this.reset();
+    this.invalidate();
+  }
+
+  /** Shows no solid. */
+  clear() {
+    if (this.surface) {
+      this.scene.remove(this.surface.mesh);
+      this.surface.dispose();
+    }
+    this.surface = null;
+    this.picking = null;
     this.invalidate();
   }
 
