@@ -111,7 +111,7 @@ class DesignStudio:
             "clips": self.clips.state(),
             "wanted": self.bench.wanted,
             "settings": {k: v for k, v in settings.items() if k not in ("mesh", "targets")},
-            "search": {"phase": self.search.phase, "message": self._search_message},
+            "search": {"phase": self._search_phase, "message": self._search_message},
             "fine": {"on": self.fine, "phase": self._fine_phase, "message": None},
             "kept": document.kept is not None,
             "builtins": sorted(BUILTINS),
@@ -124,6 +124,12 @@ class DesignStudio:
                 for number, name in enumerate(self.workspace.projects(), start=1)
             ],
         }
+
+    @property
+    def _search_phase(self) -> str:
+        """That of the search; one that waits for the solid or for clips is starting, too."""
+        is_waiting = self.is_searching and self.search.phase == "idle"
+        return "starting" if is_waiting else self.search.phase
 
     def _target(self, name: str) -> dict[str, Any]:
         target, strike = self.document.target(name), self.bench.strikes.get(name)
