@@ -107,19 +107,19 @@ def test_links_out_of_the_page_are_not_in_the_table(tmp_path: Path):
 
 @pytest.mark.parametrize(("kind", "most"), [("mesh", SMALL.mesh_bytes), ("clip", SMALL.clip_bytes)])
 def test_files_that_are_too_large_are_refused_however_they_are_sent(server: Served, kind, most):
-    before = list(server.studio.uploads)
+    before, ending = list(server.studio.uploads), {"mesh": ".stl", "clip": ".wav"}[kind]
     piece = b"RIFF" * 256
     whole = piece * (most // len(piece) + 1)
     pieces = [piece] * (len(whole) // len(piece))
     for body in (whole, iter(pieces), iter([piece] * 1000)):
         try:
-            answer = server.ask(f"/{kind}?name=a", "POST", body)
+            answer = server.ask(f"/{kind}?name=a{ending}", "POST", body)
         except (ConnectionResetError, BrokenPipeError):
             continue  # it was told to go, and did not listen
         assert answer.status == 413
         assert "larger" in answer.error and "MiB" in answer.error
     assert server.studio.uploads == before
-    assert server.ask(f"/{kind}?name=a", "POST", whole[:most]).status == 200
+    assert server.ask(f"/{kind}?name=a{ending}", "POST", whole[:most]).status == 200
 
 
 def test_a_length_that_is_only_declared_is_refused_at_once(server: Served):
@@ -247,9 +247,25 @@ NAMES = {
 
 @pytest.mark.parametrize("name", NAMES)
 def test_names_of_files_are_names_and_nothing_else(server: Served, name):
+    assert plain_name(name, "clip") == NAMES[name]
+    before = list(server.studio.uploads)
     answer = server.upload("clip", name, b"RIFF")
-    assert answer.status == 200 and answer.headers["Set-Cookie"] is None
-    assert server.studio.uploads[-1][1] == NAMES[name] == plain_name(name, "clip")
+    assert answer.headers["Set-Cookie"] is None
+    if NAMES[name].endswith(".wav"):
+        assert answer.status == 200 and server.studio.uploads[-1][1] == NAMES[name]
+    else:
+        assert answer.status == 400 and server.studio.uploads == before
+
+
+@pytest.mark.parametrize("kind", ["mesh", "clip"])
+@pytest.mark.parametrize(
+    "name", ["pan.yaml", "pan.h5", "a.py", "page.html", "run.sh", "a.stl.exe", "a", "a.", "a.zip"]
+)
+def test_only_meshes_and_clips_come_to_lie_among_the_persons_files(server: Served, kind, name):
+    before = list(server.studio.uploads)
+    answer = server.upload(kind, name, b"RIFF")
+    assert answer.status == 400 and "ends in" in answer.error
+    assert server.studio.uploads == before
 
 
 def test_script_in_names_is_text_wherever_it_comes_back(server: Served):
@@ -358,6 +374,19 @@ WRONG = (
     {"id": 1, "do": "open_mesh", "mesh": "/etc/passwd"},
     {"id": 1, "do": "add_target", "vertex": 10**9},
     {"id": 1, "do": "add_target", "vertex": "<script>"},
+    {"id": 1, "do": "add_target", "vertex": True},
+    {"id": 1, "do": "add_target", "vertex": 1.5},
+    {"id": 1, "do": "add_target", "vertex": 10**30},
+    {"id": 1, "do": "open_mesh", "mesh": ["builtin:bell"]},
+    {"id": 1, "do": "open_mesh", "mesh": None},
+    {"id": 1, "do": "open_project", "project": 7},
+    {"id": 1, "do": "save", "name": None},
+    {"id": 1, "do": "fine", "on": "yes"},
+    {"id": 1, "do": "fine", "on": 1},
+    {"id": 1, "do": "change_settings", "settings": []},
+    {"id": 1, "do": "change_target", "target": "rim", "without": ["440"]},
+    {"id": 1, "do": "change_target", "target": "rim", "without": 440.0},
+    {"id": 1, "do": "change_target", "target": "rim", "modes": 2.5},
 )
 
 

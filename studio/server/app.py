@@ -20,7 +20,15 @@ from studio.server.answers import fault
 from studio.server.guard import Guard, Keys
 from studio.server.page_files import page_table, send_file, send_page
 from studio.server.socket import OWN_FAULT, sentence_of, talk
-from studio.server.uploads import Limits, UploadError, plain_name, read_upload
+from studio.server.uploads import (
+    CLIP_ENDINGS,
+    MESH_ENDINGS,
+    Limits,
+    UploadError,
+    plain_name,
+    read_upload,
+    upload_name,
+)
 
 LONGEST_NUMBER = 15
 """Digits of a number in a path."""
@@ -79,14 +87,16 @@ class _Routes:
         return JSONResponse(project_schema())
 
     async def mesh(self, request: Request) -> Response:
-        content, name = await self._upload(request, self._limits.mesh_bytes, "a mesh")
+        content, name = await self._upload(request, "a mesh", self._limits.mesh_bytes, MESH_ENDINGS)
         return JSONResponse({"mesh": await self._studio.take_mesh(name, content)})
 
     async def clip(self, request: Request) -> Response:
-        content, name = await self._upload(request, self._limits.clip_bytes, "a clip")
+        content, name = await self._upload(request, "a clip", self._limits.clip_bytes, CLIP_ENDINGS)
         return JSONResponse({"clip": await self._studio.take_clip(name, content)})
 
-    async def _upload(self, request: Request, most: int, what: str) -> tuple[bytes, str]:
+    async def _upload(
+        self, request: Request, what: str, most: int, endings: tuple[str, ...]
+    ) -> tuple[bytes, str]:
         if self._uploads >= self._limits.uploads:
             raise UploadError(503, f"{self._uploads} files are being sent already; wait for them")
         self._uploads += 1
@@ -94,7 +104,7 @@ class _Routes:
             content = await read_upload(request, most, self._limits, what)
         finally:
             self._uploads -= 1
-        return content, plain_name(request.query_params.get("name", ""), what.split()[-1])
+        return content, upload_name(request.query_params.get("name", ""), what, endings)
 
     async def surface(self, request: Request) -> Response:
         text = request.path_params["number"]

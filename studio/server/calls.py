@@ -3,29 +3,49 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from typing import Any, NoReturn
 
 from carillon.errors import UserError
 
-CALLS: Mapping[str, tuple[str, str]] = {
-    "open_mesh": ("mesh", "unit"),
-    "open_project": ("project", ""),
-    "save": ("name", ""),
-    "add_target": ("vertex", "name clip"),
-    "change_target": ("target", "vertex name clip modes allow_clipped without"),
-    "remove_target": ("target", ""),
-    "change_settings": ("settings", ""),
-    "optimise": ("", ""),
-    "stop": ("", ""),
-    "undo": ("", ""),
-    "redo": ("", ""),
-    "forget_material": ("", ""),
-    "fine": ("on", ""),
-    "keep": ("", ""),
-    "swap": ("", ""),
+Kinds = Mapping[str, str]
+"""What values of keys have to be, by words of `_KINDS`."""
+
+CALLS: Mapping[str, tuple[Kinds, Kinds]] = {
+    "open_mesh": ({"mesh": "a text"}, {"unit": "a number"}),
+    "open_project": ({"project": "a text"}, {}),
+    "save": ({"name": "a text"}, {}),
+    "add_target": (
+        {"vertex": "a whole number"},
+        {"name": "a text or null", "clip": "a text or null"},
+    ),
+    "change_target": (
+        {"target": "a text"},
+        {
+            "vertex": "a whole number",
+            "name": "a text",
+            "clip": "a text or null",
+            "modes": "a whole number or null",
+            "allow_clipped": "true or false",
+            "without": "a list of numbers",
+        },
+    ),
+    "remove_target": ({"target": "a text"}, {}),
+    "change_settings": ({"settings": "an object"}, {}),
+    "optimise": ({}, {}),
+    "stop": ({}, {}),
+    "undo": ({}, {}),
+    "redo": ({}, {}),
+    "forget_material": ({}, {}),
+    "fine": ({"on": "true or false"}, {}),
+    "keep": ({}, {}),
+    "swap": ({}, {}),
 }
 """Calls by name: keys that have to be there, and keys that may be."""
+LARGEST = 2**53
+"""Of whole numbers, which browsers do not tell apart beyond."""
+LONGEST_LIST = 1000
 LONGEST_TEXT = 1000
 """Characters of a key or a text in a call."""
 
@@ -60,20 +80,44 @@ def read_call(message: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
     if not isinstance(name, str) or name not in CALLS:
         raise UserError(f"there is no call {name!r:.100}; expected one of {', '.join(CALLS)}")
     arguments = {key: value for key, value in message.items() if key not in ("id", "do")}
-    needed, possible = (words.split() for words in CALLS[name])
+    needed, possible = CALLS[name]
+    kinds = {**needed, **possible}
     for key in needed:
         if key not in arguments:
             raise UserError(f"{name}: lacks {key!r}")
     for key, value in arguments.items():
-        if key not in needed and key not in possible:
+        if key not in kinds:
             raise UserError(
-                f"{name}: does not know {key!r:.100}; expected "
-                f"{', '.join(needed + possible) or 'nothing'}"
+                f"{name}: does not know {key!r:.100}; expected {', '.join(kinds) or 'nothing'}"
             )
-        if isinstance(value, str) and len(value) > LONGEST_TEXT:
-            raise UserError(f"{name}: {key} is longer than {LONGEST_TEXT} characters")
+        if not any(_KINDS[word](value) for word in kinds[key].split(" or ")):
+            raise UserError(f"{name}: {key} is {value!r:.100}, expected {kinds[key]}")
     return name, arguments
 
 
 def _refuse_constant(name: str) -> NoReturn:
     raise ValueError(f"found {name}")
+
+
+def _is_number(value: Any) -> bool:
+    return _is_whole(value) or (isinstance(value, float) and math.isfinite(value))
+
+
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and abs(value) <= LARGEST
+
+
+def _is_list(value: Any) -> bool:
+    return isinstance(value, list) and len(value) <= LONGEST_LIST and all(map(_is_number, value))
+
+
+_KINDS: Mapping[str, Callable[[Any], bool]] = {
+    "a text": lambda value: isinstance(value, str) and len(value) <= LONGEST_TEXT,
+    "null": lambda value: value is None,
+    "a number": _is_number,
+    "a whole number": _is_whole,
+    "a list of numbers": _is_list,
+    "an object": lambda value: isinstance(value, dict),
+    "true": lambda value: value is True,
+    "false": lambda value: value is False,
+}

@@ -106,7 +106,8 @@ def make_server(
     studio: Studio, listener: socket.socket, host: str, keys: Keys, limits: Limits
 ) -> uvicorn.Server:
     """The server, which has not begun yet."""
-    logging.getLogger("uvicorn").setLevel(logging.ERROR)
+    # Of what uvicorn tells, faults of the program's alone are of use to people.
+    logging.getLogger("uvicorn.error").addFilter(_is_fault)
     config = uvicorn.Config(
         make_app(studio, keys, host, listener.getsockname()[1], limits),
         http="h11",
@@ -168,6 +169,10 @@ def _ended_by_signals() -> Iterator[None]:
     finally:
         for each, handler in before.items():
             signal.signal(each, handler)
+
+
+def _is_fault(record: logging.LogRecord) -> bool:
+    return record.exc_info is not None
 
 
 def _in_main_thread() -> bool:

@@ -12,7 +12,7 @@ from carillon import cli
 from carillon.errors import UserError
 from studio.feed import Feed
 from studio.interface import Studio
-from studio.server.calls import read_call, read_message
+from studio.server.calls import LARGEST, read_call, read_message
 
 MOST_CALLS = 32
 """Of a page, that are under way; more wait."""
@@ -84,7 +84,7 @@ async def _serve(text: str | None, studio: Studio, feed: Feed) -> None:
 
 def _number(message: dict[str, Any]) -> int:
     number = message.get("id")
-    if isinstance(number, bool) or not isinstance(number, int) or abs(number) > 2**53:
+    if isinstance(number, bool) or not isinstance(number, int) or abs(number) > LARGEST:
         raise UserError(f"id is {number!r:.100}, expected a whole number")
     return number
 

@@ -10,6 +10,10 @@ from pathlib import PurePosixPath
 
 from starlette.requests import ClientDisconnect, Request
 
+MESH_ENDINGS = (".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
+"""Of meshes that are taken: other files would come to lie among the person's own."""
+CLIP_ENDINGS = (".wav", ".wave", ".flac", ".ogg", ".oga", ".aif", ".aiff", ".mp3")
+"""The same of clips."""
 LONGEST_NAME = 100
 """Characters of a file's name; the ending is kept."""
 
@@ -104,6 +108,29 @@ async def _pieces(request: Request, idle_seconds: float) -> AsyncIterator[bytes]
         if piece is None:
             return
         yield piece
+
+
+def upload_name(name: str, what: str, endings: tuple[str, ...]) -> str:
+    """Name under which a file is kept.
+
+    Parameters
+    ----------
+    name
+        As the page tells it.
+    what
+        What is uploaded, for messages: "a mesh".
+    endings
+        Those that it may have, with their dots.
+
+    Raises
+    ------
+    UploadError
+        If it has another ending.
+    """
+    plain = plain_name(name, what.split()[-1])
+    if PurePosixPath(plain).suffix.lower() not in endings:
+        raise UploadError(400, f"{plain}: expected {what}, its name ends in {', '.join(endings)}")
+    return plain
 
 
 def plain_name(name: str, otherwise: str) -> str:
