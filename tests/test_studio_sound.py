@@ -17,7 +17,7 @@ from sound.rendering.render import Hit, render
 from sound.rendering.solid import SoundingSolid
 from tests.chromium import chromium, served
 from tests.small_design import small_design
-from tests.strike_latency import measure, write_tap
+from tests.strike_latency import measure
 
 RATE = 44_100
 TONE_HERTZ = 1234.5
@@ -46,7 +46,6 @@ def page(tmp_path_factory):
     folder = tmp_path_factory.mktemp("more")
     tone = 0.5 * np.sin(2 * np.pi * TONE_HERTZ * np.arange(3 * RATE) / RATE)
     soundfile.write(folder / "tone.wav", tone, RATE, subtype="PCM_16")
-    write_tap(folder)
     heard = f"--use-file-for-fake-audio-capture={folder / 'tone.wav'}"
     with chromium(heard) as browser, served(folder) as address:
         page = browser.new_page()
@@ -318,6 +317,79 @@ def test_weights_of_noise_are_those_of_listening(page) -> None:
             [points.tolist(), position],
         )
         np.testing.assert_allclose(found, listening.weights(np.array(position)), rtol=1e-5)
+
+
+def test_noise_goes_along_with_strikes_by_their_distance(page) -> None:
+    random = np.random.default_rng(5)
+    noises = 0.1 * random.normal(size=(2, RATE // 10))
+    points = np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]])
+    vertices = np.array([[0.1, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    for number, noise in enumerate(noises):
+
+        def answer(route, noise=noise):
+            file = io.BytesIO()
+            soundfile.write(file, noise, RATE, subtype="FLOAT", format="WAV")
+            route.fulfill(body=file.getvalue(), content_type="audio/wav")
+
+        page.route(f"**/clip/c{number}/noise", answer)
+    found = page.evaluate(
+        """async ({ points, vertices, rate }) => {
+          const { makeNoise } = await import("/page/sound/noise.js");
+          const context = new OfflineAudioContext(1, rate / 2, rate);
+          const input = new GainNode(context);
+          input.connect(context.destination);
+          let strike;
+          const bank = { context, input, onStrike: (listener) => { strike = listener; } };
+          const clips = points.map((_, n) => ({ clip: `c${n}`, phase: "ready", modes: [] }));
+          const targets = points.map((at, n) => ({ position_m: at, clip: `c${n}`, without: [] }));
+          const current = { clips, targets, solid: { surface: 7 } };
+          const state = { current, onChange: (listener) => listener(current) };
+          const positions = Float32Array.from(vertices.flat());
+          const connection = { binary: async () => ({ arrays: { positions } }) };
+          const noise = makeNoise({ bank, state, connection });
+          strike({ vertex: 0, strength: 1, atSeconds: 0 });
+          noise.on = true;
+          await noise.loaded();
+          strike({ vertex: 0, strength: 0.5, atSeconds: 0 });
+          strike({ vertex: 1, strength: 1, atSeconds: 0.25 });
+          return window.packed((await context.startRendering()).getChannelData(0));
+        }""",
+        {"points": points.tolist(), "vertices": vertices.tolist(), "rate": RATE},
+    )
+    page.unroute_all()
+    expected = np.zeros(RATE // 2)
+    expected[: noises.shape[1]] = 0.5 * (0.8 * noises[0] + 0.2 * noises[1])
+    begin = RATE // 4
+    expected[begin : begin + noises.shape[1]] += noises[0]
+    assert decibels(samples(found), expected) < -100.0
+
+
+def test_old_materials_fade_when_too_many_modes_ring(page) -> None:
+    modes, times = 3000, 4
+    found = page.evaluate(
+        """async ({ modes, times, rate }) => {
+          const { makeNode } = await import("/page/sound/bank.js");
+          const context = new OfflineAudioContext(1, rate, rate);
+          await context.audioWorklet.addModule("/page/sound/bank-processor.js");
+          const hertz = Float64Array.from({ length: modes }, (_, k) => 50 + 3 * k);
+          const dampings = new Float64Array(modes).fill(0.1);
+          const gains = new Float64Array(modes).fill(1e-4);
+          const messages = [];
+          for (let number = 0; number < times; number++) {
+            messages.push({ do: "bank", hertz, dampings }, { do: "strike", gains, at_seconds: 0 });
+          }
+          const node = makeNode(context, messages);
+          const counts = [];
+          node.port.onmessage = (event) => counts.push(event.data.ringing);
+          node.connect(context.destination);
+          await context.startRendering();
+          await new Promise((resolve) => setTimeout(resolve, 300));
+          return counts;
+        }""",
+        {"modes": modes, "times": times, "rate": RATE},
+    )
+    assert max(found) > 2 * modes
+    assert found[-1] <= modes + 4096
 
 
 def test_clips_play_one_at_a_time_and_in_turn(page) -> None:
