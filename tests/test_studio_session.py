@@ -270,6 +270,16 @@ def test_a_project_that_names_files_elsewhere_is_refused(folder):
         open_studio(str(path), path.parent)
 
 
+@pytest.mark.parametrize("forest", ["/etc/passwd", "../forest.h5"])
+def test_settings_that_name_files_elsewhere_are_refused(folder, forest):
+    async def play():
+        async with opened(folder) as (studio, _):
+            with pytest.raises(UserError, match="outside of the workspace"):
+                await studio.call("change_settings", {"settings": {"forest": forest}})
+
+    run(play())
+
+
 def test_settings_of_other_voxels_begin_anew_and_those_of_a_search_do_not(folder):
     async def play():
         async with opened(folder, str(folder / "bar.yaml")) as (studio, page):

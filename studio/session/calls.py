@@ -96,6 +96,8 @@ class Calls:
         schema = project_schema()
         parts = {k: v for k, v in schema["properties"].items() if k not in ("mesh", "targets")}
         check(settings, {**schema, "properties": parts, "required": []})
+        if settings.get("forest") is not None:
+            self._studio.workspace.path(settings["forest"])
         document = self._studio.document
         changed = replace(document, settings=merged(document.settings, settings))
         self._studio.do("change settings", changed)

@@ -59,7 +59,7 @@ export function fillChooser(place, parts, chosen) {
     parts.connection.call(what, values).catch((error) => parts.say(error.message, "error"));
   };
   const unit = unitSelect();
-  const file = element("input", { type: "file", name: "mesh", accept: ".obj,.stl,.ply,.off,.glb,.gltf,.3mf" });
+  const file = element("input", { type: "file", name: "mesh", accept: ".obj,.stl,.ply,.off,.glb,.gltf" });
   file.onchange = () => {
     const taken = file.files?.[0];
     if (!taken) return;

@@ -15,7 +15,7 @@ export const UNITS = [
 ];
 
 const CLIPS = /\.(wav|wave|flac|ogg|oga|aif|aiff|mp3)$/i;
-const MESHES = /\.(obj|stl|ply|off|glb|gltf|3mf|dae|msh)$/i;
+const MESHES = /\.(obj|stl|ply|off|glb|gltf)$/i;
 
 /** @param {File} file @returns {"mesh" | "clip" | null} what it is taken for */
 export function kindOf(file) {
