@@ -114,14 +114,26 @@ class SolidBench:
         """What a search needs, for its process."""
         return pickle.dumps(self._problem)
 
-    def design(self, z: Sequence[float] | None, out: str) -> None:
-        """Write the design of a material that no search has written."""
+    def is_of_targets(self, design: str) -> bool:
+        """Whether a design in a file was made for the present targets."""
+        return self._is_of_targets(read_design(design))
+
+    def design(self, material: str | Sequence[float] | None, out: str) -> list[float]:
+        """Write the design of a material for the present targets; its coordinates.
+
+        The material is that of another design, or one of coordinates, or the uniform one.
+        """
         assert self._problem is not None
+        z = material
+        if isinstance(material, str):
+            z = self._coordinates(read_design(material))
         project = self._problem.project
         once = replace(project.optimiser, seconds=None, evaluations=1, workers=1)
         problem = replace(self._problem, project=replace(project, optimiser=once))
         at = None if z is None else np.asarray(z)
-        write_design(out, optimise(problem, coordinates=at))
+        found = optimise(problem, coordinates=at)
+        write_design(out, found)
+        return found.coordinates.tolist()
 
     def bank(
         self,

@@ -101,6 +101,10 @@ class Searching:
                 return
         self.break_off()
 
+    def end(self) -> None:
+        """End the process."""
+        self._worker.end()
+
     def break_off(self) -> None:
         """End the search at once; what it has told is all there is of it."""
         self._is_broken_off = True

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -22,11 +20,11 @@ from studio.session.document import Document, Material
 from studio.session.examples import EXAMPLES
 from studio.session.history import History
 from studio.session.listening import Clips
-from studio.session.searching import Live, Searching
+from studio.session.pages import Pages
+from studio.session.searching import Searching
+from studio.session.upkeep import Upkeep
 from studio.session.workspace import Workspace
 
-BANK_SECONDS = 0.25
-"""Time between two banks of a search."""
 EXPORT_SECONDS = 600.0
 """That an export may take."""
 MEDIA_TYPES = {
@@ -38,7 +36,6 @@ MEDIA_TYPES = {
     "wav": "audio/wav",
     "html": "text/html",
 }
-logger = logging.getLogger(__name__)
 
 
 class DesignStudio:
@@ -63,21 +60,15 @@ class DesignStudio:
         self.saved: Document | None = document
         self.fine = False
         self.is_searching = False
-        self.bench = Bench(workspace.folder, self._changed)
+        self.pages = Pages(self.state, lambda: {"event": "history", "rows": self.search.rows})
+        self.upkeep = Upkeep(self)
+        self.bench = Bench(workspace.folder, self.changed)
         self.clips = Clips(workspace.path, self._clips_changed)
-        self.search = Searching(self._told, self._found)
+        self.search = Searching(self._told, self.upkeep.found)
+        self.autosave = Autosave(self._session, workspace.write_session)
         self._exports = Worker("studio.processes.exports:Exports")
-        self._feeds: set[Feed] = set()
+        self._saving: asyncio.Future[None] | None = None
         self._revision = 0
-        self._bank: tuple[Any, bytes] | None = None
-        self._banks = 0
-        self._fine_phase = "none"
-        self._search_message: str | None = None
-        self._live: Live | None = None
-        self._wake, self._lively = asyncio.Event(), asyncio.Event()
-        self._search_task: asyncio.Task[None] | None = None
-        self._autosave = Autosave(self._session, workspace.write_session)
-        self._tasks: list[asyncio.Future[None]] = []
         self._calls = Calls(self)
 
     @property
@@ -89,10 +80,8 @@ class DesignStudio:
 
     async def start(self) -> None:
         """Begin to keep up with the document."""
-        work = (self._keep_up(), self._follow(), self._autosave.run())
-        self._tasks = [asyncio.ensure_future(each) for each in work]
-        self.bench.warm()
-        self._wake.set()
+        self._saving = asyncio.ensure_future(self.autosave.run())
+        self.upkeep.start()
 
     def state(self) -> dict[str, Any]:
         """The event `state`."""
@@ -111,8 +100,8 @@ class DesignStudio:
             "clips": self.clips.state(),
             "wanted": self.bench.wanted,
             "settings": {k: v for k, v in settings.items() if k not in ("mesh", "targets")},
-            "search": {"phase": self._search_phase, "message": self._search_message},
-            "fine": {"on": self.fine, "phase": self._fine_phase, "message": None},
+            "search": {"phase": self._search_phase, "message": self.upkeep.message},
+            "fine": {"on": self.fine, "phase": self.upkeep.fine_phase, "message": None},
             "kept": document.kept is not None,
             "builtins": sorted(BUILTINS),
             "examples": [
@@ -146,17 +135,11 @@ class DesignStudio:
 
     def subscribe(self) -> Feed:
         """A feed that begins with all that there is."""
-        feed = Feed()
-        self._feeds.add(feed)
-        feed.send(self.state(), "state")
-        feed.send(self._history_event())
-        if self._bank is not None:
-            feed.put(self._bank[1], "bank")
-        return feed
+        return self.pages.subscribe()
 
     def unsubscribe(self, feed: Feed) -> None:
         """Send nothing more to a feed."""
-        self._feeds.discard(feed)
+        self.pages.unsubscribe(feed)
 
     async def call(self, name: str, arguments: Mapping[str, Any]) -> None:
         """Do what the page asks for."""
@@ -175,7 +158,7 @@ class DesignStudio:
     async def take_clip(self, name: str, content: bytes) -> str:
         """Put an uploaded clip into the workspace."""
         clip = self.clips.add(self.workspace.put(name, content))
-        self._changed()
+        self.changed()
         return clip.identifier
 
     async def surface(self, number: int) -> bytes:
@@ -206,19 +189,17 @@ class DesignStudio:
 
     async def close(self) -> None:
         """Save what is to be saved and end all processes."""
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-        self._autosave.save()
+        if self._saving is not None:
+            self._saving.cancel()
+            await asyncio.gather(self._saving, return_exceptions=True)
+        self.autosave.save()
+        await self.upkeep.end()
         self.workspace.forget_designs(self.history.designs())
-        self.search.break_off()
-        if self._search_task is not None:
-            await asyncio.gather(self._search_task, return_exceptions=True)
         self.bench.end()
         self.clips.end()
+        self.search.end()
         self._exports.end()
-        for feed in self._feeds:
-            feed.close()
+        self.pages.close()
         self.workspace.close()
 
     # What calls do.
@@ -226,7 +207,7 @@ class DesignStudio:
     def do(self, name: str, document: Document) -> None:
         """Go on to another document; a search that goes on begins anew with it."""
         document.require_sound(self.workspace.folder)
-        self._settle()
+        self.upkeep.break_off()
         changed = replace(document, material=self._material_of(document))
         self.history.do(name, changed)
         self._edited()
@@ -234,7 +215,7 @@ class DesignStudio:
     def move(self, forwards: bool) -> None:
         """Redo or undo."""
         self.is_searching = False
-        self._settle()
+        self.upkeep.break_off()
         if not (self.history.redo() if forwards else self.history.undo()):
             raise UserError(f"there is nothing to {'redo' if forwards else 'undo'}")
         self._edited()
@@ -243,7 +224,7 @@ class DesignStudio:
         """Begin with another project."""
         document.require_sound(self.workspace.folder)
         self.is_searching = False
-        self._settle()
+        self.upkeep.break_off()
         self.name, self.fine = name, False
         self.history.do(f"open {name}", document)
         self._edited()
@@ -254,27 +235,27 @@ class DesignStudio:
             return
         if not any(target.clip for target in self.document.targets):
             raise UserError("no target has a clip yet; place one and drop a clip on it")
-        self.is_searching, self._search_message = True, None
+        self.is_searching = True
         self.history.do("optimise", self.document)
-        self._changed()
-        self._wake.set()
+        self.changed()
+        self.upkeep.wake()
 
     async def stop_search(self) -> None:
         """Stop searching; what was found stays."""
         self.is_searching = False
-        self._changed()
+        self.changed()
         await self.search.stop()
 
     def is_saved_as(self, name: str) -> None:
         """Take note that the document was saved."""
         self.name, self.saved = name, self.document
-        self._changed()
+        self.changed()
 
     def show_fine(self, on: bool) -> None:
         """Show the fine solid, or the one of the search."""
         self.fine = on
-        self._changed()
-        self._wake.set()
+        self.changed()
+        self.upkeep.wake()
 
     async def designed(self) -> str:
         """The file of the present material's design, which is made if there is none.
@@ -289,14 +270,15 @@ class DesignStudio:
         if self.bench.project is None:
             raise UserError("there is no target with a clip yet, and so no design")
         material = self.document.material
-        if material is not None and material.design is not None:
-            return material.design
+        given: str | list[float] | None = None
+        if material is not None:
+            given = list(material.z) if material.design is None else material.design
+            if isinstance(given, str) and await self.bench.ask("is_of_targets", given):
+                return given
         out = str(self.workspace.new_design())
-        z = None if material is None else list(material.z)
-        await self.bench.ask("design", z, out)
-        made = Material(() if z is None else tuple(z), out)
+        made = Material(tuple(await self.bench.ask("design", given, out)), out)
         self.history.replace(replace(self.document, material=made))
-        self._changed()
+        self.changed()
         return out
 
     def _material_of(self, document: Document) -> Material | None:
@@ -314,172 +296,28 @@ class DesignStudio:
                 return None
         return material
 
-    def _settle(self) -> None:
-        """End a search that goes on; its best material is that of the document by now."""
-        if self.search.phase != "idle":
-            self.search.break_off()
-        self._live = None
-
     def _edited(self) -> None:
-        self._search_message = None
         news = self.bench.news
         if news is not None and news.phase in ("reading", "preparing"):
             if news.mesh != self.document.mesh:
                 self.bench.end()
-        self._changed()
-        self._wake.set()
+        self.changed()
+        self.upkeep.wake()
 
-    # What goes on behind.
+    def changed(self) -> None:
+        """Tell all pages the state, and save it soon."""
+        self._revision += 1
+        self.pages.tell_state()
+        self.autosave.soon()
 
-    async def _keep_up(self) -> None:
-        """Bring all that computes to what the document describes, again and again."""
-        while True:
-            await self._wake.wait()
-            self._wake.clear()
-            document = self.document
-            try:
-                await self._bring(document)
-            except UserError as error:
-                if document is self.document:
-                    self.say(str(error), "error")
-            except Exception:
-                logger.exception("the studio could not keep up")
-                self.say("this failed for a fault of the program; its terminal tells more", "error")
-
-    async def _bring(self, document: Document) -> None:
-        heard = self.clips.listen(document.targets)
-        try:
-            await self.bench.bring(document, heard)
-        except UserError as error:
-            # Of the solid alone there is something to hear, even where the clips are no good.
-            if document is self.document and not self.clips.are_listened_to:
-                self._end_search(str(error))
-            if not self.bench.is_ready:
-                return
-        if document is not self.document or heard != self.clips.listen(document.targets):
-            self._wake.set()
-            return
-        if self.is_searching and not self.clips.are_listened_to:
-            self._start_search()
-        if self.search.phase == "idle":
-            await self._show(document)
-            self.search.warm()
-
-    async def _show(self, document: Document) -> None:
-        """Send the bank of the document's material, unless it is the last one that was sent."""
-        if not self.bench.is_ready:
-            return
-        material, fine = document.material, self.fine
-        shown = (material, fine, self.bench.aimed)
-        if self._bank is not None and self._bank[0] == shown:
-            return
-        self._fine_phase = "working" if fine else "none"
-        if fine:
-            self._changed()
-        try:
-            name = "fine_bank" if fine else "bank"
-            given: str | list[float] | None = None
-            if material is not None and material.design is not None:
-                name, given = f"{name}_of", material.design
-            elif material is not None:
-                given = list(material.z)
-            message = await self.bench.ask(name, given, self._header(fine))
-        finally:
-            self._fine_phase = "ready" if fine else "none"
-        self._publish_bank(shown, message)
-        self._changed()
-
-    def _header(self, fine: bool) -> dict[str, Any]:
-        self._banks += 1
-        surface = None if self.bench.surface is None else self.bench.surface[0]
-        return {"number": self._banks, "surface": surface, "fine": fine}
-
-    def _start_search(self) -> None:
-        if self._search_task is not None and not self._search_task.done():
-            return
-        if self.bench.project is None:
-            self._end_search("no clip could be listened to; see what its target says")
-            return
-        self._search_task = asyncio.ensure_future(self._search())
-
-    async def _search(self) -> None:
-        """One search, from the document's material until it ends or is broken off."""
-        try:
-            problem = await self.bench.ask("problem")
-            running = self.search.run(problem, self.document.material, self.workspace.new_design())
-            found = await running
-        except UserError as error:
-            self._end_search(str(error))
-        else:
-            if found is not None:
-                self.is_searching = False
-                self.history.replace(replace(self.document, material=found))
-        self._live = None
-        self._publish(self._history_event())
-        self._changed()
-        self._wake.set()
-
-    def _end_search(self, sentence: str) -> None:
-        """Tell why there is no search, and want none any more."""
-        if self.is_searching:
-            self.is_searching, self._search_message = False, sentence
-        self._changed()
-        self.say(sentence, "error")
+    def _clips_changed(self) -> None:
+        self.changed()
+        self.upkeep.wake()
 
     def _told(self, news: dict[str, Any]) -> None:
         if len(self.search.rows) == 1:
-            self._changed()  # it is running
-        self._publish({"event": "progress", **news})
-
-    def _found(self, live: Live) -> None:
-        self._live = live
-        self.history.replace(replace(self.document, material=live.material))
-        self._autosave.soon(seconds=2.0)
-        self._lively.set()
-
-    async def _follow(self) -> None:
-        """Send banks of a search that goes on: of its newest material, as often as may be."""
-        while True:
-            await self._lively.wait()
-            self._lively.clear()
-            live = self._live
-            if live is None:
-                continue
-            with suppress(UserError):
-                header = {**self._header(False), "cost": live.cost}
-                message = await self.bench.ask("bank", list(live.material.z), header, live.hertz)
-                if self._live is not None:
-                    self._publish_bank(None, message)
-            await asyncio.sleep(BANK_SECONDS)
-
-    # What pages are told.
-
-    def say(self, text: str, kind: str = "note") -> None:
-        """Tell all pages a sentence; `kind` is `note` or `error`."""
-        self._publish({"event": "said", "text": text, "kind": kind})
-
-    def _clips_changed(self) -> None:
-        self._changed()
-        self._wake.set()
-
-    def _changed(self) -> None:
-        self._revision += 1
-        state = self.state()
-        for feed in self._feeds:
-            feed.send(state, "state")
-        self._autosave.soon()
-
-    def _publish_bank(self, shown: Any, message: bytes) -> None:
-        self._bank = (shown, message)
-        for feed in self._feeds:
-            feed.put(message, "bank")
-
-    def _publish(self, event: dict[str, Any]) -> None:
-        for feed in self._feeds:
-            feed.send(event)
-
-    def _history_event(self) -> dict[str, Any]:
-        return {"event": "history", "rows": self.search.rows}
+            self.changed()  # it is running
+        self.pages.tell({"event": "progress", **news})
 
     def _session(self) -> dict[str, Any]:
         """What the studio goes on with when it is started again."""
