@@ -1,4 +1,7 @@
-/** How loud it sounds: volume, a meter, noise of the clips along with strikes, why nothing is heard. */
+/**
+ * How it sounds: volume, a meter, how long strikes touch, noise of the clips along with strikes, why
+ * nothing is heard.
+ */
 
 /** @typedef {import("../main.js").Parts} Parts */
 
@@ -15,6 +18,8 @@ export function makeSounding(element, { bank, noise }) {
   element.setAttribute("aria-label", "Sound");
   element.innerHTML = `
     <label>Volume <input type="range" min="0" max="1" step="0.05" /></label>
+    <label title="How long a strike touches the solid: the longer, the duller it sounds">Contact
+      <input class="contact" type="range" min="0" max="5" step="0.25" /> <output></output></label>
     <div class="level" aria-hidden="true"><span></span></div>
     <label title="Strikes sound with what is noise in the clips, near their targets">
       <input type="checkbox" /> clips' noise</label>
@@ -25,6 +30,17 @@ export function makeSounding(element, { bank, noise }) {
   const says = /** @type {HTMLElement} */ (element.querySelector(".sounding-says"));
   volume.value = String(bank.volume);
   volume.oninput = () => (bank.volume = Number(volume.value));
+  const contact = /** @type {HTMLInputElement} */ (element.querySelector(".contact"));
+  const touching = /** @type {HTMLOutputElement} */ (element.querySelector("output"));
+  const touch = () => {
+    const milliseconds = Number(contact.value);
+    bank.contactSeconds = milliseconds / 1000;
+    touching.textContent = `${milliseconds} ms`;
+    contact.setAttribute("aria-valuetext", touching.textContent);
+  };
+  contact.value = String(1000 * bank.contactSeconds);
+  contact.oninput = touch;
+  touch();
   noisy.checked = noise.on;
   noisy.onchange = () => (noise.on = noisy.checked);
 
