@@ -1,0 +1,63 @@
+"""What a search tells while it goes on, and what is left of a round that is broken off."""
+
+from __future__ import annotations
+
+import os
+import signal
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sound.design.optimise import optimise
+from sound.design.preparation import prepare
+from tests import small_project
+
+
+@pytest.fixture(scope="module")
+def problem(tmp_path_factory):
+    """The targets are sounds of the fine bar, the search works with a coarse one."""
+    made = small_project.project(tmp_path_factory.mktemp("project"), evaluations=60)
+    targets = small_project.targets(made)
+    return prepare(replace(made, solid=replace(made.solid, coarsen="average")), targets)
+
+
+def with_options(problem, **changes):
+    optimiser = replace(problem.project.optimiser, **changes)
+    return replace(problem, project=replace(problem.project, optimiser=optimiser))
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_every_step_is_told_with_what_the_fine_solid_then_sounds_at(problem, workers):
+    followed = []
+    chosen = with_options(problem, workers=workers)
+    design = optimise(chosen, follow=lambda step, hertz: followed.append((step, hertz)))
+    assert len(followed) > 5
+    costs = [step.cost.total for step, _ in followed]
+    assert np.isfinite(costs).all() and min(costs) < max(costs)
+    near = min(followed, key=lambda each: np.linalg.norm(each[0].z - design.coordinates))
+    assert np.allclose(near[0].z, design.coordinates, atol=1e-12)
+    told, found = np.sort(near[1]), design.frequencies
+    assert np.allclose(told / told[0], found / found[0], rtol=5e-3)
+
+
+def test_a_search_begins_at_given_coordinates(problem):
+    z = np.random.default_rng(0).normal(scale=0.1, size=problem.setting.material.dimensions)
+    design = optimise(with_options(problem, evaluations=1), coordinates=z)
+    assert np.array_equal(design.coordinates, z)
+
+
+def test_a_round_that_is_broken_off_leaves_the_best_of_its_steps(problem):
+    """It is not waited for: two descents of the round alone would take all that follows."""
+    followed = []
+
+    def follow(step, hertz):
+        followed.append(step)
+        if len(followed) == 3:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    endless = with_options(problem, evaluations=None, seconds=None, workers=2, fine_check=False)
+    design = optimise(endless, follow=follow)
+    best = min(followed, key=lambda step: step.cost.total)
+    # Analyses of a search are less accurate than the last one.
+    assert design.evidence["cost"] <= best.cost.total * (1.0 + 1e-3)
