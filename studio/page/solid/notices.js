@@ -8,15 +8,18 @@ import { fillChooser } from "./chooser.js";
 /** @type {Record<string, string>} */
 const PHASES = {
   reading: "Reading the solid",
-  preparing: "Preparing the solid: it becomes voxels, then its modes are computed",
+  preparing: "Preparing the solid: it becomes voxels, then these become coarser elements",
+  ready: "Computing the modes",
 };
 
 /**
  * @param {HTMLElement} element
  * @param {Parts} parts
- * @returns {{graphics: (sentence: string | null) => void}} told what keeps the solid from being drawn
+ * @param {() => boolean} silent whether the solid's modes are not there yet
+ * @returns {{graphics: (sentence: string | null) => void, show: () => void}} `graphics` is told what keeps the
+ *     solid from being drawn, `show` that `silent` says something else
  */
-export function makeNotices(element, parts) {
+export function makeNotices(element, parts, silent) {
   element.className = "notices";
   element.innerHTML = `
     <div class="empty" hidden>
@@ -51,7 +54,7 @@ export function makeNotices(element, parts) {
       offered = offers;
       fillChooser(part(".empty .chooser"), parts, () => parts.say("Opening."));
     }
-    const underway = solid !== null && solid.phase in PHASES;
+    const underway = solid !== null && solid.phase in PHASES && (solid.phase !== "ready" || silent());
     progress.hidden = !underway;
     if (solid && underway) {
       const says = solid.message ?? PHASES[solid.phase];
@@ -68,6 +71,9 @@ export function makeNotices(element, parts) {
   parts.state.onChange(show);
 
   return {
+    show() {
+      if (parts.state.current) show(parts.state.current);
+    },
     graphics(sentence) {
       graphics.hidden = sentence === null;
       part(".graphics p").textContent = sentence ?? "";

@@ -31,6 +31,12 @@ export class Solid {
   constructor(element, parts) {
     this.parts = parts;
     this.element = element;
+    /** Number of the surface that is shown. @type {number | null} */
+    this.shown = null;
+    /** Number of the surface that is wanted. @type {number | null} */
+    this.wanted = null;
+    /** @type {{surface: number, young: Float32Array} | null} */
+    this.material = null;
     /** @param {string} className @param {string} [tag] @returns {HTMLElement} */
     const layer = (className, tag = "div") => {
       const made = document.createElement(tag);
@@ -49,16 +55,10 @@ export class Solid {
     makeSounding(bottom.appendChild(document.createElement("div")), parts);
     const toolbar = layer("stage-toolbar");
     this.hint = layer("stage-hint");
-    this.notices = makeNotices(layer("notices"), parts);
+    this.notices = makeNotices(layer("notices"), parts, () => this.#silent);
     this.openChooser = makeChooser(element, parts);
     const askUnit = makeUnitDialog(element, parts);
 
-    /** Number of the surface that is shown. @type {number | null} */
-    this.shown = null;
-    /** Number of the surface that is wanted. @type {number | null} */
-    this.wanted = null;
-    /** @type {{surface: number, young: Float32Array} | null} */
-    this.material = null;
     /** @type {[number, number] | null} */
     this.spanned = null;
     /** @type {View | null} */
@@ -96,6 +96,7 @@ export class Solid {
     parts.connection.onBinary("bank", (header, arrays) => {
       this.material = { surface: header.surface, young: /** @type {Float32Array} */ (arrays.young) };
       this.#paint();
+      this.notices.show();
     });
   }
 
@@ -154,7 +155,7 @@ export class Solid {
    */
   strike(vertex, strength = this.parts.selection.current.strength) {
     const { bank, selection, say } = this.parts;
-    if (this.material === null || this.material.surface !== this.wanted) {
+    if (this.#silent) {
       say(NO_BANK);
       return;
     }
@@ -192,6 +193,11 @@ export class Solid {
   /** @returns {boolean} whether the solid and its material are as the server told them last */
   get settled() {
     return this.shown !== null && this.shown === this.wanted && this.#painted && (this.drawing?.drawings ?? 0) > 0;
+  }
+
+  /** @returns {boolean} whether the modes of the solid are not there yet */
+  get #silent() {
+    return this.material === null || this.material.surface !== this.wanted;
   }
 
   /** @returns {boolean} whether the material is that of the surface that is shown */

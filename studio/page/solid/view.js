@@ -18,7 +18,7 @@ const FIELD_DEGREES = 32;
 const ROOM = 1.15;
 // Slower than this while something moves, and it is drawn coarser until it stands still.
 const SLOW_SECONDS = 1 / 30;
-const COARSEST = 0.35;
+const COARSEST = 0.5;
 const NEITHER = /** @type {any} */ (-1);
 
 /**
