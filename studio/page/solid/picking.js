@@ -51,6 +51,6 @@ export class Picking {
     this.caster.setFromCamera(new THREE.Vector2(projected.x, projected.y), camera);
     const hit = this.tree.raycastFirst(this.caster.ray, THREE.DoubleSide);
     const away = this.caster.ray.origin.distanceTo(point);
-    return hit !== null && hit.distance < away - 0.02 * this.surface.sphere.radius;
+    return hit !== null && hit.distance < away - 0.002 * this.surface.sphere.radius;
   }
 }
