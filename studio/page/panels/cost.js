@@ -9,8 +9,12 @@ import { axis, colour, makePlot } from "./plots.js";
 /** @typedef {import("./legend.js").Sign} Sign */
 
 const HEIGHT = 200;
+/** More points than that are not seen; every second one is left out then. */
+const MOST_ROWS = 1000;
 /** Parts this far below the cost say nothing, and would squeeze what does. */
 const LEAST_SHARE = 1e-4;
+/** A smaller fall is none that is worth to be told. */
+const LEAST_PERCENT = 0.05;
 
 /** @type {{ key: keyof Progress, text: string, sign: Sign, kind: string, dash: number[], width: number }[]} */
 const SERIES = [
@@ -53,9 +57,7 @@ export function makeCost(element, parts) {
     const first = rows[0];
     const last = rows[rows.length - 1];
     if (!first || !last) return;
-    const fall = first.cost > 0 ? 100 * (1 - last.cost / first.cost) : 0;
-    const changed = fall < 0 ? `${fixed(-fall, 1)} % above` : `${fixed(fall, fall > 99 ? 2 : 1)} % below`;
-    const compared = rows.length > 1 ? `, ${changed} the first one` : "";
+    const compared = rows.length > 1 ? `, ${change(first.cost, last.cost)}` : "";
     const effort = `${last.evaluations} ${last.evaluations === 1 ? "evaluation" : "evaluations"} in ${withSeconds(last.seconds)}`;
     setText(value, `${significant(last.cost, 4)}${compared}; ${effort}`);
     setAttribute(
@@ -111,6 +113,7 @@ export function makeCost(element, parts) {
   }
 
   function later() {
+    while (rows.length > MOST_ROWS) rows = rows.filter((_row, index) => index % 2 === 0 || index === rows.length - 1);
     if (isWaiting) return;
     isWaiting = true;
     requestAnimationFrame(show);
@@ -127,6 +130,19 @@ export function makeCost(element, parts) {
     rows.push(event);
     later();
   });
+}
+
+/**
+ * How far a cost is from the first one, in words.
+ *
+ * @param {number} first
+ * @param {number} last
+ */
+function change(first, last) {
+  const fall = first > 0 ? 100 * (1 - last / first) : 0;
+  if (Math.abs(fall) < LEAST_PERCENT) return "as at first";
+  if (fall < 0) return `${fixed(-fall, 1)} % above the first one`;
+  return `${fixed(fall, fall > 99 ? 2 : 1)} % below the first one`;
 }
 
 /** @param {unknown} value @returns {number | null} as logarithms need it */

@@ -21,7 +21,7 @@ import { bark, cents, decibels, largest } from "./numbers.js";
  */
 
 /** What a level is called that is no sound at all [dB]. */
-const SILENT = -200;
+const SILENT = -100;
 
 /**
  * Modes of a bank and what is wanted of them at a point.
