@@ -37,7 +37,7 @@ class StubStudio:
         mesh = builtin_surface("bell")
         self._mesh = mesh
         self._inward = -np.array(mesh.vertex_normals)
-        self._feeds: set[Feed] = set()
+        self.feeds: set[Feed] = set()
         self._revision = self._bank = 0
         self._away = 1.0
         self._search: asyncio.Task[None] | None = None
@@ -161,17 +161,17 @@ class StubStudio:
         feed.send(self.state(), newest="state")
         feed.send({"event": "history", "rows": self._history}, newest="history")
         feed.put(self.bank(), newest="bank")
-        self._feeds.add(feed)
+        self.feeds.add(feed)
         return feed
 
     def unsubscribe(self, feed: Feed) -> None:
-        self._feeds.discard(feed)
+        self.feeds.discard(feed)
 
     def changed(self, bank: bool = True) -> None:
         """Tell all pages."""
         self._revision += 1
         self._bank += bank
-        for feed in self._feeds:
+        for feed in self.feeds:
             feed.send(self.state(), newest="state")
             if bank:
                 feed.put(self.bank(), newest="bank")
@@ -226,7 +226,7 @@ class StubStudio:
                 "regulariser": 0.1 * self._away**2,
             }
             self._history.append(row)
-            for feed in self._feeds:
+            for feed in self.feeds:
                 feed.send({"event": "progress", **row}, newest="progress")
             self.changed()
         self._search, self._phase = None, "idle"

@@ -214,26 +214,49 @@ def test_a_slow_page_gets_the_newest_bank_and_no_backlog():
     ]
 
 
-def test_a_page_that_reads_nothing_is_cut_off_and_others_are_not(server: Served):
+def test_a_page_that_was_away_is_sent_the_newest_bank_and_few_others(server: Served):
+    """What is on its way in buffers comes as well; the rest is skipped."""
+    changes = 300
+    with server.talk(max_queue=1) as page:
+        next_event(page, "state")
+        for _ in range(changes):
+            server.soon(server.studio.changed)
+        newest, numbers = unpack(server.studio.bank())[0]["number"], []
+        while not numbers or numbers[-1] < newest:
+            message = page.recv(timeout=SECONDS)
+            if isinstance(message, bytes):
+                numbers.append(unpack(message)[0]["number"])
+    assert numbers == sorted(numbers) and len(numbers) < changes / 2
+
+
+def test_a_page_that_keeps_too_much_waiting_is_cut_off_and_others_are_not(server: Served):
     feed = Feed()
     for number in range(LONGEST_FEED + 1):
         assert not feed.closed
         feed.put(str(number))
     assert feed.closed and asyncio.run(feed.next()) is None
-    with server.talk() as idle, server.talk() as page:
-        feeds = set(server.studio._feeds)
-        server.soon(lambda: [each.close() for each in feeds if each is not feed])
-        with pytest.raises(ConnectionClosed) as caught:
-            while True:
-                idle.recv(timeout=SECONDS)
+    with server.talk() as page:
+        next_event(page, "state")
+        before = set(server.studio.feeds)
+        with server.talk() as idle:
+            next_event(idle, "state")
+            (feed,) = set(server.studio.feeds) - before
+            server.soon(feed.close)
+            with pytest.raises(ConnectionClosed) as caught:
+                while True:
+                    idle.recv(timeout=SECONDS)
         assert caught.value.rcvd is not None and caught.value.rcvd.code == 1013
-        with pytest.raises(ConnectionClosed):
-            while True:
-                page.recv(timeout=SECONDS)
+        assert reply_of(page, {"id": 1, "do": "stop"}) == {"reply": 1}
+
+
+def test_nothing_is_kept_for_pages_that_are_gone(server: Served):
+    for _ in range(5):
+        with server.talk() as page:
+            next_event(page, "state")
     until = time.monotonic() + SECONDS
-    while server.studio._feeds and time.monotonic() < until:
+    while server.studio.feeds and time.monotonic() < until:
         time.sleep(0.02)
-    assert not server.studio._feeds
+    assert not server.studio.feeds
 
 
 def test_numbers_that_json_does_not_have_are_not_sent():
