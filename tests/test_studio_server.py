@@ -23,12 +23,14 @@ from websockets.sync.client import connect
 
 from carillon.__main__ import main
 from carillon.errors import UserError
+from sound.project.design_file import write_design
 from sound.project.schema import project_schema
 from studio.binary import pack, unpack
 from studio.feed import LONGEST_FEED, Feed
 from studio.interface import CLIP_PARTS, EXPORTS
 from studio.server import browser
 from studio.server.serve import FIRST_PORT, address_of, listen
+from tests.small_design import small_design
 from tests.studio_server import SECONDS, Served, next_event, reply_of, served
 
 CHECKOUT = Path(__file__).resolve().parent.parent
@@ -402,6 +404,19 @@ def test_listening_for_other_machines_is_warned_of(opened, monkeypatch, tmp_path
     monkeypatch.chdir(tmp_path)
     assert main(["studio", "--host", "0.0.0.0", "--no-browser"]) == 0
     assert "other machines" in capsys.readouterr().err
+
+
+def test_a_finished_design_is_written_as_a_page_without_a_server(
+    opened, refuses, monkeypatch, tmp_path, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    write_design("design.h5", small_design())
+    assert main(["studio", "design.h5", "--export", "page.html"]) == 0
+    assert "page.html: " in capsys.readouterr().out
+    assert Path("page.html").read_text().lower().startswith("<!doctype html>")
+    assert not opened and not Path("carillon-studio").exists()
+    assert "ends in" in refuses(main, "studio", "design.h5", "--export", "page.pdf")
+    assert "input" in refuses(main, "studio", "page.html", "--export", "page.html")
 
 
 @pytest.mark.parametrize(

@@ -40,7 +40,7 @@ class Limits:
     clip_bytes: int = 16 << 20
     message_bytes: int = 1 << 18
     idle_seconds: float = 10.0
-    upload_seconds: float = 120.0
+    upload_seconds: float = 600.0
     uploads: int = 4
 
 
