@@ -45,7 +45,7 @@ SILENT = {
             else window.heard.push(["play", typeof piece === "string" ? piece : piece.duration]);
             return true;
           };
-          return { play, stop: () => window.heard.push(["stop"]),
+          return { play, onChange() {}, stop: () => window.heard.push(["stop"]),
             playInTurn: async (pieces) => { for (const piece of pieces) await play(piece); } };
         }""",
     "sound/recorder.js": """

@@ -8,7 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
+from carillon.errors import UserError
+from sound.design.bark import bark as bark_of
+from sound.design.cents import cents as cents_of
+from sound.project.schema import check, project_schema
 from tests.chromium import chromium
 from tests.panels_page import NOW, WANTED, bank, progress, ready_clip, state, target, window
 
@@ -320,6 +325,19 @@ def test_a_mode_of_the_solid_is_heard_alone(panels):
     assert panels.heard() == [["solo", [1]], ["strike", 1, 1], ["solo", None]]
 
 
+def test_the_page_reckons_bark_and_cents_as_the_cost_does(panels):
+    hertz = [30.0, 440.0, 1234.5, 9000.0]
+    found = panels.page.evaluate(
+        """async (hertz) => {
+          const { bark, cents } = await import("/page/panels/numbers.js");
+          return [hertz.map(bark), hertz.map((each) => cents(each, 440))];
+        }""",
+        hertz,
+    )
+    assert np.allclose(found[0], bark_of(np.array(hertz)), rtol=1e-12)
+    assert np.allclose(found[1], cents_of(np.array(hertz), np.full(4, 440.0)), atol=1e-9)
+
+
 # Cost
 
 
@@ -404,6 +422,56 @@ def test_what_is_typed_outlives_a_new_state_and_can_be_discarded(panels):
     expect(page.get_by_label("Resolution")).to_have_value("40")
     page.locator("#panel-settings").get_by_role("button", name="Discard").click()
     expect(page.get_by_label("Resolution")).to_have_value("20")
+
+
+def test_settings_that_the_server_refuses_wait_with_its_sentence(panels):
+    panels.refused["change_settings"] = "weights: expected at least one of them to be 1e-12 or more"
+    panels.page.get_by_label("Weight of frequencies").fill("0")
+    panels.page.get_by_role("button", name="Apply").click()
+    expect(panels.page.locator(".form-said")).to_contain_text("weights: expected at least one")
+    expect(panels.page.get_by_label("Weight of frequencies")).to_have_value("0")
+    expect(panels.page.get_by_role("button", name="Apply")).to_be_enabled()
+
+
+NUMBERS = ["", "0", "-1", "1", "2", "2.5", "1e3", "30.0", "0.3", "0.5", "1e-5", "1e30", "auto", "x"]
+
+
+def test_the_page_takes_the_numbers_that_projects_take(panels):
+    fields = dict(_numbers(project_schema()))
+    taken = panels.page.evaluate(
+        """async ([fields, texts]) => {
+          const { readNumber, FieldError } = await import("/page/panels/values.js");
+          const takes = (text, schema) => {
+            try { readNumber(text, schema, ""); return true; }
+            catch (error) { if (error instanceof FieldError) return false; throw error; }
+          };
+          return Object.entries(fields).map(([name, schema]) =>
+            [name, texts.filter((text) => takes(text, schema))]);
+        }""",
+        [fields, NUMBERS],
+    )
+    assert len(taken) > 10
+    for name, texts in taken:
+        assert texts == [text for text in NUMBERS if _fits(text, fields[name])], name
+
+
+def _numbers(schema, path=""):
+    """All settings that are numbers, by their names."""
+    for key, part in schema["properties"].items():
+        if "properties" in part:
+            yield from _numbers(part, f"{path}{key}.")
+        elif {"number", "integer"} & set(np.atleast_1d(part.get("type", "none"))):
+            yield path + key, part
+
+
+def _fits(text: str, schema) -> bool:
+    """Whether a file may have what is typed; an empty field is its null."""
+    value = None if text == "" else yaml.safe_load(text) if text in ("auto", "x") else float(text)
+    try:
+        check({"key": value}, {"type": "object", "properties": {"key": schema}})
+    except UserError:
+        return False
+    return True
 
 
 # The design as a whole

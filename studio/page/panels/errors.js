@@ -98,7 +98,11 @@ export function makeErrors(element, parts) {
     const wanted = pairs.filter((pair) => pair.wantedHertz !== null);
     none.hidden = wanted.length > 0;
     body.hidden = wanted.length === 0;
-    if (wanted.length === 0) return;
+    if (wanted.length === 0) {
+      // The table's buttons are gone: nobody could let the others be heard again.
+      if (alone !== null) soundAlone(null);
+      return;
+    }
     const worst = worstOf(wanted);
     keepList(rows, wanted, (pair) => String(pair.mode), create, (row, pair) => update(row, pair, worst));
     const rms = bank?.[0].rms_cents ?? rootMeanSquare(wanted.map((pair) => pair.cents ?? 0));

@@ -49,7 +49,7 @@ export function makeSettings(element, parts) {
     edited.clear();
     fields.forEach((field) => field.complain(""));
     show();
-    setText(said, "");
+    tell("");
   });
   const body = make("div", { class: "form-body" }, make("p", { class: "hint" }, "Settings are on their way …"));
   const form = make(
@@ -69,9 +69,9 @@ export function makeSettings(element, parts) {
     try {
       await connection.call("change_settings", { settings: changes });
       edited.clear();
-      setText(said, "Applied.");
+      tell("Applied.");
     } catch (error) {
-      setText(said, sentenceOf(error));
+      tell(sentenceOf(error), true);
     }
     show();
   }
@@ -102,6 +102,15 @@ export function makeSettings(element, parts) {
     return changes;
   }
 
+  /**
+   * @param {string} text
+   * @param {boolean} [isError]
+   */
+  function tell(text, isError = false) {
+    setText(said, text);
+    said.classList.toggle("field-error", isError);
+  }
+
   function show() {
     for (const field of fields) {
       const isEdited = edited.has(field.path.join("."));
@@ -123,7 +132,7 @@ export function makeSettings(element, parts) {
     const field = makeField(path, schema, () => {
       edited.add(path.join("."));
       field.complain("");
-      setText(said, "");
+      tell("");
       show();
     });
     return field;

@@ -124,6 +124,10 @@ function makeDetails(parts) {
   const listen = PARTS.map(([part, text, title]) => button(text, () => void playClip(parts, now(), part), { title }));
   const struck = button("Solid", () => strikeTarget(parts, now()), { title: "The solid, struck there" });
   const stop = button("Stop", () => parts.player.stop(), { class: "quiet", title: "Stop the clip that plays" });
+  stop.disabled = true;
+  parts.player.onChange((playing) => {
+    stop.disabled = playing === null;
+  });
   const modes = make("input", {
     type: "text",
     inputmode: "numeric",
