@@ -43,7 +43,7 @@ from workflow.studies.sounds.examples import (
     START,
     TRUTH,
     Example,
-    Target,
+    ExampleTarget,
     examples,
     project,
 )
@@ -63,7 +63,10 @@ EXAMPLE = Example(
     modes=N_MODES,
     dimensions=5,
     seconds=1.0,
-    targets=(Target("corner", SIDES, "metal", 1), Target("side", (0.0, 0.0, 0.0), "wood", 2)),
+    targets=(
+        ExampleTarget("corner", SIDES, "metal", 1),
+        ExampleTarget("side", (0.0, 0.0, 0.0), "wood", 2),
+    ),
     elsewhere=("top", (0.12, 0.08, 0.08)),
     compared=True,
 )

@@ -12,7 +12,7 @@ from solver.files.modes_file import frequencies
 from sound.design.interrupts import interruptible
 from sound.design.optimisers import OPTIMISERS
 from sound.design.outcome import Outcome
-from sound.design.pool import Pool, Step, Task
+from sound.design.pool import Pool, SearchStep, Task
 from sound.design.preparation import DesignProblem, coordinates_of
 from sound.design.search import BudgetSpentError, Search, require_modes
 from sound.design.space_mapping import SpaceMapping
@@ -30,7 +30,7 @@ def optimise(
     keep: Callable[[Design], None] | None = None,
     watch: Callable[[Search], bool | None] | None = None,
     keep_seconds: float | None = None,
-    follow: Callable[[Step, Array], None] | None = None,
+    follow: Callable[[SearchStep, Array], None] | None = None,
     coordinates: Array | None = None,
 ) -> Design:
     """Search for a material until the project's budget is spent, or somebody interrupts.
@@ -85,8 +85,8 @@ def optimise(
         assert mapping.best is not None
         return outcome.of_checked(search, mapping.best)
 
-    def pool(tell: Callable[[Step], None]) -> Pool:
-        def told(step: Step) -> None:
+    def pool(tell: Callable[[SearchStep], None]) -> Pool:
+        def told(step: SearchStep) -> None:
             tell(step)
             if follow is not None:
                 own = frequencies(step.eigenvalues)

@@ -141,7 +141,7 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Step:
+class SearchStep:
     """A material that a descent has come to, told while it goes on.
 
     Attributes
@@ -176,7 +176,7 @@ class Pool:
     """
 
     def __init__(
-        self, setting: Setting, workers: int, tell: Callable[[Step], None] | None = None
+        self, setting: Setting, workers: int, tell: Callable[[SearchStep], None] | None = None
     ) -> None:
         self._executor: ProcessPoolExecutor | None = None
         self._alone = ExitStack()
@@ -236,7 +236,7 @@ class Pool:
 
 _setting: Setting
 _simulation: Simulation
-_tell: Callable[[Step], None] | None
+_tell: Callable[[SearchStep], None] | None
 _for_good = ExitStack()
 
 
@@ -254,19 +254,19 @@ def _signals_held() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, former)
 
 
-def _pass_on(told: SimpleQueue[Step], tell: Callable[[Step], None]) -> None:
+def _pass_on(told: SimpleQueue[SearchStep], tell: Callable[[SearchStep], None]) -> None:
     """Tell what processes put into a queue, for as long as this one lives."""
     while True:
         tell(told.get())
 
 
-def _prepare_apart(setting: Setting, told: SimpleQueue[Step] | None) -> None:
+def _prepare_apart(setting: Setting, told: SimpleQueue[SearchStep] | None) -> None:
     end_with_parent()
     _for_good.enter_context(one_thread())
     _prepare(setting, None if told is None else told.put)
 
 
-def _prepare(setting: Setting, tell: Callable[[Step], None] | None) -> None:
+def _prepare(setting: Setting, tell: Callable[[SearchStep], None] | None) -> None:
     global _setting, _simulation, _tell
     _setting, _simulation, _tell = setting, setting.simulation(), tell
     _fine_simulation.cache_clear()
@@ -303,7 +303,7 @@ def _telling(fine: bool) -> Callable[[Evaluation, DesignCost], None] | None:
         return None
 
     def told(evaluation: Evaluation, cost: DesignCost) -> None:
-        tell(Step(evaluation.z, cost, evaluation.eigenvalues, fine))
+        tell(SearchStep(evaluation.z, cost, evaluation.eigenvalues, fine))
 
     return told
 

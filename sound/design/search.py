@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from carillon.errors import UserError
 from sound.design.descent import DescentLimits
 from sound.design.objective import DesignCost, Objective
-from sound.design.pool import InterruptedRoundError, Pool, Step, Task, Trial
+from sound.design.pool import InterruptedRoundError, Pool, SearchStep, Task, Trial
 
 Array = NDArray[np.float64]
 
@@ -106,7 +106,7 @@ class Search:
 
     def __init__(
         self,
-        make_pool: Callable[[Callable[[Step], None]], Pool],
+        make_pool: Callable[[Callable[[SearchStep], None]], Pool],
         seconds: float | None,
         evaluations: int | None,
         watch: Callable[[Search], bool] | None = None,
@@ -124,7 +124,7 @@ class Search:
         self._watch = watch
         self._before = before
         self._interrupted = interrupted
-        self._step: Step | None = None
+        self._step: SearchStep | None = None
         self._done = 0
         self._begin = time.monotonic()
         self.deadline = np.inf if seconds is None else self._begin + seconds
@@ -199,7 +199,7 @@ class Search:
             self._end()
         return trials
 
-    def _told(self, step: Step) -> None:
+    def _told(self, step: SearchStep) -> None:
         if self._step is None or step.cost.total < self._step.cost.total:
             self._step = step
 

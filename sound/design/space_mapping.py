@@ -22,7 +22,7 @@ from sound.design.cents import rms_cents
 from sound.design.fine_check import FineModes
 from sound.design.objective import Objective
 from sound.design.optimisers import descend_finely
-from sound.design.pool import Step, Trial
+from sound.design.pool import SearchStep, Trial
 from sound.design.search import BudgetSpentError, CheckEntry, Search, require_modes
 from sound.design.simulation import Evaluation
 
@@ -128,7 +128,7 @@ class SpaceMapping:
             share = min(LONGER * share, LARGEST_SHARE)
             seed += 1
 
-    def foretold(self, step: Step) -> Array:
+    def foretold(self, step: SearchStep) -> Array:
         """What the fine solid is likely to sound at (N,) [Hz], in the order of the coarse modes."""
         hertz = frequencies(step.eigenvalues)
         if self.best is None:

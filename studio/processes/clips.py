@@ -32,7 +32,7 @@ class ClipFile:
     allow_clipped: bool = False
 
 
-class Clips:
+class ClipsBench:
     """What the process for clips does."""
 
     def listen(self, clip: ClipFile) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sound.design.optimise import optimise
-from sound.design.pool import Step
+from sound.design.pool import SearchStep
 from sound.design.preparation import DesignProblem
 from sound.design.search import HistoryEntry, Search
 from sound.project.design import Design
@@ -77,7 +77,7 @@ class _News:
         self._ended = Event()
         self._search: Search | None = None
         self._checks = 0
-        self._best: tuple[Step, Array] | None = None
+        self._best: tuple[SearchStep, Array] | None = None
         self._is_new = False
         self._begin = time.monotonic()
 
@@ -90,7 +90,7 @@ class _News:
         self._ended.set()
         self._thread.join()
 
-    def follow(self, step: Step, hertz: Array) -> None:
+    def follow(self, step: SearchStep, hertz: Array) -> None:
         """Take up a step; costs of steps can be compared between two checks alone."""
         with self._lock:
             checks = 0 if self._search is None else len(self._search.checks)
@@ -119,7 +119,7 @@ class _News:
 
 
 def _row(
-    entry: HistoryEntry, best: tuple[Step, Array] | None, is_new: bool, seconds: float
+    entry: HistoryEntry, best: tuple[SearchStep, Array] | None, is_new: bool, seconds: float
 ) -> dict[str, Any]:
     """News: the cost, and the material if there is another one."""
     cost = entry.cost if best is None else best[0].cost

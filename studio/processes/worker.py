@@ -36,9 +36,9 @@ class Worker:
     Parameters
     ----------
     work
-        Module and class, such as `studio.processes.clips:Clips`, whose methods are called in the
-        process, on one object as long as the process lives.  A method that has news takes `tell` as
-        its first argument, a function of one value.
+        Module and class, such as `studio.processes.clips:ClipsBench`, whose methods are called in
+        the process, on one object as long as the process lives.  A method that has news takes
+        `tell` as its first argument, a function of one value.
     """
 
     def __init__(self, work: str) -> None:

@@ -27,7 +27,7 @@ class ExampleClip:
 
 
 @dataclass(frozen=True)
-class Example:
+class ExampleProject:
     """A solid and its clips."""
 
     name: str
@@ -53,21 +53,21 @@ class Example:
 
 
 EXAMPLES = (
-    Example(
+    ExampleProject(
         "wooden-plate",
         "a plate that sounds like a wooden bar when it is struck at its rim",
         "plate",
         32,
         (ExampleClip("rim", (0.12, 0.0, 0.03), "wood", 520.0, 1.0),),
     ),
-    Example(
+    ExampleProject(
         "metal-bell",
         "a bell that sounds like a metal plate",
         "bell",
         24,
         (ExampleClip("rim", (0.068, 0.0, 0.007), "metal", 420.0, 1.5),),
     ),
-    Example(
+    ExampleProject(
         "pan-of-two",
         "a frying pan of metal whose handle is of wood: nobody can have all of it, see how near",
         "frying-pan",

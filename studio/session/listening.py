@@ -69,7 +69,7 @@ class Clips:
 
     def __init__(self, path: Callable[[str], Path], changed: Callable[[], None]) -> None:
         self._path, self._changed = path, changed
-        self._worker = Worker("studio.processes.clips:Clips")
+        self._worker = Worker("studio.processes.clips:ClipsBench")
         self._known: dict[str, Clip] = {}
         self._tasks: set[asyncio.Task[None]] = set()
 

@@ -36,7 +36,7 @@ RIGID_MODES = 6
 
 
 @dataclass(frozen=True)
-class Target:
+class ExampleTarget:
     """A place, the arguments of `sound clip` for its clip, and the edit that it joins in.
 
     A `recording` of the list of real ones takes the place of the arguments; the clips of a recorded
@@ -107,7 +107,7 @@ class Example:
     modes: int
     dimensions: int
     seconds: float
-    targets: tuple[Target, ...]
+    targets: tuple[ExampleTarget, ...]
     elsewhere: tuple[str, tuple[float, float, float]]
     compared: bool
     recorded: Recording | None = None
@@ -136,7 +136,7 @@ class Example:
         """Number of the edit whose folder is `part`."""
         return self.parts.index(part) + 1
 
-    def targets_of(self, part: str) -> list[Target]:
+    def targets_of(self, part: str) -> list[ExampleTarget]:
         """Targets of an edit: its own and those before."""
         edit = self.edit_of(part)
         return [target for target in self.targets if target.edit <= edit]
@@ -187,7 +187,9 @@ def _example(name: str, config: Mapping[str, Any]) -> Example:
     chosen = list(there).index(True)
     solid = described["solids"][chosen]
     places = solid["places"]
-    targets = [Target(at=tuple(places[each["name"]]), **each) for each in described["targets"]]
+    targets = [
+        ExampleTarget(at=tuple(places[each["name"]]), **each) for each in described["targets"]
+    ]
     texts = {key: described[key] for key in ("title", "figure", "about", "density", "dimensions")}
     return Example(
         name=name,
