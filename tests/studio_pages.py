@@ -115,6 +115,12 @@ def until_page(page: Any, expression: str) -> Any:
     raise AssertionError(f"never true: {expression}")
 
 
+def until_still(page: Any) -> None:
+    """Wait until what lies over the solid has its place, and nothing is drawn any more."""
+    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    until_page(page, "!studio.view.drawing?.waiting")
+
+
 SPY = """() => {
   window.strikes = [];
   studio.bank.onStrike(({ vertex, strength }) => window.strikes.push([vertex, strength]));
@@ -144,6 +150,7 @@ def open_page(
     page.goto(address)
     page.wait_for_url(lambda url: "token" not in url)
     until_page(page, ready or "window.studio?.view?.settled")
+    until_still(page)
     if page.evaluate("document.activeElement !== document.body"):
         page.keyboard.press("Escape")
     page.evaluate(SPY)

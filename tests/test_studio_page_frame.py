@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib.util
+from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
@@ -143,3 +145,31 @@ def test_a_lost_server_is_told_and_found_again(browser):
         until_page(page, "studio.connection.status === 'refused'")
         assert "open the address that it printed" in page.locator("#connection-status").inner_text()
     page.context.close()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing_in_the_frame(browser, scheme):
+    package = importlib.util.find_spec("axe_playwright_python")
+    if package is None or package.origin is None:
+        pytest.skip("axe-playwright-python is not installed")
+    axe = (Path(package.origin).parent / "axe.min.js").read_text(encoding="utf-8")
+    studio = ToldStudio()
+    solid = studio.state()["solid"]
+    states = (
+        {},
+        {"solid": {**solid, "phase": "preparing"}},
+        {"solid": {**solid, "phase": "failed", "message": "cup.stl: is not closed."}},
+        {"solid": None, "targets": [], "clips": [], "wanted": None},
+    )
+    with serving(studio) as address:
+        page = open_page(browser, address, color_scheme=scheme)
+        page.evaluate(axe)
+        for told in states:
+            studio.tell(**told)
+            until_page(page, f"studio.state.current.revision >= {studio.state()['revision']}")
+            for opening in ("", "studio.view.openChooser()"):
+                page.evaluate(opening)
+                found = page.evaluate("axe.run(document, { resultTypes: ['violations'] })")
+                assert [each["id"] for each in found["violations"]] == []
+            page.keyboard.press("Escape")
+        page.context.close()

@@ -10,7 +10,7 @@ import trimesh
 from PIL import Image
 
 from tests.chromium import chromium
-from tests.studio_pages import ToldStudio, open_page, serving, until, until_page
+from tests.studio_pages import ToldStudio, open_page, serving, until, until_page, until_still
 
 MIDDLE = "studio.view.drawing.middle()"
 
@@ -51,6 +51,7 @@ def page(opened):
         }"""
     )
     page.mouse.move(1, 1)
+    until_still(page)
     page.faults.clear()
     yield page
     assert page.faults == []
@@ -58,8 +59,7 @@ def page(opened):
 
 def pixels(page) -> np.ndarray:
     """The solid's view as (height, width, 3), once nothing moves."""
-    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
-    until_page(page, "studio.view.drawing.waiting === 0")
+    until_still(page)
     return np.asarray(
         Image.open(io.BytesIO(page.locator("#view canvas").screenshot())).convert("RGB"), float
     )

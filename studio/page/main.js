@@ -8,6 +8,17 @@
 import { Connection } from "./connection.js";
 import { makeHeader } from "./header.js";
 import { Keys } from "./keys.js";
+import { makeClip } from "./panels/clip.js";
+import { makeCompare } from "./panels/compare.js";
+import { makeCost } from "./panels/cost.js";
+import { makeErrors } from "./panels/errors.js";
+import { makeMessages } from "./panels/messages.js";
+import { makeProject } from "./panels/project.js";
+import { makeSettings } from "./panels/settings.js";
+import { makeShortcuts } from "./panels/shortcuts.js";
+import { makeSpectrum } from "./panels/spectrum.js";
+import { makeTargets } from "./panels/targets.js";
+import { makeTour } from "./panels/tour.js";
 import { makeSolid } from "./solid/solid.js";
 import { makeBank } from "./sound/bank.js";
 import { makeNoise } from "./sound/noise.js";
@@ -29,40 +40,21 @@ import { Selection, ServerState } from "./state.js";
  * @property {import("./sound/player.js").Player} player
  * @property {import("./sound/recorder.js").Recorder} recorder
  * @property {import("./solid/solid.js").Solid | null} view null until it is made
- * @property {any} tour
- * @property {any} shortcuts
+ * @property {ReturnType<typeof makeTour> | null} tour
+ * @property {ReturnType<typeof makeShortcuts> | null} shortcuts
  */
 
+/** What is made in the body of `#panel-NAME`. */
 const PANELS = {
-  messages: ["panels/messages.js", "makeMessages", "#messages"],
-  targets: ["panels/targets.js", "makeTargets", "#panel-targets .panel-body"],
-  clip: ["panels/clip.js", "makeClip", "#panel-clip .panel-body"],
-  spectrum: ["panels/spectrum.js", "makeSpectrum", "#panel-spectrum .panel-body"],
-  cost: ["panels/cost.js", "makeCost", "#panel-cost .panel-body"],
-  errors: ["panels/errors.js", "makeErrors", "#panel-errors .panel-body"],
-  settings: ["panels/settings.js", "makeSettings", "#panel-settings .panel-body"],
-  project: ["panels/project.js", "makeProject", "#panel-project .panel-body"],
-  compare: ["panels/compare.js", "makeCompare", "#panel-compare .panel-body"],
-  shortcuts: ["panels/shortcuts.js", "makeShortcuts", "#shortcuts"],
-  tour: ["panels/tour.js", "makeTour", "#tour"],
+  targets: makeTargets,
+  clip: makeClip,
+  spectrum: makeSpectrum,
+  cost: makeCost,
+  errors: makeErrors,
+  settings: makeSettings,
+  project: makeProject,
+  compare: makeCompare,
 };
-
-/**
- * Part of a module; null, and a line in the console, where it cannot be had.
- *
- * @param {string} path
- * @param {string} name of the function that makes it
- * @param {...any} values
- * @returns {Promise<any>}
- */
-async function made(path, name, ...values) {
-  try {
-    return await (await import(`./${path}`))[name](...values);
-  } catch (error) {
-    console.error(`${path}: ${error}`);
-    return null;
-  }
-}
 
 /** @param {string} selector @returns {HTMLElement} */
 function place(selector) {
@@ -71,7 +63,7 @@ function place(selector) {
   return element;
 }
 
-async function main() {
+function main() {
   const connection = new Connection();
   const state = new ServerState(connection);
   const selection = new Selection();
@@ -93,12 +85,12 @@ async function main() {
     shortcuts: null,
   };
   Object.assign(window, { studio: parts });
+  makeMessages(place("#messages"), parts);
   makeHeader(place(".bar"), parts);
   parts.view = makeSolid(place("#view"), parts);
-  for (const [part, [path, name, selector]] of Object.entries(PANELS)) {
-    const panel = await made(path, name, place(selector), parts);
-    if (part === "tour" || part === "shortcuts") parts[part] = panel;
-  }
+  for (const [name, make] of Object.entries(PANELS)) make(place(`#panel-${name} .panel-body`), parts);
+  parts.shortcuts = makeShortcuts(place("#shortcuts"), parts);
+  parts.tour = makeTour(place("#tour"), parts);
   connection.open();
 }
 

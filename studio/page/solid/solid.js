@@ -138,6 +138,13 @@ export class Solid {
       const name = selection.current.target;
       return name === null ? false : this.strikeTarget(name);
     });
+    // The canvas takes these itself when it is focused; they are here for the list.
+    const elsewhere = () => false;
+    keys.add(["ArrowLeft", "ArrowUp", "ArrowRight", "ArrowDown"], "In the view: turn the solid", elsewhere);
+    keys.add(["Shift+ArrowLeft", "Shift+ArrowUp"], "In the view: shift it", elsewhere);
+    keys.add(["+", "-"], "In the view: nearer, farther", elsewhere);
+    keys.add("Home", "In the view: as it was seen first", elsewhere);
+    keys.add(" ", "In the view: strike it, or place a target, under the cross", elsewhere);
     keys.add("Escape", "No target selected; back to striking", () => {
       if (this.gestures?.cancel()) return;
       if (selection.current.tool === "strike" && selection.current.target === null) return false;
@@ -212,6 +219,7 @@ export class Solid {
     if (number === null) {
       this.drawing.clear();
       this.shown = null;
+      this.parts.selection.set({ vertex: null });
       this.legend.show(null);
       return;
     }
@@ -223,6 +231,8 @@ export class Solid {
         /** @type {Uint32Array} */ (arrays.triangles),
       );
       this.marks?.setInward(/** @type {Float32Array} */ (arrays.inward));
+      // Its vertices have other numbers.
+      if (this.shown !== null) this.parts.selection.set({ vertex: null });
       this.shown = number;
       this.spanned = null;
       this.#paint();
