@@ -43,7 +43,7 @@ def chromium(*arguments: str) -> Iterator[Any]:
 
 
 class _Files(http.server.SimpleHTTPRequestHandler):
-    """Files of the studio below /page/, files of a folder below /more/, an empty page at /."""
+    """The studio's files below /page/, an empty page at /, else files of a folder."""
 
     more: Path
 
@@ -57,11 +57,10 @@ class _Files(http.server.SimpleHTTPRequestHandler):
             super().do_GET()
 
     def translate_path(self, path: str) -> str:
-        name = path.split("?")[0]
-        for begin, folder in (("/page/", CHECKOUT / "studio/page"), ("/more/", self.more)):
-            if name.startswith(begin):
-                return str(folder / name.removeprefix(begin))
-        return str(CHECKOUT / "nothing")
+        name = path.split("?")[0].lstrip("/")
+        if name.startswith("page/"):
+            return str(CHECKOUT / "studio" / name)
+        return str(self.more / name)
 
     def log_message(self, *_: Any) -> None:
         pass

@@ -76,7 +76,8 @@ export function showSolid(element, page) {
   const gauge = layer("gauge");
   gauge.hidden = true;
   gauge.ariaHidden = "true";
-  const legend = makeLegend(layer("", layer("standalone-legend")));
+  const below = layer("standalone-legend");
+  const legend = makeLegend(layer("", below));
   let view;
   try {
     view = new View(element);
@@ -91,9 +92,10 @@ export function showSolid(element, page) {
   view.canvas.setAttribute("aria-label", HELP);
   const { young } = design.bank;
   const spanned = span(young, null);
+  legend.show(spanned);
+  view.margins = () => [0, below.offsetHeight];
   view.setSurface(design.positions, design.triangles);
   view.surface?.paint(young, spanned);
-  legend.show(spanned);
   const marks = new Marks(view, labels, (name) => selection.set({ target: name }));
   marks.setInward(inwardOf(design.positions, design.triangles));
   selection.onChange((now) => marks.show(design.targets, now.target));

@@ -12,6 +12,7 @@ const RIGHT = 12;
 const TOP = 10;
 const BOTTOM = 34;
 const FLOOR_DECIBELS = -60;
+const UNHEARD_DECIBELS = -100;
 const ROUND_HERTZ = [20, 50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000];
 
 /**
@@ -130,11 +131,12 @@ function fill(table, design, wanted, now, decibels) {
   for (const [mode, amplitude] of wanted.entries()) {
     const row = body.insertRow();
     const hertz = [design.wanted.hertz[mode], design.bank.hertz[mode]];
-    for (const value of [...hertz, design.cents[mode]]) {
-      row.insertCell().textContent = value.toFixed(1);
-    }
-    for (const level of [amplitude, now[mode]]) {
-      row.insertCell().textContent = level > 0 ? decibels(level).toFixed(1) : "none";
+    for (const value of [...hertz, design.cents[mode]]) row.insertCell().textContent = told(value);
+    for (const level of [amplitude, now[mode]].map(decibels)) {
+      row.insertCell().textContent = level < UNHEARD_DECIBELS ? "none" : told(level);
     }
   }
 }
+
+/** @param {number} value @returns {string} */
+const told = (value) => (Math.round(10 * value) / 10 || 0).toFixed(1);

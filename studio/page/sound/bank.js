@@ -41,6 +41,8 @@ export function makeBank(parts = {}, options = {}) {
   let node = null;
   /** @type {BankMessage[]} What was said before the processor was there. */
   let early = [];
+  /** @type {BankMessage | null} The newest material, while nothing can be heard of it. */
+  let waiting = null;
   /** @type {{header: BankHeader, arrays: BankArrays} | null} */
   let current = null;
   /** @type {BankReport} */
@@ -60,11 +62,19 @@ export function makeBank(parts = {}, options = {}) {
 
   /** @param {BankMessage} message */
   function tell(message) {
+    if (waiting && message.do === "strike") tellWaiting();
     if (node) node.port.postMessage(message);
     else if (failure === null) early.push(message);
   }
 
+  function tellWaiting() {
+    const message = waiting;
+    waiting = null;
+    if (message) tell(message);
+  }
+
   function tellState() {
+    if (context?.state === "running") tellWaiting();
     for (const listener of stateListeners) listener();
   }
 
@@ -122,7 +132,10 @@ export function makeBank(parts = {}, options = {}) {
     current = { header, arrays };
     const same =
       before && equal(before.hertz, arrays.hertz) && equal(before.dampings, arrays.dampings);
-    if (!same) tell({ do: "bank", hertz: arrays.hertz, dampings: arrays.dampings });
+    if (same) return;
+    // A search goes on for hours, even if nobody lets the page sound: materials must not pile up.
+    waiting = { do: "bank", hertz: arrays.hertz, dampings: arrays.dampings };
+    if (node && context?.state === "running") tellWaiting();
   }
 
   parts.connection?.onBinary("bank", (header, arrays) =>
