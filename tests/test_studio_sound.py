@@ -144,6 +144,13 @@ def test_what_the_rate_cannot_hold_is_muted(page) -> None:
     np.testing.assert_array_equal(found, alone)
 
 
+def test_modes_that_are_no_numbers_or_grow_stay_silent(page) -> None:
+    hertz, dampings = [500.0, float("nan"), 700.0, 900.0], [5.0, 5.0, float("nan"), -1.0]
+    found = rendered(page, hertz, dampings, [struck([0.1] * 4)], 0.2)
+    alone = rendered(page, hertz[:1], dampings[:1], [struck([0.1])], 0.2)
+    np.testing.assert_allclose(found, alone, atol=1e-7)
+
+
 def test_limiter_touches_nothing_below_full_scale_and_lets_nothing_beyond(page) -> None:
     hertz, dampings = [100.0, 1234.5], [8.0, 9.0]
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import base64
+import importlib.util
 import io
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -126,6 +128,23 @@ def test_names_are_no_markup(browser, tmp_path) -> None:
     page.wait_for_timeout(200)
     assert page.evaluate("typeof window.broken") == "undefined"
     assert f"{HOSTILE}1" in page.inner_text("#targets")
+    page.context.close()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing_serious(browser, tmp_path, scheme) -> None:
+    package = importlib.util.find_spec("axe_playwright_python")
+    if package is None or package.origin is None:
+        pytest.skip("axe-playwright-python is not installed")
+    path = tmp_path / "page.html"
+    write_page(path, small_design())
+    page, _ = opened(browser, path)
+    page.emulate_media(color_scheme=scheme)
+    for summary in page.locator("summary").all():
+        summary.click()
+    page.evaluate((Path(package.origin).parent / "axe.min.js").read_text(encoding="utf-8"))
+    found = page.evaluate("axe.run(document, { resultTypes: ['violations'] })")["violations"]
+    assert [each["id"] for each in found if each["impact"] in ("serious", "critical")] == []
     page.context.close()
 
 

@@ -55,7 +55,7 @@ function roundedToEven(value) {
 /** The modes of one material. */
 class Bank {
   /**
-   * @param {ArrayLike<number>} hertz (N) Frequencies; from half the rate on modes stay silent.
+   * @param {ArrayLike<number>} hertz (N) Frequencies; modes from half the rate on stay silent.
    * @param {ArrayLike<number>} dampings (N) [1/s]
    * @param {number} rate Samples per second.
    */
@@ -83,7 +83,9 @@ class Bank {
     /** @type {Strike[]} */
     this.strikes = [];
     for (let k = 0; k < count; k++) {
-      this.possible[k] = hertz[k] < rate / 2 ? 1 : 0;
+      // What is no number, or would grow, must not spoil the others.
+      if (!(hertz[k] >= 0 && hertz[k] < rate / 2 && dampings[k] >= 0)) continue;
+      this.possible[k] = 1;
       this.decay[k] = -dampings[k] / rate;
       this.angle[k] = (2 * Math.PI * hertz[k]) / rate;
       const size = Math.exp(this.decay[k]);
