@@ -1,7 +1,7 @@
 """Command line: `carillon COMMAND`, all commands by one name; `--help` lists them.
 
-`python -m dataset_gen`, `forests`, `solver`, `sound`, `studio` and `workflow` have the same commands,
-some of them by shorter names.
+`python -m dataset_gen`, `forests`, `solver`, `sound`, `studio` and `workflow` have the same
+commands, some of them by shorter names.
 """
 
 from __future__ import annotations
