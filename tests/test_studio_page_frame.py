@@ -173,3 +173,14 @@ def test_axe_finds_nothing_in_the_frame(browser, scheme):
                 assert [each["id"] for each in found["violations"]] == []
             page.keyboard.press("Escape")
         page.context.close()
+
+
+def test_how_it_sounds_is_set_over_the_view(page):
+    page.get_by_label("Volume").fill("0.5")
+    assert page.evaluate("studio.bank.volume") == 0.5
+    page.locator(".sounding-more summary").click()
+    page.get_by_label("Contact").fill("2")
+    page.get_by_label("With the clips' noise").check()
+    assert page.evaluate("[studio.bank.contactSeconds, studio.noise.on]") == [0.002, True]
+    page.get_by_label("Contact").press("Escape")
+    assert not page.get_by_label("Contact").is_visible()

@@ -321,7 +321,7 @@ def test_placing_adds_a_target_or_moves_the_selected_one(page, studio):
     assert "rim moves there" in page.locator(".stage-hint").inner_text()
     page.mouse.click(x, y)
     until(lambda: studio.state()["targets"][0]["vertex"] == moved)
-    page.get_by_role("button", name="Add another instead").click()
+    page.get_by_role("button", name="Add another").click()
     page.mouse.click(other_x, other_y)
     until(lambda: len(studio.state()["targets"]) == 2)
     target = studio.state()["targets"][1]

@@ -268,7 +268,7 @@ export class Solid {
     const says = target === null ? "Press on the solid: a target is added." : `Press on the solid: ${target} moves there.`;
     const another = document.createElement("button");
     another.type = "button";
-    another.textContent = "Add another instead";
+    another.textContent = "Add another";
     another.onclick = () => selection.set({ target: null });
     this.hint.replaceChildren(says, ...(target === null ? [] : [another]));
   }

@@ -18,16 +18,34 @@ export function makeSounding(element, { bank, noise }) {
   element.setAttribute("aria-label", "Sound");
   element.innerHTML = `
     <label>Volume <input type="range" min="0" max="1" step="0.05" /></label>
-    <label title="How long a strike touches the solid: the longer, the duller it sounds">Contact
-      <input class="contact" type="range" min="0" max="5" step="0.25" /> <output></output></label>
     <div class="level" aria-hidden="true"><span></span></div>
-    <label title="Strikes sound with what is noise in the clips, near their targets">
-      <input type="checkbox" /> clips' noise</label>
+    <details class="sounding-more">
+      <summary>More</summary>
+      <div>
+        <label title="How long a strike touches the solid: the longer, the duller it sounds">Contact
+          <input class="contact" type="range" min="0" max="5" step="0.25" /> <output></output></label>
+        <label title="Strikes sound with what is noise in the clips, near their targets">
+          <input type="checkbox" /> With the clips' noise</label>
+        <p class="quiet sounding-late"></p>
+      </div>
+    </details>
     <p class="sounding-says" role="status"></p>`;
   const volume = /** @type {HTMLInputElement} */ (element.querySelector("input[type=range]"));
   const noisy = /** @type {HTMLInputElement} */ (element.querySelector("input[type=checkbox]"));
   const level = /** @type {HTMLElement} */ (element.querySelector(".level"));
   const says = /** @type {HTMLElement} */ (element.querySelector(".sounding-says"));
+  const late = /** @type {HTMLElement} */ (element.querySelector(".sounding-late"));
+  const more = /** @type {HTMLDetailsElement} */ (element.querySelector("details"));
+  // It lies over the solid, so it closes as a menu does.
+  document.addEventListener("pointerdown", ({ target }) => {
+    if (target instanceof Node && !more.contains(target)) more.open = false;
+  });
+  more.addEventListener("keydown", (event) => {
+    if (event.key !== "Escape" || !more.open) return;
+    event.preventDefault();
+    more.open = false;
+    more.querySelector("summary")?.focus();
+  });
   volume.value = String(bank.volume);
   volume.oninput = () => (bank.volume = Number(volume.value));
   const contact = /** @type {HTMLInputElement} */ (element.querySelector(".contact"));
@@ -64,9 +82,9 @@ export function makeSounding(element, { bank, noise }) {
 
   const tell = () => {
     const { baseSeconds, outputSeconds } = bank.latency;
-    const late = Math.round(1000 * (baseSeconds + outputSeconds));
+    const milliseconds = Math.round(1000 * (baseSeconds + outputSeconds));
     says.textContent = bank.failure ?? (bank.state === "suspended" ? "Sound begins with a click or a key." : "");
-    level.title = late > 0 ? `Heard ${late} ms after a strike` : "";
+    late.textContent = milliseconds > 0 ? `Heard ${milliseconds} ms after a strike.` : "";
   };
   bank.onState(tell);
   tell();
