@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import unicodedata
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
+from contextlib import aclosing
 from dataclasses import dataclass
 from pathlib import PurePosixPath
 
@@ -79,14 +80,15 @@ async def read_upload(request: Request, most: int, limits: Limits, what: str) ->
     content, size = bytearray(), 0
     try:
         async with asyncio.timeout(limits.upload_seconds):
-            async for piece in _pieces(request, limits.idle_seconds):
-                size += len(piece)
-                if size <= most:
-                    content += piece
-                else:
-                    content.clear()
-                if size > 2 * most:
-                    break
+            async with aclosing(_pieces(request, limits.idle_seconds)) as pieces:
+                async for piece in pieces:
+                    size += len(piece)
+                    if size <= most:
+                        content += piece
+                    else:
+                        content.clear()
+                    if size > 2 * most:
+                        break
     except TimeoutError:
         raise UploadError(
             408, f"{what} was sent too slowly, {size:,} bytes came; send it again"
@@ -100,14 +102,15 @@ async def read_upload(request: Request, most: int, limits: Limits, what: str) ->
     return bytes(content)
 
 
-async def _pieces(request: Request, idle_seconds: float) -> AsyncIterator[bytes]:
-    stream = request.stream()
-    while True:
-        async with asyncio.timeout(idle_seconds):
-            piece = await anext(stream, None)
-        if piece is None:
-            return
-        yield piece
+async def _pieces(request: Request, idle_seconds: float) -> AsyncGenerator[bytes, None]:
+    async with aclosing(request.stream()) as stream:
+        while True:
+            try:
+                async with asyncio.timeout(idle_seconds):
+                    piece = await anext(stream)
+            except StopAsyncIteration:
+                return
+            yield piece
 
 
 def upload_name(name: str, what: str, endings: tuple[str, ...]) -> str:
