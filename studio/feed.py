@@ -34,6 +34,11 @@ class Feed:
         self._changed = asyncio.Event()
         self.closed = False
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing waits to be sent."""
+        return not self._waiting
+
     def put(self, message: Message, newest: str | None = None) -> None:
         """Add a message.
 

@@ -145,9 +145,11 @@ class Calls:
             raise UserError("there is no solid yet to place a target on; open one first")
         if not isinstance(vertex, int) or not 0 <= vertex < count:
             raise UserError(f"there is no vertex {vertex!r}, the surface has {count:,} of them")
-        for name, strike in bench.strikes.items():
-            if strike.vertex == vertex and name != target:
-                raise UserError(f"the target {name!r} is at this point; choose another")
+        for other in self._studio.document.targets:
+            strike = bench.strikes.get(other.name)
+            taken = other.vertex if strike is None else strike.vertex
+            if taken == vertex and other.name != target:
+                raise UserError(f"the target {other.name!r} is at this point; choose another")
 
 
 def opened(workspace: Workspace, name: str) -> Document:

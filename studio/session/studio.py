@@ -69,6 +69,7 @@ class DesignStudio:
         self._exports = Worker("studio.processes.exports:Exports")
         self._saving: asyncio.Future[None] | None = None
         self._revision = 0
+        self._phase = "idle"
         self._calls = Calls(self)
 
     @property
@@ -85,6 +86,7 @@ class DesignStudio:
 
     def state(self) -> dict[str, Any]:
         """The event `state`."""
+        self._phase = self.search.phase
         document, news = self.document, self.bench.news
         settings = with_defaults({**document.settings, "targets": []}, project_schema())
         return {
@@ -315,8 +317,8 @@ class DesignStudio:
         self.upkeep.wake()
 
     def _told(self, news: dict[str, Any]) -> None:
-        if len(self.search.rows) == 1:
-            self.changed()  # it is running
+        if self._phase != self.search.phase:
+            self.changed()
         self.pages.tell({"event": "progress", **news})
 
     def _session(self) -> dict[str, Any]:

@@ -51,6 +51,17 @@ class Upkeep:
         self._studio.bench.warm()
         self.wake()
 
+    @property
+    def _to_show(self) -> Any:
+        """What a bank depends on."""
+        studio = self._studio
+        return (studio.document.material, studio.fine, studio.bench.aimed)
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether no search goes on, and pages know what the present material sounds like."""
+        return self._studio.search.phase == "idle" and self._shown == self._to_show
+
     def wake(self) -> None:
         """Look at the document, which has changed."""
         self._wake.set()
@@ -110,10 +121,9 @@ class Upkeep:
         studio = self._studio
         if not studio.bench.is_ready:
             return
-        material, fine = document.material, studio.fine
-        shown = (material, fine, studio.bench.aimed)
-        if self._shown == shown:
+        if self.is_settled:
             return
+        material, fine, shown = document.material, studio.fine, self._to_show
         if fine:
             self.fine_phase = "working"
             studio.changed()
@@ -147,11 +157,13 @@ class Upkeep:
 
     async def _search(self) -> None:
         """One search, from the document's material until it ends or is broken off."""
-        studio = self._studio
+        studio, document = self._studio, self._studio.document
+        found = None
         try:
             problem = await studio.bench.ask("problem")
-            material, out = studio.document.material, studio.workspace.new_design()
-            found = await studio.search.run(problem, material, out)
+            if studio.is_searching and document is studio.document:
+                out = studio.workspace.new_design()
+                found = await studio.search.run(problem, document.material, out)
         except UserError as error:
             self._end_search(str(error))
         else:
