@@ -74,6 +74,9 @@ def seen(page, count) -> list[tuple[int, float, float]]:
           for (let vertex = 0; vertex < total; vertex++) {
             const at = view.project(vertex);
             if (!at || at.hidden || view.pick(at.x, at.y) !== vertex) continue;
+            // At the outline a hair's breadth decides whether the solid is met.
+            const around = [[-3, 0], [3, 0], [0, -3], [0, 3]];
+            if (around.some(([x, y]) => view.pick(at.x + x, at.y + y) === null)) continue;
             if (document.elementFromPoint(at.x, at.y) === view.drawing.canvas)
               found.push([vertex, at.x, at.y]);
           }
