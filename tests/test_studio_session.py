@@ -104,7 +104,7 @@ async def until(met: Callable[[], object], page: Page) -> None:
 
 
 def run(coroutine) -> None:
-    asyncio.run(asyncio.wait_for(coroutine, 60))
+    asyncio.run(coroutine)
 
 
 def aimed(page: Page, names: list[str]) -> bool:

@@ -32,6 +32,14 @@ SETTINGS = {
     "optimiser": {"seconds": None, "evaluations": None, "workers": 1},
 }
 NAMES = ("end", "side")
+BANKS = """() => {
+  window.banks = [];
+  studio.connection.onBinary("bank", (header, arrays) => {
+    window.banks.push(header);
+    window.arrays = arrays;
+  });
+}"""
+"""Keeps what the page is told of the solid's sound."""
 
 
 @contextmanager
@@ -52,7 +60,7 @@ def browser():
         yield browser
 
 
-def call(page, name, **arguments) -> None:
+def call(page, name, /, **arguments) -> None:
     """Ask the studio as the page does."""
     page.evaluate("([name, given]) => studio.connection.call(name, given)", [name, arguments])
 
@@ -120,6 +128,7 @@ def test_from_an_empty_page_to_a_design(browser, tmp_path):
     with studio_in(work) as address:
         page = open_page(browser, address, "studio.state?.current")
         page.evaluate(PACKED)
+        page.evaluate(BANKS)
         page.get_by_role("button", name="bar", exact=True).click()
         until_so(page, "studio.state.current.solid?.phase === 'ready' && studio.view.settled")
         call(page, "change_settings", settings=SETTINGS)
@@ -138,31 +147,22 @@ def test_from_an_empty_page_to_a_design(browser, tmp_path):
             until_so(page, f"studio.state.current.clips.some((c) => c.name === '{name}.wav')")
         until_so(page, "studio.state.current.wanted?.amplitudes.length === 2")
         until_so(page, "studio.view.settled")
-        before, plain = page.evaluate("studio.state.bank?.cost ?? null"), picture(page)
-        page.evaluate(
-            """() => {
-              window.banks = [];
-              studio.connection.onBinary("bank", (header, arrays) => {
-                window.banks.push(header);
-                window.arrays = arrays;
-              });
-            }"""
-        )
+        until_so(page, "window.banks.at(-1)?.targets.length === 2")
+        first, plain = page.evaluate("window.banks.at(-1).cost"), picture(page)
         page.get_by_role("button", name="Optimise", exact=True).click()
-        until_so(page, "window.banks.length > 1")
-        first = before or page.evaluate("window.banks[0].cost")
+        until_so(page, "studio.state.current.search.phase === 'running'")
 
         vertex, x, y = places[2]
         page.evaluate("studio.selection.set({ target: null })")
         page.mouse.click(x, y)
         until_so(page, "studio.state.current.targets.length === 3")
-        assert state(page)["search"]["phase"] != "idle" or state(page)["undo"] == "optimise"
-        page.get_by_role("button", name="Undo", exact=True).click()
+        assert state(page)["search"]["phase"] != "idle"
+        page.get_by_text("Undo", exact=True).click()
         until_so(page, "studio.state.current.targets.length === 2")
 
         page.get_by_role("button", name="Optimise", exact=True).click()
         until_so(page, f"window.banks.at(-1).cost < 0.2 * {first}")
-        page.get_by_role("button", name="Stop", exact=True).first.click()
+        page.locator("#panel-project").get_by_role("button", name="Stop").click()
         until_so(page, "studio.state.current.search.phase === 'idle'")
         call(page, "save", name="found")
         until_so(page, "studio.state.current.saved && studio.state.current.name === 'found'")
@@ -187,8 +187,6 @@ def test_from_an_empty_page_to_a_design(browser, tmp_path):
             struck[0],
         )
         heard = np.frombuffer(base64.b64decode(sound), "<f4").astype(float)
-        loudest = np.argmax(np.frombuffer(b"".join([heard.astype("<f8").tobytes()])) ** 2)
-        assert heard[loudest] != 0.0
         gains = page.evaluate(
             "(v) => [...window.arrays.gains.subarray(v * window.arrays.hertz.length, "
             "(v + 1) * window.arrays.hertz.length)]",

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from carillon.errors import UserError
 from carillon.fem.geometry.surface import BUILTIN_PREFIX, surface_name
@@ -40,16 +42,21 @@ def open_studio(what: str | None, folder: Path) -> DesignStudio:
     try:
         name, document = _begun(what, workspace)
         session = workspace.read_session()
-        if session is not None and (what is None or session.get("name") == name):
+        if session is not None and _goes_on(session, what, name):
             with contextlib.suppress(LookupError, TypeError, ValueError, UserError):
                 studio = DesignStudio(workspace, str(session["name"]), document)
                 studio.restore(session)
                 return studio
-        studio = DesignStudio(workspace, name, document)
-        return studio
+        return DesignStudio(workspace, name, document)
     except BaseException:
         workspace.close()
         raise
+
+
+def _goes_on(session: Mapping[str, Any], what: str | None, name: str) -> bool:
+    """Whether to go on with a session; what was saved is read, others may have changed it."""
+    is_under_way = session.get("searching") or not session.get("saved")
+    return what is None or bool(session.get("name") == name and is_under_way)
 
 
 def _begun(what: str | None, workspace: Workspace) -> tuple[str, Document]:

@@ -325,6 +325,7 @@ class DesignStudio:
         """What the studio goes on with when it is started again."""
         return {
             "name": self.name,
+            "saved": self.saved == self.document,
             "searching": self.is_searching,
             "fine": self.fine,
             "history": self.history.as_json(),
@@ -340,7 +341,7 @@ class DesignStudio:
         """
         history = History.from_json(session["history"])
         history.document.require_sound(self.workspace.folder)
-        self.history, self.saved = history, None
+        self.history, self.saved = history, history.document if session["saved"] else None
         self.is_searching = bool(session["searching"])
         self.fine = bool(session["fine"])
 
