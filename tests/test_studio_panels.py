@@ -490,8 +490,8 @@ def test_a_search_is_started_and_stopped(panels):
     )
     button.click()
     assert last_call(panels, 2) == ("stop", {})
-    panels.change(search={"phase": "stopping", "message": None})
-    expect(button).to_be_disabled()
+    panels.change(search={"phase": "idle", "message": None})
+    expect(button).to_have_text("Optimise")
 
 
 def test_without_a_solid_it_says_what_is_missing(panels):

@@ -43,13 +43,6 @@ class Bench:
     def pid(self):
         return os.getpid()
 
-    def until_asked(self):
-        asked = []
-        signal.signal(signal.SIGTERM, lambda *_: asked.append(1))
-        while not asked:
-            time.sleep(0.01)
-        return "asked"
-
 
 @pytest.fixture
 def worker():
@@ -109,18 +102,6 @@ def test_a_process_that_is_killed_fails_what_waits_and_nothing_else(worker):
         return await worker.call("add", 2)
 
     assert asyncio.run(call()) == 2
-
-
-def test_what_is_under_way_can_be_asked_to_end(worker):
-    async def call():
-        await worker.call("pid")
-        waiting = asyncio.ensure_future(worker.call("until_asked"))
-        while not waiting.done():
-            worker.signal_stop()
-            await asyncio.sleep(0.05)
-        return waiting.result()
-
-    assert asyncio.run(call()) == "asked"
 
 
 def test_ctrl_c_is_for_the_server(worker):

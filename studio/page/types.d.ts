@@ -69,7 +69,7 @@ export interface State {
   clips: Clip[];
   wanted: Wanted | null;
   settings: { [key: string]: any };
-  search: { phase: "idle" | "starting" | "running" | "stopping"; message: string | null };
+  search: { phase: "idle" | "starting" | "running"; message: string | null };
   fine: { on: boolean; phase: "none" | "working" | "ready"; message: string | null };
   /** Whether there is another material to swap with. */
   kept: boolean;

@@ -38,7 +38,7 @@ class SearchBench:
         coordinates: Sequence[float] | None,
         out: str,
     ) -> dict[str, Any]:
-        """Search from given coordinates until the budget is spent, or a SIGTERM; write to `out`.
+        """Search from given coordinates until the budget is spent; write to `out`.
 
         `initial` is a design whose history goes on.
         """

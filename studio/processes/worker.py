@@ -85,11 +85,6 @@ class Worker:
                 "simpler"
             ) from None
 
-    def signal_stop(self) -> None:
-        """Ask what is under way to come to an end."""
-        if self.pid is not None:
-            os.kill(self.pid, signal.SIGTERM)
-
     def end(self) -> None:
         """End the process at once; what waits for it gets an error, and the next call another one.
 

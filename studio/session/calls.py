@@ -105,8 +105,8 @@ class Calls:
     def _optimise(self) -> None:
         self._studio.begin_search()
 
-    async def _stop(self) -> None:
-        await self._studio.stop_search()
+    def _stop(self) -> None:
+        self._studio.stop_search()
 
     def _undo(self) -> None:
         self._studio.move(forwards=False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +11,6 @@ from carillon.errors import UserError
 from studio.processes.worker import Worker
 from studio.session.document import Material
 
-ASKED_SECONDS, PATIENCE_SECONDS = 0.2, 30.0
-"""Time between two times that a search is asked to stop, and after which it is ended."""
 MOST_ROWS = 4000
 """Of a history that is shown; of more every second one is left out."""
 
@@ -44,7 +41,7 @@ class Searching:
     Attributes
     ----------
     phase
-        `idle`, `starting`, `running` or `stopping`.
+        `idle`, `starting` or `running`.
     rows
         History of the present material.
     """
@@ -88,18 +85,6 @@ class Searching:
             self.phase = "idle"
         self.rows = _thinned(result["rows"])
         return Material(tuple(result["z"]), result["design"])
-
-    async def stop(self) -> None:
-        """Ask the search to stop until it does; one that does not is ended."""
-        if self.phase == "idle":
-            return
-        self.phase = "stopping"
-        for _ in range(round(PATIENCE_SECONDS / ASKED_SECONDS)):
-            self._worker.signal_stop()
-            await asyncio.sleep(ASKED_SECONDS)
-            if self.phase == "idle":
-                return
-        self.break_off()
 
     def end(self) -> None:
         """End the process."""

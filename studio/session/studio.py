@@ -242,11 +242,11 @@ class DesignStudio:
         self.changed()
         self.upkeep.wake()
 
-    async def stop_search(self) -> None:
-        """Stop searching; what was found stays."""
+    def stop_search(self) -> None:
+        """Stop searching at once; what was found stays, and is analysed to the end."""
         self.is_searching = False
+        self.upkeep.stop()
         self.changed()
-        await self.search.stop()
 
     def is_saved_as(self, name: str) -> None:
         """Take note that the document was saved."""
@@ -279,8 +279,9 @@ class DesignStudio:
                 return given
         out = str(self.workspace.new_design())
         made = Material(tuple(await self.bench.ask("design", given, out)), out)
-        self.history.replace(replace(self.document, material=made))
-        self.changed()
+        if self.document.material == material:
+            self.history.replace(replace(self.document, material=made))
+            self.changed()
         return out
 
     def _material_of(self, document: Document) -> Material | None:

@@ -41,6 +41,7 @@ class Upkeep:
         self._search_task: asyncio.Task[None] | None = None
         self._live: Live | None = None
         self._shown: Any = None
+        self._is_stopped = False
         self._banks = 0
         self.fine_phase = "none"
         self.message: str | None = None
@@ -80,6 +81,11 @@ class Upkeep:
         self.message = self._live = None
         if self._studio.search.phase != "idle":
             self._studio.search.break_off()
+
+    def stop(self) -> None:
+        """End a search that goes on, and make a design of what it has found."""
+        self._is_stopped = self._studio.search.phase != "idle"
+        self._studio.search.break_off()
 
     async def _keep_up(self) -> None:
         """Bring all that computes to what the document describes, again and again."""
@@ -170,10 +176,23 @@ class Upkeep:
             if found is not None:
                 studio.is_searching = False
                 studio.history.replace(replace(studio.document, material=found))
+            elif self._is_stopped:
+                await self._finish()
         self._live = self._shown = None
         studio.pages.tell_history()
         studio.changed()
         self.wake()
+
+    async def _finish(self) -> None:
+        """Make the design of what a search has found that was stopped: it takes a moment longer."""
+        studio, live = self._studio, self._live
+        self._is_stopped = False
+        if live is None or studio.document.material != live.material:
+            return
+        try:
+            await studio.designed()
+        except UserError as error:
+            studio.pages.say(str(error), "error")
 
     def _end_search(self, sentence: str) -> None:
         """Tell why there is no search, and want none any more."""

@@ -133,15 +133,14 @@ export function makeProject(element, parts) {
   function showSearch(now) {
     const why = whyNot(now);
     const { phase, message } = now.search;
-    setText(search, { idle: "Optimise", starting: "Stop", running: "Stop", stopping: "Stopping \u2026" }[phase]);
+    setText(search, { idle: "Optimise", starting: "Stop", running: "Stop" }[phase]);
     search.classList.toggle("running", phase !== "idle");
-    search.disabled = phase === "stopping" || (phase === "idle" && why !== "");
+    search.disabled = phase === "idle" && why !== "";
     const time = seconds === null ? "" : ` for ${withSeconds(seconds)}`;
     const said = {
       idle: message ?? (why || noteOn(now)),
       starting: message ?? "The search is being prepared \u2026",
       running: message ?? `The material is being sought${time}.`,
-      stopping: message ?? "What was found last is being taken over.",
     };
     setText(searchState, said[phase]);
     searchState.hidden = said[phase] === "";
