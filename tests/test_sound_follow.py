@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from sound.design.optimise import optimise
+from sound.design.pool import InterruptedRoundError, Pool, Task
 from sound.design.preparation import prepare
 from tests import small_project
 
@@ -61,3 +62,14 @@ def test_a_round_that_is_broken_off_leaves_the_best_of_its_steps(problem):
     best = min(followed, key=lambda step: step.cost.total)
     # Analyses of a search are less accurate than the last one.
     assert design.evidence["cost"] <= best.cost.total * (1.0 + 1e-3)
+
+
+def test_a_round_is_broken_off_while_tasks_are_sent(problem):
+    """They may be larger than what waits between processes, and nobody reads them any more."""
+    setting = problem.setting
+    start = np.zeros((300_000, 8))
+    z = np.zeros(setting.material.dimensions)
+    for _ in range(3):
+        processes = Pool(setting, 2)
+        with pytest.raises(InterruptedRoundError):
+            processes.run([Task(z, start)] * 6, lambda: True)

@@ -6,6 +6,7 @@ nothing that another task has done.  So results do not depend on how many proces
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_EXCEPTION, ProcessPoolExecutor, wait
@@ -14,8 +15,10 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
 from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from multiprocessing.queues import SimpleQueue
 from threading import Thread
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +47,7 @@ from sound.strikes import Strike
 
 Array = NDArray[np.float64]
 
+_PIPE_BYTES = 1 << 20
 LISTEN_SECONDS = 0.1
 """Time between two looks whether somebody asked to stop, while processes work."""
 FAILED = DesignCost(np.inf, np.inf, np.inf, np.inf)
@@ -228,10 +232,30 @@ class Pool:
     def close(self) -> None:
         """End the processes, whatever they are doing: they own nothing."""
         self._alone.close()
-        if self._executor is not None:
-            for process in list((self._executor._processes or {}).values()):
-                process.kill()
-            self._executor.shutdown(cancel_futures=True)
+        executor: Any = self._executor
+        if executor is None:
+            return
+        for process in list((executor._processes or {}).values()):
+            process.kill()
+        manager, queue = executor._executor_manager_thread, executor._call_queue
+        executor.shutdown(wait=False, cancel_futures=True)
+        if manager is not None:
+            _join(manager, queue._reader)
+
+
+def _join(manager: Thread, tasks: Connection) -> None:
+    """Wait for the thread that manages processes which were killed.
+
+    It waits for tasks to be written that nobody reads any more, so these are read here; Python does
+    that itself from 3.12 on.
+    """
+    while manager.is_alive():
+        try:
+            if tasks.poll(LISTEN_SECONDS):
+                os.read(tasks.fileno(), _PIPE_BYTES)
+        except OSError:  # closed by the thread
+            break
+    manager.join()
 
 
 _setting: Setting
