@@ -81,7 +81,9 @@ def heap_megabytes(page: Any) -> float:
     session = page.context.new_cdp_session(page)
     session.send("HeapProfiler.collectGarbage")
     session.send("Performance.enable")
-    metrics = {each["name"]: each["value"] for each in session.send("Performance.getMetrics")["metrics"]}
+    metrics = {
+        each["name"]: each["value"] for each in session.send("Performance.getMetrics")["metrics"]
+    }
     return float(metrics["JSHeapUsedSize"]) / 1e6
 
 
@@ -94,6 +96,7 @@ def main() -> None:
             page = context.new_page()
             page.add_init_script("localStorage.setItem('carillon-studio-tour', 'seen')")
             page.goto(address)
+            page.wait_for_url(lambda url: "token" not in url)
             until(page, "window.studio?.state?.current")
             page.evaluate(COUNT)
             begin = time.monotonic()
@@ -108,7 +111,7 @@ def main() -> None:
             begin = time.monotonic()
             page.evaluate("studio.connection.call('optimise')")
             until(page, "window.news.bank.length > 0")
-            print(f"first better material after {time.monotonic() - begin:.1f} s")
+            print(f"first news of a material after {time.monotonic() - begin:.1f} s")
             page.wait_for_timeout(1000 * NEWS_SECONDS)
             for name in ("progress", "bank"):
                 times = np.array(page.evaluate(f"window.news.{name}"))

@@ -187,6 +187,7 @@ class Upkeep:
         """Make the design of what a search has found that was stopped: it takes a moment longer."""
         studio, live = self._studio, self._live
         self._is_stopped = False
+        studio.changed()
         if live is None or studio.document.material != live.material:
             return
         try:
