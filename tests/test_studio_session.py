@@ -189,6 +189,7 @@ def test_an_edit_while_a_search_goes_on_is_taken_up_and_can_be_undone(folder):
             await until(lambda: page.state["search"]["phase"] == "running", page)
             await until(lambda: studio.document.material != kept, page)
             await studio.call("stop", {})
+            await until(lambda: studio.document.material.design is not None, page)
             await until(lambda: settled(studio, page), page)
             assert page.state["undo"] == "remove target side"
             assert studio.document.material.design is not None
@@ -354,6 +355,7 @@ def test_nothing_is_lost_when_all_is_killed_in_a_search(folder):
             assert list(studio.document.material.z) == saved
             await until(lambda: page.state["search"]["phase"] == "running", page)
             await studio.call("stop", {})
+            await until(lambda: studio.document.material.design is not None, page)
             await until(lambda: settled(studio, page), page)
             assert studio.document.material.design is not None
 

@@ -69,8 +69,6 @@ def write_wav(path: str | Path, samples: Array, rate: int, peak: bool = False) -
         If the name does not end in .wav, samples are not finite or beyond what the format holds,
         or the file cannot be written.
     """
-    import soundfile  # Slow to load.
-
     require_output(path, ENDINGS)
     samples = np.asarray(samples, dtype=float)
     largest = float(np.abs(samples).max(initial=0.0))
@@ -83,10 +81,18 @@ def write_wav(path: str | Path, samples: Array, rate: int, peak: bool = False) -
             f"{path}: not written, the sound reaches {largest:.3g}, more than its samples hold"
         )
     # By way of memory, since the library does not say why it could not write to a disk.
+    content = as_wav(samples, rate)
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def as_wav(samples: Array, rate: int) -> bytes:
+    """One channel (s,) at `rate` [Hz] as the content of a WAV file of 32-bit floats."""
+    import soundfile  # Slow to load.
+
     content = io.BytesIO()
     soundfile.write(content, samples, rate, format="WAV", subtype="FLOAT")
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(content.getbuffer())
+    return content.getvalue()
 
 
 def _channels(path: Path) -> tuple[Array, int]:

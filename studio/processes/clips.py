@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from sound.clips.files import extract_file
 from sound.clips.noise import noise_part
 from sound.clips.remarks import remarks
-from sound.clips.wav import read_wav
+from sound.clips.wav import as_wav, read_wav
 
 Array = NDArray[np.float64]
 
@@ -78,12 +77,3 @@ class ClipsBench:
             "hertz": hertz[at].tolist(),
             "decibels": np.maximum(levels, FLOOR_DECIBELS).tolist(),
         }
-
-
-def as_wav(samples: Array, rate: int) -> bytes:
-    """A sound (s,) at `rate` [Hz] as the content of a WAV file of 32-bit floats."""
-    import soundfile
-
-    content = io.BytesIO()
-    soundfile.write(content, samples, rate, format="WAV", subtype="FLOAT")
-    return content.getvalue()

@@ -23,8 +23,6 @@ Tell = Callable[[dict[str, Any]], None]
 
 TOLD_SECONDS = 0.25
 """Time between two pieces of news."""
-KEPT_SECONDS = 10.0
-"""Time between two designs that are written, if there is a better one."""
 
 
 class SearchBench:
@@ -48,11 +46,9 @@ class SearchBench:
             design = optimise(
                 prepared,
                 None if initial is None else read_design(initial),
-                lambda kept: news.keep(kept, out),
-                news.watch,
-                KEPT_SECONDS,
-                news.follow,
-                None if coordinates is None else np.asarray(coordinates),
+                watch=news.watch,
+                follow=news.follow,
+                coordinates=None if coordinates is None else np.asarray(coordinates),
             )
         write_design(out, design)
         return {"design": out, **found(design)}
@@ -102,10 +98,6 @@ class _News:
     def watch(self, search: Search) -> None:
         """Look at the search after a round."""
         self._search = search
-
-    def keep(self, design: Design, out: str) -> None:
-        """Write a design while the search goes on."""
-        write_design(out, design)
 
     def _tell_on(self) -> None:
         while not self._ended.wait(TOLD_SECONDS):

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 from carillon.fem.geometry.surface import BUILTIN_PREFIX
 from sound.clips.instruments import synthesised
-from sound.clips.wav import PEAK
-from studio.processes.clips import as_wav
+from sound.clips.wav import PEAK, as_wav
 from studio.session.document import Document, Target
 from studio.session.workspace import Workspace
 

@@ -185,10 +185,10 @@ class Upkeep:
 
     async def _finish(self) -> None:
         """Make the design of what a search has found that was stopped: it takes a moment longer."""
-        studio, live = self._studio, self._live
+        studio, material = self._studio, self._studio.document.material
         self._is_stopped = False
         studio.changed()
-        if live is None or studio.document.material != live.material:
+        if material is None or material.design is not None:
             return
         try:
             await studio.designed()
