@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
-from sound.design.pool import Setting
 from sound.design.simulation import TOLERANCE, Simulation
+from sound.design.tasks import Setting
 
 
 @dataclass(frozen=True, kw_only=True)

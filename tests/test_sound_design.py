@@ -25,9 +25,10 @@ from sound.design.optimise import optimise
 from sound.design.optimisers import OPTIMISERS
 from sound.design.outcome import Outcome
 from sound.design.plausible import weight
-from sound.design.pool import Pool, Task, Trial
+from sound.design.pool import Pool
 from sound.design.preparation import coordinates_of, prepare, targets_of
 from sound.design.search import HistoryEntry
+from sound.design.tasks import Task, Trial
 from sound.project.design import HISTORY_TYPE
 from sound.project.design_file import read_design, write_design
 from sound.project.project import Weights, project_of

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from sound.design.optimise import optimise
-from sound.design.pool import InterruptedRoundError, Pool, Task
+from sound.design.pool import InterruptedRoundError, Pool
 from sound.design.preparation import prepare
+from sound.design.tasks import Task
 from tests import small_project
 
 

@@ -21,6 +21,7 @@ STRUCK = replace(
     targets=(
         Target("rim", vertex=3, clip="rim.wav", without=(440.0,)),
         Target("top", at=(0.0, 0.0, 0.2), clip="top.wav", allow_clipped=True),
+        Target("first", vertex=0, clip="rim.wav"),
         Target("silent", vertex=9),
     ),
     material=Material((0.1, -0.2), "1.h5"),
@@ -39,10 +40,24 @@ def test_a_document_is_the_same_after_a_project_file(workspace):
     """But for targets that have no clip yet, and what no project tells."""
     workspace.write_project("bell", STRUCK.described())
     read = document_of(workspace.read_project("bell"))
-    assert read.targets == STRUCK.targets[:2]
+    assert read.targets == STRUCK.targets[:3]
     assert {key: read.settings[key] for key in BELL.settings} == BELL.settings
     project = load_project(workspace.folder / "bell.yaml")
-    assert [target.without for target in project.targets] == [(440.0,), ()]
+    assert [target.without for target in project.targets] == [(440.0,), (), ()]
+
+
+def test_a_project_that_was_edited_by_hand_stays_beside_what_is_saved(workspace):
+    file, former = workspace.folder / "bell.yaml", workspace.folder / "bell.yaml~"
+    workspace.write_project("bell", STRUCK.described())
+    workspace.write_project("bell", STRUCK.described())
+    assert not former.exists()
+    edited = file.read_text() + "# the one for the concert\n"
+    file.write_text(edited)
+    workspace.write_project("bell", replace(STRUCK, targets=STRUCK.targets[:1]).described())
+    assert former.read_text() == edited and file.read_text() != edited
+    file.write_bytes(b"mesh: \xff")
+    workspace.write_project("bell", STRUCK.described())
+    assert former.read_bytes() == b"mesh: \xff"
 
 
 def test_a_history_is_the_same_after_json():

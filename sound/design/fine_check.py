@@ -20,8 +20,8 @@ from solver.files.modes_file import frequencies
 from solver.response.contact import interpolation
 from sound.design.descent import cost_of
 from sound.design.objective import DesignCost
-from sound.design.pool import Setting
 from sound.design.simulation import Evaluation, Simulation
+from sound.design.tasks import Setting
 from sound.project.design import Design, FineFrequencies
 
 Array = NDArray[np.float64]

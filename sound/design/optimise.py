@@ -12,10 +12,11 @@ from solver.files.modes_file import frequencies
 from sound.design.interrupts import interruptible
 from sound.design.optimisers import OPTIMISERS
 from sound.design.outcome import Outcome
-from sound.design.pool import Pool, SearchStep, Task
+from sound.design.pool import Pool
 from sound.design.preparation import DesignProblem, coordinates_of
 from sound.design.search import BudgetSpentError, Search, require_modes
 from sound.design.space_mapping import SpaceMapping
+from sound.design.tasks import SearchStep, Task
 from sound.project.design import HISTORY_TYPE, Design
 
 Array = NDArray[np.float64]
@@ -32,6 +33,7 @@ def optimise(
     keep_seconds: float | None = None,
     follow: Callable[[SearchStep, Array], None] | None = None,
     coordinates: Array | None = None,
+    history: NDArray[np.void] | None = None,
 ) -> Design:
     """Search for a material until the project's budget is spent, or somebody interrupts.
 
@@ -55,6 +57,8 @@ def optimise(
         the design then has, in the order of the modes that are searched with.
     coordinates : (m,) or None
         Of the material to start from, in place of the initial design's.
+    history : structured array of HISTORY_TYPE or None
+        Of how that was found, in place of the initial design's.
 
     Raises
     ------
@@ -68,6 +72,8 @@ def optimise(
     if initial is not None:
         z = coordinates_of(problem, initial)
         rows = initial.history
+    if history is not None:
+        rows = history
     if len(rows):
         before = (float(rows["seconds"][-1]), int(rows["evaluations"][-1]))
     if coordinates is not None:

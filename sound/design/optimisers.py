@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sound.design.descent import LimitedMemory, StepOptions
-from sound.design.pool import Task, Trial
 from sound.design.reduced_model import TrustRegion
 from sound.design.search import Search
+from sound.design.tasks import Task, Trial
 
 Array = NDArray[np.float64]
 

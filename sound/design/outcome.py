@@ -19,11 +19,11 @@ from sound.design.descent import cost_of
 from sound.design.fine_check import FineModes, FineSolid
 from sound.design.objective import DesignCost
 from sound.design.plausible import weight
-from sound.design.pool import Trial
 from sound.design.preparation import DesignProblem
 from sound.design.search import HistoryEntry, Search, require_modes
 from sound.design.simulation import Evaluation, Simulation
 from sound.design.space_mapping import Checked
+from sound.design.tasks import Trial
 from sound.project.design import HISTORY_TYPE, Design, FineFrequencies
 
 FINAL_TOLERANCE = 1e-12

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_EXCEPTION, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
@@ -25,12 +25,8 @@ from numpy.typing import NDArray
 
 from carillon.children import end_with_parent
 from carillon.errors import ConvergenceError, UserError
-from carillon.fem.finite_cells.cells import FiniteCells
-from carillon.fem.geometry import HexMesh
 from carillon.threads import one_thread
-from solver.analysis.problem import ProblemOptions
 from sound.design.descent import (
-    DescentLimits,
     DesignDescent,
     LimitedMemory,
     StepOptions,
@@ -39,131 +35,16 @@ from sound.design.descent import (
     descend_by_gradients,
     squares_of,
 )
-from sound.design.material import ReducedMaterial
-from sound.design.objective import DesignCost, Objective
+from sound.design.objective import DesignCost
 from sound.design.reduced_model import TrustRegion, descend_by_model
-from sound.design.simulation import TOLERANCE, Evaluation, Simulation
-from sound.strikes import Strike
+from sound.design.simulation import Evaluation, Simulation
+from sound.design.tasks import FAILED, SearchStep, Setting, Task, Trial
 
 Array = NDArray[np.float64]
 
 _PIPE_BYTES = 1 << 20
 LISTEN_SECONDS = 0.1
 """Time between two looks whether somebody asked to stop, while processes work."""
-FAILED = DesignCost(np.inf, np.inf, np.inf, np.inf)
-"""Cost of a material whose modes could not be found."""
-
-
-@dataclass(frozen=True)
-class Setting:
-    """The solid, its struck points and what they shall sound like; travels to other processes."""
-
-    mesh: HexMesh
-    options: ProblemOptions
-    material: ReducedMaterial
-    strikes: Sequence[Strike]
-    objective: Objective
-    cells: FiniteCells | None = None
-
-    @property
-    def is_coarsened(self) -> bool:
-        """Whether what is analysed stands for a finer solid."""
-        return self.cells is None and self.options.coarsen != "none"
-
-    def fine(self) -> Setting:
-        """The same without coarsening."""
-        return replace(self, options=replace(self.options, coarsen="none"))
-
-    def simulation(self, tolerance: float = TOLERANCE) -> Simulation:
-        """Its simulation, on as many threads as this process is allowed."""
-        modes = len(self.objective.targets.frequencies)
-        return Simulation(
-            self.mesh, self.options, self.material, self.strikes, modes, tolerance, self.cells
-        )
-
-
-@dataclass(frozen=True)
-class Task:
-    """A material to evaluate, or to descend from.
-
-    Attributes
-    ----------
-    z : (m,)
-        Coordinates.
-    start : (3 n, k) or None
-        Rows of modes to begin from.
-    gradient : bool
-        Whether the gradient of the cost is asked for.
-    options, steps, damping, limits
-        Of a descent, see `descend`; an evaluation alone if there are no options.
-    objective
-        What is lowered in place of the setting's.
-    fine : bool
-        Whether the fine solid is meant, not the one of the search.
-    """
-
-    z: Array
-    start: Array | None = None
-    gradient: bool = False
-    options: StepOptions | LimitedMemory | TrustRegion | None = None
-    steps: int = 0
-    damping: tuple[float, ...] | None = None
-    limits: DescentLimits = DescentLimits()
-    objective: Objective | None = None
-    fine: bool = False
-
-
-@dataclass(frozen=True)
-class Trial:
-    """What became of a task.
-
-    Attributes
-    ----------
-    z : (m,)
-        Coordinates of the material.
-    cost
-        Its cost, `FAILED` if there are no modes to be had.
-    evaluations : int
-        Materials looked at.
-    gradient : (m,) or None
-        Of the cost, if it was asked for.
-    descent
-        How a descent went; its modes stay behind.
-    start : (3 n, k) or None
-        Modes for others to begin from, of a descent or with the gradient.
-    eigenvalues : (N,) [rad^2/s^2] or None
-        Of the elastic modes, if there are any to be had.
-    """
-
-    z: Array
-    cost: DesignCost
-    evaluations: int
-    gradient: Array | None = None
-    descent: DesignDescent | None = None
-    start: Array | None = None
-    eigenvalues: Array | None = None
-
-
-@dataclass(frozen=True)
-class SearchStep:
-    """A material that a descent has come to, told while it goes on.
-
-    Attributes
-    ----------
-    z : (m,)
-        Coordinates.
-    cost
-        By what the descent lowers.
-    eigenvalues : (N,) [rad^2/s^2]
-        Of the elastic modes.
-    fine : bool
-        Whether the fine solid was looked at.
-    """
-
-    z: Array
-    cost: DesignCost
-    eigenvalues: Array
-    fine: bool
 
 
 class InterruptedRoundError(Exception):

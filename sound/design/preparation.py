@@ -19,7 +19,7 @@ from sound.clips.targets import Targets, share_frequencies, without_modes
 from sound.design.material import ReducedMaterial
 from sound.design.objective import Objective
 from sound.design.poisson import FreePoisson
-from sound.design.pool import Setting
+from sound.design.tasks import Setting
 from sound.project.design import Design
 from sound.project.project import MaterialSettings, Project
 from sound.project.usable import usable_strikes

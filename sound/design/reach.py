@@ -21,9 +21,10 @@ from sound.clips.targets import Targets
 from sound.design.cents import cents
 from sound.design.descent import DescentLimits
 from sound.design.objective import Objective, Sensitivity
-from sound.design.pool import Pool, Task, Trial
+from sound.design.pool import Pool
 from sound.design.preparation import DesignProblem, coordinates_of
 from sound.design.reduced_model import TrustRegion
+from sound.design.tasks import Task, Trial
 from sound.project.design import Design
 from sound.project.project import Weights
 

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from carillon.errors import UserError
 from sound.design.descent import DescentLimits
 from sound.design.objective import DesignCost, Objective
-from sound.design.pool import InterruptedRoundError, Pool, SearchStep, Task, Trial
+from sound.design.pool import InterruptedRoundError, Pool
+from sound.design.tasks import SearchStep, Task, Trial
 
 Array = NDArray[np.float64]
 

@@ -22,9 +22,9 @@ from sound.design.cents import rms_cents
 from sound.design.fine_check import FineModes
 from sound.design.objective import Objective
 from sound.design.optimisers import descend_finely
-from sound.design.pool import SearchStep, Trial
 from sound.design.search import BudgetSpentError, CheckEntry, Search, require_modes
 from sound.design.simulation import Evaluation
+from sound.design.tasks import SearchStep, Trial
 
 Array = NDArray[np.float64]
 

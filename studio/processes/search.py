@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from threading import Event, Lock, Thread
 from typing import Any
 
@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sound.design.optimise import optimise
-from sound.design.pool import SearchStep
 from sound.design.preparation import DesignProblem
 from sound.design.search import HistoryEntry, Search
-from sound.project.design import Design
+from sound.design.tasks import SearchStep
 from sound.project.design_file import read_design, write_design
+from studio.processes.history import history_of, rows_of
 
 Array = NDArray[np.float64]
 Tell = Callable[[dict[str, Any]], None]
@@ -34,11 +34,12 @@ class SearchBench:
         problem: bytes,
         initial: str | None,
         coordinates: Sequence[float] | None,
+        rows: Sequence[Mapping[str, float]],
         out: str,
     ) -> dict[str, Any]:
         """Search from given coordinates until the budget is spent; write to `out`.
 
-        `initial` is a design whose history goes on.
+        `initial` is a design whose history goes on; without one, that of `rows` does.
         """
         prepared: DesignProblem = pickle.loads(problem)
         news = _News(tell)
@@ -49,19 +50,11 @@ class SearchBench:
                 watch=news.watch,
                 follow=news.follow,
                 coordinates=None if coordinates is None else np.asarray(coordinates),
+                history=None if coordinates is None else history_of(rows),
             )
         write_design(out, design)
-        return {"design": out, **found(design)}
-
-
-def found(design: Design) -> dict[str, Any]:
-    """Coordinates of a design, and its history as the page gets it."""
-    rows = design.history
-    columns = {name: rows[name].tolist() for name in rows.dtype.names or ()}
-    return {
-        "z": design.coordinates.tolist(),
-        "rows": [dict(zip(columns, row, strict=True)) for row in zip(*columns.values())],
-    }
+        z = design.coordinates.tolist()
+        return {"design": out, "z": z, "rows": rows_of(design.history)}
 
 
 class _News:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,7 +24,6 @@ from sound.design.cents import common_factor
 from sound.design.descent import cost_of
 from sound.design.fine_check import FINE_TOLERANCE
 from sound.design.optimise import optimise
-from sound.design.pool import Setting
 from sound.design.preparation import (
     DesignProblem,
     PreparedSolid,
@@ -33,6 +32,7 @@ from sound.design.preparation import (
     prepared_solid,
 )
 from sound.design.simulation import Evaluation, Simulation
+from sound.design.tasks import Setting
 from sound.project.design import Design
 from sound.project.design_file import read_design, write_design
 from sound.project.project import MaterialSettings, Project
@@ -40,6 +40,7 @@ from sound.strikes import Place, Strike, inward_normals, locate_all
 from sound.surface import longest_side, struck_surface
 from studio.binary import pack
 from studio.processes.bank import Aim, Heard, bank
+from studio.processes.history import history_of
 
 Array = NDArray[np.float64]
 
@@ -118,10 +119,16 @@ class SolidBench:
         """Whether a design in a file was made for the present targets."""
         return self._is_of_targets(read_design(design))
 
-    def design(self, material: str | Sequence[float] | None, out: str) -> list[float]:
+    def design(
+        self,
+        material: str | Sequence[float] | None,
+        out: str,
+        rows: Sequence[Mapping[str, float]],
+    ) -> list[float]:
         """Write the design of a material for the present targets; its coordinates.
 
-        The material is that of another design, or one of coordinates, or the uniform one.
+        The material is that of another design, or one of coordinates, or the uniform one; `rows`
+        are the history of how it was found.
         """
         assert self._problem is not None
         z = material
@@ -131,7 +138,7 @@ class SolidBench:
         once = replace(project.optimiser, seconds=None, evaluations=1, workers=1)
         problem = replace(self._problem, project=replace(project, optimiser=once))
         at = None if z is None else np.asarray(z)
-        found = optimise(problem, coordinates=at)
+        found = optimise(problem, coordinates=at, history=history_of(rows))
         write_design(out, found)
         return found.coordinates.tolist()
 

@@ -20,6 +20,10 @@ from carillon.children import end_with_parent
 from carillon.cli import meaning
 from carillon.errors import UserError, one_line
 
+# Processes are ended at once, whatever they hold. That this is then cleaned up need not be
+# told.
+os.environ.setdefault("PYTHONWARNINGS", "ignore::UserWarning:multiprocessing.resource_tracker")
+
 NICER = 5
 """Added to the niceness of these processes: the page's sound comes first."""
 GONE = (

@@ -183,7 +183,12 @@ def _material(values: Mapping[str, Any] | None) -> Material | None:
 
 def _described(target: Target) -> dict[str, Any]:
     """A target's keys, without those that have their default."""
-    values = {key: value for key, value in asdict(target).items() if value not in (None, (), False)}
+    # The first vertex has the number 0, which equals False.
+    values = {
+        key: value
+        for key, value in asdict(target).items()
+        if value is not None and value is not False and value != ()
+    }
     return {
         key: list(value) if isinstance(value, tuple) else value for key, value in values.items()
     }

@@ -76,7 +76,9 @@ class Searching:
         initial = None if material is None else material.design
         z = None if material is None or material.design is not None else list(material.z)
         try:
-            result = await self._worker.call("run", problem, initial, z, str(out), tell=self._take)
+            result = await self._worker.call(
+                "run", problem, initial, z, self.rows, str(out), tell=self._take
+            )
         except UserError:
             if self._is_broken_off:
                 return None
@@ -94,6 +96,10 @@ class Searching:
         """End the search at once; what it has told is all there is of it."""
         self._is_broken_off = True
         self._worker.end()
+
+    def forget(self) -> None:
+        """Begin a new history: that of another solid."""
+        self.rows = []
 
     def _take(self, news: dict[str, Any]) -> None:
         if self._is_broken_off:

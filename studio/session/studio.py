@@ -228,6 +228,8 @@ class DesignStudio:
         self.is_searching = False
         self.upkeep.break_off()
         self.name, self.fine = name, False
+        self.search.forget()
+        self.pages.tell_history()
         self.history.do(f"open {name}", document)
         self._edited()
 
@@ -273,12 +275,15 @@ class DesignStudio:
             raise UserError("there is no target with a clip yet, and so no design")
         material = self.document.material
         given: str | list[float] | None = None
-        if material is not None:
-            given = list(material.z) if material.design is None else material.design
-            if isinstance(given, str) and await self.bench.ask("is_of_targets", given):
-                return given
+        rows = []
+        if material is not None and material.design is None:
+            given, rows = list(material.z), self.search.rows
+        elif material is not None:
+            given = material.design
+            if await self.bench.ask("is_of_targets", given):
+                return str(given)
         out = str(self.workspace.new_design())
-        made = Material(tuple(await self.bench.ask("design", given, out)), out)
+        made = Material(tuple(await self.bench.ask("design", given, out, rows)), out)
         if self.document.material == material:
             self.history.replace(replace(self.document, material=made))
             self.changed()

@@ -41,7 +41,7 @@ class Upkeep:
         self._search_task: asyncio.Task[None] | None = None
         self._live: Live | None = None
         self._shown: Any = None
-        self._is_stopped = False
+        self._is_finishing = False
         self._banks = 0
         self.fine_phase = "none"
         self.message: str | None = None
@@ -61,7 +61,8 @@ class Upkeep:
     @property
     def is_settled(self) -> bool:
         """Whether no search goes on, and pages know what the present material sounds like."""
-        return self._studio.search.phase == "idle" and self._shown == self._to_show
+        is_idle = self._studio.search.phase == "idle" and not self._is_finishing
+        return is_idle and self._shown == self._to_show
 
     def wake(self) -> None:
         """Look at the document, which has changed."""
@@ -79,12 +80,13 @@ class Upkeep:
     def break_off(self) -> None:
         """End a search that goes on; its best material is that of the document by now."""
         self.message = self._live = None
+        self._is_finishing = False
         if self._studio.search.phase != "idle":
             self._studio.search.break_off()
 
     def stop(self) -> None:
         """End a search that goes on, and make a design of what it has found."""
-        self._is_stopped = self._studio.search.phase != "idle"
+        self._is_finishing = self._studio.search.phase != "idle"
         self._studio.search.break_off()
 
     async def _keep_up(self) -> None:
@@ -125,9 +127,8 @@ class Upkeep:
     async def _show(self, document: Document) -> None:
         """Tell the bank of the document's material, unless it is the last one that was told."""
         studio = self._studio
-        if not studio.bench.is_ready:
-            return
-        if self.is_settled:
+        # The design of a search that was stopped is soon there, and it alone has its frequencies.
+        if not studio.bench.is_ready or self._is_finishing or self.is_settled:
             return
         material, fine, shown = document.material, studio.fine, self._to_show
         if fine:
@@ -172,23 +173,27 @@ class Upkeep:
                 found = await studio.search.run(problem, document.material, out)
         except UserError as error:
             self._end_search(str(error))
+        except Exception:
+            logger.exception("the search failed")
+            self._end_search(FAULT)
         else:
             if found is not None:
                 studio.is_searching = False
                 studio.history.replace(replace(studio.document, material=found))
-            elif self._is_stopped:
+            elif self._is_finishing:
                 await self._finish()
-        self._live = self._shown = None
-        studio.pages.tell_history()
-        studio.changed()
-        self.wake()
+        finally:
+            self._is_finishing = False
+            self._live = self._shown = None
+            studio.pages.tell_history()
+            studio.changed()
+            self.wake()
 
     async def _finish(self) -> None:
         """Make the design of what a search has found that was stopped: it takes a moment longer."""
         studio, material = self._studio, self._studio.document.material
-        self._is_stopped = False
         studio.changed()
-        if material is None or material.design is not None:
+        if studio.is_searching or material is None or material.design is not None:
             return
         try:
             await studio.designed()

@@ -102,8 +102,12 @@ class Workspace:
         raise UserError(f"{name}: there is no such project in the workspace")
 
     def write_project(self, name: str, described: Mapping[str, Any]) -> None:
-        """Write a project's file."""
-        with atomic_path(self.path(f"{require_name(name)}.yaml")) as temporary:
+        """Write a project's file; one that was edited by hand stays beside it, as NAME.yaml~."""
+        path = self.path(f"{require_name(name)}.yaml")
+        if path.is_file() and _is_edited(path):
+            with atomic_path(path.with_name(f"{path.name}~")) as temporary:
+                temporary.write_bytes(path.read_bytes())
+        with atomic_path(path) as temporary:
             temporary.write_text(project_text(described), encoding="utf-8")
 
     def design(self, name: str) -> Path:
@@ -138,6 +142,15 @@ class Workspace:
         except (OSError, ValueError):
             return None
         return session if isinstance(session, dict) else None
+
+
+def _is_edited(path: Path) -> bool:
+    """Whether a project's file has anything in it that writing it again would lose."""
+    try:
+        values = read_yaml(path, "a project")
+        return path.read_text(encoding="utf-8") != project_text(values)
+    except (UserError, UnicodeDecodeError, LookupError, TypeError, AttributeError):
+        return True
 
 
 def require_name(name: str) -> str:
