@@ -25,8 +25,8 @@ if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     import numpy as np
     from numpy.typing import NDArray
 
+    from sound.rendering.instrument import Instrument
     from sound.rendering.render import Hit
-    from sound.rendering.scene import Scene
 
     Array = NDArray[np.float64]
 
@@ -123,34 +123,36 @@ def run(arguments: argparse.Namespace) -> int:
     import numpy as np
 
     from sound.clips.wav import PEAK, write_wav
+    from sound.rendering.instrument import open_instrument
     from sound.rendering.render import rendered_parts, ringing_seconds
-    from sound.rendering.scene import open_scene
 
     options, points = collect(RenderOptions, arguments), collect(PointOptions, arguments)
     _require_outputs(options, points)
     source = collect(DampingOptions, arguments).damping_from
-    scene = open_scene(options.file, options.like, options.damping, source)
-    hits = _hits(scene, points, collect(ImpulseOptions, arguments))
-    seconds = options.seconds or max(hit.seconds for hit in hits) + ringing_seconds(scene.solid)
+    instrument = open_instrument(options.file, options.like, options.damping, source)
+    hits = _hits(instrument, points, collect(ImpulseOptions, arguments))
+    seconds = options.seconds or max(hit.seconds for hit in hits) + ringing_seconds(
+        instrument.solid
+    )
     require_length(seconds, options.rate)
     modes, noise = rendered_parts(
-        scene.solid,
+        instrument.solid,
         hits,
         seconds,
         options.rate,
         options.contact_seconds,
-        scene.listening,
+        instrument.listening,
         not options.no_residual,
     )
     sound = modes + noise
     peak = float(np.abs(sound).max(initial=0.0))
     scale = 1.0
-    if peak > 0.0 and (options.normalise or scene.listening is None):
+    if peak > 0.0 and (options.normalise or instrument.listening is None):
         scale = (FULL if options.normalise else PEAK) / peak
     write_wav(options.out, scale * sound, options.rate)
     if options.modes_out is not None:
         write_wav(options.modes_out, scale * modes, options.rate)
-    summary = _summary(options, scene, hits, scale) | _level(scale * modes, scale * noise)
+    summary = _summary(options, instrument, hits, scale) | _level(scale * modes, scale * noise)
     print(json.dumps(summary) if options.json else _sentence(summary))
     if scale * peak > 1.0:
         advice = "lower --strength for players, or --normalise"
@@ -175,7 +177,7 @@ def _require_outputs(options: RenderOptions, points: PointOptions) -> None:
         require_length(options.seconds, options.rate)
 
 
-def _hits(scene: Scene, points: PointOptions, strike: ImpulseOptions) -> list[Hit]:
+def _hits(instrument: Instrument, points: PointOptions, strike: ImpulseOptions) -> list[Hit]:
     """The strikes that are asked for."""
     import numpy as np
 
@@ -185,11 +187,11 @@ def _hits(scene: Scene, points: PointOptions, strike: ImpulseOptions) -> list[Hi
     if points.strikes is not None:
         if strike.impulse is not None:
             raise UserError("--impulse goes with one strike; give strengths in the list")
-        return scene.hits(points.strikes, read_strikes(points.strikes), strike.strength)
+        return instrument.hits(points.strikes, read_strikes(points.strikes), strike.strength)
     given = next(name for name in ("target", "vertex", "at") if getattr(points, name) is not None)
     at = None if points.at is None else (points.at[0], points.at[1], points.at[2])
     point = Point(points.target, points.vertex, at)
-    ((position, inward, distance),) = scene.places([(f"--{given}", point)])
+    ((position, inward, distance),) = instrument.places([(f"--{given}", point)])
     if strike.impulse is None:
         return [Hit(0.0, position, strike.strength * inward, distance)]
     impulse = np.array(strike.impulse)
@@ -202,9 +204,11 @@ def _hits(scene: Scene, points: PointOptions, strike: ImpulseOptions) -> list[Hi
     return [Hit(0.0, position, impulse, distance)]
 
 
-def _summary(options: RenderOptions, scene: Scene, hits: list[Hit], scale: float) -> dict[str, Any]:
+def _summary(
+    options: RenderOptions, instrument: Instrument, hits: list[Hit], scale: float
+) -> dict[str, Any]:
     """What sounds; of a single strike also where, how, and how loud each mode."""
-    solid, listening = scene.solid, scene.listening
+    solid, listening = instrument.solid, instrument.listening
     heard = solid.frequencies < options.rate / 2.0
     summary = {
         "out": str(Path(options.out)),
@@ -215,7 +219,7 @@ def _summary(options: RenderOptions, scene: Scene, hits: list[Hit], scale: float
         "frequencies_hz": solid.frequencies[heard].tolist(),
         "dampings_per_second": solid.dampings[heard].tolist(),
         "modes_left_out": int((~heard).sum()),
-        "missed_share": None if listening is None else _missed(scene, hits),
+        "missed_share": None if listening is None else _missed(instrument, hits),
     }
     if len(hits) > 1:
         return summary
@@ -231,11 +235,11 @@ def _summary(options: RenderOptions, scene: Scene, hits: list[Hit], scale: float
     }
 
 
-def _missed(scene: Scene, hits: list[Hit]) -> float:
+def _missed(instrument: Instrument, hits: list[Hit]) -> float:
     """Share of the clips' energy in tones that no mode has, of those clips that are struck."""
-    assert scene.listening is not None
-    weights = sum(scene.listening.weights(hit.position) for hit in hits) / len(hits)
-    return float(weights @ scene.listening.missed)
+    assert instrument.listening is not None
+    weights = sum(instrument.listening.weights(hit.position) for hit in hits) / len(hits)
+    return float(weights @ instrument.listening.missed)
 
 
 def _level(modes: Array, noise: Array) -> dict[str, float]:

@@ -26,7 +26,7 @@ Places = Callable[[Iterable[tuple[str, Point]]], list[tuple[Array, Array, float]
 
 
 @dataclass(frozen=True)
-class Scene:
+class Instrument:
     """A solid and how it is heard.
 
     Attributes
@@ -66,13 +66,13 @@ class Scene:
         return hits
 
 
-def open_scene(
+def open_instrument(
     file: str | Path,
     like: str | Path | None = None,
     damping: Sequence[float] | None = None,
     damping_from: str | None = None,
-) -> Scene:
-    """The scene of a file.
+) -> Instrument:
+    """The instrument of a file.
 
     Parameters
     ----------
@@ -100,13 +100,13 @@ def open_scene(
             raise UserError("--damping-from goes with a design; modes.h5 takes --damping")
         modes = read_modes(file)
         solid = SoundingSolid.of_modes(modes, Damping(*damping) if damping else Damping())
-        return Scene(solid, None, _places_of_model(modes.model))
+        return Instrument(solid, None, _places_of_model(modes.model))
     design = read_design(like or file).damped_by(damping_from)
     if has_modes:
         solid = SoundingSolid.of_truth(read_modes(file), design)
     else:
         solid = SoundingSolid.of_design(design)
-    return Scene(solid, Listening.of_design(design, solid), _places_of_design(design))
+    return Instrument(solid, Listening.of_design(design, solid), _places_of_design(design))
 
 
 def _places_of_design(design: Design) -> Places:
