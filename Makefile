@@ -13,9 +13,9 @@ PYTHON_OF_VENV = $(VENV)/bin/python
 CORES ?= all
 TARGETS ?= all
 PYTEST_OPTIONS ?=
-# Test files run beside each other, each in one process, the long ones first. Those of SLURM wait most
-# of the time, which is what the third process is for.
-PYTEST_PROCESSES ?= 3
+# Test files run beside each other, each in one process, the long ones first. Many wait for a while, those
+# of SLURM most of the time, which is what the third and fourth process are for.
+PYTEST_PROCESSES ?= 4
 TORTURE_PROCESSES ?= 2
 PACKAGES = $(patsubst %/__init__.py,%,$(wildcard */__init__.py))
 RULES = $(wildcard Snakefile workflow/rules/*.smk)

@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 import psutil
 
-HANG_SECONDS = 1200.0
-"""What takes longer hangs, on however busy a machine."""
+HANG_SECONDS = 600.0
+"""What takes longer hangs, on however busy a machine; less than pytest itself waits."""
 
 
 def wait_for(
