@@ -8,10 +8,12 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from carillon.runtime import allowed_threads
+from tests.chromium import chromium
 from tests.hostile import summary
 from tests.hostile.fixtures import suite, tried, zoo  # noqa: F401
 from tests.patience import HANG_SECONDS
@@ -213,6 +215,13 @@ def recordings_folder() -> Path:
             "CARILLON_RECORDINGS names another folder"
         )
     return folder
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """A browser of playwright's; skips the test where there is none."""
+    with chromium() as found:
+        yield found
 
 
 @pytest.fixture

@@ -8,18 +8,11 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from tests.chromium import chromium
 from tests.studio_pages import ToldStudio, open_page, serving, until, until_page
 
 CALLED = """async ([name, values]) => {
   return studio.connection.call(name, values).then(() => null, (error) => error.message);
 }"""
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")

@@ -9,16 +9,9 @@ import pytest
 import trimesh
 from PIL import Image
 
-from tests.chromium import chromium
 from tests.studio_pages import ToldStudio, open_page, serving, until, until_page, until_still
 
 MIDDLE = "studio.view.drawing.middle()"
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,6 @@ from carillon.errors import UserError
 from sound.design.bark import bark as bark_of
 from sound.design.cents import cents as cents_of
 from sound.project.schema import check, project_schema
-from tests.chromium import chromium
 from tests.panels_page import NOW, WANTED, bank, progress, ready_clip, state, target, window
 
 PATIENCE_SECONDS = 10.0
@@ -33,12 +32,6 @@ INK = """(place) => {
   return found;
 }"""
 """What is drawn in a plot: pixels by colour, and a sum that differs where any pixel does."""
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")

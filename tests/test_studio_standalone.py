@@ -22,7 +22,6 @@ from studio.standalone import write_page
 from studio.standalone.content import GAIN_ERROR, STEPS, content
 from studio.standalone.modules import PAGE, gathered, shortened
 from studio.standalone.page import HERE, MANY_TRIANGLES
-from tests.chromium import chromium
 from tests.small_design import N_MODES, small_design
 
 RATE = 44_100
@@ -32,12 +31,6 @@ PACKED = """(samples) => {
   for (const byte of new Uint8Array(samples.buffer)) text += String.fromCharCode(byte);
   return btoa(text);
 }"""
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as browser:
-        yield browser
 
 
 def opened(browser, path):

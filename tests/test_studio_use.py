@@ -16,7 +16,6 @@ from sound.clips.wav import write_wav
 from sound.project.design_file import read_design
 from sound.project.project import load_project, project_of
 from tests import small_project
-from tests.chromium import chromium
 from tests.patience import HANG_SECONDS
 from tests.small_project import RATE
 from tests.studio_pages import open_page, until
@@ -52,12 +51,6 @@ def studio_in(folder, *what):
     finally:
         served.terminate()
         served.wait(HANG_SECONDS)
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as browser:
-        yield browser
 
 
 def call(page, name, /, **arguments) -> None:
