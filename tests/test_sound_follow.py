@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import os
 import signal
+import struct
+import sys
+import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +18,17 @@ from sound.design.pool import InterruptedRoundError, Pool
 from sound.design.preparation import prepare
 from sound.design.tasks import Task
 from tests import small_project
+from tests.patience import HANG_SECONDS, wait_for
+
+
+def write_half_a_result(path):
+    """In a process of a pool: begin with a result as if to be killed in the midst of it."""
+    frame = sys._getframe()
+    while "result_queue" not in frame.f_locals:
+        frame = frame.f_back
+    os.write(frame.f_locals["result_queue"]._writer.fileno(), struct.pack("!i", 1000) + b"begin")
+    Path(path).touch()
+    time.sleep(HANG_SECONDS)
 
 
 @pytest.fixture(scope="module")
@@ -74,3 +89,15 @@ def test_a_round_is_broken_off_while_tasks_are_sent(problem):
         processes = Pool(setting, 2)
         with pytest.raises(InterruptedRoundError):
             processes.run([Task(z, start)] * 6, lambda: True)
+
+
+def test_processes_are_ended_in_the_midst_of_what_they_tell(problem, tmp_path):
+    processes = Pool(problem.setting, 2)
+    written = tmp_path / "written"
+    processes._executor.submit(write_half_a_result, str(written))
+    wait_for(written.exists, "half a result")
+    manager = processes._executor._executor_manager_thread
+    # By now it waits for the rest.
+    time.sleep(0.2)
+    processes.close()
+    assert not manager.is_alive()

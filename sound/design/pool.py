@@ -119,6 +119,9 @@ class Pool:
         for process in list((executor._processes or {}).values()):
             process.kill()
         manager, queue = executor._executor_manager_thread, executor._call_queue
+        # The thread that manages them may be reading a result that one of them has half written. It
+        # waits for the rest as long as anybody could write it, and this process could.
+        executor._result_queue._writer.close()
         executor.shutdown(wait=False, cancel_futures=True)
         if manager is not None:
             _join(manager, queue._reader)
