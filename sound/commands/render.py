@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     import numpy as np
     from numpy.typing import NDArray
 
-    from sound.rendering.instrument import Instrument
+    from sound.rendering.heard_solid import HeardSolid
     from sound.rendering.render import Hit
 
     Array = NDArray[np.float64]
@@ -123,36 +123,34 @@ def run(arguments: argparse.Namespace) -> int:
     import numpy as np
 
     from sound.clips.wav import PEAK, write_wav
-    from sound.rendering.instrument import open_instrument
+    from sound.rendering.heard_solid import open_heard_solid
     from sound.rendering.render import rendered_parts, ringing_seconds
 
     options, points = collect(RenderOptions, arguments), collect(PointOptions, arguments)
     _require_outputs(options, points)
     source = collect(DampingOptions, arguments).damping_from
-    instrument = open_instrument(options.file, options.like, options.damping, source)
-    hits = _hits(instrument, points, collect(ImpulseOptions, arguments))
-    seconds = options.seconds or max(hit.seconds for hit in hits) + ringing_seconds(
-        instrument.solid
-    )
+    heard = open_heard_solid(options.file, options.like, options.damping, source)
+    hits = _hits(heard, points, collect(ImpulseOptions, arguments))
+    seconds = options.seconds or max(hit.seconds for hit in hits) + ringing_seconds(heard.solid)
     require_length(seconds, options.rate)
     modes, noise = rendered_parts(
-        instrument.solid,
+        heard.solid,
         hits,
         seconds,
         options.rate,
         options.contact_seconds,
-        instrument.listening,
+        heard.listening,
         not options.no_residual,
     )
     sound = modes + noise
     peak = float(np.abs(sound).max(initial=0.0))
     scale = 1.0
-    if peak > 0.0 and (options.normalise or instrument.listening is None):
+    if peak > 0.0 and (options.normalise or heard.listening is None):
         scale = (FULL if options.normalise else PEAK) / peak
     write_wav(options.out, scale * sound, options.rate)
     if options.modes_out is not None:
         write_wav(options.modes_out, scale * modes, options.rate)
-    summary = _summary(options, instrument, hits, scale) | _level(scale * modes, scale * noise)
+    summary = _summary(options, heard, hits, scale) | _level(scale * modes, scale * noise)
     print(json.dumps(summary) if options.json else _sentence(summary))
     if scale * peak > 1.0:
         advice = "lower --strength for players, or --normalise"
@@ -177,7 +175,7 @@ def _require_outputs(options: RenderOptions, points: PointOptions) -> None:
         require_length(options.seconds, options.rate)
 
 
-def _hits(instrument: Instrument, points: PointOptions, strike: ImpulseOptions) -> list[Hit]:
+def _hits(heard: HeardSolid, points: PointOptions, strike: ImpulseOptions) -> list[Hit]:
     """The strikes that are asked for."""
     import numpy as np
 
@@ -187,11 +185,11 @@ def _hits(instrument: Instrument, points: PointOptions, strike: ImpulseOptions) 
     if points.strikes is not None:
         if strike.impulse is not None:
             raise UserError("--impulse goes with one strike; give strengths in the list")
-        return instrument.hits(points.strikes, read_strikes(points.strikes), strike.strength)
+        return heard.hits(points.strikes, read_strikes(points.strikes), strike.strength)
     given = next(name for name in ("target", "vertex", "at") if getattr(points, name) is not None)
     at = None if points.at is None else (points.at[0], points.at[1], points.at[2])
     point = Point(points.target, points.vertex, at)
-    ((position, inward, distance),) = instrument.places([(f"--{given}", point)])
+    ((position, inward, distance),) = heard.places([(f"--{given}", point)])
     if strike.impulse is None:
         return [Hit(0.0, position, strike.strength * inward, distance)]
     impulse = np.array(strike.impulse)
@@ -205,21 +203,21 @@ def _hits(instrument: Instrument, points: PointOptions, strike: ImpulseOptions) 
 
 
 def _summary(
-    options: RenderOptions, instrument: Instrument, hits: list[Hit], scale: float
+    options: RenderOptions, heard: HeardSolid, hits: list[Hit], scale: float
 ) -> dict[str, Any]:
     """What sounds; of a single strike also where, how, and how loud each mode."""
-    solid, listening = instrument.solid, instrument.listening
-    heard = solid.frequencies < options.rate / 2.0
+    solid, listening = heard.solid, heard.listening
+    audible = solid.frequencies < options.rate / 2.0
     summary = {
         "out": str(Path(options.out)),
         "modes_out": None if options.modes_out is None else str(Path(options.modes_out)),
         "rate_hz": options.rate,
         "strikes": len(hits),
         "scale": scale,
-        "frequencies_hz": solid.frequencies[heard].tolist(),
-        "dampings_per_second": solid.dampings[heard].tolist(),
-        "modes_left_out": int((~heard).sum()),
-        "missed_share": None if listening is None else _missed(instrument, hits),
+        "frequencies_hz": solid.frequencies[audible].tolist(),
+        "dampings_per_second": solid.dampings[audible].tolist(),
+        "modes_left_out": int((~audible).sum()),
+        "missed_share": None if listening is None else _missed(heard, hits),
     }
     if len(hits) > 1:
         return summary
@@ -231,15 +229,15 @@ def _summary(
         "distance_m": hit.distance,
         "impulse_newton_seconds": hit.impulse.tolist(),
         "gain": gain,
-        "amplitudes": amplitudes[heard].tolist(),
+        "amplitudes": amplitudes[audible].tolist(),
     }
 
 
-def _missed(instrument: Instrument, hits: list[Hit]) -> float:
+def _missed(heard: HeardSolid, hits: list[Hit]) -> float:
     """Share of the clips' energy in tones that no mode has, of those clips that are struck."""
-    assert instrument.listening is not None
-    weights = sum(instrument.listening.weights(hit.position) for hit in hits) / len(hits)
-    return float(weights @ instrument.listening.missed)
+    assert heard.listening is not None
+    weights = sum(heard.listening.weights(hit.position) for hit in hits) / len(hits)
+    return float(weights @ heard.listening.missed)
 
 
 def _level(modes: Array, noise: Array) -> dict[str, float]:

@@ -26,7 +26,7 @@ Places = Callable[[Iterable[tuple[str, Point]]], list[tuple[Array, Array, float]
 
 
 @dataclass(frozen=True)
-class Instrument:
+class HeardSolid:
     """A solid and how it is heard.
 
     Attributes
@@ -66,13 +66,13 @@ class Instrument:
         return hits
 
 
-def open_instrument(
+def open_heard_solid(
     file: str | Path,
     like: str | Path | None = None,
     damping: Sequence[float] | None = None,
     damping_from: str | None = None,
-) -> Instrument:
-    """The instrument of a file.
+) -> HeardSolid:
+    """The solid of a file, as it is heard.
 
     Parameters
     ----------
@@ -100,13 +100,13 @@ def open_instrument(
             raise UserError("--damping-from goes with a design; modes.h5 takes --damping")
         modes = read_modes(file)
         solid = SoundingSolid.of_modes(modes, Damping(*damping) if damping else Damping())
-        return Instrument(solid, None, _places_of_model(modes.model))
+        return HeardSolid(solid, None, _places_of_model(modes.model))
     design = read_design(like or file).damped_by(damping_from)
     if has_modes:
         solid = SoundingSolid.of_truth(read_modes(file), design)
     else:
         solid = SoundingSolid.of_design(design)
-    return Instrument(solid, Listening.of_design(design, solid), _places_of_design(design))
+    return HeardSolid(solid, Listening.of_design(design, solid), _places_of_design(design))
 
 
 def _places_of_design(design: Design) -> Places:
