@@ -114,9 +114,9 @@ class Pool:
         """End the processes, whatever they are doing: they own nothing."""
         self._alone.close()
         executor: Any = self._executor
-        if executor is None:
+        if executor is None or executor._result_queue is None:  # ended before
             return
-        for process in list((executor._processes or {}).values()):
+        for process in list(executor._processes.values()):
             process.kill()
         manager, queue = executor._executor_manager_thread, executor._call_queue
         # The thread that manages them may be reading a result that one of them has half written. It
