@@ -130,7 +130,7 @@ def state(**changes: Any) -> dict[str, Any]:
         "settings": {k: v for k, v in settings.items() if k not in ("mesh", "targets")},
         "search": {"phase": "idle", "message": None},
         "fine": {"on": False, "phase": "none", "message": None},
-        "kept": False,
+        "heard": None,
         "builtins": ["bell"],
         "examples": [{"project": "e1", "name": "recorded-bell", "says": "a bell"}],
         "projects": [{"project": "p1", "name": "pan"}],

@@ -46,7 +46,7 @@ class StubStudio:
         self._clips = [self._clip("c1", "bell.wav")]
         self._settings = with_defaults({}, project_schema())
         self._phase = "idle"
-        self._kept = False
+        self._heard: str | None = None
         self.uploads: list[tuple[str, str, int]] = []
         self.calls: list[tuple[str, dict[str, Any]]] = []
         self.closed = False
@@ -120,7 +120,7 @@ class StubStudio:
             "settings": {k: v for k, v in self._settings.items() if k not in SIDES},
             "search": {"phase": self._phase, "message": None},
             "fine": {"on": False, "phase": "none", "message": None},
-            "kept": self._kept,
+            "heard": self._heard,
             "builtins": ["bell", "frying-pan"],
             "examples": [{"project": "e1", "name": "recorded-bell", "says": "made up"}],
             "projects": [{"project": "p1", "name": "pan"}],
@@ -202,7 +202,7 @@ class StubStudio:
         elif name == "forget_material":
             self._away, self._history = 1.0, []
         elif name == "keep":
-            self._kept = True
+            self._heard = "B"
         self.changed()
 
     def _target(self, name: object) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import time
 from pathlib import Path
 
@@ -275,6 +276,46 @@ def test_a_mode_under_the_pointer_is_read_out(panels):
     expect(page.locator("#panel-spectrum .readout")).to_contain_text("Mode 3: 945.3 Hz")
     expect(page.locator("#panel-spectrum .readout")).to_contain_text("\u221280.0 cents, +6.0 dB")
     expect(page.locator("#panel-errors tr.pointed th")).to_contain_text("3")
+
+
+def test_parts_of_a_spectrum_can_be_seen_larger(panels):
+    """By dragging and by buttons; a search that goes on leaves the part as it is."""
+    page = panels.page
+    panel = page.locator("#panel-spectrum")
+    low, high = WANTED[0] / 1.2, WANTED[-1] * 1.2
+    shown = panel.locator(".zoom .hint")
+
+    def ends() -> np.ndarray:
+        return np.array(
+            [float(x.replace(",", "")) for x in re.findall(r"[\d.,]+", shown.inner_text())]
+        )
+
+    def press(name: str) -> None:
+        panel.get_by_role("button", name=name, exact=True).click()
+
+    expect(panel.get_by_role("button", name="All frequencies")).to_be_disabled()
+    over = panel.locator(".u-over")
+    over.scroll_into_view_if_needed()
+    box = over.bounding_box()
+    y = box["y"] + 0.5 * box["height"]
+    page.mouse.move(box["x"] + 0.5 * box["width"], y)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.75 * box["width"], y, steps=4)
+    page.mouse.up()
+    dragged = low * (high / low) ** np.array([0.5, 0.75])
+    np.testing.assert_allclose(ends(), dragged, rtol=0.02)
+    before = ink(panels, "#panel-spectrum")
+    panels.tell(bank(NOW * 1.01, 2))
+    assert ink(panels, "#panel-spectrum")["sum"] != before["sum"]
+    np.testing.assert_allclose(ends(), dragged, rtol=0.02)
+    press("More frequencies")
+    assert np.ptp(np.log(ends())) == pytest.approx(2 * np.ptp(np.log(dragged)), rel=0.05)
+    over.dblclick()
+    expect(shown).to_have_text("all frequencies")
+    press("Fewer frequencies")
+    assert np.ptp(np.log(ends())) == pytest.approx(0.5 * np.log(high / low), rel=0.05)
+    press("All frequencies")
+    expect(shown).to_have_text("all frequencies")
 
 
 def test_errors_are_told_and_the_worst_are_marked(panels):
@@ -550,7 +591,8 @@ def test_a_swapped_material_is_heard_once_it_is_there(panels):
     expect(swap).to_be_disabled()
     page.keyboard.press("k")
     assert last_call(panels) == ("keep", {})
-    panels.change(kept=True)
+    panels.change(heard="B")
+    expect(page.get_by_text("You hear B; swap to hear A.")).to_be_visible()
     swap.click()
     assert last_call(panels, 2) == ("swap", {})
     page.wait_for_timeout(100)
@@ -562,7 +604,7 @@ def test_a_swapped_material_is_heard_once_it_is_there(panels):
 
 def test_keys_compare_but_steal_no_typing(panels):
     page = panels.page
-    panels.change(kept=True)
+    panels.change(heard="A")
     page.locator("body").click(position={"x": 5, "y": 300})
     for key in "cbx":
         page.keyboard.press(key)

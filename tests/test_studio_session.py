@@ -313,9 +313,14 @@ def test_materials_are_kept_and_swapped(folder):
             found = studio.document.material
             await studio.call("keep", {})
             await studio.call("forget_material", {})
-            assert (studio.document.material, studio.document.kept) == (None, found)
-            await studio.call("swap", {})
-            assert (studio.document.material, studio.document.kept) == (found, None)
+            for heard, now, other in (("B", None, found), ("A", found, None), ("B", None, found)):
+                assert page.state["heard"] == heard == studio.document.heard
+                assert (studio.document.material, studio.document.kept) == (now, other)
+                await studio.call("swap", {})
+                await asyncio.sleep(0.05)
+            await studio.call("change_settings", {"settings": {"resolution": 12}})
+            with pytest.raises(UserError, match="no material is kept"):
+                await studio.call("swap", {})
 
     run(play())
 

@@ -20,7 +20,7 @@ from sound.rendering.solid import SoundingSolid
 from studio.binary import unpack
 from studio.standalone import write_page
 from studio.standalone.content import GAIN_ERROR, STEPS, content
-from studio.standalone.modules import PAGE, gathered, shortened
+from studio.standalone.modules import PAGE, gathered, joined, shortened
 from studio.standalone.page import HERE, MANY_TRIANGLES
 from tests.small_design import N_MODES, small_design
 
@@ -195,6 +195,14 @@ def test_modules_name_each_other_by_numbers() -> None:
     for source in modules.values():
         assert all(name in modules for name in named.findall(source))
     assert "export async function start" in list(modules.values())[-1]
+
+
+def test_a_worklet_is_one_module() -> None:
+    source = joined(PAGE / "sound/bank-processor.js")
+    assert not re.search(r"^(?:import|export)\b", source, re.M)
+    # Those of its own level: classes, functions, and constants in capitals.
+    names = re.findall(r"^(?:class|function|const(?= [A-Z_]+ )) (\w+)", source, re.M)
+    assert {"Bank", "Limiter", "BankProcessor"} <= set(names) and len(names) == len(set(names))
 
 
 def test_licences_stay() -> None:

@@ -71,8 +71,8 @@ export interface State {
   settings: { [key: string]: any };
   search: { phase: "idle" | "starting" | "running"; message: string | null };
   fine: { on: boolean; phase: "none" | "working" | "ready"; message: string | null };
-  /** Whether there is another material to swap with. */
-  kept: boolean;
+  /** Which of two materials the present one is; `null` while there is no other one to swap with. */
+  heard: "A" | "B" | null;
   builtins: string[];
   examples: { project: string; name: string; says: string }[];
   projects: { project: string; name: string }[];

@@ -122,15 +122,17 @@ class Calls:
 
     def _keep(self) -> None:
         document = self._studio.document
-        if document.material is None:
-            raise UserError("the material is the uniform one; optimise first, then keep it")
-        self._studio.do("keep material", replace(document, kept=document.material))
+        if document.mesh is None:
+            raise UserError("there is no solid yet whose material could be kept; open one first")
+        kept = replace(document, kept=document.material, heard="B")
+        self._studio.do("keep material", kept)
 
     def _swap(self) -> None:
         document = self._studio.document
-        if document.kept is None:
+        if document.heard is None:
             raise UserError("no material is kept yet; keep one first")
-        swapped = replace(document, material=document.kept, kept=document.material)
+        other = "B" if document.heard == "A" else "A"
+        swapped = replace(document, material=document.kept, kept=document.material, heard=other)
         self._studio.is_searching = False
         self._studio.do("swap materials", swapped)
 

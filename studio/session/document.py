@@ -51,13 +51,16 @@ class Document:
     material
         The present one; None is the uniform one.
     kept
-        The other one of A and B, if one was kept.
+        The other one of A and B, likewise.
+    heard
+        Which of A and B the present one is; None while no other one was kept.
     """
 
     settings: Mapping[str, Any]
     targets: tuple[Target, ...] = ()
     material: Material | None = None
     kept: Material | None = None
+    heard: str | None = None
 
     @property
     def mesh(self) -> str | None:
@@ -165,7 +168,7 @@ def from_json(values: Mapping[str, Any]) -> Document:
     """
     document = document_of({**values["settings"], "targets": values["targets"]})
     material, kept = (_material(values[name]) for name in ("material", "kept"))
-    return replace(document, material=material, kept=kept)
+    return replace(document, material=material, kept=kept, heard=values.get("heard"))
 
 
 def files_of(document: Document) -> list[str]:

@@ -104,7 +104,7 @@ class DesignStudio:
             "settings": {k: v for k, v in settings.items() if k not in ("mesh", "targets")},
             "search": {"phase": self._search_phase, "message": self.upkeep.message},
             "fine": {"on": self.fine, "phase": self.upkeep.fine_phase, "message": None},
-            "kept": document.kept is not None,
+            "heard": document.heard,
             "builtins": sorted(BUILTINS),
             "examples": [
                 {"project": f"e{number}", "name": each.name, "says": each.says}
@@ -210,8 +210,7 @@ class DesignStudio:
         """Go on to another document; a search that goes on begins anew with it."""
         document.require_sound(self.workspace.folder)
         self.upkeep.break_off()
-        changed = replace(document, material=self._material_of(document))
-        self.history.do(name, changed)
+        self.history.do(name, self._with_materials_of_its_own(document))
         self._edited()
 
     def move(self, forwards: bool) -> None:
@@ -289,20 +288,21 @@ class DesignStudio:
             self.changed()
         return out
 
-    def _material_of(self, document: Document) -> Material | None:
-        """The material that an edited document keeps: that of another solid means nothing."""
+    def _with_materials_of_its_own(self, document: Document) -> Document:
+        """An edited document without materials of another solid, which mean nothing on it."""
         before = self.document
         solid, former = (
             {key: each.settings.get(key) for key in _OF_VOXELS} for each in (document, before)
         )
         if solid != former:
-            return None
+            return replace(document, material=None, kept=None, heard=None)
         law, known = ({**each.settings.get("material", {})} for each in (document, before))
-        material = document.material
-        if material is not None and material.design is None:
-            if any(law.get(key) != known.get(key) for key in _OF_COORDINATES):
-                return None
-        return material
+        if any(law.get(key) != known.get(key) for key in _OF_COORDINATES):
+            if document.material is not None and document.material.design is None:
+                document = replace(document, material=None)
+            if document.kept is not None and document.kept.design is None:
+                document = replace(document, kept=None, heard=None)
+        return document
 
     def _edited(self) -> None:
         news = self.bench.news

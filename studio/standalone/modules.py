@@ -1,7 +1,7 @@
 """The page's modules, gathered so that one file can hold them.
 
 A module that lies in a page has no address that others could be found from.  So every import names
-what it imports by a number, and the page says where that is.
+what it imports by a number, and the page says where that is; a worklet's modules become one.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ STUDIO = Path(__file__).resolve().parent.parent
 PAGE = STUDIO / "page"
 _IMPORTED = re.compile(r"""(\b(?:from|import)\s*\(?\s*)(["'])([^"'\n]+)\2""")
 _MAP = re.compile(r'<script type="importmap">(.*?)</script>', re.DOTALL)
+_IMPORT = re.compile(r"""^import [^;]*? from ["'](\.[^"'\n]+)["'];\n""", re.M)
+_EXPORT = re.compile(r"^export (?=(?:class|function) )", re.M)
 _COMMENT = re.compile(r"^[ \t]*/\*(?:(?!\*/).)*\*/[ \t]*\n|^[ \t]*//[^\n]*\n", re.DOTALL | re.M)
 _INDENTED = re.compile(r"^\s+", re.M)
 
@@ -42,6 +44,25 @@ def gathered(entry: Path) -> dict[str, str]:
 
     take(entry)
     return sources
+
+
+def joined(entry: Path) -> str:
+    """A module and all that it imports as one that imports nothing; no two may use one name.
+
+    For modules that name what they import, at their top, and export classes or functions.
+    """
+    sources: dict[Path, str] = {}
+
+    def take(path: Path) -> None:
+        source = shortened(path.read_text(encoding="utf-8"))
+        for found in _IMPORT.finditer(source):
+            imported = (path.parent / found[1]).resolve()
+            if imported not in sources:
+                take(imported)
+        sources[path] = _EXPORT.sub("", _IMPORT.sub("", source))
+
+    take(entry.resolve())
+    return "".join(sources.values())
 
 
 def shortened(source: str) -> str:

@@ -14,7 +14,7 @@ from carillon.files import atomic_path
 from carillon.progress import say
 from sound.project.design import Design
 from studio.standalone.content import content, name_of
-from studio.standalone.modules import PAGE, gathered
+from studio.standalone.modules import PAGE, gathered, joined
 
 HERE = Path(__file__).resolve().parent
 STYLES = (PAGE / "studio.css", PAGE / "solid.css", HERE / "standalone.css")
@@ -53,7 +53,7 @@ def page_of(design: Design) -> str:
     programs = {
         "modules": modules,
         "entry": list(modules)[-1],
-        "processor": PROCESSOR.read_text(encoding="utf-8"),
+        "processor": joined(PROCESSOR),
     }
     template = Template((HERE / "template.html").read_text(encoding="utf-8"))
     return template.substitute(

@@ -6,6 +6,7 @@ import { makeLegend } from "./legend.js";
 import { decaySeconds, decibels, fixed, largest, withHertz } from "./numbers.js";
 import { axis, colour, drawStems, hertzAxis, makePlot } from "./plots.js";
 import { soundOfMode } from "./single.js";
+import { makeZoom } from "./zoom.js";
 
 /** @typedef {import("../types.js").Clip} Clip */
 /** @typedef {import("../types.js").Target} Target */
@@ -33,6 +34,7 @@ export function makeClip(element, parts) {
   /** What was shown last: states come often while a search runs, and clips hardly change. */
   let shown = "";
 
+  const zoom = makeZoom(() => plot, () => null);
   const none = make("p", { class: "hint" });
   const title = make("p", { class: "figure-line" });
   const picture = make("div", { class: "plot", role: "img" });
@@ -68,6 +70,7 @@ export function makeClip(element, parts) {
       { sign: "disc", text: "modes found", kind: "wanted" },
     ]),
     picture,
+    zoom.buttons,
     says,
     make(
       "details",
@@ -185,13 +188,13 @@ export function makeClip(element, parts) {
       HEIGHT,
       {
         scales: {
-          x: { time: false, distr: 3, range: (_one, low, high) => [Math.max(low ?? 20, 20), high ?? 20000] },
+          x: { time: false, distr: 3, range: (_one, low, high) => zoom.range([Math.max(low ?? 20, 20), high ?? 20000]) },
           y: { range: [LOWEST_DECIBELS, 6] },
         },
         axes: [hertzAxis(), axis("Level [dB]", { size: 42 })],
         series: [{}, { label: "clip", stroke: () => colour("--plot-clip"), width: 1, points: { show: false } }],
-        cursor: { y: false },
-        hooks: { draw: [drawModes] },
+        cursor: zoom.cursor,
+        hooks: { draw: [drawModes], setSelect: [zoom.select] },
       },
       [[20, 20000], [null, null]],
     );

@@ -21,7 +21,7 @@ export function makeCompare(element, parts) {
   const clip = button("Clip", () => void playClip(parts, now(), "sound"), withKey("c"));
   const solid = button("Solid", () => strikeTarget(parts, now()), withKey("Enter"));
   const turn = button("Clip, then solid", () => void inTurn(), { ...withKey("b"), class: "main" });
-  const keep = button("Keep this material", () => void keepIt(), withKey("k"));
+  const keep = button("Keep this one as A", () => void keepIt(), withKey("k"));
   const swap = button("Swap", () => void swapIt(), withKey("x"));
   const kept = make("p", { class: "hint", role: "status" });
   element.append(
@@ -51,7 +51,7 @@ export function makeCompare(element, parts) {
   }
 
   async function swapIt() {
-    if (!state.current?.kept) {
+    if (!state.current?.heard) {
       parts.say("There is no other material: keep this one, change it, then swap.");
       return;
     }
@@ -84,16 +84,15 @@ export function makeCompare(element, parts) {
     solid.disabled = !target || !hasSolid;
     turn.disabled = clip.disabled || solid.disabled;
     keep.disabled = !hasSolid;
-    swap.disabled = !state.current?.kept;
-    setText(
-      kept,
-      state.current?.kept ? "One is kept: swap to hear the other one." : "None is kept yet.",
-    );
+    const heard = state.current?.heard ?? null;
+    swap.disabled = heard === null;
+    const other = heard === "A" ? "B" : "A";
+    setText(kept, heard ? `You hear ${heard}; swap to hear ${other}.` : "None is kept yet.");
   }
 
   keys.add("c", "Play the selected target's clip", () => void playClip(parts, now(), "sound"));
   keys.add("b", "Both: the clip, then the solid", () => void inTurn());
-  keys.add("k", "Keep this material", () => void keepIt());
+  keys.add("k", "Keep this material as A, go on with B", () => void keepIt());
   keys.add("x", "Swap with the kept material", () => void swapIt());
   state.onChange(show);
   selection.onChange(show);

@@ -16,6 +16,7 @@ import {
   makePlot,
   nearestMark,
 } from "./plots.js";
+import { makeZoom } from "./zoom.js";
 
 /** @typedef {import("./pairs.js").Pair} Pair */
 /** @typedef {import("./plots.js").Mark} Mark */
@@ -38,6 +39,7 @@ export function makeSpectrum(element, parts) {
   /** @type {import("uplot") | null} */
   let plot = null;
 
+  const zoom = makeZoom(() => plot, () => chosenPair()?.hertz ?? null);
   const none = make("p", { class: "hint" }, "Open a solid to see its spectrum.");
   const caption = make("p", { class: "hint" });
   const picture = make("div", { class: "plot", role: "img" });
@@ -51,6 +53,7 @@ export function makeSpectrum(element, parts) {
       { sign: "diamond", text: "now", kind: "now" },
     ]),
     picture,
+    zoom.buttons,
     readout,
   );
   element.append(none, body);
@@ -78,14 +81,15 @@ export function makeSpectrum(element, parts) {
       HEIGHT,
       {
         scales: {
-          x: { time: false, distr: 3, range: (one) => hertzRange(Array.from(one.data[0])) },
+          x: { time: false, distr: 3, range: (one) => zoom.range(hertzRange(Array.from(one.data[0]))) },
           y: { range: () => [floorOf(pairs), 4] },
         },
         axes: [hertzAxis(), axis("Level [dB]", { size: 42 })],
         series: [{}, { show: true }],
-        cursor: { y: false },
+        cursor: zoom.cursor,
         hooks: {
           draw: [draw],
+          setSelect: [zoom.select],
           setCursor: [
             (one) => {
               const near = nearestMark(one, pairs.flatMap((pair) => [markOf(pair), wantedMark(pair) ?? undefined]));
@@ -105,12 +109,16 @@ export function makeSpectrum(element, parts) {
     joinPairs(one, wantedMarks, wanted.map(markOf), colour("--plot-pair"));
     drawStems(one, wantedMarks, "disc", colour("--wanted"));
     drawStems(one, pairs.map(markOf), "diamond", colour("--now"));
-    const chosen = pairs.find((pair) => pair.mode === selection.current.mode);
+    const chosen = chosenPair();
     if (chosen) drawRing(one, markOf(chosen));
   }
 
+  function chosenPair() {
+    return pairs.find((pair) => pair.mode === selection.current.mode);
+  }
+
   function showMode() {
-    const chosen = pairs.find((pair) => pair.mode === selection.current.mode);
+    const chosen = chosenPair();
     setText(readout, chosen ? spoken(chosen) : "Point at a mode to read it.");
     plot?.redraw(false);
   }
