@@ -28,9 +28,9 @@ PROSE = ("", "text", "markdown", "{toctree}", "{include}", "{eval-rst}")
 
 PROGRAMS = {
     ".venv/bin/python": [sys.executable],
-    ".venv/bin/carillon": [sys.executable, "-m", "carillon"],
+    ".venv/bin/carillon": [sys.executable, str(Path(sys.executable).with_name("carillon"))],
 }
-"""Programs of the environment, and how the tests call them."""
+"""Programs of the environment, and how the tests call them: as people do."""
 
 _BLOCK = re.compile(
     r"(?P<spared><!-- not run: [^\n]+ -->\n)?^(?P<fence>`{3,})(?P<language>\S*)[^\n]*\n"

@@ -13,6 +13,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -58,7 +59,8 @@ WEAR = """async ([strikes, updates]) => {
 @contextmanager
 def real_studio(folder: str) -> Iterator[str]:
     """Address of a studio that works in a folder."""
-    command = [sys.executable, "-m", "carillon", "studio", "--workspace", folder, "--no-browser"]
+    program = str(Path(sys.executable).with_name("carillon"))
+    command = [program, "studio", "--workspace", folder, "--no-browser"]
     served = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         assert served.stdout is not None

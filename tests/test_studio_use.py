@@ -7,6 +7,7 @@ import io
 import subprocess
 import sys
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -44,7 +45,8 @@ BANKS = """() => {
 @contextmanager
 def studio_in(folder, *what):
     """Address of a studio that works in a folder."""
-    command = [sys.executable, "-m", "carillon", "studio", *what, "--workspace", str(folder)]
+    program = Path(sys.executable).with_name("carillon")
+    command = [str(program), "studio", *what, "--workspace", str(folder)]
     served = subprocess.Popen([*command, "--no-browser"], stdout=subprocess.PIPE, text=True)
     try:
         yield served.stdout.readline().strip()

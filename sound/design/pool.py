@@ -7,6 +7,7 @@ nothing that another task has done.  So results do not depend on how many proces
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_EXCEPTION, ProcessPoolExecutor, wait
@@ -17,6 +18,7 @@ from functools import cache
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.queues import SimpleQueue
+from tempfile import TemporaryFile
 from threading import Thread
 from typing import Any
 
@@ -64,9 +66,9 @@ class Pool:
         self, setting: Setting, workers: int, tell: Callable[[SearchStep], None] | None = None
     ) -> None:
         self._executor: ProcessPoolExecutor | None = None
-        self._alone = ExitStack()
+        self._held = ExitStack()
         if workers == 1:
-            self._alone.enter_context(one_thread())
+            self._held.enter_context(one_thread())
             _prepare(setting, tell)
             return
         # Not forked, as MPI and threads do not survive that.
@@ -75,7 +77,13 @@ class Pool:
         if tell is not None:
             told = context.SimpleQueue()
             Thread(target=_pass_on, args=(told, tell), daemon=True).start()
-        self._executor = ProcessPoolExecutor(workers, context, _prepare_apart, (setting, told))
+        # What processes are started with has to fit into a pipe, or one that died before it had read
+        # all would be waited for. So they read the setting from a file, which needs no name.
+        file = self._held.enter_context(TemporaryFile())
+        pickle.dump(setting, file)
+        file.flush()
+        path = f"/proc/{os.getpid()}/fd/{file.fileno()}"
+        self._executor = ProcessPoolExecutor(workers, context, _prepare_apart, (path, told))
 
     def run(
         self, tasks: Sequence[Task], interrupted: Callable[[], bool] | None = None
@@ -112,7 +120,7 @@ class Pool:
 
     def close(self) -> None:
         """End the processes, whatever they are doing: they own nothing."""
-        self._alone.close()
+        self._held.close()
         executor: Any = self._executor
         if executor is None or executor._result_queue is None:  # ended before
             return
@@ -168,9 +176,11 @@ def _pass_on(told: SimpleQueue[SearchStep], tell: Callable[[SearchStep], None]) 
         tell(told.get())
 
 
-def _prepare_apart(setting: Setting, told: SimpleQueue[SearchStep] | None) -> None:
+def _prepare_apart(path: str, told: SimpleQueue[SearchStep] | None) -> None:
     end_with_parent()
     _for_good.enter_context(one_thread())
+    with open(path, "rb") as file:
+        setting = pickle.load(file)
     _prepare(setting, None if told is None else told.put)
 
 

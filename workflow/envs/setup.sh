@@ -171,8 +171,17 @@ write_checkout_pth() {
     defaults+='os.environ.setdefault("PATH", os.defpath); '
     defaults+='os.environ.setdefault("HOME", os.path.expanduser("~"))'
     printf '%s\n' "$ROOT" "$defaults" >"$(site_packages)/carillon-checkout.pth"
-    printf '#!%s\nimport sys\n\nfrom carillon.__main__ import main\n\nsys.exit(main())\n' \
-        "$VENV/bin/python" >"$VENV/bin/carillon"
+    # Processes that it starts import it, too, and must not begin it anew.
+    cat >"$VENV/bin/carillon" <<END
+#!$VENV/bin/python
+import sys
+
+from carillon.__main__ import main
+
+# Processes that it starts import this, too.
+if __name__ == "__main__":
+    sys.exit(main())
+END
     chmod +x "$VENV/bin/carillon"
 }
 
