@@ -18,8 +18,9 @@ from PIL import Image
 from tests.chromium import chromium
 from tests.studio_load import real_studio, until
 
-EXAMPLE = "e2"
+EXAMPLE = "e1"
 WINDOWS: dict[str, dict[str, Any]] = {
+    "wide": {"viewport": {"width": 1780, "height": 1040}},
     "desktop": {"viewport": {"width": 1280, "height": 800}},
     "dark": {"viewport": {"width": 1280, "height": 800}, "color_scheme": "dark"},
     "phone": {
@@ -29,7 +30,7 @@ WINDOWS: dict[str, dict[str, Any]] = {
         "device_scale_factor": 2,
     },
 }
-FRAMES, FRAME_MILLISECONDS, WIDTH = 28, 350, 960
+FRAMES, FRAME_MILLISECONDS, WIDTH = 28, 350, 1068
 TURN_PIXELS = 12
 QUALITY = 60
 
@@ -47,7 +48,7 @@ class Windows:
 
     @property
     def first(self) -> Any:
-        return self.pages["desktop"]
+        return self.pages["wide"]
 
     def until(self, expression: str) -> None:
         for page in self.pages.values():

@@ -198,7 +198,7 @@ def test_a_clip_may_be_said_to_be_clipped(panels):
 def test_modes_of_a_clip_are_told(panels):
     page = panels.page
     expect(page.locator("#panel-clip .figure-line")).to_have_text(
-        "plate.wav: 4 of 4 modes used; they explain 13.6 dB"
+        "plate.wav: 4 of 4 modes used; all explain 13.6 dB"
     )
     expect(page.locator("#panel-clip .says")).to_have_text("its first 12 ms are left out")
     page.get_by_text("Modes of the clip").first.click()
@@ -629,8 +629,12 @@ def test_errors_stay_until_dismissed_and_all_are_listed(panels):
     expect(error).to_have_text("Error: The disk is full; free some space.\u00d7")
     error.get_by_role("button", name="Dismiss").click()
     expect(error).to_have_count(0)
-    page.get_by_role("button", name="2 messages").click()
-    expect(page.locator(".message-list li")).to_have_count(2)
+    panels.tell({"event": "said", "text": "There is no target.", "kind": "error"})
+    expect(error).to_have_count(1)
+    panels.change(name="another")
+    expect(error).to_have_count(0)
+    page.get_by_role("button", name="3 messages").click()
+    expect(page.locator(".message-list li")).to_have_count(3)
     page.keyboard.press("Escape")
     expect(page.locator("dialog[open]")).to_have_count(0)
 

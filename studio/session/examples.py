@@ -16,13 +16,14 @@ Point = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class ExampleClip:
-    """A synthesised clip, and the point [m] that it is given to."""
+    """A synthesised clip, the point [m] that it is given to, and how many of its modes are taken."""
 
     target: str
     at: Point
     instrument: str
     pitch_hz: float
     seconds: float
+    modes: int | None = None
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class ExampleProject:
             samples = sound.modal_part() + sound.residual
             content = as_wav(samples * (PEAK / abs(samples).max()), RATE_HERTZ)
             file = workspace.put(f"{self.name}-{clip.target}.wav", content)
-            targets.append(Target(clip.target, at=clip.at, clip=file))
+            targets.append(Target(clip.target, at=clip.at, clip=file, modes=clip.modes))
         settings = {
             "mesh": f"{BUILTIN_PREFIX}{self.mesh}",
             "resolution": self.resolution,
@@ -53,15 +54,15 @@ class ExampleProject:
 
 EXAMPLES = (
     ExampleProject(
-        "wooden-plate",
-        "a plate that sounds like a wooden bar when it is struck at its rim",
-        "plate",
+        "metal-bar",
+        "a bar that comes to sound like a metal plate",
+        "bar",
         32,
-        (ExampleClip("rim", (0.12, 0.0, 0.03), "wood", 520.0, 1.0),),
+        (ExampleClip("corner", (0.12, 0.0225, 0.03), "metal", 420.0, 1.0, 6),),
     ),
     ExampleProject(
         "metal-bell",
-        "a bell that sounds like a metal plate",
+        "a bell that comes nearer to a metal plate: 32 modes at once are more than it can have",
         "bell",
         24,
         (ExampleClip("rim", (0.068, 0.0, 0.007), "metal", 420.0, 1.5),),

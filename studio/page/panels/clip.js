@@ -132,7 +132,7 @@ export function makeClip(element, parts) {
     const used = clip.modes.filter((mode) => !isLeftOut(target, mode));
     setText(
       title,
-      `${clip.name}: ${used.length} of ${clip.modes.length} modes used; they explain ${fixed(clip.explained_decibels, 1)} dB`,
+      `${clip.name}: ${Math.min(used.length, target.modes ?? used.length)} of ${clip.modes.length} modes used; all explain ${fixed(clip.explained_decibels, 1)} dB`,
     );
     keepList(rows, clip.modes, (mode) => String(mode.hertz), create, (row, mode) => update(row, mode, target, loudest));
     keepList(says, clip.says, (_text, index) => String(index), () => make("li"), setText);

@@ -31,6 +31,11 @@ export function makeMessages(element, parts) {
 
   parts.connection.onEvent("said", (event) => tell(event.text, event.kind === "error" ? "error" : "note"));
 
+  // What was said of another solid is in the list.
+  parts.state.onChange((now, before) => {
+    if (before && (now.name !== before.name || now.solid?.mesh !== before.solid?.mesh)) shown.replaceChildren();
+  });
+
   /**
    * @param {string} text
    * @param {Kind} kind
@@ -61,7 +66,7 @@ export function makeMessages(element, parts) {
     );
     shown.append(message);
     while (shown.children.length > MOST_SHOWN) shown.firstElementChild?.remove();
-    // Errors stay until they are dismissed, notes while somebody looks at them.
+    // Errors stay until they are dismissed or another solid is opened, notes while somebody looks at them.
     if (kind === "note") fade(message);
   }
 
