@@ -16,7 +16,7 @@ Point = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class ExampleClip:
-    """A synthesised clip, the point [m] that it is given to, and how many of its modes are taken."""
+    """A synthesised clip, the point [m] it is given to, and how many of its modes are taken."""
 
     target: str
     at: Point
