@@ -77,8 +77,8 @@ class Pool:
         if tell is not None:
             told = context.SimpleQueue()
             Thread(target=_pass_on, args=(told, tell), daemon=True).start()
-        # What processes are started with has to fit into a pipe, or one that died before it had read
-        # all would be waited for. So they read the setting from a file, which needs no name.
+        # What processes are started with has to fit into a pipe, or one that died before it had
+        # read all would be waited for. So they read the setting from a file, which has no name.
         file = self._held.enter_context(TemporaryFile())
         pickle.dump(setting, file)
         file.flush()
