@@ -314,13 +314,39 @@ def test_materials_are_kept_and_swapped(folder):
             await studio.call("keep", {})
             await studio.call("forget_material", {})
             for heard, now, other in (("B", None, found), ("A", found, None), ("B", None, found)):
-                assert page.state["heard"] == heard == studio.document.heard
+                assert studio.state()["heard"] == heard
                 assert (studio.document.material, studio.document.kept) == (now, other)
                 await studio.call("swap", {})
-                await asyncio.sleep(0.05)
             await studio.call("change_settings", {"settings": {"resolution": 12}})
             with pytest.raises(UserError, match="no material is kept"):
                 await studio.call("swap", {})
+
+    run(play())
+
+
+def test_a_studio_ends_while_a_search_is_about_to_begin(folder, monkeypatch):
+    async def play():
+        async with (
+            asyncio.timeout(HANG_SECONDS / 4),
+            opened(folder, str(folder / "bar.yaml")) as (
+                studio,
+                page,
+            ),
+        ):
+            await until(lambda: aimed(page, ["end", "side"]), page)
+            budget = {"optimiser": {"evaluations": None, "seconds": None}}
+            await studio.call("change_settings", {"settings": budget})
+            ask, asked = studio.bench.ask, asyncio.Event()
+
+            async def slowly(name, *arguments):
+                if name == "problem":
+                    asked.set()
+                    await asyncio.sleep(0.5)
+                return await ask(name, *arguments)
+
+            monkeypatch.setattr(studio.bench, "ask", slowly)
+            await studio.call("optimise", {})
+            await asked.wait()
 
     run(play())
 

@@ -75,6 +75,8 @@ class Upkeep:
         await asyncio.gather(*self._tasks, return_exceptions=True)
         self.break_off()
         if self._search_task is not None:
+            # It may be about to begin, and would go on for as long as it likes.
+            self._search_task.cancel()
             await asyncio.gather(self._search_task, return_exceptions=True)
 
     def break_off(self) -> None:
