@@ -57,10 +57,10 @@ WEAR = """async ([strikes, updates]) => {
 
 
 @contextmanager
-def real_studio(folder: str) -> Iterator[str]:
-    """Address of a studio that works in a folder."""
+def real_studio(folder: str | Path, *what: str) -> Iterator[str]:
+    """Address of a studio that works in a folder, and begins with what it is given."""
     program = str(Path(sys.executable).with_name("carillon"))
-    command = [program, "studio", "--workspace", folder, "--no-browser"]
+    command = [program, "studio", *what, "--workspace", str(folder), "--no-browser"]
     served = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         assert served.stdout is not None

@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import base64
 import io
-import subprocess
-import sys
-from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,6 +15,7 @@ from sound.project.project import load_project, project_of
 from tests import small_project
 from tests.patience import HANG_SECONDS
 from tests.small_project import RATE
+from tests.studio_load import real_studio
 from tests.studio_pages import open_page, until
 from tests.test_studio_sound import PACKED, RENDER, measured
 
@@ -40,19 +37,6 @@ BANKS = """() => {
   });
 }"""
 """Keeps what the page is told of the solid's sound."""
-
-
-@contextmanager
-def studio_in(folder, *what):
-    """Address of a studio that works in a folder."""
-    program = Path(sys.executable).with_name("carillon")
-    command = [str(program), "studio", *what, "--workspace", str(folder)]
-    served = subprocess.Popen([*command, "--no-browser"], stdout=subprocess.PIPE, text=True)
-    try:
-        yield served.stdout.readline().strip()
-    finally:
-        served.terminate()
-        served.wait(HANG_SECONDS)
 
 
 def call(page, name, /, **arguments) -> None:
@@ -120,7 +104,7 @@ def test_from_an_empty_page_to_a_design(browser, tmp_path):
     work, clips = tmp_path / "work", tmp_path / "clips"
     work.mkdir()
     clips.mkdir()
-    with studio_in(work) as address:
+    with real_studio(work) as address:
         page = open_page(browser, address, "studio.state?.current")
         page.evaluate(PACKED)
         page.evaluate(BANKS)
@@ -196,7 +180,7 @@ def test_from_an_empty_page_to_a_design(browser, tmp_path):
     names = [target.clip.rsplit("/", 1)[1] for target in load_project(work / "found.yaml").targets]
     assert names == ["end.wav", "side.wav"]
 
-    with studio_in(work, str(work / "found.yaml")) as address:
+    with real_studio(work, str(work / "found.yaml")) as address:
         page = open_page(browser, address, "studio.state?.current")
         until_so(page, "studio.view.settled && studio.state.current.wanted !== null")
         again = state(page)
