@@ -154,7 +154,7 @@ install_python_packages() {
     [ "$NUMPY_ABI" -ge 2 ] && LOCK=$ENVS/lock-numpy2.txt
     say "Installing Python packages from $(display "$LOCK") (one or two minutes)"
     local part files=(-r "$ENVS/requirements.txt")
-    for part in sound studio workflow dev; do
+    for part in sound studio scenes workflow dev; do
         files+=(-r "$ENVS/requirements-$part.txt")
     done
     [ "$KIND" = source ] && files+=(-r "$ENVS/petsc-source-build.txt")
