@@ -1,0 +1,233 @@
+"""glTF 2.0: a scene that was played, as objects that move, seen by a camera, with its sound.
+
+The motion is an ordinary animation.  The sound is in the draft extension KHR_audio_emitter
+(repository omigroup/gltf-extensions, folder extensions/2.0/KHR_audio_emitter, commit b48a264;
+KhronosGroup/glTF, pull request 2137), as a global emitter: what two ears hear depends on no place
+any more.  Players that do not know the draft show the scene silently.
+
+glTF's y points up and the scene's z: a root node turns all of it.
+"""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon import __version__
+from sound.export.gltf_buffer import (
+    FLOAT,
+    TRIANGLES,
+    UNSIGNED_INT,
+    VERTICES,
+    Buffer,
+    write_asset,
+)
+from sound.scenes.performance import Performance
+from sound.scenes.picture import Appearance, Camera, Motion, Picture
+
+Array = NDArray[np.float64]
+
+EXTENSION = "KHR_audio_emitter"
+DRAFT = (
+    "draft, repository omigroup/gltf-extensions, extensions/2.0/KHR_audio_emitter, commit b48a264"
+)
+UPRIGHT = (-(0.5**0.5), 0.0, 0.0, 0.5**0.5)
+"""Turn (x, y, z, w) by which z becomes y."""
+ROUGHNESS = 0.5
+"""Of all surfaces, as renderers understand it: from 0, a mirror, to 1."""
+GROUND_COLOUR = (0.8, 0.8, 0.8)
+GROUND_REACH = 20.0
+"""Half the side of the ground, in distances of what the camera looks at."""
+NEAREST = 0.01
+"""What is closer to the camera is not shown, in the same distances."""
+_LINEAR_BELOW = 0.04045
+_STRAIGHT = 1e-9
+
+
+def write_scene_gltf(path: str | Path, performance: Performance, binary: bool) -> None:
+    """Write `.glb` if `binary`, else `.gltf` with the data embedded in it.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be written.
+    """
+    write_asset(path, *scene_document(performance), binary)
+
+
+def scene_document(performance: Performance) -> tuple[dict[str, Any], bytes]:
+    """The asset as JSON and its buffer."""
+    picture = performance.picture
+    buffer = Buffer()
+    seen = [*picture.objects, *_ground(picture)]
+    channels, samplers = _animation(picture.motion, buffer)
+    nodes = [*_object_nodes(picture), *_ground_nodes(picture), _camera_node(picture.camera)]
+    root = {
+        "name": "z points up",
+        "rotation": UPRIGHT,
+        "children": list(range(1, 1 + len(nodes))),
+    }
+    emitter = {EXTENSION: {"emitters": [0]}}
+    document = {
+        "asset": {
+            "version": "2.0",
+            "generator": f"Carillon {__version__}",
+            "extras": {EXTENSION: DRAFT, "sound": "begins with the animation, at time 0"},
+        },
+        "extensionsUsed": [EXTENSION],
+        "extensions": {EXTENSION: _emitters(performance, buffer)},
+        "scene": 0,
+        "scenes": [{"name": performance.title, "nodes": [0], "extensions": emitter}],
+        "nodes": [root, *nodes],
+        "meshes": [_mesh(each, number, buffer) for number, each in enumerate(seen)],
+        "materials": [_material(each) for each in seen],
+        "cameras": [_camera(picture.camera)],
+        "animations": [{"name": "motion", "channels": channels, "samplers": samplers}],
+        **buffer.entries(),
+    }
+    return document, bytes(buffer.data)
+
+
+def _object_nodes(picture: Picture) -> list[dict[str, Any]]:
+    """A node for each object, where it is at first; meshes have the numbers of objects."""
+    turns = _turns(picture.motion)
+    return [
+        {
+            "name": each.name,
+            "mesh": number,
+            "translation": picture.motion.positions[0, number].tolist(),
+            "rotation": turns[0, number].tolist(),
+        }
+        for number, each in enumerate(picture.objects)
+    ]
+
+
+def _animation(motion: Motion, buffer: Buffer) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Channels and samplers: places and turns of each object, at times that all share."""
+    channels: list[dict[str, Any]] = []
+    samplers: list[dict[str, Any]] = []
+    times = buffer.add(motion.times, FLOAT)
+    for path, values in (("translation", motion.positions), ("rotation", _turns(motion))):
+        for number in range(values.shape[1]):
+            # The root is the first node; objects follow.
+            channels.append(
+                {"sampler": len(samplers), "target": {"node": 1 + number, "path": path}}
+            )
+            output = buffer.add(values[:, number], FLOAT)
+            samplers.append({"input": times, "output": output, "interpolation": "LINEAR"})
+    return channels, samplers
+
+
+def _turns(motion: Motion) -> Array:
+    """Quaternions (T, B, 4) in glTF's order (x, y, z, w), each near to the one before it.
+
+    A quaternion and its negative are one rotation, but not all players take the short way.
+    """
+    turns = np.roll(motion.rotations, -1, axis=2)
+    cosines = (turns[1:] * turns[:-1]).sum(axis=2, keepdims=True)
+    turns[1:] *= np.cumprod(np.where(cosines < 0.0, -1.0, 1.0), axis=0)
+    return turns
+
+
+def _mesh(each: Appearance, material: int, buffer: Buffer) -> dict[str, Any]:
+    positions = buffer.add(each.vertices, FLOAT, VERTICES)
+    indices = buffer.add(each.faces.ravel(), UNSIGNED_INT, TRIANGLES)
+    surface = {"attributes": {"POSITION": positions}, "indices": indices, "material": material}
+    return {"name": each.name, "primitives": [surface]}
+
+
+def _material(each: Appearance) -> dict[str, Any]:
+    return {
+        "name": each.name,
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [*_linear(each.colour), 1.0],
+            "metallicFactor": 0.0,
+            "roughnessFactor": ROUGHNESS,
+        },
+    }
+
+
+def _linear(colour: tuple[float, float, float]) -> list[float]:
+    """Reflectances from sRGB, all from 0 to 1 (IEC 61966-2-1).
+
+    Examples
+    --------
+    >>> [round(value, 4) for value in _linear((0.0, 0.5, 1.0))]
+    [0.0, 0.214, 1.0]
+    """
+    return [
+        part / 12.92 if part <= _LINEAR_BELOW else ((part + 0.055) / 1.055) ** 2.4
+        for part in colour
+    ]
+
+
+def _ground(picture: Picture) -> list[Appearance]:
+    """A square about what the camera looks at, if there is a ground."""
+    if picture.ground is None:
+        return []
+    reach = GROUND_REACH * _distance(picture.camera)
+    corners = reach * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+    corners += picture.camera.target[:2]
+    vertices = np.column_stack([corners, np.zeros(len(corners))])
+    return [Appearance("ground", vertices, np.array([(0, 1, 2), (0, 2, 3)]), GROUND_COLOUR)]
+
+
+def _ground_nodes(picture: Picture) -> list[dict[str, Any]]:
+    if picture.ground is None:
+        return []
+    height = [0.0, 0.0, picture.ground]
+    return [{"name": "ground", "mesh": len(picture.objects), "translation": height}]
+
+
+def _camera(camera: Camera) -> dict[str, Any]:
+    """As far as it sees: to infinity."""
+    perspective = {
+        "yfov": float(np.radians(camera.degrees)),
+        "znear": NEAREST * _distance(camera),
+    }
+    return {"type": "perspective", "perspective": perspective}
+
+
+def _camera_node(camera: Camera) -> dict[str, Any]:
+    """glTF's cameras look along -z, with y up in the picture."""
+    from scipy.spatial.transform import Rotation
+
+    back = np.subtract(camera.position, camera.target) / _distance(camera)
+    across = np.cross([0.0, 0.0, 1.0], back)
+    long = float(np.linalg.norm(across))
+    # Looking straight up or down, where it is not told what is up in the picture.
+    right = across / long if long > _STRAIGHT else np.array([1.0, 0.0, 0.0])
+    axes = np.column_stack([right, np.cross(back, right), back])
+    return {
+        "name": "camera",
+        "camera": 0,
+        "translation": list(camera.position),
+        "rotation": Rotation.from_matrix(axes).as_quat().tolist(),
+    }
+
+
+def _distance(camera: Camera) -> float:
+    """From the camera to what it looks at [m]."""
+    return float(np.linalg.norm(np.subtract(camera.position, camera.target)))
+
+
+def _emitters(performance: Performance, buffer: Buffer) -> dict[str, Any]:
+    """The sound, played once, everywhere as loud.
+
+    Its samples have 16 bits, which all players know; they are used in full, and the gain makes up
+    for it.
+    """
+    import soundfile
+
+    peak = float(np.abs(performance.sound).max(initial=0.0)) or 1.0
+    wav = io.BytesIO()
+    soundfile.write(wav, performance.sound / peak, performance.rate, "PCM_16", format="WAV")
+    return {
+        "audio": [{"bufferView": buffer.add_bytes(wav.getvalue()), "mimeType": "audio/wav"}],
+        "sources": [{"name": "sound", "audio": 0, "gain": peak, "autoPlay": True}],
+        "emitters": [{"name": "ears", "type": "global", "sources": [0]}],
+    }

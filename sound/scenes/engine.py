@@ -1,0 +1,262 @@
+"""Rigid bodies under gravity, by MuJoCo: how they move, and the forces where they touch."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.errors import UserError
+from carillon.progress import track
+from sound.scenes.bodies import Body
+from sound.scenes.bounce import damping_ratio
+from sound.scenes.contact_log import ContactLog
+from sound.scenes.contacts import Contacts
+from sound.scenes.materials import NamedMaterial
+from sound.scenes.performance import GROUND
+from sound.scenes.picture import Motion
+from sound.scenes.scene import Scene
+
+Array = NDArray[np.float64]
+
+PICTURES_PER_SECOND = 120
+"""Poses that are kept."""
+OVERLAP = 0.01
+"""Of an object's longest side: what two may overlap at the start, as convex parts are not exact."""
+FASTEST = 1e4
+"""Speed [m/s] beyond which a scene has burst."""
+MOST_CONTACTS = 1_000_000
+"""Points of contact, each counted in every step, that a scene may have for every second."""
+REQUIREMENTS = "workflow/envs/requirements-scenes.txt"
+_IMPEDANCE = [0.999, 0.999, 0.001, 0.5, 2.0]
+
+
+@dataclass(frozen=True)
+class Course:
+    """How a scene goes.
+
+    Attributes
+    ----------
+    motion
+        Poses of all objects.
+    contacts
+        What touched what, in the order of time.
+    resting : (T, B)
+        Whether each object lay still, at the times of the motion.
+    """
+
+    motion: Motion
+    contacts: Contacts
+    resting: NDArray[np.bool_]
+
+
+def simulate(scene: Scene, bodies: list[Body], visible: bool = True) -> Course:
+    """Let bodies move as a scene says.
+
+    Contacts are springs with dampers: a bounce takes `engine.contact_seconds` whatever the mass,
+    and leaves the share of speed that the restitution says.  Bodies that lie still sleep.
+
+    Raises
+    ------
+    UserError
+        If two bodies overlap at the start, if anything flies apart, or touches too often.
+    """
+    mujoco = _mujoco()
+    model = _model(mujoco, scene, bodies)
+    data = mujoco.MjData(model)
+    _start(mujoco, model, data, bodies)
+    recorder = _Recorder(model, data, bodies)
+    recorder.require_apart(scene)
+    every = max(1, round(1.0 / (PICTURES_PER_SECOND * scene.engine.step_seconds)))
+    poses = int(np.ceil(scene.seconds / (every * scene.engine.step_seconds)))
+    steps = every * poses
+    for step in track(
+        range(steps), "moving", unit="steps", visible=visible and sys.stderr.isatty()
+    ):
+        if step % every == 0:
+            recorder.take_pose()
+        before = data.qvel.copy()
+        mujoco.mj_step(model, data)
+        if data.ncon:
+            recorder.take_contacts(step, before)
+            recorder.require_few((step + 1) * scene.engine.step_seconds)
+        if step % every == 0:
+            recorder.require_calm(step * scene.engine.step_seconds)
+    return recorder.course(every * scene.engine.step_seconds)
+
+
+def _mujoco() -> ModuleType:
+    try:
+        import mujoco
+    except ImportError as error:
+        raise UserError(
+            f"mujoco cannot be loaded ({error}); install what scenes need by pip install -r "
+            f"{REQUIREMENTS}, or 'carillon[scenes]'"
+        ) from None
+    return mujoco
+
+
+def _model(mujoco: ModuleType, scene: Scene, bodies: list[Body]) -> Any:
+    """The engine's description of a scene."""
+    spec = mujoco.MjSpec()
+    spec.option.timestep = scene.engine.step_seconds
+    spec.option.gravity = scene.gravity
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
+    if scene.ground is not None:
+        _add_ground(mujoco, spec, scene)
+    for number, body in enumerate(bodies):
+        _add_body(mujoco, spec, scene, number, body)
+    return spec.compile()
+
+
+def _add_ground(mujoco: ModuleType, spec: Any, scene: Scene) -> None:
+    material: NamedMaterial = scene.ground_material
+    spec.worldbody.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[0.0, 0.0, 1.0],
+        pos=[0.0, 0.0, scene.ground],
+        **_touch(scene, material.friction, material.restitution),
+    )
+
+
+def _add_body(mujoco: ModuleType, spec: Any, scene: Scene, number: int, body: Body) -> None:
+    from scipy.spatial.transform import Rotation
+
+    entry = body.entry
+    x, y, z, w = Rotation.from_euler("xyz", entry.rotation, degrees=True).as_quat()
+    inertia = body.inertia
+    added = spec.worldbody.add_body(
+        name=str(number),
+        pos=entry.position,
+        quat=[w, x, y, z],
+        explicitinertial=True,
+        mass=body.mass,
+        ipos=[0.0, 0.0, 0.0],
+        fullinertia=[*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]],
+    )
+    if not entry.fixed:
+        added.add_freejoint()
+    touch = _touch(scene, entry.friction, entry.restitution)
+    if entry.radius is not None:
+        size = [entry.radius, 0.0, 0.0]
+        added.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=size, **touch)
+    for part, corners in enumerate(body.parts):
+        name = f"{number} {part}"
+        spec.add_mesh(name=name, uservert=corners.ravel().tolist())
+        added.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **touch)
+
+
+def _touch(scene: Scene, friction: float, restitution: float) -> dict[str, Any]:
+    """What the engine knows of a surface."""
+    stiff = (np.pi / scene.engine.contact_seconds) ** 2
+    ratio = damping_ratio(restitution, scene.engine.steps)
+    return {
+        "friction": [friction, 0.0, 0.0],
+        "solref": [-stiff, -2.0 * ratio * np.sqrt(stiff)],
+        "solimp": _IMPEDANCE,
+        "condim": 3,
+    }
+
+
+def _start(mujoco: ModuleType, model: Any, data: Any, bodies: list[Body]) -> None:
+    """Set velocities; those of rotation are given about the axes of the scene."""
+    mujoco.mj_forward(model, data)
+    for number, body in enumerate(bodies):
+        first = model.body_dofadr[number + 1]
+        if first >= 0:
+            turned = data.xmat[number + 1].reshape(3, 3)
+            data.qvel[first : first + 3] = body.entry.velocity
+            data.qvel[first + 3 : first + 6] = np.array(body.entry.spin) @ turned
+    mujoco.mj_forward(model, data)
+
+
+class _Recorder:
+    """Keeps what the engine tells."""
+
+    def __init__(self, model: Any, data: Any, bodies: list[Body]) -> None:
+        self.model, self.data, self.bodies = model, data, bodies
+        self.owners = np.asarray(model.geom_bodyid, dtype=np.int64) - 1
+        self.first_speed = np.asarray(model.body_dofadr[1:], dtype=np.int64)
+        self.free = self.first_speed >= 0
+        self.inverse_mass = np.array([0.0 if b.entry.fixed else 1.0 / b.mass for b in bodies])
+        self.inverse_inertia = np.array(
+            [np.zeros((3, 3)) if b.entry.fixed else np.linalg.inv(b.inertia) for b in bodies]
+        )
+        self.log = ContactLog()
+        self.positions: list[Array] = []
+        self.rotations: list[Array] = []
+        self.resting: list[NDArray[np.bool_]] = []
+
+    def take_pose(self) -> None:
+        self.positions.append(self.data.xpos[1:].copy())
+        self.rotations.append(self.data.xquat[1:].copy())
+        self.resting.append(np.asarray(self.data.body_awake[1:] != 1) & self.free)
+
+    def take_contacts(self, step: int, velocities: Array) -> None:
+        """Keep what touches in a step, at whose beginning there were these velocities."""
+        contact, data = self.data.contact, self.data
+        self.log.take(
+            step,
+            contact.efc_address,
+            contact.geom,
+            contact.pos,
+            contact.frame,
+            data.efc_force,
+            data.xpos,
+            data.xmat,
+            velocities,
+            self.owners,
+            self.first_speed,
+            self.inverse_mass,
+            self.inverse_inertia,
+        )
+
+    def require_apart(self, scene: Scene) -> None:
+        """Refuse a start at which two objects, or one and the ground, are in each other."""
+        contact = self.data.contact
+        for depth, geoms in zip(-np.asarray(contact.dist), np.asarray(contact.geom)):
+            pair = [int(each) for each in self.owners[geoms]]
+            sides = [
+                float(np.ptp(self.bodies[each].shape.vertices, axis=0).max())
+                for each in pair
+                if each != GROUND
+            ]
+            if depth > OVERLAP * min(sides):
+                names = [
+                    "the ground" if each == GROUND else f"object {self.bodies[each].entry.name!r}"
+                    for each in sorted(pair, reverse=True)
+                ]
+                raise UserError(
+                    f"{names[0]} and {names[1]} overlap by {1e3 * depth:.3g} mm at the start; move "
+                    "them apart"
+                )
+
+    def require_few(self, seconds: float) -> None:
+        """Refuse more contacts than can be kept."""
+        if self.log.count > MOST_CONTACTS * max(1.0, seconds):
+            raise UserError(
+                f"found {self.log.count:,} contacts in the first {seconds:.3g} s (counted in every "
+                f"step), expected at most {MOST_CONTACTS:,} a second; take fewer objects, hull in "
+                "place of parts, or fewer steps of the engine"
+            )
+
+    def require_calm(self, seconds: float) -> None:
+        """Refuse a scene that has burst."""
+        speed = float(np.abs(self.data.qvel).max(initial=0.0))
+        if not speed < FASTEST:
+            raise UserError(
+                f"after {seconds:.3g} s something moves at {speed:.3g} m/s or turns at as many "
+                "rad/s; look at positions and masses, or give the engine more steps"
+            )
+
+    def course(self, seconds: float) -> Course:
+        self.take_pose()
+        times = seconds * np.arange(len(self.positions))
+        motion = Motion(times, np.array(self.positions), np.array(self.rotations))
+        return Course(motion, self.log.contacts(), np.array(self.resting))

@@ -1,0 +1,169 @@
+"""A head that hears: distance, delay and direction of what sounds.
+
+Each ear hears a body over the way to it: later by the speed of sound, fainter as 1 / distance, and
+through the shadow of a spherical head (Brown and Duda, IEEE Transactions on Speech and Audio
+Processing 6, 1998): a filter of one pole and one zero, and the longer way around the head.  As ways
+change, so do delays, which is Doppler's shift.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from sound.scenes.picture import Motion
+from sound.scenes.radiation import SOUND_SPEED
+
+Array = NDArray[np.float64]
+
+HEAD_RADIUS = 0.0875
+"""Of a mean head [m]."""
+NEAREST = 0.1
+"""Distance [m] within which nothing gets louder."""
+ROUNDS = 4
+"""In which the moment is found at which a body sounded: each gains a factor of v / c."""
+UP = np.array([0.0, 0.0, 1.0])
+SHADOW_LEAST, SHADOW_DEGREES = 0.1, 150.0
+"""Gain of high frequencies at the darkest angle from an ear, and that angle."""
+
+
+@dataclass(frozen=True)
+class Head:
+    """A head that may move.
+
+    Attributes
+    ----------
+    times : (t,) [s]
+        At which its places are known, ascending.
+    positions : (t, 3) [m]
+        Of its middle.
+    facing : (3,) [m]
+        Point that its nose is turned to.
+    """
+
+    times: Array
+    positions: Array
+    facing: Array
+
+    def at(self, times: Array) -> tuple[Array, Array]:
+        """Positions (s, 3) [m] and directions to the right (s, 3) at times (s,) [s]."""
+        places = np.stack([np.interp(times, self.times, each) for each in self.positions.T], axis=1)
+        ahead = self.facing - places
+        right = np.cross(ahead, UP)
+        length = np.linalg.norm(right, axis=1, keepdims=True)
+        right = np.where(length > 1e-9, right, np.array([1.0, 0.0, 0.0]))
+        return places, right / np.linalg.norm(right, axis=1, keepdims=True)
+
+
+def towards(motion: Motion, body: int, head: Head) -> tuple[Array, Array]:
+    """Times (t,) [s], and unit vectors (t, 3) in the scene from a body to the head."""
+    times = motion.times
+    places, _ = head.at(times)
+    away = places - motion.positions[:, body]
+    return times, away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
+
+
+def heard(source: Array, motion: Motion, body: int, head: Head, rate: int) -> Array:
+    """What two ears (s, 2), left and right, hear of a body.
+
+    Parameters
+    ----------
+    source : (s,) [Pa m]
+        Pressure times distance, in the direction of the head.
+    motion, body
+        Where it is.
+    head
+        Who hears it.
+    rate : int [Hz]
+        Samples per second.
+    """
+    times = motion.times
+    places, right = head.at(times)
+    away = _seen_away(motion, body, places)
+    distance = np.maximum(np.linalg.norm(away, axis=1), NEAREST)
+    lateral = np.clip(np.einsum("ti,ti->t", away, right) / distance, -1.0, 1.0)
+    ears = np.zeros((len(source), 2))
+    for ear, side in enumerate((-1.0, 1.0)):
+        angle = np.arccos(np.clip(side * lateral, -1.0, 1.0))
+        delays = rate * (distance + _around(angle)) / SOUND_SPEED
+        ears[:, ear] = _through(source, rate * times, delays, 1.0 / distance, _shadow(angle), rate)
+    return ears
+
+
+def _seen_away(motion: Motion, body: int, places: Array) -> Array:
+    """Ways (t, 3) [m] from a head to where a body was when it sounded what arrives now."""
+    track = motion.positions[:, body]
+    away = track - places
+    for _ in range(ROUNDS):
+        sounded = motion.times - np.linalg.norm(away, axis=1) / SOUND_SPEED
+        then = [np.interp(sounded, motion.times, each) for each in track.T]
+        away = np.stack(then, axis=1) - places
+    return np.asarray(away)
+
+
+def _around(angle: Array) -> Array:
+    """Way [m] to an ear beyond that to the head's middle, by the angle between ear and source.
+
+    Woodworth's: straight to the ear that is seen, around the head to one that is not.
+    """
+    bent = angle - np.pi / 2.0
+    return np.asarray(HEAD_RADIUS * np.where(bent < 0.0, -np.cos(angle), bent))
+
+
+def _shadow(angle: Array) -> Array:
+    """Gain of high frequencies, by the angle between ear and source."""
+    half = SHADOW_LEAST / 2.0
+    degrees = np.degrees(angle)
+    return (1.0 + half) + (1.0 - half) * np.cos(np.radians(180.0 * degrees / SHADOW_DEGREES))
+
+
+@numba.njit(cache=True, nogil=True)
+def _through(source, frames, delays, gains, shadows, rate):  # type: ignore[no-untyped-def]
+    """A source delayed, made fainter and filtered by what changes from frame to frame."""
+    heard = np.zeros(len(source))
+    # (1 + shadow s / (2 w)) / (1 + s / (2 w)), w = c / a, by the bilinear transformation.
+    corner = 2.0 * SOUND_SPEED / HEAD_RADIUS
+    ratio = 2.0 * rate / corner
+    pole = (1.0 - ratio) / (1.0 + ratio)
+    before_in, before_out = 0.0, 0.0
+    frame = 0
+    for n in range(len(source)):
+        while frame + 2 < len(frames) and frames[frame + 1] <= n:
+            frame += 1
+        share = 0.0
+        later = min(frame + 1, len(frames) - 1)
+        if later > frame:
+            share = min(1.0, max(0.0, (n - frames[frame]) / (frames[later] - frames[frame])))
+        delay = delays[frame] + share * (delays[later] - delays[frame])
+        gain = gains[frame] + share * (gains[later] - gains[frame])
+        shadow = shadows[frame] + share * (shadows[later] - shadows[frame])
+        value = gain * _between(source, n - delay)
+        zero = shadow * ratio
+        out = ((1.0 + zero) * value + (1.0 - zero) * before_in) / (1.0 + ratio) - pole * before_out
+        before_in, before_out = value, out
+        heard[n] = out
+    return heard
+
+
+@numba.njit(cache=True, nogil=True)
+def _between(source, place):  # type: ignore[no-untyped-def]
+    """The source between samples, by a cubic through four of them (Lagrange)."""
+    whole = int(np.floor(place))
+    if whole < -2 or whole > len(source):
+        return 0.0
+    d = place - whole
+    total = 0.0
+    weights = (
+        -d * (d - 1.0) * (d - 2.0) / 6.0,
+        (d + 1.0) * (d - 1.0) * (d - 2.0) / 2.0,
+        -(d + 1.0) * d * (d - 2.0) / 2.0,
+        (d + 1.0) * d * (d - 1.0) / 6.0,
+    )
+    for i in range(4):
+        n = whole - 1 + i
+        if 0 <= n < len(source):
+            total += weights[i] * source[n]
+    return total

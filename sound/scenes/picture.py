@@ -1,0 +1,104 @@
+"""What is seen of a scene: surfaces, how they move, and from where they are looked at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Appearance:
+    """The surface of an object.
+
+    Attributes
+    ----------
+    name
+        What the scene calls the object.
+    vertices : (V, 3) [m]
+        In the object's own axes, from its centre of mass.
+    faces : (F, 3)
+        Vertices of triangles.
+    colour : (3,)
+        Red, green and blue from 0 to 1 (sRGB).
+    """
+
+    name: str
+    vertices: Array
+    faces: NDArray[np.integer]
+    colour: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Where B objects are at T times.
+
+    Attributes
+    ----------
+    times : (T,) [s]
+        At equal steps, from 0.
+    positions : (T, B, 3) [m]
+        Of the centres of mass; z points up.
+    rotations : (T, B, 4)
+        Unit quaternions (w, x, y, z) that turn an object's own axes to those of the scene.
+    """
+
+    times: Array
+    positions: Array
+    rotations: Array
+
+    def at(self, seconds: float) -> tuple[Array, Array]:
+        """Positions (B, 3) [m] and rotations (B, 4) at a time, between steps interpolated."""
+        place = float(np.clip(np.interp(seconds, self.times, np.arange(len(self.times))), 0, None))
+        before = min(int(place), len(self.times) - 1)
+        after = min(before + 1, len(self.times) - 1)
+        share = place - before
+        first, second = self.rotations[before], self.rotations[after]
+        # A quaternion and its negative are one rotation: the nearer one is taken.
+        second = np.where((first * second).sum(axis=1, keepdims=True) < 0.0, -second, second)
+        turned = (1.0 - share) * first + share * second
+        turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+        moved = (1.0 - share) * self.positions[before] + share * self.positions[after]
+        return moved, turned
+
+
+@dataclass(frozen=True)
+class Camera:
+    """From where a scene is seen.
+
+    Attributes
+    ----------
+    position, target : (3,) [m]
+        Where it is, and what it looks at.
+    degrees : float
+        Vertical field of view.
+    """
+
+    position: tuple[float, float, float]
+    target: tuple[float, float, float]
+    degrees: float = 36.0
+
+
+@dataclass(frozen=True)
+class Picture:
+    """All that is seen.
+
+    Attributes
+    ----------
+    objects : B surfaces
+        In the order of the motion's objects.
+    motion
+        How they move.
+    ground : float [m] or None
+        Height of the ground, if there is one.
+    camera
+        From where they are seen.
+    """
+
+    objects: list[Appearance]
+    motion: Motion
+    ground: float | None
+    camera: Camera

@@ -1,0 +1,249 @@
+"""Plays a scene: bodies move, contacts excite modes, a head hears them."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import fftconvolve
+
+from carillon.errors import UserError
+from carillon.progress import say
+from carillon.runtime import allowed_threads
+from carillon.serial import serial_blas
+from carillon.threads import in_parallel
+from sound.scenes.bodies import Body, body_of
+from sound.scenes.engine import Course, simulate
+from sound.scenes.excitation import excitation, middle_places
+from sound.scenes.hearing import Head, heard, towards
+from sound.scenes.impacts import Blow, Pressing, told_apart
+from sound.scenes.loudness import click, mode_gains, voice
+from sound.scenes.lying import rests_of
+from sound.scenes.performance import Performance
+from sound.scenes.picture import Appearance, Picture
+from sound.scenes.pressing import pressed
+from sound.scenes.ringing import ring
+from sound.scenes.scene import ObjectEntry, Scene
+from sound.scenes.touch import Touch
+from sound.scenes.viewpoint import camera_of, head_of
+
+Array = NDArray[np.float64]
+
+FULL = 0.99
+"""Largest magnitude of a sound that is scaled to full scale: what rounds it does not reach 1."""
+
+
+@serial_blas
+def perform(scene: Scene, threads: int | None = None, visible: bool = True) -> Performance:
+    """A scene from its beginning to its end; the same, bit for bit, on any number of threads.
+
+    Parameters
+    ----------
+    threads
+        That bodies are shared among; as many as there are cores unless told.
+    visible
+        Whether progress is told.
+
+    Raises
+    ------
+    UserError
+        If an object is unusable, two overlap at the start, or nothing touches anything.
+    """
+    clock = Clock()
+    bodies = bodies_of(scene)
+    clock.lap("bodies")
+    course = simulate(scene, bodies, visible)
+    clock.lap("motion")
+    if not len(course.contacts):
+        raise UserError(
+            f"nothing touches anything within {scene.seconds:g} s, so nothing sounds; let the "
+            "scene last longer, or let objects meet"
+        )
+    blows, lasting = told_apart(course.contacts, scene, Touch(bodies, scene.ground_material))
+    clock.lap("contacts")
+    player = _Player(scene, bodies, course, blows, lasting)
+    numbers = [(number,) for number in range(len(bodies))]
+    parts = in_parallel(player.heard, numbers, threads or allowed_threads())
+    sound = np.sum(parts, axis=0)
+    clock.lap("sound")
+    scale = _scale(scene, float(np.abs(sound).max(initial=0.0)))
+    voices = [
+        None if body.solid is None else voice(body, scale * player.gains[number])
+        for number, body in enumerate(bodies)
+    ]
+    clock.lap("voices")
+    return Performance(
+        scene.title,
+        Picture(
+            [
+                Appearance(
+                    each.entry.name, each.shape.vertices, each.shape.faces, each.entry.colour
+                )
+                for each in bodies
+            ],
+            course.motion,
+            scene.ground,
+            player.camera,
+        ),
+        scale * sound,
+        scene.sound.rate,
+        [blow.impact for blow in blows],
+        voices,
+        scale,
+        clock.seconds,
+    )
+
+
+class Clock:
+    """Wall time of one thing after the other."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._last = time.perf_counter()
+
+    def lap(self, what: str) -> None:
+        """What took the time since the last lap."""
+        now = time.perf_counter()
+        self.seconds[what] = now - self._last
+        self._last = now
+
+
+def bodies_of(scene: Scene) -> list[Body]:
+    """Bodies of all objects; those that are alike but for their places share their modes.
+
+    Raises
+    ------
+    UserError
+        See `sound.scenes.bodies.body_of`.
+    """
+    made: dict[ObjectEntry, Body] = {}
+    bodies = []
+    for entry in scene.objects:
+        nowhere = (0.0, 0.0, 0.0)
+        alike = replace(
+            entry, name="", position=nowhere, rotation=nowhere, velocity=nowhere, spin=nowhere
+        )
+        if alike not in made:
+            made[alike] = body_of(entry)
+        body = made[alike]
+        bodies.append(replace(body, entry=replace(entry, radius=body.entry.radius)))
+    return bodies
+
+
+class _Player:
+    """Lets bodies sound, one at a time."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        bodies: list[Body],
+        course: Course,
+        blows: list[Blow],
+        lasting: list[Pressing],
+    ) -> None:
+        self.scene, self.bodies, self.course = scene, bodies, course
+        self.blows, self.lasting = blows, lasting
+        found = [pressed(each, bodies, scene) for each in lasting]
+        self.pressings = [each for each in found if each is not None]
+        self.count = round(scene.seconds * scene.sound.rate)
+        self.camera = camera_of(scene, bodies, course.motion)
+        self.head: Head = head_of(scene, self.camera)
+        silent = np.zeros((0, 4))
+        self.gains = [
+            silent if body.solid is None else mode_gains(body, scene.sound.radiation)
+            for body in bodies
+        ]
+
+    def heard(self, number: int) -> Array:
+        """What two ears (count, 2) hear of a body."""
+        source = self.source(number)
+        if not self.scene.sound.space:
+            return np.repeat(source[:, None], 2, axis=1)
+        return heard(source, self.course.motion, number, self.head, self.scene.sound.rate)
+
+    def source(self, number: int) -> Array:
+        """Pressure times distance (count,) [Pa m] of a body, in the direction of the head."""
+        scene, body, motion = self.scene, self.bodies[number], self.course.motion
+        rate = scene.sound.rate
+        seconds = np.arange(self.count) / rate
+        times, directions = towards(motion, number, self.head)
+        total = np.zeros(self.count)
+        if scene.sound.radiation:
+            jerked = click(number, body, self.blows, self.count, rate)
+            total += _along(jerked, seconds, times, directions)
+        if body.solid is None:
+            return total
+        resting = self.course.resting[:, number]
+        rests = rests_of(number, body, self.lasting, times, resting, scene)
+        act = excitation(
+            number,
+            body,
+            self.blows,
+            self.pressings,
+            rests,
+            self.count,
+            rate,
+            signed=scene.sound.radiation and body.listening is None,
+            damped=scene.sound.contact_damping,
+        )
+        gains = self.gains[number]
+        modes = ring(body.solid.frequencies, body.solid.dampings, gains, act, self.count, rate)
+        total += modes[:, 0]
+        if gains[:, 1:].any():
+            turned = np.einsum("tij,ti->tj", _matrices(motion.rotations[:, number]), directions)
+            total += _along(modes[:, 1:], seconds, times, turned)
+        if body.listening is not None and scene.sound.noise:
+            total += self._noise(number, body, float(gains[0, 0]))
+        return total
+
+    def _noise(self, number: int, body: Body, gain: float) -> Array:
+        """What the clips of a design hold besides modes, in proportion to the impulses."""
+        assert body.listening is not None
+        rate = self.scene.sound.rate
+        noises = body.listening.noise(rate)
+        trains = np.zeros((len(noises), self.count))
+        for blow in self.blows:
+            begin = round(blow.impact.seconds * rate)
+            if number not in blow.impact.pair or begin >= self.count:
+                continue
+            side = blow.impact.pair.index(number)
+            impulses = blow.impulses[:, side]
+            middle = middle_places(blow.places[:, side], impulses, np.array([0]))[0] + body.centre
+            strength = float(np.linalg.norm(impulses.sum(axis=0)))
+            trains[:, begin] += strength * body.listening.weights(middle)
+        total = np.zeros(self.count)
+        for train, noise in zip(trains, noises):
+            if train.any() and len(noise):
+                total += gain * fftconvolve(train, noise)[: self.count]
+        return total
+
+
+def _along(parts: Array, seconds: Array, times: Array, directions: Array) -> Array:
+    """Parts (s, 3) along directions (t, 3) that change with time."""
+    return np.asarray(
+        sum(parts[:, i] * np.interp(seconds, times, directions[:, i]) for i in range(3))
+    )
+
+
+def _matrices(quaternions: Array) -> Array:
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_quat(quaternions[:, [1, 2, 3, 0]]).as_matrix())
+
+
+def _scale(scene: Scene, peak: float) -> float:
+    """Full scale per pascal."""
+    wanted = scene.sound.full_scale
+    if peak == 0.0:
+        return 1.0
+    if wanted is None:
+        return FULL / peak
+    if peak > FULL * wanted:
+        say(
+            f"the loudest sample has {peak:.3g} Pa, more than full_scale ({wanted:g} Pa): all is "
+            f"{20.0 * np.log10(peak / (FULL * wanted)):.1f} dB fainter, so that nothing clips"
+        )
+        return FULL / peak
+    return 1.0 / wanted

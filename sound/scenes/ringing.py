@@ -1,0 +1,213 @@
+"""Modes that are struck, pressed and damped, sample by sample: what a body sounds like.
+
+Each mode is a complex number that turns and decays with every sample, as in
+`sound.rendering.bank`, whose samples these are when it is struck: s = Im x.  Forces are added to
+it before a sample is taken.  Samples are worked out in blocks, within which damping does not
+change, all modes side by side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.response.response import half_sine
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+BLOCK = 64
+"""Samples that a force's place and a damping hold for."""
+SILENT = 1e-30
+"""Squared magnitude, over that of the loudest force on any mode, below which a mode is silent."""
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """All that acts on the K modes of a body.
+
+    Attributes
+    ----------
+    firsts : (S,)
+        Sample at or after which each of S strikes begins, ascending.
+    since : (S,)
+        Samples between its beginning and that one, from 0 to 1.
+    durations : (S,) [s]
+        Of its force, half a sine.
+    amplitudes : (S, K)
+        What it lets the modes sound with.
+    blocks : (P,)
+        Number of the block of samples in which each of P presses acts, ascending.
+    courses : (P, BLOCK)
+        How its force goes.
+    pushes : (P, K) [1/s]
+        What a second of its force would let the modes sound with.
+    damped : (D,)
+        Numbers of the blocks in which modes are damped by what a body lies on, ascending.
+    dampings : (D, K) [1/s]
+        By how much.
+    """
+
+    firsts: Integers
+    since: Array
+    durations: Array
+    amplitudes: Array
+    blocks: Integers
+    courses: Array
+    pushes: Array
+    damped: Integers
+    dampings: Array
+
+
+def ring(
+    frequencies: Array, dampings: Array, gains: Array, act: Excitation, count: int, rate: int
+) -> Array:
+    """Samples (count, C) of a body.
+
+    Parameters
+    ----------
+    frequencies, dampings : (K,) [Hz], [1/s]
+        Of its modes; those from half the rate on stay silent.
+    gains : (K, C)
+        How loud each is in each of C channels.
+    act
+        What acts on them.
+    count : int
+        Samples.
+    rate : int [Hz]
+        Samples per second.
+    """
+    heard = frequencies < rate / 2.0
+    exponents = (-dampings + 2j * np.pi * np.where(heard, frequencies, 0.0)) / rate
+    begun = act.amplitudes * heard * np.exp(act.since[:, None] * exponents)
+    pulses = [pulse(seconds, rate) for seconds in act.durations]
+    lengths = np.array([len(pulse) for pulse in pulses], dtype=np.int64)
+    ends = np.cumsum(lengths)
+    pushes = act.pushes * heard / rate
+    loudest = max(np.abs(begun).max(initial=0.0), np.abs(pushes).max(initial=0.0))
+    samples = np.zeros((count, gains.shape[1]))
+    turns = np.exp(exponents)
+    _ring(
+        samples,
+        turns.real.copy(),
+        turns.imag.copy(),
+        np.ascontiguousarray(gains, dtype=float),
+        act.firsts,
+        ends - lengths,
+        lengths,
+        np.concatenate(pulses) if pulses else np.zeros(0),
+        np.ascontiguousarray(begun.real),
+        np.ascontiguousarray(begun.imag),
+        act.blocks,
+        act.courses,
+        np.ascontiguousarray(pushes),
+        act.damped,
+        np.exp(-act.dampings / rate),
+        SILENT * loudest**2,
+    )
+    return samples
+
+
+def pulse(seconds: float, rate: int) -> Array:
+    """Samples of a force of half a sine, see `solver.response.response.half_sine`."""
+    return _pulse(max(1, round(seconds * rate)))
+
+
+@cache
+def _pulse(count: int) -> Array:
+    return half_sine(float(count), 1)
+
+
+@numba.njit(cache=True, nogil=True)
+def _ring(  # type: ignore[no-untyped-def]
+    samples,
+    turn_re,
+    turn_im,
+    gains,
+    firsts,
+    offsets,
+    lengths,
+    pulses,
+    struck_re,
+    struck_im,
+    blocks,
+    courses,
+    pushes,
+    damped,
+    decays,
+    silent,
+):
+    n_samples, n_channels = samples.shape
+    n_modes = len(turn_re)
+    re, im = np.zeros(n_modes), np.zeros(n_modes)
+    now_re, now_im = turn_re.copy(), turn_im.copy()
+    force_re, force_im = np.zeros((BLOCK, n_modes)), np.zeros((BLOCK, n_modes))
+    oldest, next_press, next_damped = 0, 0, 0
+    ringing = False
+    for begin in range(0, n_samples, BLOCK):
+        size = min(BLOCK, n_samples - begin)
+        block = begin // BLOCK
+        pushed = False
+        while oldest < len(firsts) and firsts[oldest] + lengths[oldest] <= begin:
+            oldest += 1
+        strike = oldest
+        while strike < len(firsts) and firsts[strike] < begin + size:
+            low = max(firsts[strike], begin)
+            high = min(firsts[strike] + lengths[strike], begin + size)
+            if low < high:
+                if not pushed:
+                    force_re[:] = 0.0
+                    force_im[:] = 0.0
+                    pushed = True
+                for n in range(low, high):
+                    size_now = pulses[offsets[strike] + n - firsts[strike]]
+                    for k in range(n_modes):
+                        force_re[n - begin, k] += size_now * struck_re[strike, k]
+                        force_im[n - begin, k] += size_now * struck_im[strike, k]
+            strike += 1
+        while next_press < len(blocks) and blocks[next_press] <= block:
+            if blocks[next_press] == block:
+                if not pushed:
+                    force_re[:] = 0.0
+                    force_im[:] = 0.0
+                    pushed = True
+                for n in range(size):
+                    for k in range(n_modes):
+                        force_re[n, k] += courses[next_press, n] * pushes[next_press, k]
+            next_press += 1
+        while next_damped < len(damped) and damped[next_damped] < block:
+            next_damped += 1
+        if not pushed and not ringing:
+            continue
+        if next_damped < len(damped) and damped[next_damped] == block:
+            for k in range(n_modes):
+                now_re[k] = turn_re[k] * decays[next_damped, k]
+                now_im[k] = turn_im[k] * decays[next_damped, k]
+        else:
+            now_re[:] = turn_re
+            now_im[:] = turn_im
+        for n in range(size):
+            if pushed:
+                for k in range(n_modes):
+                    re[k] += force_re[n, k]
+                    im[k] += force_im[n, k]
+            for channel in range(n_channels):
+                total = 0.0
+                for k in range(n_modes):
+                    total += gains[k, channel] * im[k]
+                samples[begin + n, channel] = total
+            for k in range(n_modes):
+                turned = re[k] * now_re[k] - im[k] * now_im[k]
+                im[k] = re[k] * now_im[k] + im[k] * now_re[k]
+                re[k] = turned
+        ringing = False
+        for k in range(n_modes):
+            if re[k] * re[k] + im[k] * im[k] > silent:
+                ringing = True
+            else:
+                re[k] = 0.0
+                im[k] = 0.0

@@ -1,0 +1,72 @@
+"""`carillon scene` from a file to files."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import soundfile
+
+from sound.scenes.impact_list import COLUMNS
+from sound.scenes.tune import BEAT_SECONDS, tune_of
+from studio.__main__ import main
+from tests.scenes import require_engine, struck
+
+SCENE = """\
+title: A bar and a marble
+seconds: 0.6
+objects:
+  - {name: bar, mesh: builtin:bar, material: steel, resolution: 12, count: 6, position: [0, 0, 0.05]}
+  - {name: marble, radius: 0.01, material: glass, count: 0, position: [0.02, 0, 0.2]}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch) -> Path:
+    require_engine()
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.yaml").write_text(SCENE)
+    return tmp_path
+
+
+def test_everything_is_written_and_told(folder, capsys):
+    files = ["--video", "s.webm", "--page", "s.html", "--gltf", "s.glb", "--impacts", "s.csv"]
+    assert main(["scene", "scene.yaml", "--out", "s.wav", *files, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    samples, rate = soundfile.read("s.wav")
+    assert samples.shape == (round(0.6 * rate), 2) and np.abs(samples).max() <= 1.0
+    assert told["objects"] == 2 and told["modes"] == 6
+    assert all((folder / f"s.{ending}").stat().st_size for ending in ("webm", "html", "glb"))
+    with open("s.csv", newline="") as file:
+        lines = list(csv.DictReader(file))
+    assert tuple(lines[0]) == COLUMNS and len(lines) == told["impacts"]
+    assert {"ground", "marble"} <= {line["second"] for line in lines} | {
+        line["first"] for line in lines
+    }
+    assert float(lines[0]["time_seconds"]) == pytest.approx(told["first_impact_seconds"])
+
+
+def test_the_same_scene_makes_the_same_files(folder, monkeypatch):
+    for number, threads in enumerate(("1", "2")):
+        monkeypatch.setenv("OMP_NUM_THREADS", threads)
+        names = ["--out", f"{number}.wav", "--page", f"{number}.html", "--impacts", f"{number}.csv"]
+        assert main(["scene", "scene.yaml", *names]) == 0
+    for ending in ("wav", "html", "csv"):
+        assert Path(f"0.{ending}").read_bytes() == Path(f"1.{ending}").read_bytes()
+
+
+def test_a_tune_strikes_its_bars_in_turn_in_time_and_in_tune():
+    require_engine()
+    described = tune_of("C7 E7 G7")
+    bodies, blows, _ = struck(described)
+    on_bars = [
+        blow.impact for blow in blows if min(blow.impact.pair) == 0 and max(blow.impact.pair)
+    ]
+    assert [max(impact.pair) for impact in on_bars] == [1, 2, 3]
+    beats = np.diff([impact.seconds for impact in on_bars])
+    assert beats == pytest.approx(BEAT_SECONDS, rel=0.03)
+    hertz = [body.solid.frequencies[0] for body in bodies[1:]]
+    assert np.log2(np.array(hertz) / 440.0) * 12 == pytest.approx([27, 31, 34], abs=0.01)

@@ -1,0 +1,183 @@
+"""How bodies of a scene move and strike each other, beside theory."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from carillon.errors import UserError
+from sound.scenes.bounce import damping_ratio, restitution_of
+from sound.scenes.hertz import approach, bounce_seconds, stiffness
+from sound.scenes.performance import GROUND
+from tests.scenes import ball, moved, require_engine, scene, struck
+
+G = 9.81
+
+
+@pytest.fixture(autouse=True)
+def _engine():
+    require_engine()
+
+
+@pytest.mark.parametrize("restitution", [0.9, 0.7, 0.4])
+def test_a_ball_bounces_when_and_as_fast_as_theory_says(restitution):
+    height = 0.25
+    described = scene(
+        ball(position=[0, 0, height + 0.01], restitution=restitution),
+        seconds=2.0,
+        engine={"steps": 64},
+    )
+    described = _with_ground(described, restitution)
+    (body,), blows, _ = struck(described)
+    speed, time = np.sqrt(2 * G * height), np.sqrt(2 * height / G)
+    for number, blow in enumerate(blows[:4]):
+        # Theory's bounces take no time, the engine's some.
+        late = number * described.engine.contact_seconds + 1e-3 * time
+        assert blow.impact.seconds == pytest.approx(time, abs=late)
+        # What is held to the ground is slowed by its weight.
+        slowed = number * G * described.engine.contact_seconds
+        assert blow.impact.speed == pytest.approx(speed, abs=0.01 * speed + slowed)
+        gained = np.linalg.norm(blow.impact.impulse) / body.mass
+        lifted = G * described.engine.contact_seconds
+        assert gained == pytest.approx(
+            (1 + restitution) * speed + lifted, abs=0.01 * speed + 2 * slowed
+        )
+        speed *= restitution
+        time += 2 * speed / G
+
+
+def test_the_energy_of_a_bouncing_ball_falls_by_the_square_of_its_restitution():
+    described = _with_ground(scene(ball(position=[0, 0, 0.51], restitution=0.8), seconds=2.5), 0.8)
+    (body,), course = moved(described)
+    heights = course.motion.positions[:, 0, 2] - 0.01
+    tops = heights[1:-1][(heights[1:-1] > heights[:-2]) & (heights[1:-1] >= heights[2:])]
+    ratios = np.array([after / before for before, after in pairwise([0.5, *tops[:4]])])
+    assert ratios == pytest.approx(0.8**2, rel=0.03)
+    assert np.all(heights > -1.1 * np.sqrt(2 * G * 0.5) * described.engine.contact_seconds / np.pi)
+
+
+def test_momentum_goes_from_a_ball_to_one_of_its_kind():
+    described = scene(
+        ball("first", position=[-0.1, 0, 0], velocity=[1, 0, 0], restitution=0.98, friction=0),
+        ball("second", restitution=0.98, friction=0),
+        gravity=[0, 0, 0],
+        ground=None,
+        seconds=0.3,
+    )
+    _, course = moved(described)
+    last = course.motion.positions[-1] - course.motion.positions[-10]
+    speeds = last[:, 0] / (course.motion.times[-1] - course.motion.times[-10])
+    assert speeds.sum() == pytest.approx(1.0, abs=1e-6)
+    assert speeds == pytest.approx([0.01, 0.99], abs=0.012)
+
+
+def test_impacts_are_told_with_their_pair_place_and_direction():
+    described = scene(
+        ball("thrown", position=[-0.1, 0, 0], velocity=[1, 0, 0]),
+        ball("still"),
+        gravity=[0, 0, 0],
+        ground=None,
+        seconds=0.2,
+    )
+    _, blows, _ = struck(described)
+    (blow,) = blows
+    assert blow.impact.pair == (1, 0)
+    assert blow.impact.position == pytest.approx([-0.01, 0, 0], abs=5e-4)
+    assert blow.impact.impulse[0] > 0.0 and abs(blow.impact.impulse[1:]).max() < 1e-9
+    assert blow.impulses[:, 0] == pytest.approx(-blow.impulses[:, 1])
+
+
+def test_what_lands_presses_with_its_weight_and_then_sleeps():
+    block = {"name": "block", "mesh": "builtin:box", "material": "wood", "count": 0}
+    described = scene({**block, "resolution": 12, "position": [0, 0, 0.2]}, seconds=2.0)
+    (body,), blows, (pressing,) = struck(described)
+    assert pressing.pair == (0, GROUND)
+    steps = pressing.contacts.steps
+    late = steps > steps[-1] - 200
+    weight = pressing.contacts.pressures[late].sum() / 200
+    assert weight == pytest.approx(body.mass * G, rel=0.1)
+    assert blows[-1].impact.seconds <= steps[-1] * described.engine.step_seconds < 1.0
+
+
+def test_sliding_is_slowed_by_friction():
+    block = {"name": "block", "mesh": "builtin:box", "material": "wood", "count": 0}
+    first = scene({**block, "resolution": 12, "position": [0, 0, 1]}, seconds=0.01)
+    bodies, _ = moved(first)
+    half = -float(bodies[0].shape.vertices[:, 2].min())
+    described = scene(
+        {
+            **block,
+            "resolution": 12,
+            "position": [0, 0, half],
+            "velocity": [1, 0, 0],
+            "friction": 0.3,
+        },
+        seconds=1.0,
+    )
+    (body,), course = moved(described)
+    friction = max(0.3, described.ground_material.friction)
+    slid = course.motion.positions[-1, 0, 0]
+    assert slid == pytest.approx(1.0 / (2 * friction * G), rel=0.05)
+
+
+def test_hertz_contact_lasts_as_long_as_its_equation_of_motion_says():
+    mass, radius, modulus, speed = 0.033, 0.01, 1.1e11, 1.3
+
+    def course(_, state):
+        depth, velocity = state
+        force = 4 / 3 * modulus * np.sqrt(radius) * max(depth, 0.0) ** 1.5
+        return [velocity, -force / mass]
+
+    def apart(time, state):
+        return state[0] if time > 1e-6 else 1.0
+
+    apart.terminal, apart.direction = True, -1
+    solved = solve_ivp(
+        course, (0, 1e-3), [0, speed], events=apart, rtol=1e-10, atol=1e-15, max_step=1e-6
+    )
+    told = bounce_seconds(mass, radius, modulus, speed)
+    assert told == pytest.approx(solved.t_events[0][0], rel=1e-3)
+
+
+def test_impacts_last_as_hertz_says_of_both_materials():
+    described = scene(ball(position=[0, 0, 0.06]), ground_material="glass", seconds=0.3)
+    (body,), blows, _ = struck(described)
+    glass, steel = described.ground_material, body.entry.material
+    giving = (1 - glass.poisson**2) / glass.young + (1 - steel.poisson**2) / steel.young
+    expected = bounce_seconds(body.mass, 0.01, 1 / giving, np.sqrt(2 * G * 0.05))
+    assert blows[0].impact.duration == pytest.approx(expected, rel=0.01)
+
+
+def test_a_contact_is_as_stiff_as_its_force_grows():
+    force = np.array([3.0])
+    step = 1e-6
+    depths = approach(force * (1 + np.array([-step, step])), 0.02, 5e10)
+    assert stiffness(force, 0.02, 5e10) == pytest.approx(2 * step * 3.0 / np.diff(depths), rel=1e-4)
+
+
+@pytest.mark.parametrize("steps", [16, 64, 200])
+def test_damping_lets_a_bounce_leave_what_it_shall(steps):
+    for restitution in (0.2, 0.5, 0.9):
+        assert restitution_of(damping_ratio(restitution, steps), steps) == pytest.approx(
+            restitution
+        )
+    assert damping_ratio(1.0, steps) == 0.0
+
+
+def test_a_start_at_which_two_overlap_is_refused():
+    described = scene(ball("one"), ball("other", position=[0.015, 0, 0]), ground=None)
+    with pytest.raises(UserError, match="'other' and object 'one' overlap by 5 mm"):
+        moved(described)
+    with pytest.raises(UserError, match="object 'one' and the ground overlap by 10 mm"):
+        moved(scene(ball("one")))
+
+
+def _with_ground(described, restitution):
+    """The same on a ground that leaves a bounce as much."""
+    from dataclasses import replace
+
+    material = replace(described.ground_material, restitution=restitution)
+    return replace(described, ground_material=material)

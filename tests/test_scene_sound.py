@@ -1,0 +1,230 @@
+"""What scenes sound like, beside the sound of single strikes, theory, and themselves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import hilbert
+
+from carillon.errors import UserError
+from sound.project.design_file import write_design
+from sound.rendering.bank import Bank
+from sound.rendering.bank import ring as ring_bank
+from sound.rendering.render import Hit, render
+from sound.scenes.hearing import HEAD_RADIUS, Head, heard
+from sound.scenes.picture import Motion
+from sound.scenes.play import bodies_of, perform
+from sound.scenes.radiation import SOUND_SPEED
+from sound.scenes.ringing import BLOCK, Excitation, ring
+from sound.scenes.roughness import octave_heights, profile
+from tests.scenes import QUIET, ball, require_engine, scene, struck
+from tests.small_design import small_design
+
+RATE = 44_100
+BAR = {"name": "bar", "mesh": "builtin:bar", "material": "steel", "resolution": 12, "count": 8}
+
+
+@pytest.fixture(autouse=True)
+def _engine():
+    require_engine()
+
+
+def decibels(found: np.ndarray, expected: np.ndarray) -> float:
+    return 20.0 * np.log10(np.linalg.norm(found - expected) / np.linalg.norm(expected))
+
+
+@pytest.fixture
+def design(tmp_path) -> str:
+    write_design(tmp_path / "design.h5", small_design())
+    return str(tmp_path / "design.h5")
+
+
+def thrown_at(target: dict, **sound) -> object:
+    return scene(
+        {**target, "friction": 0.0},
+        ball(position=[0.03, 0.01, 0.1], velocity=[0.0, 0.0, -1.0], friction=0.0),
+        gravity=[0, 0, 0],
+        ground=None,
+        seconds=0.5,
+        sound={**QUIET, **sound},
+    )
+
+
+def test_a_strike_sounds_as_render_has_it(design):
+    described = thrown_at({"name": "box", "design": design}, noise=True)
+    bodies, (blow,), _ = struck(described)
+    body, impact = bodies[0], blow.impact
+    place = blow.places[0, 1] + body.centre
+    hit = Hit(impact.seconds, place, -impact.impulse)
+    expected = render(body.solid, [hit], 0.5, RATE, impact.duration, body.listening)
+    performance = perform(described, visible=False)
+    for ear in performance.sound.T:
+        assert decibels(ear / performance.scale, expected) < -60.0
+
+
+def test_a_strike_of_modes_of_no_design_sounds_as_render_has_it():
+    described = thrown_at(BAR)
+    bodies, (blow,), _ = struck(described)
+    body, impact = bodies[0], blow.impact
+    place = blow.places[0, 1] + body.centre
+    hit = Hit(impact.seconds, place, -impact.impulse)
+    expected = render(body.solid, [hit], 0.5, RATE, impact.duration)
+    performance = perform(described, visible=False)
+    assert decibels(performance.sound[:, 0] / performance.scale, expected) < -60.0
+
+
+def test_modes_ring_as_the_bank_has_them_from_strike_to_strike():
+    hertz, dampings = np.array([440.0, 1234.5, 23_000.0]), np.array([3.0, 20.0, 5.0])
+    seconds = np.array([0.01, 0.0123456, 0.2])
+    amplitudes = np.array([[1.0, 0.5, 1.0], [0.3, 2.0, 0.0], [1.0, 1.0, 1.0]])
+    firsts = np.ceil(seconds * RATE).astype(np.int64)
+    act = _struck(firsts, firsts - seconds * RATE, np.zeros(3), amplitudes)
+    found = ring(hertz, dampings, np.ones((3, 1)), act, RATE // 2, RATE)[:, 0]
+    bank = Bank(hertz, dampings, RATE)
+    expected = ring_bank(bank, list(zip(seconds, amplitudes)), RATE // 2)
+    assert decibels(found, expected) < -200.0
+
+
+def test_what_a_body_lies_on_damps_it_by_as_much_as_is_told():
+    count, added = RATE // 4, 40.0
+    act = _struck(np.zeros(1, np.int64), np.zeros(1), np.zeros(1), np.ones((1, 1)))
+    blocks = np.arange(-(-count // BLOCK))
+    damped = replace(act, damped=blocks, dampings=np.full((len(blocks), 1), added))
+    found = ring(np.array([800.0]), np.array([5.0]), np.ones((1, 1)), damped, count, RATE)
+    expected = ring(np.array([800.0]), np.array([5.0 + added]), np.ones((1, 1)), act, count, RATE)
+    assert decibels(found, expected) < -200.0
+
+
+def test_a_force_that_lasts_moves_a_mode_as_its_equation_of_motion_says():
+    hertz, damping, drive = 300.0, 10.0, 250.0
+    count = BLOCK * 400
+    seconds = np.arange(count) / RATE
+    force = np.sin(2 * np.pi * drive * seconds)
+    act = replace(
+        _struck(np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros((0, 1))),
+        blocks=np.arange(400),
+        courses=force.reshape(-1, BLOCK),
+        pushes=np.ones((400, 1)),
+    )
+    found = ring(np.array([hertz]), np.array([damping]), np.ones((1, 1)), act, count, RATE)[:, 0]
+    # x'' + 2 d x' + (w^2 + d^2) x = w f; the steady part, when the rest has decayed.
+    omega, pushed = 2 * np.pi * hertz, 2 * np.pi * drive
+    expected = omega / abs(omega**2 + damping**2 - pushed**2 + 2j * damping * pushed)
+    assert np.abs(hilbert(found)[-8000:-2000]).mean() == pytest.approx(expected, rel=0.01)
+
+
+def test_the_same_scene_sounds_the_same_on_any_number_of_threads():
+    described = scene(
+        {**BAR, "position": [0, 0, 0.1], "rotation": [10, 20, 0]},
+        ball(position=[0.0, 0.0, 0.25]),
+        seconds=0.5,
+    )
+    first, second, third = (perform(described, threads, False).sound for threads in (1, 2, 3))
+    assert np.array_equal(first, second) and np.array_equal(first, third)
+
+
+def test_sounds_reach_full_scale_and_not_beyond():
+    described = scene({**BAR, "position": [0, 0, 0.05]}, seconds=0.3)
+    assert np.abs(perform(described, visible=False).sound).max() == pytest.approx(0.99)
+    quiet = replace(described, sound=replace(described.sound, full_scale=1e-9))
+    assert np.abs(perform(quiet, visible=False).sound).max() == pytest.approx(0.99)
+    faint = replace(described, sound=replace(described.sound, full_scale=1e6))
+    assert np.abs(perform(faint, visible=False).sound).max() < 0.01
+
+
+def test_what_lies_on_the_ground_rings_shorter():
+    dropped = {**BAR, "position": [0, 0, 0.05], "damping": [1.0, 0.0]}
+    sounds = [
+        perform(scene(dropped, seconds=1.5, sound={"contact_damping": on}), visible=False).sound
+        for on in (True, False)
+    ]
+    damped, free = (np.linalg.norm(sound[-RATE // 2 :]) / np.linalg.norm(sound) for sound in sounds)
+    assert damped < 0.5 * free
+
+
+def test_a_ball_of_modes_is_no_louder_for_a_level_but_by_its_decibels():
+    described = scene({**BAR, "position": [0, 0, 0.05]}, seconds=0.3, sound={"full_scale": 1e3})
+    louder = replace(described, objects=(replace(described.objects[0], level=6.0),))
+    sounds = [perform(each, visible=False).sound for each in (described, louder)]
+    assert np.allclose(sounds[1], 10.0 ** (6.0 / 20.0) * sounds[0])
+
+
+@pytest.mark.parametrize("distance", [1.0, 5.0])
+def test_a_source_ahead_is_heard_late_and_faint_by_its_distance_alike_in_both_ears(distance):
+    click = np.zeros(RATE // 10)
+    click[100] = 1.0
+    ears = heard(click, _still([0.0, distance, 0.0]), 0, _head(), RATE)
+    assert np.allclose(ears[:, 0], ears[:, 1])
+    expected = 100 + RATE * distance / SOUND_SPEED
+    assert np.argmax(np.abs(ears[:, 0])) == pytest.approx(expected, abs=2.0)
+    tone = np.sin(2 * np.pi * 100.0 * np.arange(RATE) / RATE)
+    loud = heard(tone, _still([0.0, distance, 0.0]), 0, _head(), RATE)[RATE // 2 :, 0]
+    assert np.abs(loud).max() == pytest.approx(1.0 / distance, rel=0.02)
+
+
+def test_a_source_on_the_right_is_heard_there_first_and_brighter():
+    click = np.zeros(4000)
+    click[100] = 1.0
+    ears = heard(click, _still([2.0, 0.0, 0.0]), 0, _head(), RATE)
+    left, right = (np.flatnonzero(np.abs(ear) > 1e-3 * np.abs(ear).max())[0] for ear in ears.T)
+    around = HEAD_RADIUS * (1.0 + np.pi / 2.0) / SOUND_SPEED
+    assert (left - right) / RATE == pytest.approx(around, abs=2e-4)
+    bright = np.abs(np.fft.rfft(ears, axis=0))[-400:].mean(axis=0)
+    assert bright[1] > 3.0 * bright[0]
+
+
+def test_a_source_that_comes_nearer_sounds_higher():
+    times = np.arange(0.0, 1.01, 0.01)
+    speed = 20.0
+    positions = np.stack([0 * times, 30.0 - speed * times, 0 * times], axis=1)[:, None]
+    motion = Motion(times, positions, np.tile([1.0, 0, 0, 0], (len(times), 1, 1)))
+    tone = np.sin(2 * np.pi * 1000.0 * np.arange(RATE) / RATE)
+    ear = heard(tone, motion, 0, _head(), RATE)[RATE // 4 : 3 * RATE // 4, 0]
+    spectrum = np.abs(np.fft.rfft(ear * np.hanning(len(ear)), 16 * len(ear)))
+    found = np.argmax(spectrum) * RATE / (16 * len(ear))
+    assert found == pytest.approx(1000.0 / (1.0 - speed / SOUND_SPEED), abs=1.0)
+
+
+def test_a_profile_is_as_rough_as_told_and_the_same_for_the_same_seed():
+    way = np.arange(0.0, 20.0, 2e-6)
+    none = np.zeros(len(way))
+    found = profile(way, none, none, 3e-6, 5, RATE)
+    assert np.sqrt((found**2).mean()) == pytest.approx(3e-6, rel=0.05)
+    assert np.array_equal(found, profile(way, none, none, 3e-6, 5, RATE))
+    assert not np.array_equal(found, profile(way, none, none, 3e-6, 6, RATE))
+    smooth = profile(way, none, none + 1.0, 3e-6, 5, RATE)
+    assert not smooth.any()
+    assert np.linalg.norm(octave_heights(3e-6)) == pytest.approx(3e-6)
+
+
+def test_what_slides_is_heard_and_what_lies_still_is_not():
+    slid = {**BAR, "name": "slid", "friction": 0.1, "velocity": [2.0, 0, 0]}
+    bodies = bodies_of(scene(slid, ground=None))
+    low = -float(bodies[0].shape.vertices[:, 2].min())
+    described = scene({**slid, "position": [0, 0, low + 1e-5]}, seconds=0.5, gravity=[0, 0, -9.81])
+    sound = perform(described, visible=False).sound
+    assert np.abs(sound[RATE // 10 : RATE // 5]).max() > 1e-4
+
+
+def test_nothing_that_touches_is_refused():
+    with pytest.raises(UserError, match="nothing touches anything within 0.1 s"):
+        perform(scene({**BAR, "position": [0, 0, 9.0]}, seconds=0.1), visible=False)
+
+
+def _struck(firsts, since, durations, amplitudes) -> Excitation:
+    modes = amplitudes.shape[1]
+    none = np.zeros(0, np.int64)
+    rows = np.zeros((0, modes))
+    return Excitation(
+        firsts, since, durations, amplitudes, none, np.zeros((0, BLOCK)), rows, none, rows
+    )
+
+
+def _still(place) -> Motion:
+    return Motion(np.array([0.0, 9.0]), np.array([[place]] * 2), np.tile([1.0, 0, 0, 0], (2, 1, 1)))
+
+
+def _head() -> Head:
+    return Head(np.zeros(1), np.zeros((1, 3)), np.array([0.0, 10.0, 0.0]))
