@@ -6,4 +6,7 @@ COMMANDS = {
     "studio": Command(
         "studio.commands.studio", "design sounds in the browser: pick, drop a clip, strike, listen"
     ),
+    "scene": Command(
+        "studio.commands.scene", "solids that fall, roll and strike each other, heard and seen"
+    ),
 }

@@ -34,12 +34,9 @@ def content(design: Design) -> bytes:
     solid = SoundingSolid.of_design(design)
     listening = Listening.of_design(design, solid)
     positions = design.surface_vertices
-    gains = _gains(design, solid, listening)
-    loudest = gains.max(axis=0)
-    shares = np.divide(gains, loudest, out=np.zeros_like(gains), where=loudest > 0.0)
-    low = positions.min(axis=0)
-    side = float(np.ptp(positions, axis=0).max()) or 1.0
-    young = np.log10(_young_at(design, positions))
+    loudest, halves = halved(_gains(design, solid, listening))
+    low, step, places = stepped(positions)
+    young = np.log10(design.young_near(positions))
     wide = float(np.ptp(young)) or 1.0
     targets = design.targets
     header: dict[str, Any] = {
@@ -50,12 +47,9 @@ def content(design: Design) -> bytes:
         "cents": cents(solid.frequencies, targets.frequencies).tolist(),
         "rms_cents": rms_cents(solid.frequencies, targets.frequencies),
         "origin_m": low.tolist(),
-        "step_m": side / STEPS,
+        "step_m": step,
         "young_log10_pa": [float(young.min()), wide / STEPS],
     }
-    small = "u2" if len(positions) <= STEPS else "u4"
-    # One mode after the other, and all high bytes together: what is alike takes fewer bytes.
-    halves = np.ascontiguousarray(shares.T).astype("<f2").view("u1").reshape(-1, 2).T
     return pack(
         header,
         {
@@ -64,12 +58,39 @@ def content(design: Design) -> bytes:
             "wanted_hertz": ("f8", targets.frequencies),
             "wanted_dampings": ("f8", targets.dampings),
             "loudest": ("f8", loudest),
-            "halves": ("u2", np.ascontiguousarray(halves).ravel().view("<u2")),
-            "places": ("u2", np.rint((positions - low) / side * STEPS).T),
+            "halves": ("u2", halves),
+            "places": ("u2", places),
             "young": ("u2", np.rint((young - young.min()) / wide * STEPS)),
-            "triangles": (small, design.surface_faces),
+            "triangles": (index_type(len(positions)), design.surface_faces),
         },
     )
+
+
+def index_type(count: int) -> str:
+    """The smallest type, of `studio.binary.TYPES`, that tells so many things apart."""
+    return "u2" if count <= STEPS + 1 else "u4"
+
+
+def stepped(positions: Array) -> tuple[Array, float, Array]:
+    """Positions (V, 3) [m] as whole steps, a `STEPS`-th of the longest side each.
+
+    Returns where they begin (3,) [m], the step [m], and places (3, V): one axis after the other.
+    """
+    low = positions.min(axis=0)
+    step = (float(np.ptp(positions, axis=0).max()) or 1.0) / STEPS
+    return low, step, np.rint((positions - low) / step).T
+
+
+def halved(gains: Array) -> tuple[Array, Array]:
+    """Gains (V, N) as shares of half precision of each mode's loudest one.
+
+    Returns the loudest ones (N,), and the shares as bytes that are alike in a row: one mode after
+    the other, all low bytes before all high ones, seen as V N numbers of 16 bits.
+    """
+    loudest = np.abs(gains).max(axis=0)
+    shares = np.divide(gains, loudest, out=np.zeros_like(gains), where=loudest > 0.0)
+    halves = np.ascontiguousarray(shares.T).astype("<f2").view("u1").reshape(-1, 2).T
+    return loudest, np.ascontiguousarray(halves).ravel().view("<u2")
 
 
 def name_of(design: Design) -> str:
@@ -93,11 +114,3 @@ def _gains(design: Design, solid: SoundingSolid, listening: Listening) -> Array:
         loudness = near_weights(listening.positions, positions[part]) @ listening.gains
         gains[part] = solid.amplitudes(positions[part], inward[part]) * loudness[:, None]
     return gains
-
-
-def _young_at(design: Design, positions: Array) -> Array:
-    """Moduli (V,) [Pa] of the fine cells that are nearest to points (V, 3) [m]."""
-    from scipy.spatial import cKDTree
-
-    centres = design.fine_origin + design.fine_edge * (design.fine_grid + 0.5)
-    return np.asarray(design.young[cKDTree(centres).query(positions)[1]])

@@ -13,7 +13,7 @@ const HOW_WITHOUT_GRAPHICS = "Strike where the targets are.";
  * @param {(value: number) => string} shown
  * @param {(value: number) => void} take
  */
-function addRange(element, range, shown, take) {
+export function addRange(element, range, shown, take) {
   const label = document.createElement("label");
   const input = document.createElement("input");
   const output = document.createElement("output");

@@ -23,6 +23,39 @@ export function fromHalf(bits) {
 }
 
 /**
+ * @param {import("../page/connection.js").Numbers} places (3, V) Steps, one axis after the other.
+ * @param {number[]} origin [m]
+ * @param {number} step [m]
+ * @returns {Float32Array} (V, 3) [m]
+ */
+export function positionsOf(places, origin, step) {
+  const vertices = places.length / 3;
+  const positions = new Float32Array(places.length);
+  for (let axis = 0; axis < 3; axis++) {
+    for (let vertex = 0; vertex < vertices; vertex++) {
+      positions[3 * vertex + axis] = origin[axis] + places[axis * vertices + vertex] * step;
+    }
+  }
+  return positions;
+}
+
+/**
+ * Reads gains of half precision, whose low bytes all come first, then all high ones.
+ *
+ * @param {import("../page/connection.js").Numbers} halves (N V) One mode after the other.
+ * @param {import("../page/connection.js").Numbers} loudest (N)
+ * @returns {(vertex: number, mode: number) => number}
+ */
+export function gainsOf({ buffer, byteOffset, byteLength, length }, loudest) {
+  const bytes = new Uint8Array(buffer, byteOffset, byteLength);
+  const vertices = length / loudest.length;
+  return (vertex, mode) => {
+    const at = mode * vertices + vertex;
+    return fromHalf(bytes[at] | (bytes[length + at] << 8)) * loudest[mode];
+  };
+}
+
+/**
  * @param {any} header
  * @param {import("../page/connection.js").Arrays} arrays
  * @returns {Design}
@@ -31,22 +64,10 @@ export function readDesign(header, arrays) {
   const hertz = /** @type {Float64Array} */ (arrays.hertz);
   const [modes, vertices] = [hertz.length, arrays.young.length];
   const gains = new Float32Array(vertices * modes);
-  // All low bytes come first, then all high ones.
-  const { buffer, byteOffset, byteLength } = arrays.halves;
-  const bytes = new Uint8Array(buffer, byteOffset, byteLength);
-  const count = modes * vertices;
-  const positions = new Float32Array(3 * vertices);
+  const gainOf = gainsOf(arrays.halves, arrays.loudest);
   for (let mode = 0; mode < modes; mode++) {
     for (let vertex = 0; vertex < vertices; vertex++) {
-      const at = mode * vertices + vertex;
-      const share = fromHalf(bytes[at] | (bytes[count + at] << 8));
-      gains[vertex * modes + mode] = share * arrays.loudest[mode];
-    }
-  }
-  for (let axis = 0; axis < 3; axis++) {
-    for (let vertex = 0; vertex < vertices; vertex++) {
-      const steps = arrays.places[axis * vertices + vertex];
-      positions[3 * vertex + axis] = header.origin_m[axis] + steps * header.step_m;
+      gains[vertex * modes + mode] = gainOf(vertex, mode);
     }
   }
   const [least, step] = header.young_log10_pa;
@@ -80,7 +101,7 @@ export function readDesign(header, arrays) {
       dampings: /** @type {Float64Array} */ (arrays.wanted_dampings),
       amplitudes: header.amplitudes,
     },
-    positions,
+    positions: positionsOf(arrays.places, header.origin_m, header.step_m),
     triangles: Uint32Array.from(arrays.triangles),
   };
 }

@@ -14,7 +14,7 @@ STUDIO = Path(__file__).resolve().parent.parent
 PAGE = STUDIO / "page"
 _IMPORTED = re.compile(r"""(\b(?:from|import)\s*\(?\s*)(["'])([^"'\n]+)\2""")
 _MAP = re.compile(r'<script type="importmap">(.*?)</script>', re.DOTALL)
-_IMPORT = re.compile(r"""^import [^;]*? from ["'](\.[^"'\n]+)["'];\n""", re.M)
+_IMPORT = re.compile(r"""^import (?:[^;]*? from )?["'](\.[^"'\n]+)["'];\n""", re.M)
 _EXPORT = re.compile(r"^export (?=(?:class|function) )", re.M)
 _COMMENT = re.compile(r"^[ \t]*/\*(?:(?!\*/).)*\*/[ \t]*\n|^[ \t]*//[^\n]*\n", re.DOTALL | re.M)
 _INDENTED = re.compile(r"^\s+", re.M)
@@ -49,7 +49,7 @@ def gathered(entry: Path) -> dict[str, str]:
 def joined(entry: Path) -> str:
     """A module and all that it imports as one that imports nothing; no two may use one name.
 
-    For modules that name what they import, at their top, and export classes or functions.
+    For modules that import at their top, and export classes or functions by name.
     """
     sources: dict[Path, str] = {}
 

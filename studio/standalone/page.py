@@ -49,22 +49,51 @@ def write_page(path: str | Path, design: Design) -> None:
 
 def page_of(design: Design) -> str:
     """The page as text."""
-    modules = gathered(HERE / "main.js")
+    return assembled(HERE, PROCESSOR, STYLES, name_of(design), content(design))
+
+
+def assembled(
+    folder: Path, processor: Path, styles: tuple[Path, ...], title: str, message: bytes
+) -> str:
+    """A page as text, from what lies in a folder.
+
+    Parameters
+    ----------
+    folder
+        Has `main.js`, whose `start` is given the content, and `template.html`, which `frame.html`
+        is put around; its name is the page's class.
+    processor
+        Of sound: module that becomes that of a worklet.
+    styles
+        Files, in the order of their cascade.
+    message
+        The content, as `studio.binary` has it.
+    """
+    modules = gathered(folder / "main.js")
     programs = {
         "modules": modules,
         "entry": list(modules)[-1],
-        "processor": joined(PROCESSOR),
+        "processor": joined(processor),
     }
-    template = Template((HERE / "template.html").read_text(encoding="utf-8"))
-    return template.substitute(
-        title=html.escape(f"{name_of(design)} - Carillon"),
-        version=html.escape(__version__),
-        styles="\n".join(each.read_text(encoding="utf-8") for each in STYLES),
-        licences="\n\n".join(html.escape(each.read_text(encoding="utf-8")) for each in LICENCES),
+    version = html.escape(__version__)
+    licences = [html.escape(each.read_text(encoding="utf-8")) for each in LICENCES]
+    body = _template(folder / "template.html").substitute(
+        version=version, licences="\n\n".join(licences)
+    )
+    return _template(HERE / "frame.html").substitute(
+        kind=folder.name,
+        title=html.escape(f"{title} - Carillon"),
+        version=version,
+        styles="\n".join(each.read_text(encoding="utf-8") for each in styles),
+        body=body.rstrip(),
         programs=_packed(json.dumps(programs).encode()),
-        design=_packed(content(design)),
+        content=_packed(message),
         start=(HERE / "start.js").read_text(encoding="utf-8"),
     )
+
+
+def _template(path: Path) -> Template:
+    return Template(path.read_text(encoding="utf-8"))
 
 
 def _packed(data: bytes) -> str:

@@ -13,7 +13,9 @@
 
   const unpacked = (/** @type {string} */ id) => {
     const text = atob(document.getElementById(id)?.textContent ?? "");
-    const bytes = Uint8Array.from(text, (letter) => letter.charCodeAt(0));
+    // A hundred times as fast as `Uint8Array.from`, which takes seconds for a page of many megabytes.
+    const bytes = new Uint8Array(text.length);
+    for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
     const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
     return new Response(stream).arrayBuffer();
   };
@@ -33,7 +35,7 @@
     const main = await import(programs.entry);
     // A worklet of a page without an origin, as files are, takes nothing from a blob.
     const processor = `data:text/javascript,${encodeURIComponent(programs.processor)}`;
-    await main.start(await unpacked("design"), processor, tell);
+    await main.start(await unpacked("content"), processor, tell);
   } catch (error) {
     const { message } = /** @type {Error} */ (error);
     tell(`The page could not start (${message}); open it in a current browser.`);

@@ -9,6 +9,7 @@ from tests.hostile import (
     forests_cases,
     solver_cases,
     sound_cases,
+    studio_cases,
     workflow_cases,
 )
 
@@ -17,6 +18,7 @@ TABLES = {
     "forests": forests_cases.TABLE,
     "solver": solver_cases.TABLE,
     "sound": sound_cases.TABLE,
+    "studio": studio_cases.TABLE,
     "workflow": workflow_cases.TABLE,
     "configuration": configuration_cases.TABLE,
     "carillon": carillon_cases.TABLE,

@@ -28,7 +28,15 @@ export class Picking {
    */
   pick(place, camera) {
     this.caster.setFromCamera(place, camera);
-    const hit = this.tree.raycastFirst(this.caster.ray, THREE.DoubleSide);
+    return this.along(this.caster.ray);
+  }
+
+  /**
+   * @param {THREE.Ray} ray in the surface's own axes
+   * @returns {Picked | null} null beside the solid; its distance is that from where the ray begins
+   */
+  along(ray) {
+    const hit = this.tree.raycastFirst(ray, THREE.DoubleSide);
     if (!hit?.face) return null;
     let [vertex, least] = [-1, Infinity];
     for (const corner of [hit.face.a, hit.face.b, hit.face.c]) {

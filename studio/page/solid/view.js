@@ -7,7 +7,7 @@ import { Surface } from "./surface.js";
 
 /** @typedef {import("./picking.js").Picked} Picked */
 
-const NO_GRAPHICS =
+export const NO_GRAPHICS =
   "This browser draws no 3D (WebGL 2): allow hardware acceleration, or take another browser. " +
   "Targets can still be struck and heard.";
 
@@ -57,11 +57,7 @@ export class View {
     this.camera = new THREE.PerspectiveCamera(FIELD_DEGREES, 1, 0.01, 10);
     this.camera.up.set(0, 0, 1);
     this.scene.add(this.camera);
-    // Together they show what faces the camera as bright as the legend does.
-    this.scene.add(new THREE.HemisphereLight(0xffffff, 0xb8bcc4, 0.42 * Math.PI));
-    const light = new THREE.DirectionalLight(0xffffff, 0.62 * Math.PI);
-    light.position.set(-0.5, 0.8, 1.2);
-    this.camera.add(light);
+    this.light();
 
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = !matchMedia("(prefers-reduced-motion: reduce)").matches;
@@ -109,6 +105,24 @@ export class View {
     this.resize();
   }
 
+  /** Lights the scene: together they show what faces the camera as bright as the legend does. */
+  light() {
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0xb8bcc4, 0.42 * Math.PI));
+    const light = new THREE.DirectionalLight(0xffffff, 0.62 * Math.PI);
+    light.position.set(-0.5, 0.8, 1.2);
+    this.camera.add(light);
+  }
+
+  /**
+   * Lets pass what moves by itself, before each drawing.
+   *
+   * @param {number} seconds since the last one
+   * @returns {boolean} whether anything still moves
+   */
+  advance(seconds) {
+    return this.surface?.waves.advance(seconds) ?? false;
+  }
+
   /**
    * Shows another solid, from where the camera fits all of it.
    *
@@ -148,7 +162,7 @@ export class View {
   fit(from = this.camera.position.clone().sub(this.controls.target).normalize()) {
     if (!this.surface) return;
     const { center, radius } = this.surface.sphere;
-    this.#halt();
+    this.halt();
     this.controls.target.copy(center);
     this.camera.position.copy(center).addScaledVector(from, this.#distance(from));
     this.camera.near = radius / 50;
@@ -167,7 +181,7 @@ export class View {
   }
 
   /** Ends what is left of a turn that was let go. */
-  #halt() {
+  halt() {
     const { enableDamping } = this.controls;
     this.controls.enableDamping = false;
     this.controls.update();
@@ -307,7 +321,7 @@ export class View {
     const turns = this.controls.update();
     const seconds = Math.max(0, (time - this.last) / 1000);
     this.last = time;
-    const runs = this.surface?.waves.advance(Math.min(0.1, seconds)) ?? false;
+    const runs = this.advance(Math.min(0.1, seconds));
     this.#choose(turns || runs, seconds);
     for (const called of this.beforeDrawing) called();
     this.renderer.render(this.scene, this.camera);

@@ -1,0 +1,159 @@
+"""`carillon scene`: solids that fall, roll and strike each other, heard and seen.
+
+Reads a scene (YAML): designs, modes files, meshes and balls of named materials, where they are and
+how they move. Writes what two ears hear (WAV), and, if asked for, a video, a page on which any
+object can be struck, an animated glTF, and a list of impacts.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from carillon.errors import UserError
+from carillon.options import REQUIRED, add_options, collect, option
+
+if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
+    from sound.scenes.performance import Performance
+    from sound.scenes.scene import Scene
+
+EXAMPLES = """examples:
+  carillon scene scene.yaml --out scene.wav --page scene.html
+  carillon scene scene.yaml --out scene.wav --video scene.mp4 --gltf scene.glb
+  carillon scene builtin:bars --notes "C6 E6 G6 C7" --out tune.wav --page tune.html
+"""
+BARS = "builtin:bars"
+OUTPUTS = {
+    "out": (".wav",),
+    "video": (".mp4", ".webm"),
+    "gltf": (".gltf", ".glb"),
+    "page": (".html", ".htm"),
+    "impacts": (".csv",),
+}
+"""Options that name files to write, and endings that these may have."""
+
+
+@dataclass(frozen=True)
+class SceneOptions:
+    """What is played, and what is written of it."""
+
+    scene: str = option(REQUIRED, f"scene (YAML), or {BARS}, a row of bars that a ball strikes")
+    out: str = option(REQUIRED, "file for what is heard (WAV)", metavar="SCENE.wav")
+    video: str | None = option(None, "film of it, with its sound", metavar="SCENE.mp4|.webm")
+    page: str | None = option(
+        None, "page that plays it, and lets any object be struck", metavar="SCENE.html"
+    )
+    gltf: str | None = option(None, "what moves, for other tools", metavar="SCENE.glb|.gltf")
+    impacts: str | None = option(
+        None, "list of impacts: when, what, where, how hard", metavar="IMPACTS.csv"
+    )
+    notes: str | None = option(
+        None, f"of {BARS}: names of notes, such as 'C6 E6 G6'", metavar="NOTES"
+    )
+    json: bool = option(False, "print what happened as JSON")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command line."""
+    add_options(parser, SceneOptions, positional=("scene",))
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Play the scene, write, and say what happened."""
+    options = collect(SceneOptions, arguments)
+    scene = _scene(options)
+    _require_outputs(options, scene)
+    from sound.scenes.play import perform
+
+    performance = perform(scene)
+    _write(options, performance)
+    summary = _summary(options, performance)
+    print(json.dumps(summary) if options.json else _sentence(summary))
+    return 0
+
+
+def _scene(options: SceneOptions) -> Scene:
+    if options.scene == BARS:
+        from sound.scenes.tune import tune_of
+
+        if options.notes is None:
+            raise UserError(f"{BARS}: name the notes that its bars sound, by --notes 'C6 E6 G6'")
+        return tune_of(options.notes)
+    if options.notes is not None:
+        raise UserError(f"--notes goes with {BARS}; found {options.scene}")
+    from sound.scenes.scene import load_scene
+
+    return load_scene(options.scene)
+
+
+def _require_outputs(options: SceneOptions, scene: Scene) -> None:
+    """Refuse names that nothing can be written under, and two of one name, before the work."""
+    from sound.outputs import require_output
+
+    inputs = [*scene.files, *([] if options.scene == BARS else [options.scene])]
+    seen: dict[Path, str] = {}
+    for name, endings in OUTPUTS.items():
+        file = getattr(options, name)
+        if file is None:
+            continue
+        require_output(file, endings, inputs)
+        path = Path(file).absolute()
+        if path in seen:
+            raise UserError(f"--{name} {file}: is --{seen[path]}, too; name another file")
+        seen[path] = name
+
+
+def _write(options: SceneOptions, performance: Performance) -> None:
+    from sound.clips.wav import write_wav
+
+    write_wav(options.out, performance.sound, performance.rate)
+    if options.impacts is not None:
+        from sound.scenes.impact_list import write_impacts
+
+        write_impacts(options.impacts, performance)
+    if options.gltf is not None:
+        from sound.export.scene_gltf import write_scene_gltf
+
+        binary = Path(options.gltf).suffix.lower() == ".glb"
+        write_scene_gltf(options.gltf, performance, binary)
+    if options.page is not None:
+        from studio.scene.page import write_scene_page
+
+        write_scene_page(options.page, performance)
+    if options.video is not None:
+        from sound.scenes.film import write_film
+
+        write_film(options.video, performance)
+
+
+def _summary(options: SceneOptions, performance: Performance) -> dict[str, Any]:
+    from math import log10
+
+    impacts = performance.impacts
+    return {
+        "files": {name: getattr(options, name) for name in OUTPUTS},
+        "seconds": len(performance.sound) / performance.rate,
+        "rate_hz": performance.rate,
+        "objects": len(performance.voices),
+        "modes": sum(len(each.frequencies) for each in performance.voices if each is not None),
+        "impacts": len(impacts),
+        "first_impact_seconds": impacts[0].seconds if impacts else None,
+        "hardest_impact_newton_seconds": max(
+            (float((each.impulse**2).sum() ** 0.5) for each in impacts), default=None
+        ),
+        "timings": performance.timings,
+        "full_scale_pascal": 1.0 / performance.scale,
+        "full_scale_decibels": 20.0 * log10(1.0 / performance.scale / 2e-5),
+    }
+
+
+def _sentence(summary: dict[str, Any]) -> str:
+    files = [name for name in summary["files"].values() if name is not None]
+    return (
+        f"{', '.join(files)}: {summary['seconds']:.4g} s, {summary['objects']} objects with "
+        f"{summary['modes']} modes, {summary['impacts']:,} impacts; full scale is "
+        f"{summary['full_scale_pascal']:.3g} Pa"
+    )

@@ -1,0 +1,13 @@
+"""`python -m studio` meets hostile command lines and files; see `tests.hostile`."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.hostile.fixtures import parameters
+from tests.hostile.studio_cases import TABLE
+
+
+@pytest.mark.parametrize("case", parameters(TABLE))
+def test_studio(case, tried):
+    tried(case)
