@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import command_help
+import materials_table
 import rooms_picture
 import schema_keys
 from sphinx.application import Sphinx
@@ -17,6 +18,8 @@ PARTS: dict[str, Callable[..., str]] = {
     "packages": rooms_picture.of_packages,
     "configuration": schema_keys.of_configuration,
     "project": schema_keys.of_project,
+    "scene": schema_keys.of_scene,
+    "materials": materials_table.of_materials,
 }
 _PLACE = re.compile(r"^<!-- made here: (.+) -->$", re.MULTILINE)
 

@@ -1,4 +1,4 @@
-"""Keys of the configuration and of projects as lists, from their schemas."""
+"""Keys of the configuration, of projects and of scenes as lists, from their schemas."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import yaml
 
 from sound.project.schema import SCHEMA as PROJECT_SCHEMA
 from sound.project.schema import word_of
+from sound.scenes.scene import SCHEMA as SCENE_SCHEMA
 from workflow import settings
 
 _BOUNDS = {
@@ -35,6 +36,11 @@ def of_configuration() -> str:
 def of_project() -> str:
     """Sections with the keys of a project."""
     return _sections(yaml.safe_load(PROJECT_SCHEMA.read_text(encoding="utf-8")), "The solid")
+
+
+def of_scene() -> str:
+    """Sections with the keys of a scene."""
+    return _sections(yaml.safe_load(SCENE_SCHEMA.read_text(encoding="utf-8")), "The scene")
 
 
 def _sections(schema: Schema, plain_title: str) -> str:
