@@ -25,7 +25,7 @@ from solver.studies.audit import audit
 from solver.studies.comparison import compare_files
 from sound.__main__ import main
 from sound.export.gltf import EXTENSION, UNSIGNED_INT
-from sound.export.rigid import mass_properties
+from carillon.fem.rigid import mass_properties
 from sound.project.design_file import write_design
 from sound.rendering.bank import Bank, ring
 from sound.rendering.listening import Listening

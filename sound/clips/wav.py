@@ -52,11 +52,11 @@ def read_wav(path: str | Path, allow_clipped: bool = False) -> tuple[Array, int]
 
 
 def write_wav(path: str | Path, samples: Array, rate: int, peak: bool = False) -> None:
-    """Write one channel (s,) as WAV of 32-bit floats, atomically.
+    """Write one channel (s,) or several (s, c) as WAV of 32-bit floats, atomically.
 
     Parameters
     ----------
-    samples : (s,)
+    samples : (s,) or (s, c)
         Full scale is 1.
     rate : int [Hz]
         Samples per second.

@@ -14,9 +14,6 @@ asks for such data "in the same form", and the factors stand in the model's extr
 
 from __future__ import annotations
 
-import base64
-import json
-import struct
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +21,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon import __version__
-from carillon.files import atomic_path
-from sound.export.rigid import mass_properties
+from carillon.fem.rigid import mass_properties
+from sound.export.gltf_buffer import (
+    FLOAT,
+    TRIANGLES,
+    UNSIGNED_INT,
+    VERTICES,
+    Buffer,
+    write_asset,
+)
 from sound.project.design import Design
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
@@ -47,10 +51,6 @@ UNITS = {
     "youngsModulus": "Pa",
     "output": "full scale is 1",
 }
-FLOAT, UNSIGNED_INT = 5126, 5125
-VERTICES, TRIANGLES = 34962, 34963
-_WIDTHS = {1: "SCALAR", 3: "VEC3"}
-_MAGIC, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
 
 
 def write_gltf(path: str | Path, design: Design, binary: bool) -> None:
@@ -61,14 +61,7 @@ def write_gltf(path: str | Path, design: Design, binary: bool) -> None:
     UserError
         If the file cannot be written.
     """
-    document, data = gltf_document(design)
-    with atomic_path(path) as temporary:
-        if binary:
-            temporary.write_bytes(_glb(document, data))
-        else:
-            text = base64.b64encode(data).decode()
-            document["buffers"][0]["uri"] = f"data:application/octet-stream;base64,{text}"
-            temporary.write_text(json.dumps(document))
+    write_asset(path, *gltf_document(design), binary)
 
 
 def gltf_document(design: Design) -> tuple[dict[str, Any], bytes]:
@@ -79,7 +72,7 @@ def gltf_document(design: Design) -> tuple[dict[str, Any], bytes]:
     lowest = float(solid.frequencies.min())
     scales = lowest / solid.frequencies[order]
     shapes = solid.motion(design.surface_vertices).transpose(2, 0, 1)[order]
-    buffer = _Buffer()
+    buffer = Buffer()
     positions = buffer.add(design.surface_vertices, FLOAT, VERTICES)
     indices = buffer.add(design.surface_faces.ravel(), UNSIGNED_INT, TRIANGLES)
     model = {
@@ -123,39 +116,9 @@ def gltf_document(design: Design) -> tuple[dict[str, Any], bytes]:
         "meshes": [
             {"primitives": [{"attributes": {"POSITION": positions}, "indices": indices}]},
         ],
-        "accessors": buffer.accessors,
-        "bufferViews": buffer.views,
-        "buffers": [{"byteLength": len(buffer.data)}],
+        **buffer.entries(),
     }
     return document, bytes(buffer.data)
-
-
-class _Buffer:
-    """Data of accessors, one view each, aligned to four bytes as all of them are."""
-
-    def __init__(self) -> None:
-        self.data = bytearray()
-        self.views: list[dict[str, Any]] = []
-        self.accessors: list[dict[str, Any]] = []
-
-    def add(self, values: NDArray[Any], component: int, target: int | None = None) -> int:
-        """Append values (n,) or (n, 3); returns the number of their accessor."""
-        rows = values.reshape(len(values), -1).astype("<f4" if component == FLOAT else "<u4")
-        raw = rows.tobytes()
-        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(raw)}
-        self.views.append(view if target is None else {**view, "target": target})
-        self.data += raw
-        self.accessors.append(
-            {
-                "bufferView": len(self.views) - 1,
-                "componentType": component,
-                "count": len(rows),
-                "type": _WIDTHS[rows.shape[1]],
-                "min": rows.min(axis=0).tolist(),
-                "max": rows.max(axis=0).tolist(),
-            }
-        )
-        return len(self.accessors) - 1
 
 
 def _loudest_first(
@@ -208,19 +171,3 @@ def _strike_nodes(design: Design, listening: Listening) -> list[dict[str, Any]]:
         }
         for strike, gain in zip(design.strikes, listening.gains)
     ]
-
-
-def _glb(document: dict[str, Any], data: bytes) -> bytes:
-    text = json.dumps(document).encode()
-    text += b" " * (-len(text) % 4)
-    data += b"\0" * (-len(data) % 4)
-    length = 12 + 8 + len(text) + 8 + len(data)
-    return b"".join(
-        [
-            struct.pack("<III", _MAGIC, 2, length),
-            struct.pack("<II", len(text), _JSON),
-            text,
-            struct.pack("<II", len(data), _BIN),
-            data,
-        ]
-    )

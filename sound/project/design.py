@@ -139,6 +139,13 @@ class Design:
             return self.targets.dampings
         return self.damping.dampings
 
+    def young_near(self, positions: Array) -> Array:
+        """Moduli (p,) [Pa] of the fine cells that are nearest to positions (p, 3) [m]."""
+        from scipy.spatial import cKDTree
+
+        centres = self.fine_origin + self.fine_edge * (self.fine_grid + 0.5)
+        return np.asarray(self.young[cKDTree(centres).query(positions)[1]])
+
     def damped_by(self, source: str | None) -> Design:
         """The same design that sounds with dampings of `clips`, of the `material`, or as it is.
 

@@ -50,25 +50,37 @@ class SoundingSolid:
 
     @classmethod
     def of_modes(cls, file: ModesFile, damping: Damping) -> SoundingSolid:
-        """A solid of any modes file with Rayleigh damping; modes too damped to oscillate are out.
+        """A solid of any modes file with Rayleigh damping; see `damped`."""
+        assert file.modes is not None
+        return cls.damped(file.model, file.eigenvalues, file.modes, damping)
+
+    @classmethod
+    def damped(
+        cls, model: Solid, eigenvalues: Array, modes: Array, damping: Damping
+    ) -> SoundingSolid:
+        """A solid with Rayleigh damping; rigid modes and those too damped to oscillate are out.
+
+        Parameters
+        ----------
+        eigenvalues, modes : (k,) [rad^2/s^2], (n_dofs, k) [kg^-1/2]
+            Ascending, those of the rigid motions first.
 
         Raises
         ------
         UserError
             If none is left.
         """
-        assert file.modes is not None
-        values = file.eigenvalues[RIGID_MODES:]
+        values = eigenvalues[RIGID_MODES:]
         decay = damping.decay_per_second(values)
         square = values - decay**2
         kept = np.flatnonzero(square > 0.0)
         if not len(kept):
             raise UserError(
-                f"of {len(file.eigenvalues)} modes none is elastic and damped little enough to "
-                "sound; compute more or lower the damping"
+                f"of {len(eigenvalues)} modes none is elastic and damped little enough to sound; "
+                "compute more or lower the damping"
             )
         hertz = np.sqrt(square[kept]) / (2.0 * np.pi)
-        return cls(hertz, decay[kept], file.model, file.modes[:, RIGID_MODES + kept])
+        return cls(hertz, decay[kept], model, modes[:, RIGID_MODES + kept])
 
     @classmethod
     def of_truth(cls, file: ModesFile, design: Design) -> SoundingSolid:
