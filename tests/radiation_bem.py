@@ -1,13 +1,13 @@
-"""How loud modes are heard: `sound.scenes.radiation` against the boundary element method.
+"""How loud modes are heard: `sound.scenes.audible.radiation` against the boundary element method.
 
     python -m tests.radiation_bem [SOLID...]    bar and plate, or builtin solids without overlaps
 
 The field is that of Burton and Miller's equation, solved by bempp-cl for the pressure on the
 surface (linear on each triangle) from the normal velocity (constant on each), and checked first on
 spheres that pulsate, swing and flatten.  Printed for each mode is the level of its pressure, rms of
-all directions, and how far off it are two approximations: that of `sound.scenes.radiation`, and the
-plainest one, a sphere of the same surface whose velocity in the direction x/|x| is that of the
-solid in x.  Takes a minute, then some seconds a mode (with pyopencl; some minutes without).
+all directions, and how far off it are two approximations: that of `sound.scenes.audible.radiation`,
+and the plainest one, a sphere of the same surface whose velocity in the direction x/|x| is that of
+the solid in x.  Takes a minute, then some seconds a mode (with pyopencl; some minutes without).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from carillon.fem.geometry import builtin_surface, hexmesh_from_voxels, voxelize
 from carillon.fem.model import RIGID_MODES, fine_model
 from solver.analysis.library import solve
 from solver.response.contact import interpolation
-from sound.scenes.radiation import AIR_DENSITY, SOUND_SPEED, radiated
+from sound.scenes.audible.radiation import AIR_DENSITY, SOUND_SPEED, radiated
 from sound.surface import struck_surface
 
 Array = NDArray[np.float64]
@@ -163,7 +163,7 @@ def level(power: Array) -> Array:
 
 
 def approximate_power(vibrating: VibratingSurface) -> Array:
-    """Mean square (N,) of pressure times distance by `sound.scenes.radiation`."""
+    """Mean square (N,) of pressure times distance by `sound.scenes.audible.radiation`."""
     found = radiated(vibrating.motion, vibrating.vertices, vibrating.faces, vibrating.frequencies)
     return found.monopoles**2 + (found.dipoles**2).sum(axis=1) / 3.0
 

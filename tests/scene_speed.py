@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from sound.scenes.play import perform
+from sound.scenes.playing.play import perform
 from sound.scenes.scene import Scene, scene_of
 
 KINDS = tuple(product(("bowl", "bar", "bell", "plate", "pitcher"), ("glass", "steel")))

@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 
 from sound.scenes.bodies import Body
-from sound.scenes.engine import Course, simulate
-from sound.scenes.impacts import Blow, Pressing, told_apart
-from sound.scenes.play import bodies_of
+from sound.scenes.contact.engine import Course, simulate
+from sound.scenes.contact.impacts import Blow, Pressing, told_apart
+from sound.scenes.contact.touch import Touch
+from sound.scenes.playing.play import bodies_of
 from sound.scenes.scene import Scene, scene_of
-from sound.scenes.touch import Touch
 
 QUIET = {"radiation": False, "space": False, "contact_damping": False, "noise": False}
 """Sound of modes alone, as they are struck."""

@@ -9,11 +9,11 @@ from scipy.signal import freqz, lfilter
 from scipy.spatial.transform import Rotation
 from scipy.special import spherical_jn, spherical_yn
 
-from sound.scenes.acceleration_noise import (
+from sound.scenes.audible.acceleration_noise import (
     acceleration_filter,
     equivalent_radius,
 )
-from sound.scenes.radiation import AIR_DENSITY, SOUND_SPEED, Radiation, radiated
+from sound.scenes.audible.radiation import AIR_DENSITY, SOUND_SPEED, Radiation, radiated
 from tests.radiation_bem import approximate_power, level, sphere_pressure, vibrating_solid
 
 RADIUS = 0.05

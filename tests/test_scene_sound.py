@@ -13,12 +13,12 @@ from sound.project.design_file import write_design
 from sound.rendering.bank import Bank
 from sound.rendering.bank import ring as ring_bank
 from sound.rendering.render import Hit, render
-from sound.scenes.hearing import HEAD_RADIUS, Head, heard
+from sound.scenes.audible.hearing import HEAD_RADIUS, Head, heard
+from sound.scenes.audible.radiation import SOUND_SPEED
+from sound.scenes.audible.ringing import BLOCK, Excitation, ring
+from sound.scenes.audible.roughness import octave_heights, profile
 from sound.scenes.picture import Motion
-from sound.scenes.play import bodies_of, perform
-from sound.scenes.radiation import SOUND_SPEED
-from sound.scenes.ringing import BLOCK, Excitation, ring
-from sound.scenes.roughness import octave_heights, profile
+from sound.scenes.playing.play import bodies_of, perform
 from tests.scenes import QUIET, ball, require_engine, scene, struck
 from tests.small_design import small_design
 

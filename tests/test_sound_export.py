@@ -17,6 +17,7 @@ import trimesh
 
 from carillon.fem.materials import young_modulus
 from carillon.fem.model import fine_model
+from carillon.fem.rigid import mass_properties
 from solver.coarsening.choice import make_coarsening
 from solver.coarsening.model import build_model
 from solver.files.modes_file import read_modes
@@ -25,7 +26,6 @@ from solver.studies.audit import audit
 from solver.studies.comparison import compare_files
 from sound.__main__ import main
 from sound.export.gltf import EXTENSION, UNSIGNED_INT
-from carillon.fem.rigid import mass_properties
 from sound.project.design_file import write_design
 from sound.rendering.bank import Bank, ring
 from sound.rendering.listening import Listening

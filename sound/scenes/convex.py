@@ -16,7 +16,7 @@ from importlib import metadata
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,13 +38,12 @@ HOLLOW = 0.02
 """Share of its hull that a solid may leave empty and still be taken for convex."""
 CELLS = 40
 """Of the grid, along the longest side, in which what is not closed is made into a solid."""
-MOST_FACES = 800
-"""Of a surface that is cut, if that goes well; finer ones are made coarser before."""
-COARSENINGS = ((1, 1e-4), (1, 0.0), (2, 1e-4), (2, 0.0))
-"""What is tried for that: multiples of `MOST_FACES`, and displacements of the vertices at random.
+MOST_FACES = (800, 1600)
+"""Of a surface that is cut; finer ones are made coarser before, as coarse as goes well."""
+JITTER = 1e-4
+"""By which vertices are displaced at random for that, over the longest side.
 
-These are over the longest side.  In a plane triangles fold over each other, as nothing speaks
-against it, unless vertices are off it a little; thin walls may prefer to keep in step.
+In a plane triangles fold over each other, as nothing speaks against it, unless vertices are off it.
 """
 EDGES_AT_ONCE = 256
 """Of which it is tried whether they go through triangles."""
@@ -61,6 +60,22 @@ CONCAVITIES = (0.01, 1.0)
 _KIND, _SCHEMA = "convex parts", 1  # counted up, too, when other parts are found than before
 _DIRECTIONS = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if way > (0, 0, 0)])
 """Of edges, diagonals of faces, and diagonals of a cube, one way each."""
+
+
+class Cuttable(NamedTuple):
+    """A closed surface, and whether CoACD shall see to it that it crosses itself nowhere.
+
+    Attributes
+    ----------
+    surface
+        Of a solid.
+    preprocessing
+        "off", or "auto": CoACD then takes for crossing, too, what merely is narrow, and makes a
+        surface of its own of that, which is thicker and takes far longer to cut.
+    """
+
+    surface: trimesh.Trimesh
+    preprocessing: str
 
 
 def convex_parts(
@@ -178,30 +193,26 @@ def _distances(surface: trimesh.Trimesh, points: Array) -> Array:
     return np.asarray(igl.signed_distance(points, vertices, faces, sign)[0])
 
 
-def _coarser(solid: trimesh.Trimesh) -> trimesh.Trimesh:
-    """A solid of few faces that goes through itself nowhere, or else the one of fewest faces.
-
-    What goes through itself is cut, too, but CoACD makes a surface of its own of it, which is
-    thicker and takes far longer.
-    """
-    if len(solid.faces) <= MOST_FACES:
-        return solid
-    tries = [_decimated(solid, *coarsening) for coarsening in COARSENINGS]
-    closed = [fewer for fewer in tries if _is_solid(fewer)]
-    clean = (fewer for fewer in closed if not _crosses_itself(fewer))
-    return next(clean, min([*closed, solid], key=lambda fewer: len(fewer.faces)))
+def _coarser(solid: trimesh.Trimesh) -> Cuttable:
+    """A solid of few faces that crosses itself nowhere, or else the solid as it is."""
+    for faces in MOST_FACES:
+        if len(solid.faces) <= faces:
+            break
+        fewer = _decimated(solid, faces)
+        if _is_solid(fewer) and not _crosses_itself(fewer):
+            return Cuttable(fewer, "off")
+    return Cuttable(solid, "auto")
 
 
-def _decimated(solid: trimesh.Trimesh, multiple: int, jitter: float) -> trimesh.Trimesh:
+def _decimated(solid: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
     """By collapsing edges that matter least (Garland and Heckbert 1997)."""
     import igl
     import trimesh
 
     noise = np.random.default_rng(0).standard_normal(solid.vertices.shape)
-    vertices = np.asfortranarray(solid.vertices + jitter * np.max(solid.extents) * noise)
-    faces = np.asfortranarray(solid.faces, dtype=np.int32)
-    found = igl.qslim(vertices, faces, multiple * MOST_FACES, block_intersections=True)
-    return trimesh.Trimesh(*found[:2])
+    vertices = np.asfortranarray(solid.vertices + JITTER * np.max(solid.extents) * noise)
+    given = np.asfortranarray(solid.faces, dtype=np.int32)
+    return trimesh.Trimesh(*igl.qslim(vertices, given, faces, block_intersections=True)[:2])
 
 
 def _crosses_itself(surface: trimesh.Trimesh) -> bool:
@@ -263,16 +274,17 @@ def _hull(points: Array) -> Array:
     return corners[taken]
 
 
-def _searched(solids: Sequence[trimesh.Trimesh], reach: float, seed: int) -> list[Array]:
+def _searched(solids: Sequence[Cuttable], reach: float, seed: int) -> list[Array]:
     """Points (p, 3) of the parts that CoACD finds; their hulls reach `reach` [m] beyond a solid.
 
     It has one thread: of several the order of the parts would depend on which one is faster.
     """
     with TemporaryDirectory() as folder:
         task, result = Path(folder, "task.npz"), Path(folder, "result.npz")
-        surfaces = {f"vertices {n}": solid.vertices for n, solid in enumerate(solids)}
-        surfaces |= {f"faces {n}": solid.faces for n, solid in enumerate(solids)}
-        np.savez(task, reach=reach, seed=seed, count=len(solids), **surfaces)
+        arrays = {f"vertices {n}": solid.surface.vertices for n, solid in enumerate(solids)}
+        arrays |= {f"faces {n}": solid.surface.faces for n, solid in enumerate(solids)}
+        modes = np.array([solid.preprocessing for solid in solids])
+        np.savez(task, reach=reach, seed=seed, modes=modes, **arrays)
         command = [sys.executable, "-m", __name__, str(task), str(result)]
         done = run_child(command, {**os.environ, "OMP_NUM_THREADS": "1"})
         if done.returncode != 0:
@@ -292,13 +304,13 @@ def _search(task: str, result: str) -> None:
     coacd.set_log_level("error")
     parts: list[Array] = []
     with np.load(task) as given:
-        for n in range(given["count"]):
+        reach, seed = float(given["reach"]), int(given["seed"])
+        for n, mode in enumerate(given["modes"]):
             vertices = given[f"vertices {n}"]
-            threshold = 2.0 * float(given["reach"]) / np.ptp(vertices, axis=0).max()
+            threshold = min(2.0 * reach / np.ptp(vertices, axis=0).max(), 1.0)
             mesh = coacd.Mesh(vertices, given[f"faces {n}"])
-            seed = int(given["seed"])
-            found = coacd.run_coacd(mesh, threshold=min(threshold, 1.0), seed=seed, **SEARCH)
-            parts += [points for points, _ in found]
+            settings = {"threshold": threshold, "preprocess_mode": str(mode), "seed": seed}
+            parts += [points for points, _ in coacd.run_coacd(mesh, **settings, **SEARCH)]
     np.savez(result, *parts)
 
 
@@ -326,7 +338,7 @@ def _key(vertices: Array, faces: Faces, concavity: float, seed: int) -> str:
             "CoACD, which cuts hollow solids into convex parts, is not installed; "
             f"pip install -r {REQUIREMENTS}"
         ) from None
-    constants = (HOLLOW, CELLS, MOST_FACES, COARSENINGS, MOST_VERTICES, SEARCH)
+    constants = (HOLLOW, CELLS, MOST_FACES, JITTER, MOST_VERTICES, SEARCH)
     settings = (version, constants, concavity, seed)
     digest = hashlib.sha256(repr(settings).encode())
     digest.update(np.asarray(vertices, dtype="<f8").tobytes())

@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
     options = collect(SceneOptions, arguments)
     scene = _scene(options)
     _require_outputs(options, scene)
-    from sound.scenes.play import perform
+    from sound.scenes.playing.play import perform
 
     performance = perform(scene)
     _write(options, performance)
@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _scene(options: SceneOptions) -> Scene:
     if options.scene == BARS:
-        from sound.scenes.tune import tune_of
+        from sound.scenes.playing.tune import tune_of
 
         if options.notes is None:
             raise UserError(f"{BARS}: name the notes that its bars sound, by --notes 'C6 E6 G6'")
@@ -111,7 +111,7 @@ def _write(options: SceneOptions, performance: Performance) -> None:
 
     write_wav(options.out, performance.sound, performance.rate)
     if options.impacts is not None:
-        from sound.scenes.impact_list import write_impacts
+        from sound.scenes.playing.impact_list import write_impacts
 
         write_impacts(options.impacts, performance)
     if options.gltf is not None:
@@ -124,7 +124,7 @@ def _write(options: SceneOptions, performance: Performance) -> None:
 
         write_scene_page(options.page, performance)
     if options.video is not None:
-        from sound.scenes.film import write_film
+        from sound.scenes.film.film import write_film
 
         write_film(options.video, performance)
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from carillon.errors import UserError
 from carillon.progress import track
 from sound.scenes.bodies import Body
-from sound.scenes.bounce import damping_ratio
-from sound.scenes.contact_log import ContactLog
-from sound.scenes.contacts import Contacts
+from sound.scenes.contact.bounce import damping_ratio
+from sound.scenes.contact.contact_log import ContactLog
+from sound.scenes.contact.contacts import ContactPoints
 from sound.scenes.materials import NamedMaterial
 from sound.scenes.performance import GROUND
 from sound.scenes.picture import Motion
@@ -50,7 +50,7 @@ class Course:
     """
 
     motion: Motion
-    contacts: Contacts
+    contacts: ContactPoints
     resting: NDArray[np.bool_]
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from sound.scenes.bodies import Body
-from sound.scenes.contacts import Contacts
+from sound.scenes.contact.contacts import ContactPoints
 from sound.scenes.hertz import compliance
 from sound.scenes.materials import NamedMaterial
 from sound.scenes.performance import GROUND
@@ -55,7 +55,7 @@ class Touch:
     def _trees(self) -> list[cKDTree]:
         return [cKDTree(body.shape.vertices) for body in self._bodies]
 
-    def spots(self, pair: tuple[int, int], contacts: Contacts) -> Spots:
+    def spots(self, pair: tuple[int, int], contacts: ContactPoints) -> Spots:
         """What the surfaces of a pair of objects are like where they touch."""
         vertices = np.full((len(contacts), 2), GROUND)
         curvatures, giving = np.zeros(len(contacts)), np.zeros(len(contacts))

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sound.rendering.solid import struck_amplitudes
+from sound.scenes.audible.damping import pushed_modes
+from sound.scenes.audible.lying import Rest
+from sound.scenes.audible.pressing import Pressed
+from sound.scenes.audible.ringing import BLOCK, Excitation
 from sound.scenes.bodies import Body
-from sound.scenes.damping import pushed_modes
-from sound.scenes.impacts import Blow
-from sound.scenes.lying import Rest
-from sound.scenes.pressing import Pressed
-from sound.scenes.ringing import BLOCK, Excitation
+from sound.scenes.contact.impacts import Blow
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter
 
+from sound.scenes.audible.damping import dashpot
+from sound.scenes.audible.ringing import BLOCK
+from sound.scenes.audible.roughness import profile
 from sound.scenes.bodies import Body
-from sound.scenes.contacts import Contacts
-from sound.scenes.damping import dashpot
+from sound.scenes.contact.contacts import ContactPoints
+from sound.scenes.contact.impacts import Pressing
 from sound.scenes.hertz import patch_radius, stiffness
-from sound.scenes.impacts import Pressing
 from sound.scenes.performance import GROUND
-from sound.scenes.ringing import BLOCK
-from sound.scenes.roughness import profile
 from sound.scenes.scene import Scene
 
 Array = NDArray[np.float64]
@@ -49,7 +49,7 @@ class Pressed:
     """
 
     pair: tuple[int, int]
-    contacts: Contacts
+    contacts: ContactPoints
     vertices: NDArray[np.integer]
     shares: Array
     blocks: Integers

@@ -14,9 +14,9 @@ from carillon.files import atomic_path
 from carillon.progress import track
 from carillon.threads import blas_threads
 from sound.outputs import require_output
-from sound.scenes.frames import Stage
+from sound.scenes.film.frames import Stage
+from sound.scenes.film.rays import scene_package
 from sound.scenes.performance import Performance
-from sound.scenes.rays import scene_package
 
 if TYPE_CHECKING:
     from av.audio.stream import AudioStream

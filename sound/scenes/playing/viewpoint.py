@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from sound.scenes.audible.hearing import Head
 from sound.scenes.bodies import Body
-from sound.scenes.hearing import Head
 from sound.scenes.picture import Camera, Motion
 from sound.scenes.scene import Scene
 

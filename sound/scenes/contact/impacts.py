@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import grey_closing, grey_opening
 from scipy.signal import find_peaks, peak_prominences
 
-from sound.scenes.contacts import Contacts
+from sound.scenes.contact.contacts import ContactPoints
+from sound.scenes.contact.touch import Spots, Touch
 from sound.scenes.hertz import bounce_seconds
 from sound.scenes.performance import Impact
 from sound.scenes.scene import Scene
-from sound.scenes.touch import Spots, Touch
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.integer]
@@ -73,12 +73,14 @@ class Pressing:
     """
 
     pair: tuple[int, int]
-    contacts: Contacts
+    contacts: ContactPoints
     spots: Spots
     shares: Array
 
 
-def told_apart(contacts: Contacts, scene: Scene, touch: Touch) -> tuple[list[Blow], list[Pressing]]:
+def told_apart(
+    contacts: ContactPoints, scene: Scene, touch: Touch
+) -> tuple[list[Blow], list[Pressing]]:
     """Impacts in the order of time, and what lasts, pair by pair."""
     blows: list[Blow] = []
     pressings: list[Pressing] = []
@@ -96,7 +98,7 @@ def told_apart(contacts: Contacts, scene: Scene, touch: Touch) -> tuple[list[Blo
 
 
 def _of_pair(
-    pair: tuple[int, int], contacts: Contacts, spots: Spots, scene: Scene
+    pair: tuple[int, int], contacts: ContactPoints, spots: Spots, scene: Scene
 ) -> tuple[list[Blow], Array]:
     """Impacts of a pair, and shares (c,) of the forces that last."""
     first = int(contacts.steps[0])
@@ -128,7 +130,7 @@ def _starts(counts: Integers) -> Integers:
 
 def _impacts(
     pair: tuple[int, int],
-    contacts: Contacts,
+    contacts: ContactPoints,
     spots: Spots,
     owners: Integers,
     weights: Array,
@@ -174,7 +176,7 @@ def _impacts(
 
 def _blows(
     told: list[Impact | None],
-    contacts: Contacts,
+    contacts: ContactPoints,
     vertices: Integers,
     owners: Integers,
     weights: Array,

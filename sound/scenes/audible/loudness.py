@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from sound.scenes.acceleration_noise import acceleration_filter, equivalent_radius
+from sound.scenes.audible.acceleration_noise import acceleration_filter, equivalent_radius
+from sound.scenes.audible.radiation import Radiation, radiated
+from sound.scenes.audible.ringing import pulse
 from sound.scenes.bodies import Body
-from sound.scenes.impacts import Blow
+from sound.scenes.contact.impacts import Blow
 from sound.scenes.performance import Voice
-from sound.scenes.radiation import Radiation, radiated
-from sound.scenes.ringing import pulse
 
 Array = NDArray[np.float64]
 

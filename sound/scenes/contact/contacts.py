@@ -12,7 +12,7 @@ Integers = NDArray[np.integer]
 
 
 @dataclass(frozen=True)
-class Contacts:
+class ContactPoints:
     """Points of contact, one after the other; c of them.
 
     Attributes
@@ -50,8 +50,8 @@ class Contacts:
     turning: Array
     masses: Array
 
-    def __getitem__(self, chosen: Integers | slice) -> Contacts:
-        return Contacts(*(getattr(self, field.name)[chosen] for field in fields(self)))
+    def __getitem__(self, chosen: Integers | slice) -> ContactPoints:
+        return ContactPoints(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
     def __len__(self) -> int:
         return len(self.steps)

@@ -14,20 +14,20 @@ from carillon.progress import say
 from carillon.runtime import allowed_threads
 from carillon.serial import serial_blas
 from carillon.threads import in_parallel
+from sound.scenes.audible.excitation import excitation, middle_places
+from sound.scenes.audible.hearing import Head, heard, towards
+from sound.scenes.audible.loudness import click, mode_gains, voice
+from sound.scenes.audible.lying import rests_of
+from sound.scenes.audible.pressing import pressed
+from sound.scenes.audible.ringing import ring
 from sound.scenes.bodies import Body, body_of
-from sound.scenes.engine import Course, simulate
-from sound.scenes.excitation import excitation, middle_places
-from sound.scenes.hearing import Head, heard, towards
-from sound.scenes.impacts import Blow, Pressing, told_apart
-from sound.scenes.loudness import click, mode_gains, voice
-from sound.scenes.lying import rests_of
+from sound.scenes.contact.engine import Course, simulate
+from sound.scenes.contact.impacts import Blow, Pressing, told_apart
+from sound.scenes.contact.touch import Touch
 from sound.scenes.performance import Performance
 from sound.scenes.picture import Appearance, Picture
-from sound.scenes.pressing import pressed
-from sound.scenes.ringing import ring
+from sound.scenes.playing.viewpoint import camera_of, head_of
 from sound.scenes.scene import ObjectEntry, Scene
-from sound.scenes.touch import Touch
-from sound.scenes.viewpoint import camera_of, head_of
 
 Array = NDArray[np.float64]
 

@@ -14,8 +14,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from sound.scenes.audible.radiation import SOUND_SPEED
 from sound.scenes.picture import Motion
-from sound.scenes.radiation import SOUND_SPEED
 
 Array = NDArray[np.float64]
 

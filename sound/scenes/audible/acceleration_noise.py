@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sound.scenes.radiation import AIR_DENSITY, SOUND_SPEED
+from sound.scenes.audible.radiation import AIR_DENSITY, SOUND_SPEED
 
 Array = NDArray[np.float64]
 

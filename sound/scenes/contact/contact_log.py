@@ -8,7 +8,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from sound.scenes.contacts import Contacts
+from sound.scenes.contact.contacts import ContactPoints
 
 Array = NDArray[np.float64]
 
@@ -19,7 +19,7 @@ _LEAST_INVERSE = 1e-12
 
 
 class ContactLog:
-    """Points of contact in the order of time; see `Contacts` for what is kept of each."""
+    """Points of contact in the order of time; see `ContactPoints` for what is kept of each."""
 
     def __init__(self) -> None:
         self._full: list[tuple[NDArray[np.int64], Array]] = []
@@ -52,14 +52,14 @@ class ContactLog:
             self._new()
         self._used = _keep(self._numbers, self._values, self._used, step, addresses, *told)
 
-    def contacts(self) -> Contacts:
+    def contacts(self) -> ContactPoints:
         """All of them."""
         parts = [*self._full, (self._numbers[: self._used], self._values[: self._used])]
         numbers = np.concatenate([part[0] for part in parts])
         values = np.concatenate([part[1] for part in parts])
         columns = np.split(values, [3, 9, 12, 15, 21, 24, 25], axis=1)
         position, places, normal, force, own_forces, velocity, turning, inverse = columns
-        return Contacts(
+        return ContactPoints(
             numbers[:, 0],
             numbers[:, 1:],
             position,

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sound.scenes.audible.damping import dashpot, dashpot_damping
 from sound.scenes.bodies import Body
-from sound.scenes.damping import dashpot, dashpot_damping
-from sound.scenes.impacts import LASTING, Pressing
+from sound.scenes.contact.impacts import LASTING, Pressing
 from sound.scenes.scene import Scene
 
 Array = NDArray[np.float64]

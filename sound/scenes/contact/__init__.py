@@ -1,0 +1,1 @@
+"""Rigid bodies in motion, and the contacts between them."""
