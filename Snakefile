@@ -50,6 +50,7 @@ include: f"{RULES}/forests_study.smk"
 include: f"{RULES}/recordings.smk"
 include: f"{RULES}/examples.smk"
 include: f"{RULES}/sound.smk"
+include: f"{RULES}/scenes.smk"
 include: f"{RULES}/compare.smk"
 
 

@@ -19,7 +19,7 @@ SCENE = """\
 title: A bar and a marble
 seconds: 0.6
 objects:
-  - {name: bar, mesh: builtin:bar, material: steel, resolution: 12, count: 6, position: [0, 0, 0.05]}
+  - {name: bar, mesh: builtin:bar, material: steel, resolution: 12, count: 6, position: [0, 0, .05]}
   - {name: marble, radius: 0.01, material: glass, count: 0, position: [0.02, 0, 0.2]}
 """
 

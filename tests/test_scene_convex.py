@@ -15,6 +15,7 @@ from carillon.errors import UserError
 from carillon.fem.geometry import builtin_surface
 from sound.scenes import convex
 from sound.scenes.convex import MOST_VERTICES, convex_parts
+from sound.surface import struck_surface
 
 POINTS = 20_000
 """Random ones, by which volumes are measured: to 1 % of a solid that fills a fifth of its box."""
@@ -138,6 +139,22 @@ def test_a_cavity_stays_empty() -> None:
     parts = parts_of(shell + cavity)
     assert not within(parts, np.zeros((1, 3))).any()
     assert volume(parts, shell) == pytest.approx(0.1**3 - 0.06**3, rel=0.1)
+
+
+def test_a_fine_surface_is_made_coarser_without_crossing_itself() -> None:
+    fine = struck_surface("builtin:frying-pan").split()[0]  # its planes are cut finely, too
+    coarse, preprocessing = convex._coarser(fine)
+    assert preprocessing == "off" and coarse.is_volume
+    assert len(coarse.faces) <= min(convex.MOST_FACES) < len(fine.faces)
+    assert coarse.volume == pytest.approx(fine.volume, rel=1e-3)
+
+
+def test_surfaces_that_cross_themselves_are_told() -> None:
+    box = trimesh.creation.box((0.1, 0.1, 0.1))
+    beside = box.copy().apply_translation((0.11, 0.012, 0.023))
+    through = box.copy().apply_translation((0.06, 0.012, 0.023))
+    assert not convex._crosses_itself(box + beside)
+    assert convex._crosses_itself(box + through)
 
 
 def test_of_many_vertices_those_are_kept_that_matter() -> None:

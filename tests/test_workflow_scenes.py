@@ -118,7 +118,7 @@ def test_a_design_is_bowled_at_pins_that_stand_on_the_ground_and_make_a_scale(tm
     pin = DESCRIBED["scenes"]["bowled"]["pin"]
     units = np.array([each.unit for each in pins])
     assert [each.position[2] for each in pins] == pytest.approx(pin["height"] * units, abs=1e-4)
-    assert -12.0 * np.log2(units) == pytest.approx(pin["semitones"])
+    assert -12.0 * np.log2(units / pin["size"]) == pytest.approx(pin["semitones"])
 
 
 def test_the_pins_stand(tmp_path):

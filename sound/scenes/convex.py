@@ -26,7 +26,7 @@ from carillon.errors import UserError
 from carillon.files import create_h5, open_h5
 from carillon.limits import require_within
 
-if TYPE_CHECKING:  # Its import takes long, and what is in the cache needs no surface.
+if TYPE_CHECKING:  # Its import takes long, and a scene may have no solid of a mesh.
     import trimesh
 
 Array = NDArray[np.float64]
@@ -53,7 +53,7 @@ SEARCH = {
     "mcts_iterations": 60,
     "mcts_max_depth": 2,
 }
-"""How hard CoACD searches for cuts: a tenth of the work of its defaults, for a few more parts."""
+"""How hard CoACD searches for cuts; its defaults take thrice as long for a few parts fewer."""
 REQUIREMENTS = "workflow/envs/requirements-scenes.txt"
 CONCAVITIES = (0.01, 1.0)
 """Bounds of how far hulls may reach; with less CoACD hardly comes to an end."""

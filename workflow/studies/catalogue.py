@@ -31,6 +31,7 @@ ALL = {
     SOUNDS_OF_RECORDINGS,
     RECORDING,
     RECORDINGS,
+    SCENES,
 ) = ALL.values()
 STUDIES = (REPORT, FIGURES, OBJECTIVES, COARSENING, DISCRETISATION, ACCURACY, FORESTS)
 """Those whose tables, figures and page are made one after the other."""

@@ -20,7 +20,7 @@ CHANNELS = 4
 
 
 def mode_gains(body: Body, radiation: bool) -> Array:
-    """Pressure times distance (K, CHANNELS) [Pa m] of the amplitudes of a body's modes.
+    """Pressure times distance (K, CHANNELS) [Pa m] of the amplitudes of a body's modes, at 0 dB.
 
     Of modes without clips each is as loud as its surface moves the air.  The modes of a design are
     as loud beside each other as its clips say; together they are as loud as their surface moves the
@@ -40,7 +40,7 @@ def mode_gains(body: Body, radiation: bool) -> Array:
             gains = np.column_stack([found.monopoles, found.dipoles])
         else:
             gains *= _as_loud(body, found)
-    return np.asarray(gains * 10.0 ** (body.entry.level / 20.0))
+    return gains
 
 
 def voice(body: Body, gains: Array) -> Voice:

@@ -21,6 +21,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -207,19 +208,39 @@ def _power_above(
     plain, turned : (N,), (N, 3)
         Orders 0 and 1 with the same z.
     """
-    power = np.zeros(len(numbers))
     directions = _half_of_all_directions(DIRECTION_PAIRS)
     ways, facings = directions @ panels.centres.T, directions @ panels.normals.T
-    for direction, way, facing in zip(directions, ways, facings):
-        phases = way[:, None] * numbers
-        cosine, sine = np.cos(phases) * panels.flows, np.sin(phases) * panels.flows
-        # No matrix products: for so few rows their threads would wait for each other.
-        steep_cosine, steep_sine = (np.einsum("f,fn->n", facing, part) for part in (cosine, sine))
-        # What is the same, and what is opposite, in the opposite direction.
-        even = cosine.sum(axis=0) - numbers * scatter * steep_sine - plain
-        odd = -1j * (sine.sum(axis=0) + numbers * scatter * steep_cosine) - turned @ direction
-        power += np.abs(even) ** 2 + np.abs(odd) ** 2
-    return power / DIRECTION_PAIRS
+    sums = _waves(ways, facings, numbers, np.ascontiguousarray(panels.flows))
+    cosine, sine, steep_cosine, steep_sine = sums
+    # What is the same, and what is opposite, in the opposite direction.
+    even = cosine - numbers * scatter * steep_sine - plain
+    odd = -1j * (sine + numbers * scatter * steep_cosine) - directions @ turned.T
+    return np.asarray((np.abs(even) ** 2 + np.abs(odd) ** 2).mean(axis=0))
+
+
+@numba.njit(cache=True, nogil=True)
+def _waves(ways, facings, numbers, flows):  # type: ignore[no-untyped-def]
+    """Sums (4, d, N) over F panels of flows (F, N) times cosine and sine of k way, then so facing.
+
+    Parameters
+    ----------
+    ways, facings : (d, F) [m], (d, F)
+        How far the panels lie, and how much they face, in d directions.
+    numbers : (N,) [1/m]
+        k.
+    """
+    sums = np.zeros((4, len(ways), len(numbers)))
+    for d in range(len(ways)):
+        for f in range(len(flows)):
+            way, facing = ways[d, f], facings[d, f]
+            for n in range(len(numbers)):
+                phase = way * numbers[n]
+                cosine, sine = np.cos(phase) * flows[f, n], np.sin(phase) * flows[f, n]
+                sums[0, d, n] += cosine
+                sums[1, d, n] += sine
+                sums[2, d, n] += facing * cosine
+                sums[3, d, n] += facing * sine
+    return sums
 
 
 def _main_axis(turned: Waves, towards: Waves) -> tuple[Array, Array]:

@@ -16,7 +16,7 @@ from carillon.serial import serial_blas
 from carillon.threads import in_parallel
 from sound.scenes.audible.excitation import excitation, middle_places
 from sound.scenes.audible.hearing import Head, heard, towards
-from sound.scenes.audible.loudness import click, mode_gains, voice
+from sound.scenes.audible.loudness import CHANNELS, click, mode_gains, voice
 from sound.scenes.audible.lying import rests_of
 from sound.scenes.audible.pressing import pressed
 from sound.scenes.audible.ringing import ring
@@ -51,6 +51,7 @@ def perform(scene: Scene, threads: int | None = None, visible: bool = True) -> P
     UserError
         If an object is unusable, two overlap at the start, or nothing touches anything.
     """
+    threads = threads or allowed_threads()
     clock = Clock()
     bodies = bodies_of(scene)
     clock.lap("bodies")
@@ -63,9 +64,9 @@ def perform(scene: Scene, threads: int | None = None, visible: bool = True) -> P
         )
     blows, lasting = told_apart(course.contacts, scene, Touch(bodies, scene.ground_material))
     clock.lap("contacts")
-    player = _Player(scene, bodies, course, blows, lasting)
+    player = _Player(scene, bodies, course, blows, lasting, threads)
     numbers = [(number,) for number in range(len(bodies))]
-    parts = in_parallel(player.heard, numbers, threads or allowed_threads())
+    parts = in_parallel(player.heard, numbers, threads)
     sound = np.sum(parts, axis=0)
     clock.lap("sound")
     scale = _scale(scene, float(np.abs(sound).max(initial=0.0)))
@@ -142,6 +143,7 @@ class _Player:
         course: Course,
         blows: list[Blow],
         lasting: list[Pressing],
+        threads: int,
     ) -> None:
         self.scene, self.bodies, self.course = scene, bodies, course
         self.blows, self.lasting = blows, lasting
@@ -150,11 +152,7 @@ class _Player:
         self.count = round(scene.seconds * scene.sound.rate)
         self.camera = camera_of(scene, bodies, course.motion)
         self.head: Head = head_of(scene, self.camera)
-        silent = np.zeros((0, 4))
-        self.gains = [
-            silent if body.solid is None else mode_gains(body, scene.sound.radiation)
-            for body in bodies
-        ]
+        self.gains = _gains(bodies, scene.sound.radiation, threads)
 
     def heard(self, number: int) -> Array:
         """What two ears (count, 2) hear of a body."""
@@ -218,6 +216,16 @@ class _Player:
             if train.any() and len(noise):
                 total += gain * fftconvolve(train, noise)[: self.count]
         return total
+
+
+def _gains(bodies: list[Body], radiation: bool, threads: int) -> list[Array]:
+    """Gains of the modes of all bodies; those of bodies that are alike are found once."""
+    sounding = {id(body.solid): body for body in bodies if body.solid is not None}
+    arguments = [(body, radiation) for body in sounding.values()]
+    found = dict(zip(sounding, in_parallel(mode_gains, arguments, threads)))
+    levels = [10.0 ** (body.entry.level / 20.0) for body in bodies]
+    silent = np.zeros((0, CHANNELS))
+    return [found.get(id(body.solid), silent) * level for body, level in zip(bodies, levels)]
 
 
 def _along(parts: Array, seconds: Array, times: Array, directions: Array) -> Array:
