@@ -19,7 +19,7 @@ from sound.project.design import Design
 from sound.project.design_file import read_design
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
-from sound.scenes.convex import convex_parts
+from sound.scenes.convex import convex_parts, hull_of
 from sound.scenes.hertz import compliance
 from sound.scenes.scene import ObjectEntry
 from sound.scenes.shape import Shape
@@ -226,7 +226,8 @@ def _assembled(
     listening: Listening | None,
 ) -> Body:
     inertia = (rigid.axes * rigid.moments) @ rigid.axes.T
-    parts = (
-        [shape.vertices] if entry.collision == "hull" else convex_parts(shape.vertices, shape.faces)
-    )
+    if entry.collision == "hull":
+        parts = [hull_of(shape.vertices)]
+    else:
+        parts = convex_parts(shape.vertices, shape.faces)
     return Body(entry, rigid.mass, inertia, rigid.centre, shape, giving, parts, solid, listening)

@@ -115,7 +115,7 @@ def convex_parts(
     surface = trimesh.Trimesh(vertices, faces)
     solids = _components(surface)
     if solids and all(map(_is_convex, solids)):
-        return [_hull(solid.vertices) for solid in solids]
+        return [hull_of(solid.vertices) for solid in solids]
     path = _cache() / f"{_key(vertices, faces, concavity, seed)}.h5"
     with suppress(UserError, OSError):
         return _read(path)
@@ -250,11 +250,11 @@ def _cut(solids: Sequence[trimesh.Trimesh], concavity: float, seed: int) -> list
     hulls = []
     for part in whole + _searched(hollow, concavity * longest / 2.0, seed):
         with suppress(QhullError):  # a part as flat as rounding errors
-            hulls.append(_hull(part))
+            hulls.append(hull_of(part))
     return hulls
 
 
-def _hull(points: Array) -> Array:
+def hull_of(points: Array) -> Array:
     """At most `MOST_VERTICES` of the points (p, 3), by which their hull is kept best.
 
     One by one those are taken that are farthest outside of the hull of those taken before.

@@ -41,7 +41,9 @@ def excitation(
     ----------
     number
         Of the body.
-    blows, pressings
+    blows
+        Those that it takes part in, in the order of time.
+    pressings
         All of the scene.
     rests
         Times in which the body lies still.
@@ -53,8 +55,7 @@ def excitation(
     damped : bool
         Whether what the body touches damps it.
     """
-    own = [blow for blow in blows if number in blow.impact.pair]
-    begins = rate * np.array([blow.impact.seconds for blow in own])
+    begins = rate * np.array([blow.impact.seconds for blow in blows])
     firsts = np.ceil(begins).astype(np.int64)
     touched = [pressing for pressing in pressings if number in pressing.pair]
     motion = body.motion(body.shape.vertices) if touched else np.zeros((0, 3, 0))
@@ -72,8 +73,8 @@ def excitation(
     return Excitation(
         firsts,
         firsts - begins,
-        np.array([blow.impact.duration for blow in own]),
-        _amplitudes(number, body, own, signed),
+        np.array([blow.impact.duration for blow in blows]),
+        _amplitudes(number, body, blows, signed),
         blocks[order],
         courses[order],
         pushes[order],

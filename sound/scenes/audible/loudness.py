@@ -59,7 +59,8 @@ def voice(body: Body, gains: Array) -> Voice:
 def click(number: int, body: Body, blows: list[Blow], count: int, rate: int) -> Array:
     """Pressure times distance (count, 3) [Pa m] towards the scene's x, y and z, as a body jerks.
 
-    As of a rigid sphere of its volume.  The clips of a design have such clicks already.
+    As of a rigid sphere of its volume, by the blows that it takes part in.  The clips of a design
+    have such clicks already.
     """
     jerked = np.zeros((count, 3))
     if body.entry.fixed or body.listening is not None:
@@ -67,8 +68,8 @@ def click(number: int, body: Body, blows: list[Blow], count: int, rate: int) -> 
     for blow in blows:
         impact = blow.impact
         begin = round(impact.seconds * rate)
-        if number not in impact.pair or begin >= count:
-            continue
+        if begin >= count:
+            break
         sign = 1.0 if impact.pair[0] == number else -1.0
         jerk = rate * pulse(impact.duration, rate)[: count - begin]
         change = sign * impact.impulse / body.mass

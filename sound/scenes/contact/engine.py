@@ -29,6 +29,10 @@ OVERLAP = 0.01
 """Of an object's longest side: what two may overlap at the start, as convex parts are not exact."""
 FASTEST = 1e4
 """Speed [m/s] beyond which a scene has burst."""
+STEPS_TO_SLEEP = 10
+"""The engine's own number (mjMINAWAKE)."""
+SLOWEST_BODY = 1e-7
+"""Speed [m/s] at which a body lies still where nothing falls."""
 MOST_CONTACTS = 1_000_000
 """Points of contact, each counted in every step, that a scene may have for every second."""
 REQUIREMENTS = "workflow/envs/requirements-scenes.txt"
@@ -108,11 +112,21 @@ def _model(mujoco: ModuleType, scene: Scene, bodies: list[Body]) -> Any:
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
+    spec.option.sleep_tolerance = _stillness(scene)
     if scene.ground is not None:
         _add_ground(mujoco, spec, scene)
     for number, body in enumerate(bodies):
         _add_body(mujoco, spec, scene, number, body)
     return spec.compile()
+
+
+def _stillness(scene: Scene) -> float:
+    """Speed [m/s] below which a body that keeps it for `STEPS_TO_SLEEP` lies still.
+
+    A quarter of what a body gains in them that falls: none is still at the top of its flight.
+    """
+    gained = float(np.linalg.norm(scene.gravity)) * STEPS_TO_SLEEP * scene.engine.step_seconds
+    return max(0.25 * gained, SLOWEST_BODY)
 
 
 def _add_ground(mujoco: ModuleType, spec: Any, scene: Scene) -> None:

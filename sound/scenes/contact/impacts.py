@@ -32,6 +32,9 @@ PROMINENT = 0.5
 """Of the height of a peak: what it must stand out by to be an impact of its own."""
 SLOWEST = 1e-3
 """Speed of approach [m/s] below which an impact is not heard; its force goes on as if it lasted."""
+HOVERING = 0.5
+"""Of the speed that gravity makes in a bounce's time: the engine cannot tell slower bounces from a
+force that lasts."""
 LONGEST = 0.02
 """Duration of an impact [s]; what is softer presses rather than strikes."""
 _TINY = 1e-30
@@ -153,18 +156,17 @@ def _impacts(
     safe = np.maximum(totals, _TINY)
     masses = safe / np.maximum(summed(pushes / contacts.masses), _TINY)
     closing = -np.einsum("ci,ci->c", contacts.velocities, contacts.normals)
-    at_first = contacts.steps == contacts.steps[firsts][owners]
-    begun = np.maximum.reduceat(np.where(at_first, closing, 0.0), firsts)
-    # What comes to rest is slower than its impulse says: gravity, too, pushes in that time.
-    speeds = np.maximum(begun, 0.5 * totals / masses)
+    speeds = np.maximum.reduceat(closing, firsts)
     radii = safe / np.maximum(summed(pushes * spots.curvatures), _TINY)
     moduli = safe / np.maximum(summed(pushes * spots.giving), np.finfo(float).tiny)
     places = summed(pushes[:, None] * contacts.positions) / safe[:, None]
     impulses = summed(weights[:, None] * contacts.forces)
     seconds = contacts.steps[firsts] * scene.engine.step_seconds
+    weight = float(np.linalg.norm(scene.gravity)) * scene.engine.contact_seconds
+    slowest = max(SLOWEST, HOVERING * weight)
     found: list[Impact | None] = []
     for i in range(len(firsts)):
-        if totals[i] <= 0.0 or speeds[i] < SLOWEST:
+        if totals[i] <= 0.0 or speeds[i] < slowest:
             found.append(None)
             continue
         speed = float(speeds[i])

@@ -24,7 +24,7 @@ from sound.scenes.bodies import Body, body_of
 from sound.scenes.contact.engine import Course, simulate
 from sound.scenes.contact.impacts import Blow, Pressing, told_apart
 from sound.scenes.contact.touch import Touch
-from sound.scenes.performance import Performance
+from sound.scenes.performance import GROUND, Performance
 from sound.scenes.picture import Appearance, Picture
 from sound.scenes.playing.viewpoint import camera_of, head_of
 from sound.scenes.scene import ObjectEntry, Scene
@@ -146,7 +146,12 @@ class _Player:
         threads: int,
     ) -> None:
         self.scene, self.bodies, self.course = scene, bodies, course
-        self.blows, self.lasting = blows, lasting
+        self.lasting = lasting
+        self.blows: list[list[Blow]] = [[] for _ in bodies]
+        for blow in blows:
+            for number in blow.impact.pair:
+                if number != GROUND:
+                    self.blows[number].append(blow)
         found = [pressed(each, bodies, scene) for each in lasting]
         self.pressings = [each for each in found if each is not None]
         self.count = round(scene.seconds * scene.sound.rate)
@@ -169,7 +174,7 @@ class _Player:
         times, directions = towards(motion, number, self.head)
         total = np.zeros(self.count)
         if scene.sound.radiation:
-            jerked = click(number, body, self.blows, self.count, rate)
+            jerked = click(number, body, self.blows[number], self.count, rate)
             total += _along(jerked, seconds, times, directions)
         if body.solid is None:
             return total
@@ -178,7 +183,7 @@ class _Player:
         act = excitation(
             number,
             body,
-            self.blows,
+            self.blows[number],
             self.pressings,
             rests,
             self.count,
@@ -202,10 +207,10 @@ class _Player:
         rate = self.scene.sound.rate
         noises = body.listening.noise(rate)
         trains = np.zeros((len(noises), self.count))
-        for blow in self.blows:
+        for blow in self.blows[number]:
             begin = round(blow.impact.seconds * rate)
-            if number not in blow.impact.pair or begin >= self.count:
-                continue
+            if begin >= self.count:
+                break
             side = blow.impact.pair.index(number)
             impulses = blow.impulses[:, side]
             middle = middle_places(blow.places[:, side], impulses, np.array([0]))[0] + body.centre
