@@ -187,6 +187,17 @@ def test_a_source_that_comes_nearer_sounds_higher():
     assert found == pytest.approx(1000.0 / (1.0 - speed / SOUND_SPEED), abs=1.0)
 
 
+def test_a_head_that_walks_away_hears_less_and_less():
+    tone = np.sin(2 * np.pi * 200.0 * np.arange(2 * RATE) / RATE)
+    path = np.array([[0.0, 1.0, 0.0], [0.0, 8.0, 0.0]])
+    head = Head(np.array([0.0, 2.0]), path, np.zeros(3))
+    times = np.arange(0.0, 2.01, 0.01)
+    still = np.tile([1.0, 0, 0, 0], (len(times), 1, 1))
+    ear = heard(tone, Motion(times, np.zeros((len(times), 1, 3)), still), 0, head, RATE)[:, 0]
+    near, far = (np.abs(ear[round(at * RATE) :][: RATE // 10]).max() for at in (0.5, 1.9))
+    assert near / far == pytest.approx((1.0 + 3.5 * 1.9) / (1.0 + 3.5 * 0.5), rel=0.1)
+
+
 def test_a_profile_is_as_rough_as_told_and_the_same_for_the_same_seed():
     way = np.arange(0.0, 20.0, 2e-6)
     none = np.zeros(len(way))

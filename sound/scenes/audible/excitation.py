@@ -18,10 +18,9 @@ from sound.scenes.contact.impacts import Blow
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-_TINY = 1e-12
-
 MOST_DAMPED = 0.05
 """Of a mode's angular frequency: the most that what it lies on may add to its damping."""
+_TINY = 1e-12
 
 
 def excitation(

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
+from scipy.signal import fftconvolve, lfilter
 
 from sound.scenes.audible.acceleration_noise import acceleration_filter, equivalent_radius
+from sound.scenes.audible.excitation import middle_places
 from sound.scenes.audible.radiation import Radiation, radiated
 from sound.scenes.audible.ringing import pulse
 from sound.scenes.bodies import Body
@@ -76,6 +77,32 @@ def click(number: int, body: Body, blows: list[Blow], count: int, rate: int) -> 
         jerked[begin : begin + len(jerk)] += jerk[:, None] * change
     b, a = acceleration_filter(equivalent_radius(body.volume), rate)
     return np.asarray(lfilter(b, a, jerked, axis=0)) * 10.0 ** (body.entry.level / 20.0)
+
+
+def clip_noise(
+    number: int, body: Body, blows: list[Blow], gain: float, count: int, rate: int
+) -> Array:
+    """What the clips of a design hold besides modes (count,), in proportion to the impulses.
+
+    As `sound.rendering.render` has it, times a `gain` of the modes that go with it [Pa m].
+    """
+    assert body.listening is not None
+    noises = body.listening.noise(rate)
+    strikes = np.zeros((len(noises), count))
+    for blow in blows:
+        begin = round(blow.impact.seconds * rate)
+        if begin >= count:
+            break
+        side = blow.impact.pair.index(number)
+        impulses = blow.impulses[:, side]
+        middle = middle_places(blow.places[:, side], impulses, np.array([0]))[0] + body.centre
+        strength = float(np.linalg.norm(impulses.sum(axis=0)))
+        strikes[:, begin] += strength * body.listening.weights(middle)
+    total = np.zeros(count)
+    for struck, noise in zip(strikes, noises):
+        if struck.any() and len(noise):
+            total += gain * fftconvolve(struck, noise)[:count]
+    return total
 
 
 def _radiation(body: Body) -> Radiation:

@@ -7,16 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import fftconvolve
 
 from carillon.errors import UserError
 from carillon.progress import say
 from carillon.runtime import allowed_threads
 from carillon.serial import serial_blas
 from carillon.threads import in_parallel
-from sound.scenes.audible.excitation import excitation, middle_places
+from sound.scenes.audible.excitation import excitation
 from sound.scenes.audible.hearing import Head, heard, towards
-from sound.scenes.audible.loudness import CHANNELS, click, mode_gains, voice
+from sound.scenes.audible.loudness import CHANNELS, click, clip_noise, mode_gains, voice
 from sound.scenes.audible.lying import rests_of
 from sound.scenes.audible.pressing import pressed
 from sound.scenes.audible.ringing import ring
@@ -31,6 +30,8 @@ from sound.scenes.scene import ObjectEntry, Scene
 
 Array = NDArray[np.float64]
 
+AT_ONCE = 16
+"""Bodies whose sounds are kept before they are added up."""
 FULL = 0.99
 """Largest magnitude of a sound that is scaled to full scale: what rounds it does not reach 1."""
 
@@ -65,9 +66,7 @@ def perform(scene: Scene, threads: int | None = None, visible: bool = True) -> P
     blows, lasting = told_apart(course.contacts, scene, Touch(bodies, scene.ground_material))
     clock.lap("contacts")
     player = _Player(scene, bodies, course, blows, lasting, threads)
-    numbers = [(number,) for number in range(len(bodies))]
-    parts = in_parallel(player.heard, numbers, threads)
-    sound = np.sum(parts, axis=0)
+    sound = player.heard_together(threads)
     clock.lap("sound")
     scale = _scale(scene, float(np.abs(sound).max(initial=0.0)))
     voices = [
@@ -159,6 +158,15 @@ class _Player:
         self.head: Head = head_of(scene, self.camera)
         self.gains = _gains(bodies, scene.sound.radiation, threads)
 
+    def heard_together(self, threads: int) -> Array:
+        """What two ears (count, 2) hear of all bodies, added up in their order."""
+        sound = np.zeros((self.count, 2))
+        for first in range(0, len(self.bodies), AT_ONCE):
+            last = min(first + AT_ONCE, len(self.bodies))
+            for part in in_parallel(self.heard, [(each,) for each in range(first, last)], threads):
+                sound += part
+        return sound
+
     def heard(self, number: int) -> Array:
         """What two ears (count, 2) hear of a body."""
         source = self.source(number)
@@ -198,28 +206,8 @@ class _Player:
             turned = np.einsum("tij,ti->tj", _matrices(motion.rotations[:, number]), directions)
             total += _along(modes[:, 1:], seconds, times, turned)
         if body.listening is not None and scene.sound.noise:
-            total += self._noise(number, body, float(gains[0, 0]))
-        return total
-
-    def _noise(self, number: int, body: Body, gain: float) -> Array:
-        """What the clips of a design hold besides modes, in proportion to the impulses."""
-        assert body.listening is not None
-        rate = self.scene.sound.rate
-        noises = body.listening.noise(rate)
-        trains = np.zeros((len(noises), self.count))
-        for blow in self.blows[number]:
-            begin = round(blow.impact.seconds * rate)
-            if begin >= self.count:
-                break
-            side = blow.impact.pair.index(number)
-            impulses = blow.impulses[:, side]
-            middle = middle_places(blow.places[:, side], impulses, np.array([0]))[0] + body.centre
-            strength = float(np.linalg.norm(impulses.sum(axis=0)))
-            trains[:, begin] += strength * body.listening.weights(middle)
-        total = np.zeros(self.count)
-        for train, noise in zip(trains, noises):
-            if train.any() and len(noise):
-                total += gain * fftconvolve(train, noise)[: self.count]
+            own = self.blows[number]
+            total += clip_noise(number, body, own, float(gains[0, 0]), self.count, rate)
         return total
 
 
