@@ -5,8 +5,6 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from threadpoolctl import ThreadpoolController
@@ -125,21 +123,6 @@ def allowed_threads() -> int:
     cores = allowed_cores()
     requested = os.environ.get("OMP_NUM_THREADS", "")
     return min(cores, int(requested)) if requested.isdigit() and int(requested) > 0 else cores
-
-
-@contextmanager
-def on_one_thread() -> Iterator[None]:
-    """Let solvers take a single thread, so that results are the same bits on any machine load."""
-    before = os.environ.get("OMP_NUM_THREADS")
-    os.environ["OMP_NUM_THREADS"] = "1"
-    try:
-        with ThreadpoolController().limit(limits=1):
-            yield
-    finally:
-        if before is None:
-            del os.environ["OMP_NUM_THREADS"]
-        else:
-            os.environ["OMP_NUM_THREADS"] = before
 
 
 def limit_threads(ranks: int) -> int:

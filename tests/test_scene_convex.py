@@ -13,7 +13,7 @@ from scipy.spatial import ConvexHull
 
 from carillon.errors import UserError
 from carillon.fem.geometry import builtin_surface
-from sound.scenes import convex
+from sound.scenes import convex, cuttable
 from sound.scenes.convex import MOST_VERTICES, convex_parts
 from sound.surface import struck_surface
 
@@ -143,7 +143,7 @@ def test_a_cavity_stays_empty() -> None:
 
 def test_a_fine_surface_is_made_coarser_without_crossing_itself() -> None:
     fine = struck_surface("builtin:frying-pan").split()[0]  # its planes are cut finely, too
-    coarse, preprocessing = convex._coarser(fine)
+    coarse, preprocessing = cuttable.coarser(fine)
     assert preprocessing == "off" and coarse.is_volume
     assert len(coarse.faces) <= min(convex.MOST_FACES) < len(fine.faces)
     assert coarse.volume == pytest.approx(fine.volume, rel=1e-3)
@@ -153,8 +153,8 @@ def test_surfaces_that_cross_themselves_are_told() -> None:
     box = trimesh.creation.box((0.1, 0.1, 0.1))
     beside = box.copy().apply_translation((0.11, 0.012, 0.023))
     through = box.copy().apply_translation((0.06, 0.012, 0.023))
-    assert not convex._crosses_itself(box + beside)
-    assert convex._crosses_itself(box + through)
+    assert not cuttable.crosses_itself(box + beside)
+    assert cuttable.crosses_itself(box + through)
 
 
 def test_of_many_vertices_those_are_kept_that_matter() -> None:

@@ -151,6 +151,23 @@ def test_a_ball_of_modes_is_no_louder_for_a_level_but_by_its_decibels():
     assert np.allclose(sounds[1], 10.0 ** (6.0 / 20.0) * sounds[0])
 
 
+def test_both_solids_sound_that_strike_each_other():
+    first = {**BAR, "name": "first", "position": [0, 0, 0.2], "velocity": [0, 0, -1.0]}
+    second = {**BAR, "name": "second", "rotation": [0, 0, 90]}
+    given = {"gravity": [0, 0, 0], "ground": None, "seconds": 0.3, "sound": {"full_scale": 1e3}}
+    silent = {"level": -120.0}
+    both, one, other = (
+        perform(scene(*objects, **given), visible=False).sound
+        for objects in (
+            (first, second),
+            (first, {**second, **silent}),
+            ({**first, **silent}, second),
+        )
+    )
+    assert np.abs(one).max() > 1e-6 and np.abs(other).max() > 1e-6
+    assert decibels(one + other, both) < -80.0
+
+
 @pytest.mark.parametrize("distance", [1.0, 5.0])
 def test_a_source_ahead_is_heard_late_and_faint_by_its_distance_alike_in_both_ears(distance):
     click = np.zeros(RATE // 10)

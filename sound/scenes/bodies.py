@@ -12,7 +12,7 @@ from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES, Solid
 from carillon.fem.rigid import MassProperties, mass_properties
 from carillon.files import kind_of
-from carillon.runtime import on_one_thread
+from carillon.threads import one_thread
 from solver.files.modes_file import read_modes
 from solver.response.response import Damping
 from sound.project.design import Design
@@ -202,7 +202,7 @@ def _sounding(
         return 1.0, model, None
     from solver.analysis.library import solve
 
-    with on_one_thread():
+    with one_thread():
         found = solve(model, modes=RIGID_MODES + entry.count)
     assert found.modes is not None
     size = 1.0 if entry.pitch is None else float(found.frequencies[RIGID_MODES]) / entry.pitch
