@@ -161,7 +161,8 @@ def middle_of(page, number: int) -> tuple[float, float]:
 
 def begin(page) -> None:
     page.click("#begin")
-    until_page(page, "scene.playback.runs && scene.playback.at > 0.05")
+    # On a busy machine little that is left of a scene may have been played before it is looked.
+    until_page(page, "scene.playback.at > 0.05 && (scene.playback.runs || !scene.playback.wanted)")
 
 
 def test_opens_from_a_file_and_asks_for_nothing(shown) -> None:
@@ -200,11 +201,14 @@ def test_playing_moves_bodies_to_where_they_are_at_the_time(shown) -> None:
 def test_what_is_drawn_is_what_is_heard_within_a_frame(shown) -> None:
     begin(shown)
     off: list[float] = []
-    while not off or (shown.evaluate("scene.playback.runs") and len(off) < 40):
+    while len(off) < 11:
+        if not shown.evaluate("scene.playback.wanted"):
+            shown.evaluate("scene.playback.seek(0)")
+            shown.click("#play")
         seconds, heard = shown.evaluate("Object.values(scene.playback.drawn)")
         off.append(abs(seconds - heard))
         shown.wait_for_timeout(30)
-    assert max(off) < FRAME and len(off) > 10
+    assert max(off) < FRAME
 
 
 def test_an_impact_sounds_when_the_scene_says_that_it_does(shown) -> None:

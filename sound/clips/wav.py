@@ -87,11 +87,14 @@ def write_wav(path: str | Path, samples: Array, rate: int, peak: bool = False) -
 
 
 def as_wav(samples: Array, rate: int) -> bytes:
-    """One channel (s,) at `rate` [Hz] as the content of a WAV file of 32-bit floats."""
-    import soundfile  # Slow to load.
+    """One channel (s,), or several (s, c), as the content of a WAV file of 32-bit floats.
+
+    The same samples make the same bytes: libsndfile would add the time of day (chunk PEAK).
+    """
+    from scipy.io import wavfile  # Slow to load.
 
     content = io.BytesIO()
-    soundfile.write(content, samples, rate, format="WAV", subtype="FLOAT")
+    wavfile.write(content, rate, samples.astype(np.float32))
     return content.getvalue()
 
 

@@ -39,7 +39,7 @@ def bounce_seconds(mass: float, radius: float, modulus: float, speed: float) -> 
 
     >>> ball = 4.0 / 3.0 * np.pi * 0.01**3 * 7850.0
     >>> f"{1e6 * bounce_seconds(ball, 0.01, 2.0e11 / (1.0 - 0.29**2) / 2.0, 1.0):.0f} us"
-    '61 us'
+    '71 us'
     """
     return float(BOUNCE * (mass**2 / (radius * modulus**2 * speed)) ** 0.2)
 
