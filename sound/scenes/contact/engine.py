@@ -33,8 +33,11 @@ STEPS_TO_SLEEP = 10
 """The engine's own number (mjMINAWAKE)."""
 SLOWEST_BODY = 1e-7
 """Speed [m/s] at which a body lies still where nothing falls."""
-MOST_CONTACTS = 1_000_000
-"""Points of contact, each counted in every step, that a scene may have for every second."""
+MOST_CONTACTS, MOST_CONTACTS_EACH = 1_000_000, 20_000
+"""Points of contact, each counted in every step, that a scene may have for every second; and for
+every object and second, where that is more."""
+MOST_KEPT = 12_000_000
+"""Points of contact that a scene may have in all, which take 3 GB."""
 REQUIREMENTS = "workflow/envs/requirements-scenes.txt"
 _IMPEDANCE = [0.999, 0.999, 0.001, 0.5, 2.0]
 
@@ -253,11 +256,12 @@ class _Recorder:
 
     def require_few(self, seconds: float) -> None:
         """Refuse more contacts than can be kept."""
-        if self.log.count > MOST_CONTACTS * max(1.0, seconds):
+        rate = max(MOST_CONTACTS, MOST_CONTACTS_EACH * len(self.bodies))
+        if self.log.count > min(rate * max(1.0, seconds), MOST_KEPT):
             raise UserError(
                 f"found {self.log.count:,} contacts in the first {seconds:.3g} s (counted in every "
-                f"step), expected at most {MOST_CONTACTS:,} a second; take fewer objects, hull in "
-                "place of parts, or fewer steps of the engine"
+                f"step), expected at most {rate:,} a second and {MOST_KEPT:,} in all; take fewer "
+                "objects, hull in place of parts, or fewer steps of the engine"
             )
 
     def require_calm(self, seconds: float) -> None:
