@@ -36,6 +36,7 @@ from sound.scenes.cuttable import (
     is_convex,
     remeshed,
 )
+from sound.scenes.packages import REQUIREMENTS
 
 if TYPE_CHECKING:  # Its import takes long, and a scene may have no solid of a mesh.
     import trimesh
@@ -52,7 +53,6 @@ SEARCH = {
     "mcts_max_depth": 2,
 }
 """How hard CoACD searches for cuts; its defaults take thrice as long for a few parts fewer."""
-REQUIREMENTS = "workflow/envs/requirements-scenes.txt"
 CONCAVITIES = (0.01, 1.0)
 """Bounds of how far hulls may reach; with less CoACD hardly comes to an end."""
 _KIND, _SCHEMA = "convex parts", 1  # counted up, too, when other parts are found than before

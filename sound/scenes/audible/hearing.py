@@ -58,12 +58,11 @@ class Head:
         return places, right / np.linalg.norm(right, axis=1, keepdims=True)
 
 
-def towards(motion: Motion, body: int, head: Head) -> tuple[Array, Array]:
-    """Times (t,) [s], and unit vectors (t, 3) in the scene from a body to the head."""
-    times = motion.times
-    places, _ = head.at(times)
+def towards(motion: Motion, body: int, head: Head) -> Array:
+    """Unit vectors (T, 3) in the scene from a body to the head, at the times of the motion."""
+    places, _ = head.at(motion.times)
     away = places - motion.positions[:, body]
-    return times, away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
+    return np.asarray(away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9))
 
 
 def heard(source: Array, motion: Motion, body: int, head: Head, rate: int) -> Array:

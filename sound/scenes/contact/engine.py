@@ -17,6 +17,7 @@ from sound.scenes.contact.bounce import damping_ratio
 from sound.scenes.contact.contact_log import ContactLog
 from sound.scenes.contact.contacts import ContactPoints
 from sound.scenes.materials import NamedMaterial
+from sound.scenes.packages import scene_package
 from sound.scenes.performance import GROUND
 from sound.scenes.picture import Motion
 from sound.scenes.scene import Scene
@@ -38,7 +39,6 @@ MOST_CONTACTS, MOST_CONTACTS_EACH = 1_000_000, 20_000
 every object and second, where that is more."""
 MOST_KEPT = 12_000_000
 """Points of contact that a scene may have in all, which take 3 GB."""
-REQUIREMENTS = "workflow/envs/requirements-scenes.txt"
 _IMPEDANCE = [0.999, 0.999, 0.001, 0.5, 2.0]
 
 
@@ -72,7 +72,7 @@ def simulate(scene: Scene, bodies: list[Body], visible: bool = True) -> Course:
     UserError
         If two bodies overlap at the start, if anything flies apart, or touches too often.
     """
-    mujoco = _mujoco()
+    mujoco = scene_package("mujoco")
     model = _model(mujoco, scene, bodies)
     data = mujoco.MjData(model)
     _start(mujoco, model, data, bodies)
@@ -94,17 +94,6 @@ def simulate(scene: Scene, bodies: list[Body], visible: bool = True) -> Course:
         if step % every == 0:
             recorder.require_calm(step * scene.engine.step_seconds)
     return recorder.course(every * scene.engine.step_seconds)
-
-
-def _mujoco() -> ModuleType:
-    try:
-        import mujoco
-    except ImportError as error:
-        raise UserError(
-            f"mujoco cannot be loaded ({error}); install what scenes need by pip install -r "
-            f"{REQUIREMENTS}, or 'carillon[scenes]'"
-        ) from None
-    return mujoco
 
 
 def _model(mujoco: ModuleType, scene: Scene, bodies: list[Body]) -> Any:

@@ -15,7 +15,7 @@ from carillon.progress import track
 from carillon.threads import blas_threads
 from sound.outputs import require_output
 from sound.scenes.film.frames import Stage
-from sound.scenes.film.rays import scene_package
+from sound.scenes.packages import scene_package
 from sound.scenes.performance import Performance
 
 if TYPE_CHECKING:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from carillon.errors import UserError, one_line
+from sound.scenes.packages import scene_package
 from sound.scenes.picture import Camera
 
 Flags = NDArray[np.bool_]
@@ -20,25 +19,6 @@ Window = tuple[slice, slice]
 
 CREASE_DEGREES = 40.0
 """Faces that meet at more than this do so at an edge, which is shaded as one."""
-REQUIREMENTS = "workflow/envs/requirements-scenes.txt"
-
-
-def scene_package(name: str) -> Any:
-    """A package that films need, loaded when it is: that takes long.
-
-    Raises
-    ------
-    UserError
-        If it cannot be loaded.
-    """
-    try:
-        return import_module(name)
-    except (ImportError, OSError) as error:  # OSError: a library that it needs.
-        package = name.partition(".")[0]
-        raise UserError(
-            f"{package} cannot be loaded ({one_line(str(error))}); "
-            f"install it by pip install -r {REQUIREMENTS}"
-        ) from None
 
 
 class View:

@@ -179,7 +179,7 @@ class _Player:
         scene, body, motion = self.scene, self.bodies[number], self.course.motion
         rate = scene.sound.rate
         seconds = np.arange(self.count) / rate
-        times, directions = towards(motion, number, self.head)
+        times, directions = motion.times, towards(motion, number, self.head)
         total = np.zeros(self.count)
         if scene.sound.radiation:
             jerked = click(number, body, self.blows[number], self.count, rate)

@@ -1,0 +1,28 @@
+"""Packages that scenes stand on, and nothing else of the project does."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+from carillon.errors import UserError, one_line
+
+REQUIREMENTS = "workflow/envs/requirements-scenes.txt"
+
+
+def scene_package(name: str) -> Any:
+    """A package that scenes need, loaded when it is: that takes long.
+
+    Raises
+    ------
+    UserError
+        If it cannot be loaded.
+    """
+    try:
+        return import_module(name)
+    except (ImportError, OSError) as error:  # OSError: a library that it needs.
+        package = name.partition(".")[0]
+        raise UserError(
+            f"{package} cannot be loaded ({one_line(str(error))}); "
+            f"install it by pip install -r {REQUIREMENTS}"
+        ) from None
