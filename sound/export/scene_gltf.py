@@ -27,7 +27,7 @@ from sound.export.gltf_buffer import (
     write_asset,
 )
 from sound.scenes.performance import Performance
-from sound.scenes.picture import Appearance, Camera, Motion, Picture
+from sound.scenes.picture import Appearance, Camera, Motion, Picture, linear_light
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,6 @@ GROUND_REACH = 20.0
 """Half the side of the ground, in distances of what the camera looks at."""
 NEAREST = 0.01
 """What is closer to the camera is not shown, in the same distances."""
-_LINEAR_BELOW = 0.04045
 _STRAIGHT = 1e-9
 
 
@@ -144,25 +143,11 @@ def _material(each: Appearance) -> dict[str, Any]:
     return {
         "name": each.name,
         "pbrMetallicRoughness": {
-            "baseColorFactor": [*_linear(each.colour), 1.0],
+            "baseColorFactor": [*linear_light(each.colour).tolist(), 1.0],
             "metallicFactor": 0.0,
             "roughnessFactor": ROUGHNESS,
         },
     }
-
-
-def _linear(colour: tuple[float, float, float]) -> list[float]:
-    """Reflectances from sRGB, all from 0 to 1 (IEC 61966-2-1).
-
-    Examples
-    --------
-    >>> [round(value, 4) for value in _linear((0.0, 0.5, 1.0))]
-    [0.0, 0.214, 1.0]
-    """
-    return [
-        part / 12.92 if part <= _LINEAR_BELOW else ((part + 0.055) / 1.055) ** 2.4
-        for part in colour
-    ]
 
 
 def _ground(picture: Picture) -> list[Appearance]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,3 +103,15 @@ class Picture:
     motion: Motion
     ground: float | None
     camera: Camera
+
+
+def linear_light(colour: Sequence[float]) -> Array:
+    """Light of a colour (3,) in sRGB, both from 0 to 1 (IEC 61966-2-1).
+
+    Examples
+    --------
+    >>> linear_light((0.0, 0.5, 1.0)).round(4).tolist()
+    [0.0, 0.214, 1.0]
+    """
+    parts = np.array(colour, dtype=float)
+    return np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from sound.scenes.film.ground import SKYLIGHT, SUNLIGHT, Ground, sun_behind, unit
 from sound.scenes.film.rays import Flags, Floats, PlacedSurface, RayedSurface, View, Window
-from sound.scenes.picture import Picture
+from sound.scenes.picture import Picture, linear_light
 
 Bytes = NDArray[np.uint8]
 Numbers = NDArray[np.intp]
@@ -51,7 +51,7 @@ class Stage:
         height = -np.inf if picture.ground is None else picture.ground
         self.ground = Ground(height, self.view, self.sun)
         self.surfaces = [RayedSurface(each.vertices, each.faces) for each in picture.objects]
-        self.colours = [_linear(np.array(each.colour)) for each in picture.objects]
+        self.colours = [linear_light(each.colour).astype(np.float32) for each in picture.objects]
 
     def frame(self, seconds: float) -> Bytes:
         """What is seen at a time: (H, W, 3), sRGB."""
@@ -171,12 +171,6 @@ def _edges(owners: Numbers, tones: Bytes) -> Flags:
         edges[first] |= apart
         edges[second] |= apart
     return edges
-
-
-def _linear(colours: NDArray[np.floating]) -> Floats:
-    """Light of colours in sRGB, both from 0 to 1 (IEC 61966-2-1)."""
-    low = colours <= 0.04045
-    return np.where(low, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
 def _toned(light: Floats) -> Bytes:
