@@ -105,7 +105,7 @@ def _checked(done: subprocess.CompletedProcess[str]) -> subprocess.CompletedProc
 
 @pytest.fixture(scope="session", autouse=True)
 def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Tests, and the programs that they start, keep what they found in clips to themselves."""
+    """Tests, and the programs that they start, keep what they found to themselves."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("CARILLON_CACHE", str(tmp_path_factory.mktemp("cache")))
         yield

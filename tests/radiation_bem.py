@@ -26,6 +26,7 @@ from carillon.fem.model import RIGID_MODES, fine_model
 from solver.analysis.library import solve
 from solver.response.contact import interpolation
 from sound.scenes.audible.radiation import AIR_DENSITY, SOUND_SPEED, radiated
+from sound.scenes.shape import Shape
 from sound.surface import struck_surface
 
 Array = NDArray[np.float64]
@@ -164,7 +165,8 @@ def level(power: Array) -> Array:
 
 def approximate_power(vibrating: VibratingSurface) -> Array:
     """Mean square (N,) of pressure times distance by `sound.scenes.audible.radiation`."""
-    found = radiated(vibrating.motion, vibrating.vertices, vibrating.faces, vibrating.frequencies)
+    shape = Shape.of_surface(vibrating.vertices, vibrating.faces, np.zeros(3))
+    found = radiated(vibrating.motion, shape, vibrating.frequencies)
     return found.monopoles**2 + (found.dipoles**2).sum(axis=1) / 3.0
 
 

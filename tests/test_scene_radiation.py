@@ -14,6 +14,7 @@ from sound.scenes.audible.acceleration_noise import (
     equivalent_radius,
 )
 from sound.scenes.audible.radiation import AIR_DENSITY, SOUND_SPEED, Radiation, radiated
+from sound.scenes.shape import Shape
 from tests.radiation_bem import approximate_power, level, sphere_pressure, vibrating_solid
 
 RADIUS = 0.05
@@ -41,8 +42,12 @@ def hertz(ka: float, count: int = 1) -> np.ndarray:
     return np.full(count, ka / RADIUS * SOUND_SPEED / (2.0 * np.pi))
 
 
+def shape_of(vertices: np.ndarray, faces: np.ndarray) -> Shape:
+    return Shape.of_surface(np.asarray(vertices), np.asarray(faces), np.zeros(3))
+
+
 def heard(surface: trimesh.Trimesh, motion: np.ndarray, frequencies: np.ndarray) -> Radiation:
-    return radiated(motion, np.asarray(surface.vertices), np.asarray(surface.faces), frequencies)
+    return radiated(motion, shape_of(surface.vertices, surface.faces), frequencies)
 
 
 def power(found: Radiation) -> np.ndarray:
@@ -130,7 +135,7 @@ def test_a_larger_solid_at_a_lower_frequency_is_louder_by_its_size(ball):
     motion, frequencies = some_modes(ball), np.array([300.0, 1000.0, 4000.0])
     found = heard(ball, motion, frequencies)
     vertices = 3.0 * np.asarray(ball.vertices)
-    larger = radiated(motion, vertices, np.asarray(ball.faces), frequencies / 3.0)
+    larger = radiated(motion, shape_of(vertices, ball.faces), frequencies / 3.0)
     assert larger.monopoles == pytest.approx(3.0 * found.monopoles, rel=1e-9)
     assert larger.dipoles == pytest.approx(3.0 * found.dipoles, rel=1e-9)
 
@@ -142,7 +147,7 @@ def test_a_turned_solid_has_turned_dipoles():
     turn = Rotation.from_euler("xyz", [20.0, 50.0, 110.0], degrees=True).as_matrix()
     vertices = np.asarray(box.vertices) @ turn.T
     turned = radiated(
-        np.einsum("ij,vjn->vin", turn, motion), vertices, np.asarray(box.faces), frequencies
+        np.einsum("ij,vjn->vin", turn, motion), shape_of(vertices, box.faces), frequencies
     )
     assert turned.dipoles == pytest.approx(found.dipoles @ turn.T, rel=1e-6, abs=1e-9)
     assert turned.monopoles == pytest.approx(found.monopoles, rel=0.01)  # directions are not turned
@@ -153,7 +158,7 @@ def test_the_way_that_triangles_face_does_not_matter(ball):
     found = heard(ball, motion, frequencies)
     faces = np.array(ball.faces)
     faces[::3] = faces[::3, ::-1]
-    mixed = radiated(motion, np.asarray(ball.vertices), faces, frequencies)
+    mixed = radiated(motion, shape_of(ball.vertices, faces), frequencies)
     assert mixed.monopoles == pytest.approx(found.monopoles, rel=1e-9)
     assert mixed.dipoles == pytest.approx(found.dipoles, rel=1e-9, abs=1e-9)
 
@@ -163,14 +168,14 @@ def test_an_open_surface_is_heard_nearly_as_the_closed_one(ball):
     hole = ball.triangles_center[:, 2] > 0.97 * RADIUS
     faces = np.array(ball.faces)[~hole]
     assert 0 < np.count_nonzero(hole) < 0.02 * len(hole)
-    found = power(radiated(motion, np.asarray(ball.vertices), faces, frequencies))
+    found = power(radiated(motion, shape_of(ball.vertices, faces), frequencies))
     assert found == pytest.approx(power(heard(ball, motion, frequencies)), rel=0.1)
 
 
 def test_triangles_without_area_are_not_heard(ball):
     motion, frequencies = some_modes(ball), np.array([300.0, 1000.0, 4000.0])
     faces = np.concatenate([np.array(ball.faces), [[5, 5, 7]]])
-    found = radiated(motion, np.asarray(ball.vertices), faces, frequencies)
+    found = radiated(motion, shape_of(ball.vertices, faces), frequencies)
     assert power(found) == pytest.approx(power(heard(ball, motion, frequencies)), rel=1e-9)
 
 

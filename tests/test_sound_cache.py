@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from carillon import cache
 from carillon.errors import UserError
-from sound.clips import cache, files
+from sound.clips import cache as clips
+from sound.clips import files
 from sound.clips.damped import damped_sinusoids
 from sound.clips.extraction import ModalSound, extract
 from sound.clips.files import extract_file
@@ -67,7 +69,7 @@ def test_another_search_is_another_entry(clip, folder, searches, monkeypatch):
     extract_file(clip)
     assert len(extract_file(clip, 1).frequencies) == 1
     extract_file(written(clip, 450.0))
-    monkeypatch.setattr(cache, "_origin", lambda: b"other code")
+    monkeypatch.setattr(clips, "_origin", lambda: b"other code")
     extract_file(clip)
     assert len(searches) == 4 == len(list(folder.iterdir()))
 
@@ -94,7 +96,7 @@ def test_a_damaged_entry_is_made_anew(clip, folder, searches, damage):
 @pytest.mark.parametrize("place", ["/dev/null", "/proc/nowhere", "clip.wav", "x" * 300, "~"])
 def test_without_a_cache_clips_are_searched(clip, searches, place, monkeypatch):
     monkeypatch.chdir(clip.parent)
-    monkeypatch.setattr(cache, "_folder", lambda: Path(place))
+    monkeypatch.setattr(cache, "folder_of", lambda kind: Path(place))
     extract_file(clip)
     extract_file(clip)
     assert len(searches) == 2
@@ -121,4 +123,4 @@ def test_entries_used_least_recently_make_room(tmp_path, folder, searches, monke
 def test_the_cache_is_the_users_own_unless_told(monkeypatch, tmp_path):
     monkeypatch.delenv(cache.PLACE)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert cache._folder() == tmp_path / "carillon" / "clips"
+    assert cache.folder_of("clips") == tmp_path / "carillon" / "clips"

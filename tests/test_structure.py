@@ -79,11 +79,10 @@ ARROWS = {
         solver.linear solver.subspace solver.analysis sound sound.clips sound.project""",
     "sound.rendering": """solver.files solver.response solver.subspace sound sound.clips
         sound.project""",
-    "sound.scenes": """solver.analysis solver.files solver.response sound sound.clips sound.project
+    "sound.scenes": """solver.analysis solver.files solver.response sound sound.project
         sound.rendering""",
     "sound.scenes.contact": "sound.scenes",
-    "sound.scenes.audible": """solver.response sound sound.rendering sound.scenes
-        sound.scenes.contact""",
+    "sound.scenes.audible": "solver.response sound.rendering sound.scenes sound.scenes.contact",
     "sound.scenes.film": "sound sound.scenes",
     "sound.scenes.playing": "sound.clips sound.scenes sound.scenes.audible sound.scenes.contact",
     "sound.export": """solver.files solver.response solver.assembly solver.studies sound

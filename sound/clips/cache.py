@@ -1,17 +1,10 @@
-"""Modes found in clips, kept in the user's cache: what was searched once is not searched again.
-
-Entries are named by a hash of all that they depend on, so none is ever out of date.  The cache
-saves time and nothing else: what is damaged in it is made anew, and where it cannot be written,
-clips are searched every time.
-"""
+"""Modes found in clips are kept: what was searched once is not searched again."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Callable
-from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -19,21 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon import provenance
-from carillon.errors import UserError
+from carillon.cache import remembered
 from carillon.files import create_h5, open_h5
 from sound.clips.extraction import ModalSound
 
 Array = NDArray[np.float64]
 
-PLACE = "CARILLON_CACHE"
-"""Environment variable that names the folder in place of the user's own cache."""
-MOST_BYTES = 1 << 28
-"""Of all entries; those that were used least recently make room."""
 _KIND, _SCHEMA = "clip", 1
 _ARRAYS = ("frequencies", "dampings", "amplitudes", "phases", "residual")
 
 
-def remembered(
+def remembered_modes(
     samples: Array, rate: int, modes: int | None, search: Callable[[], ModalSound]
 ) -> ModalSound:
     """What `search` finds in a clip, or found in it before.
@@ -49,26 +38,7 @@ def remembered(
     search
         Called unless its result is in the cache.  What it raises is not kept.
     """
-    folder = _folder()
-    path = folder / f"{_key(samples, rate, modes)}.h5"
-    with suppress(UserError, OSError):
-        sound = _read(path)
-        os.utime(path)
-        return sound
-    sound = search()
-    if folder.is_absolute():  # else the user has no home
-        with suppress(UserError, OSError):
-            folder.mkdir(parents=True, exist_ok=True)
-            _write(path, sound)
-            _make_room(folder)
-    return sound
-
-
-def _folder() -> Path:
-    from platformdirs import user_cache_path
-
-    named = os.environ.get(PLACE)
-    return (Path(named).absolute() if named else user_cache_path("carillon")) / "clips"
+    return remembered("clips", _key(samples, rate, modes), search, _read, _write)
 
 
 def _key(samples: Array, rate: int, modes: int | None) -> str:
@@ -101,14 +71,3 @@ def _write(path: Path, sound: ModalSound) -> None:
             file[name] = getattr(sound, name)
         file.attrs["rate"] = sound.rate
         file.attrs["evidence"] = json.dumps(sound.evidence)
-
-
-def _make_room(folder: Path) -> None:
-    """Remove the entries used least recently, until the others take no more than `MOST_BYTES`."""
-    entries = [(path, path.stat()) for path in folder.glob("*.h5")]
-    size = sum(status.st_size for _, status in entries)
-    for path, status in sorted(entries, key=lambda entry: entry[1].st_mtime_ns):
-        if size <= MOST_BYTES:
-            return
-        path.unlink(missing_ok=True)
-        size -= status.st_size

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from carillon.errors import UserError
-from sound.clips.cache import remembered
+from sound.clips.cache import remembered_modes
 from sound.clips.extraction import ModalSound, extract
 from sound.clips.wav import read_wav
 
@@ -21,7 +21,9 @@ def extract_file(
     """
     samples, rate = read_wav(path, allow_clipped)
     try:
-        return remembered(samples, rate, modes, lambda: extract(samples, rate, modes, visible))
+        return remembered_modes(
+            samples, rate, modes, lambda: extract(samples, rate, modes, visible)
+        )
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
 

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.cache import remembered
 from carillon.children import run_child
 from carillon.errors import UserError
 from carillon.files import create_h5, open_h5
@@ -98,14 +99,10 @@ def convex_parts(
     solids = components(surface)
     if solids and all(map(is_convex, solids)):
         return [hull_of(solid.vertices) for solid in solids]
-    path = _cache() / f"{_key(vertices, faces, concavity, seed)}.h5"
-    with suppress(UserError, OSError):
-        return _read(path)
-    parts = _cut(solids or remeshed(surface), concavity, seed)
-    with suppress(UserError, OSError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        _write(path, parts)
-    return parts
+    key = _key(vertices, faces, concavity, seed)
+    return remembered(
+        "convex", key, lambda: _cut(solids or remeshed(surface), concavity, seed), _read, _write
+    )
 
 
 def _cut(solids: Sequence[trimesh.Trimesh], concavity: float, seed: int) -> list[Array]:
@@ -180,15 +177,6 @@ def _search(task: str, result: str) -> None:
             settings = {"threshold": threshold, "preprocess_mode": str(mode), "seed": seed}
             parts += [points for points, _ in coacd.run_coacd(mesh, **settings, **SEARCH)]
     np.savez(result, *parts)
-
-
-def _cache() -> Path:
-    from platformdirs import user_cache_path
-
-    from sound.clips.cache import PLACE
-
-    named = os.environ.get(PLACE)
-    return (Path(named).absolute() if named else user_cache_path("carillon")) / "convex"
 
 
 def _key(vertices: Array, faces: Faces, concavity: float, seed: int) -> str:

@@ -107,9 +107,7 @@ def clip_noise(
 
 def _radiation(body: Body) -> Radiation:
     assert body.solid is not None
-    shape = body.shape
-    moved = body.motion(shape.vertices)
-    return radiated(moved, shape.vertices, shape.faces, body.solid.frequencies)
+    return radiated(body.motion(body.shape.vertices), body.shape, body.solid.frequencies)
 
 
 def _as_loud(body: Body, found: Radiation) -> float:

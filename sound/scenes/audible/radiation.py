@@ -19,17 +19,15 @@ the volume that any solid displaces at low frequencies.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from sound.strikes import inward_normals
+from sound.scenes.shape import Shape
 
 Array = NDArray[np.float64]
 Waves = NDArray[np.complex128]
-Faces = NDArray[np.integer[Any]]
 
 AIR_DENSITY = 1.204
 """Of air at 20 C [kg/m^3]."""
@@ -95,17 +93,15 @@ class _Panels:
     radius: float
 
 
-def radiated(solid_motion: Array, vertices: Array, faces: Faces, frequencies: Array) -> Radiation:
+def radiated(solid_motion: Array, shape: Shape, frequencies: Array) -> Radiation:
     """How loud the modes of a solid are heard, approximately; see this module.
 
     Parameters
     ----------
     solid_motion : (V, 3, N) [kg^-1/2]
         Displacement of the vertices in each mass-normalised mode.
-    vertices : (V, 3) [m]
-        Of the surface, from the centre of mass.
-    faces : (F, 3)
-        Vertices of triangles, which may face either way; the surface may be open.
+    shape
+        The surface, from the centre of mass.  Its triangles may face either way; it may be open.
     frequencies : (N,) [Hz]
         Above 0.
 
@@ -126,7 +122,7 @@ def radiated(solid_motion: Array, vertices: Array, faces: Faces, frequencies: Ar
     soft.  The velocity as a function of x/|x| on the sphere would be 3.9, 7.2 and 13.7 dB off
     (`python -m tests.radiation_bem bar plate bowl`).
     """
-    panels = _panels(solid_motion, vertices, faces)
+    panels = _panels(solid_motion, shape)
     numbers = 2.0 * np.pi * frequencies / SOUND_SPEED
     values, slopes = _hankel(numbers * panels.radius)
     scatter = -values / (numbers * slopes)
@@ -141,18 +137,15 @@ def radiated(solid_motion: Array, vertices: Array, faces: Faces, frequencies: Ar
     return Radiation(pressure * np.where(inward, -monopole, monopole), pressure[:, None] * dipole)
 
 
-def _panels(motion: Array, vertices: Array, faces: Faces) -> _Panels:
+def _panels(motion: Array, shape: Shape) -> _Panels:
     """The triangles of a surface whose vertices move by (V, 3, N), none without area."""
-    import trimesh
-
-    corners = vertices[faces]
+    corners = shape.vertices[shape.faces]
     doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     areas = np.linalg.norm(doubled, axis=1) / 2.0
     there = areas > 0.0
-    faces, areas = faces[there], areas[there]
+    faces, areas = shape.faces[there], areas[there]
     normals = doubled[there] / (2.0 * areas[:, None])
-    surface = trimesh.Trimesh(vertices, faces, process=False)
-    outward = -inward_normals(surface, vertices)[faces].sum(axis=1)
+    outward = -shape.inward[faces].sum(axis=1)
     normals = np.where(((normals * outward).sum(axis=1) < 0.0)[:, None], -normals, normals)
     flows = np.einsum("fcin,fi,f->fn", motion[faces], normals, areas / 3.0, optimize=True)
     radius = float(np.sqrt(areas.sum() / (4.0 * np.pi)))

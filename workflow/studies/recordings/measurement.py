@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from carillon.cache import PLACE
 from carillon.files import atomic_path
 from carillon.measurement import measured
-from sound.clips.cache import PLACE
 from sound.clips.wav import write_wav
 
 MODES, RESIDUAL, RUN = "modes.json", "residual.wav", "run.json"
