@@ -28,6 +28,7 @@ from workflow.studies.scenes.examples import (
     EXAMPLES,
     FOLDER,
     OUTPUTS,
+    PAGE_SOURCES,
     SCENE,
     TOLD,
     command,
@@ -63,6 +64,11 @@ def read(name: str, folder: Path) -> Scene:
 def test_the_schema_names_the_scenes():
     section = settings.schema()["properties"]["scenes"]["properties"]
     assert section["examples"]["items"]["enum"] == list(DESCRIBED["scenes"])
+
+
+def test_pages_are_made_anew_when_what_they_are_made_of_changes():
+    found = {path.name for path in PAGE_SOURCES}
+    assert {"playback.js", "scene.css", "template.html", "bank.js", "three.module.js"} <= found
 
 
 def test_ten_designs_fall_from_heights_that_grow_and_overlap_nothing(tmp_path):

@@ -17,7 +17,7 @@ import { Ground } from "./ground.js";
  */
 
 // Narrower views see as much from left to right as one of this shape.
-const SHAPE = 4 / 3;
+const SHAPE = 16 / 9;
 const WIDEST_DEGREES = 75;
 // From the left, from the front, and mostly from above.
 const SUN = new THREE.Vector3(-0.45, -0.35, 1).normalize();

@@ -40,6 +40,7 @@ rule play_scene:
             f"{SOUND}/{EXAMPLES[name].parts[-1]}/{DESIGN}"
             for name in PLAYED[wildcards.scene].designs
         ],
+        page=scene_examples.PAGE_SOURCES,
     output:
         **OF_SCENE,
         told=f"{SCENES}/{{scene}}/{scene_examples.TOLD}",

@@ -14,26 +14,46 @@ Array = NDArray[np.float64]
 
 FROM = np.array([0.25, -1.0, 0.42]) / np.linalg.norm([0.25, -1.0, 0.42])
 """Direction to the camera: in front, a little to the right and above."""
+_RIGHT = np.cross([0.0, 0.0, 1.0], FROM) / np.hypot(FROM[0], FROM[1])
+AXES = np.stack([_RIGHT, np.cross(FROM, _RIGHT)])
+"""To the right and up in the picture."""
+ASPECT = 16.0 / 9.0
+"""Width over height of what a camera sees at least."""
 ROOM = 1.15
 """Around what is seen."""
-MOST = 0.6
+MOST = 0.8
 """Share of all places, the nearest to their median, that must be seen; what rolls away need not."""
 
 
 def camera_of(scene: Scene, bodies: list[Body], motion: Motion) -> Camera:
-    """The camera of a scene, at a place that sees nearly all unless told."""
+    """The camera of a scene, at a place that sees nearly all unless told.
+
+    In a picture with the axes a, a ball of radius r at the place x is seen from the distance d of
+    the point u that is looked at if |a.(x - u)| + r <= s (d - b.(x - u)), where b points to the
+    camera and s is the slope of the picture's edge.  Along one axis, d is least where the balls on
+    either side need the same.
+    """
     entry = scene.camera
-    sizes = [np.linalg.norm(body.shape.vertices, axis=1).max() for body in bodies]
+    if entry.position is not None and entry.target is not None:
+        return Camera(entry.position, entry.target, entry.degrees)
+    sizes = np.array([np.linalg.norm(body.shape.vertices, axis=1).max() for body in bodies])
     places = motion.positions.reshape(-1, 3)
     away = np.linalg.norm(places - np.median(places, axis=0), axis=1)
-    near = places[away <= np.quantile(away, MOST)]
-    seen = np.concatenate([motion.positions[0], near])
-    low, high = seen.min(axis=0), seen.max(axis=0)
-    target = 0.5 * (low + high) if entry.target is None else np.array(entry.target)
+    near = away <= np.quantile(away, MOST)
+    near[: len(bodies)] = True  # where all begin
+    seen, reach = places[near], np.resize(sizes, len(places))[near]
+    middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
     if entry.position is not None:
-        return Camera(entry.position, _three(target), entry.degrees)
-    radius = 0.5 * float(np.linalg.norm(high - low)) + float(max(sizes))
-    distance = ROOM * radius / np.sin(np.radians(entry.degrees) / 2.0)
+        return Camera(entry.position, _three(middle), entry.degrees)
+    target = middle if entry.target is None else np.array(entry.target)
+    slopes = np.tan(np.radians(entry.degrees) / 2.0) * np.array([ASPECT, 1.0]) / ROOM
+    aside = (seen - target) @ AXES.T
+    needed = reach[:, None] + slopes * ((seen - target) @ FROM)[:, None]
+    ahead, behind = (needed + aside).max(axis=0), (needed - aside).max(axis=0)
+    if entry.target is None:
+        target = target + 0.5 * (ahead - behind) @ AXES
+        ahead = behind = 0.5 * (ahead + behind)
+    distance = (np.maximum(ahead, behind) / slopes).max()
     return Camera(_three(target + distance * FROM), _three(target), entry.degrees)
 
 

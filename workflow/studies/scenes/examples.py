@@ -20,6 +20,14 @@ Array = NDArray[np.float64]
 Entry = dict[str, Any]
 
 EXAMPLES = Path(__file__).with_name("examples.yaml")
+_STUDIO = Path(__file__).parents[3] / "studio"
+PAGE_SOURCES = sorted(
+    path
+    for folder in ("page", "scene", "standalone")
+    for path in (_STUDIO / folder).rglob("*.*")
+    if path.suffix in {".js", ".css", ".html"}
+)
+"""Scripts, styles and frames of which the page of a scene consists."""
 FOLDER = "scenes"
 """Folder of the scenes beside the run's configuration."""
 SCENE = "scene.yaml"
