@@ -29,18 +29,13 @@ def dashpot(forces: Array, radius: float, modulus: float, mass: float) -> Array:
     return np.asarray(2.0 * DAMPING_RATIO * np.sqrt(springs * mass))
 
 
-def dashpot_damping(body: Body, places: Array, forces: Array) -> Array:
-    """Damping (p, K) [1/s per N s/m] of a body's modes by dashpots along forces (p, 3).
+def moved_along(motion: Array, forces: Array) -> Array:
+    """How far points that modes move by (p, 3, K) go (p, K) along the forces (p, 3) on them.
 
     A dashpot c along u takes the power c (u . v)^2, which damps a mode U_k by c (u . U_k)^2 / 2.
-
-    Parameters
-    ----------
-    places : (p, 3) [m]
-        In the body's own axes, as are the forces.
     """
     sizes = np.linalg.norm(forces, axis=1, keepdims=True)
-    return np.asarray(0.5 * pushed_modes(body, places, forces / np.maximum(sizes, _TINY)) ** 2)
+    return np.asarray(np.einsum("pik,pi->pk", motion, forces / np.maximum(sizes, _TINY)))
 
 
 def pushed_modes(body: Body, places: Array, forces: Array) -> Array:

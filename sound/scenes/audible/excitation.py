@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sound.rendering.solid import struck_amplitudes
-from sound.scenes.audible.damping import pushed_modes
+from sound.scenes.audible.damping import moved_along, pushed_modes
 from sound.scenes.audible.lying import Rest
 from sound.scenes.audible.pressing import Pressed
 from sound.scenes.audible.ringing import BLOCK, Excitation
@@ -20,12 +20,12 @@ Integers = NDArray[np.int64]
 
 MOST_DAMPED = 0.05
 """Of a mode's angular frequency: the most that what it lies on may add to its damping."""
-_TINY = 1e-12
 
 
 def excitation(
     number: int,
     body: Body,
+    motion: Array,
     blows: Sequence[Blow],
     pressings: Sequence[Pressed],
     rests: Sequence[Rest],
@@ -40,6 +40,8 @@ def excitation(
     ----------
     number
         Of the body.
+    motion : (V, 3, K) [kg^-1/2]
+        Of its surface's vertices in each mode.
     blows
         Those that it takes part in, in the order of time.
     pressings
@@ -57,7 +59,6 @@ def excitation(
     begins = rate * np.array([blow.impact.seconds for blow in blows])
     firsts = np.ceil(begins).astype(np.int64)
     touched = [pressing for pressing in pressings if number in pressing.pair]
-    motion = body.motion(body.shape.vertices) if touched else np.zeros((0, 3, 0))
     found = [_pushes(number, body, pressing, motion) for pressing in touched]
     modes = _modes(body)
     blocks = np.concatenate([np.zeros(0, np.int64), *(each.blocks for each in touched)])
@@ -121,7 +122,7 @@ def _pushes(number: int, body: Body, pressing: Pressed, motion: Array) -> tuple[
     vertices = pressing.vertices[:, side]
     forces = pressing.shares[:, None] * pressing.contacts.own_forces[:, side]
     sizes = np.linalg.norm(forces, axis=1, keepdims=True)
-    along = np.einsum("pik,pi->pk", motion[vertices], forces / np.maximum(sizes, _TINY))
+    along = moved_along(motion[vertices], forces)
     pushes = pressing.mean(sizes * along)
     if body.listening is not None:
         places = body.shape.vertices[vertices[pressing.firsts]] + body.centre

@@ -25,6 +25,7 @@ NEAREST = 0.1
 """Distance [m] within which nothing gets louder."""
 ROUNDS = 4
 """In which the moment is found at which a body sounded: each gains a factor of v / c."""
+SIXTH = 1.0 / 6.0
 UP = np.array([0.0, 0.0, 1.0])
 SHADOW_LEAST, SHADOW_DEGREES = 0.1, 150.0
 """Gain of high frequencies at the darkest angle from an ear, and that angle."""
@@ -92,6 +93,25 @@ def heard(source: Array, motion: Motion, body: int, head: Head, rate: int) -> Ar
     return ears
 
 
+@numba.njit(cache=True, nogil=True)
+def along(parts, frames, directions):  # type: ignore[no-untyped-def]
+    """Parts (s, 3) along directions (t, 3) that change evenly between frames (t,) [samples]."""
+    total = np.zeros(len(parts))
+    last = len(frames) - 1
+    begin = 0
+    for frame in range(len(frames)):
+        end = min(len(parts), int(np.ceil(frames[frame + 1]))) if frame < last else len(parts)
+        length = frames[frame + 1] - frames[frame] if frame < last else 1.0
+        then = min(frame + 1, last)
+        for i in range(3):
+            here = directions[frame, i]
+            turn = (directions[then, i] - here) / length
+            for n in range(begin, end):
+                total[n] += parts[n, i] * (here + (n - frames[frame]) * turn)
+        begin = max(begin, end)
+    return total
+
+
 def _seen_away(motion: Motion, body: int, places: Array) -> Array:
     """Ways (t, 3) [m] from a head to where a body was when it sounded what arrives now."""
     track = motion.positions[:, body]
@@ -121,48 +141,55 @@ def _shadow(angle: Array) -> Array:
 
 @numba.njit(cache=True, nogil=True)
 def _through(source, frames, delays, gains, shadows, rate):  # type: ignore[no-untyped-def]
-    """A source delayed, made fainter and filtered by what changes from frame to frame."""
-    heard = np.zeros(len(source))
+    """A source delayed, made fainter and filtered by what changes evenly from frame to frame."""
+    count = len(source)
+    heard = np.zeros(count)
     # (1 + shadow s / (2 w)) / (1 + s / (2 w)), w = c / a, by the bilinear transformation.
     corner = 2.0 * SOUND_SPEED / HEAD_RADIUS
     ratio = 2.0 * rate / corner
-    pole = (1.0 - ratio) / (1.0 + ratio)
+    pole, scale = (1.0 - ratio) / (1.0 + ratio), 1.0 / (1.0 + ratio)
     before_in, before_out = 0.0, 0.0
-    frame = 0
-    for n in range(len(source)):
-        while frame + 2 < len(frames) and frames[frame + 1] <= n:
-            frame += 1
-        share = 0.0
-        later = min(frame + 1, len(frames) - 1)
-        if later > frame:
-            share = min(1.0, max(0.0, (n - frames[frame]) / (frames[later] - frames[frame])))
-        delay = delays[frame] + share * (delays[later] - delays[frame])
-        gain = gains[frame] + share * (gains[later] - gains[frame])
-        shadow = shadows[frame] + share * (shadows[later] - shadows[frame])
-        value = gain * _between(source, n - delay)
-        zero = shadow * ratio
-        out = ((1.0 + zero) * value + (1.0 - zero) * before_in) / (1.0 + ratio) - pole * before_out
-        before_in, before_out = value, out
-        heard[n] = out
+    last = len(frames) - 1
+    begin = 0
+    for frame in range(len(frames)):
+        # The last values hold on.
+        end = min(count, int(np.ceil(frames[frame + 1]))) if frame < last else count
+        length = frames[frame + 1] - frames[frame] if frame < last else 1.0
+        then = min(frame + 1, last)
+        slower = (delays[then] - delays[frame]) / length
+        louder = (gains[then] - gains[frame]) / length
+        brighter = (shadows[then] - shadows[frame]) / length
+        for n in range(begin, end):
+            since = n - frames[frame]
+            place = n - (delays[frame] + since * slower)
+            value = (gains[frame] + since * louder) * _between(source, place)
+            zero = (shadows[frame] + since * brighter) * ratio
+            out = scale * ((1.0 + zero) * value + (1.0 - zero) * before_in) - pole * before_out
+            before_in, before_out = value, out
+            heard[n] = out
+        begin = max(begin, end)
     return heard
 
 
 @numba.njit(cache=True, nogil=True)
 def _between(source, place):  # type: ignore[no-untyped-def]
-    """The source between samples, by a cubic through four of them (Lagrange)."""
+    """The source between samples, by a cubic through four of them (Lagrange); silent around."""
     whole = int(np.floor(place))
-    if whole < -2 or whole > len(source):
-        return 0.0
     d = place - whole
+    before, after, beyond = d + 1.0, d - 1.0, d - 2.0
+    first = -SIXTH * d * after * beyond
+    second = 0.5 * before * after * beyond
+    third = -0.5 * before * d * beyond
+    fourth = SIXTH * before * d * after
+    if 1 <= whole < len(source) - 2:
+        return (
+            first * source[whole - 1]
+            + second * source[whole]
+            + third * source[whole + 1]
+            + fourth * source[whole + 2]
+        )
     total = 0.0
-    weights = (
-        -d * (d - 1.0) * (d - 2.0) / 6.0,
-        (d + 1.0) * (d - 1.0) * (d - 2.0) / 2.0,
-        -(d + 1.0) * d * (d - 2.0) / 2.0,
-        (d + 1.0) * d * (d - 1.0) / 6.0,
-    )
-    for i in range(4):
-        n = whole - 1 + i
+    for n, weight in ((whole - 1, first), (whole, second), (whole + 1, third), (whole + 2, fourth)):
         if 0 <= n < len(source):
-            total += weights[i] * source[n]
+            total += weight * source[n]
     return total

@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sound.scenes.audible.damping import dashpot, dashpot_damping
-from sound.scenes.bodies import Body
+from sound.scenes.audible.damping import dashpot, moved_along
 from sound.scenes.contact.impacts import LASTING, Pressing
 from sound.scenes.scene import Scene
 
@@ -26,7 +25,7 @@ class Rest(NamedTuple):
 
 def rests_of(
     number: int,
-    body: Body,
+    motion: Array,
     pressings: Sequence[Pressing],
     times: Array,
     resting: NDArray[np.bool_],
@@ -40,6 +39,8 @@ def rests_of(
     ----------
     number
         Of the body.
+    motion : (V, 3, K) [kg^-1/2]
+        Of its surface's vertices in each mode.
     pressings
         All contacts of the scene, by pairs.
     times, resting : (T,) [s], (T,)
@@ -52,27 +53,26 @@ def rests_of(
         begin = float(times[first])
         end = float(times[after]) if after < len(times) else float("inf")
         before = float(times[max(0, first - 1)])
-        parts = [_damping(number, body, each, before, begin, scene) for each in own]
+        parts = [_damping(number, motion, each, before, begin, scene) for each in own]
         rests.append(Rest(begin, end, np.sum(parts, axis=0)))
     return rests
 
 
 def _damping(
     number: int,
-    body: Body,
+    motion: Array,
     pressing: Pressing,
     before: float,
     begin: float,
     scene: Scene,
 ) -> Array:
     """Dampings (K,) [1/s] by one solid that the body touched in the last moment before a time."""
-    assert body.solid is not None
     step_seconds = scene.engine.step_seconds
     width = round(LASTING * scene.engine.steps)
     steps = pressing.contacts.steps
     high = int(np.searchsorted(steps, begin / step_seconds, side="right"))
     if not high or steps[high - 1] < before / step_seconds - width:
-        return np.zeros(len(body.solid.frequencies))
+        return np.zeros(motion.shape[2])
     low = int(np.searchsorted(steps, steps[high - 1] - width))
     contacts = pressing.contacts[slice(low, high)]
     forces = contacts.pressures / (width + 1)
@@ -81,5 +81,6 @@ def _damping(
     mass = float(np.median(contacts.masses))
     damper = dashpot(np.array([forces.sum()]), radius, modulus, mass)
     side = pressing.pair.index(number)
-    squares = dashpot_damping(body, contacts.places[:, side], contacts.own_forces[:, side])
-    return np.asarray(damper[0] * (forces @ squares) / forces.sum())
+    moved = motion[pressing.spots.vertices[low:high, side]]
+    along = moved_along(moved, contacts.own_forces[:, side])
+    return np.asarray(0.5 * damper[0] * (forces @ along**2) / forces.sum())

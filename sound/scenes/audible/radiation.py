@@ -126,9 +126,9 @@ def radiated(solid_motion: Array, shape: Shape, frequencies: Array) -> Radiation
     numbers = 2.0 * np.pi * frequencies / SOUND_SPEED
     values, slopes = _hankel(numbers * panels.radius)
     scatter = -values / (numbers * slopes)
-    plain, turned = _low_orders(panels, numbers, scatter[:2])
-    common = _low_orders(panels, numbers, scatter[[2, 2]])
-    rest = _power_above(panels, numbers, scatter[2], *common)
+    low = _low_orders(panels, numbers)
+    plain, turned = low.scattered(scatter[0], scatter[1])
+    rest = _power_above(panels, numbers, scatter[2], *low.scattered(scatter[2], scatter[2]))
     dipole, beside = _main_axis(turned, 1.0 / slopes[1])
     monopole = np.sqrt(np.abs(plain) ** 2 + rest + (beside**2).sum(axis=1) / 3.0)
     # On a sphere order 0 has the phase of i / h_0', order 1 that of 1 / h_1'.
@@ -164,34 +164,48 @@ def _hankel(x: Array) -> tuple[Waves, Waves]:
     return values, slopes
 
 
-def _low_orders(panels: _Panels, numbers: Array, scatter: Waves) -> tuple[Waves, Waves]:
-    """Integrals of v (J_l + z_l dJ_l/dn) over the surface.
+@dataclass(frozen=True)
+class _LowOrders:
+    """Integrals over the surface of v J_l and v dJ_l/dn, of orders 0 and 1.
 
-    Parameters
+    J_0 = j_0(kr), and J_1 = -3i j_1(kr) x/|x|, to be multiplied by the direction d.
+
+    Attributes
     ----------
-    scatter : (2, N) [m]
-        z_0 and z_1.
-
-    Returns
-    -------
-    plain : (N,) [m^2 kg^-1/2]
-        Of order 0, J_0 = j_0(kr).
-    turned : (N, 3) [m^2 kg^-1/2]
-        Of order 1, J_1 = -3i j_1(kr) x/|x|, to be multiplied by the direction d.
+    plain, plain_slope : (N,) [m^2 kg^-1/2], [m kg^-1/2]
+        Of order 0.
+    turned, turned_slope : (N, 3) [m^2 kg^-1/2], [m kg^-1/2]
+        Of order 1.
     """
+
+    plain: Array
+    plain_slope: Array
+    turned: Waves
+    turned_slope: Waves
+
+    def scattered(self, first: Waves, second: Waves) -> tuple[Waves, Waves]:
+        """Integrals (N,), (N, 3) of v (J_l + z_l dJ_l/dn), by z_0 and z_1 (N,) [m]."""
+        return (
+            self.plain + first * self.plain_slope,
+            self.turned + second[:, None] * self.turned_slope,
+        )
+
+
+def _low_orders(panels: _Panels, numbers: Array) -> _LowOrders:
     from scipy.special import spherical_jn
 
     away = np.linalg.norm(panels.centres, axis=1).clip(AT_CENTRE * panels.radius)[:, None]
     outward = panels.centres / away
     steep = (outward * panels.normals).sum(axis=1)[:, None]
     zero, one, two = (spherical_jn(order, away * numbers) for order in range(3))
-    still = (panels.flows * zero).sum(axis=0)
-    plain = still - scatter[0] * numbers * (panels.flows * steep * one).sum(axis=0)
-    radial = (panels.flows * one).T @ outward
     along = (panels.flows * one / away).T @ panels.normals
     bent = (panels.flows * two * steep).T @ outward
-    slope = along - numbers[:, None] * bent
-    return plain, -3j * (radial + scatter[1][:, None] * slope)
+    return _LowOrders(
+        (panels.flows * zero).sum(axis=0),
+        -numbers * (panels.flows * steep * one).sum(axis=0),
+        -3j * ((panels.flows * one).T @ outward),
+        -3j * (along - numbers[:, None] * bent),
+    )
 
 
 def _power_above(

@@ -141,10 +141,11 @@ def _ring(  # type: ignore[no-untyped-def]
     decays,
     silent,
 ):
-    n_samples, n_channels = samples.shape
+    n_samples = len(samples)
     n_modes = len(turn_re)
     re, im = np.zeros(n_modes), np.zeros(n_modes)
     now_re, now_im = turn_re.copy(), turn_im.copy()
+    course = np.zeros((BLOCK, n_modes))
     force_re, force_im = np.zeros((BLOCK, n_modes)), np.zeros((BLOCK, n_modes))
     oldest, next_press, next_damped = 0, 0, 0
     ringing = False
@@ -195,15 +196,12 @@ def _ring(  # type: ignore[no-untyped-def]
                 for k in range(n_modes):
                     re[k] += force_re[n, k]
                     im[k] += force_im[n, k]
-            for channel in range(n_channels):
-                total = 0.0
-                for k in range(n_modes):
-                    total += gains[k, channel] * im[k]
-                samples[begin + n, channel] = total
             for k in range(n_modes):
+                course[n, k] = im[k]
                 turned = re[k] * now_re[k] - im[k] * now_im[k]
                 im[k] = re[k] * now_im[k] + im[k] * now_re[k]
                 re[k] = turned
+        samples[begin : begin + size] = np.dot(course[:size], gains)
         ringing = False
         for k in range(n_modes):
             if re[k] * re[k] + im[k] * im[k] > silent:

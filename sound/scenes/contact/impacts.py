@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import grey_closing, grey_opening
@@ -87,15 +88,15 @@ def told_apart(
     """Impacts in the order of time, and what lasts, pair by pair."""
     blows: list[Blow] = []
     pressings: list[Pressing] = []
-    pairs, numbers = np.unique(contacts.pairs, axis=0, return_inverse=True)
-    order = np.argsort(numbers.ravel(), kind="stable")
-    ends = np.cumsum(np.bincount(numbers.ravel(), minlength=len(pairs)))
-    for pair, chosen in zip(pairs.tolist(), np.split(order, ends[:-1])):
+    order = np.lexsort(contacts.pairs.T[::-1])  # stable: each pair's are in the order of time
+    firsts = np.flatnonzero(np.diff(contacts.pairs[order], axis=0, prepend=-2).any(axis=1))
+    for chosen in np.split(order, firsts[1:]):
         own = contacts[chosen]
-        spots = touch.spots((pair[0], pair[1]), own)
-        found, shares = _of_pair((pair[0], pair[1]), own, spots, scene)
+        pair = (int(own.pairs[0, 0]), int(own.pairs[0, 1]))
+        spots = touch.spots(pair, own)
+        found, shares = _of_pair(pair, own, spots, scene)
         blows += found
-        pressings.append(Pressing((pair[0], pair[1]), own, spots, shares))
+        pressings.append(Pressing(pair, own, spots, shares))
     blows.sort(key=lambda blow: (blow.impact.seconds, blow.impact.pair))
     return blows, pressings
 
@@ -207,14 +208,26 @@ def _peaks(force: Array) -> Integers:
     if not len(peaks):
         return np.zeros((0, 2), dtype=np.int64)
     stands_out = peak_prominences(padded, peaks)[0]
-    peaks = peaks[stands_out >= PROMINENT * padded[peaks]] - 1
-    ranges = []
+    return _cut(force, peaks[stands_out >= PROMINENT * padded[peaks]] - 1)
+
+
+@numba.njit(cache=True)
+def _cut(force, peaks):  # type: ignore[no-untyped-def]
+    """Ranges (n, 2) about peaks (n,) of a force, cut where it is least between two."""
+    ranges = np.empty((len(peaks), 2), dtype=np.int64)
     begin = 0
-    for peak, following in zip(peaks, [*peaks[1:], len(force)]):
-        between = force[peak:following]
-        end = int(peak + 1 + np.argmin(between[1:])) if following < len(force) else len(force)
-        active = np.flatnonzero(force[begin:end] > 0.0)
-        if len(active):
-            ranges.append((begin + int(active[0]), begin + int(active[-1]) + 1))
+    for number in range(len(peaks)):
+        end = len(force)
+        if number + 1 < len(peaks):
+            end = peaks[number] + 1
+            for step in range(end + 1, peaks[number + 1]):
+                if force[step] < force[end]:
+                    end = step
+        low, high = begin, end
+        while not force[low] > 0.0:
+            low += 1
+        while not force[high - 1] > 0.0:
+            high -= 1
+        ranges[number] = low, high
         begin = end
-    return np.array(ranges, dtype=np.int64).reshape(-1, 2)
+    return ranges

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -50,10 +49,8 @@ class Touch:
     def __init__(self, bodies: list[Body], ground: NamedMaterial) -> None:
         self._bodies = bodies
         self._ground = float(compliance(ground.young, ground.poisson))
-
-    @cached_property
-    def _trees(self) -> list[cKDTree]:
-        return [cKDTree(body.shape.vertices) for body in self._bodies]
+        trees = {id(body.shape): cKDTree(body.shape.vertices) for body in bodies}
+        self._trees = [trees[id(body.shape)] for body in bodies]
 
     def spots(self, pair: tuple[int, int], contacts: ContactPoints) -> Spots:
         """What the surfaces of a pair of objects are like where they touch."""

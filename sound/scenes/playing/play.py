@@ -14,7 +14,7 @@ from carillon.runtime import allowed_threads
 from carillon.serial import serial_blas
 from carillon.threads import in_parallel
 from sound.scenes.audible.excitation import excitation
-from sound.scenes.audible.hearing import Head, heard, towards
+from sound.scenes.audible.hearing import Head, along, heard, towards
 from sound.scenes.audible.loudness import CHANNELS, click, clip_noise, mode_gains, voice
 from sound.scenes.audible.lying import rests_of
 from sound.scenes.audible.pressing import pressed
@@ -151,7 +151,7 @@ class _Player:
             for number in blow.impact.pair:
                 if number != GROUND:
                     self.blows[number].append(blow)
-        found = [pressed(each, bodies, scene) for each in lasting]
+        found = in_parallel(pressed, [(each, bodies, scene) for each in lasting], threads)
         self.pressings = [each for each in found if each is not None]
         self.count = round(scene.seconds * scene.sound.rate)
         self.camera = camera_of(scene, bodies, course.motion)
@@ -178,19 +178,20 @@ class _Player:
         """Pressure times distance (count,) [Pa m] of a body, in the direction of the head."""
         scene, body, motion = self.scene, self.bodies[number], self.course.motion
         rate = scene.sound.rate
-        seconds = np.arange(self.count) / rate
         times, directions = motion.times, towards(motion, number, self.head)
         total = np.zeros(self.count)
         if scene.sound.radiation:
             jerked = click(number, body, self.blows[number], self.count, rate)
-            total += _along(jerked, seconds, times, directions)
+            total += along(jerked, rate * times, directions)
         if body.solid is None:
             return total
+        moved = body.motion(body.shape.vertices)
         resting = self.course.resting[:, number]
-        rests = rests_of(number, body, self.lasting, times, resting, scene)
+        rests = rests_of(number, moved, self.lasting, times, resting, scene)
         act = excitation(
             number,
             body,
+            moved,
             self.blows[number],
             self.pressings,
             rests,
@@ -204,7 +205,7 @@ class _Player:
         total += modes[:, 0]
         if gains[:, 1:].any():
             turned = np.einsum("tij,ti->tj", _matrices(motion.rotations[:, number]), directions)
-            total += _along(modes[:, 1:], seconds, times, turned)
+            total += along(modes[:, 1:], rate * times, turned)
         if body.listening is not None and scene.sound.noise:
             own = self.blows[number]
             total += clip_noise(number, body, own, float(gains[0, 0]), self.count, rate)
@@ -219,13 +220,6 @@ def _gains(bodies: list[Body], radiation: bool, threads: int) -> list[Array]:
     levels = [10.0 ** (body.entry.level / 20.0) for body in bodies]
     silent = np.zeros((0, CHANNELS))
     return [found.get(id(body.solid), silent) * level for body, level in zip(bodies, levels)]
-
-
-def _along(parts: Array, seconds: Array, times: Array, directions: Array) -> Array:
-    """Parts (s, 3) along directions (t, 3) that change with time."""
-    return np.asarray(
-        sum(parts[:, i] * np.interp(seconds, times, directions[:, i]) for i in range(3))
-    )
 
 
 def _matrices(quaternions: Array) -> Array:
