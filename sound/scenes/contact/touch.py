@@ -49,7 +49,8 @@ class Touch:
     def __init__(self, bodies: list[Body], ground: NamedMaterial) -> None:
         self._bodies = bodies
         self._ground = float(compliance(ground.young, ground.poisson))
-        trees = {id(body.shape): cKDTree(body.shape.vertices) for body in bodies}
+        shapes = {id(body.shape): body.shape for body in bodies}
+        trees = {key: cKDTree(shape.vertices) for key, shape in shapes.items()}
         self._trees = [trees[id(body.shape)] for body in bodies]
 
     def spots(self, pair: tuple[int, int], contacts: ContactPoints) -> Spots:
