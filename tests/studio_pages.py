@@ -19,6 +19,7 @@ from studio.server.serve import address_of, listen
 from tests.studio_stub import StubStudio
 
 PATIENCE_SECONDS = 30.0
+TWO_FRAMES = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 
 
 class ToldStudio(StubStudio):
@@ -117,7 +118,7 @@ def until_page(page: Any, expression: str) -> Any:
 
 def until_still(page: Any) -> None:
     """Wait until what lies over the solid has its place, and nothing is drawn any more."""
-    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    page.evaluate(TWO_FRAMES)
     until_page(page, "!studio.view.drawing?.waiting")
 
 

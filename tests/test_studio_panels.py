@@ -16,8 +16,8 @@ from sound.design.bark import bark as bark_of
 from sound.design.cents import cents as cents_of
 from sound.project.schema import check, project_schema
 from tests.panels_page import NOW, WANTED, bank, progress, ready_clip, state, target, window
+from tests.studio_pages import PATIENCE_SECONDS, TWO_FRAMES
 
-PATIENCE_SECONDS = 10.0
 INK = """(place) => {
   const canvas = document.querySelector(place + " canvas");
   const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
@@ -71,7 +71,7 @@ def expect(locator):
 
 def ink(panels, place: str) -> dict[str, int]:
     # Plots are drawn in the next frame.
-    panels.page.wait_for_timeout(60)
+    panels.page.evaluate(TWO_FRAMES)
     return panels.page.evaluate(INK, place)
 
 
