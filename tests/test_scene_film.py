@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from fractions import Fraction
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -134,6 +135,25 @@ def test_a_film_has_the_same_bytes_again(film, bouncing, tmp_path, monkeypatch):
     again = tmp_path / f"again{film.suffix}"
     write_film(again, bouncing, FRAMES_PER_SECOND, SIZE)
     assert again.read_bytes() == film.read_bytes()
+
+
+def test_a_film_has_the_same_bytes_whatever_memory_held_before(
+    film, bouncing, tmp_path, monkeypatch
+):
+    """Of films that depend on it, one in some thirty differs."""
+    paint = lru_cache(None)(Stage(bouncing.picture, SIZE).frame)
+
+    def painted(stage, seconds):
+        for size in random.integers(1_000, 200_000, 3):
+            random.bytes(size)
+        return paint(seconds)
+
+    random = np.random.default_rng(0)
+    monkeypatch.setattr(Stage, "frame", painted)
+    again, expected = tmp_path / f"again{film.suffix}", film.read_bytes()
+    for _ in range(40):
+        write_film(again, bouncing, FRAMES_PER_SECOND, SIZE)
+        assert again.read_bytes() == expected
 
 
 def test_a_film_says_what_is_in_it(film):
