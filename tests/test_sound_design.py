@@ -187,6 +187,16 @@ def test_a_start_without_modes_is_refused_at_once(problem, monkeypatch):
         optimise(with_options(problem, evaluations=None))
 
 
+def test_modes_are_found_however_far_away_the_start_is(problem):
+    """From the symmetric modes of the uniform bar, those of one material in seven are not."""
+    simulation = problem.setting.simulation()
+    materials = 0.15 * np.random.default_rng(0).normal(size=(30, simulation.material.dimensions))
+    uniform = simulation.evaluate(np.zeros_like(materials[0])).modes
+    for z in materials:
+        found, expected = simulation.evaluate_anyway(z, uniform), simulation.evaluate(z)
+        np.testing.assert_allclose(found.eigenvalues, expected.eigenvalues, rtol=2e-3)
+
+
 @pytest.mark.parametrize("weights", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
 def test_a_part_of_the_cost_may_weigh_nothing(problem, weights):
     objective = Objective(problem.setting.objective.targets, Weights(*weights))

@@ -93,7 +93,7 @@ class FineSolid:
         """
         simulation, setting = self._simulation, self._setting
         with one_thread():
-            fine = simulation.evaluate(evaluation.z, self._last)
+            fine = simulation.evaluate_anyway(evaluation.z, self._last)
             self._last = fine.modes
             hertz, coarse = frequencies(fine.eigenvalues), frequencies(evaluation.eigenvalues)
             order = self._shapes.order(

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from carillon.errors import ConvergenceError
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.geometry import HexMesh
@@ -138,6 +140,13 @@ class Simulation:
         pushed = self._pushes.T @ elastic
         evaluation = Evaluation(z, modes.values[RIGID_MODES:], pushed, modes, inverse=own)
         return self.differentiate(evaluation) if derivatives else evaluation
+
+    def evaluate_anyway(self, z: Array, start: Modes | None) -> Evaluation:
+        """Modes at the coordinates z, from nothing if those of another material lead nowhere."""
+        if start is not None:
+            with suppress(ConvergenceError):
+                return self.evaluate(z, start)
+        return self.evaluate(z)
 
     def differentiate(self, evaluation: Evaluation, whole: bool = False) -> Evaluation:
         """The same evaluation with derivatives, `whole` those of all pairs of modes one by one.

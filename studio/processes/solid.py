@@ -296,7 +296,7 @@ class _Sounding:
 
     def evaluate(self, z: Array) -> Evaluation:
         """Modes at the coordinates z."""
-        evaluation = self._simulation.evaluate(z, self._last)
+        evaluation = self._simulation.evaluate_anyway(z, self._last)
         self._last = evaluation.modes
         return evaluation
 
