@@ -4,8 +4,8 @@
 
 /** What is drawn now is seen so much later, when the screen shows its next picture. */
 export const SCREEN_SECONDS = 1 / 60;
-/** Beyond that, the sound's time has jumped. */
-const JUMP_SECONDS = 0.08;
+/** Beyond that, the sound's time has jumped: what is seen would be another picture's. */
+const JUMP_SECONDS = SCREEN_SECONDS;
 /** Of what the sound's time is off, how much is made good with each picture. */
 const CORRECTION = 0.1;
 
