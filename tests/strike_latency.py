@@ -26,11 +26,18 @@ class Tap extends AudioWorkletProcessor {
   constructor() {
     super();
     this.silent = false;
+    this.onset = null;
+    this.loudest = 0;
   }
-  process(inputs) {
-    const samples = inputs[0][0] ?? [];
-    const at = samples.findIndex((sample) => sample !== 0);
-    if (this.silent && at >= 0) this.port.postMessage((currentFrame + at) / sampleRate);
+  process([ears]) {
+    const at = (ears[0] ?? []).findIndex((sample) => sample !== 0);
+    const begins = this.silent && at >= 0;
+    const before = this.loudest;
+    for (const ear of ears) this.loudest = Math.max(this.loudest, ...ear.map(Math.abs));
+    if (begins) this.onset = (currentFrame + at) / sampleRate;
+    if (begins || this.loudest > before) {
+      this.port.postMessage({ onset: this.onset, loudest: this.loudest });
+    }
     this.silent = at < 0;
     return true;
   }
@@ -38,6 +45,9 @@ class Tap extends AudioWorkletProcessor {
 registerProcessor("tap", Tap);
 """
 TAP_ADDRESS = f"data:text/javascript,{quote(TAP)}"
+"""Of a processor that tells when sound begins after silence, by the time of the context, and how
+loud it has been: in the sound's own thread, so that it does not matter how seldom anybody looks.
+"""
 ALONE = """async (modes) => {
   const { makeBank } = await import("/page/sound/bank.js");
   const bank = makeBank();
@@ -84,7 +94,7 @@ STRIKES = """async ({ count, tap: address }) => {
     bank.silence();
     await wait(60 + 40 * Math.random());
     const heard = new Promise((resolve, reject) => {
-      tap.port.onmessage = (event) => resolve([event.data, performance.now()]);
+      tap.port.onmessage = (event) => resolve([event.data.onset, performance.now()]);
       setTimeout(() => reject(new Error("a strike was not heard within 5 s")), 5000);
     });
     const [clientX, clientY] = place();
