@@ -266,6 +266,32 @@ def test_time_passes_evenly_and_follows_the_sound(browser) -> None:
         page.close()
 
 
+def test_nothing_is_heard_beyond_the_end(browser) -> None:
+    """The last picture is the end's, however far beyond it the sound's time says that it is."""
+    with served(CHECKOUT / "studio") as address:
+        page = browser.new_page()
+        page.goto(address)
+        last, off, runs = page.evaluate(
+            """async () => {
+              const { Playback } = await import("/scene/playback.js");
+              const sound = { from: 0, heard: 0, allowed: async () => {}, play() {}, stop() {} };
+              const playback = new Playback(sound, 1);
+              await playback.play();
+              const off = [];
+              for (let piece = 0; playback.runs && piece < 100; piece++) {
+                await new Promise(requestAnimationFrame);
+                sound.heard = piece * 0.07;
+                playback.frame();
+                off.push(Math.abs(playback.drawn.seconds - playback.drawn.heard));
+              }
+              return [playback.at, off, playback.runs];
+            }"""
+        )
+        assert last == 1.0 and not runs
+        assert max(off) < FRAME
+        page.close()
+
+
 def test_numbers_are_written_as_people_read_them(browser) -> None:
     with served(CHECKOUT / "studio") as address:
         page = browser.new_page()

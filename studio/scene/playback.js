@@ -130,7 +130,8 @@ export class Playback {
     if (!this.runs) return this.at;
     const { heard } = this.sound;
     if (heard < this.sound.from) return this.at;
-    const told = heard + SCREEN_SECONDS;
+    // The sound's time goes on beyond the scene's end, where nothing more is heard of it.
+    const told = Math.min(this.seconds, heard + SCREEN_SECONDS);
     this.at = Math.min(this.seconds, this.clock.follow(told, performance.now() / 1000));
     this.drawn = { seconds: this.at, heard: told };
     if (this.at >= this.seconds) this.#end();
