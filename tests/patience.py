@@ -10,6 +10,8 @@ import psutil
 
 HANG_SECONDS = 600.0
 """What takes longer hangs, on however busy a machine; less than pytest itself waits."""
+PATIENCE_SECONDS = 30.0
+"""What a page does at once is there by then."""
 
 
 def wait_for(

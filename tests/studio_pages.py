@@ -16,9 +16,9 @@ import uvicorn
 from studio.server.app import make_app
 from studio.server.guard import Keys
 from studio.server.serve import address_of, listen
+from tests.patience import PATIENCE_SECONDS
 from tests.studio_stub import StubStudio
 
-PATIENCE_SECONDS = 30.0
 TWO_FRAMES = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 
 

@@ -9,7 +9,15 @@ import pytest
 import trimesh
 from PIL import Image
 
-from tests.studio_pages import ToldStudio, open_page, serving, until, until_page, until_still
+from tests.studio_pages import (
+    TWO_FRAMES,
+    ToldStudio,
+    open_page,
+    serving,
+    until,
+    until_page,
+    until_still,
+)
 
 MIDDLE = "studio.view.drawing.middle()"
 
@@ -127,7 +135,7 @@ def direction(page) -> np.ndarray:
         if np.allclose(before, now, rtol=0, atol=1e-7 * np.linalg.norm(now)):
             return now
         before = now
-        page.wait_for_timeout(60)
+        page.evaluate(TWO_FRAMES)
 
 
 def test_the_map_gets_lighter_by_even_steps(page):
@@ -177,10 +185,10 @@ def test_legend_tells_moduli_in_gigapascals(page, studio):
 
 def test_nothing_is_drawn_while_nothing_moves(page):
     direction(page)
-    page.wait_for_timeout(300)
-    before = page.evaluate("studio.view.drawing.drawings")
-    page.wait_for_timeout(400)
-    assert page.evaluate("studio.view.drawing.drawings") == before
+    drawings = "studio.view.drawing.drawings"
+    page.evaluate(f"window.before = {drawings}")
+    wait = "new Promise((done) => setTimeout(done, 400))"
+    until_page(page, f"{wait}.then(() => before === (before = {drawings}))")
 
 
 def test_every_vertex_that_is_seen_is_picked_at_its_pixel(page):

@@ -16,7 +16,8 @@ from sound.design.bark import bark as bark_of
 from sound.design.cents import cents as cents_of
 from sound.project.schema import check, project_schema
 from tests.panels_page import NOW, WANTED, bank, progress, ready_clip, state, target, window
-from tests.studio_pages import PATIENCE_SECONDS, TWO_FRAMES
+from tests.patience import PATIENCE_SECONDS
+from tests.studio_pages import TWO_FRAMES
 
 INK = """(place) => {
   const canvas = document.querySelector(place + " canvas");
