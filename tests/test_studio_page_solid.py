@@ -185,10 +185,10 @@ def test_legend_tells_moduli_in_gigapascals(page, studio):
 
 def test_nothing_is_drawn_while_nothing_moves(page):
     direction(page)
-    drawings = "studio.view.drawing.drawings"
-    page.evaluate(f"window.before = {drawings}")
-    wait = "new Promise((done) => setTimeout(done, 400))"
-    until_page(page, f"{wait}.then(() => before === (before = {drawings}))")
+    until_still(page)
+    before = page.evaluate("studio.view.drawing.drawings")
+    page.wait_for_timeout(400)
+    assert page.evaluate("studio.view.drawing.drawings") == before
 
 
 def test_every_vertex_that_is_seen_is_picked_at_its_pixel(page):

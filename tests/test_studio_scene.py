@@ -23,7 +23,7 @@ from studio.scene.content import GROUND_ON_PAGE, LOUDEST_STRIKE, QUIETEST_STRIKE
 from studio.standalone.content import GAIN_ERROR, STEPS
 from tests.chromium import ARGUMENTS, CHECKOUT, PROGRAMS, served
 from tests.strike_latency import TAP_ADDRESS
-from tests.studio_pages import TWO_FRAMES, until_page
+from tests.studio_pages import until_page
 from tests.test_studio_standalone import HOSTILE, samples
 
 FRAME = 1.0 / 60.0
@@ -148,6 +148,16 @@ def shown(browser, path):
     assert page.faults == []
 
 
+@pytest.fixture
+def modules(browser):
+    """An empty page, which the modules of a scene's page can be imported into."""
+    with served(CHECKOUT / "studio") as address:
+        page = browser.new_page()
+        page.goto(address)
+        yield page
+        page.close()
+
+
 def middle_of(page, number: int) -> tuple[float, float]:
     """Pixels of the page of the middle of a body."""
     x, y = page.evaluate(
@@ -238,79 +248,67 @@ def test_an_impact_sounds_when_the_scene_says_that_it_does(shown) -> None:
     assert abs(shown.evaluate(f"scene.sound.playedAt({onset})") - bounces(SECONDS)[0][0]) < 1e-3
 
 
-def test_time_passes_evenly_and_follows_the_sound(browser) -> None:
+def test_time_passes_evenly_and_follows_the_sound(modules) -> None:
     """The sound's time comes in pieces of 10 ms, a jump is taken at once, and on a machine that has
     no time for sound, whose pieces are of 40 ms, what is seen stays with it.
     """
-    with served(CHECKOUT / "studio") as address:
-        page = browser.new_page()
-        page.goto(address)
-        steps, jump, starved = page.evaluate(
-            """async () => {
-              const { Clock } = await import("/scene/playback.js");
-              const [clock, seen, off] = [new Clock(), [], []];
-              for (let frame = 0; frame < 200; frame++) {
-                const now = frame / 60;
-                seen.push(clock.follow(Math.floor(now / 0.01) * 0.01, now) - now);
-              }
-              const jump = clock.follow(9, 200 / 60);
-              for (let frame = 0; frame < 200; frame++) {
-                const heard = Math.floor(frame / 60 / 0.04) * 0.04;
-                off.push(Math.abs(clock.follow(heard, frame / 60) - heard));
-              }
-              return [seen, jump, off];
-            }"""
-        )
-        late = np.array(steps[50:])
-        assert late.min() > -0.01 and late.max() < 0.0
-        assert np.ptp(late) < 0.003
-        assert jump == 9.0
-        assert max(starved) < FRAME
-        page.close()
+    steps, jump, starved = modules.evaluate(
+        """async () => {
+          const { Clock } = await import("/scene/playback.js");
+          const [clock, seen, off] = [new Clock(), [], []];
+          for (let frame = 0; frame < 200; frame++) {
+            const now = frame / 60;
+            seen.push(clock.follow(Math.floor(now / 0.01) * 0.01, now) - now);
+          }
+          const jump = clock.follow(9, 200 / 60);
+          for (let frame = 0; frame < 200; frame++) {
+            const heard = Math.floor(frame / 60 / 0.04) * 0.04;
+            off.push(Math.abs(clock.follow(heard, frame / 60) - heard));
+          }
+          return [seen, jump, off];
+        }"""
+    )
+    late = np.array(steps[50:])
+    assert late.min() > -0.01 and late.max() < 0.0
+    assert np.ptp(late) < 0.003
+    assert jump == 9.0
+    assert max(starved) < FRAME
 
 
-def test_nothing_is_heard_beyond_the_end(browser) -> None:
+def test_nothing_is_heard_beyond_the_end(modules) -> None:
     """The last picture is the end's, however far beyond it the sound's time says that it is."""
-    with served(CHECKOUT / "studio") as address:
-        page = browser.new_page()
-        page.goto(address)
-        last, off, runs = page.evaluate(
-            """async () => {
-              const { Playback } = await import("/scene/playback.js");
-              const sound = { from: 0, heard: 0, allowed: async () => {}, play() {}, stop() {} };
-              const playback = new Playback(sound, 1);
-              await playback.play();
-              const off = [];
-              for (let piece = 0; playback.runs && piece < 100; piece++) {
-                await new Promise(requestAnimationFrame);
-                sound.heard = piece * 0.07;
-                playback.frame();
-                off.push(Math.abs(playback.drawn.seconds - playback.drawn.heard));
-              }
-              return [playback.at, off, playback.runs];
-            }"""
-        )
-        assert last == 1.0 and not runs
-        assert max(off) < FRAME
-        page.close()
+    last, off, runs = modules.evaluate(
+        """async () => {
+          const { Playback } = await import("/scene/playback.js");
+          const sound = { from: 0, heard: 0, allowed: async () => {}, play() {}, stop() {} };
+          const playback = new Playback(sound, 1);
+          await playback.play();
+          const off = [];
+          for (let piece = 0; playback.runs && piece < 100; piece++) {
+            await new Promise(requestAnimationFrame);
+            sound.heard = piece * 0.07;
+            playback.frame();
+            off.push(Math.abs(playback.drawn.seconds - playback.drawn.heard));
+          }
+          return [playback.at, off, playback.runs];
+        }"""
+    )
+    assert last == 1.0 and not runs
+    assert max(off) < FRAME
 
 
-def test_numbers_are_written_as_people_read_them(browser) -> None:
-    with served(CHECKOUT / "studio") as address:
-        page = browser.new_page()
-        page.goto(address)
-        found = page.evaluate(
-            """async () => {
-              const say = await import("/scene/numbers.js");
-              return [
-                [1.25, 0.034, 0.0004, 2e-8, 0.9999].map(say.impulse),
-                [0.5, 0.05, 0.1, 1].map(say.length),
-                [0.0003, 0.0123, 0.00005].map(say.milliseconds),
-                [312.4, 2345].map(say.frequency),
-              ];
-            }"""
-        )
-        page.close()
+def test_numbers_are_written_as_people_read_them(modules) -> None:
+    found = modules.evaluate(
+        """async () => {
+          const say = await import("/scene/numbers.js");
+          return [
+            [1.25, 0.034, 0.0004, 2e-8, 0.9999].map(say.impulse),
+            [0.5, 0.05, 0.1, 1].map(say.length),
+            [0.0003, 0.0123, 0.00005].map(say.milliseconds),
+            [312.4, 2345].map(say.frequency),
+          ];
+        }"""
+    )
     assert found == [
         ["1.3 N s", "34 mN s", "400 µN s", "0.02 µN s", "1.0 N s"],
         ["50 cm", "5 cm", "10 cm", "1 m"],
@@ -476,7 +474,7 @@ def test_names_are_no_markup(browser, tmp_path) -> None:
     page.evaluate("scene.playback.seek(1)")
     page.get_by_role("button", name=f"{HOSTILE}1").click()
     until_page(page, "document.querySelectorAll('#impacts tbody tr').length > 0")
-    page.evaluate(TWO_FRAMES)
+    page.wait_for_timeout(100)
     assert page.evaluate("typeof window.broken") == "undefined"
     assert page.inner_text("h1") == HOSTILE
     assert f"{HOSTILE}2" in page.inner_text("#bodies")
