@@ -22,8 +22,9 @@ def describe() -> dict[str, Any]:
     """
     try:
         from mpi4py import MPI
-        from petsc4py import PETSc
         from slepc4py import SLEPc
+
+        from carillon.petsc import PETSc
     except ImportError as error:
         raise UserError(
             f"{error}; expected MPI, PETSc and SLEPc in the environment of {sys.executable}, "

@@ -10,10 +10,10 @@ import sys
 import numpy as np
 import scipy.sparse.linalg as spla
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from carillon.errors import ConvergenceError
 from carillon.fem.model import ElasticModel
+from carillon.petsc import PETSc
 from solver.assembly.sparse import assembled
 from solver.assembly.system import System, assemble
 from solver.distribution.local_mesh import distribute

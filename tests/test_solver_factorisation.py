@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from petsc4py import PETSc
 
 from carillon.errors import ConvergenceError
+from carillon.petsc import PETSc
 from solver.linear import factorisation
 from solver.linear.factorisation import factorised
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import trimesh
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from carillon.errors import UserError
 from carillon.fem.geometry import hexmesh_from_grid, load_surface, voxelize
 from carillon.fem.model import fine_model
+from carillon.petsc import PETSc
 from solver.analysis import bounds
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions

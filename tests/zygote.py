@@ -216,6 +216,7 @@ def _be(job: Job, mark: str, libraries: tuple[Any, Any, Any], pipes: list[int]) 
             MPI.Init_thread(MPI.THREAD_MULTIPLE)
             PETSc._initialize()
             SLEPc._initialize()
+            importlib.import_module("carillon.petsc").leave_pipes_to_python()
         for name in _ALONE:
             os.environ.pop(name, None)  # those that the program starts may be several ranks
         os.environ.update({MARK: mark, **job.environment})

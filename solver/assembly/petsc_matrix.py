@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import scipy.sparse as sp
-from petsc4py import PETSc
+
+from carillon.petsc import PETSc
 
 
 def distributed_matrix(rows: sp.csr_matrix, comm: Any) -> Any:

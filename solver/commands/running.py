@@ -9,11 +9,11 @@ from contextlib import contextmanager
 from typing import Any
 
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from carillon import outputs
 from carillon.files import atomic_path
 from carillon.options import add_options
+from carillon.petsc import PETSc
 from carillon.runtime import limit_threads, warn_about_reference_blas
 from solver.analysis.problem import ProblemOptions
 from solver.distribution.collective import bcast_from_root, ranks_of_machine

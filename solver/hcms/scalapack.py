@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
-from petsc4py import PETSc
+
+from carillon.petsc import PETSc
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

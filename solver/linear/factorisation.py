@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from petsc4py import PETSc
-
 from carillon.errors import ConvergenceError, UserError
+from carillon.petsc import PETSc
 
 ROOM = (50, 200, 800)
 """Percent by which MUMPS's guess of the memory it needs is exceeded, tried one after the other.

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from petsc4py import PETSc
+
+from carillon.petsc import PETSc
 
 Array = NDArray[np.float64]
 

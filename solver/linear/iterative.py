@@ -14,9 +14,9 @@ import numba
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
 from carillon.errors import ConvergenceError
+from carillon.petsc import PETSc
 from carillon.threads import in_parallel, split
 from solver.linear.incomplete import IncompleteCholesky
 from solver.linear.multigrid import Multigrid

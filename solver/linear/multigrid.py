@@ -14,8 +14,8 @@ import numpy as np
 import scipy.linalg as la
 from mpi4py import MPI
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
+from carillon.petsc import PETSc
 from carillon.threads import in_parallel, split
 from solver.linear.block_rows import BlockRows
 from solver.linear.petsc_options import MULTIGRID_PREFIX

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
+from carillon.petsc import PETSc
 from solver.assembly.system import System
 from solver.linear.factorisation import factorised
 from solver.linear.petsc_options import INNER_PREFIX

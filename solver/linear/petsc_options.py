@@ -6,9 +6,8 @@ import ctypes
 from contextlib import suppress
 from pathlib import Path
 
-from petsc4py import PETSc
-
 from carillon.errors import LocalUserError, UserError
+from carillon.petsc import PETSc
 
 OPTIONS_PREFIX = "carillon_"
 """What the names of PETSc's options for this program begin with."""

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
 from carillon.errors import ConvergenceError
 from carillon.fem.model import RIGID_MODES
+from carillon.petsc import PETSc
 from solver.assembly.system import System
 from solver.linear.factorisation import factorised
 from solver.reference.eigensolver import smallest_eigenpairs

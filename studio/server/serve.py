@@ -106,10 +106,6 @@ def make_server(
     studio: Studio, listener: socket.socket, host: str, keys: Keys, limits: Limits
 ) -> uvicorn.Server:
     """The server, which has not begun yet."""
-    if _in_main_thread() and hasattr(signal, "SIGPIPE"):
-        # PETSc, where it is loaded, takes the signal for a crash: a page that leaves while it is
-        # answered would end the studio.
-        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
     # Of what uvicorn tells, faults of the program's alone are of use to people.
     logging.getLogger("uvicorn.error").addFilter(_is_fault)
     config = uvicorn.Config(

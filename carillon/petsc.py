@@ -1,0 +1,28 @@
+"""PETSc, as it is loaded here: it leaves a pipe that nobody reads any more to Python.
+
+PETSc takes the signal of such a pipe for a crash, says so in ten lines and ends all ranks: of what
+is printed into `... | head`, of an answer to a page that is gone, or of word to a process that has
+just ended.  Python ignores the signal and raises BrokenPipeError, which programs can deal with.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+
+from petsc4py import PETSc
+
+__all__ = ["PETSc", "leave_pipes_to_python"]
+
+
+def leave_pipes_to_python() -> None:
+    """Have the signal of a broken pipe handled as Python had it, which PETSc does not ask.
+
+    Nothing changes in a thread other than the main one, where Python allows no such change.
+    """
+    if hasattr(signal, "SIGPIPE") and threading.current_thread() is threading.main_thread():
+        # What Python knows of: it has not heard of PETSc's own.
+        signal.signal(signal.SIGPIPE, signal.getsignal(signal.SIGPIPE) or signal.SIG_IGN)
+
+
+leave_pipes_to_python()

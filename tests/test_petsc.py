@@ -1,0 +1,54 @@
+"""PETSc does not take a pipe that nobody reads any more for a crash."""
+
+from __future__ import annotations
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.patience import HANG_SECONDS
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+MODES = ("modes", "builtin:box", "--resolution", "6", "--modes", "9", "--json", "--out", "box.h5")
+
+
+@pytest.mark.parametrize("both", [False, True])
+def test_a_reader_of_modes_who_has_seen_enough_is_no_error(tmp_path, both):
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run(
+        [sys.executable, "-m", "carillon", *MODES],
+        cwd=tmp_path,
+        stdout=write,
+        stderr=write if both else subprocess.PIPE,
+        text=True,
+        timeout=HANG_SECONDS,
+    )
+    os.close(write)
+    assert done.returncode == 0, done.stderr
+    assert "PETSC" not in (done.stderr or "")
+    assert (tmp_path / "box.h5").is_file()
+
+
+def test_python_raises_what_it_does_without_petsc():
+    program = "import os\nfrom carillon.petsc import PETSc\nread, write = os.pipe()\n"
+    program += "os.close(read)\ntry: os.write(write, b'x')\n"
+    program += "except BrokenPipeError: print('told', PETSc.Sys.isInitialized())\n"
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=HANG_SECONDS
+    )
+    assert done.stdout.strip() == "told True", done.stderr
+
+
+def test_petsc_is_had_from_one_module():
+    found = []
+    for room in ("carillon", "solver", "sound", "studio", "workflow", "tests"):
+        for path in (CHECKOUT / room).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.ImportFrom) and node.module == "petsc4py":
+                    found.append(os.fspath(path.relative_to(CHECKOUT)))
+    assert found == ["carillon/petsc.py"]
