@@ -7,11 +7,12 @@ import os
 import signal
 import time
 
+import psutil
 import pytest
 
 from carillon.errors import UserError
 from studio.processes.worker import Worker
-from tests.patience import HANG_SECONDS
+from tests.patience import HANG_SECONDS, wait_for
 
 BENCH = "tests.test_studio_worker:Bench"
 
@@ -92,6 +93,19 @@ def test_what_takes_too_long_is_ended_and_the_next_call_answered(worker):
     assert time.monotonic() - begin < HANG_SECONDS
 
 
+def test_who_is_told_to_end_does_so_even_as_the_answer_comes(worker):
+    async def play():
+        asking = asyncio.ensure_future(worker.call("add", 1, seconds=HANG_SECONDS))
+        await asyncio.sleep(0)
+        ((future, _),) = worker._waiting.values()
+        future.set_result(2)
+        asking.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await asking
+
+    asyncio.run(play())
+
+
 def test_a_process_that_is_killed_fails_what_waits_and_nothing_else(worker):
     async def call():
         waiting = asyncio.ensure_future(worker.call("sleep", HANG_SECONDS))
@@ -99,6 +113,19 @@ def test_a_process_that_is_killed_fails_what_waits_and_nothing_else(worker):
         os.kill(worker.pid, signal.SIGKILL)
         with pytest.raises(UserError, match="has ended"):
             await waiting
+        return await worker.call("add", 2)
+
+    assert asyncio.run(call()) == 2
+
+
+def test_what_a_process_is_asked_that_has_just_ended_fails_likewise(worker):
+    async def call():
+        await worker.call("add", 1)
+        process = psutil.Process(worker.pid)
+        process.kill()
+        wait_for(lambda: process.status() == psutil.STATUS_ZOMBIE, "a process to end")
+        with pytest.raises(UserError, match="has ended"):
+            await worker.call("add", 1)
         return await worker.call("add", 2)
 
     assert asyncio.run(call()) == 2

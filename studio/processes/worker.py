@@ -78,10 +78,15 @@ class Worker:
         assert self._pipe is not None
         number = next(self._numbers)
         future: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
-        self._waiting[number] = (future, tell)
-        self._pipe.send((number, name, arguments, tell is not None))
         try:
-            return await asyncio.wait_for(future, seconds)
+            self._pipe.send((number, name, arguments, tell is not None))
+        except OSError:  # it has just ended
+            self.end()
+            raise UserError(GONE) from None
+        self._waiting[number] = (future, tell)
+        try:
+            async with asyncio.timeout(seconds):
+                return await future
         except TimeoutError:
             self.end()
             raise UserError(
