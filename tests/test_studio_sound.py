@@ -16,6 +16,7 @@ from sound.rendering.listening import Listening
 from sound.rendering.render import Hit, render
 from sound.rendering.solid import SoundingSolid
 from tests.chromium import chromium, served
+from tests.patience import PATIENCE_SECONDS
 from tests.small_design import small_design
 from tests.strike_latency import measure
 
@@ -38,6 +39,31 @@ PACKED = """() => {
   };
 }"""
 """Arrays come back as text: a number at a time takes long."""
+UNTIL = f"""() => {{
+  window.until = async (met) => {{
+    const end = performance.now() + {1000 * PATIENCE_SECONDS};
+    while (!met() && performance.now() < end) await new Promise((done) => setTimeout(done, 20));
+  }};
+}}"""
+"""Waits until something is met; what is asserted then tells if it never was."""
+ECHO = """() => {
+  const processor = `registerProcessor("echo", class extends AudioWorkletProcessor {
+    constructor() {
+      super();
+      this.port.onmessage = (event) => this.port.postMessage(event.data);
+    }
+    process() { return true; }
+  })`;
+  window.makeEcho = async (context) => {
+    await context.audioWorklet.addModule(`data:text/javascript,${encodeURIComponent(processor)}`);
+    const node = new AudioWorkletNode(context, "echo");
+    return () => new Promise((resolve) => {
+      node.port.onmessage = resolve;
+      node.port.postMessage("");
+    });
+  };
+}"""
+"""What the thread of sound was told before has come to it once this is answered."""
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +81,8 @@ def page(folder):
     with chromium(heard) as browser, served(folder) as address:
         page = browser.new_page()
         page.goto(f"{address}/")
-        page.evaluate(PACKED)
+        for helper in (PACKED, UNTIL, ECHO):
+            page.evaluate(helper)
         yield page
 
 
@@ -187,10 +214,11 @@ def test_a_new_material_lets_the_old_one_ring_out(page) -> None:
             { do: "strike", gains: [0.3], at_seconds: 0 },
           ]);
           node.connect(context.destination);
+          const echo = await window.makeEcho(context);
           context.suspend(at).then(async () => {
             node.port.postMessage({ do: "bank", hertz: [1000, 1500], dampings: [30, 40] });
             node.port.postMessage({ do: "strike", gains: [0.2, 0.1] });
-            await new Promise((resolve) => setTimeout(resolve, 200));
+            await echo();
             context.resume();
           });
           return window.packed((await context.startRendering()).getChannelData(0));
@@ -259,7 +287,7 @@ def test_microphone_is_recorded(page, tmp_path) -> None:
           const { makeRecorder } = await import("/page/sound/recorder.js");
           const recorder = makeRecorder();
           await recorder.start();
-          await new Promise((resolve) => setTimeout(resolve, 1500));
+          await window.until(() => recorder.seconds > 1.5);
           const level = recorder.level();
           const blob = await recorder.stop();
           return { level, bytes: window.packed(await blob.arrayBuffer()) };
@@ -291,12 +319,8 @@ def test_live_bank_strikes_and_tells_its_level(page) -> None:
           bank.onStrike((struck) => heard.push(struck));
           const struck = [[1, 0.5], [2, 1], [-1, 1], [0.5, 1]].map((at) => bank.strike(...at));
           await bank.ready;
-          const end = performance.now() + 5000;
-          let level = bank.level();
-          while (level.ringing === 0 && performance.now() < end) {
-            await new Promise((resolve) => setTimeout(resolve, 20));
-            level = bank.level();
-          }
+          let level;
+          await window.until(() => (level = bank.level()).ringing > 0);
           const answer = { before, struck, heard, level, state: bank.state, latency: bank.latency };
           await bank.close();
           return answer;
@@ -418,8 +442,9 @@ def test_old_materials_fade_when_too_many_modes_ring(page) -> None:
           const counts = [];
           node.port.onmessage = (event) => counts.push(event.data.ringing);
           node.connect(context.destination);
+          const echo = await window.makeEcho(context);
           await context.startRendering();
-          await new Promise((resolve) => setTimeout(resolve, 300));
+          await echo();
           return counts;
         }""",
         {"modes": modes, "times": times, "rate": RATE},
