@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -129,8 +130,10 @@ def test_somebody_who_interrupts_gets_the_best_checked_so_far(problem):
     assert design.evidence["cost"] < design.evidence["cost_start"]
 
 
-def test_a_search_is_checked_within_its_time(problem):
-    design = optimise(with_options(problem, evaluations=None, seconds=2.0))
+def test_a_search_is_checked_within_its_time(problem, monkeypatch):
+    # Time of the processor, of which whatever else runs on the machine takes none.
+    monkeypatch.setattr(time, "monotonic", time.process_time)
+    design = optimise(with_options(problem, evaluations=None, seconds=2.0, workers=1))
     assert design.evidence["seconds"] < 4.0
     assert len(design.evidence["checks"]) > 1
 
