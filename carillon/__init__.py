@@ -13,6 +13,7 @@ from carillon import step as _step
 _openblas.configure(_os.environ)
 _step.leave_lone_step(_os.environ)
 _step.start_without_daemon(_os.environ)
+_step.stay_apart(_os.environ, _os.getpid())
 
 __version__ = "0.1.0"
 

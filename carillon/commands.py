@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 
-from carillon import cli
+from carillon import cli, step
 from carillon.arguments import Parser
 from carillon.errors import UserError
 from carillon.progress import say
@@ -48,6 +49,7 @@ def run_program(
     words
         The command line, that of this process if None.
     """
+    step.keep_apart(os.environ, os.getpid())
     chosen: list[argparse.Namespace] = []
     given = sys.argv[1:] if words is None else list(words)
     try:

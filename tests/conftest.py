@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from carillon import step
 from carillon.runtime import allowed_threads
 from tests.chromium import chromium
 from tests.hostile import summary
@@ -34,6 +35,9 @@ RANKS = {
     "OMPI_MCA_mpi_yield_when_idle": "1",
     "OMPI_MCA_hwloc_base_binding_policy": "none",
 }
+
+# Processes of tests, and those that they start, begin and end all the time.
+step.keep_apart(os.environ, os.getpid())
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 

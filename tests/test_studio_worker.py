@@ -6,9 +6,11 @@ import asyncio
 import os
 import signal
 import time
+from pathlib import Path
 
 import psutil
 import pytest
+from mpi4py import MPI
 
 from carillon.errors import UserError
 from studio.processes.worker import Worker
@@ -43,6 +45,9 @@ class Bench:
 
     def pid(self):
         return os.getpid()
+
+    def directory(self):
+        return MPI.Is_initialized(), os.environ["OMPI_MCA_orte_top_session_dir"]
 
 
 @pytest.fixture
@@ -129,6 +134,12 @@ def test_what_a_process_is_asked_that_has_just_ended_fails_likewise(worker):
         return await worker.call("add", 2)
 
     assert asyncio.run(call()) == 2
+
+
+def test_a_process_has_nothing_on_the_disk_that_it_would_leave_when_it_is_ended(worker):
+    is_initialised, directory = asyncio.run(worker.call("directory"))
+    assert is_initialised and directory.endswith(f".{worker.pid}")
+    assert not Path(directory).exists()
 
 
 def test_ctrl_c_is_for_the_server(worker):

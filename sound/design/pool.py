@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from carillon.children import end_with_parent
 from carillon.errors import ConvergenceError, UserError
+from carillon.step import leave_nothing
 from carillon.threads import one_thread
 from sound.design.descent import (
     DesignDescent,
@@ -178,6 +179,7 @@ def _pass_on(told: SimpleQueue[SearchStep], tell: Callable[[SearchStep], None]) 
 
 def _prepare_apart(path: str, told: SimpleQueue[SearchStep] | None) -> None:
     end_with_parent()
+    leave_nothing(os.environ)
     _for_good.enter_context(one_thread())
     with open(path, "rb") as file:
         setting = pickle.load(file)
