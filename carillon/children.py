@@ -11,6 +11,8 @@ from multiprocessing import parent_process
 from multiprocessing.connection import wait
 from threading import Thread
 
+from carillon.step import leave_nothing
+
 PATIENCE_SECONDS = 10.0
 """Time that a program gets to end its own children, once it has been told to end."""
 
@@ -55,6 +57,7 @@ def end_with_parent() -> None:
 
 def _end_after(sentinel: int) -> None:
     wait([sentinel])
+    leave_nothing(os.environ, os.getpid())
     os._exit(1)
 
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import MutableMapping
+from collections.abc import Mapping, MutableMapping
 
 _STEP = ("SLURM_STEP_ID", "SLURM_STEPID")
 _LAUNCHERS = ("PMIX_", "PMI_", "OMPI_COMM_WORLD_")
@@ -74,10 +74,12 @@ def stay_apart(environment: MutableMapping[str, str], process: int) -> None:
         keep_apart(environment, process)
 
 
-def leave_nothing(environment: MutableMapping[str, str]) -> None:
-    """Remove the directory of this process at once, as it may be killed; alone it needs none."""
-    directory = environment.get(_DIRECTORY, "")
-    if not _launched(environment) and _is_own(directory) and directory.endswith(f".{os.getpid()}"):
+def leave_nothing(environment: Mapping[str, str], process: int) -> None:
+    """Remove the directory of a process that was started from here, and was killed."""
+    its_own = dict(environment)
+    stay_apart(its_own, process)
+    directory = its_own.get(_DIRECTORY, "")
+    if _is_own(directory) and directory.endswith(f".{process}"):
         shutil.rmtree(directory, ignore_errors=True)
 
 

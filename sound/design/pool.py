@@ -125,7 +125,8 @@ class Pool:
         executor: Any = self._executor
         if executor is None or executor._result_queue is None:  # ended before
             return
-        for process in list(executor._processes.values()):
+        processes = list(executor._processes.values())
+        for process in processes:
             process.kill()
         manager, queue = executor._executor_manager_thread, executor._call_queue
         # The thread that manages them may be reading a result that one of them has half written. It
@@ -134,6 +135,8 @@ class Pool:
         executor.shutdown(wait=False, cancel_futures=True)
         if manager is not None:
             _join(manager, queue._reader)
+        for process in processes:
+            leave_nothing(os.environ, process.pid)
 
 
 def _join(manager: Thread, tasks: Connection) -> None:
@@ -179,7 +182,6 @@ def _pass_on(told: SimpleQueue[SearchStep], tell: Callable[[SearchStep], None]) 
 
 def _prepare_apart(path: str, told: SimpleQueue[SearchStep] | None) -> None:
     end_with_parent()
-    leave_nothing(os.environ)
     _for_good.enter_context(one_thread())
     with open(path, "rb") as file:
         setting = pickle.load(file)

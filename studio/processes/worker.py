@@ -105,6 +105,7 @@ class Worker:
         if process is not None and pipe is not None:
             process.kill()
             process.join()
+            leave_nothing(os.environ, process.pid or 0)
         self._give_up()
 
     def start(self) -> None:
@@ -176,7 +177,6 @@ def _serve(pipe: Connection, work: str) -> None:
     os.environ["OMP_NUM_THREADS"] = "1"
     module, name = work.split(":")
     done = getattr(import_module(module), name)()
-    leave_nothing(os.environ)
     while True:
         try:
             number, method, arguments, has_news = pipe.recv()
