@@ -161,10 +161,11 @@ def test_slow_uploads_are_ended(hasty: Served, pause):
     head = f"POST /clip HTTP/1.1\r\nHost: {hasty.host}\r\nCookie: {hasty.cookie}\r\n"
     with socket.create_connection(("127.0.0.1", hasty.port), timeout=SECONDS) as stream:
         stream.sendall(f"{head}Origin: {hasty.origin}\r\nContent-Length: 900\r\n\r\nR".encode())
-        ended = threading.Event()
+        ended, drops = threading.Event(), []
 
         def drip() -> None:
             while not ended.wait(pause):
+                drops.append(pause)
                 try:
                     stream.sendall(b"I")
                 except OSError:
@@ -178,6 +179,8 @@ def test_slow_uploads_are_ended(hasty: Served, pause):
         ended.set()
         thread.join()
     assert answer.split()[1] == b"408" and b"slowly" in answer
+    # By a clock that is as busy as the server.
+    assert sum(drops) < 3 * HASTY.upload_seconds
 
 
 def test_uploads_that_break_off_leave_the_server_well(server: Served):
