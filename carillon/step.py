@@ -76,11 +76,9 @@ def stay_apart(environment: MutableMapping[str, str], process: int) -> None:
 
 def leave_nothing(environment: Mapping[str, str], process: int) -> None:
     """Remove the directory of a process that was started from here, and was killed."""
-    its_own = dict(environment)
-    stay_apart(its_own, process)
-    directory = its_own.get(_DIRECTORY, "")
-    if _is_own(directory) and directory.endswith(f".{process}"):
-        shutil.rmtree(directory, ignore_errors=True)
+    directory = environment.get(_DIRECTORY, "")
+    if _is_own(directory):  # that of this process, beside which its children's are
+        shutil.rmtree(f"{directory.rpartition('.')[0]}.{process}", ignore_errors=True)
 
 
 def _is_own(directory: str) -> bool:
