@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import ast
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from tests.patience import HANG_SECONDS
 
-CHECKOUT = Path(__file__).resolve().parent.parent
 MODES = ("modes", "builtin:box", "--resolution", "6", "--modes", "9", "--json", "--out", "box.h5")
 
 
@@ -42,13 +39,3 @@ def test_python_raises_what_it_does_without_petsc():
         [sys.executable, "-c", program], capture_output=True, text=True, timeout=HANG_SECONDS
     )
     assert done.stdout.strip() == "told True", done.stderr
-
-
-def test_petsc_is_had_from_one_module():
-    found = []
-    for room in ("carillon", "solver", "sound", "studio", "workflow", "tests"):
-        for path in (CHECKOUT / room).rglob("*.py"):
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-                if isinstance(node, ast.ImportFrom) and node.module == "petsc4py":
-                    found.append(os.fspath(path.relative_to(CHECKOUT)))
-    assert found == ["carillon/petsc.py"]

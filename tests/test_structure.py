@@ -203,3 +203,13 @@ def test_class_names_are_told_apart():
             if isinstance(node, ast.ClassDef):
                 named.setdefault(node.name, []).append(name)
     assert {name: where for name, where in named.items() if len(where) > 1} == {}
+
+
+def test_petsc_is_had_from_one_module():
+    """Which has it leave broken pipes to Python."""
+    found = []
+    for path in (*modules().values(), *(CHECKOUT / "tests").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and node.module == "petsc4py":
+                found.append(_module_of(path))
+    assert found == ["carillon.petsc"]
