@@ -45,11 +45,13 @@ Run = Callable[..., "subprocess.CompletedProcess[str]"]
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Files that take longest first, so that no process is left with them at the end.
 
-    What only `make torture` tries is left out otherwise.
+    What only `make torture` or `make test-all` tries is left out otherwise.
     """
-    if not os.environ.get("CARILLON_TORTURE"):
-        spared = [item for item in items if item.get_closest_marker("torture")]
-        items[:] = [item for item in items if not item.get_closest_marker("torture")]
+    for marker in ("torture", "nightly"):
+        if os.environ.get(f"CARILLON_{marker.upper()}"):
+            continue
+        spared = [item for item in items if item.get_closest_marker(marker)]
+        items[:] = [item for item in items if not item.get_closest_marker(marker)]
         if spared:
             config.hook.pytest_deselected(items=spared)
 
