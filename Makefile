@@ -1,4 +1,4 @@
-# Carillon: `make run` for the default workflow and its report, `make test` for the test suite.
+# Carillon: `make run` for the default workflow and its report, `make test` for the tests.
 # From a fresh Debian or Ubuntu machine both install what is missing first.
 
 SHELL := /bin/bash
@@ -16,7 +16,8 @@ PYTEST_OPTIONS ?=
 # Test files run beside each other, each in one process, the long ones first. Many wait for a while, those
 # of SLURM most of the time, which is what the third and fourth process are for.
 PYTEST_PROCESSES ?= 4
-TORTURE_PROCESSES ?= 2
+# change: what every change needs; part: that and a part of the rest (tests/tiers.py); all: everything.
+TIER ?= change
 PACKAGES = $(patsubst %/__init__.py,%,$(wildcard */__init__.py))
 RULES = $(wildcard Snakefile workflow/rules/*.smk)
 
@@ -32,12 +33,12 @@ endif
 # Tests start thousands of processes, which need not compile the same modules.
 unexport PYTHONDONTWRITEBYTECODE
 # They run beside each other, so that more threads would only wait for each other.
-test torture: export OMP_NUM_THREADS ?= 1
+test: export OMP_NUM_THREADS ?= 1
 
-.PHONY: help env run test torture check docs clean
+.PHONY: help env run test test-all check docs clean
 
 help:  ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-7s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 	@echo "  PETSC=source make env   build PETSc and SLEPc against the MPI on PATH instead of using apt's"
 
 env:  ## only the environment: .venv with PETSc and SLEPc
@@ -49,15 +50,16 @@ run: env  ## the default workflow; ends at results/report.html
 	@snakemake --profile workflow/profiles/default --cores $(CORES) $(TARGETS)
 	@echo "report: $(abspath results/report.html)"
 
-test: env  ## the whole test suite
+test: env  ## the tests that every change needs, ten minutes at most
 	@bash workflow/envs/packages.sh install tests >/dev/null || echo "tests without them are skipped"
 	@$(PYTHON_OF_VENV) -m workflow compile || true
 	@$(PYTHON_OF_VENV) -m pytest -q -n $(PYTEST_PROCESSES) --dist loadfile \
-		--no-loadscope-reorder $(PYTEST_OPTIONS)
+		--no-loadscope-reorder --tier $(TIER) $(PYTEST_OPTIONS)
 
-torture: env  ## all hostile inputs, many more random ones, fifty kills; a quarter of an hour or more
-	@CARILLON_TORTURE=1 $(PYTHON_OF_VENV) -m pytest -q -n $(TORTURE_PROCESSES) --dist loadfile \
-		$(wildcard tests/test_hostile_*.py tests/test_properties*.py tests/test_kills.py) $(PYTEST_OPTIONS)
+test-all:  ## all tests, an hour or so; those of a clean root, too, where one can be made
+	@bash workflow/envs/packages.sh install faust >/dev/null || echo "tests without it are skipped"
+	@$(MAKE) test TIER=all
+	@.ci/bare-root --reuse || { status=$$?; [ $$status -eq 77 ] || exit $$status; }
 
 check: env  ## lint, formatting, types (of the page, too), Snakemake rules
 	@ruff check --quiet

@@ -14,8 +14,9 @@ import pytest
 
 from carillon import step
 from carillon.runtime import allowed_threads
+from tests import tiers
 from tests.chromium import chromium
-from tests.hostile import summary
+from tests.hostile import fuzzing, summary
 from tests.hostile.fixtures import suite, tried, zoo  # noqa: F401
 from tests.patience import HANG_SECONDS
 from tests.zygote import Job, Limits, Zygote
@@ -42,22 +43,52 @@ step.keep_apart(os.environ, os.getpid())
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Files that take longest first, so that no process is left with them at the end.
+DUE: pytest.StashKey[frozenset[str]] = pytest.StashKey()
+"""Files whose nightly tests are run in the tier `part`."""
 
-    What only `make torture` or `make test-all` tries is left out otherwise.
-    """
-    for marker in ("torture", "nightly"):
-        if os.environ.get(f"CARILLON_{marker.upper()}"):
-            continue
-        spared = [item for item in items if item.get_closest_marker(marker)]
-        items[:] = [item for item in items if not item.get_closest_marker(marker)]
-        if spared:
-            config.hook.pytest_deselected(items=spared)
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--tier",
+        choices=tiers.TIERS,
+        default=tiers.TIERS[0],
+        help="what every change needs (default), that and the nightly tests that are due, or all",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    due: frozenset[str] = frozenset()
+    if hasattr(config, "workerinput"):
+        due = frozenset(config.workerinput["due"])
+    elif config.getoption("--tier") == "part":
+        due = tiers.due(tiers.measured()).files
+    config.stash[DUE] = due
+    fuzzing.load(long=config.getoption("--tier") == "all" or bool(due & fuzzing.FILES))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node: Any) -> None:
+    node.workerinput["due"] = sorted(node.config.stash[DUE])
+
+
+def pytest_report_header(config: pytest.Config) -> str | None:
+    due = config.stash[DUE]
+    return f"nightly tests of: {', '.join(sorted(due))}" if due else None
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what is not of the tier; files that take longest first, so that none is left."""
+
+    def spared(item: pytest.Item) -> bool:
+        return bool(item.get_closest_marker("nightly")) and item.path.name not in config.stash[DUE]
+
+    if config.getoption("--tier") != "all":
+        config.hook.pytest_deselected(items=[item for item in items if spared(item)])
+        items[:] = [item for item in items if not spared(item)]
 
     def first(item: pytest.Item) -> int:
         marks = {mark.name for mark in item.iter_markers()}
-        return 0 if "slurm" in marks else 1 if "slow" in marks else 2
+        return 0 if "slurm" in marks else 1 if marks & {"slow", "nightly"} else 2
 
     rank: dict[Path, int] = {}
     for item in items:

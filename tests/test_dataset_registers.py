@@ -75,13 +75,13 @@ def test_no_closure_is_compiled():
     assert not [name for name in compiled if "<locals>" in name]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("target", "objectives"),
     [
         ("haswell", ["calibrated"]),
-        pytest.param("haswell", ["inertial", "chen2015", "energy"], marks=pytest.mark.torture),
-        pytest.param("generic", ["calibrated", "inertial"], marks=pytest.mark.torture),
+        pytest.param("haswell", ["inertial", "chen2015", "energy"], marks=pytest.mark.nightly),
+        pytest.param("generic", ["calibrated", "inertial"], marks=pytest.mark.nightly),
     ],
 )
 def test_fits_differ_by_rounding_between_widths_and_not_with_their_company(

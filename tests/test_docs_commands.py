@@ -17,14 +17,14 @@ def reader(tmp_path_factory) -> Reader:
     return Reader(tmp_path_factory.mktemp("reader"))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.mpi
 @pytest.mark.parametrize("page", RUN, ids=lambda page: str(page.relative_to(CHECKOUT)))
 def test_commands_of_a_page_run(reader: Reader, page: Path):
     assert reader.follow(page)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_example_of_the_readme_prints_frequencies(reader: Reader):
     *_, frequencies = reader.follow(CHECKOUT / "README.md")
     assert len(frequencies.strip("[]\n").split()) == 34

@@ -65,7 +65,7 @@ def test_galerkin_bounds_the_frequencies_from_above(cases):
         assert (coarse_frequencies(field, galerkin, MODES) >= exact * (1 - 1e-8)).all()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("material", "objective", "expected"),
     [

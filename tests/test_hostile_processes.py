@@ -8,8 +8,6 @@ from tests.hostile.suite import snapshot
 from tests.hostile.zoo import CONFIGURATION
 from tests.workflow_runs import PROFILE, snakemake
 
-pytestmark = pytest.mark.slow
-
 ALONE = {
     "no command": "dataset_gen",
     "a broken shard": "forests inspect ZOO/shard-cut.h5",
@@ -29,6 +27,18 @@ RANKS = {
     "damaged shards": "forests train ZOO/shard-flipped.h5 --out o.h5",
     "no such split": "dataset_gen generate --samples 10 --shard 3 --shards 2 --out o.h5",
 }
+
+
+OFTEN = ("no such option", "damaged shards", "builtin:bar$(touch x)", "$(touch x)")
+"""Of those below that start several processes, what is tried with every change."""
+
+
+def some(names):
+    """The names as parameters, nightly but for `OFTEN`."""
+    return [
+        pytest.param(name, id=name, marks=[] if name in OFTEN else pytest.mark.nightly)
+        for name in names
+    ]
 
 
 def words_of(command, zoo):
@@ -53,13 +63,15 @@ def test_alone(name, zoo, start_cli, tmp_path):
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("name", RANKS)
+@pytest.mark.parametrize("name", some(RANKS))
 def test_on_two_ranks_it_is_said_once_and_both_end(name, zoo, mpiexec, tmp_path):
     room, *words = words_of(RANKS[name], zoo)
     assert_refused(mpiexec(2, room, *words, cwd=tmp_path), room, tmp_path)
 
 
-@pytest.mark.parametrize("mesh", ["builtin:bar$(touch x)", "builtin:bar; touch x", "nowhere.obj"])
+@pytest.mark.parametrize(
+    "mesh", some(["builtin:bar$(touch x)", "builtin:bar; touch x", "nowhere.obj"])
+)
 def test_snakemake_refuses_a_mesh(mesh, tmp_path):
     (tmp_path / "c.yaml").write_text(CONFIGURATION.replace("'builtin:bar'", f"'{mesh}'"))
     done = snakemake(
@@ -70,7 +82,7 @@ def test_snakemake_refuses_a_mesh(mesh, tmp_path):
     assert {path.name for path in tmp_path.iterdir()} <= {"c.yaml", ".snakemake"}
 
 
-@pytest.mark.parametrize("launcher", ["mpiexec; touch x;", "$(touch x)", "mpiexec | touch x"])
+@pytest.mark.parametrize("launcher", some(["mpiexec; touch x;", "$(touch x)", "mpiexec | touch x"]))
 def test_a_launcher_is_no_other_command(launcher, tmp_path):
     text = CONFIGURATION.replace("cores: 1", f'cores: 2, ranks: 2, launcher: "{launcher}"')
     (tmp_path / "c.yaml").write_text(text)

@@ -12,7 +12,7 @@ import pytest
 
 from tests.patience import HANG_SECONDS
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 

@@ -1,6 +1,6 @@
 """SIGKILL at any moment: the same command run again ends as if nothing had happened.
 
-A part of the kills is tried with every change, all of them by `make torture`.
+When a run is killed hangs on the clock, and each run is made twice: all of this is nightly.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from tests.hostile import summary
 from tests.hostile.killing import Killed, kill_and_repeat, moments, run_undisturbed, snakemake
 from tests.hostile.zoo import CONFIGURATION
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 SHARDS = ("results/dataset/uniform-0.h5", "results/dataset/uniform-1.h5")
 FORESTS, TRUTH = "results/forests/forests.h5", "results/models/bar/truth.h5"
@@ -29,19 +29,19 @@ BENCHMARK = (
 DESIGN = "sound design project.yaml --evaluations 4 --restart --workers 2 --out design.h5".split()
 
 NUMBERS = {
-    "generate": (7, 1),
-    "generate by workers": (3, 1),
-    "train": (7, 1),
-    "modes": (8, 1),
-    "modes, one rank": (6, 1),
-    "modes, mpiexec": (5, 1),
-    "benchmark": (4, 0),
-    "design": (3, 0),
-    "design, its first process": (2, 1),
-    "rules": (3, 0),
-    "rules, Snakemake alone": (2, 0),
+    "generate": 7,
+    "generate by workers": 3,
+    "train": 7,
+    "modes": 8,
+    "modes, one rank": 6,
+    "modes, mpiexec": 5,
+    "benchmark": 4,
+    "design": 3,
+    "design, its first process": 2,
+    "rules": 3,
+    "rules, Snakemake alone": 2,
 }
-"""Kills in all, 50, and those of them that are tried with every change."""
+"""Kills of each command, 50 in all."""
 
 
 @pytest.fixture(scope="module")
@@ -84,14 +84,13 @@ def undisturbed(commands, tmp_path_factory):
 
 def kills():
     """Every kill: the command's name and the share of its time after which it is killed."""
-    for name, (count, usual) in NUMBERS.items():
+    for name, count in NUMBERS.items():
         for number, moment in enumerate(moments(name, count)):
-            marks = [] if number < usual else [pytest.mark.torture]
-            yield pytest.param(name, moment, id=f"{name} {number}", marks=marks)
+            yield pytest.param(name, moment, id=f"{name} {number}")
 
 
 def test_there_are_fifty_kills():
-    assert sum(count for count, _ in NUMBERS.values()) == 50
+    assert sum(NUMBERS.values()) == 50
 
 
 @pytest.mark.parametrize(("name", "moment"), list(kills()))

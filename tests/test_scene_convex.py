@@ -57,7 +57,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "convex"
 
 
-@pytest.mark.parametrize("name", ["frying-pan", pytest.param("cup", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["frying-pan", pytest.param("cup", marks=pytest.mark.nightly)])
 def test_parts_fill_the_solid_and_leave_its_hollow_free(name: str) -> None:
     surface = builtin_surface(name)
     parts = parts_of(surface)

@@ -24,7 +24,7 @@ from tests.workflow_runs import CHECKOUT
 from workflow import orphans
 from workflow.commands.digest import digest
 
-pytestmark = [pytest.mark.slurm, pytest.mark.mpi, pytest.mark.slow]
+pytestmark = [pytest.mark.slurm, pytest.mark.mpi, pytest.mark.nightly]
 
 SAMPLES, SHARDS = 3000, 2
 SMALL = f"""\

@@ -32,7 +32,7 @@ def test_one_rank_factorises_for_its_machine(ranks, mpiexec):
 
 
 @pytest.mark.parametrize("linear_solver", ["auto", "mumps"])
-@pytest.mark.parametrize("ranks", [1, 2, 3, pytest.param(7, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("ranks", [1, 2, 3, pytest.param(7, marks=pytest.mark.nightly)])
 def test_corrected_modes_on_any_number_of_ranks(ranks, linear_solver, truth, tmp_path, mpiexec):
     out = tmp_path / "modes.h5"
     options = ("--tol", "1e-11", "--linear-solver", linear_solver, "--out", out)

@@ -150,7 +150,7 @@ def study(tmp_path_factory, run_cli):
 
 
 @pytest.mark.mpi
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_study_measures_and_models_and_says_which(study):
     found, plot = study
     assert plot.stat().st_size > 10_000
@@ -174,7 +174,7 @@ def test_study_measures_and_models_and_says_which(study):
 
 
 @pytest.mark.mpi
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_people_read_what_is_measured_and_what_is_modelled(study, tmp_path):
     found, _ = study
     lines = study_lines(found)

@@ -351,7 +351,7 @@ def test_a_studio_ends_while_a_search_is_about_to_begin(folder, monkeypatch):
     run(play())
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_nothing_is_lost_when_all_is_killed_in_a_search(folder):
     """The server ends at once with its processes; started again, it goes on from there."""
     command = [sys.executable, "-m", "carillon", "studio", "bar.yaml", "--no-browser"]

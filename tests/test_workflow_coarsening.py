@@ -159,7 +159,7 @@ def finished(tmp_path_factory):
     return folder / "results-tiny" / "coarsening"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_page_of_a_miniature_study_holds_its_tables(finished):
     page = Page(finished / "report.html")
     assert_self_contained(page)
@@ -171,7 +171,7 @@ def test_the_page_of_a_miniature_study_holds_its_tables(finished):
         assert (finished / "figures" / f"{name}.png").stat().st_size > 5000
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_miniature_study_is_refined_to_its_goals(finished):
     plain, refined = read_table(finished / "tables/summary.json").rows
     assert refined["all_rms"] <= 0.05 < plain["all_rms"]

@@ -22,7 +22,7 @@ from tests.patience import HANG_SECONDS, wait_for, words_of
 from tests.workflow_runs import CHECKOUT, PROFILE, snakemake
 from workflow.commands.digest import digest
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 CONFIG = """\
 models: {bar: {mesh: 'builtin:bar', resolution: 20, material: two-region}}

@@ -108,7 +108,7 @@ def finished(tmp_path_factory):
     return folder / "results-tiny" / FIGURES.folder
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.mpi
 def test_the_page_of_miniature_figures_holds_its_tables_and_plots(finished):
     page = Page(finished / "report.html")
@@ -121,7 +121,7 @@ def test_the_page_of_miniature_figures_holds_its_tables_and_plots(finished):
     assert "takes for granted" in page.source
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.mpi
 def test_miniature_figures_find_what_the_paper_found(finished):
     rows = read_table(finished / "tables" / "convergence.json").rows

@@ -71,7 +71,7 @@ def finished(tmp_path_factory):
     return folder / FOLDER
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_tiny_default_forests_hold_the_trees_grown_apart(finished):
     summary = json.loads((finished / "default_forest" / "forests.json").read_text())
     assert summary["trees"] == 1
@@ -79,7 +79,7 @@ def test_tiny_default_forests_hold_the_trees_grown_apart(finished):
     assert len(list((finished / "default_forest" / "trees").iterdir())) == 2
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_page_of_a_miniature_study_holds_its_tables_and_figures(finished):
     study = finished / "forests_study"
     page = Page(study / "report.html")
@@ -91,7 +91,7 @@ def test_the_page_of_a_miniature_study_holds_its_tables_and_figures(finished):
         assert (study / "figures" / f"{name}.png").stat().st_size > 5000
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_miniature_study_finds_that_more_rows_help(finished):
     few, many = read_table(finished / "forests_study" / "tables" / "curve.json").rows
     assert few["rows"] < many["rows"] <= 24000

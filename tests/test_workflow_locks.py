@@ -77,7 +77,7 @@ def test_a_signature_that_was_cut_off_is_of_nobody(folder):
     assert left(folder) == ["0.output.lock"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_run_goes_on_after_the_one_before_was_killed(tmp_path):
     config = tmp_path / "config.yaml"
     config.write_text(

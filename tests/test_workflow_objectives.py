@@ -202,7 +202,7 @@ def finished(tmp_path_factory, run_cli):
     return folder / "results" / "objectives"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_page_of_a_miniature_study_holds_its_tables(finished):
     page = Page(finished / "report.html")
     assert_self_contained(page)
@@ -214,7 +214,7 @@ def test_the_page_of_a_miniature_study_holds_its_tables(finished):
     assert (finished / "figures" / "box.png").stat().st_size > 5000
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_miniature_study_finds_that_a_fit_beats_galerkin(finished):
     rows = {row["coarsening"]: row for row in read_table(finished / "tables/summary.json").rows}
     assert rows["oversampled"]["all_rms"] < rows["galerkin"]["all_rms"]

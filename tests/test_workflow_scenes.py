@@ -244,7 +244,7 @@ def test_the_page_has_the_films_and_the_numbers_of_its_tables(results):
     assert len(read.ids) == len(set(read.ids)) and "<script" not in read.source
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_tiny_scenes_are_played_and_shown(tmp_path):
     require_engine()
     done = snakemake(tmp_path, FOLDER, "--configfile", TINY, "--cores", 2)

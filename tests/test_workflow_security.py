@@ -101,7 +101,7 @@ def test_every_placeholder_of_every_rule_is_quoted():
     assert [lint.title for lint in lints] == ["Placeholder {input} without quotes"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_run_with_hostile_names_runs_nothing_but_its_rules(tmp_path):
     """From the mesh's name over the launcher of two ranks to the folder of the results."""
     mesh, folder = "-my 'box' $(touch x) \"`touch y`;touch z&*.obj", "my $(touch r) 'results'; [a]"

@@ -399,7 +399,7 @@ def test_examples_of_recordings_are_planned_and_need_no_other(tmp_path):
     assert "synthesise_clip" not in jobs and "build_sounds_index" not in jobs
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_tiny_design_is_made_from_synthesised_clips_and_sounds(tmp_path):
     folder = Path("results-tiny", FOLDER, "frying-pan")
     target = folder / "after" / "plate.wav"

@@ -176,7 +176,7 @@ def change(path: Path, addition: str) -> None:
     path.write_text(text[:place] + addition + text[place:])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_did_not_change_is_not_repeated(run):
     change(run / "dataset_gen" / "generate.py", "# A remark.\n")
     change(run / "solver" / "correction" / "lanczos.py", "CHANGED = True\n")
@@ -184,14 +184,14 @@ def test_what_did_not_change_is_not_repeated(run):
     assert repeated(run) == set()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_changed_source_repeats_what_depends_on_it(run):
     change(run / "forests" / "training" / "leaves.py", "CHANGED = True\n")
     # The forests' description is made anew because they are.
     assert repeated(run) == {"train_forests", "describe_forests"}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_changed_parameter_repeats_what_depends_on_it(run):
     write_config(run, seed=1)
     everything = {"generate_shard", "describe_shard", "train_forests", "describe_forests"}

@@ -46,7 +46,7 @@ class Case:
     writes : for a control, the files that it leaves; all it leaves, but for folders.
     plain : whether it runs without the rights of root.
     file_size : largest file that can be written [bytes], as on a full disk.
-    usual : whether it is tried with every change, and not by `make torture` alone.
+    usual : whether it is tried with every change, or else marked `nightly`.
     """
 
     name: str

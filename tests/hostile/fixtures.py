@@ -18,7 +18,7 @@ from tests.hostile.zoo import Zoo
 def parameters(table: Table) -> list[ParameterSet]:
     """The rows of a table for `pytest.mark.parametrize`."""
     return [
-        pytest.param(row, id=row.name, marks=[] if row.usual else pytest.mark.torture)
+        pytest.param(row, id=row.name, marks=[] if row.usual else pytest.mark.nightly)
         for row in table.rows
     ]
 

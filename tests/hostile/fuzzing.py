@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import resource
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,24 +14,40 @@ from carillon.errors import UserError
 
 Result = TypeVar("Result")
 
-TORTURE = bool(os.environ.get("CARILLON_TORTURE"))
-"""Whether everything is to be tried, by `make torture`, and not the part for every change."""
+FILES = frozenset({"test_properties.py", "test_properties_files.py"})
+"""Tests that take the profiles of Hypothesis below."""
 MORE = 20
-"""How many times more examples torture takes."""
+"""How many times more examples the nightly profile takes, others on every run."""
+ONCE = 100
 EXTRA_BYTES = 1 << 30
 """Memory that reading may take beyond what the process has: files here are far below a megabyte."""
 
 
+settings.register_profile(
+    "change",
+    max_examples=ONCE,
+    derandomize=True,
+    database=None,
+    deadline=None,
+    print_blob=True,
+    suppress_health_check=list(HealthCheck),
+)
+settings.register_profile(
+    "nightly",
+    settings.get_profile("change"),
+    max_examples=ONCE * MORE,
+    derandomize=False,
+)
+
+
+def load(long: bool) -> None:
+    """Take the profile of every change, or the long one, for tests that are loaded later."""
+    settings.load_profile("nightly" if long else "change")
+
+
 def examples(count: int) -> settings:
-    """Settings for `count` examples, the same ones on every run unless it is torture."""
-    return settings(
-        max_examples=count * (MORE if TORTURE else 1),
-        derandomize=not TORTURE,
-        database=None,
-        deadline=None,
-        print_blob=True,
-        suppress_health_check=list(HealthCheck),
-    )
+    """Settings for `count` examples, or as many times more as the profile takes."""
+    return settings(max_examples=count * settings.default.max_examples // ONCE)
 
 
 @st.composite

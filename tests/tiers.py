@@ -1,0 +1,239 @@
+"""Which tests are run: what every change needs, all, or that and a part of the rest (test support).
+
+`python -m tests.tiers` tells what of the rest is due with this change,
+`python -m tests.tiers --measured LOG` writes anew how long it takes.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+TIERS = ("change", "part", "all")
+"""What every change needs; that and a part of the rest; everything."""
+TURNS = 3
+"""The rest is run in so many parts, one with each change."""
+BUDGET_SECONDS = 12 * 60 * 4 / 1.4
+"""Of a part: four processes for twelve minutes, on slower cores than those measured on."""
+MEASURED = Path(__file__).with_name("nightly_seconds.json")
+"""Seconds of each file's tests marked `nightly`, run beside three others on two cores."""
+UNKNOWN_SECONDS = 60.0
+"""What is taken for a file that was not yet measured."""
+CLEAN_ROOT = ".ci/bare-root"
+"""Is due in turns like a file of tests."""
+
+NEAR = 2
+"""Imports on the way from a test to a module that it is taken to test."""
+ROOMS = {
+    "dataset_gen": ("test_dataset_", "test_hostile_dataset_gen"),
+    "forests": ("test_forests_", "test_hostile_forests"),
+    "solver": ("test_solver_", "test_hostile_solver", "test_determinism"),
+    "sound": ("test_sound_", "test_scene_", "test_hostile_sound", "test_docs_sound"),
+    "studio": ("test_studio_", "test_hostile_studio"),
+    "workflow": ("test_workflow_", "test_hostile_workflow", "test_kills"),
+    "workflow/envs": ("test_installed", "test_environment", CLEAN_ROOT),
+    "slurm": ("test_slurm", CLEAN_ROOT),
+    ".ci": (CLEAN_ROOT,),
+    "docs": ("test_docs_",),
+    "README.md": ("test_docs_",),
+    "pyproject.toml": ("test_installed",),
+}
+"""Names with which tests of a folder or a file begin: tests do not import programs and rules."""
+TESTS = "tests"
+
+
+@dataclass(frozen=True)
+class Part:
+    """Files whose nightly tests are due: `related` to what has changed, and those of a turn."""
+
+    turn: int
+    related: tuple[str, ...]
+    in_turn: tuple[str, ...]
+
+    @property
+    def files(self) -> frozenset[str]:
+        """All of them, as names in `tests/`."""
+        return frozenset((*self.related, *self.in_turn))
+
+    def __str__(self) -> str:
+        names = ", ".join([*(f"{name} (changed)" for name in self.related), *self.in_turn])
+        return f"turn {self.turn + 1} of {TURNS} of the nightly tests: {names}"
+
+
+def measured() -> dict[str, float]:
+    """Seconds of nightly tests by file, those too that are in no table yet."""
+    marked = [path for path in sorted((CHECKOUT / TESTS).glob("test_*.py")) if _is_nightly(path)]
+    found: dict[str, float] = json.loads(MEASURED.read_text())
+    return {**{path.name: UNKNOWN_SECONDS for path in marked}, **found}
+
+
+def _is_nightly(path: Path) -> bool:
+    return "mark.nightly" in path.read_text()
+
+
+def choose(seconds: Mapping[str, float], nearest: Iterable[str], turn: int) -> Part:
+    """What is due: one turn whole, and what is nearest to the change as far as the budget lasts.
+
+    Parameters
+    ----------
+    seconds
+        By file with nightly tests.
+    nearest
+        Files of tests, those nearest to the change first.
+    turn
+        Any whole number; `TURNS` in a row cover everything.
+    """
+    turn %= TURNS
+    in_turn = turns(seconds)[turn]
+    left = BUDGET_SECONDS - sum(seconds[name] for name in in_turn)
+    related = []
+    for name in nearest:
+        if name in seconds and name not in in_turn and seconds[name] <= left:
+            left -= seconds[name]
+            related.append(name)
+    return Part(turn, tuple(related), tuple(in_turn))
+
+
+def turns(seconds: Mapping[str, float]) -> list[list[str]]:
+    """All files in `TURNS` parts that take about as long."""
+    parts: list[list[str]] = [[] for _ in range(TURNS)]
+    for name in sorted(seconds, key=lambda name: (-seconds[name], name)):
+        min(parts, key=lambda part: sum(seconds[each] for each in part)).append(name)
+    return [sorted(part) for part in parts]
+
+
+# What has changed ---------------------------------------------------------------------------------
+
+
+def due(seconds: Mapping[str, float]) -> Part:
+    """What is due with the state of this checkout."""
+    return choose(seconds, nearest(changed_files()), turn_of_history())
+
+
+def turn_of_history() -> int:
+    """Number of commits on the main line; 0 without a history."""
+    count = _git("rev-list", "--count", "--first-parent", "HEAD")
+    return int(count[0]) if count else 0
+
+
+def changed_files() -> list[str]:
+    """Files that differ from the main branch, or else from the last commit on it."""
+    head = _git("rev-parse", "HEAD")
+    for main in ("origin/main", "main", "HEAD^"):
+        base = _git("merge-base", "HEAD", main)
+        if base and base != head:
+            break
+    else:
+        base = head
+    new = _git("ls-files", "--others", "--exclude-standard")
+    return sorted({*_git("diff", "--name-only", *base), *new}) if base else []
+
+
+def _git(*arguments: str) -> list[str]:
+    """Lines that git prints; none if it fails or is not there."""
+    try:
+        command = ["git", "-C", str(CHECKOUT), *arguments]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return []
+    return done.stdout.splitlines()
+
+
+def nearest(changed: Iterable[str]) -> list[str]:
+    """Files of tests that try what has changed: themselves, then by imports, then by rooms."""
+    changed = set(changed)
+    found: dict[str, int] = {}
+    for path in sorted((CHECKOUT / TESTS).glob("test_*.py")):
+        name = f"{TESTS}/{path.name}"
+        for distance, modules in enumerate(_imported(name)):
+            if changed & modules:
+                found[path.name] = distance
+                break
+        else:
+            if _of_rooms(path.name, changed):
+                found[path.name] = NEAR + 1
+    if _of_rooms(CLEAN_ROOT, changed):
+        found[CLEAN_ROOT] = NEAR + 1
+    return sorted(found, key=lambda name: (found[name], name))
+
+
+def _of_rooms(name: str, changed: Iterable[str]) -> bool:
+    """Whether tests of this name are those of a folder in which something has changed."""
+    return any(
+        name.startswith(begin)
+        for room, begins in ROOMS.items()
+        for begin in begins
+        if any(path == room or path.startswith(f"{room}/") for path in changed)
+    )
+
+
+def _imported(name: str) -> Iterator[set[str]]:
+    """The file itself, what it imports, what that imports, up to `NEAR`."""
+    seen: set[str] = set()
+    ring = {name}
+    for _ in range(NEAR + 1):
+        yield ring
+        seen |= ring
+        ring = {each for path in ring for each in _imports(path)} - seen
+
+
+@functools.cache
+def _imports(path: str) -> frozenset[str]:
+    """Files of the checkout that a module imports by name."""
+    if not path.endswith(".py"):
+        return frozenset()
+    found = set()
+    for node in ast.walk(ast.parse((CHECKOUT / path).read_bytes())):
+        if isinstance(node, ast.Import):
+            found |= {file for alias in node.names for file in _files(alias.name)}
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            for alias in node.names:
+                found |= set(_files(f"{node.module}.{alias.name}")) or set(_files(node.module))
+    return frozenset(found)
+
+
+@functools.cache
+def _files(module: str) -> tuple[str, ...]:
+    """The file of a module or a package, if it is one of the checkout."""
+    base = module.replace(".", "/")
+    return tuple(
+        path for path in (f"{base}.py", f"{base}/__init__.py") if (CHECKOUT / path).is_file()
+    )[:1]
+
+
+# What was measured --------------------------------------------------------------------------------
+
+
+def seconds_by_file(durations: Iterable[str]) -> dict[str, float]:
+    """Sum of the lines that `pytest --durations=0 -vv` prints, by file."""
+    found: dict[str, float] = {}
+    for line in durations:
+        match = re.match(r"([\d.]+)s (?:setup|call|teardown) +tests/(test_\w+\.py)::", line)
+        if match:
+            found[match[2]] = found.get(match[2], 0.0) + float(match[1])
+    return found
+
+
+def main(words: list[str]) -> int:
+    """Print what is due; status 1 if none of the files that are named is."""
+    if words[:1] == ["--measured"]:
+        found = seconds_by_file(Path(words[1]).read_text().splitlines())
+        kept = {name: seconds for name, seconds in measured().items() if name not in found}
+        told = {name: round(seconds) for name, seconds in sorted({**kept, **found}.items())}
+        MEASURED.write_text(json.dumps(told, indent=2) + "\n")
+        return 0
+    part = due(measured())
+    print(part)
+    return 0 if not words or part.files & set(words) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
