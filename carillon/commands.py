@@ -15,6 +15,7 @@ from carillon.arguments import Parser
 from carillon.errors import UserError
 from carillon.progress import say
 from carillon.ranks import world
+from carillon.waiting import leave_cores
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,8 @@ def run_program(
     except UserError as error:
         say(f"{name}: {error}")
         return cli.EXIT_BAD_INPUT
+    if comm is not None:
+        leave_cores(comm)
 
     def parse() -> None:
         chosen.append(_parser(name, description, commands, given).parse_args(given))

@@ -14,6 +14,7 @@ from carillon.fem.model import RIGID_MODES, Solid
 from carillon.fem.moduli import require_coarse_moduli
 from carillon.progress import say
 from carillon.runtime import limit_threads, reuse_freed_memory
+from carillon.waiting import leave_cores
 from solver.analysis.bounds import check_mode_count, require_memory
 from solver.analysis.components import ComponentModes, elastic_part, lowest_pairs
 from solver.analysis.modes import Initial, Modes
@@ -105,6 +106,7 @@ class ModalSolver:
         self.comm = comm
         self._verbose = verbose
         self._threads = limit_threads(ranks_of_machine(comm))
+        leave_cores(comm)
         reuse_freed_memory()
         phases = Phases(comm, verbose)
         with phases("partition"):

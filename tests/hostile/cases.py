@@ -46,7 +46,8 @@ class Case:
     writes : for a control, the files that it leaves; all it leaves, but for folders.
     plain : whether it runs without the rights of root.
     file_size : largest file that can be written [bytes], as on a full disk.
-    usual : whether it is tried with every change, or else marked `nightly`.
+    usual : whether it is tried with every change, or else by the nightly tier alone.
+    inside : whether it runs inside the process of the tests, and not as one of its own.
     """
 
     name: str
@@ -59,6 +60,7 @@ class Case:
     plain: bool = False
     file_size: int = 1 << 28
     usual: bool = True
+    inside: bool = False
 
     @property
     def control(self) -> bool:

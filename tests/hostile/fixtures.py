@@ -5,22 +5,47 @@ from __future__ import annotations
 import fcntl
 import os
 import time
+from dataclasses import replace
 
 import pytest
 from _pytest.mark.structures import ParameterSet
 
 from tests.hostile import summary
-from tests.hostile.cases import Case, Table
+from tests.hostile.cases import ZOO, Case, Table
 from tests.hostile.suite import Suite
 from tests.hostile.zoo import Zoo
 
 
 def parameters(table: Table) -> list[ParameterSet]:
-    """The rows of a table for `pytest.mark.parametrize`."""
-    return [
-        pytest.param(row, id=row.name, marks=[] if row.usual else pytest.mark.nightly)
-        for row in table.rows
-    ]
+    """The rows of a table for `pytest.mark.parametrize`.
+
+    With every change, a row of each kind is run as a process, the others inside the process of the
+    tests; the nightly tier runs them all as processes.
+    """
+    kinds: set[tuple[str, str]] = set()
+    found = []
+    for row in table.rows:
+        kind = (row.arguments[0] if len(row.arguments) > 1 else "", _kind(row))
+        marks = [pytest.mark.nightly] if kind in kinds or not row.usual else []
+        if marks and _can_be_inside(row) and row.usual:
+            found.append(pytest.param(replace(row, inside=True), id=f"{row.name}, inside"))
+        elif not marks:
+            kinds.add(kind)
+        found.append(pytest.param(row, id=row.name, marks=marks))
+    return found
+
+
+def _kind(row: Case) -> str:
+    if row.control:
+        return "control"
+    if not _can_be_inside(row):
+        return "rights or space"
+    return "file" if row.files or any(ZOO in word for word in row.arguments) else "argument"
+
+
+def _can_be_inside(row: Case) -> bool:
+    """Whether it needs no limits: what is valid may compute for long, and leave what it likes."""
+    return not row.control and not row.plain and row.file_size == Case.file_size
 
 
 @pytest.fixture(scope="session")

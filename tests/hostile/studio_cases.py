@@ -138,6 +138,7 @@ hostile(
             engine="{steps: 200, contact_seconds: 0.0001}",
         )
     },
+    usual=False,
 )
 hostile("no room for the sound", PLAY, files={"s.yaml": scene()}, file_size=4096)
 control("a ball that falls", PLAY, "o.wav", files={"s.yaml": scene()})

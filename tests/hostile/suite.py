@@ -10,6 +10,7 @@ import stat
 from pathlib import Path
 
 from tests.hostile.cases import ZOO, Case, Copy, Place
+from tests.hostile.inside import run_inside
 from tests.hostile.places import put_place
 from tests.hostile.zoo import Zoo
 from tests.zygote import Job, Limits, Outcome, Zygote
@@ -50,7 +51,7 @@ class Suite:
         arguments = [word.replace(ZOO, f"{self._zoo.folder}/") for word in case.arguments]
         limits = Limits(cpu_seconds=CPU_SECONDS, file_size=case.file_size)
         job = Job(case.room, arguments, str(folder), {}, limits, case.plain)
-        outcome = self._zygote.run(job)
+        outcome = run_inside(job) if case.inside else self._zygote.run(job)
         after = (snapshot(folder), snapshot(self._zoo.folder))
         faults = [*_faults(case, outcome), *_changes(case, before[0], after[0])]
         faults += [f"changes {name} of its input" for name in _differing(before[1], after[1])]
