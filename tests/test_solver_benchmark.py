@@ -13,6 +13,7 @@ from carillon.errors import ConvergenceError
 from solver.analysis.problem import ProblemOptions
 from solver.studies.benchmark import BenchmarkOptions, benchmark_row, row_lines
 from solver.studies.benchmark.methods import MethodRun, Methods
+from solver.studies.benchmark.options import COARSE
 from solver.studies.benchmark.rivals import (
     SlepcConfiguration,
     configurations,
@@ -29,6 +30,7 @@ TIMED = (
     "arpack",
     "slepc",
     "ddfem",
+    "ddfem_rough",
     "hcms",
     "hcms_ec",
     "fastest",
@@ -79,10 +81,11 @@ def test_every_method_finds_what_it_promises(row):
     # Both stop on an estimate of the error, 1e-2.
     assert errors["ddfem_ec"]["max"] < 0.05
     assert errors["ddfem_ec_warm"]["max"] < 0.05
+    assert errors["ddfem_rough"]["max"] < 0.05
     found = row["frequency_error"]
     assert found["ddfem"]["rms_7_60"] < found["average"]["rms_7_60"]
     assert "lumped mass" in row["problem"]["arpack_regular"]
-    assert set(row["missed"]) <= {"slepc", "arpack", "ddfem"}
+    assert set(row["missed"]) <= {"slepc", "arpack", "ddfem", "ddfem_rough"}
 
 
 def test_speedups_name_their_base(row):
@@ -134,6 +137,16 @@ def test_methods_alternate():
     rounds = [name for name in order if name != "arpack"]
     assert rounds == rounds[: len(rounds) // 3] * 3
     assert len(runs["hcms"]) == 3 and failed == {}
+
+
+def test_a_design_is_timed_beside_few_others_and_the_fine_mesh_less_often():
+    options = BenchmarkOptions(MODES, runs=3, fine_runs=1, design=True)
+    methods = set(TIMED) - set(options.left_out)
+    assert methods == {"slepc", "fastest", *COARSE}
+    rounds = {name: options.rounds(name) for name in methods}
+    assert rounds == {"slepc": 1, "fastest": 1, **dict.fromkeys(COARSE, 3)}
+    asked = BenchmarkOptions(MODES, design=True, rough=True, rivals=["scipy_superlu"])
+    assert not {"slepc_rough", "scipy_superlu"} & set(asked.left_out)
 
 
 def test_a_method_that_fails_is_told_and_the_others_go_on(monkeypatch):

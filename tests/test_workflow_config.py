@@ -68,6 +68,7 @@ def test_default_configuration_states_the_defaults_of_the_schema():
     for part in ("convergence", "times", "scaling"):
         assert config[part].pop("models")
         expected[part].pop("models")
+    assert config["times"].pop("all_methods") and expected["times"].pop("all_methods") is None
     assert config == expected
 
 
@@ -124,6 +125,7 @@ def test_a_missing_mesh_file_and_an_unknown_model_are_named(tmp_path):
     [
         ("convergence", "models"),
         ("times", "models"),
+        ("times", "all_methods"),
         ("scaling", "models"),
         ("figures", "convergence"),
         ("figures", "scaling"),

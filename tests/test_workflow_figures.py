@@ -28,7 +28,7 @@ def test_figures_are_no_part_of_the_default_run(tmp_path):
     assert jobs["follow_convergence_in_full"] == jobs["measure_scaling"] == 1
     assert "find_modes" not in jobs and "time_methods" not in jobs
     default = planned(snakemake(tmp_path, "--dry-run", "--cores", 1))
-    assert default["time_methods"] == 1
+    assert default["time_methods"] == 4
     assert not {"time_methods_in_full", "measure_scaling"} & set(default)
 
 

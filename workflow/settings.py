@@ -131,6 +131,9 @@ def check_links(config: Mapping[str, Any]) -> None:
                 )
     for part in ("convergence", "times", "scaling"):
         _require_models(f"{part}.models", config[part]["models"], config["models"])
+    _require_models(
+        "times.all_methods", config["times"]["all_methods"] or (), config["times"]["models"]
+    )
     for part in ("convergence", "scaling"):
         figures = config["figures"]
         _require_models(f"figures.{part}", figures[part], figures["models"])

@@ -1,5 +1,7 @@
 # From a model in the configuration to the solver's arguments.
 
+LEAST_RESOLUTION = 4
+
 
 def model_files(wildcards):
     """Mesh and material files of a model; none for a built-in object."""
@@ -73,6 +75,20 @@ def hcms_arguments(corrected):
     how = {key: solver[key] for key in ("interface", "retained_modes", "subdomains")}
     corrections = {"tol": solver["tolerance"], "corrections": solver["corrections"]}
     return options(how | (corrections if corrected else {"corrections": 0}))
+
+
+def timed_resolution(wildcards):
+    """Resolution at which a model is timed."""
+    part, own = config["times"], config["models"][wildcards.model]["resolution"]
+    return part["resolution"] or max(LEAST_RESOLUTION, round(part["share"] * own))
+
+
+def timed_methods(wildcards):
+    """How a model of the run is timed: by every method, or by those of a design and their rivals."""
+    part = config["times"]
+    every = part["all_methods"] is None or wildcards.model in part["all_methods"]
+    how = {} if every else {"design": True, "fine_runs": part["slow_runs"]}
+    return [*times_arguments(part), *options(how)]
 
 
 def times_arguments(part):

@@ -64,7 +64,7 @@ rule compare_with_truth:
         " --json > {output:q}.partial 2> {log:q} && mv {output:q}.partial {output:q}"
 
 
-# All methods in alternating runs, on a solid that may be coarser than the model itself.
+# Methods in alternating runs, on a solid that may be coarser than the model itself.
 rule time_methods:
     input:
         model=model_files,
@@ -80,8 +80,8 @@ rule time_methods:
         **limits("time_methods", ranks=RANKS),
     params:
         source=source("solver.commands.benchmark"),
-        model=lambda wildcards: model_arguments(wildcards, config["times"]["resolution"]),
-        how=times_arguments(config["times"]),
+        model=lambda wildcards: model_arguments(wildcards, timed_resolution(wildcards)),
+        how=timed_methods,
         forest=forest_argument,
     shell:
         solver_command("benchmark {params.model:q} {params.how:q} {params.forest:q}")

@@ -25,6 +25,7 @@ ALL = {
     ACCURACY,
     FORESTS,
     VALIDATION,
+    CLAIMS,
     SOUND,
     SOUNDS,
     COMPARED_SOUNDS,

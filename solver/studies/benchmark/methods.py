@@ -124,6 +124,11 @@ class Methods:
         with self.configuration.in_force(self.modes):
             return self._rival("slepc", *self._model("none"), ROUGH_TOLERANCE)
 
+    def ddfem_rough(self) -> MethodRun:
+        """SLEPc's Krylov-Schur on the coarse mesh, to the interactive tolerance."""
+        with self.configuration.in_force(self.modes):
+            return self._rival("slepc", *self._model("ddfem"), INTERACTIVE_TOLERANCE)
+
     def arpack(self) -> MethodRun:
         """ARPACK in shift-and-invert mode."""
         with without_purification():
@@ -305,6 +310,7 @@ def named(methods: Methods) -> dict[str, Callable[[], MethodRun]]:
         "arpack": methods.arpack,
         "slepc": methods.slepc,
         "ddfem": partial(methods.slepc, "ddfem"),
+        "ddfem_rough": methods.ddfem_rough,
         "hcms": methods.hcms,
         "hcms_ec": methods.hcms_ec,
         "fastest": methods.fastest,

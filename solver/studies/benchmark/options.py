@@ -12,6 +12,10 @@ from solver.studies.benchmark.methods import RIVAL_SECONDS
 
 SLOW = ("arpack", "arpack_regular", *RIVALS)
 ROUGH = ("slepc_rough", "fastest_rough", "refined")
+COARSE = ("ddfem", "ddfem_rough", "ddfem_ec_accurate", "ddfem_ec", "ddfem_ec_warm")
+"""Methods on the coarse mesh; all others are on the fine one."""
+BESIDE_DESIGN = ("arpack", "hcms", "hcms_ec")
+"""What `design` leaves out."""
 
 number_of_rounds = whole_number(1, 10_000)
 """Argument type: a number of rounds."""
@@ -27,6 +31,14 @@ class BenchmarkOptions:
         None,
         "rounds that ARPACK and --rivals take part in (default: all)",
         type=number_of_rounds,
+    )
+    fine_runs: int | None = option(
+        None,
+        "rounds that methods on the fine mesh take part in (default: all)",
+        type=number_of_rounds,
+    )
+    design: bool = option(
+        False, "only what a design does on the coarse mesh, and --method auto and SLEPc beside it"
     )
     arpack: bool = option(True, "run ARPACK, the slowest method, too")
     arpack_regular: bool = option(False, "also ARPACK without a factorisation, on a lumped mass")
@@ -47,6 +59,8 @@ class BenchmarkOptions:
         choices = {"arpack": self.arpack, "arpack_regular": self.arpack_regular}
         choices |= dict.fromkeys(ROUGH, self.rough)
         choices |= {name: name in self.further for name in RIVALS}
+        if self.design:
+            choices |= dict.fromkeys(BESIDE_DESIGN, False)
         return tuple(name for name, runs in choices.items() if not runs)
 
     @property
@@ -57,6 +71,9 @@ class BenchmarkOptions:
 
     def rounds(self, method: str) -> int:
         """Runs of a method."""
+        limits = [self.runs]
         if method in SLOW and self.slow_runs is not None:
-            return min(self.runs, self.slow_runs)
-        return self.runs
+            limits.append(self.slow_runs)
+        if method not in COARSE and self.fine_runs is not None:
+            limits.append(self.fine_runs)
+        return min(limits)

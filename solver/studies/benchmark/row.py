@@ -17,7 +17,7 @@ from solver.analysis.problem import ProblemOptions
 from solver.distribution.collective import bcast_from_root, compute_on_root
 from solver.studies.benchmark.further import RIVALS
 from solver.studies.benchmark.methods import MethodRun, Methods, named
-from solver.studies.benchmark.options import ROUGH, BenchmarkOptions
+from solver.studies.benchmark.options import COARSE, ROUGH, BenchmarkOptions
 from solver.studies.benchmark.rivals import SlepcConfiguration, configurations
 from solver.studies.benchmark.scores import (
     BASES,
@@ -34,7 +34,7 @@ logger = logging.getLogger(__name__)
 
 Runs = dict[str, list[MethodRun]]
 
-NEED_FORESTS = ("refined", "ddfem", "ddfem_ec_accurate", "ddfem_ec", "ddfem_ec_warm")
+NEED_FORESTS = ("refined", *COARSE)
 LUMPED = tuple(name for name, rival in RIVALS.items() if rival.lumped)
 NEED_VOXELS = (*NEED_FORESTS, "arpack_regular", *LUMPED)
 WARM_UP_MODES = 20
@@ -59,6 +59,7 @@ MEANING = {
     "speedup_with_precompute": "the same, with the partition, sparsity and elimination plan of the "
     "outer name added to its seconds, and nothing to those of the inner name",
     "ddfem": "coarsened by forests, then SLEPc on the coarse model (DDFEM* alone)",
+    "ddfem_rough": "the same to a residual of 1e-2",
     "fastest": "what --method auto takes: block Lanczos from random vectors",
     "slepc_rough": "SLEPc to a residual of 1e-3",
     "fastest_rough": "the fastest to an eigenvalue error of 1e-3",
@@ -297,6 +298,7 @@ def _errors(runs: Runs, spectra: dict[str, MethodRun], further: tuple[str, ...])
         "hcms_ec": "fine",
         "fastest": "fine",
         **dict.fromkeys(ROUGH, "fine"),
+        "ddfem_rough": "coarse",
         "ddfem_ec_accurate": "coarse",
         "ddfem_ec": "coarse",
         "ddfem_ec_warm": "coarse_changed",

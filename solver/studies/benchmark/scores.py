@@ -21,9 +21,10 @@ BASES = {
     "fastest_rough": ("slepc_rough",),
     "refined": ("slepc_rough", "fastest_rough"),
     "ddfem": ("arpack", "slepc"),
+    "ddfem_rough": ("arpack", "slepc"),
     "ddfem_ec_accurate": ("arpack", "slepc", "ddfem"),
-    "ddfem_ec": ("arpack", "slepc", "ddfem", "fastest"),
-    "ddfem_ec_warm": ("arpack", "slepc", "ddfem", "ddfem_ec"),
+    "ddfem_ec": ("arpack", "slepc", "ddfem", "ddfem_rough", "fastest"),
+    "ddfem_ec_warm": ("arpack", "slepc", "ddfem", "ddfem_rough", "ddfem_ec"),
 }
 """Methods that a speed-up is told of, and what it may be told over."""
 
