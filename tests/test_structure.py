@@ -108,6 +108,7 @@ ARROWS = {
     "workflow.studies.report": """solver.files solver.hcms solver.refinement
         solver.studies.scaling workflow workflow.studies.base""",
     "workflow.studies.figures": "workflow.studies.base workflow.studies.report",
+    "workflow.studies.claims": "forests workflow workflow.studies.base workflow.studies.report",
     "workflow.studies.forests": """dataset_gen.objectives workflow.studies.base
         workflow.studies.report""",
     "workflow.studies.objectives": """dataset_gen.objectives solver.coarsening

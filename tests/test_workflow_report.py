@@ -15,6 +15,7 @@ from workflow.studies.base.media import cropped
 from workflow.studies.base.numbers import show
 from workflow.studies.base.style import svg
 from workflow.studies.base.table import Column, Table, read_table, write_table
+from workflow.studies.report.design_tables import costs, design, spread_of
 from workflow.studies.report.mode_pictures import aligned, cluster
 
 TABLE = Table(
@@ -114,3 +115,77 @@ def test_figures_can_share_a_page_and_follow_its_colours():
     page = themed(sources[0])
     assert "var(--hcms-ec)" in page and COLOURS["hcms_ec"] not in page
     assert "DejaVu" not in page and "<metadata>" not in page
+
+
+def timed(slepc: float, cold: float, error: float) -> dict:
+    """Output of `solver benchmark --design`, as far as the headline needs it."""
+    worst = {"max": 1e-4}
+    return {
+        "resolution": 24,
+        "modes": 100,
+        "dof_fine": 9000,
+        "dof_coarse": 2000,
+        "seconds": {
+            "precompute": 0.5,
+            "slepc": slepc,
+            "fastest": slepc / 4,
+            "ddfem_rough": 2 * cold,
+            "ddfem_ec": cold,
+            "ddfem_ec_warm": cold / 8,
+        },
+        "eigenvalue_error": dict.fromkeys(
+            ("fastest", "ddfem_rough", "ddfem_ec", "ddfem_ec_warm"), worst
+        ),
+        "frequency_error": {
+            "ddfem": {"rms_7_60": error, "worst_7_60": -3 * error},
+            "average": {"rms_7_60": 0.3, "worst_7_60": 0.5},
+        },
+    }
+
+
+def headlines(methods: dict, summary: list[dict]) -> dict[str, Table]:
+    """The tables that the costs of a design are told from."""
+    titles = dict(zip(methods, methods))
+    results = SimpleNamespace(methods=methods, titles=titles)
+    forests = {"method": "calibrated, forests", "training_seconds": 8.0}
+    return {
+        "design": Table("design", "", [], list(design(results))),
+        "summary": Table("summary", "", [], summary),
+        "blocks": Table("blocks", "", [], [forests]),
+    }
+
+
+def single(title: str, speed_up: float, left: int) -> dict:
+    """A row of the summary, of a solid of 17,745 unknowns."""
+    return {"title": title, "speed_up": speed_up, "coarse_unknowns": left, "unknowns": 17745}
+
+
+def test_the_headline_is_that_of_all_solids_and_of_equal_problems():
+    bare = {**timed(4.0, 0.5, 0.02), "seconds": {"precompute": 0.5, "slepc": 4.0, "ddfem_ec": None}}
+    methods = {"Bell": timed(4.0, 0.2, 0.02), "Pan": timed(1.0, 0.1, 0.03), "Cells": bare}
+    table = headlines(methods, [])["design"]
+    assert [row["title"] for row in table.rows] == ["Bell", "Pan"]
+    assert spread_of(table, "cold") == pytest.approx((15.0, 10.0, 20.0))
+    assert spread_of(table, "warm") == pytest.approx((120.0, 80.0, 160.0))
+    assert spread_of(table, "cold_same") == pytest.approx((2.0, 2.0, 2.0))
+    assert spread_of(table, "error") == pytest.approx((0.025, 0.02, 0.03))
+    assert spread_of(table, "fine") == pytest.approx((4.0, 4.0, 4.0))
+    assert spread_of(headlines({"Cells": bare}, [])["design"], "cold") is None
+
+
+def test_where_it_does_not_pay_is_named():
+    tables = headlines({"Bell": timed(4.0, 0.2, 0.02), "Pitcher": timed(4.0, 0.2, 0.08)}, [])
+    _, rough = costs(tables)
+    assert "Pitcher (8.0 % rms, worst 24 %)" in rough and "Bell" not in rough
+    tables["summary"].rows[:] = [single("Bell", 5.0, 4053), single("Pitcher", 0.38, 15228)]
+    told = costs(tables)[-1]
+    assert "It did not pay: Pitcher (0.38×, 15,228 of 17,745 unknowns left)." in told
+    assert "would not have paid" not in told
+
+
+def test_a_solid_that_was_left_fine_is_told_as_such():
+    tables = headlines({"Bell": timed(4.0, 0.2, 0.02)}, [single("Pitcher", 1.0, 17745)])
+    told = costs(tables)[-1]
+    assert "Coarsening would not have paid, and the fine model was solved: Pitcher." in told
+    assert "It was slower than SLEPc on none of the solids." in told
+    assert "none of the solids" in costs(tables)[1]

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from workflow.estimate.sizes import ORIGINS
 from workflow.studies.base.numbers import show
 from workflow.studies.base.table import Table
 from workflow.studies.claims.results import MEASURED, Claims
@@ -31,6 +30,8 @@ THREE_ORDERS, TWO_ORDERS = 1e3, 1e2
 SIMILAR = 0.1
 """Errors, relative ones too, below which two blocks, costs or motions count as alike."""
 DAY = 86400.0
+ROWS_OF_A_FIT = 8
+"""A fit is seen from the eight corners of its block."""
 STILL = 1.0
 """Relative difference of a motion from the true one that no motion at all would have."""
 INTERACTIVE = 3.0
@@ -40,7 +41,7 @@ EXACT = "HCMS + EC"
 
 
 @dataclass(frozen=True)
-class Found:
+class Finding:
     """What was measured of a claim.
 
     Attributes
@@ -58,7 +59,7 @@ class Found:
     files: tuple[str, ...] = ()
 
 
-def shapes(claims: Claims) -> Found:
+def shapes(claims: Claims) -> Finding:
     """Fig. 8: the first elastic mode."""
     tables = claims.of_model("shapes")
     by_method = {
@@ -79,10 +80,10 @@ def shapes(claims: Claims) -> Found:
         f"Least likeness of mode 7 over {len(tables)} solids: {show(rough, 'fraction')} by HCMS, "
         f"{show(corrected, 'fraction')} after error correction."
     )
-    return Found(verdict, text, files(claims, "-shapes.json"))
+    return Finding(verdict, text, files(claims, "-shapes.json"))
 
 
-def blocks(claims: Claims) -> Found:
+def blocks(claims: Claims) -> Finding:
     """Fig. 9, top: errors on single blocks."""
     rows = by_method(claims.of_run("blocks"))
     average, least = rows["average"]["kind0_nodal"], rows[LOWER_BOUND]["kind0_nodal"]
@@ -96,20 +97,20 @@ def blocks(claims: Claims) -> Found:
         claims.paper["blocks"]["average"]["error"] / claims.paper["blocks"]["forests"]["error"]
     )
     verdict = REPRODUCED if average / forests >= (1.0 - SIMILAR) * claimed else NOT
-    return Found(verdict, text, ("tables/blocks.json",))
+    return Finding(verdict, text, ("tables/blocks.json",))
 
 
-def scaling(claims: Claims) -> Found:
+def scaling(claims: Claims) -> Finding:
     """Fig. 9, bottom: errors on blocks beyond the range trained on."""
     row = forests_row(by_method(claims.of_run("blocks")))
     within, beyond = row["kind0_nodal"], row["kind1_nodal"]
     verdict = REPRODUCED if beyond <= (1.0 + SIMILAR) * within else NOT
     told = [show(value, "fraction") for value in (within, beyond)]
     text = f"{told[0]} on 0 to 10 GPa, {told[1]} on 100 to 10,000 GPa."
-    return Found(verdict, text, ("tables/blocks.json",))
+    return Finding(verdict, text, ("tables/blocks.json",))
 
 
-def evaluation(claims: Claims) -> Found:
+def evaluation(claims: Claims) -> Finding:
     """Fig. 9: the cost of a block."""
     rows = by_method(claims.of_run("blocks"))
     forests, database = forests_row(rows), database_row(rows)
@@ -123,10 +124,10 @@ def evaluation(claims: Claims) -> Found:
         f"{show(ours, 'seconds')} by the forests, {show(others, 'seconds')} by a database of "
         f"{show(database['storage_bytes'], 'bytes')}."
     )
-    return Found(verdict, text, ("tables/blocks.json",))
+    return Finding(verdict, text, ("tables/blocks.json",))
 
 
-def storage(claims: Claims) -> Found:
+def storage(claims: Claims) -> Finding:
     """Fig. 9: the size of the forests."""
     row = forests_row(by_method(claims.of_run("blocks")))
     kept = claims.forests_bytes
@@ -134,38 +135,38 @@ def storage(claims: Claims) -> Found:
     text = f"{show(row['storage_bytes'], 'bytes')} for the forests of this run{package}."
     claimed = 1e6 * claims.paper["blocks"]["forests"]["megabytes"]
     verdict = LESS if max(row["storage_bytes"], kept or 0) <= claimed else NOT
-    return Found(verdict, text, ("tables/blocks.json",))
+    return Finding(verdict, text, ("tables/blocks.json",))
 
 
-def training(claims: Claims) -> Found:
+def training(claims: Claims) -> Finding:
     """Section 8.1: the time of the training."""
     rows = claims.of_run("blocks").rows
     row = forests_row(by_method(claims.of_run("blocks")))
     quantities = {each["key"]: each["value"] for each in claims.of_run("training").rows}
     seconds = row.get("training_seconds")
     if seconds is None or "fits" not in quantities:
-        return Found(
+        return Finding(
             UNMEASURED, "This run took forests that were there.", ("tables/training.json",)
         )
     fit = next(each for each in rows if is_fit_of(each, row))
     errors = row["kind0_nodal"], fit["kind0_nodal"]
     text = (
         f"{show(seconds, 'seconds')} for trees and leaves from "
-        f"{show(ORIGINS * quantities['fits'], 'count')} rows; on blocks these forests err by "
+        f"{show(ROWS_OF_A_FIT * quantities['fits'], 'count')} rows; on blocks these forests err by "
         f"{show(errors[0], 'fraction')}, the fits that they learned from by "
         f"{show(errors[1], 'fraction')}."
     )
     days = sum(claims.paper["training"][key] for key in ("structure_days", "leaves_days"))
     learned = errors[0] <= (1.0 + SIMILAR) * errors[1]
     verdict = LESS if learned and seconds < DAY * days else NOT
-    return Found(verdict, text, ("tables/blocks.json", "tables/training.json"))
+    return Finding(verdict, text, ("tables/blocks.json", "tables/training.json"))
 
 
-def convergence(claims: Claims) -> Found:
+def convergence(claims: Claims) -> Finding:
     """Fig. 10: corrections from HCMS and from random vectors."""
     table = claims.in_full("convergence") or claims.of_run("convergence")
     if not table.rows:
-        return Found(UNMEASURED, "No convergence was followed in this run.")
+        return Finding(UNMEASURED, "No convergence was followed in this run.")
     told, agree = [], []
     for model in dict.fromkeys(row["model"] for row in table.rows):
         rows = [
@@ -188,10 +189,10 @@ def convergence(claims: Claims) -> Found:
         )
         agree.append(worst[SYNTHESIS] < SIMILAR * worst[RANDOM])
     text = f"Worst eigenvalue after {last} over-relaxed corrections: {'; '.join(told)}."
-    return Found(REPRODUCED if all(agree) else NOT, text, (named(claims, table),))
+    return Finding(REPRODUCED if all(agree) else NOT, text, (named(claims, table),))
 
 
-def total(claims: Claims) -> Found:
+def total(claims: Claims) -> Finding:
     """Fig. 11: all methods together."""
     design = claims.of_run("design")
     full = claims.in_full("methods")
@@ -218,7 +219,7 @@ def total(claims: Claims) -> Found:
         ratios += [*cold, *warm]
         tuned += cold
     if not ratios:
-        return Found(UNMEASURED, "No design was timed in this run.")
+        return Finding(UNMEASURED, "No design was timed in this run.")
     if tuned and min(tuned) >= THREE_ORDERS:
         verdict = REPRODUCED
     else:
@@ -226,26 +227,26 @@ def total(claims: Claims) -> Found:
     kept = (MEASURED.name,) if claims.kept else ()
     own_table = ("tables/design.json",) if design.rows else ()
     of_full = (named(claims, full),) if full else ()
-    return Found(verdict, f"Faster than {'; '.join(told)}.", (*of_full, *kept, *own_table))
+    return Finding(verdict, f"Faster than {'; '.join(told)}.", (*of_full, *kept, *own_table))
 
 
-def each(claims: Claims) -> Found:
+def each(claims: Claims) -> Finding:
     """Section 8.1: coarsening alone, and component mode synthesis with correction alone."""
     full = claims.in_full("methods") or claims.of_run("methods")
     names = {"ddfem": "DDFEM* alone", "hcms_ec": EXACT, "fastest": "--method auto"}
     found = {name: speed_ups(full, "slepc", name) for name in names}
     told = [f"{names[name]} {ends(values)}" for name, values in found.items() if values]
     if not told:
-        return Found(UNMEASURED, "Methods were not timed in this run.")
+        return Finding(UNMEASURED, "Methods were not timed in this run.")
     verdict = (
         REPRODUCED
         if all(min(found[name] or [0.0]) >= TWO_ORDERS for name in ("ddfem", "hcms_ec"))
         else NOT
     )
-    return Found(verdict, f"Over SLEPc: {', '.join(told)}.", (named(claims, full),))
+    return Finding(verdict, f"Over SLEPc: {', '.join(told)}.", (named(claims, full),))
 
 
-def interactive(claims: Claims) -> Found:
+def interactive(claims: Claims) -> Finding:
     """Section 8.1: seconds of a solve."""
     full = claims.in_full("methods") or claims.of_run("methods")
     cold, warm = (
@@ -253,13 +254,13 @@ def interactive(claims: Claims) -> Found:
         for name in ("ddfem_ec", "ddfem_ec_warm")
     )
     if not cold or not warm:
-        return Found(UNMEASURED, "No design was timed in this run.")
+        return Finding(UNMEASURED, "No design was timed in this run.")
     text = f"{ends(cold, 'seconds')} cold, {ends(warm, 'seconds')} warm."
     verdict = REPRODUCED if max(cold) <= INTERACTIVE else NOT
-    return Found(verdict, text, (named(claims, full),))
+    return Finding(verdict, text, (named(claims, full),))
 
 
-def response(claims: Claims) -> Found:
+def response(claims: Claims) -> Finding:
     """Fig. 12: motion after a strike."""
     coarse, fine = (strikes(claims, VARIANTS[name].label) for name in ("ddfem_hcms_ec", "hcms_ec"))
     text = (
@@ -276,14 +277,14 @@ def response(claims: Claims) -> Found:
         text += " (100 % is what no motion at all would differ by)"
     else:
         verdict = UNMEASURED
-    return Found(
+    return Finding(
         verdict,
         f"{text}. Curves are on the pages of the validation.",
         files(claims, "-responses.json"),
     )
 
 
-def scene(claims: Claims) -> Found:
+def scene(claims: Claims) -> Finding:
     """Fig. 13: spectrograms."""
     strike = strikes(claims, VARIANTS["ddfem_hcms_ec"].label)
     single = (
@@ -293,16 +294,16 @@ def scene(claims: Claims) -> Found:
         else "single strikes of the fine mesh"
     )
     if claims.scene is None:
-        return Found(
+        return Finding(
             IN_PART if strike else UNMEASURED,
             f"No scene in this run; {single}, stand on the pages of the validation.",
             files(claims, "-responses.json"),
         )
     text = f"The same scene from both is below; {single}, are on the pages of the validation."
-    return Found(IN_PART, text, (named(claims, claims.scene), *files(claims, "-responses.json")))
+    return Finding(IN_PART, text, (named(claims, claims.scene), *files(claims, "-responses.json")))
 
 
-MEASURES: dict[str, Callable[[Claims], Found]] = {
+MEASURES: dict[str, Callable[[Claims], Finding]] = {
     "shapes": shapes,
     "blocks": blocks,
     "scaling": scaling,
