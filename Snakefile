@@ -4,7 +4,8 @@ from pathlib import Path
 from snakemake.utils import min_version, validate
 
 from carillon.errors import UserError
-from workflow import orphans, room, settings, submission
+from carillon.progress import say
+from workflow import orphans, pinned_meshes, room, settings, submission
 
 min_version("9.0")
 
@@ -62,6 +63,8 @@ onstart:
             submission.require_plain(places, workflow.config_settings.config)
         except UserError as error:
             raise WorkflowError(str(error)) from None
+    for sentence in pinned_meshes.of_run(config):
+        say(sentence)
     if ALONE:
         orphans.cancel(Path.cwd())
 

@@ -1,4 +1,4 @@
-"""Optimisers of the material: the hybrid of appendix 3, and its two parts by themselves."""
+"""Optimisers of the material: a hybrid after appendix 3, and its two parts by themselves."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _LARGE = 1e12
 
 
 def hybrid(search: Search, z: Array, seed: int, population: int | None) -> None:
-    """Appendix 3: quasi-Newton descents to local optima, and offspring to leave them.
+    """Descents to local optima, and offspring to leave them, as in appendix 3 but not in turn.
 
     Descents run side by side.  One that stalls gives its place to one of the best offspring that
     the evolution strategy bears around the best material known; what descends from them goes back

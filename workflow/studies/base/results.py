@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import yaml
 
-from workflow import solids
+from workflow import pinned_meshes, solids
 from workflow.studies.base.conditions import Record
 from workflow.studies.base.table import Table, read_table
 
@@ -46,8 +46,11 @@ class Results:
 
     @property
     def without(self) -> str:
-        """One sentence about the solids that are left out; empty if there are none."""
-        return solids.without(self.config, self.section) if self.section in solids.STUDIED else ""
+        """What is said of solids that are left out, and of meshes that are not the pinned ones."""
+        if self.section not in solids.STUDIED:
+            return ""
+        others = pinned_meshes.of_study(self.config, self.section)
+        return " ".join(filter(None, [solids.without(self.config, self.section), *others]))
 
     @property
     def titles(self) -> dict[str, str]:

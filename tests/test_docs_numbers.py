@@ -1,0 +1,83 @@
+"""Numbers that pages quote are those of the kept tables."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+
+import pytest
+import yaml
+
+from tests.documentation import CHECKOUT
+from workflow.studies.base.numbers import show
+from workflow.studies.base.table import Table, read_csv_table
+from workflow.studies.claims.results import REFERENCE
+
+QUOTED = yaml.safe_load((CHECKOUT / "tests" / "quoted_numbers.yaml").read_text())
+WALL_TIMES = {
+    "SLEPc, fine mesh": ("slepc", None),
+    "HCMS": ("hcms", "slepc"),
+    "HCMS + EC": ("hcms_ec", "slepc"),
+    "`--method auto`, to 10⁻⁶": ("fastest", "slepc"),
+    "SLEPc to 10⁻³": ("slepc_rough", None),
+    "`--method auto`, to 10⁻³": ("fastest_rough", "slepc_rough"),
+    "the same from coarse modes (`--refine`)": ("refined", "slepc_rough"),
+    "DDFEM\\*, then SLEPc": ("ddfem", "slepc"),
+    "DDFEM\\* + `auto`, to 10⁻⁶": ("ddfem_ec_accurate", "ddfem"),
+    "the same, to 10⁻²": ("ddfem_ec", "slepc"),
+    "the same, warm": ("ddfem_ec_warm", "slepc"),
+}
+"""Methods of the rows of the table of wall times, and what their speed-ups are over."""
+
+
+@cache
+def kept(name: str) -> Table:
+    """A table of the reference."""
+    return read_csv_table(CHECKOUT / REFERENCE / f"{name}.csv")
+
+
+def words(page: str) -> str:
+    """Text of a page in one line."""
+    return " ".join((CHECKOUT / page).read_text(encoding="utf-8").split())
+
+
+def number(table: str, where: dict, column: str, kind: str = "times", **end: bool) -> str:
+    """A number of a kept table as pages quote it."""
+    rows = [row for row in kept(table).rows if where.items() <= row.items()]
+    values = [row[column] for row in rows]
+    if end:
+        return show(min(values) if "least" in end else max(values), kind).rstrip("×")
+    (value,) = values
+    return show(value, kind).rstrip("×")
+
+
+@pytest.mark.parametrize("quoted", QUOTED, ids=lambda quoted: quoted["sentence"][:40])
+def test_quoted_numbers_are_those_of_the_tables(quoted):
+    numbers = [number(**each) for each in quoted["numbers"]]
+    assert quoted["sentence"].format(*numbers) in words(quoted["page"])
+
+
+def test_the_table_of_wall_times_is_that_of_the_reference():
+    page = (CHECKOUT / "docs" / "results" / "measured.md").read_text(encoding="utf-8")
+    section = page.split("## Wall time\n")[1].split("\n### ")[0]
+    lines = re.findall(r"^\|(.*)\|$", section, re.MULTILINE)
+    solids, _, unknowns, *rows = ([cell.strip() for cell in line.split("|")] for line in lines)
+    by_solid = {row["model"]: row for row in kept("paper/tables/methods").rows}
+    assert set(by_solid) == set(solids[1:])
+    for cell, solid in zip(unknowns[1:], solids[1:], strict=True):
+        row = by_solid[solid]
+        assert cell == f"{row['dof_fine']:,}, {row['dof_coarse']:,}"
+    assert [row[0] for row in rows] == list(WALL_TIMES)
+    for label, *cells in rows:
+        method, base = WALL_TIMES[label]
+        for cell, solid in zip(cells, solids[1:], strict=True):
+            seconds = by_solid[solid][method]
+            found = re.fullmatch(r"([\d.]+)(?: \(([\d.]+)\))?", cell)
+            assert found, cell
+            for text, value in zip(
+                found.groups(), (seconds, by_solid[solid][base] / seconds if base else None)
+            ):
+                assert (text is None) == (value is None), (label, solid)
+                if text is not None:
+                    digits = len(text.partition(".")[2])
+                    assert float(text) == pytest.approx(value, abs=0.5001 * 10.0**-digits)

@@ -1,0 +1,43 @@
+"""Meshes that kept tables rest on: whether files of their names are the same files."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from carillon.documents import read_own_yaml
+from workflow import settings, solids
+
+PINNED: dict[str, dict[str, str]] = read_own_yaml(Path(__file__).with_suffix(".yaml"))
+"""SHA-256 and source by file name."""
+SHOWN = 12
+"""Digits of a hash that a sentence tells."""
+
+
+def of_run(config: Mapping[str, Any]) -> list[str]:
+    """A sentence about every mesh of a configuration that is another file than the pinned one."""
+    meshes = [each["mesh"] for each in config["models"].values()]
+    meshes += [each["mesh"] for part in solids.STUDIED for each in config[part]["models"].values()]
+    return list(_others(config, [*meshes, config["sound"]["bunny"]]))
+
+
+def of_study(config: Mapping[str, Any], section: str) -> list[str]:
+    """The same of the solids of a study."""
+    return list(_others(config, [each["mesh"] for each in config[section]["models"].values()]))
+
+
+def _others(config: Mapping[str, Any], meshes: Iterable[str]) -> Iterator[str]:
+    for mesh in dict.fromkeys(meshes):
+        path = Path(settings.located(config, mesh))
+        pinned = PINNED.get(path.name)
+        if pinned is None or not path.is_file():
+            continue
+        found = hashlib.sha256(path.read_bytes()).hexdigest()
+        if found != pinned["sha256"]:
+            yield (
+                f"{path} is another file than the one that kept tables rest on (SHA-256 "
+                f"{found[:SHOWN]}…, expected {pinned['sha256'][:SHOWN]}…; {pinned['source']}): "
+                "figures of it do not compare with theirs."
+            )
