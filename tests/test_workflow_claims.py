@@ -129,8 +129,12 @@ def test_the_page_names_the_dragons_and_what_made_each_table(run):
 
 
 def test_a_scene_from_both_modes_is_shown_where_it_is(run):
-    write_table(table("scene_spectra", [{"band": "1 kHz", "difference": 2.0}]), run / "tables")
+    write_table(
+        table("scene_spectra", [{"title": "coarse", "distance_decibels": 2.5}]), run / "tables"
+    )
     claims = Claims(run / CLAIMS.folder)
     tables = {name: make(claims) for name, make in CLAIMS.entries.items()}
     assert 'data-table="scene_spectra"' in page(claims, tables)
-    assert "is below" in found(run, "scene").text
+    assert "coarse 2.5 dB" in found(run, "scene").text
+    sources = {row["file"]: row["command"] for row in tables["sources"].rows}
+    assert sources["tables/scene_spectra.json"] == "snakemake scene_spectra"

@@ -1,11 +1,11 @@
 # What the paper claims beside what is measured: `snakemake claims`, no part of the default run.
-# It reads the tables of the run; those of `figures` and `scenes` as well where they are there.
-from workflow.studies.claims.results import FULL, SCENE_PICTURE, SCENE_TABLES
+# It reads the tables of the run; those of `figures` and `scene_spectra` as well where they are there.
+from workflow.studies.claims.results import FULL, SCENE_PICTURE, SCENE_TABLE
 
 READ_IF_THERE = [
     f"{RESULTS}/{path}"
     for path in (
-        *SCENE_TABLES,
+        SCENE_TABLE,
         SCENE_PICTURE,
         *(f"{FULL}/tables/{name}.json" for name in ("methods", "convergence")),
     )

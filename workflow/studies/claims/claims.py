@@ -299,7 +299,13 @@ def scene(claims: Claims) -> Finding:
             f"No scene in this run; {single}, stand on the pages of the validation.",
             files(claims, "-responses.json"),
         )
-    text = f"The same scene from both is below; {single}, are on the pages of the validation."
+    apart = [
+        f"{row['title']} {show(row['distance_decibels'], 'small')} dB"
+        for row in claims.scene.rows
+        if row.get("distance_decibels")
+    ]
+    told = f", off the truth’s by (rms) {', '.join(apart)}" if apart else ""
+    text = f"The same scene by each is below{told}; {single}, are on the pages of the validation."
     return Finding(IN_PART, text, (named(claims, claims.scene), *files(claims, "-responses.json")))
 
 

@@ -20,7 +20,7 @@ REFERENCE = "results/reference/znver4"
 """Tables of a complete run that are kept in a checkout; an installed package has none."""
 MEASURED = HERE / "measured.json"
 """Rows of `carillon benchmark` that take too long for a run, each with its command."""
-SCENE_TABLES = ("scenes/tables/scene_spectra.json", "tables/scene_spectra.json")
+SCENE_TABLE = "tables/scene_spectra.json"
 SCENE_PICTURE = "figures/scene-spectrograms.png"
 FULL = "paper"
 """Folder of `snakemake figures` below that of a run."""
@@ -67,8 +67,8 @@ class Claims(Results):
     @cached_property
     def scene(self) -> Table | None:
         """Spectra of a scene by the truth's and by coarse modes, if the run has them."""
-        paths = (self.run / path for path in SCENE_TABLES)
-        return next((self._table(path) for path in paths if path.is_file()), None)
+        path = self.run / SCENE_TABLE
+        return self._table(path) if path.is_file() else None
 
     @property
     def scene_picture(self) -> Path | None:

@@ -12,7 +12,7 @@ from carillon.documents import read_own_yaml
 from workflow.studies.base.entry import Row
 from workflow.studies.base.numbers import show
 from workflow.studies.claims.claims import LESS, MEASURES, NOT, REPRODUCED
-from workflow.studies.claims.results import FULL, MEASURED, Claims
+from workflow.studies.claims.results import FULL, MEASURED, SCENE_TABLE, Claims
 
 TEXTS: dict[str, dict[str, str]] = read_own_yaml(Path(__file__).with_name("claims.yaml"))
 NO_MESH = "mesh not at hand"
@@ -20,7 +20,7 @@ MARKS = {REPRODUCED: "met", LESS: "met", NOT: "missed"}
 """How verdicts are marked on the page."""
 COMMANDS = {
     f"{FULL}/": "snakemake figures",
-    "scenes/": "snakemake scenes",
+    SCENE_TABLE: "snakemake scene_spectra",
     "results/reference/": "snakemake reference",
     "validation/": "snakemake (make run)",
     "tables/": "snakemake (make run)",
