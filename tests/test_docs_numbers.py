@@ -1,13 +1,15 @@
-"""Numbers that pages quote are those of the kept tables."""
+"""Numbers that pages quote are those of the kept tables and of the code."""
 
 from __future__ import annotations
 
 import re
 from functools import cache
+from importlib import import_module
 
 import pytest
 import yaml
 
+from carillon.fem.geometry.builtin import BUILTINS, THIN, TRIALS
 from tests.documentation import CHECKOUT
 from workflow.studies.base.numbers import show
 from workflow.studies.base.table import Table, read_csv_table
@@ -51,10 +53,24 @@ def number(table: str, where: dict, column: str, kind: str = "times", **end: boo
     return show(value, kind).rstrip("×")
 
 
+def constant(place: str, factor: float = 1) -> str:
+    """A constant of the code as pages quote it."""
+    module, _, name = place.partition(":")
+    return f"{factor * getattr(import_module(module), name):,g}"
+
+
 @pytest.mark.parametrize("quoted", QUOTED, ids=lambda quoted: quoted["sentence"][:40])
-def test_quoted_numbers_are_those_of_the_tables(quoted):
-    numbers = [number(**each) for each in quoted["numbers"]]
-    assert quoted["sentence"].format(*numbers) in words(quoted["page"])
+def test_quoted_numbers_are_those_of_tables_and_code(quoted):
+    numbers = [number(**each) for each in quoted.get("numbers", ())]
+    constants = [constant(each, quoted.get("factor", 1)) for each in quoted.get("constants", ())]
+    sentence = re.sub(r"\{\}", "%s", quoted["sentence"].replace("%", "%%"))
+    assert sentence % (*numbers, *constants) in words(quoted["page"])
+
+
+def test_the_tutorial_names_all_solids_that_come_along():
+    section = words("docs/tutorials/modes.md").split("`builtin:NAME` with")[1].split(". ")[0]
+    named = set(re.findall(r"[a-z]+(?:-[a-z]+)*", section))
+    assert {*BUILTINS, *THIN, *TRIALS} <= named
 
 
 def test_the_table_of_wall_times_is_that_of_the_reference():
