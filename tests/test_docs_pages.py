@@ -114,6 +114,42 @@ def test_every_command_has_its_help_on_a_page():
     assert sorted(headings) == sorted(commands())
 
 
+def inline(page: Path) -> list[str]:
+    """Code within sentences of a page."""
+    return re.findall(r"`([^`\n]+)`", prose(page))
+
+
+OTHERS = {"--mpi", "--unlock", "--oversubscribe", "--report", "--tier", "--durations", "--measured"}
+"""Options of other programs that pages name."""
+
+
+def test_options_that_pages_name_exist():
+    text = "\n".join(map(command_help.of_room, ROOMS))
+    known = {*re.findall(r"--[a-z][a-z-]*", text), *OTHERS}
+    for page in PAGES:
+        for code in inline(page):
+            for option in re.findall(r"(?<![\w-])--[a-z][a-z-]*", code):
+                # Any option may be shortened.
+                assert any(each.startswith(option) for each in known), (page.name, code)
+
+
+def test_commands_that_pages_name_exist():
+    known = set(commands())
+    for page in PAGES:
+        for code in inline(page):
+            for name in re.findall(r"(?:^|/)carillon ([a-z][a-z-]*)", code):
+                assert name in known, (page.name, code)
+
+
+def test_targets_that_pages_name_exist():
+    rules = (CHECKOUT / "workflow" / "rules").glob("*.smk")
+    known = {name for file in rules for name in re.findall(r"^rule (\w+):", file.read_text(), re.M)}
+    for page in PAGES:
+        for code in inline(page):
+            for name in re.findall(r"^(?:\S*/)?snakemake (?:--cores \d+ )?([a-z]\w+)$", code):
+                assert name in known, (page.name, code)
+
+
 def test_public_functions_have_an_example():
     page = (DOCS / "reference" / "api.md").read_text()
     module = ""
