@@ -235,8 +235,12 @@ def open_h5(path: str | Path, kind: str, schema: int, sealed: bool = False) -> I
     path = require_file(path, f"a Carillon {kind} file (HDF5)")
     try:
         found_seal = _is_sealed(path)
-        file = h5py.File(path, "r")
+        file = _opened(path)
     except OSError as error:
+        if error.errno:  # the system's refusal, which says nothing of what the file holds
+            raise UserError(
+                f"{path}: cannot be read ({cause(error)}), expected a Carillon {kind} file"
+            ) from None
         raise UserError(
             f"{path}: is not readable as HDF5 ({first_line(error)}); the file is damaged or of "
             f"another format, expected a Carillon {kind} file"
@@ -274,10 +278,19 @@ def kind_of(path: str | Path, what: str) -> tuple[str, int]:
     """
     require_file(path, what)
     try:
-        with h5py.File(path, "r") as file:
+        with _opened(path) as file:
             return str(file.attrs["kind"]), int(file.attrs["schema_version"])
     except Exception:  # HDF5 has many ways to say that bytes make no sense
         return "", -1
+
+
+def _opened(path: str | Path) -> h5py.File:
+    """An HDF5 file opened for reading, without a lock.
+
+    Files are complete or absent, so nobody writes to one that is read; and some file systems have
+    no locks.
+    """
+    return h5py.File(path, "r", locking=False)
 
 
 def _require_whole(path: Path, file: h5py.File) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import json
 import os
 import socket
@@ -14,9 +16,9 @@ import h5py
 import numpy as np
 import pytest
 
-from carillon import files
+from carillon import ROOMS, files
 from carillon.errors import UserError
-from carillon.files import atomic_path, create_h5, open_h5, require_writable
+from carillon.files import atomic_path, create_h5, kind_of, open_h5, require_writable
 from carillon.places import require_file
 
 CHECKOUT = Path(__file__).resolve().parent.parent
@@ -469,3 +471,42 @@ def test_readers_beside_several_writers_see_one_whole_file_or_another(tmp_path):
     whole = {64 * 4096 * letter for letter in (b"a", b"b", b"c")}
     assert set(seen) <= whole and path.read_bytes() in whole
     assert list(tmp_path.iterdir()) == [path]
+
+
+# Locks --------------------------------------------------------------------------------------------
+
+
+def test_a_file_is_read_while_another_holds_it(shard):
+    """Reading takes no lock, so neither others' locks nor file systems without any are in its way.
+
+    What the system would answer, errno 11 here or 37 of a file system, comes from taking one.
+    """
+    with open(shard, "rb+") as other:
+        fcntl.flock(other, fcntl.LOCK_EX)
+        with pytest.raises(OSError, match="errno = 11"):
+            h5py.File(shard, "r")
+        with open_h5(shard, "shard", 3) as file:
+            assert file.attrs["kind"] == "shard"
+        assert kind_of(shard, "a shard") == ("shard", 3)
+
+
+def test_what_the_system_refuses_is_not_called_damaged(shard, monkeypatch):
+    def refuse(*_, **__):
+        raise OSError(errno.EIO, "Unable to synchronously open file (..., errno = 5)")
+
+    monkeypatch.setattr(h5py, "File", refuse)
+    with pytest.raises(UserError) as caught, open_h5(shard, "shard", 3):
+        pass
+    text = one_sentence(caught)
+    assert "cannot be read" in text and "damaged" not in text
+
+
+def test_all_rooms_open_files_in_one_way():
+    """So that no command reads with a lock."""
+    openers = {
+        path.relative_to(CHECKOUT)
+        for room in ROOMS
+        for path in (CHECKOUT / room).rglob("*.py")
+        if "h5py.File(" in path.read_text()
+    }
+    assert openers == {Path("carillon/files.py")}
