@@ -6,12 +6,14 @@ of the numerical runtime (BLAS, threads), and the finite element (`fem`), on whi
 
 import os as _os
 
+from carillon import kernel_cache as _kernel_cache
 from carillon import openblas as _openblas
 from carillon import step as _step
 
-# Before anything loads numpy, and with it OpenBLAS, or MPI.
+# Before anything loads numpy, and with it OpenBLAS, or numba, or MPI.
 _openblas.configure(_os.environ)
-_step.leave_lone_step(_os.environ)
+_kernel_cache.configure(_os.environ)
+_step.leave_lonely_step(_os.environ)
 _step.start_without_daemon(_os.environ)
 _step.stay_apart(_os.environ, _os.getpid())
 

@@ -60,6 +60,8 @@ def run_program(
         return cli.EXIT_BAD_INPUT
     if comm is not None:
         leave_cores(comm)
+    elif lonely := step.lonely_among(os.environ):
+        say(f"warning: {lonely}")
 
     def parse() -> None:
         chosen.append(_parser(name, description, commands, given).parse_args(given))

@@ -7,9 +7,9 @@ All such processes of a user share a directory, which each makes and removes in 
 begins as another ends, what it has just made may be gone, and it aborts; so commands, and what
 they start, get one each.
 
-`srun` without `--mpi` starts a process as the only task of a step and hands it no way to find other
-ranks. Open MPI sees the step, looks for the way, and aborts; without the step's number it starts as
-a single rank.
+`srun` without `--mpi` starts the tasks of a step and hands them no way to find each other. Open MPI
+sees the step, looks for the way, and aborts; without the step's number it starts as a single rank.
+Likewise `mpiexec` of another MPI. Such ranks do not know each other, and are told so.
 """
 
 from __future__ import annotations
@@ -22,6 +22,20 @@ _STEP = ("SLURM_STEP_ID", "SLURM_STEPID")
 _LAUNCHERS = ("PMIX_", "PMI_", "OMPI_COMM_WORLD_")
 _SETTINGS = "PMIX_MCA_"
 """Of PMIx, which it leaves to processes that a lone one starts."""
+_MPIEXEC = "rank {} of {}", "the mpiexec of the MPI that mpi4py was built with"
+_SEVERAL = (
+    ("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK", *_MPIEXEC),
+    ("MV2_COMM_WORLD_SIZE", "MV2_COMM_WORLD_RANK", *_MPIEXEC),
+    ("PMI_SIZE", "PMI_RANK", *_MPIEXEC),
+    ("MPI_LOCALNRANKS", "MPI_LOCALRANKID", *_MPIEXEC),
+    (
+        "SLURM_STEP_NUM_TASKS",
+        "SLURM_PROCID",
+        "task {} of {} of a Slurm step",
+        "srun --mpi=pmix",
+    ),
+)
+"""Variables by which launchers tell how many processes they have started, and which one this is."""
 _DIRECTORY = "OMPI_MCA_orte_top_session_dir"
 _OWN = "carillon-mpi"
 
@@ -85,24 +99,44 @@ def _is_own(directory: str) -> bool:
     return os.path.basename(directory).startswith(_OWN)
 
 
-def leave_lone_step(environment: MutableMapping[str, str]) -> None:
-    """Forget the step of a process that is its only task and was not started as an MPI rank.
+def leave_lonely_step(environment: MutableMapping[str, str]) -> None:
+    """Forget the step of a process that was not started as an MPI rank, one task of it or several.
 
     Examples
     --------
     >>> environment = {"SLURM_STEP_ID": "0", "SLURM_STEP_NUM_TASKS": "1"}
-    >>> leave_lone_step(environment)
+    >>> leave_lonely_step(environment)
     >>> environment
     {'SLURM_STEP_NUM_TASKS': '1'}
     """
-    if environment.get("SLURM_STEP_NUM_TASKS") != "1":
-        return
     if not _launched(environment):
         for name in _STEP:
             environment.pop(name, None)
 
 
-def _launched(environment: MutableMapping[str, str]) -> bool:
+def lonely_among(environment: Mapping[str, str]) -> str | None:
+    """What to tell a process that has found no other ranks, if it was started as one of several.
+
+    Without MPI, each of them would do all the work and write the same file.
+
+    Examples
+    --------
+    >>> lonely_among({"SLURM_STEP_NUM_TASKS": "2", "SLURM_PROCID": "0"})[:50]
+    'this process is task 0 of 2 of a Slurm step, but M'
+    >>> lonely_among({"SLURM_STEP_NUM_TASKS": "1"})
+    """
+    for size, rank, of, remedy in _SEVERAL:
+        count = environment.get(size, "")
+        if count.isdigit() and int(count) > 1:
+            return (
+                f"this process is {of.format(environment.get(rank, '?'), count)}, but MPI finds no "
+                "other; each does all the work by itself and writes the same files: start them by "
+                f"{remedy}"
+            )
+    return None
+
+
+def _launched(environment: Mapping[str, str]) -> bool:
     return any(
         name.startswith(_LAUNCHERS) and not name.startswith(_SETTINGS) for name in environment
     )

@@ -7,6 +7,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+from carillon import step
 from tests.patience import HANG_SECONDS
 
 DIRECTORY = "OMPI_MCA_orte_top_session_dir"
@@ -48,3 +51,37 @@ def test_each_process_has_a_directory_of_its_own_and_leaves_none(tmp_path):
 def test_a_directory_that_the_user_has_chosen_stays(tmp_path):
     chosen = str(tmp_path / "chosen")
     assert [directory for directory, _ in printed(**{DIRECTORY: chosen})] == [chosen, chosen]
+
+
+def warned(**variables: str) -> str:
+    """What a command says that was started with these variables."""
+    done = subprocess.run(
+        [sys.executable, "-m", "carillon", "environment", "--json"],
+        env={**os.environ, **variables},
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=HANG_SECONDS,
+    )
+    return done.stderr
+
+
+SLURM = {"SLURM_JOB_ID": "77", "SLURM_STEP_ID": "0", "SLURM_STEP_NUM_TASKS": "2"}
+
+
+@pytest.mark.parametrize(
+    ("variables", "who", "remedy"),
+    [
+        ({**SLURM, "SLURM_PROCID": "1"}, "task 1 of 2 of a Slurm step", "srun --mpi=pmix"),
+        ({"PMI_SIZE": "3", "PMI_RANK": "2"}, "rank 2 of 3", "the mpiexec of the MPI"),
+    ],
+    ids=["srun without PMIx", "mpiexec of another MPI"],
+)
+def test_one_of_several_processes_that_do_not_find_each_other_says_so(variables, who, remedy):
+    said = warned(**variables)
+    assert f"warning: this process is {who}, but MPI finds no other" in said and remedy in said
+
+
+def test_a_process_that_was_started_alone_has_nothing_to_say():
+    assert "MPI finds no other" not in warned(**{**SLURM, "SLURM_STEP_NUM_TASKS": "1"})
+    assert step.lonely_among({"SLURM_NTASKS": "4", "SLURM_JOB_ID": "7"}) is None  # a batch script

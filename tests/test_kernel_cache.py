@@ -1,0 +1,105 @@
+"""Kernels are compiled and, where a folder can be written, kept, whoever runs the program."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from carillon import kernel_cache
+from tests.patience import HANG_SECONDS
+
+KERNEL = """
+import numba
+
+@numba.njit(cache=True)
+def twice(x):
+    return 2 * x
+"""
+SCRIPT = """
+import logging, sys
+import carillon
+from carillon import kernel_cache, logs
+logs.show()
+kernel_cache.PLACES = ()
+from numba.core import caching
+beside = sys.argv[1] == "beside"
+caching.CacheImpl._locator_classes = [caching.InTreeCacheLocator] if beside else []
+import kernel
+assert kernel.twice(2) == 4 and kernel.twice(2.5) == 5.0
+print(sum(kernel.twice.stats.cache_hits.values()))
+"""
+"""Numba's own places but the one beside the source are taken away; root can write everywhere."""
+
+
+@pytest.fixture
+def kernel(tmp_path):
+    """Calls a kernel in a process without a home; returns cache hits and what was said."""
+    source = tmp_path / "source"
+    source.mkdir()
+    (source / "kernel.py").write_text(KERNEL)
+
+    def call(place: str, temporary: Path) -> tuple[int, str]:
+        removed = (kernel_cache._CLASSES, kernel_cache._DIRECTORY)
+        kept = {name: value for name, value in os.environ.items() if name not in removed}
+        path = os.pathsep.join([str(source), *filter(None, [os.environ.get("PYTHONPATH")])])
+        variables = {"XDG_CACHE_HOME": "/dev/null", "TMPDIR": str(temporary), "PYTHONPATH": path}
+        done = subprocess.run(
+            [sys.executable, "-c", SCRIPT, place],
+            env={**kept, **variables},
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=HANG_SECONDS,
+        )
+        assert done.returncode == 0, done.stderr
+        return int(done.stdout), done.stderr
+
+    return call
+
+
+def test_kernels_are_kept_in_a_private_folder_where_no_other_can_be_written(kernel, tmp_path):
+    hits, said = kernel("nowhere", tmp_path)
+    folder = tmp_path / f"{kernel_cache.FOLDER}-{os.geteuid()}"
+    assert hits == 0 and f"kept in {folder}" in said and len(said.splitlines()) == 1
+    assert folder.stat().st_mode & 0o777 == 0o700
+    assert kernel("nowhere", tmp_path)[0] == 2
+
+
+def test_kernels_that_were_compiled_beside_the_source_are_taken_over(kernel, tmp_path):
+    assert kernel("beside", tmp_path) == (0, "")
+    assert kernel("nowhere", tmp_path)[0] == 2
+
+
+def test_kernels_are_compiled_every_time_where_nothing_can_be_written(kernel, tmp_path):
+    for _ in range(2):
+        hits, said = kernel("nowhere", tmp_path / "absent")
+        assert hits == 0 and "kept nowhere" in said and "NUMBA_CACHE_DIR" in said
+
+
+@pytest.mark.parametrize("fault", ["open to others", "link", "file"])
+def test_a_folder_that_others_may_have_made_is_not_used(tmp_path, monkeypatch, fault):
+    """What lies in it would be run."""
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr(kernel_cache, "PLACES", ())
+    folder = kernel_cache.private_folder()
+    assert folder is not None and folder.parent == tmp_path
+    folder.rmdir()
+    if fault == "link":
+        (tmp_path / "elsewhere").mkdir(mode=0o700)
+        folder.symlink_to(tmp_path / "elsewhere")
+    elif fault == "file":
+        folder.touch()
+    else:
+        folder.mkdir()
+        folder.chmod(0o777)
+    assert kernel_cache.private_folder() is None
+
+
+def test_a_user_with_a_cache_keeps_numbas_own_rules(tmp_path):
+    environment = {"XDG_CACHE_HOME": str(tmp_path)}
+    kernel_cache.configure(environment)
+    assert list(environment) == ["XDG_CACHE_HOME"]
