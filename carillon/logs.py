@@ -7,6 +7,7 @@ the standard library what becomes of it.
 from __future__ import annotations
 
 import logging
+from functools import cache
 
 from carillon import ROOMS
 from carillon.progress import say
@@ -21,6 +22,12 @@ class _LineHandler(logging.Handler):
 
 
 _LINES = _LineHandler()
+
+
+@cache
+def warn_once(sentence: str) -> None:
+    """Log a warning, once in a process, however often the same input is read."""
+    logging.getLogger(__name__).warning(f"warning: {sentence}")
 
 
 def show() -> None:

@@ -11,6 +11,10 @@ if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
     import trimesh
 
 
+ROUNDED = 1e-3
+"""Part of a voxel by which sides may exceed whole voxels: files round coordinates."""
+
+
 @dataclass(frozen=True, eq=False)
 class Grid:
     """Cubes of edge `edge` [m], `shape` of them along the axes, from the corner `origin` [m]."""
@@ -21,11 +25,22 @@ class Grid:
 
 
 def bounding_grid(surface: trimesh.Trimesh, resolution: int) -> Grid:
-    """Grid with `resolution` voxels along the longest side of the bounding box, centred on it."""
+    """Grid with `resolution` voxels along the longest side of the bounding box, centred on it.
+
+    Voxels are larger by as much as spares a layer of them for sides that exceed it by `ROUNDED`.
+    """
     low, high = np.asarray(surface.bounds)
-    edge = float((high - low).max() / resolution)
-    # The tolerance keeps a side of exactly n voxels from rounding up to n + 1.
-    shape = np.maximum(np.ceil((high - low) / edge - 1e-6), 1).astype(int)
+    extents = high - low
+    edge = float(extents.max() / resolution)
+    fewer = np.maximum(np.ceil(extents / edge - ROUNDED), 1)
+    if (fewer < _whole(extents / edge)).any():
+        edge = float((extents / fewer).max())
+    shape = _whole(extents / edge).astype(int)
     return Grid(
         (low + high - edge * shape) / 2, edge, (int(shape[0]), int(shape[1]), int(shape[2]))
     )
+
+
+def _whole(sizes: np.ndarray) -> np.ndarray:
+    """Whole voxels; the tolerance keeps a side of exactly n of them from rounding up to n + 1."""
+    return np.asarray(np.maximum(np.ceil(sizes - 1e-6), 1))

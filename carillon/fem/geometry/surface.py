@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import logging
 import warnings
+from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -12,7 +14,12 @@ from trimesh.resolvers import FilePathResolver
 
 from carillon.errors import UserError
 from carillon.fem.geometry.builtin import builtin_surface
+from carillon.fem.geometry.gltf import plain_gltf
+from carillon.fem.geometry.obj import plain_obj
+from carillon.fem.geometry.orientation import turned_alike
+from carillon.fem.geometry.size import unit_hint
 from carillon.limits import EXTENTS, FARTHEST, UNITS, require_within
+from carillon.logs import warn_once
 from carillon.places import require_file
 
 BUILTIN_PREFIX = "builtin:"
@@ -42,13 +49,14 @@ def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
     Returns
     -------
     trimesh.Trimesh
-        Surface with vertices in metres. It need not be closed or manifold.
+        Surface with vertices in metres, its faces turned alike. It need not be closed or manifold.
 
     Raises
     ------
     UserError
         If the file is missing, not readable as a mesh, without faces, flat, or holds coordinates
-        that are not finite; if `unit` is out of range, or the surface too large, too small or too
+        that are not finite; if its faces are there both ways, or cannot be turned alike; if `unit`
+        is out of range, or the surface too large, too small or too
         far from the origin (see `carillon.limits`); if the built-in name is unknown.
 
     Examples
@@ -67,8 +75,12 @@ def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
     else:
         surface = _read(Path(mesh))
     _require_solid(mesh, surface, unit)
+    if not mesh.startswith(BUILTIN_PREFIX):
+        surface = _turned_alike(mesh, surface)
     if unit != 1.0:
         surface.apply_scale(unit)
+    if not mesh.startswith(BUILTIN_PREFIX) and (hint := unit_hint(surface.extents, unit)):
+        warn_once(f"{mesh}: {hint}")
     return surface
 
 
@@ -97,11 +109,13 @@ def _read(path: Path) -> trimesh.Trimesh:
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
-            loaded = trimesh.load(path, resolver=_MeshFolder(str(path)), process=False)
+            loaded = _loaded(path)
             if isinstance(loaded, trimesh.Scene):
                 loaded = loaded.to_geometry() if loaded.geometry else trimesh.Trimesh()
             if isinstance(loaded, trimesh.Trimesh):
                 _require_vertices(loaded)
+    except UserError:
+        raise
     except Exception as error:  # parsers of a dozen formats raise anything
         reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
         raise UserError(
@@ -114,6 +128,21 @@ def _read(path: Path) -> trimesh.Trimesh:
             f"{path}: has no faces, expected the triangles of a surface; export it as a mesh"
         )
     return loaded
+
+
+def _loaded(path: Path) -> Any:
+    """What trimesh reads of a file, in a form that it reads rightly."""
+    folder = _MeshFolder(str(path))
+    kind = path.suffix.lstrip(".").lower()
+    content: bytes | None = None
+    if kind == "obj":
+        content = plain_obj(path.read_bytes())
+    elif kind in ("gltf", "glb"):
+        content = plain_gltf(path.read_bytes(), folder.get, str(path))
+        kind = "glb"
+    if content is None:
+        return trimesh.load(path, resolver=folder, process=False)
+    return trimesh.load(BytesIO(content), file_type=kind, resolver=folder, process=False)
 
 
 def _require_mesh_file(path: Path) -> None:
@@ -138,6 +167,12 @@ def _require_vertices(surface: trimesh.Trimesh) -> None:
     strange = faces[(faces < 0) | (faces >= count)]
     if strange.size:
         raise ValueError(f"a face names vertex {strange[0]}, there are 0 to {count - 1}")
+
+
+def _turned_alike(mesh: str, surface: trimesh.Trimesh) -> trimesh.Trimesh:
+    vertices, faces = np.asarray(surface.vertices), np.asarray(surface.faces, dtype=np.int64)
+    turned = turned_alike(vertices, faces, mesh)
+    return surface if turned is None else trimesh.Trimesh(vertices, turned, process=False)
 
 
 def _require_solid(mesh: str, surface: trimesh.Trimesh, unit: float) -> None:

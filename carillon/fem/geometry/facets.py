@@ -1,0 +1,108 @@
+"""Which triangles of a surface are one, share edges, and hang together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+DIGITS = 10
+"""Decimals, over the longest side, to which the places of two vertices agree that are one."""
+
+
+@dataclass(frozen=True)
+class Facets:
+    """Distinct triangles of a surface whose vertices are numbered by their places.
+
+    Attributes
+    ----------
+    vertices : (v, 3)
+        Over the longest side of the surface, from its lowest corner.
+    triangles : (t, 3)
+        Distinct ones, turned as the first face that each stands for.
+    of_face : (f,)
+        Triangle of each face; -1 of faces without an area.
+    along : (f,)
+        1 for faces that are turned as their triangle, -1 for others.
+    """
+
+    vertices: Array
+    triangles: Index
+    of_face: Index
+    along: Index
+
+    @classmethod
+    def of_surface(cls, vertices: Array, faces: Index) -> Facets:
+        """Those of faces (f, 3)."""
+        from trimesh.grouping import unique_rows
+
+        low, high = vertices[faces].min(axis=(0, 1)), vertices[faces].max(axis=(0, 1))
+        scaled = (vertices - low) / (high - low).max()
+        first, number = unique_rows(scaled, digits=DIGITS)
+        corners = number[faces]
+        whole = np.flatnonzero((corners != np.roll(corners, 1, axis=1)).all(axis=1))
+        ordered = np.sort(corners[whole], axis=1)
+        chosen, of_whole = unique_rows(ordered)
+        of_face = np.full(len(faces), -1)
+        of_face[whole] = of_whole
+        triangles = corners[whole[chosen]]
+        # The corner after the lowest one tells which way a triangle is turned.
+        follows = np.take_along_axis(
+            corners, (corners.argmin(axis=1) + 1)[:, None] % 3, axis=1
+        ).ravel()
+        along = np.where(follows == follows[whole[chosen]][of_face], 1, -1)
+        return cls(scaled[first], triangles, of_face, along)
+
+    def __len__(self) -> int:
+        return len(self.triangles)
+
+    @cached_property
+    def normals(self) -> Array:
+        """Normals (t, 3) as long as twice the areas."""
+        a, b, c = np.moveaxis(self.vertices[self.triangles], 1, 0)
+        return np.asarray(np.cross(b - a, c - a))
+
+    @cached_property
+    def areas(self) -> Array:
+        """Areas (t,)."""
+        return np.asarray(0.5 * np.linalg.norm(self.normals, axis=1))
+
+    @cached_property
+    def edges(self) -> tuple[Index, Index, Index]:
+        """Edge (3 t,) of each triangle's sides 01, 12, 20; ways (3 t,) along it; triangles at it.
+
+        The ways are 1 and -1.
+        """
+        starts, ends = self.triangles.ravel(), np.roll(self.triangles, -1, axis=1).ravel()
+        low, high = np.minimum(starts, ends), np.maximum(starts, ends)
+        keys = low * (int(high.max(initial=0)) + 1) + high
+        edge, counts = np.unique(keys, return_inverse=True, return_counts=True)[1:]
+        return edge, np.where(starts < ends, 1, -1), counts
+
+    @cached_property
+    def links(self) -> tuple[Index, Index, Flags]:
+        """Pairs of triangles (k,), (k,) that alone share an edge, and whether turned alike (k,)."""
+        edge, way, counts = self.edges
+        sides = np.flatnonzero(counts[edge] == 2)
+        one, other = sides[np.argsort(edge[sides], kind="stable")].reshape(-1, 2).T
+        return one // 3, other // 3, way[one] != way[other]
+
+    def unbalanced(self, sign: Index) -> Index:
+        """Sum (e,) of the ways in which triangles with these signs (t,), or without, pass edges."""
+        edge, way, counts = self.edges
+        return np.bincount(edge, way * np.repeat(sign, 3), minlength=len(counts)).astype(np.int64)
+
+
+def connected(count: int, left: Index, right: Index) -> Index:
+    """Component (count,) of each of things that are linked in pairs."""
+    from scipy.sparse.csgraph import connected_components  # Its import takes long.
+
+    graph = sp.coo_matrix((np.ones(len(left)), (left, right)), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)

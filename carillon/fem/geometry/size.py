@@ -1,0 +1,44 @@
+"""How large a solid is, in words, and whether its unit looks wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+LARGE = 3.0
+"""Longest side [m] from which a mesh may be in millimetres: of what is struck, most is smaller."""
+SMALL = 3e-3
+"""Longest side [m] up to which a mesh that is taken for one in millimetres may be in metres."""
+
+
+def size_in_words(extents: Sequence[float]) -> str:
+    """Sides of the bounding box [m].
+
+    Examples
+    --------
+    >>> size_in_words([0.4, 0.1, 0.05])
+    '0.4 x 0.1 x 0.05 m'
+    """
+    return f"{' x '.join(f'{side:.4g}' for side in extents)} m"
+
+
+def unit_hint(extents: Sequence[float], unit: float) -> str | None:
+    """What to say of sides [m] that a mistaken unit would make.
+
+    Parameters
+    ----------
+    unit
+        Metres per unit of the mesh, as it was given.
+
+    Examples
+    --------
+    >>> unit_hint([400.0, 100.0, 100.0], 1.0)
+    'it measures 400 x 100 x 100 m; if its coordinates are millimetres, give --unit 0.001'
+    >>> unit_hint([0.0004, 0.0001, 0.0001], 0.001)
+    'it measures 0.0004 x 0.0001 x 0.0001 m; if its coordinates are metres, give --unit 1'
+    """
+    longest, measures = max(extents), f"it measures {size_in_words(extents)}"
+    if unit == 1.0 and longest >= LARGE:
+        return f"{measures}; if its coordinates are millimetres, give --unit 0.001"
+    if unit < 1.0 and longest <= SMALL and longest / unit < LARGE:
+        return f"{measures}; if its coordinates are metres, give --unit 1"
+    return None

@@ -1,0 +1,272 @@
+"""A mesh is the same solid, whichever of the ways that its format allows it is written in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from carillon.errors import UserError
+from carillon.fem.geometry import load_surface, voxelize
+from carillon.fem.geometry.obj import plain_obj
+from tests.mesh_files import DTYPES, Gltf, block, concatenated
+
+SIDES = np.array([0.4, 0.1, 0.1])
+BOX = block(tuple(-SIDES / 2), tuple(SIDES / 2))
+HALVES = (
+    block((-0.2, -0.05, -0.05), (0.05, 0.05, 0.05)),
+    block((-0.05, -0.05, -0.05), (0.2, 0.05, 0.05)),
+)
+
+
+def same_triangles(surface: trimesh.Trimesh, expected: trimesh.Trimesh, tolerance: float) -> bool:
+    """Whether two surfaces have the same triangles, in order."""
+    one, other = np.asarray(surface.triangles), np.asarray(expected.triangles)
+    return one.shape == other.shape and bool(np.abs(one - other).max() <= tolerance)
+
+
+# OBJ ----------------------------------------------------------------------------------------------
+
+
+def obj(parts, face=lambda corner, count: str(corner + 1), head="v", tail="f", end="\n"):
+    """Parts in turn, vertices before faces; `face` writes a corner after so many vertices."""
+    text, count = [], 0
+    for part in parts:
+        text += [f"{head} {' '.join(map(repr, row))}" for row in part.vertices.tolist()]
+        count += len(part.vertices)
+        before = count - len(part.vertices)
+        for corners in part.faces.tolist():
+            text.append(f"{tail} {' '.join(face(before + each, count) for each in corners)}")
+    return end.join([*text, ""])
+
+
+def back(corner: int, count: int) -> str:
+    return str(corner - count)
+
+
+MORE = "vt 0 0\nvt 1 0\nvn 0 0 1\n"
+FORMS = {
+    "absolute": obj(HALVES),
+    "counting back": obj(HALVES, back),
+    "with texture": MORE + obj(HALVES, lambda *each: f"{back(*each)}/-1"),
+    "with normal": MORE + obj(HALVES, lambda *each: f"{back(*each)}//-1"),
+    "with both": MORE + obj(HALVES, lambda *each: f"{back(*each)}/-2/-1"),
+    "texture back alone": MORE + obj(HALVES, lambda corner, _: f"{corner + 1}/-2/1"),
+    "groups and lines": "o one\ng a b\ns 1\n" + obj(HALVES, back).replace("f ", "l -1 -2\nf ", 1),
+    "going on": obj(HALVES, back).replace(" -", " \\\n-"),
+    "going on, tight": obj(HALVES).replace("f 1 2", "f 1\\\n2").replace("f 5 ", "f 5\\\n"),
+    "indented, tabs": obj(HALVES, back, head="  v\t", tail="\tf\t"),
+    "comments": obj(HALVES, back, end=" # here: f 1 2 3\n"),
+    "carriage returns": obj(HALVES, back, end="\r\n"),
+    "old carriage returns": obj(HALVES, end="\r"),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_an_obj_file_is_one_solid_in_all_forms(tmp_path, form):
+    path = tmp_path / "halves.obj"
+    path.write_bytes(FORMS[form].encode())
+    found = load_surface(str(path))
+    expected = np.sort(np.asarray(concatenated(*HALVES).triangles).reshape(-1, 9), axis=0)
+    assert np.array_equal(np.sort(np.asarray(found.triangles).reshape(-1, 9), axis=0), expected)
+    assert found.volume == pytest.approx(0.005)
+
+
+def test_an_ordinary_obj_file_is_read_as_it_is():
+    """Not a byte of it changes, so that its solid keeps its bits."""
+    content = (MORE + FORMS["absolute"]).encode()
+    assert plain_obj(content) is content
+
+
+def test_polygons_that_count_back_become_triangles(tmp_path):
+    path = tmp_path / "quads.obj"
+    quads = np.array(
+        [[1, 2, 4, 3], [5, 7, 8, 6], [1, 5, 6, 2], [3, 4, 8, 7], [1, 3, 7, 5], [2, 6, 8, 4]]
+    )
+    corners = [f"v {x} {y} {z}" for x in (0, 0.4) for y in (0, 0.1) for z in (0, 0.1)]
+    lines = [f"f {' '.join(str(each - 9) for each in quad)}" for quad in quads]
+    path.write_text("\n".join([*corners, *lines]))
+    found = load_surface(str(path))
+    assert len(found.faces) == 12 and abs(found.volume) == pytest.approx(0.004)
+
+
+@pytest.mark.parametrize("corner", ["0", "-4", "9"])
+def test_a_face_of_a_vertex_that_is_not_there_is_refused(tmp_path, corner):
+    path = tmp_path / "bad.obj"
+    path.write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 {corner}\nv 0 0 1\n")
+    with pytest.raises(UserError, match="could not be read as a mesh"):
+        load_surface(str(path))
+
+
+# glTF ---------------------------------------------------------------------------------------------
+
+
+def quantised(component: int, normalised: bool, stride: int | None = None) -> tuple[Gltf, float]:
+    """The box in integers, scaled by its node; and half a step of them [m]."""
+    info = np.iinfo(DTYPES[component])
+    largest, signed = info.max, info.min < 0
+    units = np.asarray(BOX.vertices) / SIDES.max()  # from -1/2 to 1/2
+    steps = np.rint(units * 2 * largest) if signed else np.rint((units + 0.5) * largest)
+    file = Gltf()
+    positions = file.accessor(steps, component, stride, normalized=normalised)
+    file.primitive["attributes"]["POSITION"] = positions
+    file.primitive["indices"] = file.accessor(np.asarray(BOX.faces).ravel(), 5123)
+    width = 1.0 if normalised else float(largest)
+    scale = SIDES.max() / (2 * width if signed else width)
+    file.header["nodes"][0]["scale"] = [scale] * 3
+    if not signed:
+        file.header["nodes"][0]["translation"] = [-SIDES.max() / 2] * 3
+    file.header["extensionsUsed"] = file.header["extensionsRequired"] = ["KHR_mesh_quantization"]
+    return file, SIDES.max() / largest
+
+
+@pytest.mark.parametrize("ending", ["glb", "gltf"])
+@pytest.mark.parametrize("normalised", [True, False], ids=["normalised", "plain"])
+@pytest.mark.parametrize("component", [5120, 5121, 5122, 5123])
+def test_quantised_positions_are_those_of_the_solid(tmp_path, component, normalised, ending):
+    stride = 4 if component in (5120, 5121) else 8
+    file, step = quantised(component, normalised, stride)
+    found = load_surface(file.written(tmp_path / f"box.{ending}"))
+    assert same_triangles(found, BOX, step)
+
+
+def test_rounding_of_positions_adds_no_layer_of_voxels(tmp_path):
+    """A side of 0.10000305 instead of 0.1 m would be five voxels instead of four."""
+    file, _ = quantised(5122, True, 8)
+    voxels = voxelize(load_surface(file.written(tmp_path / "box.glb")), 16)
+    assert voxels.shape == (16, 4, 4) and voxels.filled.all()
+    assert voxels.edge == pytest.approx(0.025, rel=1e-4)
+
+
+def plain_box() -> Gltf:
+    file = Gltf()
+    file.primitive["attributes"]["POSITION"] = file.accessor(np.asarray(BOX.vertices), 5126)
+    file.primitive["indices"] = file.accessor(np.asarray(BOX.faces).ravel(), 5125)
+    return file
+
+
+@pytest.mark.parametrize("base", [True, False], ids=["changed", "all"])
+def test_sparse_positions_are_put_in_their_places(tmp_path, base):
+    """Over values that are there, or over zeros."""
+    file = plain_box()
+    rows = np.arange(3, 8) if base else np.arange(8)
+    entry = file.header["accessors"][0]
+    if base:
+        wrong = np.array(BOX.vertices)
+        wrong[rows] += 1.0
+        entry["bufferView"] = file.view(wrong.astype("<f4"))
+    else:
+        del entry["bufferView"]
+    entry["sparse"] = {
+        "count": len(rows),
+        "indices": {"bufferView": file.view(rows.astype("<u1")), "componentType": 5121},
+        "values": {"bufferView": file.view(np.asarray(BOX.vertices)[rows].astype("<f4"))},
+    }
+    found = load_surface(file.written(tmp_path / "box.glb"))
+    assert same_triangles(found, BOX, 1e-7)
+
+
+def test_fans_of_triangles_count_and_lines_do_not(tmp_path):
+    file = plain_box()
+    faces = np.asarray(BOX.faces)
+    position = file.primitive["attributes"]["POSITION"]
+    fans = [
+        {"attributes": {"POSITION": position}, "mode": 6, "indices": file.accessor(face, 5123)}
+        for face in faces[10:]
+    ]
+    file.primitive["indices"] = file.accessor(faces[:10].ravel(), 5123)
+    edges = {
+        "attributes": {"POSITION": position},
+        "mode": 1,
+        "indices": file.accessor(faces[0][:2], 5123),
+    }
+    file.header["meshes"][0]["primitives"] += [*fans, edges]
+    found = load_surface(file.written(tmp_path / "box.gltf"))
+    assert same_triangles(found, BOX, 1e-7)
+
+
+def test_a_file_beside_it_may_have_a_name_with_spaces(tmp_path):
+    file = plain_box()
+    path = Path(file.written(tmp_path / "box.gltf"))
+    (tmp_path / "my data.bin").write_bytes(bytes(file.data))
+    text = path.read_text()
+    start = text.index("data:")
+    path.write_text(text[:start] + "my%20data.bin" + text[text.index('"', start) :])
+    assert same_triangles(load_surface(str(path)), BOX, 1e-7)
+
+
+@pytest.mark.parametrize("ending", ["glb", "gltf"])
+@pytest.mark.parametrize(
+    "extension",
+    ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression", "X_any"],
+)
+def test_a_file_that_needs_what_is_not_read_is_refused(tmp_path, extension, ending):
+    file = plain_box()
+    file.header["extensionsRequired"] = ["KHR_materials_unlit", extension]
+    with pytest.raises(UserError, match=f"needs {extension}, which is not read; export it without"):
+        load_surface(file.written(tmp_path / f"box.{ending}"))
+
+
+def test_extensions_of_colours_are_no_hindrance(tmp_path):
+    file = plain_box()
+    names = [
+        "KHR_materials_unlit",
+        "KHR_texture_transform",
+        "EXT_texture_webp",
+        "KHR_mesh_quantization",
+    ]
+    file.header["extensionsRequired"] = names
+    assert same_triangles(load_surface(file.written(tmp_path / "box.glb")), BOX, 1e-7)
+
+
+def test_positions_that_are_in_an_extension_alone_are_refused(tmp_path):
+    """Though the file does not say that it needs it."""
+    file = plain_box()
+    del file.header["accessors"][0]["bufferView"]
+    file.primitive["extensions"] = {"KHR_draco_mesh_compression": {}}
+    with pytest.raises(UserError, match="no coordinates .* KHR_draco_mesh_compression"):
+        load_surface(file.written(tmp_path / "box.glb"))
+
+
+def test_data_that_are_in_an_extension_alone_are_refused(tmp_path):
+    file = plain_box()
+    file.header["buffers"].append({"byteLength": 96})
+    view = file.header["bufferViews"][0]
+    view |= {"buffer": 1, "byteOffset": 0, "extensions": {"EXT_meshopt_compression": {}}}
+    with pytest.raises(UserError, match="data in EXT_meshopt_compression alone"):
+        load_surface(file.written(tmp_path / "box.glb"))
+
+
+def test_an_accessor_beyond_its_data_is_refused(tmp_path):
+    file, _ = quantised(5122, True, 8)
+    file.header["accessors"][0]["count"] = 9
+    with pytest.raises(UserError, match="could not be read as a mesh .an accessor reaches"):
+        load_surface(file.written(tmp_path / "box.glb"))
+
+
+# Units --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ending", ["obj", "ply", "stl", "off", "glb"])
+def test_a_mesh_in_millimetres_is_told_to_be_metres_long(tmp_path, caplog, ending):
+    path = tmp_path / f"{tmp_path.name}.{ending}"
+    block((0, 0, 0), (400, 100, 100)).export(path)
+    load_surface(str(path))
+    load_surface(str(path))
+    (said,) = [record.message for record in caplog.records]
+    assert "400 x 100 x 100 m" in said and "--unit 0.001" in said
+    caplog.clear()
+    load_surface(str(path), 0.001)
+    assert not caplog.records
+
+
+def test_a_mesh_in_metres_is_not_taken_for_millimetres(tmp_path, caplog):
+    path = tmp_path / f"{tmp_path.name}.ply"
+    BOX.export(path)
+    load_surface(str(path))
+    assert not caplog.records
+    load_surface(str(path), 0.001)
+    (said,) = [record.message for record in caplog.records]
+    assert "0.0004 x 0.0001 x 0.0001 m" in said and "--unit 1" in said
