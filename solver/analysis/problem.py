@@ -105,7 +105,7 @@ class Problem:
     """Voxels, their moduli (m,) [Pa], the model to solve, and how long making them took.
 
     `coarsening` tells what the coarse elements rest on, see `Coarsening.record`; `covering` is that
-    of finite cells.
+    of finite cells; `extents` (3,) are the sides of the box around the surface [m].
     """
 
     fine: HexMesh
@@ -114,6 +114,7 @@ class Problem:
     seconds: dict[str, float]
     coarsening: dict[str, str] = field(default_factory=dict)
     covering: Covering | None = None
+    extents: tuple[float, ...] = ()
 
     @property
     def hexahedra(self) -> ElasticModel:
@@ -139,6 +140,7 @@ def build_problem(options: ProblemOptions) -> Problem:
     require_constants(options.poisson, options.density)
     begin = time.perf_counter()
     surface = geometry.load_surface(options.mesh, options.unit)
+    extents = tuple(float(side) for side in surface.extents)
     name = geometry.surface_name(options.mesh)
     mesh, cells = discretised(surface, options, name)
     meshed = time.perf_counter()
@@ -148,7 +150,7 @@ def build_problem(options: ProblemOptions) -> Problem:
     seconds = {"mesh": meshed - begin, "material": assigned - meshed}
     if cells is not None:
         model = finite_cell_model(cells.cells, young, options.poisson, options.density)
-        return Problem(mesh, young, model, seconds, covering=cells)
+        return Problem(mesh, young, model, seconds, covering=cells, extents=extents)
     coarsening = options.coarsening()
     elements = build_model(
         mesh,
@@ -159,9 +161,9 @@ def build_problem(options: ProblemOptions) -> Problem:
         lumped=options.lumped,
     )
     if coarsening is None:
-        return Problem(mesh, young, elements, seconds)
+        return Problem(mesh, young, elements, seconds, extents=extents)
     seconds["coarsening"] = time.perf_counter() - assigned
-    return Problem(mesh, young, elements, seconds, coarsening.record())
+    return Problem(mesh, young, elements, seconds, coarsening.record(), extents=extents)
 
 
 def discretised(

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from carillon.arguments import whole_number
 from carillon.errors import UserError
+from carillon.fem.geometry.size import size_in_words
 from carillon.fem.model import Solid
 from carillon.options import add_options, collect
 from carillon.progress import say
@@ -145,8 +146,9 @@ def run(arguments: argparse.Namespace) -> None:
 
         result.system.stream_to_root(result.vectors, write)
         if comm.rank == 0:
+            assert problem is not None
             _warn_about_options()
-            _print_summary(attributes, result.values, arguments)
+            _print_summary(attributes, problem.extents, result.values, arguments)
 
 
 def _coarsening(arguments: argparse.Namespace, described: ProblemOptions) -> Coarsening | None:
@@ -217,11 +219,15 @@ def _attributes(
 
 
 def _print_summary(
-    attributes: dict[str, Any], values: NDArray[np.float64], arguments: argparse.Namespace
+    attributes: dict[str, Any],
+    extents: tuple[float, ...],
+    values: NDArray[np.float64],
+    arguments: argparse.Namespace,
 ) -> None:
     hertz = frequencies(values)
     if arguments.json:
-        summary = {**attributes, "frequencies_hz": hertz.tolist(), "out": arguments.out}
+        found = {"extents_m": extents, "frequencies_hz": hertz.tolist()}
+        summary = {**attributes, **found, "out": arguments.out}
         print(json.dumps(summary))
         return
     total = sum(attributes["timings"].values())
@@ -231,6 +237,7 @@ def _print_summary(
     late = f", {added} found after the first search" if added else ""
     print(
         f"{arguments.out}: {len(values)} modes of {attributes['n_dofs']:,} unknowns, {span}{late}; "
+        f"a solid of {size_in_words(extents)}, "
         f"{attributes['rigid_modes']} rigid, largest residual {attributes['residual_max']:.1e}, "
         f"orthogonal to {attributes['orthogonality']:.1e}, {total:.1f} s on {attributes['ranks']} "
         f"rank{'s' if attributes['ranks'] > 1 else ''}"

@@ -17,6 +17,7 @@ import yaml
 from carillon.arguments import non_negative_number, number_of_workers, positive_number, whole_number
 from carillon.errors import UserError
 from carillon.fem.geometry import surface_name
+from carillon.fem.geometry.size import size_in_words
 from carillon.fem.materials import NAMES as MATERIALS
 from carillon.files import atomic_path
 from carillon.options import REQUIRED, add_options, collect, option
@@ -169,7 +170,8 @@ def _checked_size(arguments: argparse.Namespace) -> str:
         point = getattr(arguments, name)
         if point is not None:
             surface_of(solid.model).nearest(arguments.unit * np.array(point), name)
-    return f"{solid.fine.n_cells:,} voxels, {solid.fine.n_dofs:,} unknowns"
+    size = size_in_words(solid.extents)
+    return f"{size}, {solid.fine.n_cells:,} voxels, {solid.fine.n_dofs:,} unknowns"
 
 
 def _run_rules(folder: Path, cores: int) -> None:

@@ -13,6 +13,7 @@ from carillon.fem.finite_cells.cover import cover_of
 from carillon.fem.finite_cells.covering import SMALLEST_PIECE, Covering, pieces
 from carillon.fem.finite_cells.inside import Inside, find_inside
 from carillon.fem.finite_cells.pieces import CUT, FULL
+from carillon.fem.geometry.contacts import one_body
 from carillon.fem.geometry.grid import Grid, bounding_grid
 from carillon.fem.geometry.voxels import COMPONENTS, checked_resolution
 
@@ -52,6 +53,7 @@ def covering(
             f"components {components!r} is unknown, expected one of {', '.join(COMPONENTS)}"
         )
     grid = grid or even_grid(surface, resolution)
+    surface = one_body(surface, components, name)
     inside = find_inside(surface, grid)
     if not _holds(inside):
         raise UserError(_lost(surface, inside, resolution, grid, name))

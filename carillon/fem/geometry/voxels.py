@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from carillon.errors import UserError
+from carillon.fem.geometry.contacts import one_body
 from carillon.fem.geometry.fill import FILLS, cut_triangles
-from carillon.fem.geometry.grid import bounding_grid
+from carillon.fem.geometry.grid import Grid, bounding_grid
 from carillon.fem.geometry.topology import pieces as label_pieces
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
@@ -109,7 +110,7 @@ def voxelize(
     ------
     UserError
         If the resolution is not an integer >= 2 or needs too large a grid, if no voxel is filled,
-        or if the model falls into pieces.
+        if the model falls into pieces, or its bodies touch along edges or in points alone.
 
     Examples
     --------
@@ -125,7 +126,9 @@ def voxelize(
         raise UserError(
             f"components {components!r} is unknown, expected one of {', '.join(COMPONENTS)}"
         )
-    model = _filled_model(surface, resolution, fill, name)
+    grid = bounding_grid(surface, resolution)
+    surface = one_body(surface, components, name)
+    model = _filled_model(surface, grid, resolution, fill, name)
     if model.n_cells == 0:
         raise UserError(
             f"mesh {name!r} at resolution {resolution} fills no voxel: its walls are thinner than "
@@ -173,8 +176,9 @@ def checked_resolution(surface: trimesh.Trimesh, resolution: int, name: str) -> 
     return checked
 
 
-def _filled_model(surface: trimesh.Trimesh, resolution: int, fill: str, name: str) -> VoxelModel:
-    grid = bounding_grid(surface, resolution)
+def _filled_model(
+    surface: trimesh.Trimesh, grid: Grid, resolution: int, fill: str, name: str
+) -> VoxelModel:
     filled, origin = FILLS[fill](surface, grid)
     # Padding at the far end keeps index 0 the start of a block.
     even = np.pad(filled, [(0, size % 2) for size in filled.shape])
@@ -202,6 +206,7 @@ def _connected_resolution(surface: trimesh.Trimesh, model: VoxelModel, fill: str
         resolution = int(np.ceil(model.resolution * factor))
         if model.filled.size * factor**3 > TRIAL_GRID:
             return None
-        if len(_filled_model(surface, resolution, fill, model.name).piece_sizes) == 1:
+        grid = bounding_grid(surface, resolution)
+        if len(_filled_model(surface, grid, resolution, fill, model.name).piece_sizes) == 1:
             return resolution
     return None
