@@ -13,7 +13,7 @@ import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Iterator, MutableMapping
+from collections.abc import Iterator, Mapping, MutableMapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -42,8 +42,7 @@ def configure(environment: MutableMapping[str, str]) -> None:
     >>> environment["NUMBA_CACHE_LOCATOR_CLASSES"]
     'carillon.kernel_cache.Locator'
     """
-    cache = environment.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    if not _can_be_made(os.path.join(cache, "numba")):
+    if not _can_be_made(os.path.join(_users(environment), "numba")):
         environment.setdefault(_CLASSES, f"{__name__}.Locator")
 
 
@@ -67,6 +66,8 @@ class Locator:
             del os.environ[_CLASSES]
         if config.CACHE_DIR != str(cls.folder):
             for known in caching.CacheImpl._locator_classes:
+                if "UserWide" in known.__name__ and not os.path.isabs(_users(os.environ)):
+                    continue  # a folder "~" beside the user's files
                 if found := known.from_function(function, source):
                     return found
             cls.folder = private_folder()
@@ -138,10 +139,17 @@ def _files(folder: Path) -> Iterator[Path]:
         yield from folder.glob(pattern)
 
 
+def _users(environment: Mapping[str, str]) -> str:
+    """The user's cache; a relative path for users whom the system does not know."""
+    return environment.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+
+
 def _can_be_made(folder: str) -> bool:
     """Whether this user may write to a folder, or make it."""
+    if not os.path.isabs(folder):
+        return False
     while not os.path.lexists(folder):
-        folder = os.path.dirname(folder) or "."
+        folder = os.path.dirname(folder)
     return os.path.isdir(folder) and os.access(folder, os.W_OK | os.X_OK, effective_ids=True)
 
 

@@ -57,21 +57,34 @@ def start_without_daemon(environment: MutableMapping[str, str]) -> None:
 def keep_apart(environment: MutableMapping[str, str], process: int) -> None:
     """Have Open MPI give a process that was not started as an MPI rank a directory of its own.
 
-    A directory that the user has chosen stays.
+    A directory that the user has chosen stays. Others are in a folder for temporary files that can
+    be written, or else in the present one.
 
     Examples
     --------
-    >>> environment = {"TMPDIR": "/scratch"}
+    >>> environment = {"TMPDIR": "/dev"}
     >>> keep_apart(environment, 17)
     >>> directory = environment["OMPI_MCA_orte_top_session_dir"]
-    >>> directory.startswith("/scratch/carillon-mpi."), directory.endswith(".17")
+    >>> "/carillon-mpi." in directory, directory.endswith(".17")
     (True, True)
     """
     if _launched(environment) or not _is_own(environment.get(_DIRECTORY, _OWN)):
         return
-    folder = environment.get("OMPI_MCA_orte_tmpdir_base") or environment.get("TMPDIR") or "/tmp"
+    folder = _temporary_folder(environment)
     name = f"{_OWN}.{os.uname().nodename}.{os.getuid()}.{process}"
     environment[_DIRECTORY] = os.path.join(folder, name)
+
+
+def _temporary_folder(environment: Mapping[str, str]) -> str:
+    given = (environment.get("OMPI_MCA_orte_tmpdir_base"), environment.get("TMPDIR"))
+    folders = [*filter(None, given), "/tmp", "/var/tmp", "/dev/shm"]
+    for each in folders:
+        if os.path.isdir(each) and os.access(each, os.W_OK | os.X_OK, effective_ids=True):
+            return each
+    try:
+        return os.getcwd()
+    except OSError:  # it was removed
+        return folders[0]
 
 
 def stay_apart(environment: MutableMapping[str, str], process: int) -> None:
