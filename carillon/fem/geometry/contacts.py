@@ -70,9 +70,9 @@ def one_body(surface: trimesh.Trimesh, components: str, name: str) -> trimesh.Tr
         return surface
     if components == "error":
         raise UserError(
-            f"mesh {name!r} is in {body.max() + 1} pieces that touch along an edge or in a point "
-            "at most, where nothing holds them together; let them overlap, or pass --components "
-            "largest to keep the largest"
+            f"mesh {name!r} falls into {body.max() + 1} pieces that touch along an edge or in a "
+            "point at most, where nothing holds them together; let them overlap, or pass "
+            "--components largest to keep the largest"
         )
     volumes = np.bincount(body, [part.volume for part in outer])
     largest = int(volumes.argmax())
