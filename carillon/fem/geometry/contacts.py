@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from carillon.errors import UserError
 from carillon.fem.geometry.crossings import line_crossings
 from carillon.fem.geometry.facets import Facets, connected
-from carillon.fem.geometry.parts import Part, closed_parts, winding_numbers
+from carillon.fem.geometry.parts import ClosedPart, closed_parts, winding_numbers
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
     import trimesh
@@ -85,7 +85,7 @@ def one_body(surface: trimesh.Trimesh, components: str, name: str) -> trimesh.Tr
     return kept
 
 
-def _bodies(facets: Facets, parts: list[Part]) -> Index:
+def _bodies(facets: Facets, parts: list[ClosedPart]) -> Index:
     """Body of each part: those that overlap, or share an area, are one."""
     joined: list[tuple[int, int]] = []
     body = np.arange(len(parts))
@@ -96,11 +96,11 @@ def _bodies(facets: Facets, parts: list[Part]) -> Index:
     return body
 
 
-def _common_box(one: Part, other: Part) -> tuple[Array, Array]:
+def _common_box(one: ClosedPart, other: ClosedPart) -> tuple[Array, Array]:
     return np.maximum(one.low, other.low), np.minimum(one.high, other.high)
 
 
-def _joined(facets: Facets, one: Part, other: Part) -> bool:
+def _joined(facets: Facets, one: ClosedPart, other: ClosedPart) -> bool:
     low, high = _common_box(one, other)
     if (high - low < -MEETING).any() or np.count_nonzero(high - low <= MEETING) > 1:
         return False
@@ -110,7 +110,7 @@ def _joined(facets: Facets, one: Part, other: Part) -> bool:
 
 
 def _meet_on_lines(
-    facets: Facets, one: Part, other: Part, low: Array, high: Array, axis: int
+    facets: Facets, one: ClosedPart, other: ClosedPart, low: Array, high: Array, axis: int
 ) -> bool:
     """Whether a line along an axis goes from one part into the other, or through both at once."""
     across = [(axis + 1) % 3, (axis + 2) % 3]
@@ -138,7 +138,9 @@ def _meet_on_lines(
     return bool((gap <= MEETING).any())
 
 
-def _holds_corners(facets: Facets, one: Part, other: Part, low: Array, high: Array) -> bool:
+def _holds_corners(
+    facets: Facets, one: ClosedPart, other: ClosedPart, low: Array, high: Array
+) -> bool:
     """Whether corners of one part are inside the other."""
     corners = facets.vertices[np.unique(facets.triangles[one.triangles])]
     corners = corners[((corners >= low) & (corners <= high)).all(axis=1)]
@@ -149,7 +151,7 @@ def _holds_corners(facets: Facets, one: Part, other: Part, low: Array, high: Arr
     return bool((_distances(facets, other, corners) > MEETING).any())
 
 
-def _touch(facets: Facets, one: Part, other: Part) -> bool:
+def _touch(facets: Facets, one: ClosedPart, other: ClosedPart) -> bool:
     """Whether a corner of one part lies on the other."""
     low, high = _common_box(one, other)
     if (high - low < -TOUCHING).any():
@@ -162,7 +164,7 @@ def _touch(facets: Facets, one: Part, other: Part) -> bool:
     return False
 
 
-def _distances(facets: Facets, part: Part, points: Array) -> Array:
+def _distances(facets: Facets, part: ClosedPart, points: Array) -> Array:
     """Distances (k,) of points (k, 3) from the surface of a part."""
     import igl
 
@@ -173,7 +175,7 @@ def _distances(facets: Facets, part: Part, points: Array) -> Array:
     return np.sqrt(np.atleast_1d(squares))
 
 
-def _lies_in(facets: Facets, cavity: Part, parts: list[Part]) -> bool:
+def _lies_in(facets: Facets, cavity: ClosedPart, parts: list[ClosedPart]) -> bool:
     corner = facets.vertices[facets.triangles[cavity.triangles[:1]]].mean(axis=1)
     numbers = [winding_numbers(facets, part.triangles, corner)[0] for part in parts]
     return any(abs(number) > 0.5 for number in numbers)

@@ -18,8 +18,8 @@ EXACT = 20_000_000
 
 
 @dataclass(frozen=True)
-class Part:
-    """A closed part.
+class ClosedPart:
+    """What of a surface is closed by itself.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class Part:
     high: Array
 
 
-def closed_parts(facets: Facets) -> list[Part]:
+def closed_parts(facets: Facets) -> list[ClosedPart]:
     """The closed parts of a surface whose faces are turned alike."""
     ones = np.ones(len(facets), dtype=np.int64)
     patch = connected(len(facets), *facets.links[:2])
@@ -51,7 +51,7 @@ def closed_parts(facets: Facets) -> list[Part]:
         if closed[part[own[0]]]:
             corners = facets.vertices[facets.triangles[own]].reshape(-1, 3)
             volume = outward * float(volumes[part[own[0]]])
-            found.append(Part(own, volume, corners.min(axis=0), corners.max(axis=0)))
+            found.append(ClosedPart(own, volume, corners.min(axis=0), corners.max(axis=0)))
     return found
 
 
