@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 import shutil
 import subprocess
@@ -18,7 +20,9 @@ from tests import tiers
 from tests.chromium import chromium
 from tests.hostile import fuzzing, summary
 from tests.hostile.fixtures import suite, tried, zoo  # noqa: F401
+from tests.once import once
 from tests.patience import HANG_SECONDS
+from tests.workflow_runs import planned
 from tests.zygote import Job, Limits, Zygote
 from workflow.studies.recordings.packages import SOUNDS
 
@@ -175,6 +179,45 @@ def run_cli(zygote: Zygote) -> Run:
         return _checked(done) if check else done
 
     return run
+
+
+@pytest.fixture(scope="session")
+def together(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of all processes of this session of tests."""
+    base = tmp_path_factory.getbasetemp()
+    return base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+
+
+@pytest.fixture(scope="session")
+def dry_run(run_cli: Run) -> Run:
+    """Function that plans a run of Snakemake in a folder, `dry_run(folder, *arguments)`, forked."""
+
+    def run(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
+        snakefile = ("-s", CHECKOUT / "Snakefile")
+        return run_cli("snakemake", *snakefile, "--dry-run", *arguments, cwd=folder)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def plan(dry_run: Run, together: Path) -> Callable[..., dict[str, int]]:
+    """Function that counts by rule the jobs of a run in an empty folder, each once for all tests.
+
+    Called as `plan(*targets_and_options)`.
+    """
+
+    def counted(*arguments: object) -> dict[str, int]:
+        words = [str(word) for word in arguments]
+        name = hashlib.sha256(json.dumps(words).encode()).hexdigest()[:16]
+        with once(together / f"plan-{name}") as folder:
+            jobs = folder / "jobs.json"
+            if not jobs.exists():
+                (folder / "empty").mkdir()
+                found = planned(dry_run(folder / "empty", "--cores", 2, *words))
+                jobs.write_text(json.dumps(found))
+            return dict(json.loads(jobs.read_text()))
+
+    return counted
 
 
 @pytest.fixture(scope="session")

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import psutil
 
-HANG_SECONDS = 600.0
+HANG_SECONDS = 1800.0
 """What takes longer hangs, on however busy a machine; less than pytest itself waits."""
 PATIENCE_SECONDS = 30.0
 """What a page does at once is there by then."""

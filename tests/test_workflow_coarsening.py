@@ -11,7 +11,7 @@ import yaml
 from carillon.fem.geometry.picture import looks_at
 from tests import solids
 from tests.pages import Page, assert_same_numbers, assert_self_contained
-from tests.workflow_runs import CHECKOUT, PROFILE, TINY, planned, snakemake
+from tests.workflow_runs import CHECKOUT, PROFILE, TINY, snakemake
 from workflow.studies import catalogue
 from workflow.studies.base.cases import Case, cases_of
 from workflow.studies.base.table import read_table
@@ -123,10 +123,10 @@ def test_a_solid_without_its_mesh_is_left_out_and_named(study, tmp_path):
     assert study.without.startswith(f"Without bust: there is no {tmp_path}/bust.obj")
 
 
-def test_the_study_is_no_part_of_the_default_run(tmp_path):
-    default = planned(snakemake(tmp_path, "--dry-run", "--cores", 1))
+def test_the_study_is_no_part_of_the_default_run(plan):
+    default = plan()
     assert "find_modes" in default and "rate_coarsening" not in default
-    study = planned(snakemake(tmp_path, "coarsening", "--dry-run", "--cores", 1))
+    study = plan("coarsening")
     # No mesh files lie here: four built-in solids and eight trial solids with two materials.
     assert study["rate_coarsening"] == 12 * 2
     assert "find_modes" not in study and "rate_objectives" not in study

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from tests.pages import Page, assert_self_contained
-from tests.workflow_runs import CHECKOUT, TINY, snakemake
+from tests.workflow_runs import CHECKOUT, TINY
 from workflow.__main__ import main
 from workflow.studies.base.conditions import Repeats, conditions
 from workflow.studies.base.table import Column, Table, read_csv_table, write_table
@@ -228,11 +228,11 @@ def test_folders_that_cannot_be_compared_are_answered_in_a_sentence(before, tmp_
         assert said in output and str(folder) in output and "Traceback" not in output
 
 
-def test_the_target_wants_a_baseline_before_anything_runs(tmp_path):
-    plan = ["compare", "--dry-run", "--cores", 1, "--configfile", TINY]
-    done = snakemake(tmp_path, *plan, "--config", "baseline=nowhere")
+def test_the_target_wants_a_baseline_before_anything_runs(dry_run, tmp_path):
+    words = ["compare", "--cores", 1, "--configfile", TINY]
+    done = dry_run(tmp_path, *words, "--config", "baseline=nowhere")
     assert done.returncode != 0
     assert "baseline: nowhere: there is no such folder" in done.stdout + done.stderr
-    done = snakemake(tmp_path, *plan)
+    done = dry_run(tmp_path, *words)
     assert done.returncode != 0
     assert "baseline: names no folder" in done.stdout + done.stderr

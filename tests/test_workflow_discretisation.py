@@ -9,7 +9,6 @@ import yaml
 
 from carillon.measurement import measured
 from tests.pages import Page, assert_same_numbers, assert_self_contained
-from tests.workflow_runs import planned, snakemake
 from workflow.studies import catalogue
 from workflow.studies.base.cases import cases_of
 from workflow.studies.base.study import named
@@ -106,8 +105,8 @@ def test_the_page_holds_its_tables_and_figures(study):
         assert_same_numbers(page, study.folder / "tables", name)
 
 
-def test_a_target_makes_the_study(tmp_path):
-    found = planned(snakemake(tmp_path, "discretisation", "--dry-run", "--cores", 1))
+def test_a_target_makes_the_study(plan):
+    found = plan("discretisation")
     # No mesh files lie here: six built-in solids with four materials.
     assert found["rate_discretisation"] == 6 * 4
     assert "find_modes" not in found and "rate_coarsening" not in found

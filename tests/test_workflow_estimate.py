@@ -13,7 +13,6 @@ import pytest
 
 from carillon.errors import UserError
 from dataset_gen.objectives import DATASET_OBJECTIVES, SAMPLED
-from tests.workflow_runs import planned, snakemake
 from workflow.__main__ import main
 from workflow.commands import estimate as command
 from workflow.commands.estimate import CONFIGURATIONS, estimate, load
@@ -221,10 +220,9 @@ def test_the_distance_from_the_solid_costs_what_its_exponent_says(config):
     assert told.to_numpy() == pytest.approx(2.0**power * plain.to_numpy())
 
 
-def test_jobs_are_those_of_the_rules(configs, tmp_path):
+def test_jobs_are_those_of_the_rules(configs, plan):
     file = CONFIGURATIONS / "tiny.yaml"
-    done = snakemake(tmp_path, "all", "figures", "-n", "--cores", 2, "--configfile", file)
-    jobs = planned(done)
+    jobs = plan("all", "figures", "--configfile", file)
     estimated_jobs, _ = estimated(configs["tiny"], load_rates(), HERE)
     counts = estimated_jobs["rule"].value_counts().to_dict()
     assert counts | {"all": 1, "figures": 1} == {n: jobs[n] for n in jobs if n != "total"}

@@ -10,7 +10,7 @@ import yaml
 from solver.studies.benchmark.methods import Methods, named
 from solver.studies.benchmark.rivals import SlepcConfiguration
 from tests.pages import Page, assert_same_numbers, assert_self_contained
-from tests.workflow_runs import CHECKOUT, PROFILE, TINY, planned, snakemake
+from tests.workflow_runs import CHECKOUT, PROFILE, TINY, snakemake
 from workflow import solids
 from workflow.studies.base.table import read_table
 from workflow.studies.catalogue import FIGURES
@@ -21,13 +21,13 @@ convergence, methods, ratios = map(FIGURES.entries.get, ("convergence", "methods
 CONFIG = yaml.safe_load((CHECKOUT / "workflow" / "config" / "laptop.yaml").read_text())
 
 
-def test_figures_are_no_part_of_the_default_run(tmp_path):
-    jobs = planned(snakemake(tmp_path, "figures", "--dry-run", "--cores", 1))
+def test_figures_are_no_part_of_the_default_run(plan):
+    jobs = plan("figures")
     # Bunny and teapot have no mesh here.
     assert jobs["time_methods_in_full"] == 4
     assert jobs["follow_convergence_in_full"] == jobs["measure_scaling"] == 1
     assert "find_modes" not in jobs and "time_methods" not in jobs
-    default = planned(snakemake(tmp_path, "--dry-run", "--cores", 1))
+    default = plan()
     assert default["time_methods"] == 4
     assert not {"time_methods_in_full", "measure_scaling"} & set(default)
 

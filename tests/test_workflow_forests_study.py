@@ -10,7 +10,7 @@ import yaml
 from carillon.errors import UserError
 from forests import default as default_forests
 from tests.pages import Page, assert_same_numbers, assert_self_contained
-from tests.workflow_runs import CHECKOUT, PROFILE, TINY, planned, snakemake
+from tests.workflow_runs import CHECKOUT, PROFILE, TINY, snakemake
 from workflow import settings
 from workflow.studies.base.table import read_table
 from workflow.studies.catalogue import FORESTS
@@ -19,13 +19,13 @@ FOLDER = "results-tiny"
 FIGURES = [figure.file for figure in FORESTS.figures]
 
 
-def test_default_forests_are_trained_tree_by_tree_and_not_in_the_default_run(tmp_path):
-    jobs = planned(snakemake(tmp_path, "default_forest", "--dry-run", "--cores", 1))
+def test_default_forests_are_trained_tree_by_tree_and_not_in_the_default_run(plan):
+    jobs = plan("default_forest")
     assert jobs["generate_default_shard"] == 2 * 8
     assert jobs["grow_tree"] == 2 * 3
     assert jobs["train_default_forest"] == jobs["describe_default_forest"] == 1
     assert "generate_shard" not in jobs and "find_modes" not in jobs
-    default = planned(snakemake(tmp_path, "--dry-run", "--cores", 1))
+    default = plan()
     assert not {"grow_tree", "compare_on_blocks", "rate_objectives"} & set(default)
 
 

@@ -11,7 +11,7 @@ from carillon.errors import UserError
 from dataset_gen.objectives import OBJECTIVES
 from tests.pages import Page, assert_same_numbers, assert_self_contained
 from tests.small_forests import train_small_forests
-from tests.workflow_runs import CHECKOUT, PROFILE, TINY, planned, snakemake
+from tests.workflow_runs import CHECKOUT, PROFILE, TINY, snakemake
 from workflow import settings, solids
 from workflow.studies import catalogue
 from workflow.studies.base.cases import cases_of
@@ -177,10 +177,10 @@ def test_an_unknown_objective_is_answered_in_one_sentence():
         settings.check_links(config)
 
 
-def test_the_study_is_no_part_of_the_default_run(tmp_path):
-    default = planned(snakemake(tmp_path, "--dry-run", "--cores", 1))
+def test_the_study_is_no_part_of_the_default_run(plan):
+    default = plan()
     assert "find_modes" in default and "rate_objectives" not in default
-    study = planned(snakemake(tmp_path, "objectives", "--dry-run", "--cores", 1))
+    study = plan("objectives")
     # No mesh files lie here: box, bell and pan at two resolutions with five materials.
     assert study["rate_objectives"] == 3 * 2 * 5
     assert study["plot_objectives_solid"] == 3

@@ -6,7 +6,6 @@ import pytest
 import schema_keys
 
 from tests.test_workflow_config import every_key
-from tests.workflow_runs import planned, snakemake
 from workflow import settings
 from workflow.commands.estimate import CONFIGURATIONS, load
 from workflow.estimate.rates import load_rates
@@ -25,11 +24,10 @@ def test_presets_need_no_file(name):
 
 
 @pytest.mark.parametrize("name", ["cluster", "paper"])
-def test_presets_are_planned_on_a_fresh_clone(name, tmp_path):
+def test_presets_are_planned_on_a_fresh_clone(name, plan):
     config = preset(name)
     file = CONFIGURATIONS / f"{name}.yaml"
-    options = ("--dry-run", "--cores", 16, "--configfile", file)
-    jobs = planned(snakemake(tmp_path, "all", "figures", *options))
+    jobs = plan("all", "figures", "--configfile", file)
     shards = config["dataset"]["shards"] * len(config["dataset"]["distributions"])
     assert jobs["generate_shard"] == shards
     assert jobs["find_modes"] == 7 * len(config["models"])

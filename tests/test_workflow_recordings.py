@@ -18,7 +18,6 @@ from carillon.errors import UserError
 from sound.clips.damped import damped_sinusoids
 from sound.clips.wav import write_wav
 from tests.pages import Page, assert_same_numbers, assert_self_contained
-from tests.workflow_runs import planned, snakemake
 from workflow.__main__ import main
 from workflow.commands.estimate import CONFIGURATIONS, load
 from workflow.studies.base.table import Table, write_table
@@ -325,8 +324,8 @@ def test_modes_in_another_format_are_looked_for_among_the_strong_ones():
 # Rules --------------------------------------------------------------------------------------------
 
 
-def test_the_study_is_planned_without_the_packages(tmp_path):
-    jobs = planned(snakemake(tmp_path, "recordings", "--dry-run", "--cores", 2))
+def test_the_study_is_planned_without_the_packages(plan):
+    jobs = plan("recordings")
     assert jobs["extract_recording"] == jobs["build_recording_page"] == len(recordings())
     assert jobs["bring_recordings"] == jobs["time_extraction_start"] == 1
     assert jobs["compare_formats"] == jobs["build_recordings_index"] == 1

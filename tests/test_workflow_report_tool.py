@@ -11,7 +11,7 @@ import rule_graph
 from docutils.core import publish_parts
 
 from carillon.errors import UserError
-from tests.workflow_runs import CHECKOUT, planned, snakemake
+from tests.workflow_runs import CHECKOUT
 from workflow.studies import catalogue, marks
 
 CAPTIONS = sorted((CHECKOUT / "workflow" / "studies" / "captions").glob("*.rst"))
@@ -28,9 +28,9 @@ def rendered(caption: str) -> str:
     return str(parts["html_body"])
 
 
-def test_picture_of_the_rules_shows_the_default_run(tmp_path):
+def test_picture_of_the_rules_shows_the_default_run(plan):
     """If it fails: python docs/extensions/rule_graph.py"""
-    jobs = planned(snakemake(tmp_path, "--dry-run", "--cores", 2))
+    jobs = plan()
     picture = rule_graph.PICTURE.read_text()
     assert set(re.findall(r">(\w+)</text>", picture)) == set(jobs) - {"all", "total"}
 

@@ -8,11 +8,11 @@ import sys
 import pytest
 
 from tests.patience import HANG_SECONDS
-from tests.workflow_runs import CHECKOUT, PROFILE, planned, snakemake
+from tests.workflow_runs import CHECKOUT, PROFILE
 
 
-def test_default_run_is_planned_without_a_gap(tmp_path):
-    jobs = planned(snakemake(tmp_path, "--dry-run", "--cores", 2))
+def test_default_run_is_planned_without_a_gap(plan):
+    jobs = plan()
     models, shards = 4, 4
     assert jobs["generate_shard"] == shards
     assert jobs["find_modes"] == 7 * models
@@ -20,8 +20,8 @@ def test_default_run_is_planned_without_a_gap(tmp_path):
     assert jobs["train_forests"] == jobs["tabulate_report"] == jobs["build_report"] == 1
 
 
-def test_default_profile_is_read(tmp_path):
-    done = snakemake(tmp_path, "--dry-run", "--profile", PROFILE)
+def test_default_profile_is_read(dry_run, tmp_path):
+    done = dry_run(tmp_path, "--profile", PROFILE)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
@@ -33,23 +33,22 @@ def test_rules_lint():
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_a_bad_value_on_the_command_line_stops_the_run_with_a_sentence(tmp_path):
-    done = snakemake(tmp_path, "--dry-run", "--cores", 1, "--config", "poisson=0.7")
+def test_a_bad_value_on_the_command_line_stops_the_run_with_a_sentence(dry_run, tmp_path):
+    done = dry_run(tmp_path, "--cores", 1, "--config", "poisson=0.7")
     assert done.returncode != 0
     output = done.stdout + done.stderr
     assert "poisson: 0.7 is greater than or equal to the maximum of 0.5" in output
     assert "Traceback" not in output
 
 
-def test_one_variant_of_a_model_tells_its_distance_and_all_have_one_mesh(tmp_path):
+def test_one_variant_of_a_model_tells_its_distance_and_all_have_one_mesh(dry_run, tmp_path):
     config = tmp_path / "config.yaml"
     config.write_text(
         "models:\n"
         "  bar: {mesh: 'builtin:bar', resolution: 16}\n"
         "  bell: {mesh: 'builtin:bell', resolution: 16, discretisation: finite-cell}\n"
     )
-    options = ("-n", "-p", "--cores", 2, "--configfile", config)
-    done = snakemake(tmp_path, "validation", *options)
+    done = dry_run(tmp_path, "validation", "-p", "--cores", 2, "--configfile", config)
     assert done.returncode == 0, done.stdout + done.stderr
     runs = [line.split() for line in done.stdout.splitlines() if "-m solver modes" in line]
     telling = {run[run.index("--out") + 1] for run in runs if "--no-estimate" not in run}
@@ -60,14 +59,14 @@ def test_one_variant_of_a_model_tells_its_distance_and_all_have_one_mesh(tmp_pat
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_ranks_get_a_launcher_only_where_there_are_several(tmp_path, ranks):
+def test_ranks_get_a_launcher_only_where_there_are_several(dry_run, tmp_path, ranks):
     config = tmp_path / "config.yaml"
     config.write_text(
         "models: {bar: {mesh: 'builtin:bar', resolution: 16}}\n"
         f"solver: {{ranks: {ranks}, modes: 20}}\n"
     )
     target = "results/models/bar/truth.h5"
-    done = snakemake(tmp_path, target, "-n", "-p", "--cores", 2, "--configfile", config)
+    done = dry_run(tmp_path, target, "-p", "--cores", 2, "--configfile", config)
     output = done.stdout + done.stderr
     assert done.returncode == 0, output
     assert ("mpiexec -n 2 python" in output) == (ranks == 2)

@@ -17,7 +17,7 @@ from sound.scenes.playing.impact_list import COLUMNS
 from sound.scenes.scene import Scene, load_scene
 from tests.pages import Page, assert_same_numbers
 from tests.scenes import moved, require_engine
-from tests.workflow_runs import TINY, planned, snakemake
+from tests.workflow_runs import TINY, snakemake
 from workflow import settings
 from workflow.commands.estimate import CONFIGURATIONS, load
 from workflow.studies.base.table import write_table
@@ -165,8 +165,8 @@ def test_points_are_as_far_apart_as_asked():
 # How they are planned ----------------------------------------------------------------------------
 
 
-def test_all_scenes_are_planned_with_the_designs_that_they_need(tmp_path):
-    jobs = planned(snakemake(tmp_path, FOLDER, "--dry-run", "--cores", 2))
+def test_all_scenes_are_planned_with_the_designs_that_they_need(plan):
+    jobs = plan(FOLDER)
     assert jobs["play_scene"] == 3 and jobs["write_scene"] == 2
     assert jobs["build_scenes_page"] == jobs["scenes"] == 1
     chosen = [sounds.examples(CONFIG)[name] for name in CONFIG["sound"]["examples"]]
@@ -174,8 +174,8 @@ def test_all_scenes_are_planned_with_the_designs_that_they_need(tmp_path):
     assert not {"build_sound_page", "find_reach", "find_modes"} & set(jobs)
 
 
-def test_the_tiny_run_plays_bars_alone(tmp_path):
-    jobs = planned(snakemake(tmp_path, FOLDER, "--dry-run", "--cores", 2, "--configfile", TINY))
+def test_the_tiny_run_plays_bars_alone(plan):
+    jobs = plan(FOLDER, "--configfile", TINY)
     assert set(jobs) == {"play_scene", "save_config", "build_scenes_page", "scenes", "total"}
 
 

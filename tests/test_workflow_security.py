@@ -325,10 +325,10 @@ def test_files_and_values_of_the_command_line_take_precedence_in_their_order(tmp
     }
 
 
-def test_a_configuration_that_snakemake_has_loaded_is_refused_in_a_sentence(tmp_path):
+def test_a_configuration_that_snakemake_has_loaded_is_refused_in_a_sentence(dry_run, tmp_path):
     """References in lists are harmless to Snakemake itself, which is before us."""
     (tmp_path / "bomb.yaml").write_text(BOMB)
-    done = snakemake(tmp_path, "-n", "--cores", 1, "--configfile", "bomb.yaml")
+    done = dry_run(tmp_path, "--cores", 1, "--configfile", "bomb.yaml")
     assert done.returncode != 0
     output = done.stdout + done.stderr
     assert "the reference *a0; write its content out" in output

@@ -24,7 +24,7 @@ from sound.rendering.render import Hit, rendered_parts
 from sound.rendering.solid import SoundingSolid
 from tests.pages import Page, assert_same_numbers, assert_self_contained
 from tests.small_design import N_MODES, SIDES, small_design
-from tests.workflow_runs import TINY, planned, snakemake
+from tests.workflow_runs import TINY, snakemake
 from workflow import settings
 from workflow.commands.estimate import CONFIGURATIONS, load
 from workflow.studies.base.table import write_table
@@ -275,8 +275,8 @@ def test_optimisers_are_set_beside_each_other_on_the_recorded_solids(tmp_path):
     assert_same_numbers(read, tmp_path / "tables", "comparison")
 
 
-def test_the_comparison_is_planned_for_recorded_solids_alone(tmp_path):
-    jobs = planned(snakemake(tmp_path, "compared_sounds", "--dry-run", "--cores", 2))
+def test_the_comparison_is_planned_for_recorded_solids_alone(plan):
+    jobs = plan("compared_sounds")
     assert jobs["compare_optimisers_by_seeds"] == 4 and jobs["compared_sounds"] == 1
     assert "design_sound" not in jobs
 
@@ -381,8 +381,8 @@ def test_the_chord_is_on_the_bunny_where_its_mesh_is_and_on_a_bell_otherwise(tmp
     assert relative == "../../../stanford-bunny.obj"
 
 
-def test_all_examples_are_planned_without_any_mesh_file(tmp_path):
-    jobs = planned(snakemake(tmp_path, "sounds", "--dry-run", "--cores", 2))
+def test_all_examples_are_planned_without_any_mesh_file(plan):
+    jobs = plan("sounds")
     chosen = [examples(CONFIG)[name] for name in CONFIG["sound"]["examples"]]
     assert jobs["design_sound"] == sum(example.edits for example in chosen) == 9
     assert jobs["begin_design"] == jobs["check_design"] == jobs["build_sound_page"] == 7
@@ -391,8 +391,8 @@ def test_all_examples_are_planned_without_any_mesh_file(tmp_path):
     assert jobs["build_sounds_index"] == 1 and jobs["compare_optimisers"] == 2
 
 
-def test_examples_of_recordings_are_planned_and_need_no_other(tmp_path):
-    jobs = planned(snakemake(tmp_path, "sounds_of_recordings", "--dry-run", "--cores", 2))
+def test_examples_of_recordings_are_planned_and_need_no_other(plan):
+    jobs = plan("sounds_of_recordings")
     count = len(CONFIG["sound"]["recordings"])
     assert jobs["take_recording"] == jobs["design_sound"] == jobs["build_sound_page"] == count
     assert jobs["bring_recordings"] == jobs["build_sounds_of_recordings_index"] == 1

@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from carillon.errors import UserError
-from tests.workflow_runs import CHECKOUT, planned, snakemake
+from tests.workflow_runs import CHECKOUT, planned
 from workflow import settings, training
 
 
@@ -76,11 +76,10 @@ def test_the_schema_knows_distributions_and_ranges(key, value, says):
         assert words in str(caught.value)
 
 
-def test_one_distribution_has_all_samples(tmp_path):
+def test_one_distribution_has_all_samples(dry_run, tmp_path):
     loaded = config(distributions=["uniform"], shards=3)
     (tmp_path / "config.yaml").write_text(yaml.safe_dump(loaded))
-    options = ["--dry-run", "-p", "--cores", 1, "--configfile", "config.yaml"]
-    done = snakemake(tmp_path, *options)
+    done = dry_run(tmp_path, "-p", "--cores", 1, "--configfile", "config.yaml")
     assert planned(done)["generate_shard"] == 3
     output = done.stdout + done.stderr
     assert "--samples 120000 --shard 2 --shards 3" in output

@@ -30,7 +30,7 @@ from typing import Any, NoReturn
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "studio", "workflow")
-WITHOUT_MPI = ("dataset_gen", "forests", "tests.hostile.configure")
+WITHOUT_MPI = ("dataset_gen", "forests", "tests.hostile.configure", "snakemake")
 """Programs that import no MPI unless they are started on several ranks."""
 MARK = "CARILLON_HOSTILE_JOB"
 """Environment variable by which processes that a job has started are known."""
@@ -53,7 +53,8 @@ _LATER = (
     *("sound.design.optimise", "sound.export.faust", "sound.export.gltf", "sound.export.embedded"),
     *("sound.rendering.render", "sound.project.project", "sound.project.design_file"),
     *("solver.studies.calibration.gauss_newton", "solver.studies.scaling.plot"),
-    *("snakemake.utils", "soundfile", "igl", "scipy.signal", "scipy.optimize", "trimesh"),
+    *("snakemake.cli", "snakemake.utils", "soundfile", "igl", "trimesh"),
+    *("scipy.signal", "scipy.optimize"),
     *("networkx", "multiprocessing.pool", "matplotlib.pyplot"),
     *("scipy.ndimage", "scipy.cluster.vq", "scipy.sparse.csgraph"),
     *("carillon.fem.finite_cells.build", "dataset_gen.objectives.fitting"),

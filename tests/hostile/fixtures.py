@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
-import os
 import time
 from dataclasses import replace
 
@@ -14,6 +12,7 @@ from tests.hostile import summary
 from tests.hostile.cases import ZOO, Case, Table
 from tests.hostile.suite import Suite
 from tests.hostile.zoo import Zoo
+from tests.once import once
 
 
 def parameters(table: Table) -> list[ParameterSet]:
@@ -49,18 +48,14 @@ def _can_be_inside(row: Case) -> bool:
 
 
 @pytest.fixture(scope="session")
-def zoo(zygote, tmp_path_factory) -> Zoo:
-    base = tmp_path_factory.getbasetemp()
-    shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
-    folder = shared / "zoo"
-    with open(shared / "zoo.lock", "w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        finished = shared / "zoo.finished"
+def zoo(zygote, together) -> Zoo:
+    with once(together / "zoo-made") as made:
+        finished = made / "finished"
         if not finished.exists():
-            made = Zoo.made(folder, zygote)
+            found = Zoo.made(together / "zoo", zygote)
             finished.touch()
-            return made
-    return Zoo(folder)
+            return found
+    return Zoo(together / "zoo")
 
 
 @pytest.fixture(scope="session")
