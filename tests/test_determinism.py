@@ -25,7 +25,7 @@ def results(tmp_path_factory, start_cli):
     found = {}
     for name, variables in CIRCUMSTANCES.items():
         path = folder / f"{name}.npz"
-        start_cli("tests.repeated_results", path, folder, env=variables, check=True, timeout=600)
+        start_cli("tests.repeated_results", path, folder, env=variables, check=True)
         found[name] = dict(np.load(path))
     return found
 
@@ -64,4 +64,4 @@ def test_repetitions_on_several_ranks(ranks, mpiexec):
         "repetitions_give_the_same_bits",
         "repetitions_with_mumps_agree_to_the_tolerance",
     ]
-    mpiexec(ranks, HERE / "distributed_checks.py", ",".join(names), check=True, timeout=600)
+    mpiexec(ranks, HERE / "distributed_checks.py", ",".join(names), check=True)

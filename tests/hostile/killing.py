@@ -17,13 +17,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from tests.patience import HANG_SECONDS
 from tests.workflow_runs import CHECKOUT, PROFILE
 from workflow.commands.digest import digest
 
 MARK = "CARILLON_KILLED"
 """Environment variable that all processes of a run inherit."""
-LONGEST_SECONDS = 600.0
-"""Of a run; only one that hangs takes so long."""
 ORPHAN_SECONDS = 90.0
 """Within which what is left of a killed run has to end by itself, on a machine under load."""
 TIMES = (
@@ -168,11 +167,11 @@ def _finish(killed: Killed, folder: Path) -> None:
     mark = uuid.uuid4().hex
     run = _start(killed, folder, mark, subprocess.PIPE)
     try:
-        output, _ = run.communicate(timeout=LONGEST_SECONDS)
+        output, _ = run.communicate(timeout=HANG_SECONDS)
     except subprocess.TimeoutExpired:
         _kill_all(mark)
         output, _ = run.communicate()
-        raise AssertionError(f"no end after {LONGEST_SECONDS:g} s:\n{output[-4000:]}") from None
+        raise AssertionError(f"no end after {HANG_SECONDS:g} s:\n{output[-4000:]}") from None
     assert run.returncode == 0, f"exit status {run.returncode}:\n{output[-4000:]}"
     _require_none_left(mark)
 
