@@ -11,6 +11,7 @@ import trimesh
 from carillon.errors import UserError
 from carillon.fem.geometry import load_surface, voxelize
 from carillon.fem.geometry.obj import plain_obj
+from solver.analysis.problem import ProblemOptions, build_problem
 from tests.mesh_files import DTYPES, Gltf, block, concatenated
 
 SIDES = np.array([0.4, 0.1, 0.1])
@@ -251,22 +252,31 @@ def test_an_accessor_beyond_its_data_is_refused(tmp_path):
 
 @pytest.mark.parametrize("ending", ["obj", "ply", "stl", "off", "glb"])
 def test_a_mesh_in_millimetres_is_told_to_be_metres_long(tmp_path, caplog, ending):
+    """Once, however often its solid is made."""
     path = tmp_path / f"{tmp_path.name}.{ending}"
     block((0, 0, 0), (400, 100, 100)).export(path)
-    load_surface(str(path))
-    load_surface(str(path))
+    for _ in range(2):
+        assert build_problem(ProblemOptions(str(path), 8)).extents == (400.0, 100.0, 100.0)
     (said,) = [record.message for record in caplog.records]
     assert "400 x 100 x 100 m" in said and "--unit 0.001" in said
     caplog.clear()
-    load_surface(str(path), 0.001)
+    build_problem(ProblemOptions(str(path), 8, unit=0.001))
     assert not caplog.records
 
 
 def test_a_mesh_in_metres_is_not_taken_for_millimetres(tmp_path, caplog):
     path = tmp_path / f"{tmp_path.name}.ply"
     BOX.export(path)
-    load_surface(str(path))
+    build_problem(ProblemOptions(str(path), 8))
     assert not caplog.records
-    load_surface(str(path), 0.001)
+    build_problem(ProblemOptions(str(path), 8, unit=0.001))
     (said,) = [record.message for record in caplog.records]
     assert "0.0004 x 0.0001 x 0.0001 m" in said and "--unit 1" in said
+
+
+def test_what_is_refused_is_refused_in_one_sentence(tmp_path, caplog):
+    path = tmp_path / "sheet.ply"
+    block((0, 0, 0), (4000, 1000, 1)).export(path)
+    with pytest.raises(UserError, match="fills no voxel"):
+        build_problem(ProblemOptions(str(path), 8))
+    assert not caplog.records

@@ -15,6 +15,7 @@ from carillon.fem import geometry, materials
 from carillon.fem.element import DEFAULT_POISSON
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.geometry import COMPONENTS, FILLS, HexMesh, hexmesh_from_voxels, voxelize
+from carillon.fem.geometry.size import doubt_unit
 from carillon.fem.materials import young_modulus
 from carillon.fem.model import DEFAULT_DENSITY, ElasticModel, Solid
 from carillon.limits import require_constants
@@ -143,6 +144,7 @@ def build_problem(options: ProblemOptions) -> Problem:
     extents = tuple(float(side) for side in surface.extents)
     name = geometry.surface_name(options.mesh)
     mesh, cells = discretised(surface, options, name)
+    doubt_unit(options.mesh, extents, options.unit)
     meshed = time.perf_counter()
     label = f"mesh '{name}', resolution {options.resolution}"
     young = young_modulus(options.material, mesh, options.seed, label)

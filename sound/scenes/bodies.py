@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
+from carillon.fem.geometry.size import doubt_unit
 from carillon.fem.model import RIGID_MODES, Solid
 from carillon.fem.rigid import MassProperties, mass_properties
 from carillon.files import kind_of
@@ -178,6 +179,7 @@ def _of_mesh(entry: ObjectEntry) -> Body:
     assert entry.mesh is not None
     surface = struck_surface(entry.mesh, entry.unit)
     size, model, solid = _sounding(entry, surface)
+    doubt_unit(entry.mesh, surface.extents, entry.unit)
     surface.apply_scale(size)
     rigid = mass_properties(model)
     shape = Shape.of_surface(np.asarray(surface.vertices), np.asarray(surface.faces), rigid.centre)

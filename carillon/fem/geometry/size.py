@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from carillon.logs import warn_once
+
 LARGE = 3.0
 """Longest side [m] from which a mesh may be in millimetres: of what is struck, most is smaller."""
 SMALL = 3e-3
@@ -19,6 +21,15 @@ def size_in_words(extents: Sequence[float]) -> str:
     '0.4 x 0.1 x 0.05 m'
     """
     return f"{' x '.join(f'{side:.4g}' for side in extents)} m"
+
+
+def doubt_unit(mesh: str, extents: Sequence[float], unit: float) -> None:
+    """Log what `unit_hint` says of a mesh file, once; built-in objects are in metres.
+
+    For those who have made a solid of it: what is refused is told alone.
+    """
+    if not mesh.startswith("builtin:") and (hint := unit_hint(extents, unit)):
+        warn_once(f"{mesh}: {hint}")
 
 
 def unit_hint(extents: Sequence[float], unit: float) -> str | None:

@@ -17,9 +17,7 @@ from carillon.fem.geometry.builtin import builtin_surface
 from carillon.fem.geometry.gltf import plain_gltf
 from carillon.fem.geometry.obj import plain_obj
 from carillon.fem.geometry.orientation import turned_alike
-from carillon.fem.geometry.size import unit_hint
 from carillon.limits import EXTENTS, FARTHEST, UNITS, require_within
-from carillon.logs import warn_once
 from carillon.places import require_file
 
 BUILTIN_PREFIX = "builtin:"
@@ -79,8 +77,6 @@ def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
         surface = _turned_alike(mesh, surface)
     if unit != 1.0:
         surface.apply_scale(unit)
-    if not mesh.startswith(BUILTIN_PREFIX) and (hint := unit_hint(surface.extents, unit)):
-        warn_once(f"{mesh}: {hint}")
     return surface
 
 

@@ -57,7 +57,9 @@ export function makeNotices(element, parts, silent) {
     const underway = solid !== null && solid.phase in PHASES && (solid.phase !== "ready" || silent());
     progress.hidden = !underway;
     if (solid && underway) {
-      const says = solid.message ?? PHASES[solid.phase];
+      const length = solid.longest_side_m;
+      const size = length ? ` (${Number(length.toPrecision(3))} m long)` : "";
+      const says = solid.message ?? `${PHASES[solid.phase]}${size}`;
       if (part("#progress-says").textContent !== says) part("#progress-says").textContent = says;
       if (solid.progress === null) bar.removeAttribute("value");
       else bar.value = solid.progress;
