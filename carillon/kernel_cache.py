@@ -1,4 +1,4 @@
-"""Where compiled kernels are kept if neither the program's folders nor the user's can be written.
+"""Where caches are kept if the user's cannot be written, those of compiled kernels above all.
 
 Numba keeps them in the folder that NUMBA_CACHE_DIR names, beside the source, or in the user's cache
 (`~/.cache/numba`), and refuses to work where none of these can be written: in a checkout of another
@@ -13,14 +13,14 @@ import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Iterator, Mapping, MutableMapping
+from collections.abc import Iterator, MutableMapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 logger = logging.getLogger(__name__)
 
-FOLDER = "carillon-kernels"
+FOLDER = "carillon-cache"
 """Name of the private folder, before the number of its user."""
 PLACES = ("/tmp", "/var/tmp", "/dev/shm")
 """Where it may be, besides TMPDIR."""
@@ -35,15 +35,14 @@ _COMPILED = ("*.nbc", "*.nbi")
 def configure(environment: MutableMapping[str, str]) -> None:
     """Have numba ask `Locator` where to keep kernels, if the user's cache cannot be written.
 
-    Examples
-    --------
-    >>> environment = {"XDG_CACHE_HOME": "/dev/null"}
-    >>> configure(environment)
-    >>> environment["NUMBA_CACHE_LOCATOR_CLASSES"]
-    'carillon.kernel_cache.Locator'
+    Others, such as Snakemake, which ends without a cache, get the private folder for theirs.
     """
-    if not _can_be_made(os.path.join(_users(environment), "numba")):
-        environment.setdefault(_CLASSES, f"{__name__}.Locator")
+    cache = environment.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    if _can_be_made(os.path.join(cache, "numba")):
+        return
+    environment.setdefault(_CLASSES, f"{__name__}.Locator")
+    if folder := private_folder():
+        environment["XDG_CACHE_HOME"] = str(folder)
 
 
 class Locator:
@@ -52,7 +51,7 @@ class Locator:
     Attributes
     ----------
     folder
-        The private folder, once it is used.
+        Within the private one, once it is used.
     """
 
     folder: Path | None = None
@@ -66,13 +65,14 @@ class Locator:
             del os.environ[_CLASSES]
         if config.CACHE_DIR != str(cls.folder):
             for known in caching.CacheImpl._locator_classes:
-                if "UserWide" in known.__name__ and not os.path.isabs(_users(os.environ)):
-                    continue  # a folder "~" beside the user's files
-                if found := known.from_function(function, source):
+                own = "UserWide" not in known.__name__  # that cannot be written
+                if own and (found := known.from_function(function, source)):
                     return found
-            cls.folder = private_folder()
-            if cls.folder is None:
+            folder = private_folder()
+            if folder is None:
                 return _kept_nowhere(function, source)
+            cls.folder = folder / "kernels"
+            cls.folder.mkdir(exist_ok=True)
             _say(f"compiled kernels are kept in {cls.folder}, as the user's cache is not writable")
             config.CACHE_DIR = os.environ[_DIRECTORY] = str(cls.folder)
         place = caching.UserProvidedCacheLocator(function, source)
@@ -139,13 +139,8 @@ def _files(folder: Path) -> Iterator[Path]:
         yield from folder.glob(pattern)
 
 
-def _users(environment: Mapping[str, str]) -> str:
-    """The user's cache; a relative path for users whom the system does not know."""
-    return environment.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-
-
 def _can_be_made(folder: str) -> bool:
-    """Whether this user may write to a folder, or make it."""
+    """Whether this user may write to a folder, or make it; "~" is none, of unknown users."""
     if not os.path.isabs(folder):
         return False
     while not os.path.lexists(folder):

@@ -64,7 +64,7 @@ def kernel(tmp_path):
 def test_kernels_are_kept_in_a_private_folder_where_no_other_can_be_written(kernel, tmp_path):
     hits, said = kernel("nowhere", tmp_path)
     folder = tmp_path / f"{kernel_cache.FOLDER}-{os.geteuid()}"
-    assert hits == 0 and f"kept in {folder}" in said and len(said.splitlines()) == 1
+    assert hits == 0 and f"kept in {folder}/kernels" in said and len(said.splitlines()) == 1
     assert folder.stat().st_mode & 0o777 == 0o700
     assert kernel("nowhere", tmp_path)[0] == 2
 
@@ -97,6 +97,14 @@ def test_a_folder_that_others_may_have_made_is_not_used(tmp_path, monkeypatch, f
         folder.mkdir()
         folder.chmod(0o777)
     assert kernel_cache.private_folder() is None
+
+
+def test_programs_that_are_started_get_a_cache(tmp_path, monkeypatch):
+    """Snakemake ends without one."""
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    environment = {"XDG_CACHE_HOME": "/dev/null"}
+    kernel_cache.configure(environment)
+    assert Path(environment["XDG_CACHE_HOME"]).parent == tmp_path
 
 
 def test_a_user_with_a_cache_keeps_numbas_own_rules(tmp_path):
