@@ -184,8 +184,9 @@ def test_where_it_does_not_pay_is_named():
 
 
 def test_a_solid_that_was_left_fine_is_told_as_such():
-    tables = headlines({"Bell": timed(4.0, 0.2, 0.02)}, [single("Pitcher", 1.0, 17745)])
+    rows = [single("Pitcher", 1.0, 17745), {**single("Jug", 1.1, 17745), "fine_taken": "too soft"}]
+    tables = headlines({"Bell": timed(4.0, 0.2, 0.02)}, rows)
     told = costs(tables)[-1]
-    assert "Coarsening would not have paid, and the fine model was solved: Pitcher." in told
+    assert "and the fine model was solved: Pitcher; Jug (too soft)." in told
     assert "It was slower than SLEPc on none of the solids." in told
     assert "none of the solids" in costs(tables)[1]

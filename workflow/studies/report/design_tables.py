@@ -128,13 +128,18 @@ def _single_spectra(tables: Mapping[str, Table]) -> str:
         f"was {_ranged(ratios, 'times')} as fast as SLEPc’s ground truth (table below)."
     ]
     if fallen:
-        names = ", ".join(row["title"] for row in fallen)
+        names = "; ".join(map(_fallen, fallen))
         sentences.append(f"Coarsening would not have paid, and the fine model was solved: {names}.")
     if slower:
         sentences.append(f"It did not pay: {'; '.join(map(_slow, slower))}.")
     else:
         sentences.append("It was slower than SLEPc on none of the solids.")
     return " ".join(sentences)
+
+
+def _fallen(row: Row) -> str:
+    reason = row.get("fine_taken")
+    return f"{row['title']} ({reason})" if reason else str(row["title"])
 
 
 def _slow(row: Row) -> str:

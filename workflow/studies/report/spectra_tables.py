@@ -14,6 +14,8 @@ from workflow.variants import FROM_SOLID, TRUTH, VARIANTS
 from workflow.variants import SHOWN as SHOWN
 
 FAST = "ddfem_hcms_ec"
+FINE_TAKEN = "fine_taken"
+"""Attribute of a modes file that says why a solid was solved without being coarsened."""
 TIMED = (TRUTH, "ddfem_slepc", "hcms", "hcms_ec", FAST)
 UNTIMED, ONE_RUN = measured(records, NOT_TIMED), measured(records, ONE_COLD_RUN)
 
@@ -46,6 +48,7 @@ def summary(run: Run) -> Iterator[Row]:
             fast = solve_seconds(spectra[FAST])
             row["ddfem_error"] = compared[FAST]["frequency_rms_relative_error_7_60"]
             row |= {"fast_seconds": fast, "speed_up": truth / fast}
+            row["fine_taken"] = spectra[FAST].attributes.get(FINE_TAKEN)
         yield row
 
 
@@ -100,7 +103,6 @@ def evidence(run: Run) -> Iterator[Row]:
     for model, variant, spectrum in run.solved:
         attributes = spectrum.attributes
         counted = attributes.get("inertia_count", -1)
-        uncorrected = 0 if attributes["method"] == "hcms" else None
         uncorrected = 0 if attributes["method"] == "hcms" else None
         yield {
             **attributes,
