@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-DIGITS = 10
+DIGITS = 7
 """Decimals, over the longest side, to which the places of two vertices agree that are one."""
 
 
