@@ -1,11 +1,12 @@
 # Training data -> forests -> spectra of every model -> tables -> results/report.html
+import shutil
 from pathlib import Path
 
 from snakemake.utils import min_version, validate
 
 from carillon.errors import UserError
 from carillon.progress import say
-from workflow import orphans, pinned_meshes, room, settings, submission
+from workflow import orphans, patient_slurm, pinned_meshes, room, settings, submission
 
 min_version("9.0")
 
@@ -58,6 +59,8 @@ include: f"{RULES}/compare.smk"
 
 onstart:
     if not workflow.local_exec:
+        if shutil.which("sbatch"):
+            prepend("PATH", patient_slurm.install())
         places = [workflow.main_snakefile, Path.cwd(), *workflow.overwrite_configfiles]
         try:
             submission.require_plain(places, workflow.config_settings.config)

@@ -65,6 +65,12 @@ class Cluster:
         time.sleep(pause)
         subprocess.run([str(shutil.which("slurmctld", path=DAEMONS))], check=True)
 
+    def shorten(self) -> None:
+        """Leave the running jobs a minute, counted from their start."""
+        running = ["squeue", "--noheader", "--states=RUNNING", "--format=%A"]
+        for job in subprocess.run(running, capture_output=True, text=True).stdout.split():
+            subprocess.run(["scontrol", "update", f"JobId={job}", "TimeLimit=1"], check=True)
+
     def log(self) -> str:
         """What slurmd has to say."""
         return (self.folder / "log" / "slurmd.log").read_text()

@@ -193,10 +193,7 @@ def test_a_job_outlives_all_that_befalls_it(cluster: Cluster, tmp_path):
         tmp_path,
         *(DATASET[0], "--configfile", "config.yaml", "--set-resources"),
         # Too little for a Python with its packages at the first try.
-        *(
-            "generate_shard:mem_mb=60 if attempt == 1 else 1000",
-            "generate_shard:runtime=max(1, attempt - 1)",
-        ),
+        *("generate_shard:mem_mb=60 if attempt == 1 else 1000", "generate_shard:runtime=60"),
     )
     try:
         wait_for(lambda: "exceeded memory limit" in cluster.log(), "out of memory", run)
@@ -213,6 +210,7 @@ def test_a_job_outlives_all_that_befalls_it(cluster: Cluster, tmp_path):
         cluster.restart_controller(pause=3)
         # A process that hangs, as on a file system that does not answer, until its time is up.
         os.kill(worker(shard), signal.SIGSTOP)
+        cluster.shorten()
         wait_for(lambda: "TIMEOUT" in cluster.ends(), "the time limit", run)
     except AssertionError as error:
         run.kill()
