@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.linalg as la
@@ -20,7 +22,7 @@ from solver.correction.correct import correct
 from solver.distribution.local_mesh import distribute
 from solver.hcms.condense import restrict_stiffness
 from solver.hcms.synthesis import synthesize
-from solver.linear import LinearSolver
+from solver.linear import LinearSolver, iterative
 from solver.studies.accuracy import domains
 from solver.studies.accuracy.ritz import free_eigenvalues
 from solver.studies.comparison import subspace_angles
@@ -127,6 +129,40 @@ def test_error_estimate_follows_the_true_error(acceleration):
     for step, estimate in enumerate(result.history):
         true = (steps[step] / exact[6:56] - 1.0).max()
         assert true <= estimate <= 100.0 * true
+
+
+@pytest.mark.parametrize("acceleration", ["krylov", "relaxation"])
+def test_a_missed_tolerance_may_be_kept_and_is_told(acceleration):
+    model = solids.random_box(12, 6, 5)
+    exact = solids.dense_eigenvalues(model)[6:60]
+    options = SolverOptions(
+        modes=60, tolerance=1e-12, corrections=1, acceleration=acceleration, subdomains=6
+    )
+    with pytest.raises(ConvergenceError, match=r"after 1 steps, 1\.0e-12 was asked for"):
+        modal_analysis(model, options, COMM)
+    kept = modal_analysis(model, replace(options, missed_tolerance="keep"), COMM)
+    told = kept.evidence["eigenvalue_error_estimate"]
+    assert kept.evidence["missed_tolerance"] == 1e-12 < told
+    # Ritz values, which bound the eigenvalues from above, as near as is told.
+    error = kept.values[6:] / exact - 1.0
+    assert (error >= -1e-12).all() and error.max() <= told
+    enough = replace(options, missed_tolerance="keep", tolerance=1e-2, corrections=40)
+    reached = modal_analysis(model, enough, COMM)
+    assert "missed_tolerance" not in reached.evidence
+
+
+def test_what_a_failing_linear_solver_leaves_may_be_kept(monkeypatch):
+    model = solids.random_box(12, 6, 5)
+    options = SolverOptions(modes=60, acceleration="relaxation", linear_solver="icc-pcg")
+
+    def stopped(self, block):
+        raise ConvergenceError("icc-pcg stopped")
+
+    monkeypatch.setattr(iterative.IterativeInverse, "solve", stopped)
+    with pytest.raises(ConvergenceError, match="icc-pcg stopped"):
+        modal_analysis(model, options, COMM)
+    kept = modal_analysis(model, replace(options, missed_tolerance="keep"), COMM).evidence
+    assert kept["corrections"] == 0 and kept["eigenvalue_error_estimate"] > 1e-7
 
 
 def test_correction_that_misses_its_tolerance_says_so():

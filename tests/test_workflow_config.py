@@ -72,7 +72,7 @@ def test_default_configuration_states_the_defaults_of_the_schema():
     assert config == expected
 
 
-@pytest.mark.parametrize("name", ["laptop", "cluster", "paper", "tiny", "meshes"])
+@pytest.mark.parametrize("name", sorted(path.stem for path in CONFIGS.glob("*.yaml")))
 def test_every_configuration_fits_the_schema(name):
     settings.check(load(name))
 

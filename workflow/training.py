@@ -11,6 +11,12 @@ from dataset_gen.sampling import moduli
 from forests.studies.variants import VARIANTS
 from workflow.arguments import options
 
+TRAINING = (
+    *("trees", "depth", "max_leaves", "min_leaf", "structure_rows", "prior", "uniform_weight"),
+    *("transform", "grower", "seed"),
+)
+"""Options of `forests.training.train.TrainingOptions`, which takes long to load."""
+
 
 @dataclass(frozen=True)
 class Training:
@@ -65,8 +71,7 @@ class Training:
     @property
     def train_arguments(self) -> list[str]:
         """Arguments of `forests grow` and `forests train` that say how."""
-        names = ("trees", "depth", "max_leaves", "min_leaf", "structure_rows", "seed")
-        return options({name: self.forests[name] for name in names})
+        return options({name: self.forests[name] for name in TRAINING})
 
     @property
     def trees(self) -> range:

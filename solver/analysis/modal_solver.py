@@ -310,15 +310,19 @@ class ModalSolver:
                 report=_reporter(self._verbose and self.comm.rank == 0),
                 similar=similar,
                 begun=cold,
+                keep=options.keeps_missed,
             )
             cold = start = None  # a factorisation, and a copy of the modes
             rigid_values, rigid = rigid_pairs(system)
+        reached = float(result.errors[: options.modes - RIGID_MODES].max())
         evidence |= {
             "linear_solver": self._linear.method,
             "corrections": result.steps,
             "right_hand_sides": result.solves,
-            "eigenvalue_error_estimate": float(result.errors[: options.modes - RIGID_MODES].max()),
+            "eigenvalue_error_estimate": reached,
         }
+        if options.keeps_missed and reached > tolerance > 0.0:
+            evidence["missed_tolerance"] = tolerance
         truth = Truth(
             np.concatenate([rigid_values, result.values]),
             np.concatenate([rigid, result.vectors], axis=1),

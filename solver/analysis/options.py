@@ -17,6 +17,8 @@ METHODS = ("auto", "hcms", "lanczos", "lobpcg", *TYPES)
 RANDOM = ("lanczos", "lobpcg")
 """Methods that begin with random vectors."""
 MAX_CORRECTIONS = 40
+MISSED = ("fail", "keep")
+"""What may come of a correction that misses its tolerance."""
 LEAST_UNKNOWNS = 4
 """Unknowns to each mode from which on the modes are few of all there are."""
 
@@ -98,11 +100,22 @@ class SolverOptions:
     acceleration: str = option(
         "lanczos", "of the corrections; relaxation is the paper's", choices=ACCELERATIONS
     )
+    missed_tolerance: str = option(
+        "fail",
+        "what comes of a correction that misses its tolerance: fail, with status 3 and no file, or "
+        "keep, a file that tells what was reached",
+        choices=MISSED,
+    )
 
     @property
     def is_general(self) -> bool:
         """Whether an eigensolver of SLEPc's finds the modes, as ground truth."""
         return self.method in TYPES
+
+    @property
+    def keeps_missed(self) -> bool:
+        """Whether a correction that misses its tolerance yields what it has reached."""
+        return self.missed_tolerance == "keep"
 
     @property
     def is_corrected(self) -> bool:

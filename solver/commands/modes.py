@@ -169,7 +169,15 @@ def _for_estimate(options: SolverOptions, modes: int) -> SolverOptions:
     if options.is_general or options.tolerance == 0.0:
         return asked
     tolerance = max(options.tolerance or 0.0, ESTIMATE_TOLERANCE)
-    return replace(asked, method="auto", tolerance=tolerance)
+    # How it is solved is not asked, and incomplete factors are none for cells cut by a surface.
+    direct = options.linear_solver == "icc-pcg"
+    return SolverOptions(
+        method="auto",
+        modes=asked.modes,
+        tolerance=tolerance,
+        seed=options.seed,
+        linear_solver="auto" if direct else options.linear_solver,
+    )
 
 
 def _resolution(arguments: argparse.Namespace) -> int:
@@ -242,6 +250,12 @@ def _print_summary(
         f"orthogonal to {attributes['orthogonality']:.1e}, {total:.1f} s on {attributes['ranks']} "
         f"rank{'s' if attributes['ranks'] > 1 else ''}"
     )
+    if "missed_tolerance" in attributes:
+        print(
+            f"tolerance missed: {attributes['corrections']} corrections reached an eigenvalue "
+            f"error of {attributes['eigenvalue_error_estimate']:.1e}, "
+            f"{attributes['missed_tolerance']:.1e} was asked for"
+        )
     for prefix, words in EXPECTED.items():
         if f"{prefix}_rms" in attributes:
             print(f"expected {words} {in_words(attributes, prefix)}{_refined_in_words(attributes)}")

@@ -34,6 +34,7 @@ def correct(
     observe: Callable[[int, Array], None] | None = None,
     similar: Lasting | None = None,
     begun: Cold | None = None,
+    keep: bool = False,
 ) -> Correction:
     """Improve the `requested` lowest elastic modes from the block `start` until they are accurate.
 
@@ -71,11 +72,15 @@ def correct(
         Inverse for a similar material, which does for the steps of a nearly accurate start.
     begun
         Block Lanczos iteration that `start` and `values` come from.
+    keep
+        Whether a correction that does not reach `tolerance`, stagnates, or has a linear system that
+        `linear` cannot solve returns what it has.
 
     Raises
     ------
     ConvergenceError
-        If `tolerance` is positive and not reached.
+        If `tolerance` is positive and not reached, unless that is to be kept; or if the vectors
+        collapse to too few.
 
     Notes
     -----
@@ -88,7 +93,13 @@ def correct(
     early.  Otherwise it lies below the spectrum.
     """
     if acceleration == "lanczos" and linear.method == "amg-cg":
-        return _by_gradients(system, start, requested, linear, tolerance, max_steps, report)
+        found = _by_gradients(system, start, requested, linear, tolerance, max_steps, report)
+        if found.errors.max() > tolerance > 0.0 and not keep:
+            raise ConvergenceError(
+                f"conjugate gradients reached an eigenvalue error of {found.errors.max():.1e} "
+                f"after {found.steps} steps, {tolerance:.1e} was asked for; allow more steps"
+            )
+        return found
     assert start is not None
     rough = values is not None and begun is None
     if values is None:
@@ -109,7 +120,7 @@ def correct(
     if begun is not None:
         iteration.go_on_from(begun)
     try:
-        result = iteration.run(tolerance, max_steps, rough, report, observe)
+        result = iteration.run(tolerance, max_steps, rough, report, observe, keep)
         result.inverse = iteration.lasting(tolerance)
     finally:
         iteration.destroy()
@@ -135,11 +146,6 @@ def _by_gradients(
         found = lobpcg(system, inverse.precondition, start, requested, tolerance, max_steps, report)
     finally:
         inverse.destroy()
-    if found.errors.max() > tolerance > 0.0:
-        raise ConvergenceError(
-            f"conjugate gradients reached an eigenvalue error of {found.errors.max():.1e} after "
-            f"{found.steps} steps, {tolerance:.1e} was asked for; allow more steps"
-        )
     return Correction(
         found.values[:requested],
         np.ascontiguousarray(found.vectors[:, :requested]),

@@ -93,8 +93,12 @@ class Iteration:
         rough: bool,
         report: Callable[[int, float], None] | None,
         observe: Callable[[int, Array], None] | None,
+        keep: bool,
     ) -> Correction:
-        """Correct until the tolerance, or the last step allowed, is reached."""
+        """Correct until the tolerance, or the last step allowed, is reached.
+
+        See `solver.correction.correct.correct`, also for what is raised.
+        """
         step = self.steps
         if tolerance >= LOOSE:
             # One step then has to do, for the last modes too.
@@ -116,10 +120,21 @@ class Iteration:
                 self._run_lanczos(tolerance, observe)
                 step = 1
                 continue
-            if tolerance > 0.0:
-                self._require_progress(step, tolerance)
+            if tolerance > 0.0 and self._stagnates():
+                if keep:
+                    break
+                raise ConvergenceError(
+                    f"error correction stagnates at an eigenvalue error of {min(self.history):.1e} "
+                    f"after {step} steps, {tolerance:.1e} was asked for; use another linear solver "
+                    "(--linear-solver) or a looser tolerance"
+                )
             inverse = self._inverse(step, tolerance)
-            correction = inverse.solve(np.ascontiguousarray(residual))
+            try:
+                correction = inverse.solve(np.ascontiguousarray(residual))
+            except ConvergenceError as error:
+                if keep and error.collective:
+                    break
+                raise
             self.solves += correction.shape[1]
             self.blocks += 1
             self.step(self.system, self.ritz, correction, active, inverse, self.width)
@@ -127,7 +142,7 @@ class Iteration:
             self._require_independent(step)
             if observe is not None:
                 observe(step, np.sort(self.ritz.values)[: self.requested])
-        if tolerance > 0.0 and not accurate:
+        if tolerance > 0.0 and not accurate and not keep:
             raise ConvergenceError(
                 f"error correction reached an eigenvalue error of {worst:.1e} after {step} steps, "
                 f"{tolerance:.1e} was asked for; allow more steps or keep more modes"
@@ -295,14 +310,9 @@ class Iteration:
             return min(value, grown * float(values[self.requested - 1]))
         return value
 
-    def _require_progress(self, step: int, tolerance: float) -> None:
+    def _stagnates(self) -> bool:
         recent = self.history[-STAGNATION - 1 :]
-        if len(recent) > STAGNATION and recent[-1] > PROGRESS * max(recent[:-1]):
-            raise ConvergenceError(
-                f"error correction stagnates at an eigenvalue error of {min(self.history):.1e} "
-                f"after {step} steps, {tolerance:.1e} was asked for; use another linear solver "
-                "(--linear-solver) or a looser tolerance"
-            )
+        return len(recent) > STAGNATION and recent[-1] > PROGRESS * max(recent[:-1])
 
 
 def _are_accurate(errors: Array, tolerance: float) -> bool:

@@ -1,6 +1,9 @@
 # From a model in the configuration to the solver's arguments.
 
 LEAST_RESOLUTION = 4
+SOLID_OPTIONS = ("unit", "density", "lumped", "seed", "fill", "components")
+HCMS_OPTIONS = ("interface", "retained_modes", "subdomains")
+CORRECTION_OPTIONS = ("corrections", "acceleration", "linear_solver", "missed_tolerance")
 
 
 def model_files(wildcards):
@@ -23,7 +26,7 @@ def model_arguments(wildcards, resolution=None):
         "discretisation": model["discretisation"] if cells else None,
         "material": settings.material_of(config, wildcards.model),
         "poisson": config["poisson"],
-        **{key: model[key] for key in ("unit", "density", "seed", "fill", "components")},
+        **{key: model[key] for key in SOLID_OPTIONS},
     }
     return [settings.mesh_of(config, wildcards.model), *options(how)]
 
@@ -61,20 +64,27 @@ def variant_arguments(wildcards, input):
 
 
 def distance_arguments(wildcards):
-    """Whether the distance from the solid is told; finite cells are those of all variants."""
+    """Whether the distance from the solid is told, and how fine a coarsened solid is kept.
+
+    Finite cells are those of all variants.
+    """
     cells = config["models"][wildcards.model]["discretisation"] != "voxel"
     told = wildcards.variant == variants.FROM_SOLID
     # Finite cells tell it by themselves, at hardly a cost; voxels need a second solve.
     how = {"estimate": told and not cells, "no_estimate": not told}
-    return options(how | {"refine_to": 0 if cells else None})
+    by_forests = variants.VARIANTS[wildcards.variant].coarsen == "ddfem"
+    fine = config["solver"]["refine_to"] if by_forests else None
+    return options(how | {"refine_to": 0 if cells else fine})
 
 
 def hcms_arguments(corrected):
     """Parameters of component mode synthesis and its correction."""
     solver = config["solver"]
-    how = {key: solver[key] for key in ("interface", "retained_modes", "subdomains")}
-    corrections = {"tol": solver["tolerance"], "corrections": solver["corrections"]}
-    return options(how | (corrections if corrected else {"corrections": 0}))
+    how = {key: solver[key] for key in HCMS_OPTIONS}
+    if not corrected:
+        return options(how | {"corrections": 0})
+    corrections = {key: solver[key] for key in CORRECTION_OPTIONS}
+    return options(how | {"tolerance": solver["tolerance"]} | corrections)
 
 
 def timed_resolution(wildcards):

@@ -45,6 +45,11 @@ def findings(tables: dict[str, Table]) -> dict[str, Any]:
     }
 
 
+def missed(evidence: Table, tolerance: float) -> list[dict[str, Any]]:
+    """Rows of the runs whose correction came no nearer than this, by their own estimate."""
+    return [row for row in evidence.rows if (row.get("estimate") or 0.0) > tolerance]
+
+
 def _frame(table: Table) -> pd.DataFrame:
     """A table with all of its columns; what rows lack is no number."""
     frame = pd.DataFrame(table.rows, columns=[column.key for column in table.columns])

@@ -7,7 +7,7 @@ from typing import Any
 from workflow.studies.base.page import inline, listed_modes, picture_uri, rendered
 from workflow.studies.base.table import Table, read_table
 from workflow.studies.report.convergence_tables import convergence_sentences
-from workflow.studies.report.findings import findings, headline
+from workflow.studies.report.findings import findings, headline, missed
 from workflow.studies.report.results import Run
 from workflow.studies.report.scaling_tables import assumptions
 from workflow.variants import SHOWN, TRUTH, VARIANTS
@@ -34,6 +34,8 @@ def page(run: Run, tables: Tables) -> str:
         config=run.config,
         tables=tables,
         findings=findings(tables),
+        missed=missed(tables["evidence"], run.config["solver"]["tolerance"]),
+        titles=run.titles,
         models=[_model(run, tables, model) for model in run.models],
         convergence=plots(run, "convergence", run.convergence),
         sentences=convergence_sentences(tables["convergence"]),
