@@ -95,8 +95,9 @@ class Slurm:
         path = os.environ.get("PATH", os.defpath).split(os.pathsep)
         own = [part for part in path if Path(part).resolve() != folder.resolve()]
         self._path = os.pathsep.join(own)
-        # Arrays are told in full, however many tasks wait.
-        self._environ = {**os.environ, "SLURM_BITSTR_LEN": "0"}
+        # All jobs are told, those of arrays in full, whatever a user wants to see of them.
+        told = {"SLURM_BITSTR_LEN": "0", "SQUEUE_ALL": "1"}
+        self._environ = {k: v for k, v in os.environ.items() if not k.startswith("SQUEUE_")} | told
         self._pause = float(os.environ.get(PAUSE, PAUSE_SECONDS))
 
     def passed_on(self, command: str, arguments: Sequence[str]) -> int:
@@ -178,7 +179,7 @@ class Slurm:
                 capture_output=True,
                 text=True,
                 timeout=timeout,
-                env=self._environ,
+                env=None if command == "sbatch" else self._environ,
             )
         except (OSError, subprocess.TimeoutExpired) as error:
             return subprocess.CompletedProcess(words, 1, "", f"{command}: {error}\n")
