@@ -99,6 +99,12 @@ MIRRORED = {
         LEFT,
         inside_out(concatenated(RIGHT, inside_out(block((0.1, -0.02, -0.02), (0.15, 0.02, 0.02))))),
     ),
+    "surrounded": tuple(
+        block(tuple(at - 0.1), tuple(at + 0.1))
+        for at in 0.18
+        * np.array([[0, 0, 1], [0, 0, -1], [0, 1, 0], [0, -1, 0], [1, 0, 0], [-1, 0, 0]])
+    )
+    + (inside_out(block((-0.1, -0.1, -0.1), (0.1, 0.1, 0.1))),),
     "open": (
         LEFT,
         trimesh.Trimesh(

@@ -94,6 +94,11 @@ class Facets:
         one, other = sides[np.argsort(edge[sides], kind="stable")].reshape(-1, 2).T
         return one // 3, other // 3, way[one] != way[other]
 
+    @cached_property
+    def patches(self) -> Index:
+        """Patch (t,) of each triangle: of those that alone share edges."""
+        return connected(len(self), *self.links[:2])
+
     def unbalanced(self, sign: Index) -> Index:
         """Sum (e,) of the ways in which triangles with these signs (t,), or without, pass edges."""
         edge, way, counts = self.edges

@@ -28,6 +28,8 @@ CERTAIN = 0.15
 """Mean winding number of an open part on itself, half of one if closed, that tells its inside."""
 BESIDE = 1e-4
 """Distance of points beside a triangle, over its size."""
+TURNS = 4
+"""Parts of a surface, in the order of its triangles, between which points inside are looked for."""
 SAMPLE = 100
 """Triangles of a part that are looked at."""
 LEAST = 1e-4
@@ -58,7 +60,7 @@ def turned_alike(vertices: Array, faces: Index, name: str) -> Index | None:
     if not len(facets):
         return None
     both, sign = _both_ways(facets), np.ones(len(facets), dtype=np.int64)
-    patch = connected(len(facets), *facets.links[:2])
+    patch = facets.patches
     doubled = np.zeros(len(facets), dtype=bool)
     if both.any() or not facets.links[2].all():
         sign = _within_patches(facets, patch, both, name)
@@ -69,7 +71,7 @@ def turned_alike(vertices: Array, faces: Index, name: str) -> Index | None:
     balance = facets.unbalanced(sign)
     if (sign < 0).any() and balance.any() and not (facets.edges[2] & 1).any():
         raise UserError(_refusal(name))
-    part, closed = parts_of(facets, patch, sign, balance)
+    part, closed = parts_of(facets, sign, balance)
     wrong = _inside_out(facets, part, closed, sign)
     if wrong.any():
         warn_once(
@@ -159,11 +161,23 @@ def _inside_out(facets: Facets, part: Index, closed: Flags, sign: Index) -> Flag
     outward = 1 if (facing * volumes)[outer].sum() >= 0.0 else -1
     among = np.flatnonzero((outer & (facing == outward))[part])
     for each in np.flatnonzero(outer & (facing == -outward)):
-        points, weights = _points(facets, np.flatnonzero(part == each))
+        own = np.flatnonzero(part == each)
+        points, weights = _points(facets, own)
         numbers = outward * winding_numbers(facets, among, points, sign)
         outside = weights[numbers < INSIDE].sum() / weights.sum()
+        # Others that overlap it all around may cover its surface, and not what is in it.
+        middles = _within(facets, own, points, sign)
+        numbers = outward * winding_numbers(facets, among, middles, sign)
+        outside = max(outside, np.count_nonzero(numbers < INSIDE) / max(len(middles), 1))
         wrong[each] = outside > (POKING if closed[each] else MOSTLY)
     return np.asarray(wrong[root] & (facing != 0))
+
+
+def _within(facets: Facets, own: Index, points: Array, sign: Index) -> Array:
+    """Points (m, 3) in a part, between those (k, 3) on its surface."""
+    far = [np.roll(points, len(points) * turn // TURNS, axis=0) for turn in range(1, TURNS)]
+    middles = 0.5 * (np.concatenate(far) + np.tile(points, (TURNS - 1, 1)))
+    return middles[np.abs(winding_numbers(facets, own, middles, sign)) > INSIDE]
 
 
 def _around(facets: Facets, part: Index, volumes: Array, sign: Index) -> Index:

@@ -41,8 +41,7 @@ class ClosedPart:
 def closed_parts(facets: Facets) -> list[ClosedPart]:
     """The closed parts of a surface whose faces are turned alike."""
     ones = np.ones(len(facets), dtype=np.int64)
-    patch = connected(len(facets), *facets.links[:2])
-    part, closed = parts_of(facets, patch, ones, facets.unbalanced(ones))
+    part, closed = parts_of(facets, ones, facets.unbalanced(ones))
     volumes = signed_volumes(facets, part, ones)
     outward = 1.0 if volumes[closed].sum() >= 0.0 else -1.0
     order = np.argsort(part, kind="stable")
@@ -55,7 +54,7 @@ def closed_parts(facets: Facets) -> list[ClosedPart]:
     return found
 
 
-def parts_of(facets: Facets, patch: Index, sign: Index, balance: Index) -> tuple[Index, Flags]:
+def parts_of(facets: Facets, sign: Index, balance: Index) -> tuple[Index, Flags]:
     """Part (t,) of each triangle, and whether each part (p,) is closed.
 
     A patch that is closed by itself is a part, whatever it touches; others are by the edges that
@@ -63,13 +62,12 @@ def parts_of(facets: Facets, patch: Index, sign: Index, balance: Index) -> tuple
 
     Parameters
     ----------
-    patch : (t,)
-        Of triangles that alone share edges.
     sign : (t,)
         1 for triangles as they are, -1 for those to be turned, 0 for those that do not count.
     balance : (e,)
         See `Facets.unbalanced`.
     """
+    patch = facets.patches
     edge, way, counts = facets.edges
     side_patch = np.repeat(patch, 3)
     shared = counts[edge] > 2
@@ -100,6 +98,8 @@ def winding_numbers(facets: Facets, own: Index, points: Array, sign: Index | Non
     """Winding numbers (k,) of the triangles `own` about points (k, 3)."""
     import igl
 
+    if not len(points) or not len(own):
+        return np.zeros(len(points))
     triangles = facets.triangles[own]
     if sign is not None:
         signs = sign[own]
