@@ -9,6 +9,7 @@ from dataset_gen.journal import journal_of
 from dataset_gen.settings import ShardOptions, settings_of
 from dataset_gen.shards import origin_of
 from dataset_gen.tasks import ShardPlan
+from tests.rank_counts import TO_THREE
 
 pytestmark = pytest.mark.mpi
 
@@ -67,7 +68,7 @@ def path(tmp_path):
     return folder / "shard.h5"
 
 
-@pytest.mark.parametrize("ranks", [1, 2, 3])
+@pytest.mark.parametrize("ranks", TO_THREE)
 def test_bytes_do_not_depend_on_the_number_of_ranks(ranks, path, program, reference, mpiexec):
     mpiexec(ranks, program(), *options(path), check=True)
     assert path.read_bytes() == reference
@@ -83,7 +84,7 @@ def sentences(done):
     ]
 
 
-@pytest.mark.parametrize("rank", [0, 2])
+@pytest.mark.parametrize("rank", [pytest.param(0, marks=pytest.mark.nightly), 2])
 def test_an_error_on_one_rank_ends_all_and_what_was_done_is_kept(
     rank, path, program, reference, mpiexec
 ):
@@ -98,12 +99,14 @@ def test_an_error_on_one_rank_ends_all_and_what_was_done_is_kept(
     assert path.read_bytes() == reference
 
 
+@pytest.mark.nightly
 def test_a_mistake_of_the_program_on_one_rank_ends_all_with_its_traceback(path, program, mpiexec):
     done = mpiexec(3, program("((1, 2), (1, 3), (1, 4), (1, 5))", "ValueError"), *options(path))
     assert done.returncode not in (0, 2)
     assert "ValueError: planted" in done.stderr
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("program", "more", "sentence"),
     [

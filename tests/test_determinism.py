@@ -9,6 +9,8 @@ import pytest
 
 from tests.repeated_results import TOLERANCE
 
+pytestmark = pytest.mark.nightly
+
 HERE = Path(__file__).parent
 RESIDUAL_TOLERANCE = 1e-9
 """Relative error of eigenvalues from SLEPc, whose residuals are below 1e-10."""

@@ -27,6 +27,7 @@ from solver.files.modes_file import read_modes
 from solver.studies.accuracy.solids import SOLIDS
 from tests import cut_solids
 from tests.cut_solids import spaced, uniform
+from tests.rank_counts import TO_THREE
 
 CELLS = ["--discretisation", "finite-cell"]
 
@@ -171,7 +172,7 @@ def alone(tmp_path_factory):
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [1, 2, 3])
+@pytest.mark.parametrize("ranks", TO_THREE)
 def test_any_number_of_ranks_divides_the_same_cells(ranks, alone, mpiexec, tmp_path):
     arguments, expected = alone
     out = tmp_path / "modes.h5"

@@ -29,6 +29,7 @@ from solver.studies.comparison import compare_files
 from tests import cut_solids, solids
 from tests.cut_solids import box, spaced, turned, uniform
 from tests.edited_files import edited
+from tests.rank_counts import TO_THREE
 
 PROGRAM = Path(__file__).with_name("distributed_checks.py")
 
@@ -124,7 +125,7 @@ def test_other_moduli_without_another_analysis(material):
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [1, 2, 3])
+@pytest.mark.parametrize("ranks", TO_THREE)
 def test_ranks_agree(mpiexec, ranks):
     mpiexec(ranks, PROGRAM, "finite_cells_on_ranks", check=True)
 

@@ -7,6 +7,7 @@ import pytest
 from dataset_gen.generate import generate
 from dataset_gen.settings import ShardOptions
 from forests import coarsen, load_model
+from tests.rank_counts import TO_THREE
 from tests.shard_files import write_shard
 
 pytestmark = pytest.mark.mpi
@@ -33,7 +34,7 @@ def command(folder, name):
     return ("train", folder / "0.h5", folder / "1.h5", *OPTIONS, "--out", folder / name)
 
 
-@pytest.mark.parametrize("ranks", [1, 2, 3])
+@pytest.mark.parametrize("ranks", TO_THREE)
 def test_forests_do_not_depend_on_the_number_of_ranks(ranks, folder, reference, mpiexec):
     path = folder / f"{ranks}.h5.model"
     mpiexec(ranks, "forests", *command(folder, path.name), check=True)
@@ -65,9 +66,15 @@ def sentences(done):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("train", "missing.h5", "--out", "new.h5"), "missing.h5"),
-        (("train", "0.h5", "0.h5", "--out", "new.h5"), "overlap"),
-        (("train", "0.h5", "--depth", "0", "--out", "new.h5"), "depth"),
+        pytest.param(
+            ("train", "missing.h5", "--out", "new.h5"), "missing.h5", marks=pytest.mark.nightly
+        ),
+        pytest.param(
+            ("train", "0.h5", "0.h5", "--out", "new.h5"), "overlap", marks=pytest.mark.nightly
+        ),
+        pytest.param(
+            ("train", "0.h5", "--depth", "0", "--out", "new.h5"), "depth", marks=pytest.mark.nightly
+        ),
         (
             ("grow", "0.h5", "--tree", "0", "--out", "new.h5"),
             "train run on several",
@@ -99,7 +106,7 @@ sys.exit(main())
 """
 
 
-@pytest.mark.parametrize("rank", [0, 2])
+@pytest.mark.parametrize("rank", [pytest.param(0, marks=pytest.mark.nightly), 2])
 def test_an_error_on_one_rank_ends_all(rank, folder, tmp_path, mpiexec):
     path = tmp_path / "program.py"
     path.write_text(PROGRAM.format(rank=rank))
@@ -109,6 +116,7 @@ def test_an_error_on_one_rank_ends_all(rank, folder, tmp_path, mpiexec):
     assert not (folder / "new.h5").exists()
 
 
+@pytest.mark.nightly
 def test_errors_carry_the_name_that_was_typed(folder, mpiexec):
     done = mpiexec(2, "carillon", "train", "0.h5", "0.h5", "--out", "new.h5", cwd=folder)
     assert done.returncode == 2
@@ -116,6 +124,7 @@ def test_errors_carry_the_name_that_was_typed(folder, mpiexec):
     assert line.startswith("carillon train: ") and "overlap" in line
 
 
+@pytest.mark.nightly
 def test_a_damaged_shard_is_named_and_nothing_is_written(folder, tmp_path, mpiexec):
     path = tmp_path / "damaged.h5"
     path.write_bytes((folder / "0.h5").read_bytes())

@@ -29,7 +29,7 @@ RANKS = {
 }
 
 
-OFTEN = ("no such option", "damaged shards", "builtin:bar$(touch x)", "$(touch x)")
+OFTEN = ("damaged shards", "builtin:bar$(touch x)", "$(touch x)")
 """Of those below that start several processes, what is tried with every change."""
 
 

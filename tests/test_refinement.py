@@ -42,6 +42,7 @@ from solver.response.contact import interpolation
 from solver.studies.comparison import compare_files, on_mesh_of
 from tests import solids
 from tests.edited_files import edited
+from tests.rank_counts import TO_THREE
 
 COMM = MPI.COMM_SELF
 SEEDS = range(12)
@@ -428,7 +429,7 @@ def test_files_of_plain_meshes_have_nothing_new(files):
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [1, 2, 3])
+@pytest.mark.parametrize("ranks", TO_THREE)
 def test_mixed_models_on_several_ranks(ranks, mpiexec):
     program = Path(__file__).with_name("distributed_checks.py")
     checks = ("products_of_a_mixed_model", "mixed_models_are_solved_by_every_method")

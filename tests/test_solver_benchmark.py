@@ -229,6 +229,7 @@ def test_bad_arguments_are_answered_in_one_sentence(arguments, sentence, tmp_pat
 
 
 @pytest.mark.mpi
+@pytest.mark.nightly
 def test_row_on_two_ranks(mpiexec):
     command = ["benchmark", BAR.mesh, "--resolution", BAR.resolution, "--no-arpack", "--json"]
     done = mpiexec(2, "solver", *command, "--modes", MODES, "--runs", 1, check=True)

@@ -34,17 +34,12 @@ def truth(tmp_path_factory, run_cli):
 
 
 @pytest.fixture(scope="module")
-def histories(truth, tmp_path_factory, mpiexec) -> list[dict]:
-    """What the command finds on one rank and on two; the second run finds the truth by itself."""
-    folder = tmp_path_factory.mktemp("histories")
-    found = []
-    for ranks in (1, 2):
-        out = folder / f"{ranks}.json"
-        known = ("--truth", truth) if ranks == 1 else ()
-        options = ("--modes", MODES, "--steps", STEPS, *known, "--out", out)
-        mpiexec(ranks, "solver", "convergence", *BAR, *options, check=True)
-        found.append(json.loads(out.read_text()))
-    return found
+def history(truth, tmp_path_factory, run_cli) -> dict:
+    """What the command finds on one rank."""
+    out = tmp_path_factory.mktemp("history") / "1.json"
+    options = ("--modes", MODES, "--steps", STEPS, "--truth", truth, "--out", out)
+    run_cli("solver", "convergence", *BAR, *options, check=True)
+    return dict(json.loads(out.read_text()))
 
 
 def test_every_interface_and_acceleration_is_followed():
@@ -52,9 +47,7 @@ def test_every_interface_and_acceleration_is_followed():
     assert set(STEPWISE) == {"krylov", "relaxation"} == set(ACCELERATIONS) - {"lanczos"}
 
 
-@pytest.mark.mpi
-def test_histories_are_complete_and_errors_those_of_the_values(histories):
-    history = histories[0]
+def test_histories_are_complete_and_errors_those_of_the_values(history):
     exact = np.array(history["exact"])
     assert len(history["histories"]) == len(STARTS) * len(STEPWISE)
     for curve in history["histories"]:
@@ -64,30 +57,33 @@ def test_histories_are_complete_and_errors_those_of_the_values(histories):
         assert np.abs(values / exact - 1.0).max(axis=1) == pytest.approx(worst)
 
 
-@pytest.mark.mpi
-def test_ritz_values_never_fall_below_the_exact_ones(histories):
-    exact = np.array(histories[0]["exact"])
+def test_ritz_values_never_fall_below_the_exact_ones(history):
+    exact = np.array(history["exact"])
     for acceleration in STEPWISE:
-        for values in curves(histories[0], acceleration).values():
+        for values in curves(history, acceleration).values():
             assert (values >= exact * (1.0 - 1e-8)).all()
 
 
-@pytest.mark.mpi
 @pytest.mark.parametrize("acceleration", STEPWISE)
-def test_synthesis_is_the_better_start(histories, acceleration):
-    found = curves(histories[0], acceleration)
+def test_synthesis_is_the_better_start(history, acceleration):
+    found = curves(history, acceleration)
     for start in STARTS:
         assert (found[start][1] <= found["random"][1] * (1.0 + 1e-9)).all()
-    free = [errors["median"] for errors in _errors(histories[0], "hcms-free", acceleration)]
+    free = [errors["median"] for errors in _errors(history, "hcms-free", acceleration)]
     assert free[-1] < 1e-2 * free[0]
 
 
+@pytest.mark.nightly
 @pytest.mark.mpi
-def test_truth_and_lowest_values_do_not_depend_on_the_number_of_ranks(histories):
-    one, two = histories
+def test_truth_and_lowest_values_do_not_depend_on_the_number_of_ranks(history, mpiexec, tmp_path):
+    out = tmp_path / "2.json"
+    # It finds the truth by itself.
+    options = ("--modes", MODES, "--steps", STEPS, "--out", out)
+    mpiexec(2, "solver", "convergence", *BAR, *options, check=True)
+    one, two = history, json.loads(out.read_text())
     assert one["exact"] == pytest.approx(two["exact"], rel=1e-8)
     for acceleration in STEPWISE:
-        ours, theirs = (curves(history, acceleration) for history in histories)
+        ours, theirs = (curves(each, acceleration) for each in (one, two))
         for interface in INTERFACES:
             lowest = slice(0, 5)
             start = f"hcms-{interface}"

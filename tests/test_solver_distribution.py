@@ -42,7 +42,10 @@ CHECKS = {
 """By number of ranks; all of one number in one start, which takes longer than any of them."""
 
 
-@pytest.mark.parametrize("ranks", CHECKS)
+@pytest.mark.parametrize(
+    "ranks",
+    [each if each in (2, 3) else pytest.param(each, marks=pytest.mark.nightly) for each in CHECKS],
+)
 def test_checks(ranks, mpiexec):
     mpiexec(ranks, PROGRAM, ",".join(CHECKS[ranks]), check=True)
 

@@ -24,6 +24,7 @@ from solver.refinement.errors import ExpectedErrors
 from solver.refinement.estimate import estimate_errors
 from solver.refinement.options import ALLOWED_ERROR, RefinementOptions
 from solver.refinement.two_grid import TwoGrid
+from tests.rank_counts import TO_THREE
 
 
 def solved(model, modes=60):
@@ -153,7 +154,7 @@ def alone(tmp_path_factory):
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [1, 2, 3])
+@pytest.mark.parametrize("ranks", TO_THREE)
 def test_any_number_of_ranks_keeps_the_same_blocks_fine(ranks, alone, mpiexec, tmp_path):
     arguments, expected = alone
     out = tmp_path / "modes.h5"
@@ -164,6 +165,7 @@ def test_any_number_of_ranks_keeps_the_same_blocks_fine(ranks, alone, mpiexec, t
     np.testing.assert_allclose(found.eigenvalues[6:], expected.eigenvalues[6:], rtol=1e-5)
 
 
+@pytest.mark.nightly
 @pytest.mark.mpi
 def test_memory_that_is_missing_for_the_estimate_ends_all_ranks(mpiexec, tmp_path):
     script = tmp_path / "little_memory.py"

@@ -14,6 +14,7 @@ from solver.linear.iterative import METHODS, IterativeInverse
 from solver.subspace.rayleigh_ritz import safe_shift
 from tests import inner_checks, solids
 from tests.patience import HANG_SECONDS
+from tests.rank_counts import SEVERAL
 
 PROGRAM = Path(__file__).with_name("inner_checks.py")
 CHECKS = (
@@ -31,7 +32,7 @@ def test_on_one_rank(name):
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [2, 3])
+@pytest.mark.parametrize("ranks", SEVERAL)
 def test_on_several_ranks(ranks, mpiexec):
     mpiexec(ranks, PROGRAM, ",".join(CHECKS), timeout=HANG_SECONDS, check=True)
 

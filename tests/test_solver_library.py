@@ -14,6 +14,7 @@ from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
 from solver.studies.comparison import compare_files
 from tests import solids
+from tests.rank_counts import TO_THREE
 
 COMM = MPI.COMM_SELF
 BAR = ("builtin:bar", "--resolution", "16")
@@ -88,7 +89,7 @@ def test_coarse_moduli_may_be_zero_but_not_negative():
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [1, 2, 3])
+@pytest.mark.parametrize("ranks", TO_THREE)
 def test_command_starts_from_a_file_on_any_number_of_ranks(ranks, tmp_path, run_cli, mpiexec):
     before, after, truth = (tmp_path / f"{name}.h5" for name in ("before", "after", "truth"))
     run_cli("solver", "modes", *BAR, "--material", "uniform", *MODES, "--out", before, check=True)

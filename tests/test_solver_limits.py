@@ -219,6 +219,7 @@ def test_what_petsc_dislikes_is_one_sentence(options, said, tmp_path, run_cli):
     assert done.stderr.count("\n") == 1 and said in done.stderr
 
 
+@pytest.mark.nightly
 @pytest.mark.mpi
 def test_what_petsc_dislikes_ends_all_ranks(tmp_path, mpiexec):
     solid = ("builtin:bar", "--resolution", "8", "--modes", "8", "--method", "slepc")

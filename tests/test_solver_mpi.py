@@ -10,6 +10,7 @@ import pytest
 from solver.files.modes_file import read_modes
 from solver.studies.comparison import compare_files
 from tests.patience import HANG_SECONDS
+from tests.rank_counts import SEVERAL
 
 pytestmark = pytest.mark.mpi
 
@@ -25,14 +26,24 @@ def truth(tmp_path_factory, run_cli) -> Path:
     return path
 
 
-@pytest.mark.parametrize("ranks", [2, 3])
+@pytest.mark.parametrize("ranks", SEVERAL)
 def test_one_rank_factorises_for_its_machine(ranks, mpiexec):
     names = "one_rank_factorises_for_all,others_sleep_while_one_works_alone"
     mpiexec(ranks, PROGRAM, names, check=True)
 
 
-@pytest.mark.parametrize("linear_solver", ["auto", "mumps"])
-@pytest.mark.parametrize("ranks", [1, 2, 3, pytest.param(7, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize(
+    ("ranks", "linear_solver"),
+    [
+        (3, "auto"),
+        *(
+            pytest.param(ranks, linear_solver, marks=pytest.mark.nightly)
+            for ranks in (1, 2, 3, 7)
+            for linear_solver in ("auto", "mumps")
+            if (ranks, linear_solver) != (3, "auto")
+        ),
+    ],
+)
 def test_corrected_modes_on_any_number_of_ranks(ranks, linear_solver, truth, tmp_path, mpiexec):
     out = tmp_path / "modes.h5"
     options = ("--tol", "1e-11", "--linear-solver", linear_solver, "--out", out)
@@ -43,6 +54,7 @@ def test_corrected_modes_on_any_number_of_ranks(ranks, linear_solver, truth, tmp
     assert read_modes(out).attributes["ranks"] == ranks
 
 
+@pytest.mark.nightly
 def test_synthesis_is_the_same_on_1_2_and_3_ranks(tmp_path, mpiexec):
     values = []
     for ranks in (1, 2, 3):
@@ -56,7 +68,8 @@ def test_synthesis_is_the_same_on_1_2_and_3_ranks(tmp_path, mpiexec):
             assert np.abs(other[interface] - alone).max() < 1e-8 * alone[-1]
 
 
-@pytest.mark.parametrize("ranks", [2, 3])
+@pytest.mark.nightly
+@pytest.mark.parametrize("ranks", SEVERAL)
 def test_ground_truth_in_parallel(ranks, truth, tmp_path, mpiexec):
     out = tmp_path / "modes.h5"
     options = ("--method", "slepc", "--out", out)
@@ -69,10 +82,15 @@ def test_ground_truth_in_parallel(ranks, truth, tmp_path, mpiexec):
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (("missing.obj", "--resolution", "20"), "missing.obj"),
-        (("builtin:bar", "--resolution", "20", "--material", "absent.npy"), "absent.npy"),
         (("builtin:bar", "--resolution", "20", "--subdomains", "2"), "3 ranks for 2 subdomains"),
-        (("builtin:bar", "--resolution", "6", "--modes", "5000"), "modes asked for"),
+        *(
+            pytest.param(*each, marks=pytest.mark.nightly)
+            for each in [
+                (("missing.obj", "--resolution", "20"), "missing.obj"),
+                (("builtin:bar", "--resolution", "20", "--material", "absent.npy"), "absent.npy"),
+                (("builtin:bar", "--resolution", "6", "--modes", "5000"), "modes asked for"),
+            ]
+        ),
     ],
 )
 def test_bad_input_ends_all_ranks_with_one_sentence(arguments, sentence, tmp_path, mpiexec):

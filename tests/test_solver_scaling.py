@@ -70,7 +70,16 @@ def bar():
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize(("ranks", "options"), [(1, ""), (2, ""), (3, ""), (6, "shared")])
+@pytest.mark.parametrize(
+    ("ranks", "options"),
+    [
+        *(
+            pytest.param(*each, marks=pytest.mark.nightly)
+            for each in [(1, ""), (2, ""), (6, "shared")]
+        ),
+        (3, ""),
+    ],
+)
 def test_planned_counts_are_those_of_a_run(ranks, options, tmp_path, mpiexec):
     program = tmp_path / "count.py"
     program.write_text(COUNT)
@@ -184,6 +193,7 @@ def test_people_read_what_is_measured_and_what_is_modelled(study, tmp_path):
     assert (tmp_path / "strong.svg").read_text().startswith("<?xml")
 
 
+@pytest.mark.nightly
 @pytest.mark.mpi
 def test_started_under_mpiexec_it_measures_the_ranks_it_has(mpiexec):
     done = mpiexec(2, "solver", "scaling", *BAR, "--modes", 30, "--json", check=True)

@@ -22,6 +22,7 @@ from solver.reference import eigensolver
 from solver.reference.truth import complete, count_below, count_beyond, solve_truth, start_vector
 from solver.subspace.verification import verify
 from tests import solids
+from tests.rank_counts import TO_THREE
 
 COMM = MPI.COMM_SELF
 PROGRAM = Path(__file__).with_name("distributed_checks.py")
@@ -231,6 +232,6 @@ def test_start_depends_on_seed_and_search_but_not_on_the_partition():
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [1, 2, 3])
+@pytest.mark.parametrize("ranks", TO_THREE)
 def test_missed_modes_are_found_on_any_number_of_ranks(ranks, mpiexec):
     mpiexec(ranks, PROGRAM, "missed_copies_are_found", check=True)

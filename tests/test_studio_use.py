@@ -98,7 +98,7 @@ def picture(page) -> np.ndarray:
     return np.asarray(Image.open(io.BytesIO(content)).convert("RGB"), float)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_from_an_empty_page_to_a_design(browser, tmp_path):
     """Two clips, a third target in the midst of the search, undo, saved and opened again."""
     work, clips = tmp_path / "work", tmp_path / "clips"

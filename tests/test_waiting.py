@@ -60,7 +60,9 @@ def test_ranks_with_cores_of_their_own_do_not_sleep(monkeypatch):
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize(("how", "asked"), [("share", "0"), ("as they are", "1")])
+@pytest.mark.parametrize(
+    ("how", "asked"), [("share", "0"), pytest.param("as they are", "1", marks=pytest.mark.nightly)]
+)
 def test_ranks_that_share_cores_sleep_while_they_wait(how, asked, mpiexec, tmp_path):
     if "Open MPI" not in MPI.Get_library_version():
         pytest.skip("another MPI waits in its own way")

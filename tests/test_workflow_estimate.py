@@ -377,7 +377,7 @@ def test_what_is_measured_are_rates(monkeypatch, capsys):
     assert rates["made"]["cores"] >= 1 and rates["made"]["date"] and rates["made"]["processor"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_run_is_measured_by_its_benchmark_files(tmp_path):
     jobs = measure.finished(tmp_path / "run", SMALL_RUN, load_rates()["fits_per_second"], law=TRUTH)
     assert list(jobs["law"]) == [TRUTH] and 0.1 < jobs["seconds"].item() < 300.0
