@@ -33,12 +33,12 @@ def test_turns_take_about_as_long():
     assert max(takes) - min(takes) <= max(SECONDS.values())
 
 
-def test_a_turn_of_the_measured_tests_is_within_the_budget():
+def test_a_turn_of_the_measured_tests_takes_half_an_hour_at_most():
+    """A turn is run whole, even where it takes longer than the budget; not without end."""
     seconds = tiers.measured()
-    for turn in range(tiers.TURNS):
-        assert sum(seconds[name] for name in tiers.choose(seconds, [], turn).files) <= (
-            tiers.BUDGET_SECONDS
-        )
+    most = tiers.BUDGET_SECONDS * 30 / 12
+    for part in tiers.turns(seconds):
+        assert sum(seconds[name] for name in part) <= most
 
 
 @pytest.mark.parametrize("turn", range(tiers.TURNS))
