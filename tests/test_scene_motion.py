@@ -172,8 +172,83 @@ def test_a_start_at_which_two_overlap_is_refused():
     described = scene(ball("one"), ball("other", position=[0.015, 0, 0]), ground=None)
     with pytest.raises(UserError, match="'other' and object 'one' overlap by 5 mm"):
         moved(described)
-    with pytest.raises(UserError, match="object 'one' and the ground overlap by 10 mm"):
+    with pytest.raises(UserError, match="object 'one' and the ground overlap by 10 mm") as refused:
         moved(scene(ball("one")))
+    assert str(refused.value).endswith("rests on it at a height (z) of 0.01 m")
+
+
+def bowl(height):
+    return {
+        "name": "bowl",
+        "mesh": "builtin:bowl",
+        "material": "steel",
+        "count": 0,
+        "position": [0, 0, height],
+    }
+
+
+def test_a_bowl_that_overlaps_the_ground_a_little_is_lifted_and_rests(capsys):
+    (made,), course = moved(scene(bowl(0.0417), seconds=0.5))
+    heights = course.motion.positions[:, 0, 2]
+    (lifted,) = course.moved.values()
+    lowest = min(part[:, 2].min() for part in made.parts)
+    assert heights[0] == pytest.approx(-lowest, abs=1e-7)
+    assert lifted == pytest.approx([0, 0, -lowest - 0.0417], abs=1e-7)
+    # What is left, and what its weight presses it in by.
+    assert np.abs(heights - heights[0]).max() < 2e-5
+    assert f"object 'bowl' by {1e3 * lifted[2]:.3g} mm" in capsys.readouterr().err
+
+
+def test_the_height_that_a_refusal_names_is_one_at_which_the_bowl_rests():
+    with pytest.raises(UserError, match="object 'bowl' and the ground overlap by") as refused:
+        moved(scene(bowl(0.04), seconds=0.1))
+    height = float(str(refused.value).split()[-2])
+    _, course = moved(scene(bowl(height), seconds=0.3))
+    assert not course.moved
+    heights = course.motion.positions[:, 0, 2]
+    # Parts of a bowl are no smooth ball: it may lean, but does not leap.
+    assert heights.max() <= height + 1e-6 and np.ptp(heights) < 5e-4
+
+
+@pytest.mark.parametrize("fixed", [False, True])
+def test_of_a_stack_that_overlaps_each_is_lifted_by_what_is_below_it(fixed):
+    step = 0.0199
+    balls = [ball(str(n), position=[0, 0, 0.01 + step * n], friction=0) for n in range(3)]
+    balls[0]["fixed"] = fixed
+    _, course = moved(scene(*balls, seconds=0.05))
+    assert {n: way[2] for n, way in course.moved.items()} == pytest.approx(
+        {1: 1e-4, 2: 2e-4}, abs=2e-7
+    )
+    assert np.abs(course.motion.positions - course.motion.positions[0]).max() < 1e-5
+
+
+def test_what_overlaps_sideways_is_moved_to_both_sides_and_stays_there():
+    row = [ball(str(n), position=[0.0199 * n, 0, 0.01]) for n in range(3)]
+    _, course = moved(scene(*row, seconds=0.2))
+    places = course.motion.positions
+    assert np.diff(places[0, :, 0]) == pytest.approx(0.02, abs=1e-7)
+    assert places[0].mean(axis=0) == pytest.approx([0.0199, 0, 0.01], abs=1e-9)
+    assert np.abs(places - places[0]).max() < 1e-5
+
+
+def test_the_position_that_a_refusal_names_is_clear_of_the_other():
+    still = ball("still", position=[0.3, 0.2, 0.5], fixed=True)
+    with pytest.raises(UserError, match="'free' would be clear at the position") as refused:
+        moved(scene(still, ball("free", position=[0.307, 0.205, 0.509])))
+    place = [float(x) for x in str(refused.value).split("[")[1].rstrip("]").split(",")]
+    _, course = moved(scene(still, ball("free", position=place), seconds=0.01))
+    assert not course.moved
+
+
+def test_what_has_no_room_to_be_moved_apart_is_refused():
+    walls = [ball(f"wall {x:g}", position=[x, 0, 0], fixed=True) for x in (-0.0199, 0.0199)]
+    with pytest.raises(UserError, match="too closely packed"):
+        moved(scene(*walls, ball("between"), ground=None, gravity=[0, 0, 0]))
+
+
+def test_a_start_without_overlap_is_left_as_it_is():
+    _, course = moved(scene(ball(position=[0, 0, 0.01]), seconds=0.05))
+    assert not course.moved and (course.motion.positions[0] == [0, 0, 0.01]).all()
 
 
 def _with_ground(described, restitution):

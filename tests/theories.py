@@ -79,3 +79,35 @@ def plate_frequencies(side: float, thickness: float, young: float, density: floa
     parameters = np.array([13.4682, 19.5961, 24.2702, 34.8009])
     bending = young * thickness**2 / (12.0 * (1.0 - 0.3**2)) / density
     return parameters * np.sqrt(bending) / (2.0 * np.pi * side**2)
+
+
+def rod_frequencies(
+    length: float, radius: float, young: float, poisson: float, density: float
+) -> np.ndarray:
+    """Bending frequencies [Hz] of a free round rod, one of each pair, by Timoshenko's theory.
+
+    Deflections and rotations are polynomials (Rayleigh and Ritz); Cowper's shear factor (1966).
+    """
+    from numpy.polynomial import legendre
+    from scipy.linalg import eigh
+
+    degree = 12
+    x, weights = legendre.leggauss(2 * degree)
+    values = legendre.legvander(x, degree)
+    units = np.eye(degree + 1)
+    slopes = np.stack([legendre.legval(x, legendre.legder(unit)) for unit in units], axis=1)
+    slopes = slopes * (2.0 / length)
+    area, moment = np.pi * radius**2, np.pi * radius**4 / 4.0
+    factor = 6.0 * (1.0 + poisson) / (7.0 + 6.0 * poisson)
+    shear = factor * area * young / (2.0 * (1.0 + poisson))
+    none = np.zeros_like(values)
+    deflection, rotation = np.hstack([values, none]), np.hstack([none, values])
+    bent, sheared = np.hstack([none, slopes]), np.hstack([slopes, -values])
+
+    def summed(functions: np.ndarray) -> np.ndarray:
+        return (functions.T * (weights * length / 2.0)) @ functions
+
+    stiffness = young * moment * summed(bent) + shear * summed(sheared)
+    mass = density * (area * summed(deflection) + moment * summed(rotation))
+    squares = eigh(stiffness, mass, eigvals_only=True)
+    return np.sqrt(squares[2:]) / (2.0 * np.pi)

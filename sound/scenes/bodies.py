@@ -3,30 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.errors import UserError
+from carillon.errors import ConvergenceError, UserError
 from carillon.fem.geometry.size import doubt_unit
 from carillon.fem.model import RIGID_MODES, Solid
 from carillon.fem.rigid import MassProperties, mass_properties
 from carillon.files import kind_of
-from carillon.threads import one_thread
+from carillon.limits import EXTENTS
 from solver.files.modes_file import read_modes
+from solver.refinement.errors import FROM_SOLID
 from solver.response.response import Damping
 from sound.project.design import Design
 from sound.project.design_file import read_design
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
+from sound.scenes.axes import upright
 from sound.scenes.convex import convex_parts, hull_of
 from sound.scenes.hertz import compliance
 from sound.scenes.scene import ObjectEntry
 from sound.scenes.shape import Shape
-
-if TYPE_CHECKING:  # Its import takes long.
-    import trimesh
+from sound.scenes.uniform import Discretised, UniformSolid, uniform_solid
 
 Array = NDArray[np.float64]
 
@@ -58,6 +58,11 @@ class Body:
         Its modes; None if it is silent.
     listening
         Loudness and noise of a design's clips.
+    turn : (3, 3)
+        Rotation from the coordinates of the solid to the body's own axes; None if they agree.
+    accuracy : dict
+        How far its frequencies are expected to be from the solid's, see
+        `sound.scenes.uniform.UniformSolid`; None if nothing is known.
     """
 
     entry: ObjectEntry
@@ -69,6 +74,8 @@ class Body:
     parts: list[Array]
     solid: SoundingSolid | None
     listening: Listening | None
+    turn: Array | None = None
+    accuracy: dict[str, Any] | None = None
 
     @property
     def volume(self) -> float:
@@ -78,7 +85,16 @@ class Body:
     def motion(self, places: Array) -> Array:
         """Displacement (p, 3, k) [kg^-1/2] in each mode at places (p, 3) [m] from the centre."""
         assert self.solid is not None
-        return self.solid.motion(places + self.centre)
+        moved = self.solid.motion(self.in_solid(places))
+        return moved if self.turn is None else np.einsum("ij,pjk->pik", self.turn, moved)
+
+    def in_solid(self, places: Array) -> Array:
+        """Coordinates (p, 3) [m] in the solid of places (p, 3) [m] from the centre."""
+        return self.along_solid(places) + self.centre
+
+    def along_solid(self, vectors: Array) -> Array:
+        """Vectors (p, 3) of the body's own axes in those of the solid."""
+        return vectors if self.turn is None else vectors @ self.turn
 
 
 def body_of(entry: ObjectEntry) -> Body:
@@ -88,17 +104,29 @@ def body_of(entry: ObjectEntry) -> Body:
     ------
     UserError
         With the object's name: if a file is missing or unusable, a solid has no mass or no modes.
+    ConvergenceError
+        With its name, too: if modes were not found.
     """
     try:
         body = _read(entry)
     except UserError as error:
-        raise UserError(f"object {entry.name!r}: {error}") from None
+        raise UserError(f"object {entry.name!r}: {_in_keys(str(error))}") from None
+    except ConvergenceError as error:
+        raise ConvergenceError(f"object {entry.name!r}: {error}") from None
     if not body.mass > LIGHTEST:
         raise UserError(
             f"object {entry.name!r}: has a mass of {body.mass:.3g} kg, expected more than "
             f"{LIGHTEST:g} kg; look at its unit and its density"
         )
     return body
+
+
+def _in_keys(sentence: str) -> str:
+    """A sentence that names options of commands, with the keys of a scene in their place."""
+    keys = {"--resolution": "resolution", "--components largest": "components: largest"}
+    for option, key in keys.items():
+        sentence = sentence.replace(option, key)
+    return sentence
 
 
 def _read(entry: ObjectEntry) -> Body:
@@ -125,7 +153,8 @@ def _of_design(entry: ObjectEntry, design: Design) -> Body:
     young = design.young_near(design.surface_vertices)
     giving = compliance(young, design.model.poisson)
     listening = Listening.of_design(design, solid)
-    return _assembled(entry, rigid, shape, giving, solid, listening)
+    body = _assembled(entry, rigid, shape, giving, solid, upright(design.settings["mesh"]))
+    return replace(body, listening=listening)
 
 
 def _of_modes(entry: ObjectEntry, path: str) -> Body:
@@ -144,7 +173,11 @@ def _of_modes(entry: ObjectEntry, path: str) -> Body:
     else:
         young = np.full(len(vertices), moduli.mean())
     giving = compliance(young, file.model.poisson)
-    return _assembled(entry, rigid, shape, giving, solid, None)
+    body = _assembled(entry, rigid, shape, giving, solid, upright(file.attributes.get("mesh", "")))
+    told = {key: value for key, value in file.attributes.items() if key.startswith(FROM_SOLID)}
+    kept = ("discretisation", "resolution")
+    told |= {key: file.attributes[key] for key in kept if told and key in file.attributes}
+    return replace(body, accuracy=told or None)
 
 
 def _voxel_surface(model: Solid) -> tuple[Array, NDArray[np.int64]]:
@@ -160,58 +193,72 @@ def _voxel_surface(model: Solid) -> tuple[Array, NDArray[np.int64]]:
 def _of_ball(entry: ObjectEntry, radius: float) -> Body:
     import trimesh
 
-    sphere = trimesh.creation.icosphere(BALL_DIVISIONS, radius)
-    size, _, solid = _sounding(entry, sphere) if entry.count else (1.0, None, None)
-    sphere.apply_scale(size)
-    radius *= size
+    sphere = trimesh.creation.icosphere(BALL_DIVISIONS, 1.0)
+    solid, accuracy = None, None
+    if entry.count:
+        found, size = _sized(uniform_solid(sphere, entry.name, _discretised(entry)), radius, entry)
+        radius *= size
+        solid, accuracy = _sounding(found, entry), found.accuracy
+    sphere.apply_scale(radius)
     mass = 4.0 / 3.0 * np.pi * radius**3 * entry.density
     inertia = 0.4 * mass * radius**2 * np.eye(3)
     shape = Shape.of_surface(np.asarray(sphere.vertices), np.asarray(sphere.faces), np.zeros(3))
     shape = replace(shape, radii=np.full(len(shape.vertices), radius))
     giving = _uniform_compliance(entry, shape)
     ball = replace(entry, radius=radius)
-    return Body(ball, mass, inertia, np.zeros(3), shape, giving, [], solid, None)
+    centre = np.zeros(3)
+    return Body(ball, mass, inertia, centre, shape, giving, [], solid, None, accuracy=accuracy)
 
 
 def _of_mesh(entry: ObjectEntry) -> Body:
-    from sound.surface import struck_surface
+    from carillon.fem.geometry import load_surface
+    from sound.surface import longest_side, struck_surface
 
     assert entry.mesh is not None
     surface = struck_surface(entry.mesh, entry.unit)
-    size, model, solid = _sounding(entry, surface)
+    # Of the mesh's own unit, so that all that differ by theirs alone share what is found.
+    longest = longest_side(surface) / entry.unit
+    unit = 1.0 if EXTENTS[0] <= longest <= EXTENTS[1] else entry.unit
+    own = load_surface(entry.mesh, unit)
+    solved = uniform_solid(own, entry.name, _discretised(entry))
+    found, size = _sized(solved, entry.unit / unit, entry)
     doubt_unit(entry.mesh, surface.extents, entry.unit)
     surface.apply_scale(size)
-    rigid = mass_properties(model)
+    rigid = mass_properties(found.model)
     shape = Shape.of_surface(np.asarray(surface.vertices), np.asarray(surface.faces), rigid.centre)
-    return _assembled(entry, rigid, shape, _uniform_compliance(entry, shape), solid, None)
+    giving = _uniform_compliance(entry, shape)
+    solid = _sounding(found, entry) if entry.count else None
+    body = _assembled(entry, rigid, shape, giving, solid, upright(entry.mesh))
+    return replace(body, accuracy=found.accuracy if entry.count else None)
 
 
-def _sounding(
-    entry: ObjectEntry, surface: trimesh.Trimesh
-) -> tuple[float, Solid, SoundingSolid | None]:
-    """Factor of its size, the solid inside a surface at that size, and its modes that sound.
+def _discretised(entry: ObjectEntry) -> Discretised:
+    return Discretised(
+        entry.discretisation,
+        entry.resolution,
+        entry.components,
+        entry.material.poisson,
+        entry.count,
+    )
+
+
+def _sized(solved: UniformSolid, size: float, entry: ObjectEntry) -> tuple[UniformSolid, float]:
+    """A solid at a size, of the entry's material, and the factor that its pitch makes it larger by.
 
     The factor lets the first mode have the entry's pitch: frequencies go as 1 / size.
     """
-    from carillon.fem.geometry import hexmesh_from_voxels, voxelize
-    from carillon.fem.model import fine_model
+    factor = 1.0
+    if entry.pitch is not None:
+        found = solved.scaled(size, entry.material.young, entry.density)
+        assert found.eigenvalues is not None
+        factor = float(np.sqrt(found.eigenvalues[RIGID_MODES])) / (2.0 * np.pi * entry.pitch)
+    return solved.scaled(factor * size, entry.material.young, entry.density), factor
 
-    material = entry.material
-    mesh = hexmesh_from_voxels(voxelize(surface, entry.resolution, name=entry.name))
-    young = np.full(mesh.n_cells, material.young)
-    model = fine_model(mesh, young, poisson=material.poisson, density=entry.density)
-    if entry.count == 0:
-        return 1.0, model, None
-    from solver.analysis.library import solve
 
-    with one_thread():
-        found = solve(model, modes=RIGID_MODES + entry.count)
-    assert found.modes is not None
-    size = 1.0 if entry.pitch is None else float(found.frequencies[RIGID_MODES]) / entry.pitch
-    scaled = replace(mesh, origin=size * mesh.origin, edge=size * mesh.edge)
-    model = replace(model, mesh=scaled)
-    values, modes = found.eigenvalues / size**2, found.modes / size**1.5
-    return size, model, SoundingSolid.damped(model, values, modes, Damping(*entry.damping))
+def _sounding(found: UniformSolid, entry: ObjectEntry) -> SoundingSolid:
+    assert found.eigenvalues is not None and found.modes is not None
+    damping = Damping(*entry.damping)
+    return SoundingSolid.damped(found.model, found.eigenvalues, found.modes, damping)
 
 
 def _uniform_compliance(entry: ObjectEntry, shape: Shape) -> Array:
@@ -225,11 +272,16 @@ def _assembled(
     shape: Shape,
     giving: Array,
     solid: SoundingSolid | None,
-    listening: Listening | None,
+    turn: Array | None,
 ) -> Body:
+    """A body of what is known in the coordinates of its solid, which a rotation sets upright."""
     inertia = (rigid.axes * rigid.moments) @ rigid.axes.T
+    if turn is not None:
+        inertia = turn @ inertia @ turn.T
+        shape = replace(shape, vertices=shape.vertices @ turn.T, inward=shape.inward @ turn.T)
     if entry.collision == "hull":
         parts = [hull_of(shape.vertices)]
     else:
         parts = convex_parts(shape.vertices, shape.faces)
-    return Body(entry, rigid.mass, inertia, rigid.centre, shape, giving, parts, solid, listening)
+    centre = rigid.centre
+    return Body(entry, rigid.mass, inertia, centre, shape, giving, parts, solid, None, turn)

@@ -27,7 +27,7 @@ from carillon.errors import UserError
 from carillon.files import create_h5, open_h5
 from carillon.limits import require_within
 from sound.scenes.cuttable import (
-    CELLS,
+    GRIDS,
     HOLLOW,
     JITTER,
     MOST_FACES,
@@ -67,8 +67,8 @@ def convex_parts(
     """Convex hulls that together fill a solid.
 
     Closed parts of the surface that are not connected are cut one by one.  If one is not closed,
-    the solid is what is inside by winding numbers, on a grid of `CELLS` along the longest side.
-    What was cut once is in the user's cache.
+    the solid is what is inside by winding numbers, on a grid, see `GRIDS`.  What was cut once is in
+    the user's cache.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def convex_parts(
 
     require_within(f"concavity {concavity:g}", concavity, CONCAVITIES)
     surface = trimesh.Trimesh(vertices, faces)
-    solids = components(surface)
+    solids = components(trimesh.Trimesh(vertices, faces, process=False))
     if solids and all(map(is_convex, solids)):
         return [hull_of(solid.vertices) for solid in solids]
     key = _key(vertices, faces, concavity, seed)
@@ -194,7 +194,7 @@ def _key(vertices: Array, faces: Faces, concavity: float, seed: int) -> str:
             "CoACD, which cuts hollow solids into convex parts, is not installed; "
             f"pip install -r {REQUIREMENTS}"
         ) from None
-    constants = (HOLLOW, CELLS, MOST_FACES, JITTER, MOST_VERTICES, SEARCH)
+    constants = (HOLLOW, GRIDS, MOST_FACES, JITTER, MOST_VERTICES, SEARCH)
     settings = (version, constants, concavity, seed)
     digest = hashlib.sha256(repr(settings).encode())
     digest.update(np.asarray(vertices, dtype="<f8").tobytes())

@@ -17,8 +17,13 @@ Faces = NDArray[np.integer]
 
 HOLLOW = 0.02
 """Share of its hull that a solid may leave empty and still be taken for convex."""
-CELLS = 40
-"""Of the grid, along the longest side, in which what is not closed is made into a solid."""
+GRIDS = ((40, 0.0), (40, 0.38), (80, 0.38), (160, 0.38))
+"""Grids in which what is not closed is made into a solid: cells along the longest side, and by how
+many the surface lies within the grid.  The first one that shows a closed surface is taken.
+
+Where a grid begins with the surface, flat walls may lie on points, which are neither inside nor
+outside then.
+"""
 MOST_FACES = (800, 1600)
 """Of a surface that is cut; finer ones are made coarser before, as coarse as goes well."""
 JITTER = 1e-4
@@ -49,12 +54,19 @@ class Cuttable(NamedTuple):
 def components(surface: trimesh.Trimesh) -> list[trimesh.Trimesh]:
     """Closed surfaces of a solid: its pieces, or all at once if it has cavities.
 
-    None if something is open, or inside out.
+    Pieces that share places but no vertices, as boards of a box at its corners, are apart.  None if
+    something is open, or inside out.
     """
-    pieces = list(surface.split(only_watertight=False))
-    if all(map(_is_solid, pieces)):
-        return pieces
-    return [surface] if _is_solid(surface) else []
+    import trimesh
+
+    merged = trimesh.Trimesh(surface.vertices, surface.faces)
+    for whole in (merged, surface):
+        pieces = list(whole.split(only_watertight=False))
+        for piece in pieces:
+            piece.merge_vertices()
+        if pieces and all(map(_is_solid, pieces)):
+            return pieces
+    return [merged] if _is_solid(merged) else []
 
 
 def _is_solid(surface: trimesh.Trimesh) -> bool:
@@ -80,25 +92,27 @@ def remeshed(surface: trimesh.Trimesh) -> list[trimesh.Trimesh]:
     UserError
         If nothing is inside.
     """
-    solids = components(_boundary(surface)) if surface.area > 0.0 else []
-    if not solids:
-        raise UserError(
-            f"the surface encloses nothing that {CELLS} cells along its longest side would show; "
-            "close it, or make its walls thicker"
-        )
-    return solids
+    for grid in GRIDS if surface.area > 0.0 else ():
+        solids = components(_boundary(surface, *grid))
+        if solids:
+            return solids
+    raise UserError(
+        f"the surface encloses nothing that {GRIDS[-1][0]} cells along its longest side would "
+        "show; close it, make its walls thicker, or take collision: hull"
+    )
 
 
-def _boundary(surface: trimesh.Trimesh) -> trimesh.Trimesh:
+def _boundary(surface: trimesh.Trimesh, cells: int, within: float) -> trimesh.Trimesh:
     """The closed surface between points of a grid that are inside and those that are outside."""
     import igl
     import trimesh
 
     low, high = surface.bounds
-    edge = float(np.max(high - low)) / CELLS
+    edge = float(np.max(high - low)) / cells
     counts = np.ceil((high - low) / edge).astype(int) + 3
     z, y, x = np.meshgrid(*(np.arange(n) for n in counts[::-1]), indexing="ij")
-    points = low + edge * (np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1) - 1.0)
+    places = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1) - 1.0 - within
+    points = low + edge * places
     distances = _distances(surface, points)
     return trimesh.Trimesh(*igl.marching_cubes(distances, points, *map(int, counts), 0.0)[:2])
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +85,12 @@ class Performance:
         Full scale per pascal.
     timings : dict [s]
         Wall time by what was done.
+    accuracies : B dicts
+        How far each object's frequencies are expected to be from the solid's, see
+        `sound.scenes.uniform.UniformSolid`; None for one that does not sound, or if nothing is
+        known of it.
+    moved : dict
+        How far (3,) [m] objects that overlapped were moved before the start, by their names.
     """
 
     title: str
@@ -95,3 +101,5 @@ class Performance:
     voices: list[Voice | None]
     scale: float = 1.0
     timings: dict[str, float] = field(default_factory=dict)
+    accuracies: list[dict[str, Any] | None] = field(default_factory=list)
+    moved: dict[str, list[float]] = field(default_factory=dict)

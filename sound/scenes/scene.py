@@ -40,6 +40,8 @@ class ObjectEntry:
     unit: float
     pitch: float | None
     resolution: int
+    discretisation: str
+    components: str
     count: int
     density: float
     position: Vector
@@ -225,6 +227,7 @@ def _require_suiting(where: str, entry: Mapping[str, Any], source: str) -> None:
     """Refuse keys that have no meaning for what an object is."""
     suits = {"unit": ("mesh",), "pitch": ("mesh", "radius"), "density": ("mesh", "radius")}
     suits["damping"] = ("modes", "mesh", "radius")
+    suits["discretisation"] = suits["components"] = ("mesh", "radius")
     standard = scene_schema()["properties"]["objects"]["items"]["properties"]
     for key, sources in suits.items():
         if source not in sources and entry[key] != standard[key]["default"]:

@@ -144,10 +144,32 @@ def _summary(options: SceneOptions, performance: Performance) -> dict[str, Any]:
         "hardest_impact_newton_seconds": max(
             (float((each.impulse**2).sum() ** 0.5) for each in impacts), default=None
         ),
+        "accuracy": _accuracies(performance),
+        "moved_metres": performance.moved,
         "timings": performance.timings,
         "full_scale_pascal": 1.0 / performance.scale,
         "full_scale_decibels": 20.0 * log10(1.0 / performance.scale / 2e-5),
     }
+
+
+def _accuracies(performance: Performance) -> dict[str, dict[str, Any] | None]:
+    """How far frequencies of each object that sounds are expected to be off; None if unknown."""
+    accuracies = performance.accuracies or [None] * len(performance.voices)
+    names = [each.name for each in performance.picture.objects]
+    told = zip(names, accuracies, performance.voices)
+    return {name: accuracy for name, accuracy, voice in told if voice is not None}
+
+
+def _expected(accuracies: dict[str, dict[str, Any] | None]) -> str:
+    """What is said of the object whose frequencies are expected to be farthest off."""
+    from solver.refinement.errors import FROM_SOLID, in_words
+
+    worst = f"{FROM_SOLID}_worst"
+    told = {name: each for name, each in accuracies.items() if each and worst in each}
+    if not told:
+        return ""
+    name = max(told, key=lambda name: abs(told[name][worst]))
+    return f"\nexpected distance from the solid, of {name!r} {in_words(told[name], FROM_SOLID)}"
 
 
 def _sentence(summary: dict[str, Any]) -> str:
@@ -155,5 +177,5 @@ def _sentence(summary: dict[str, Any]) -> str:
     return (
         f"{', '.join(files)}: {summary['seconds']:.4g} s, {summary['objects']} objects with "
         f"{summary['modes']} modes, {summary['impacts']:,} impacts; full scale is "
-        f"{summary['full_scale_pascal']:.3g} Pa"
+        f"{summary['full_scale_pascal']:.3g} Pa{_expected(summary['accuracy'])}"
     )

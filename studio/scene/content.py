@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
+from solver.refinement.errors import FROM_SOLID
 from sound.scenes.performance import GROUND, Impact, Performance, Voice
 from sound.scenes.picture import Appearance
 from studio.binary import pack
@@ -62,10 +63,12 @@ def content(performance: Performance) -> bytes:
         "turned": ("f4", motion.rotations),
         **_impacts(performance.impacts),
     }
+    accuracies = performance.accuracies or [None] * len(picture.objects)
     for number, (appearance, voice) in enumerate(zip(picture.objects, performance.voices)):
         own, told = _surface(appearance)
         if voice is not None and len(voice.frequencies) > 0:
             own |= _modes(voice)
+            told["expected_error"] = (accuracies[number] or {}).get(f"{FROM_SOLID}_rms")
             told |= _strike(voice, [e for e in performance.impacts if number in e.pair])
         header["objects"].append(told)
         arrays |= {f"{name}_{number}": values for name, values in own.items()}

@@ -44,7 +44,8 @@ function soundOf({ voice }) {
   if (!voice) return "silent";
   const lowest = shown.frequency(Math.min(...voice.hertz));
   const { length } = voice.hertz;
-  return length === 1 ? `1 mode, ${lowest}` : `${length} modes from ${lowest}`;
+  const says = length === 1 ? `1 mode, ${lowest}` : `${length} modes from ${lowest}`;
+  return voice.expectedError === null ? says : `${says}, about ${shown.share(voice.expectedError)} off`;
 }
 
 /**

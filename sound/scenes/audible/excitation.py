@@ -98,7 +98,7 @@ def _amplitudes(number: int, body: Body, blows: Sequence[Blow], signed: bool) ->
     assert body.solid is not None
     found = struck_amplitudes(pushed, body.solid.frequencies)
     if body.listening is not None:
-        middles = body.centre + middle_places(places, impulses, firsts)
+        middles = body.in_solid(middle_places(places, impulses, firsts))
         found *= np.array([[body.listening.gain(middle)] for middle in middles])
     return found
 
@@ -125,7 +125,7 @@ def _pushes(number: int, body: Body, pressing: Pressed, motion: Array) -> tuple[
     along = moved_along(motion[vertices], forces)
     pushes = pressing.mean(sizes * along)
     if body.listening is not None:
-        places = body.shape.vertices[vertices[pressing.firsts]] + body.centre
+        places = body.in_solid(body.shape.vertices[vertices[pressing.firsts]])
         pushes = pushes * np.array([[body.listening.gain(place)] for place in places])
     squares = pressing.mean(sizes * along**2) / pressing.mean(sizes)
     return pushes, 0.5 * pressing.dashpots[:, None] * squares

@@ -51,7 +51,7 @@ def voice(body: Body, gains: Array) -> Voice:
     pushed = np.einsum("vik,vi->vk", body.motion(shape.vertices), shape.inward)
     struck = np.abs(pushed)
     if body.listening is not None:
-        places = shape.vertices + body.centre
+        places = body.in_solid(shape.vertices)
         struck *= np.array([[body.listening.gain(place)] for place in places])
     loud = np.sqrt(gains[:, 0] ** 2 + (gains[:, 1:] ** 2).sum(axis=1) / 3.0)
     return Voice(body.solid.frequencies, body.solid.dampings, struck * loud)
@@ -95,7 +95,7 @@ def clip_noise(
             break
         side = blow.impact.pair.index(number)
         impulses = blow.impulses[:, side]
-        middle = middle_places(blow.places[:, side], impulses, np.array([0]))[0] + body.centre
+        middle = body.in_solid(middle_places(blow.places[:, side], impulses, np.array([0])))[0]
         strength = float(np.linalg.norm(impulses.sum(axis=0)))
         strikes[:, begin] += strength * body.listening.weights(middle)
     total = np.zeros(count)
@@ -114,9 +114,10 @@ def _as_loud(body: Body, found: Radiation) -> float:
     """Factor that lets a design's modes have the energy with which its surface moves the air."""
     assert body.solid is not None and body.listening is not None
     solid, listening = body.solid, body.listening
-    places = body.shape.vertices + body.centre
+    places = body.in_solid(body.shape.vertices)
     near = [int(np.argmin(np.linalg.norm(places - at, axis=1))) for at in listening.positions]
-    amplitudes = solid.amplitudes(listening.positions, body.shape.inward[near])
+    inward = body.along_solid(body.shape.inward[near])
+    amplitudes = solid.amplitudes(listening.positions, inward)
     moved = found.monopoles**2 + (found.dipoles**2).sum(axis=1) / 3.0
     ringing = amplitudes**2 / np.maximum(solid.dampings, 1e-3)
     own = (ringing * moved).sum()

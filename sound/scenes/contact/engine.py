@@ -16,9 +16,9 @@ from sound.scenes.bodies import Body
 from sound.scenes.contact.bounce import damping_ratio
 from sound.scenes.contact.contact_log import ContactLog
 from sound.scenes.contact.contacts import ContactPoints
+from sound.scenes.contact.start import start
 from sound.scenes.materials import NamedMaterial
 from sound.scenes.packages import scene_package
-from sound.scenes.performance import GROUND
 from sound.scenes.picture import Motion
 from sound.scenes.scene import Scene
 
@@ -26,8 +26,6 @@ Array = NDArray[np.float64]
 
 PICTURES_PER_SECOND = 120
 """Poses that are kept."""
-OVERLAP = 0.01
-"""Of an object's longest side: what two may overlap at the start, as convex parts are not exact."""
 FASTEST = 1e4
 """Speed [m/s] beyond which a scene has burst."""
 STEPS_TO_SLEEP = 10
@@ -54,30 +52,33 @@ class Course:
         What touched what, in the order of time.
     resting : (T, B)
         Whether each object lay still, at the times of the motion.
+    moved : dict
+        How far (3,) [m] objects were moved before the start to be apart, by their numbers.
     """
 
     motion: Motion
     contacts: ContactPoints
     resting: NDArray[np.bool_]
+    moved: dict[int, Array]
 
 
 def simulate(scene: Scene, bodies: list[Body], visible: bool = True) -> Course:
     """Let bodies move as a scene says.
 
+    Bodies that overlap a little at the start are moved apart, see `sound.scenes.contact.start`.
     Contacts are springs with dampers: a bounce takes `engine.contact_seconds` whatever the mass,
     and leaves the share of speed that the restitution says.  Bodies that lie still sleep.
 
     Raises
     ------
     UserError
-        If two bodies overlap at the start, if anything flies apart, or touches too often.
+        If two bodies overlap much at the start, if anything flies apart, or touches too often.
     """
     mujoco = scene_package("mujoco")
     model = _model(mujoco, scene, bodies)
     data = mujoco.MjData(model)
-    _start(mujoco, model, data, bodies)
+    moved = start(mujoco, model, data, scene, bodies)
     recorder = _Recorder(model, data, bodies)
-    recorder.require_apart(scene)
     every = max(1, round(1.0 / (PICTURES_PER_SECOND * scene.engine.step_seconds)))
     poses = int(np.ceil(scene.seconds / (every * scene.engine.step_seconds)))
     steps = every * poses
@@ -93,7 +94,7 @@ def simulate(scene: Scene, bodies: list[Body], visible: bool = True) -> Course:
             recorder.require_few((step + 1) * scene.engine.step_seconds)
         if step % every == 0:
             recorder.require_calm(step * scene.engine.step_seconds)
-    return recorder.course(every * scene.engine.step_seconds)
+    return recorder.course(every * scene.engine.step_seconds, moved)
 
 
 def _model(mujoco: ModuleType, scene: Scene, bodies: list[Body]) -> Any:
@@ -170,18 +171,6 @@ def _touch(scene: Scene, friction: float, restitution: float) -> dict[str, Any]:
     }
 
 
-def _start(mujoco: ModuleType, model: Any, data: Any, bodies: list[Body]) -> None:
-    """Set velocities; those of rotation are given about the axes of the scene."""
-    mujoco.mj_forward(model, data)
-    for number, body in enumerate(bodies):
-        first = model.body_dofadr[number + 1]
-        if first >= 0:
-            turned = data.xmat[number + 1].reshape(3, 3)
-            data.qvel[first : first + 3] = body.entry.velocity
-            data.qvel[first + 3 : first + 6] = np.array(body.entry.spin) @ turned
-    mujoco.mj_forward(model, data)
-
-
 class _Recorder:
     """Keeps what the engine tells."""
 
@@ -223,26 +212,6 @@ class _Recorder:
             self.inverse_inertia,
         )
 
-    def require_apart(self, scene: Scene) -> None:
-        """Refuse a start at which two objects, or one and the ground, are in each other."""
-        contact = self.data.contact
-        for depth, geoms in zip(-np.asarray(contact.dist), np.asarray(contact.geom)):
-            pair = [int(each) for each in self.owners[geoms]]
-            sides = [
-                float(np.ptp(self.bodies[each].shape.vertices, axis=0).max())
-                for each in pair
-                if each != GROUND
-            ]
-            if depth > OVERLAP * min(sides):
-                names = [
-                    "the ground" if each == GROUND else f"object {self.bodies[each].entry.name!r}"
-                    for each in sorted(pair, reverse=True)
-                ]
-                raise UserError(
-                    f"{names[0]} and {names[1]} overlap by {1e3 * depth:.3g} mm at the start; move "
-                    "them apart"
-                )
-
     def require_few(self, seconds: float) -> None:
         """Refuse more contacts than can be kept."""
         rate = max(MOST_CONTACTS, MOST_CONTACTS_EACH * len(self.bodies))
@@ -262,8 +231,8 @@ class _Recorder:
                 "rad/s; look at positions and masses, or give the engine more steps"
             )
 
-    def course(self, seconds: float) -> Course:
+    def course(self, seconds: float, moved: dict[int, Array]) -> Course:
         self.take_pose()
         times = seconds * np.arange(len(self.positions))
         motion = Motion(times, np.array(self.positions), np.array(self.rotations))
-        return Course(motion, self.log.contacts(), np.array(self.resting))
+        return Course(motion, self.log.contacts(), np.array(self.resting), moved)

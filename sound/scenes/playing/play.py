@@ -93,6 +93,8 @@ def perform(scene: Scene, threads: int | None = None, visible: bool = True) -> P
         voices,
         scale,
         clock.seconds,
+        [body.accuracy for body in bodies],
+        {bodies[number].entry.name: way.tolist() for number, way in course.moved.items()},
     )
 
 

@@ -1,0 +1,210 @@
+"""Modes of a solid of one material, found once for all its sizes, moduli and densities.
+
+A solid of the size s, Young's modulus E and density rho has the eigenvalues of that of size 1, E_0
+and rho_0 times (E / E_0) (rho_0 / rho) / s^2, if Poisson's ratios agree; mass-normalised modes go
+as 1 / sqrt(rho s^3).  What was found is in the user's cache.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon import __version__
+from carillon.cache import remembered
+from carillon.errors import UserError
+from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
+from carillon.fem.geometry import hexmesh_from_voxels, voxelize
+from carillon.fem.model import RIGID_MODES, Solid, fine_model
+from carillon.progress import say
+from carillon.threads import one_thread
+from solver.accuracy.estimate import estimate_cell_errors
+from solver.accuracy.lattices import covering_on, voxel_lattice
+from solver.accuracy.voxels import Reference
+from solver.files.modes_file import read_modes, write_modes
+from solver.refinement.errors import FROM_SOLID, LAST, ExpectedErrors
+
+if TYPE_CHECKING:  # Its import takes long.
+    import trimesh
+
+Array = NDArray[np.float64]
+
+YOUNG, DENSITY = 1e9, 1000.0
+"""Of the solid that is solved [Pa], [kg/m^3]."""
+VOXEL, FINITE_CELL, AUTO = "voxel", "finite-cell", "auto"
+DISCRETISATIONS = (AUTO, FINITE_CELL, VOXEL)
+"""Ways to discretise; `auto` are finite cells, or voxels where these have no use for a surface."""
+_KIND, _VERSION = "modes of scenes", 1  # counted up, too, when other modes are found than before
+
+
+@dataclass(frozen=True)
+class Discretised:
+    """What is solved.
+
+    Attributes
+    ----------
+    discretisation, resolution
+        One of `DISCRETISATIONS`; lattice spacings along the longest side.
+    components
+        See `carillon.fem.geometry.voxelize`.
+    poisson
+        Poisson's ratio.
+    count
+        Elastic modes; 0 for the solid alone.
+    """
+
+    discretisation: str
+    resolution: int
+    components: str
+    poisson: float
+    count: int
+
+
+@dataclass(frozen=True)
+class UniformSolid:
+    """A solid of one material.
+
+    Attributes
+    ----------
+    model
+        Its mesh, of modulus and density.
+    eigenvalues, modes : (k,) [rad^2/s^2], (n_dofs, k) [kg^-1/2]
+        Ascending, the six rigid ones first; None if none were asked for.
+    accuracy : dict
+        Discretisation, resolution, and how far frequencies are expected to be from the solid's, as
+        `solver.refinement.errors.ExpectedErrors.attributes` has it, where that could be told.
+    """
+
+    model: Solid
+    eigenvalues: Array | None
+    modes: Array | None
+    accuracy: dict[str, Any]
+
+    def scaled(self, size: float, young: float = YOUNG, density: float = DENSITY) -> UniformSolid:
+        """The same solid at another size, of another modulus [Pa] and density [kg/m^3]."""
+        stiffer, denser = young / YOUNG, density / DENSITY
+        model = _resized(self.model, size)
+        model = model.with_young(np.full(model.mesh.n_cells, young))
+        model = model.with_constants(model.poisson, density)
+        if self.eigenvalues is None or self.modes is None:
+            return replace(self, model=model)
+        return UniformSolid(
+            model,
+            self.eigenvalues * (stiffer / denser / size**2),
+            self.modes / np.sqrt(denser * size**3),
+            self.accuracy,
+        )
+
+
+def uniform_solid(surface: trimesh.Trimesh, name: str, how: Discretised) -> UniformSolid:
+    """The solid inside a surface, of `YOUNG` and `DENSITY`, and its modes.
+
+    Raises
+    ------
+    UserError
+        If the surface encloses nothing, walls too thin, or several pieces.
+    ConvergenceError
+        If modes were not found.
+    """
+    if how.count == 0:
+        return _without_modes(surface, name, how)
+    key = hashlib.sha256(repr((__version__, _VERSION, how)).encode())
+    key.update(np.asarray(surface.vertices, dtype="<f8").tobytes())
+    key.update(np.asarray(surface.faces, dtype="<i8").tobytes())
+    return remembered("modes", key.hexdigest(), lambda: _solved(surface, name, how), _read, _write)
+
+
+def _solved(surface: trimesh.Trimesh, name: str, how: Discretised) -> UniformSolid:
+    from solver.analysis.library import solve
+
+    solid = _without_modes(surface, name, how)
+    with one_thread():
+        found = solve(solid.model, modes=RIGID_MODES + how.count)
+        assert found.modes is not None
+        accuracy = {**solid.accuracy}
+        try:
+            errors = _expected(surface, name, how, solid.model, found.eigenvalues, found.modes)
+            accuracy |= errors.attributes(FROM_SOLID)
+        except Exception as error:  # the modes are right without it
+            say(f"how far the frequencies of {name!r} are from the solid's cannot be told: {error}")
+    return UniformSolid(solid.model, found.eigenvalues, found.modes, accuracy)
+
+
+def _without_modes(surface: trimesh.Trimesh, name: str, how: Discretised) -> UniformSolid:
+    chosen = FINITE_CELL if how.discretisation == AUTO else how.discretisation
+    try:
+        model = _model(surface, name, how, chosen)
+    except UserError as error:
+        if how.discretisation == VOXEL:
+            hint = "finite cells (discretisation: auto) take walls thinner than a voxel"
+            raise UserError(f"{error}; {hint}") from None
+        if how.discretisation == FINITE_CELL:
+            raise
+        chosen = VOXEL
+        try:
+            model = _model(surface, name, how, chosen)
+        except UserError:
+            raise error from None
+        say(f"voxels are taken in place of finite cells: {error}")
+    return UniformSolid(model, None, None, {"discretisation": chosen, "resolution": how.resolution})
+
+
+def _model(surface: trimesh.Trimesh, name: str, how: Discretised, discretisation: str) -> Solid:
+    if discretisation == FINITE_CELL:
+        from carillon.fem.finite_cells.build import finite_cells  # Its import takes long.
+
+        cells = finite_cells(surface, how.resolution, how.components, name)
+        young = np.full(cells.mesh.n_cells, YOUNG)
+        return finite_cell_model(cells, young, how.poisson, DENSITY)
+    voxels = voxelize(surface, how.resolution, components=how.components, name=name)
+    mesh = hexmesh_from_voxels(voxels)
+    young = np.full(mesh.n_cells, YOUNG)
+    return fine_model(mesh, young, poisson=how.poisson, density=DENSITY)
+
+
+def _expected(
+    surface: trimesh.Trimesh,
+    name: str,
+    how: Discretised,
+    model: Solid,
+    values: Array,
+    modes: Array,
+) -> ExpectedErrors:
+    """Expected errors of frequencies; voxels are compared with finite cells on their lattice."""
+    if isinstance(model, FiniteCellModel):
+        return estimate_cell_errors(model, values, modes).errors
+    from solver.analysis.library import solve
+
+    lattice = voxel_lattice(surface, how.resolution)
+    cells = covering_on(surface, lattice, "largest", name).cells
+    young = np.full(cells.mesh.n_cells, YOUNG)
+    reference = Reference(finite_cell_model(cells, young, how.poisson, DENSITY))
+    found = solve(reference.model, modes=min(RIGID_MODES + how.count, LAST))
+    assert found.modes is not None
+    return reference.errors(values, found.eigenvalues, found.modes)
+
+
+def _resized(model: Solid, size: float) -> Solid:
+    def resized(mesh: Any) -> Any:
+        return replace(mesh, origin=size * mesh.origin, edge=size * mesh.edge)
+
+    if isinstance(model, FiniteCellModel):
+        return replace(model, cells=replace(model.cells, mesh=resized(model.cells.mesh)))
+    return replace(model, mesh=resized(model.mesh))  # type: ignore[call-arg]
+
+
+def _read(path: Path) -> UniformSolid:
+    file = read_modes(path)
+    return UniformSolid(file.model, file.eigenvalues, file.modes, file.attributes["accuracy"])
+
+
+def _write(path: Path, solid: UniformSolid) -> None:
+    assert solid.eigenvalues is not None and solid.modes is not None
+    told = {"accuracy": solid.accuracy}
+    none = np.zeros(len(solid.eigenvalues))
+    write_modes(path, solid.model, solid.eigenvalues, [solid.modes], none, told, {})
