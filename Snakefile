@@ -54,6 +54,7 @@ include: f"{RULES}/recordings.smk"
 include: f"{RULES}/examples.smk"
 include: f"{RULES}/sound.smk"
 include: f"{RULES}/scenes.smk"
+include: f"{RULES}/scene_spectra.smk"
 include: f"{RULES}/compare.smk"
 
 

@@ -206,3 +206,28 @@ class TestUp:
         long, wide, thick = np.ptp(found.shape.vertices, axis=0)
         assert long > 0.39 and 0.09 < wide < 0.15 and thick < 0.07
         assert found.accuracy["solid_frequency_error_rms"] > 0.0
+
+
+def test_one_motion_is_heard_by_the_modes_of_either_file(tmp_path):
+    from solver.__main__ import main
+    from sound.scenes.playing.play import perform
+    from tests.scenes import require_engine
+
+    require_engine()
+    how = ["builtin:bar", "--resolution", "12", "--modes", "10", "--no-estimate", "--out"]
+    files = [str(tmp_path / f"{name}.h5") for name in ("fine", "coarse", "other")]
+    for file, more in zip(files, ([], ["--coarsen", "average"], ["--unit", "2"])):
+        assert main(["modes", *how, file, *more]) == 0
+    given = {"name": "bar", "modes": files[0], "material": "steel", "position": [0, 0, 0.1]}
+    given["rotation"] = [0, 20, 0]
+    sound = {"full_scale": 1e3, "rate": 8000}
+    fine, coarse, same = (
+        perform(scene({**given, **heard}, seconds=0.3, sound=sound), 1, visible=False)
+        for heard in ({}, {"heard_modes": files[1]}, {"heard_modes": files[0]})
+    )
+    assert np.array_equal(fine.picture.motion.positions, coarse.picture.motion.positions)
+    assert np.array_equal(fine.sound, same.sound)
+    assert fine.voices[0].frequencies[0] != coarse.voices[0].frequencies[0]
+    assert np.abs(fine.sound - coarse.sound).max() > 0.01 * np.abs(fine.sound).max()
+    with pytest.raises(UserError, match="is of another solid"):
+        body(**{**given, "name": "it", "heard_modes": files[2]})

@@ -79,8 +79,8 @@ ARROWS = {
         solver.linear solver.subspace solver.analysis sound sound.clips sound.project""",
     "sound.rendering": """solver.files solver.response solver.subspace sound sound.clips
         sound.project""",
-    "sound.scenes": """solver.analysis solver.files solver.response sound sound.project
-        sound.rendering""",
+    "sound.scenes": """solver.analysis solver.files solver.refinement solver.response
+        solver.accuracy sound sound.project sound.rendering""",
     "sound.scenes.contact": "sound.scenes",
     "sound.scenes.audible": "solver.response sound.rendering sound.scenes sound.scenes.contact",
     "sound.scenes.film": "sound sound.scenes",
@@ -92,14 +92,14 @@ ARROWS = {
     #
     "studio": "",
     "studio.standalone": "sound sound.project sound.design sound.rendering studio",
-    "studio.scene": "sound.scenes studio studio.standalone",
+    "studio.scene": "solver.refinement sound.scenes studio studio.standalone",
     "studio.processes": """solver.files solver.response solver.analysis sound sound.clips
         sound.project sound.design sound.rendering sound.export studio studio.standalone""",
     "studio.session": "sound sound.clips sound.project studio studio.processes",
     "studio.server": "sound.project studio",
-    "studio.commands": """sound sound.clips sound.project sound.scenes sound.scenes.film
-        sound.scenes.playing sound.export studio.standalone studio.scene studio.server
-        studio.session""",
+    "studio.commands": """solver.refinement sound sound.clips sound.project sound.scenes
+        sound.scenes.film sound.scenes.playing sound.export studio.standalone studio.scene
+        studio.server studio.session""",
     #
     "workflow": "dataset_gen dataset_gen.objectives forests forests.studies",
     "workflow.estimate": "dataset_gen.objectives workflow",
@@ -119,6 +119,8 @@ ARROWS = {
     "workflow.studies.sounds": """solver.files solver.response sound sound.clips sound.project
         sound.design sound.rendering workflow workflow.studies.base""",
     "workflow.studies.scenes": "workflow workflow.studies.base workflow.studies.sounds",
+    "workflow.studies.scene_spectra": """solver.files solver.response workflow
+        workflow.studies.base workflow.studies.sounds""",
     "workflow.studies.recordings": "solver.response sound.clips workflow.studies.base",
     "workflow.studies.validation": """solver.files solver.refinement solver.response
         solver.studies workflow workflow.studies.base workflow.studies.report""",

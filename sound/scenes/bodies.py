@@ -14,7 +14,7 @@ from carillon.fem.model import RIGID_MODES, Solid
 from carillon.fem.rigid import MassProperties, mass_properties
 from carillon.files import kind_of
 from carillon.limits import EXTENTS
-from solver.files.modes_file import read_modes
+from solver.files.modes_file import read_modes, require_same_solid
 from solver.refinement.errors import FROM_SOLID
 from solver.response.response import Damping
 from sound.project.design import Design
@@ -161,7 +161,11 @@ def _of_modes(entry: ObjectEntry, path: str) -> Body:
     from scipy.spatial import cKDTree
 
     file = read_modes(path)
-    solid = SoundingSolid.of_modes(file, Damping(*entry.damping))
+    heard = file
+    if entry.heard_modes is not None:
+        heard = read_modes(_of_kind(entry.heard_modes, "modes"))
+        require_same_solid((path, entry.heard_modes), (file, heard))
+    solid = SoundingSolid.of_modes(heard, Damping(*entry.damping))
     rigid = mass_properties(file.model)
     vertices, faces = _voxel_surface(file.model)
     shape = Shape.of_surface(vertices, faces, rigid.centre)
@@ -174,9 +178,9 @@ def _of_modes(entry: ObjectEntry, path: str) -> Body:
         young = np.full(len(vertices), moduli.mean())
     giving = compliance(young, file.model.poisson)
     body = _assembled(entry, rigid, shape, giving, solid, upright(file.attributes.get("mesh", "")))
-    told = {key: value for key, value in file.attributes.items() if key.startswith(FROM_SOLID)}
+    told = {key: value for key, value in heard.attributes.items() if key.startswith(FROM_SOLID)}
     kept = ("discretisation", "resolution")
-    told |= {key: file.attributes[key] for key in kept if told and key in file.attributes}
+    told |= {key: heard.attributes[key] for key in kept if told and key in heard.attributes}
     return replace(body, accuracy=told or None)
 
 

@@ -18,6 +18,8 @@ from sound.scenes.materials import NamedMaterial, named_material
 SCHEMA = Path(__file__).parent / "scene.schema.yaml"
 SOURCES = ("design", "modes", "mesh", "radius")
 """What an object may be, one of them."""
+FILES = ("design", "modes", "mesh", "heard_modes")
+"""Keys of an object that name files."""
 STANDARD_MATERIAL = "plastic"
 """Of designs and modes files, for what these do not tell."""
 Vector = tuple[float, float, float]
@@ -34,6 +36,7 @@ class ObjectEntry:
     name: str
     design: str | None
     modes: str | None
+    heard_modes: str | None
     mesh: str | None
     radius: float | None
     material: NamedMaterial
@@ -123,7 +126,7 @@ class Scene:
     @property
     def files(self) -> list[str]:
         """Files that it is made from."""
-        named = [getattr(each, key) for each in self.objects for key in SOURCES[:3]]
+        named = [getattr(each, key) for each in self.objects for key in FILES]
         return [name for name in named if name and not name.startswith(BUILTIN_PREFIX)]
 
 
@@ -207,7 +210,7 @@ def _object(where: str, entry: Mapping[str, Any], folder: Path) -> ObjectEntry:
         for key in ("density", "friction", "restitution", "roughness")
     }
     damping = entry["damping"] or (material.alpha, material.beta)
-    files = {key: _file(entry[key], folder) for key in SOURCES[:3]}
+    files = {key: _file(entry[key], folder) for key in FILES}
     vectors = {key: _vector(entry[key]) for key in ("position", "rotation", "velocity", "spin")}
     colour = _vector(entry["colour"] or material.colour)
     return ObjectEntry(
@@ -226,6 +229,7 @@ def _object(where: str, entry: Mapping[str, Any], folder: Path) -> ObjectEntry:
 def _require_suiting(where: str, entry: Mapping[str, Any], source: str) -> None:
     """Refuse keys that have no meaning for what an object is."""
     suits = {"unit": ("mesh",), "pitch": ("mesh", "radius"), "density": ("mesh", "radius")}
+    suits["heard_modes"] = ("modes",)
     suits["damping"] = ("modes", "mesh", "radius")
     suits["discretisation"] = suits["components"] = ("mesh", "radius")
     standard = scene_schema()["properties"]["objects"]["items"]["properties"]

@@ -20,7 +20,7 @@ from carillon.cache import remembered
 from carillon.errors import UserError
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.geometry import hexmesh_from_voxels, voxelize
-from carillon.fem.model import RIGID_MODES, Solid, fine_model
+from carillon.fem.model import RIGID_MODES, ElasticModel, Solid, fine_model
 from carillon.progress import say
 from carillon.threads import one_thread
 from solver.accuracy.estimate import estimate_cell_errors
@@ -195,7 +195,8 @@ def _resized(model: Solid, size: float) -> Solid:
 
     if isinstance(model, FiniteCellModel):
         return replace(model, cells=replace(model.cells, mesh=resized(model.cells.mesh)))
-    return replace(model, mesh=resized(model.mesh))  # type: ignore[call-arg]
+    assert isinstance(model, ElasticModel)
+    return replace(model, mesh=resized(model.mesh))
 
 
 def _read(path: Path) -> UniformSolid:

@@ -33,6 +33,7 @@ ALL = {
     RECORDING,
     RECORDINGS,
     SCENES,
+    SCENE_SPECTRA,
 ) = ALL.values()
 STUDIES = (REPORT, FIGURES, OBJECTIVES, COARSENING, DISCRETISATION, ACCURACY, FORESTS)
 """Those whose tables, figures and page are made one after the other."""
