@@ -172,7 +172,7 @@ def test_no_finer_parts_are_asked_for_than_can_be_had() -> None:
 @pytest.mark.parametrize("faces", [[(0, 1, 2)], []])
 def test_what_encloses_nothing_is_refused(faces: list[tuple[int, int, int]]) -> None:
     vertices = np.array([(0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.0, 0.1, 0.0)])
-    with pytest.raises(UserError, match="^the surface encloses nothing that 40 cells"):
+    with pytest.raises(UserError, match="^the surface encloses nothing that 160 cells"):
         convex_parts(vertices, np.array(faces, dtype=int).reshape(-1, 3))
 
 
