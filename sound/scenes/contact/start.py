@@ -100,14 +100,13 @@ def _move_apart(
         if not found:
             return moved
         if not moved:
-            _require_shallow(found, data, bodies)
             least *= CLEAR
+            _require_shallow(mujoco, model, data, found, bodies, least)
         for each in found:
             for number, way in zip(each.pair, _ways(each, scene, bodies)):
                 if way.any():
                     moved[number] = moved.get(number, np.zeros(3)) + way
-                    first = model.jnt_qposadr[model.body_jntadr[number + 1]]
-                    data.qpos[first : first + 3] += way
+                    _move(model, data, number, way)
         mujoco.mj_forward(model, data)
     names = " and ".join(_name(number, bodies) for number in found[0].pair)
     raise UserError(
@@ -138,7 +137,14 @@ def _overlaps(model: Any, data: Any) -> list[Overlap]:
     return [deepest[pair] for pair in sorted(deepest)]
 
 
-def _require_shallow(found: Sequence[Overlap], data: Any, bodies: Sequence[Body]) -> None:
+def _require_shallow(
+    mujoco: ModuleType,
+    model: Any,
+    data: Any,
+    found: Sequence[Overlap],
+    bodies: Sequence[Body],
+    least: float,
+) -> None:
     def excess(each: Overlap) -> float:
         sides = [_longest_side(bodies[number]) for number in each.pair if number != GROUND]
         return each.depth / (OVERLAP * min(sides))
@@ -149,16 +155,37 @@ def _require_shallow(found: Sequence[Overlap], data: Any, bodies: Sequence[Body]
     names = " and ".join(_name(number, bodies) for number in worst.pair)
     start = f"{names} overlap by {1e3 * worst.depth:.3g} mm at the start"
     first, second = worst.pair
-    if second == GROUND:
-        height = float(data.xpos[first + 1][2]) + worst.depth
-        raise UserError(f"{start}; it rests on it at a height (z) of {_up(height)} m")
-    way, free = (worst.depth, first) if not bodies[first].entry.fixed else (-worst.depth, second)
-    place = data.xpos[free + 1] + way * worst.normal
+    free = second if bodies[first].entry.fixed else first
+    begin = data.xpos[free + 1].copy()
+    place = _clear_place(mujoco, model, data, worst.pair, free, least)
+    if place is None:
+        raise UserError(f"{start}; move them apart")
     # Rounded away from the other one, so that the place can be written as it is told.
-    rounded = [_up(x, n) for x, n in zip(place, np.sign(way) * worst.normal)]
+    rounded = [_rounded(x, way) for x, way in zip(place, place - begin)]
+    if second == GROUND:
+        raise UserError(f"{start}; it rests on it at a height (z) of {rounded[2]} m")
     raise UserError(
         f"{start}; {_name(free, bodies)} would be clear at the position [{', '.join(rounded)}]"
     )
+
+
+def _clear_place(
+    mujoco: ModuleType, model: Any, data: Any, pair: tuple[int, int], free: int, least: float
+) -> Array | None:
+    """Where (3,) [m] one of a pair, moved alone, is clear of the other one."""
+    side = 1.0 if free == pair[0] else -1.0
+    for _ in range(ROUNDS):
+        found = [each for each in _overlaps(model, data) if each.pair == pair]
+        if not found or found[0].depth <= least:
+            return np.array(data.xpos[free + 1])
+        _move(model, data, free, side * found[0].depth * found[0].normal)
+        mujoco.mj_forward(model, data)
+    return None
+
+
+def _move(model: Any, data: Any, number: int, way: Array) -> None:
+    first = model.jnt_qposadr[model.body_jntadr[number + 1]]
+    data.qpos[first : first + 3] += way
 
 
 def _ways(each: Overlap, scene: Scene, bodies: Sequence[Body]) -> tuple[Array, Array]:
@@ -182,10 +209,12 @@ def _name(number: int, bodies: Sequence[Body]) -> str:
     return "the ground" if number == GROUND else f"object {bodies[number].entry.name!r}"
 
 
-def _up(value: float, direction: float = 1.0) -> str:
-    """A coordinate [m] to a hundredth of a millimetre, rounded in a direction."""
+def _rounded(value: float, direction: float) -> str:
+    """A coordinate [m] to a hundredth of a millimetre, rounded in a direction if there is one."""
+    if abs(direction) < 1e-9:
+        return f"{value:.5g}"
     hundredths = np.ceil(1e5 * value) if direction > 0.0 else np.floor(1e5 * value)
-    return f"{hundredths / 1e5:.5g}" if abs(direction) > 1e-6 else f"{value:.5g}"
+    return f"{hundredths / 1e5:.7g}"
 
 
 def _in_words(moved: dict[int, Array], data: Any, bodies: Sequence[Body]) -> str:
