@@ -39,6 +39,8 @@ def test_everything_is_written_and_told(folder, capsys):
     samples, rate = soundfile.read("s.wav")
     assert samples.shape == (round(0.6 * rate), 2) and np.abs(samples).max() <= 1.0
     assert told["objects"] == 2 and told["modes"] == 6
+    assert told["accuracy"]["bar"]["discretisation"] == "finite-cell"
+    assert 0.0 < told["accuracy"]["bar"]["solid_frequency_error_rms"] and not told["moved_metres"]
     assert all((folder / f"s.{ending}").stat().st_size for ending in ("webm", "html", "glb"))
     with open("s.csv", newline="") as file:
         lines = list(csv.DictReader(file))
@@ -70,3 +72,12 @@ def test_a_tune_strikes_its_bars_in_turn_in_time_and_in_tune():
     assert beats == pytest.approx(BEAT_SECONDS, rel=0.03)
     hertz = [body.solid.frequencies[0] for body in bodies[1:]]
     assert np.log2(np.array(hertz) / 440.0) * 12 == pytest.approx([27, 31, 34], abs=0.01)
+
+
+def test_the_summary_tells_the_distance_and_what_was_moved(folder, capsys):
+    described = SCENE.replace("0.02, 0, 0.2]", "0.3, 0, 0.00995]").replace("0.6", "0.2")
+    (folder / "scene.yaml").write_text(described)
+    assert main(["scene", "scene.yaml", "--out", "s.wav"]) == 0
+    told = capsys.readouterr()
+    assert "expected distance from the solid, of 'bar' of frequencies 7 to 12: " in told.out
+    assert "object 'marble' by 0.05 mm to [0.3, 0, 0.01]" in told.err
