@@ -9,9 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from solver.response.response import FLOOR_DECIBELS, decibels
 from workflow.studies.base import numbers
 from workflow.studies.base.colours import COLOURS, themed
-from workflow.studies.base.media import cropped
+from workflow.studies.base.media import cropped, highest_hertz, spectrogram_figure
 from workflow.studies.base.numbers import show
 from workflow.studies.base.style import svg
 from workflow.studies.base.table import Column, Table, read_table, write_table
@@ -190,3 +191,14 @@ def test_a_solid_that_was_left_fine_is_told_as_such():
     assert "and the fine model was solved: Pitcher; Jug (too soft)." in told
     assert "It was slower than SLEPc on none of the solids." in told
     assert "none of the solids" in costs(tables)[1]
+
+
+def test_a_solid_that_is_not_heard_has_a_spectrogram_too():
+    rate = 44100
+    silence = np.zeros(rate // 4)
+    tone = np.sin(2.0 * np.pi * 3000.0 * np.arange(rate // 4) / rate)
+    assert highest_hertz([(tone, rate), (silence, rate)]) == highest_hertz([(tone, rate)])
+    with np.errstate(all="raise"):
+        levels = decibels(silence, 0.0)
+        figure = spectrogram_figure(silence, 0.0, highest_hertz([(silence, rate)]), rate)
+    assert (levels == FLOOR_DECIBELS).all() and figure.axes

@@ -166,9 +166,10 @@ def spectrogram(sound: Array, rate: int = SAMPLE_RATE_HERTZ) -> tuple[Array, Arr
 
 
 def decibels(magnitudes: Array, loudest: float) -> Array:
-    """Levels below the `loudest` magnitude, not below `FLOOR_DECIBELS`."""
+    """Levels below the `loudest` magnitude, not below `FLOOR_DECIBELS`, where all of silence is."""
     floor = 10.0 ** (FLOOR_DECIBELS / 20.0)
-    return np.asarray(20.0 * np.log10(np.maximum(magnitudes / loudest, floor)))
+    shares = magnitudes / loudest if loudest > 0.0 else np.zeros_like(magnitudes)
+    return np.asarray(20.0 * np.log10(np.maximum(shares, floor)))
 
 
 def spectral_distance(sound: Array, truth: Array) -> float:

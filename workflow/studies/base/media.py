@@ -126,11 +126,11 @@ def spectrogram_figure(
 
 
 def highest_hertz(sounds: Iterable[tuple[Array, int]]) -> float:
-    """Frequency up to which the loudest sounds, each with its rate, reach, with room above."""
+    """Frequency up to which sounds, each with its rate, reach, with room above; silence is none."""
     highest, limit = 0.0, np.inf
     for sound, rate in sounds:
         _, hertz, magnitudes = spectrogram(sound, rate)
         heard = (decibels(magnitudes, float(magnitudes.max())) > FLOOR_DECIBELS).any(axis=1)
-        highest = max(highest, float(hertz[heard].max()))
+        highest = max(highest, float(hertz[heard].max(initial=0.0)))
         limit = min(limit, float(hertz[-1]))
     return min(1.1 * highest + 200.0, limit)
