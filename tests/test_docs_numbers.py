@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from functools import cache
 from importlib import import_module
@@ -13,7 +14,7 @@ from carillon.fem.geometry.builtin import BUILTINS, THIN, TRIALS
 from tests.documentation import CHECKOUT
 from workflow.studies.base.numbers import show
 from workflow.studies.base.table import Table, read_csv_table
-from workflow.studies.claims.results import REFERENCE
+from workflow.studies.claims.results import MEASURED, REFERENCE
 
 QUOTED = yaml.safe_load((CHECKOUT / "tests" / "quoted_numbers.yaml").read_text())
 WALL_TIMES = {
@@ -65,6 +66,21 @@ def test_quoted_numbers_are_those_of_tables_and_code(quoted):
     constants = [constant(each, quoted.get("factor", 1)) for each in quoted.get("constants", ())]
     sentence = re.sub(r"\{\}", "%s", quoted["sentence"].replace("%", "%%"))
     assert sentence % (*numbers, *constants) in words(quoted["page"])
+
+
+def test_arpack_without_a_factorisation_took_what_the_page_says():
+    (row,) = json.loads(MEASURED.read_text(encoding="utf-8")).values()
+    times = row["seconds"]
+    seconds = [times[name] for name in ("arpack_regular", "slepc", "ddfem_ec", "ddfem_ec_warm")]
+    ratios = [seconds[0] / seconds[2], seconds[0] / seconds[3]]
+    text = words("docs/results/measured.md")
+    assert "it took {:.1f} s for {} modes".format(seconds[0], row["modes"]) in text
+    assert (
+        "SLEPc took {:.2f} s, and the coarse model {:.2f} s cold and {:.3f} s".format(*seconds[1:])
+        in text
+    )
+    assert "{:.0f} and {:.0f} times as long".format(*ratios) in text
+    assert f"`{row['provenance']['command']}`" in text
 
 
 def test_the_tutorial_names_all_solids_that_come_along():

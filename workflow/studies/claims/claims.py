@@ -208,8 +208,9 @@ def total(claims: Claims) -> Finding:
         plain = seconds["arpack_regular"]
         cold, warm = [plain / seconds["ddfem_ec"]], [plain / seconds["ddfem_ec_warm"]]
         told.append(
-            f"ARPACK without a factorisation, {show(plain, 'seconds')} ({row['model']}, "
-            f"{show(row['dof_fine'], 'count')} unknowns): {ends(cold)} cold, {ends(warm)} warm"
+            f"ARPACK without a factorisation, {show(plain, 'seconds')} for {row['modes']} modes of "
+            f"the {row['model']} of {show(row['dof_fine'], 'count')} unknowns ({row['clock']}): "
+            f"{ends(cold)} cold, {ends(warm)} warm"
         )
         ratios += [*cold, *warm]
     if design.rows:
