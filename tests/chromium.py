@@ -6,7 +6,7 @@ import functools
 import http.server
 import shutil
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -39,10 +39,24 @@ def chromium(*arguments: str) -> Iterator[Any]:
     api.expect.set_options(timeout=1000.0 * PATIENCE_SECONDS)
     with api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=program, args=[*ARGUMENTS, *arguments])
+        for name in ("new_page", "new_context"):
+            setattr(browser, name, _patient(getattr(browser, name)))
         try:
             yield browser
         finally:
             browser.close()
+
+
+def _patient(make: Callable[..., Any]) -> Callable[..., Any]:
+    """What makes a page or a context whose actions may take as long as on a busy machine."""
+
+    @functools.wraps(make)
+    def made(*arguments: Any, **options: Any) -> Any:
+        found = make(*arguments, **options)
+        found.set_default_timeout(1000.0 * PATIENCE_SECONDS)
+        return found
+
+    return made
 
 
 class _Files(http.server.SimpleHTTPRequestHandler):

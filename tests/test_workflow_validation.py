@@ -74,7 +74,7 @@ def words_of(page: Page) -> str:
     return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", text))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_good_spectrum_passes_in_words(run, page):
     text = words_of(page)
     assert "Passed: all 17 criteria are met." in text
@@ -87,7 +87,7 @@ def test_a_good_spectrum_passes_in_words(run, page):
         assert criterion == row["label"] + row["why"] + row["source"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_distance_from_the_solid_is_told_and_not_judged(run, page):
     (row,) = read_table(run / "validation" / "tables" / "block-solid.json").rows
     assert 0.0 < row["rms"] < abs(row["worst"]) < 1.0 and row["modes"] == "7–24"
@@ -96,7 +96,7 @@ def test_the_distance_from_the_solid_is_told_and_not_judged(run, page):
     assert row["told"] in text and "--discretisation finite-cell" in text
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_page_needs_nothing_from_elsewhere_and_can_be_heard(page):
     assert_self_contained(page)
     assert page.source.count("data:audio/wav;base64,") == len(SHOWN)
@@ -104,7 +104,7 @@ def test_page_needs_nothing_from_elsewhere_and_can_be_heard(page):
     assert len(page.source) < 4e6
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_no_forest_was_trained_and_the_point_that_was_named_is_struck(run):
     assert not (run / "dataset").exists() and not (run / "forests").exists()
     strike = read_response(run / "models" / "block" / "response.h5").contacts["strike"]
@@ -114,7 +114,7 @@ def test_no_forest_was_trained_and_the_point_that_was_named_is_struck(run):
     assert config["validation"]["tolerances"]["frequency_rms"] == 0.5
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_every_number_tells_its_origin(run, page):
     rows = read_table(run / "validation" / "tables" / "block-provenance.json").rows
     files = {row["file"] for row in rows}
@@ -126,7 +126,7 @@ def test_every_number_tells_its_origin(run, page):
         assert re.search(rf"\b{name} SHA-256 begins with [0-9a-f]{{16}}\b", words_of(page))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_mode_that_is_missing_fails_in_words(run, tmp_path):
     """HCMS + EC is robbed of mode 10, and everything after it is done again."""
     shutil.copytree(run, tmp_path / "spoiled", ignore=shutil.ignore_patterns(".snakemake"))

@@ -35,7 +35,7 @@ WITHOUT_MPI = ("dataset_gen", "forests", "tests.hostile.configure", "snakemake")
 MARK = "CARILLON_HOSTILE_JOB"
 """Environment variable by which processes that a job has started are known."""
 NOBODY = 65534
-GRACE_SECONDS = 15.0
+GRACE_SECONDS = 60.0
 """Within which what a job has started has to end after it, on a machine under load."""
 IDLE_SECONDS = 15.0
 """After which a job of which nothing runs, nor wants to, is said to sleep for ever."""
