@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import copy
+import subprocess
+import sys
 from dataclasses import fields
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -18,7 +21,7 @@ from solver.analysis.problem import ProblemOptions
 from solver.response.response_file import StrikeOptions
 from solver.studies.benchmark.options import BenchmarkOptions
 from solver.studies.scaling.study import ScalingOptions
-from workflow import settings
+from workflow import settings, solids
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 CONFIGS = CHECKOUT / "workflow" / "config"
@@ -183,16 +186,80 @@ def test_keys_that_are_options_have_their_choices_and_defaults(section):
             assert part["default"] == default, path
 
 
-def test_materials_and_objectives_of_the_schema_exist():
-    from dataset_gen.objectives import DATASET_OBJECTIVES
-
+def test_materials_are_told_where_a_file_may_be_named():
     schema = settings.schema()["properties"]
-    assert set(schema["dataset"]["properties"]["objective"]["enum"]) == set(DATASET_OBJECTIVES)
     material = schema["models"]["additionalProperties"]["properties"]["material"]["description"]
     assert all(name in material for name in settings.MATERIALS)
 
 
-def test_built_in_objects_are_those_of_the_solver():
-    from carillon.fem.geometry.builtin import BUILTINS
+LISTS = {
+    "discretisation": "solver.analysis.problem:DISCRETISATIONS",
+    "fill": "carillon.fem.geometry:FILLS",
+    "components": "carillon.fem.geometry:COMPONENTS",
+    "material": "carillon.fem.materials:NAMES",
+    "materials": "carillon.fem.materials:NAMES",
+    "distributions": "dataset_gen.sampling:DISTRIBUTIONS",
+    "ranges": "dataset_gen.sampling:DISTRIBUTIONS",
+    "objective": "dataset_gen.objectives:DATASET_OBJECTIVES",
+    "interface": "solver.hcms.condense:INTERFACES",
+    "rivals": "solver.studies.benchmark.further:RIVALS",
+    "quantity": "workflow.studies.objectives.goals:LABELS",
+    "solids": "solver.studies.accuracy.solids:SOLIDS",
+}
+"""Where the code holds what a key of the schema enumerates, by the name of the key."""
+EXAMPLES = {
+    "sound.examples": "workflow/studies/sounds/examples.yaml",
+    "sound.recordings": "workflow/studies/sounds/examples.yaml",
+    "scenes.examples": "workflow/studies/scenes/examples.yaml",
+}
+"""The same of those that are entries of a file."""
 
-    assert tuple(BUILTINS) == settings.BUILTIN_MESHES
+
+def enumerations(part: object, path: tuple[str, ...] = ()) -> list[tuple[str, list[str]]]:
+    """Every list of choices in the schema, after the keys that it is of."""
+    if isinstance(part, list):
+        return [found for each in part for found in enumerations(each, path)]
+    if not isinstance(part, dict):
+        return []
+    here = [(".".join(path), part["enum"])] if "enum" in part else []
+    for key, each in part.items():
+        inner = part.get("properties") is not None and key == "properties"
+        keys = each.items() if inner else [(None, each)]
+        for name, below in keys:
+            here += enumerations(below, path if name is None else (*path, name))
+    return here
+
+
+@pytest.mark.parametrize(("path", "choices"), enumerations(settings.schema()), ids=str)
+def test_every_list_of_the_schema_is_that_of_the_code(path, choices):
+    """Snakemake reads the schema by itself, so that it has to hold them, too."""
+    name = path.split(".")[-1]
+    if path in EXAMPLES:
+        entries = yaml.safe_load((CHECKOUT / EXAMPLES[path]).read_text())
+        assert set(choices) <= set(entries.get("scenes", entries)), path
+        return
+    module, _, attribute = LISTS[name].partition(":")
+    held = getattr(import_module(module), attribute)
+    assert sorted(set(choices) - {"all"}) == sorted(held), path
+
+
+def test_built_in_solids_are_known_without_loading_what_makes_them():
+    from carillon.fem.geometry.builtin import builtin_surface
+
+    for name in settings.BUILTIN_NAMES:
+        assert builtin_surface(name).is_volume, name
+    with pytest.raises(UserError) as error:
+        builtin_surface("gong")
+    assert str(error.value).endswith(f"expected one of {', '.join(settings.BUILTIN_NAMES)}")
+    program = "import sys, workflow.settings; assert not {'trimesh', 'numba'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", program], check=True)
+
+
+@pytest.mark.parametrize("section", ["models", *solids.STUDIED])
+def test_a_built_in_solid_that_there_is_not_is_named_with_its_key(section):
+    config = load("laptop")
+    models = config["models"] if section == "models" else config[section]["models"]
+    models["gong"] = {**next(iter(models.values())), "mesh": "builtin:gong"}
+    where = "models" if section == "models" else f"{section}.models"
+    with pytest.raises(UserError, match=rf"{where}\.gong\.mesh: there is no builtin:gong"):
+        settings.check_links(config)

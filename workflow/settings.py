@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from snakemake.utils import update_config, validate
 from carillon import provenance
 from carillon.documents import read_own_yaml, read_yaml
 from carillon.errors import UserError
+from carillon.fem.builtin_names import BUILTIN_NAMES, BUILTIN_PREFIX
 from carillon.fem.materials import NAMES as MATERIALS
 from dataset_gen.objectives import OBJECTIVES, require_objective
 from forests import default as default_forests
@@ -31,9 +32,6 @@ FOLDER = Path(__file__).resolve().parent
 """Of the rules and all that belongs to them."""
 SCHEMA = FOLDER / "schemas" / "config.schema.yaml"
 CONFIGURATION = "a configuration"
-BUILTIN = "builtin:"
-BUILTIN_MESHES = ("bar", "bell", "bowl", "box", "frying-pan", "pitcher", "plate", "snare-drum")
-"""As in `carillon.fem.geometry.builtin`, which takes too long to load for every planned job."""
 
 
 @cache
@@ -116,13 +114,10 @@ def check_links(config: Mapping[str, Any]) -> None:
         `objectives.objectives` names no objective, or training data make no sense.
     """
     require_place(Path(config["results_dir"]), "results_dir")
+    for where, models in _solids(config):
+        for name, model in models.items():
+            require_known_mesh(f"{where}.{name}.mesh", model["mesh"])
     for name in config["models"]:
-        mesh = mesh_of(config, name)
-        if mesh.startswith(BUILTIN) and mesh.removeprefix(BUILTIN) not in BUILTIN_MESHES:
-            raise UserError(
-                f"models.{name}.mesh: there is no {mesh}, expected a file or {BUILTIN}NAME with "
-                f"{', '.join(BUILTIN_MESHES)}"
-            )
         for path in model_files(config, name):
             if not Path(path).is_file():
                 raise UserError(
@@ -153,6 +148,15 @@ def check_links(config: Mapping[str, Any]) -> None:
             raise UserError(f"objectives.objectives: {error}") from None
 
 
+def require_known_mesh(where: str, mesh: str) -> None:
+    """Raise UserError unless a mesh that is called built-in is one, as the key `where` says."""
+    if mesh.startswith(BUILTIN_PREFIX) and mesh.removeprefix(BUILTIN_PREFIX) not in BUILTIN_NAMES:
+        raise UserError(
+            f"{where}: there is no {mesh}, expected a file or {BUILTIN_PREFIX}NAME with "
+            f"{', '.join(BUILTIN_NAMES)}"
+        )
+
+
 def mesh_of(config: Mapping[str, Any], model: str, section: str | None = None) -> str:
     """Mesh argument of the solver: `builtin:NAME` or the path of a file.
 
@@ -171,7 +175,7 @@ def material_of(config: Mapping[str, Any], model: str) -> str:
 def model_files(config: Mapping[str, Any], model: str) -> list[str]:
     """Files that a model is made from; none for a built-in object with a named material."""
     mesh, material = mesh_of(config, model), material_of(config, model)
-    files = [] if mesh.startswith(BUILTIN) else [mesh]
+    files = [] if mesh.startswith(BUILTIN_PREFIX) else [mesh]
     return files if material in MATERIALS else [*files, material]
 
 
@@ -213,6 +217,15 @@ def _forests_of_package() -> str:
     return str(file.relative_to(here) if file.is_relative_to(here) else file)
 
 
+def _solids(config: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Solids by name, of the run and of every section that has some of its own, after its key."""
+    yield "models", config["models"]
+    for section, part in config.items():
+        models = part.get("models") if isinstance(part, Mapping) and section != "models" else None
+        if isinstance(models, Mapping):
+            yield f"{section}.models", models
+
+
 def _require_models(where: str, names: Iterable[str], models: Iterable[str]) -> None:
     known = list(models)
     for name in names:
@@ -222,7 +235,7 @@ def _require_models(where: str, names: Iterable[str], models: Iterable[str]) -> 
 
 def located(config: Mapping[str, Any], mesh: str) -> str:
     """Mesh argument of the solver: `builtin:NAME`, or the path of a file below mesh_folder."""
-    return mesh if mesh.startswith(BUILTIN) else _in_mesh_folder(config, mesh)
+    return mesh if mesh.startswith(BUILTIN_PREFIX) else _in_mesh_folder(config, mesh)
 
 
 def _in_mesh_folder(config: Mapping[str, Any], path: str) -> str:

@@ -29,7 +29,7 @@ MEASURED = {
 def mesh_files(config: Config, section: str, solid: str) -> list[str]:
     """Mesh file of a solid; none for a built-in object."""
     mesh = settings.mesh_of(config, solid, section)
-    return [] if mesh.startswith(settings.BUILTIN) else [mesh]
+    return [] if mesh.startswith(settings.BUILTIN_PREFIX) else [mesh]
 
 
 def absent_meshes(config: Config, section: str) -> dict[str, str]:

@@ -8,8 +8,10 @@ from __future__ import annotations
 import argparse
 import json
 
+from carillon.arguments import number_between
 from carillon.provenance import record
 from solver.commands.running import on_ranks, parameters, require_outputs, write_json
+from solver.correction.correction import EIGENVALUE_TOLERANCE
 from solver.studies.audit import audit_files
 
 EXAMPLES = """example:
@@ -20,6 +22,13 @@ EXAMPLES = """example:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     parser.add_argument("files", nargs="+", metavar="FILE", help="modes files")
+    parser.add_argument(
+        "--tolerance",
+        type=number_between(1e-15, 1.0),
+        default=EIGENVALUE_TOLERANCE,
+        help="relative error that the eigenvalues were asked for to, which decides how wide the "
+        "gap has to be below which they are counted (default: %(default)g)",
+    )
     parser.add_argument("--out", help="also write the result to this JSON file")
     parser.add_argument("--json", action="store_true", help="print JSON")
 
@@ -28,7 +37,8 @@ def run(arguments: argparse.Namespace) -> None:
     """Audit and print."""
     with on_ranks():
         require_outputs(arguments)
-        audits = {name: audit.as_dict() for name, audit in audit_files(arguments.files).items()}
+        found = audit_files(arguments.files, arguments.tolerance)
+        audits = {name: audit.as_dict() for name, audit in found.items()}
     content = {"spectra": audits, "provenance": record(parameters(arguments))}
     write_json(arguments, content)
     if arguments.json:

@@ -63,6 +63,10 @@ class Contacts:
     motion: Array
     push: Array
 
+    def lowest(self, count: int) -> Contacts:
+        """The same without all modes beyond the first `count`."""
+        return Contacts(self.eigenvalues[:count], self.motion[:, :, :count], self.push[:, :count])
+
 
 def at_contacts(file: ModesFile, contacts: list[Contact]) -> Contacts:
     """Elastic modes of a solid at points of its surface, interpolated in the cells they lie in.

@@ -30,13 +30,15 @@ from solver.response.response import (
     relative_difference,
     spectral_distance,
 )
+from solver.subspace.spectrum import clusters
 
 Array = NDArray[np.float64]
 
 KIND = "response"
-SCHEMA = 1
+SCHEMA = 2
 TRUTH = "truth"
 POINTS = ("strike", "observed", "third")
+SEEN = {"eigenvalues": "rad^2/s^2", "motion": "kg^-1/2", "push": "kg^-1/2"}
 INSTANTS = 1500
 
 
@@ -115,6 +117,9 @@ class ResponseFile:
         Instants of the displacements.
     contacts
         The points, by the names `POINTS`.
+    seen
+        The truth's modes at these points, as far as motions are made of them: without the last
+        cluster, which the end of the spectrum may cut.
     responses
         By name of the spectrum, the first being the truth.
     attributes, provenance
@@ -123,6 +128,7 @@ class ResponseFile:
 
     seconds: Array
     contacts: dict[str, Contact]
+    seen: Contacts
     responses: dict[str, Response]
     attributes: dict[str, Any] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
@@ -148,7 +154,11 @@ def respond(
         seen[name] = at_contacts(candidate, points)
     period = 2.0 * np.pi / np.sqrt(seen[TRUTH].eigenvalues[0])
     seconds = np.linspace(0.0, options.periods * period, INSTANTS)
-    motions = {name: displacements(part, options.damping, seconds) for name, part in seen.items()}
+    whole = clusters(seen[TRUTH].eigenvalues)[-1].start or len(seen[TRUTH].eigenvalues)
+    motions = {
+        name: displacements(part.lowest(whole), options.damping, seconds)
+        for name, part in seen.items()
+    }
     sounds = _played(seen, options)
     for name in seen:
         if not (np.isfinite(motions[name]).all() and np.isfinite(sounds[name]).all()):
@@ -159,6 +169,7 @@ def respond(
     return ResponseFile(
         seconds,
         dict(zip(POINTS, points, strict=True)),
+        seen[TRUTH].lowest(whole),
         {
             name: Response(
                 motions[name],
@@ -187,6 +198,8 @@ def write_response(path: str | Path, response: ResponseFile, parameters: dict[st
         for name, contact in response.contacts.items():
             _put(file, f"points/{name}/position", contact.position, "m")
             _put(file, f"points/{name}/inward", contact.inward, "1")
+        for name, units in SEEN.items():
+            _put(file, f"seen/{name}", getattr(response.seen, name), units)
         for name, part in response.responses.items():
             _put(file, f"spectra/{name}/displacement", part.displacement, "m")
             _put(file, f"spectra/{name}/sound", part.sound, "m/s")
@@ -213,6 +226,7 @@ def read_response(path: str | Path) -> ResponseFile:
             name: Contact(file[f"points/{name}/position"][()], file[f"points/{name}/inward"][()])
             for name in POINTS
         }
+        seen = Contacts(*(file[f"seen/{name}"][()] for name in SEEN))
         responses = {}
         for name in attributes.pop("order"):
             group = file[f"spectra/{name}"]
@@ -224,7 +238,7 @@ def read_response(path: str | Path) -> ResponseFile:
                 float(group.attrs["distance_decibels"]),
             )
         return ResponseFile(
-            file["seconds"][()], contacts, responses, attributes, provenance.read(file)
+            file["seconds"][()], contacts, seen, responses, attributes, provenance.read(file)
         )
 
 

@@ -18,19 +18,23 @@ from numpy.typing import NDArray
 
 from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES
+from carillon.petsc import PETSc
 from solver.assembly.petsc_matrix import distributed_matrix
 from solver.assembly.sparse import assembled
+from solver.correction.correction import EIGENVALUE_TOLERANCE
 from solver.files.modes_file import ModesFile, read_modes
+from solver.linear.factorisation import factorised
 from solver.reference.truth import can_count, count_negative
 from solver.studies.comparison import recomputed_residuals
-from solver.subspace.verification import count_rigid
+from solver.subspace.verification import COLUMNS_AT_ONCE, count_rigid, residual_scale
 
 Array = NDArray[np.float64]
 
-LAST_MODES = 16
-"""Modes before the last one among which a gap is looked for, to count below it."""
-GAP = 1e-4
-"""Relative width of a gap in which inaccurate eigenvalues cannot be mistaken for others."""
+GAP, GAP_OF_TOLERANCE = 1e-4, 40.0
+"""Relative width of a gap in which inaccurate eigenvalues cannot be mistaken for others, and the
+same as a multiple of the tolerance that they were computed to."""
+NEGLIGIBLE, FEWEST_SOLVED = 1e-8, 8
+"""Residual ratio below which a residual is not looked at in energy, but for the largest few."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,14 @@ class Audit:
         Number of modes and of unknowns.
     residual_max, residual_median
         Of the residual ratios, see `solver.subspace.verification.residual_ratios`.
+    energy_residuals
+        (k,) residuals r = K x - lambda M x in energy: the root of r^T (K + s M)^-1 r / lambda,
+        where s is the last eigenvalue; lambda of rigid modes is the first elastic one.  Its square
+        is of the order of the eigenvalue's relative error.  Where the residual ratio is below
+        `NEGLIGIBLE`, that ratio.
+    rounding
+        (k,) by how much each eigenvalue changes, relatively, if every product with an entry of K is
+        rounded once: the unit roundoff times |x|^T |K| |x| / lambda.
     orthogonality
         Largest entry of |X^T M X - I|.
     rigid_modes
@@ -58,6 +70,8 @@ class Audit:
     unknowns: int
     residual_max: float
     residual_median: float
+    energy_residuals: list[float]
+    rounding: list[float]
     orthogonality: float
     rigid_modes: int
     counted_below: float
@@ -70,8 +84,12 @@ class Audit:
         return asdict(self)
 
 
-def audit_files(paths: Iterable[str | Path]) -> dict[str, Audit]:
+def audit_files(
+    paths: Iterable[str | Path], tolerance: float = EIGENVALUE_TOLERANCE
+) -> dict[str, Audit]:
     """Audits of modes files by the stems of their names, or by the names where stems are equal.
+
+    The `tolerance` is that to which the eigenvalues were asked for.
 
     Raises
     ------
@@ -81,18 +99,18 @@ def audit_files(paths: Iterable[str | Path]) -> dict[str, Audit]:
     names = list(dict.fromkeys(map(str, paths)))
     stems = [Path(path).stem for path in names]
     labels = stems if len(set(stems)) == len(stems) else names
-    return {label: _audited(path) for label, path in zip(labels, names, strict=True)}
+    return {label: _audited(path, tolerance) for label, path in zip(labels, names, strict=True)}
 
 
-def _audited(path: str) -> Audit:
+def _audited(path: str, tolerance: float) -> Audit:
     try:
-        return audit(read_modes(path))
+        return audit(read_modes(path), tolerance)
     except ArithmeticError as error:
         raise UserError(f"{path}: {error}; compute the modes again") from None
 
 
-def audit(file: ModesFile) -> Audit:
-    """Audit the contents of a modes file.
+def audit(file: ModesFile, tolerance: float = EIGENVALUE_TOLERANCE) -> Audit:
+    """Audit the contents of a modes file, whose eigenvalues were asked for to a `tolerance`.
 
     Raises
     ------
@@ -106,12 +124,15 @@ def audit(file: ModesFile) -> Audit:
         gram = file.modes.T @ (M @ file.modes)
     if not (np.isfinite(residuals).all() and np.isfinite(gram).all()):
         raise ArithmeticError("residuals or products of the modes are not finite numbers")
-    value, expected = gap_below_last(file.eigenvalues)
+    gap = max(GAP, GAP_OF_TOLERANCE * tolerance)
+    value, expected = gap_below_last(file.eigenvalues, gap)
     return Audit(
         len(file.eigenvalues),
         file.mesh.n_dofs,
         float(residuals.max()),
         float(np.median(residuals)),
+        _energy_residuals(file, K, M, residuals).tolist(),
+        _rounding(file, K).tolist(),
         float(np.abs(gram - np.eye(len(gram))).max()),
         count_rigid(file.eigenvalues),
         value,
@@ -121,7 +142,43 @@ def audit(file: ModesFile) -> Audit:
     )
 
 
-def gap_below_last(values: Array) -> tuple[float, int]:
+def _energy_residuals(file: ModesFile, K: sp.csr_matrix, M: sp.csr_matrix, ratios: Array) -> Array:
+    assert file.modes is not None
+    values, modes = file.eigenvalues, file.modes
+    found = ratios.copy()
+    largest = np.argsort(ratios)[-FEWEST_SOLVED:]
+    columns = np.union1d(np.flatnonzero(ratios > NEGLIGIBLE), largest)
+    scale = residual_scale(values)
+    matrix = distributed_matrix((K + values[-1] * M).tocsr(), MPI.COMM_SELF)
+    matrix.setOption(PETSc.Mat.Option.SPD, True)
+    factorisation = factorised(matrix, {})
+    for start in range(0, len(columns), COLUMNS_AT_ONCE):
+        few = columns[start : start + COLUMNS_AT_ONCE]
+        chosen = modes[:, few]
+        residual = np.asfortranarray(K @ chosen - (M @ chosen) * values[few])
+        right = PETSc.Mat().createDense(residual.shape, array=residual, comm=MPI.COMM_SELF)
+        solution = right.duplicate()
+        factorisation.getFactorMatrix().matSolve(right, solution)
+        square = np.einsum("ij,ij->j", residual, solution.getDenseArray(readonly=True))
+        found[few] = np.sqrt(np.maximum(square, 0.0) / scale[few])
+        right.destroy()
+        solution.destroy()
+    factorisation.destroy()
+    matrix.destroy()
+    return found
+
+
+def _rounding(file: ModesFile, K: sp.csr_matrix) -> Array:
+    assert file.modes is not None
+    size, weight = abs(K), np.empty(len(file.eigenvalues))
+    for start in range(0, len(weight), COLUMNS_AT_ONCE):
+        few = slice(start, start + COLUMNS_AT_ONCE)
+        part = np.abs(file.modes[:, few])
+        weight[few] = np.einsum("ij,ij->j", part, size @ part)
+    return np.asarray(np.finfo(float).eps * weight / residual_scale(file.eigenvalues))
+
+
+def gap_below_last(values: Array, gap: float = GAP) -> tuple[float, int]:
     """Middle of the last gap between ascending values that is wide, or else of the widest one.
 
     Returns
@@ -136,10 +193,9 @@ def gap_below_last(values: Array) -> tuple[float, int]:
     """
     if len(values) <= RIGID_MODES + 1:
         return float(values[-1] * (1.0 + 1e-6)), len(values)
-    first = max(RIGID_MODES, len(values) - 1 - LAST_MODES)
-    gaps = np.diff(values[first:]) / values[first + 1 :]
-    wide = np.flatnonzero(gaps > GAP)
-    below = first + 1 + int(wide[-1] if len(wide) else np.argmax(gaps))
+    gaps = np.diff(values[RIGID_MODES:]) / values[RIGID_MODES + 1 :]
+    wide = np.flatnonzero(gaps > gap)
+    below = RIGID_MODES + 1 + int(wide[-1] if len(wide) else np.argmax(gaps))
     return float(0.5 * (values[below - 1] + values[below])), below
 
 

@@ -21,6 +21,8 @@ from solver.subspace.verification import residual_scale
 
 Array = NDArray[np.float64]
 
+DEPENDENT = 1e-10
+"""Share of the largest eigenvalue of products of vectors below which these are dependent."""
 AUDIBLE_FIRST, AUDIBLE_LAST = 7, 60
 """Mode numbers, from 1, of the frequency errors that are reported for coarsened models."""
 
@@ -169,17 +171,28 @@ def recomputed_residuals(file: ModesFile, K: sp.csr_matrix, M: sp.csr_matrix) ->
     return np.asarray(np.linalg.norm(residual, axis=0) / scale)
 
 
+def is_independent(gram: Array) -> bool:
+    """Whether vectors with these products are independent, far beyond rounding."""
+    squares = np.linalg.eigvalsh(gram)
+    return bool(squares[0] > DEPENDENT * squares[-1])
+
+
 def subspace_angles(modes: Array, truth: Array, M: sp.csr_matrix, groups: list[slice]) -> Array:
     """Largest M-weighted principal angle [rad] of each group of columns.
 
     The truth's block (n, k) is M-orthonormal; the candidate's, which may come from another mesh, is
-    made so group by group.  The sine is taken from the part of the truth outside the candidate's
-    span, which is accurate for small angles too.
+    made so group by group; one whose modes are not independent is at a right angle.  The sine is
+    taken from the part of the truth outside the candidate's span, which is accurate for small
+    angles too.
     """
     angles = np.empty(len(groups))
     for index, group in enumerate(groups):
         inside, exact = modes[:, group], truth[:, group]
-        factor = np.linalg.cholesky(inside.T @ (M @ inside))
+        gram = inside.T @ (M @ inside)
+        if not is_independent(gram):
+            angles[index] = 0.5 * np.pi
+            continue
+        factor = np.linalg.cholesky(gram)
         inside = np.linalg.solve(factor, inside.T).T
         outside = exact - inside @ (inside.T @ (M @ exact))
         square = np.linalg.eigvalsh(outside.T @ (M @ outside))[-1]

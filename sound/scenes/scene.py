@@ -11,7 +11,7 @@ from typing import Any
 
 from carillon.documents import read_own_yaml, read_yaml
 from carillon.errors import UserError
-from carillon.fem.geometry.surface import BUILTIN_PREFIX
+from carillon.fem.builtin_names import BUILTIN_PREFIX
 from sound.project.schema import check, with_defaults
 from sound.scenes.materials import NamedMaterial, named_material
 

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from carillon.errors import UserError
-from carillon.fem.geometry.surface import BUILTIN_PREFIX, surface_name
+from carillon.fem.builtin_names import BUILTIN_PREFIX
+from carillon.fem.geometry.surface import surface_name
 from carillon.files import kind_of
 from sound.project.design_file import read_design
 from studio.session.calls import fit_name, opened, with_design

@@ -16,6 +16,7 @@ import yaml
 
 from carillon.arguments import non_negative_number, number_of_workers, positive_number, whole_number
 from carillon.errors import UserError
+from carillon.fem.builtin_names import BUILTIN_PREFIX
 from carillon.fem.geometry import surface_name
 from carillon.fem.geometry.size import size_in_words
 from carillon.fem.materials import NAMES as MATERIALS
@@ -27,8 +28,9 @@ from solver.analysis.problem import ProblemOptions, build_problem
 from solver.coarsening.forest import load_forest
 from solver.response.surface import surface_of
 from workflow import settings
+from workflow.failure import cause
 from workflow.room import make_folder
-from workflow.settings import BUILTIN, DEFAULT_FORESTS
+from workflow.settings import DEFAULT_FORESTS
 from workflow.studies.base.table import read_table
 from workflow.studies.report.findings import headline
 
@@ -137,9 +139,10 @@ def configuration(arguments: argparse.Namespace) -> dict[str, Any]:
     )
     named = arguments.material in MATERIALS
     title = arguments.name or surface_name(arguments.mesh)
+    is_builtin = arguments.mesh.startswith(BUILTIN_PREFIX)
     model = {
         "title": title,
-        "mesh": arguments.mesh if arguments.mesh.startswith(BUILTIN) else _path(arguments.mesh),
+        "mesh": arguments.mesh if is_builtin else _path(arguments.mesh),
         "material": arguments.material if named else _path(arguments.material),
         **{key: given[key] for key in (*keys, "strike", "observed")},
     }
@@ -188,6 +191,4 @@ def _run_rules(folder: Path, cores: int) -> None:
     with open(log, "w") as stream:
         done = subprocess.run(command, env=environment, stdout=stream, stderr=stream)
     if done.returncode:
-        said = re.findall(r"^\s*((?:solver|forests)[ \w]*: .+)$", log.read_text(), re.MULTILINE)
-        cause = said[-1] if said else "no program said why"
-        raise UserError(f"the run failed, {cause}; all that it said is in {log}")
+        raise UserError(f"the run failed, {cause(log.read_text())}; all that it said is in {log}")

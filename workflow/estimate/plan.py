@@ -64,7 +64,7 @@ def _placeless(config: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any],
         for model in part["models"].values():
             if "material" in model:
                 model["material"] = "smooth"
-            if not model["mesh"].startswith(settings.BUILTIN):
+            if not model["mesh"].startswith(settings.BUILTIN_PREFIX):
                 place = str(folder / f"mesh-{len(meshes)}.obj")
                 meshes[place] = settings.located(config, model["mesh"])
                 model["mesh"] = place

@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from carillon.errors import UserError
+from carillon.fem.builtin_names import BUILTIN_PREFIX
 from carillon.fem.finite_cells.build import finite_cells
 from carillon.fem.geometry import blocks_from_mesh, hexmesh_from_voxels, load_surface, voxelize
-from workflow.settings import BUILTIN
 
 TYPICAL = 0.8, 0.15
 """Unknowns of a compact solid such as the Stanford bunny on the fine and the coarse mesh, over the
@@ -49,7 +49,7 @@ def size_of(solid: NamedSolid) -> Size:
     UserError
         If the mesh cannot be voxelised so.
     """
-    if not solid.mesh.startswith(BUILTIN) and not Path(solid.mesh).is_file():
+    if not solid.mesh.startswith(BUILTIN_PREFIX) and not Path(solid.mesh).is_file():
         fine, coarse = (round(share * solid.resolution**3) for share in TYPICAL)
         return Size(fine, coarse, f"guessed, {solid.mesh} is absent: as compact as the bunny")
     if solid.resolution > LARGEST_COUNTED:

@@ -20,8 +20,9 @@ rule audit_spectra:
         **limits("audit_spectra"),
     params:
         source=source("solver.commands.audit"),
+        tolerance=options({"tolerance": config["solver"]["tolerance"]}),
     shell:
-        "python -m solver audit {input:q} --out {output:q} > {log:q} 2>&1"
+        "python -m solver audit {input:q} {params.tolerance:q} --out {output:q} > {log:q} 2>&1"
 
 
 rule strike_solid:

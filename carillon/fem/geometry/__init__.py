@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 from carillon import lazily
+from carillon.fem.builtin_names import BUILTIN_NAMES, BUILTIN_PREFIX
 from carillon.fem.geometry.blocks import (
     Blocks,
     blocks_from_mesh,
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BUILTINS",
+    "BUILTIN_NAMES",
+    "BUILTIN_PREFIX",
     "CORNER_OFFSETS",
     "FILLS",
     "COMPONENTS",

@@ -12,6 +12,7 @@ import numpy as np
 import trimesh
 
 from carillon.errors import UserError
+from carillon.fem import builtin_names
 from carillon.fem.geometry.sweep import SECTIONS, joined, spline, sweep, tube, turned
 from carillon.fem.geometry.thin import THIN
 from carillon.fem.geometry.trials import TRIALS
@@ -157,16 +158,9 @@ def plate() -> trimesh.Trimesh:
     )
 
 
-BUILTINS: dict[str, Callable[[], trimesh.Trimesh]] = {
-    "bar": bar,
-    "bell": bell,
-    "bowl": bowl,
-    "box": box,
-    "frying-pan": frying_pan,
-    "pitcher": pitcher,
-    "plate": plate,
-    "snare-drum": snare_drum,
-}
+BUILTINS: dict[str, Callable[[], trimesh.Trimesh]] = builtin_names.named(
+    builtin_names.THICK, bar, bell, bowl, box, frying_pan, pitcher, plate, snare_drum
+)
 
 
 def builtin_surface(name: str) -> trimesh.Trimesh:

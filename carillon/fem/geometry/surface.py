@@ -13,14 +13,13 @@ import trimesh
 from trimesh.resolvers import FilePathResolver
 
 from carillon.errors import UserError
+from carillon.fem.builtin_names import BUILTIN_PREFIX
 from carillon.fem.geometry.builtin import builtin_surface
 from carillon.fem.geometry.gltf import plain_gltf
 from carillon.fem.geometry.obj import plain_obj
 from carillon.fem.geometry.orientation import turned_alike
 from carillon.limits import EXTENTS, FARTHEST, UNITS, require_within
 from carillon.places import require_file
-
-BUILTIN_PREFIX = "builtin:"
 
 # A box thinner than this fraction of its longest side holds no solid that voxels could show.
 FLATNESS = 1e-6

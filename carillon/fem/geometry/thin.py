@@ -11,6 +11,7 @@ from collections.abc import Callable
 import numpy as np
 import trimesh
 
+from carillon.fem import builtin_names
 from carillon.fem.geometry.sweep import joined, turned
 
 
@@ -101,10 +102,6 @@ def cymbal() -> trimesh.Trimesh:
     return turned([*below, *above[::-1]], ring=True)
 
 
-THIN: dict[str, Callable[[], trimesh.Trimesh]] = {
-    "cymbal": cymbal,
-    "handbell": handbell,
-    "rin": rin,
-    "skillet": skillet,
-    "wine-glass": wine_glass,
-}
+THIN: dict[str, Callable[[], trimesh.Trimesh]] = builtin_names.named(
+    builtin_names.THIN, cymbal, handbell, rin, skillet, wine_glass
+)

@@ -14,6 +14,7 @@ import trimesh
 from trimesh.creation import box, cylinder, icosphere
 from trimesh.transformations import rotation_matrix
 
+from carillon.fem import builtin_names
 from carillon.fem.geometry.sweep import joined, sweep, tube, turned
 
 SIDE = 0.24
@@ -109,16 +110,9 @@ def stool() -> trimesh.Trimesh:
     return joined(*parts)
 
 
-TRIALS: dict[str, Callable[[], trimesh.Trimesh]] = {
-    "comb": comb,
-    "cup": cup,
-    "dumbbell": dumbbell,
-    "eared-head": eared_head,
-    "fork": fork,
-    "slit-ring": slit_ring,
-    "spiral": spiral,
-    "stool": stool,
-}
+TRIALS: dict[str, Callable[[], trimesh.Trimesh]] = builtin_names.named(
+    builtin_names.TRIALS, comb, cup, dumbbell, eared_head, fork, slit_ring, spiral, stool
+)
 
 
 def _block(low: Sequence[float], high: Sequence[float]) -> trimesh.Trimesh:

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.documents import read_own_yaml
+from carillon.fem.builtin_names import BUILTIN_PREFIX
 from workflow.arguments import options
-from workflow.settings import BUILTIN, located
+from workflow.settings import located
 
 Array = NDArray[np.float64]
 
@@ -121,7 +122,7 @@ class Example:
     @property
     def mesh_files(self) -> list[str]:
         """Its mesh file; none for a built-in object."""
-        return [] if self.mesh.startswith(BUILTIN) else [self.mesh]
+        return [] if self.mesh.startswith(BUILTIN_PREFIX) else [self.mesh]
 
     def part(self, edit: int) -> str:
         """Folder of an edit below that of the examples; the last one has none of its own."""
@@ -183,7 +184,7 @@ def solid_arguments(example: Example) -> list[str]:
 def _example(name: str, config: Mapping[str, Any]) -> Example:
     described, sound = _described()[name], config["sound"]
     meshes = [_mesh(solid["mesh"], config) for solid in described["solids"]]
-    there = (mesh.startswith(BUILTIN) or Path(mesh).is_file() for mesh in meshes)
+    there = (mesh.startswith(BUILTIN_PREFIX) or Path(mesh).is_file() for mesh in meshes)
     chosen = list(there).index(True)
     solid = described["solids"][chosen]
     places = solid["places"]

@@ -15,15 +15,15 @@ from solver.files.modes_file import frequencies
 from solver.studies.comparison import AUDIBLE_FIRST, AUDIBLE_LAST
 from workflow.studies.base.numbers import show
 from workflow.studies.report.findings import headline
+from workflow.studies.validation import limits
 from workflow.studies.validation.distance import distance_in_words
 from workflow.studies.validation.evidence import COARSENED, SOLVED, Evidence
+from workflow.studies.validation.limits import Found
 from workflow.variants import TRUTH
 
 TEXTS: dict[str, Any] = read_own_yaml(Path(__file__).with_name("criteria.yaml"))
 SOLID = "solid"
 """Group of what is asked about the solid itself."""
-Limited = tuple[float | None, float]
-"""What was found, and its limit."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,12 @@ class Criterion:
         How both are shown, see `workflow.studies.base.numbers.show`.
     exact
         Whether the limit must be hit; otherwise it must not be passed.
+    allowed
+        What the tolerance of the run allows; None where the limit itself says what is wrong.
     why
         Why it matters, in one sentence.
+    missed
+        What it means if it is missed; empty if the spectrum is wrong then.
     source
         File below the folder of the run, and key in it.
     """
@@ -58,7 +62,9 @@ class Criterion:
     kind: str
     why: str
     source: str
+    missed: str = ""
     exact: bool = False
+    allowed: float | None = None
 
     @property
     def passed(self) -> bool:
@@ -66,6 +72,22 @@ class Criterion:
         if self.found is None:
             return False
         return self.found == self.limit if self.exact else self.found <= self.limit
+
+    @property
+    def wrong(self) -> bool:
+        """Whether it shows that the spectrum is wrong, not just less good than was asked for."""
+        if self.passed or self.missed or self.found is None:
+            return False
+        return self.allowed is None or not self.found <= self.allowed
+
+    @property
+    def meaning(self) -> str:
+        """What it means that it is missed, in one or two sentences, where nothing is wrong."""
+        if self.found is None:
+            return TEXTS["not_found"][self.key]
+        if self.allowed is not None and self.found <= self.allowed:
+            return str(TEXTS["tighter"]).format(key=self.key, shown=self.shown)
+        return self.missed
 
     @property
     def shown(self) -> str:
@@ -87,53 +109,49 @@ class Criterion:
 
 def judge(evidence: Evidence) -> list[Criterion]:
     """All criteria of a model, group by group."""
-    limits = evidence.tolerances
     return [
-        *_spectrum(evidence, TRUTH, limits["truth_residual"]),
+        *_spectrum(evidence, TRUTH),
         *_solver(evidence),
-        *_spectrum(evidence, SOLVED, limits["residual"]),
+        *_spectrum(evidence, SOLVED),
         *(_of_coarsened(evidence) if COARSENED in evidence.shown else ()),
         *_from_solid(evidence),
     ]
 
 
-def _spectrum(evidence: Evidence, variant: str, residual: float) -> Iterator[Criterion]:
+def _spectrum(evidence: Evidence, variant: str) -> Iterator[Criterion]:
     audit = evidence.audit["spectra"][variant]
     counted, expected = audit["counted"], audit["expected"]
     values = {
-        "residual": (audit["residual_max"], residual),
-        "orthogonality": (audit["orthogonality"], evidence.tolerances["orthogonality"]),
-        "rigid": (audit["rigid_modes"], RIGID_MODES),
+        "residual": limits.residual(evidence, variant),
+        "orthogonality": limits.orthogonality(evidence, variant),
+        "rigid": Found(audit["rigid_modes"], RIGID_MODES),
         # Without a count there is nothing to find, and what was expected is the limit.
-        "counted": (None, expected) if counted is None else (expected, counted),
+        "counted": Found(None, expected) if counted is None else Found(expected, counted),
     }
     below = show(float(frequencies(np.array(audit["counted_below"]))), "hertz")
     return _criteria(evidence, "spectrum", variant, values, below=below)
 
 
 def _solver(evidence: Evidence) -> Iterator[Criterion]:
-    comparison, limits = evidence.compared[SOLVED], evidence.tolerances
     values = {
-        "eigenvalue_error": comparison["eigenvalue_relative_error"]["max"],
-        "subspace_angle": comparison["subspace_angle_max"],
-        "response": evidence.response.responses[SOLVED].difference,
+        "eigenvalue_error": limits.eigenvalue_error(evidence),
+        "subspace_angle": limits.subspace_angle(evidence),
+        "response": limits.response(evidence),
     }
-    limited = {key: (value, limits[key]) for key, value in values.items()}
-    return _criteria(evidence, "solver", SOLVED, limited)
+    return _criteria(evidence, "solver", SOLVED, values)
 
 
 def _of_coarsened(evidence: Evidence) -> list[Criterion]:
-    residual = evidence.tolerances["residual"]
-    return [*_coarsening(evidence), *_spectrum(evidence, COARSENED, residual)]
+    return [*_coarsening(evidence), *_spectrum(evidence, COARSENED)]
 
 
 def _coarsening(evidence: Evidence) -> Iterator[Criterion]:
-    comparison, limits = evidence.compared[COARSENED], evidence.tolerances
+    comparison, tolerances = evidence.compared[COARSENED], evidence.tolerances
     last = min(AUDIBLE_LAST, RIGID_MODES + comparison["modes_compared"])
     rms, worst = (comparison[f"frequency_{name}_relative_error_7_60"] for name in ("rms", "max"))
     limited = {
-        "frequency_rms": (rms, limits["frequency_rms"]),
-        "frequency_worst": (worst, limits["frequency_worst"]),
+        "frequency_rms": Found(rms, tolerances["frequency_rms"]),
+        "frequency_worst": Found(worst, tolerances["frequency_worst"]),
     }
     modes = f"modes {AUDIBLE_FIRST}–{last}"
     return _criteria(evidence, "coarsening", COARSENED, limited, modes=modes)
@@ -144,7 +162,7 @@ def _from_solid(evidence: Evidence) -> Iterator[Criterion]:
     distance = evidence.distance
     found = {f"solid_{key}": abs(distance[key]) if distance else None for key in ("rms", "worst")}
     limited = {
-        key: (value, evidence.tolerances[key])
+        key: Found(value, evidence.tolerances[key])
         for key, value in found.items()
         if evidence.tolerances[key] is not None
     }
@@ -153,7 +171,7 @@ def _from_solid(evidence: Evidence) -> Iterator[Criterion]:
 
 
 def _criteria(
-    evidence: Evidence, part: str, variant: str, values: dict[str, Limited], **names: str
+    evidence: Evidence, part: str, variant: str, values: dict[str, Found], **names: str
 ) -> Iterator[Criterion]:
     """Criteria of a part of the texts, whose labels may hold the `names`."""
     names |= {
@@ -162,11 +180,21 @@ def _criteria(
         "comparison": evidence.file(f"{variant}.comparison.json"),
         "response": evidence.file("response.h5"),
         "solved": evidence.file(f"{SOLVED}.h5"),
+        "truth": evidence.file(f"{TRUTH}.h5"),
     }
-    for key, (value, limit) in values.items():
-        texts = {name: text.format(**names) for name, text in TEXTS[part][key].items()}
-        exact = texts["kind"] == "count"
-        yield Criterion(variant, key, found=value, limit=limit, exact=exact, **texts)
+    for key, each in values.items():
+        told = names | {"where": each.where}
+        texts = {name: text.format(**told) for name, text in TEXTS[part][key].items()}
+        yield Criterion(
+            variant,
+            key,
+            found=each.value,
+            limit=each.limit,
+            allowed=each.allowed,
+            exact=texts["kind"] == "count",
+            missed=TEXTS["groups"][variant].get("missed", {}).get(key, "").strip(),
+            **texts,
+        )
 
 
 def verdict(evidence: Evidence) -> dict[str, Any]:
@@ -175,9 +203,10 @@ def verdict(evidence: Evidence) -> dict[str, Any]:
     Returns
     -------
     dict[str, Any]
-        Whether it `passed`; the `headline`; `advice` on what may be relied on; and the `parts`, one
-        for each group: `title`, `question`, whether it `passed` (None if it is told only), a
-        `word`, a `sentence` and its `criteria`.
+        Whether it `passed`; the `headline`; titles of the spectra that are `wrong`; `advice` on
+        what may be relied on; and the `parts`, one for each group: `title`, `question`, whether it
+        `passed` (None if it is told only) and whether it is `wrong`, a `word`, a `sentence` and its
+        `criteria`.
     """
     criteria = judge(evidence)
     judged = {criterion.group for criterion in criteria}
@@ -194,25 +223,41 @@ def verdict(evidence: Evidence) -> dict[str, Any]:
     return {
         "passed": missed == 0,
         "headline": headline(len(criteria), missed),
-        "advice": next((part["doubt"] for part in parts if part["passed"] is False), TEXTS[trust]),
+        "wrong": [part["title"] for part in parts if part["wrong"]],
+        "advice": _advice(parts) or TEXTS[trust],
         "parts": parts,
     }
 
 
+def _advice(parts: list[dict[str, Any]]) -> str:
+    """Which spectrum is wrong; or else what it means that criteria are missed, if any are."""
+    for part in parts:
+        if part["wrong"]:
+            return str(part["doubt"])
+    return " ".join(dict.fromkeys(meaning for part in parts for meaning in part["meanings"]))
+
+
 def _part(texts: dict[str, Any], criteria: list[Criterion]) -> dict[str, Any]:
-    passed = all(criterion.passed for criterion in criteria)
     by_key = {criterion.key: criterion for criterion in criteria}
     sentence = texts["sentence"].format(completeness=_completeness(by_key["counted"]), **by_key)
-    judged = {"passed": passed, "word": texts["words"][passed], "sentence": sentence}
-    return {**texts, **judged, "criteria": criteria}
+    wrong = any(criterion.wrong for criterion in criteria)
+    judged = _judged(criteria) | {"wrong": wrong, "sentence": sentence}
+    word = texts["words"]["wrong" if wrong else judged["passed"]]
+    return {**texts, **judged, "word": word}
+
+
+def _judged(criteria: list[Criterion]) -> dict[str, Any]:
+    missed = [criterion for criterion in criteria if not criterion.passed]
+    meanings = [criterion.meaning for criterion in missed]
+    return {"passed": not missed, "meanings": meanings, "criteria": criteria}
 
 
 def _solid_part(evidence: Evidence, criteria: list[Criterion]) -> dict[str, Any]:
     texts, words = TEXTS["groups"][SOLID], distance_in_words(evidence)
-    passed = all(criterion.passed for criterion in criteria) if criteria else None
-    word = words["word"] if passed is None else texts["words"][passed]
-    judged = {"passed": passed, "word": word, "sentence": words["told"], "criteria": criteria}
-    return {**texts, **judged, "doubt": texts["doubt"].format(**words)}
+    judged = _judged(criteria) | {"wrong": False, "sentence": words["told"]}
+    word = texts["words"][judged["passed"]] if criteria else words["word"]
+    judged["meanings"] = [text.format(**words) for text in judged["meanings"]]
+    return {**texts, **judged, "passed": judged["passed"] if criteria else None, "word": word}
 
 
 def _completeness(counted: Criterion) -> str:

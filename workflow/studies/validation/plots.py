@@ -17,12 +17,15 @@ from workflow.studies.base.table import Table
 from workflow.studies.report.convergence_plot import visible
 from workflow.studies.report.plots import LINES
 from workflow.studies.validation.evidence import COARSENED, SOLVED, Evidence
+from workflow.studies.validation.limits import angles_allowed, eigenvalue_error
 from workflow.variants import TRUTH, VARIANTS
 
 Array = NDArray[np.float64]
 
 BINS = 24
 """Bars of the histogram of moduli."""
+LIMITED: dict[str, Any] = {"linewidth": 0.9, "linestyle": (0, (1, 2))}
+"""Lines of limits."""
 SMALLEST_ANGLE = 1e-10
 """Angles [rad] below this are drawn there."""
 
@@ -38,7 +41,7 @@ def errors_figure(evidence: Evidence, errors: Table) -> Figure:
         for axes, quantity in ((middle, "eigenvalue"), (right, "frequency")):
             values = [row[f"{variant}_{quantity}"] for row in errors.rows]
             axes.semilogy(mode, visible(values), **_line(variant))
-    _limit(middle, tolerances["eigenvalue_error"], SOLVED)
+    _limit(middle, eigenvalue_error(evidence).limit, SOLVED)
     if COARSENED in evidence.shown:
         _limit(right, tolerances["frequency_worst"], COARSENED)
     left.set(ylabel="frequency [Hz]", title="Natural frequencies")
@@ -59,7 +62,7 @@ def shapes_figure(evidence: Evidence) -> Figure:
         mode = [0.5 * (cluster["first"] + cluster["last"]) for cluster in clusters]
         angle = [max(cluster["angle"], SMALLEST_ANGLE) for cluster in clusters]
         axes.semilogy(mode, np.degrees(angle), ".", ms=4, **_line(variant, line=False))
-    _limit(axes, float(np.degrees(evidence.tolerances["subspace_angle"])), SOLVED)
+    _angle_limits(axes, evidence)
     axes.set(xlabel="mode number", ylabel="angle [°]", title="Angle to the ground truth")
     figure.legend(loc="outside lower center", ncols=len(evidence.compared), columnspacing=1.0)
     return figure
@@ -136,4 +139,15 @@ def _line(variant: str, line: bool = True) -> dict[str, Any]:
 
 
 def _limit(axes: Any, value: float, variant: str) -> None:
-    axes.axhline(value, color=COLOURS[variant], linewidth=0.9, linestyle=(0, (1, 2)))
+    axes.axhline(value, color=COLOURS[variant], **LIMITED)
+
+
+def _angle_limits(axes: Any, evidence: Evidence) -> None:
+    clusters = evidence.compared[SOLVED]["clusters"]
+    if not clusters:
+        return
+    groups = [(cluster["first"], cluster["last"]) for cluster in clusters]
+    limit = evidence.tolerances["subspace_angle"]
+    allowed = angles_allowed(evidence, groups) if limit is None else np.full(len(groups), limit)
+    mode = [0.5 * (first + last) for first, last in groups]
+    axes.semilogy(mode, np.degrees(allowed), color=COLOURS[SOLVED], **LIMITED)
