@@ -35,7 +35,7 @@ ARROWS = {
     "solver.coarsening": "dataset_gen.objectives forests",
     "solver.distribution": "",
     "solver.files": "solver.distribution",
-    "solver.response": "solver.files",
+    "solver.response": "solver.files solver.subspace",
     "solver.assembly": "solver.distribution",
     "solver.linear": "solver.distribution solver.assembly",
     "solver.subspace": "solver.distribution solver.assembly",
@@ -67,8 +67,8 @@ ARROWS = {
     "solver.studies.scaling": """solver.distribution solver.assembly solver.linear solver.hcms
         solver.correction solver.analysis""",
     "solver.commands": """dataset_gen.objectives solver.distribution solver.files solver.response
-        solver.linear solver.analysis solver.refinement solver.accuracy solver.studies
-        solver.studies.benchmark
+        solver.linear solver.correction solver.analysis solver.refinement solver.accuracy
+        solver.studies solver.studies.benchmark
         solver.studies.calibration solver.studies.scaling solver.coarsening
         solver.studies.accuracy solver.studies.coarsening solver.studies.discretisation""",
     #
@@ -123,14 +123,17 @@ ARROWS = {
         workflow.studies.base workflow.studies.sounds""",
     "workflow.studies.recordings": "solver.response sound.clips workflow.studies.base",
     "workflow.studies.validation": """solver.files solver.refinement solver.response
-        solver.studies workflow workflow.studies.base workflow.studies.report""",
+        solver.studies solver.subspace workflow workflow.studies.base workflow.studies.report""",
+    "workflow.studies.campaign": """workflow workflow.studies.base
+        workflow.studies.validation""",
     "workflow.studies.comparison": "workflow workflow.studies.base",
-    "workflow.commands": """dataset_gen.objectives solver.coarsening solver.response
+    "workflow.commands": """dataset_gen.objectives solver.coarsening solver.correction
+        solver.response
         solver.analysis workflow workflow.studies.base workflow.studies.comparison workflow.estimate
         workflow.studies.report workflow.studies.recordings""",
     "workflow.scripts": """solver.analysis sound.clips workflow.studies.base
-        workflow.studies.report workflow.studies.comparison workflow.studies.sounds
-        workflow.studies.recordings""",
+        workflow.studies.campaign workflow.studies.report workflow.studies.comparison
+        workflow.studies.sounds workflow.studies.recordings""",
 }
 """Packages, from the bottom to the top, with those that they import beside `EVERYBODY`."""
 

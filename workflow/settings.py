@@ -11,9 +11,9 @@ from jsonschema.exceptions import ValidationError
 from snakemake.utils import update_config, validate
 
 from carillon import provenance
+from carillon.builtin_names import BUILTIN_NAMES, BUILTIN_PREFIX
 from carillon.documents import read_own_yaml, read_yaml
 from carillon.errors import UserError
-from carillon.fem.builtin_names import BUILTIN_NAMES, BUILTIN_PREFIX
 from carillon.fem.materials import NAMES as MATERIALS
 from dataset_gen.objectives import OBJECTIVES, require_objective
 from forests import default as default_forests

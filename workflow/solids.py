@@ -9,7 +9,7 @@ from typing import Any
 from workflow import settings
 
 Config = Mapping[str, Any]
-STUDIED = ("figures", "objectives", "coarsening", "discretisation")
+STUDIED = ("figures", "objectives", "coarsening", "discretisation", "campaign")
 """Sections with solids of their own, which are left out if they have no mesh."""
 MEASURED = {
     "report": {

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
-from carillon.fem.builtin_names import BUILTIN_PREFIX
 from carillon.fem.geometry.surface import surface_name
 from carillon.files import kind_of
 from sound.project.design_file import read_design

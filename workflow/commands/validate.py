@@ -14,9 +14,15 @@ from typing import Any
 import numpy as np
 import yaml
 
-from carillon.arguments import non_negative_number, number_of_workers, positive_number, whole_number
+from carillon.arguments import (
+    non_negative_number,
+    number_between,
+    number_of_workers,
+    positive_number,
+    whole_number,
+)
+from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
-from carillon.fem.builtin_names import BUILTIN_PREFIX
 from carillon.fem.geometry import surface_name
 from carillon.fem.geometry.size import size_in_words
 from carillon.fem.materials import NAMES as MATERIALS
@@ -26,6 +32,7 @@ from carillon.progress import say
 from carillon.runtime import allowed_cores
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.coarsening.forest import load_forest
+from solver.correction.correction import EIGENVALUE_TOLERANCE
 from solver.response.surface import surface_of
 from workflow import settings
 from workflow.failure import cause
@@ -73,6 +80,13 @@ class ValidateOptions:
     stiffness_damping: float | None = option(
         None, "Rayleigh damping [s] (default: of a plastic)", type=non_negative_number
     )
+    tolerance: float = option(
+        EIGENVALUE_TOLERANCE,
+        "relative error of an eigenvalue that HCMS + EC is corrected to, and from which the limits "
+        "of the criteria follow",
+        type=number_between(1e-15, 0.1),
+    )
+    ranks: int = option(1, "MPI ranks of every solver run", type=whole_number(1, 4096))
     forest: str | None = option(None, "forests to coarsen by (default: those of the package)")
     cores: int = option(allowed_cores(), "cores to use (default: all)", type=number_of_workers)
     strike: list[float] | None = _point("struck")
@@ -156,6 +170,7 @@ def configuration(arguments: argparse.Namespace) -> dict[str, Any]:
         "mesh_folder": "",
         "poisson": arguments.poisson,
         "models": {name: model},
+        "solver": {"tolerance": arguments.tolerance, "ranks": arguments.ranks},
         "forests": {"model": _path(arguments.forest) if arguments.forest else DEFAULT_FORESTS},
         "validation": {"tolerances": dict(arguments.tolerances or []), **validation},
     }

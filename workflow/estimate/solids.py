@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
-from carillon.fem.builtin_names import BUILTIN_PREFIX
 from carillon.fem.finite_cells.build import finite_cells
 from carillon.fem.geometry import blocks_from_mesh, hexmesh_from_voxels, load_surface, voxelize
 

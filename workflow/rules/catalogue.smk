@@ -3,8 +3,9 @@ from workflow import solids
 from workflow.studies import catalogue, marks
 from workflow.studies.base.cases import cases_of
 from workflow.studies.base.study import modules_of
+from workflow.studies.campaign.cells import Cell, cells_of, validation_arguments
 
-CASES = [config["objectives"], config["coarsening"], config["discretisation"]]
+CASES = [config["objectives"], config["coarsening"], config["discretisation"], config["campaign"]]
 
 
 wildcard_constraints:
@@ -88,6 +89,8 @@ def measured_for(study):
         return measured
     if study in (catalogue.OBJECTIVES, catalogue.COARSENING, catalogue.DISCRETISATION):
         return [f"{folder}/cases/{case.path}" for case in cases_of(config, study.name)]
+    if study is catalogue.CAMPAIGN:
+        return [f"{folder}/cells/{cell.path}.json" for cell in cells_of(config)]
     if study is catalogue.ACCURACY:
         return [f"{folder}/accuracy.json"]
     parts = ("model", "blocks", "benchmark", "variants", "curve")

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from carillon import lazily
-from carillon.fem.builtin_names import BUILTIN_NAMES, BUILTIN_PREFIX
+from carillon.builtin_names import BUILTIN_NAMES, BUILTIN_PREFIX
 from carillon.fem.geometry.blocks import (
     Blocks,
     blocks_from_mesh,

@@ -11,8 +11,8 @@ from collections.abc import Callable
 import numpy as np
 import trimesh
 
+from carillon import builtin_names
 from carillon.errors import UserError
-from carillon.fem import builtin_names
 from carillon.fem.geometry.sweep import SECTIONS, joined, spline, sweep, tube, turned
 from carillon.fem.geometry.thin import THIN
 from carillon.fem.geometry.trials import TRIALS

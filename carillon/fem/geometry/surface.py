@@ -12,8 +12,8 @@ import numpy as np
 import trimesh
 from trimesh.resolvers import FilePathResolver
 
+from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
-from carillon.fem.builtin_names import BUILTIN_PREFIX
 from carillon.fem.geometry.builtin import builtin_surface
 from carillon.fem.geometry.gltf import plain_gltf
 from carillon.fem.geometry.obj import plain_obj

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.documents import read_own_yaml
-from carillon.fem.builtin_names import BUILTIN_PREFIX
 from workflow.arguments import options
 from workflow.settings import located
 

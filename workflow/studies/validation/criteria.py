@@ -18,7 +18,7 @@ from workflow.studies.report.findings import headline
 from workflow.studies.validation import limits
 from workflow.studies.validation.distance import distance_in_words
 from workflow.studies.validation.evidence import COARSENED, SOLVED, Evidence
-from workflow.studies.validation.limits import Found
+from workflow.studies.validation.limits import Worst
 from workflow.variants import TRUTH
 
 TEXTS: dict[str, Any] = read_own_yaml(Path(__file__).with_name("criteria.yaml"))
@@ -124,9 +124,9 @@ def _spectrum(evidence: Evidence, variant: str) -> Iterator[Criterion]:
     values = {
         "residual": limits.residual(evidence, variant),
         "orthogonality": limits.orthogonality(evidence, variant),
-        "rigid": Found(audit["rigid_modes"], RIGID_MODES),
+        "rigid": Worst(audit["rigid_modes"], RIGID_MODES),
         # Without a count there is nothing to find, and what was expected is the limit.
-        "counted": Found(None, expected) if counted is None else Found(expected, counted),
+        "counted": Worst(None, expected) if counted is None else Worst(expected, counted),
     }
     below = show(float(frequencies(np.array(audit["counted_below"]))), "hertz")
     return _criteria(evidence, "spectrum", variant, values, below=below)
@@ -150,8 +150,8 @@ def _coarsening(evidence: Evidence) -> Iterator[Criterion]:
     last = min(AUDIBLE_LAST, RIGID_MODES + comparison["modes_compared"])
     rms, worst = (comparison[f"frequency_{name}_relative_error_7_60"] for name in ("rms", "max"))
     limited = {
-        "frequency_rms": Found(rms, tolerances["frequency_rms"]),
-        "frequency_worst": Found(worst, tolerances["frequency_worst"]),
+        "frequency_rms": Worst(rms, tolerances["frequency_rms"]),
+        "frequency_worst": Worst(worst, tolerances["frequency_worst"]),
     }
     modes = f"modes {AUDIBLE_FIRST}–{last}"
     return _criteria(evidence, "coarsening", COARSENED, limited, modes=modes)
@@ -162,7 +162,7 @@ def _from_solid(evidence: Evidence) -> Iterator[Criterion]:
     distance = evidence.distance
     found = {f"solid_{key}": abs(distance[key]) if distance else None for key in ("rms", "worst")}
     limited = {
-        key: Found(value, evidence.tolerances[key])
+        key: Worst(value, evidence.tolerances[key])
         for key, value in found.items()
         if evidence.tolerances[key] is not None
     }
@@ -171,7 +171,7 @@ def _from_solid(evidence: Evidence) -> Iterator[Criterion]:
 
 
 def _criteria(
-    evidence: Evidence, part: str, variant: str, values: dict[str, Found], **names: str
+    evidence: Evidence, part: str, variant: str, values: dict[str, Worst], **names: str
 ) -> Iterator[Criterion]:
     """Criteria of a part of the texts, whose labels may hold the `names`."""
     names |= {

@@ -22,13 +22,13 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Found:
+class Worst:
     """The worst value of a criterion beside its limit.
 
     Attributes
     ----------
     value, limit
-        Found, and required; None if nothing was found.
+        Worst, and required; None if nothing was found.
     allowed
         What the tolerance of the run allows; None if nothing follows from it.
     where
@@ -41,25 +41,25 @@ class Found:
     where: str = ""
 
 
-def residual(evidence: Evidence, variant: str) -> Found:
+def residual(evidence: Evidence, variant: str) -> Worst:
     """Worst residual in energy of the elastic modes."""
     values = evidence.shown[variant].eigenvalues
     allowed = residual_limits(values, _errors(evidence, variant))[RIGID_MODES:]
     values = np.array(evidence.audit["spectra"][variant]["energy_residuals"])[RIGID_MODES:]
     key = "truth_residual" if variant == TRUTH else "residual"
     worst, found = _worst(values, allowed, evidence.tolerances[key])
-    return Found(*found, f"mode {RIGID_MODES + 1 + worst}")
+    return Worst(*found, f"mode {RIGID_MODES + 1 + worst}")
 
 
-def orthogonality(evidence: Evidence, variant: str) -> Found:
+def orthogonality(evidence: Evidence, variant: str) -> Worst:
     """Largest entry of |X^T M X - I|, as the solver itself demands it."""
     audit = evidence.audit["spectra"][variant]
     allowed = ORTHOGONALITY_TOLERANCE + float(np.finfo(float).eps) * audit["unknowns"]
     limit = evidence.tolerances["orthogonality"]
-    return Found(audit["orthogonality"], allowed if limit is None else limit, allowed)
+    return Worst(audit["orthogonality"], allowed if limit is None else limit, allowed)
 
 
-def eigenvalue_error(evidence: Evidence) -> Found:
+def eigenvalue_error(evidence: Evidence) -> Worst:
     """Worst relative error of an eigenvalue of the solver."""
     exact, values = (evidence.shown[name].eigenvalues for name in (TRUTH, SOLVED))
     elastic = slice(RIGID_MODES, min(len(exact), len(values)))
@@ -68,15 +68,15 @@ def eigenvalue_error(evidence: Evidence) -> Found:
     tolerance = ACCEPTED * evidence.config["solver"]["tolerance"]
     allowed = accepted_errors(exact, rounding, tolerance)[elastic] / exact[elastic]
     worst, found = _worst(errors, allowed, evidence.tolerances["eigenvalue_error"])
-    return Found(*found, f"mode {RIGID_MODES + 1 + worst}")
+    return Worst(*found, f"mode {RIGID_MODES + 1 + worst}")
 
 
-def subspace_angle(evidence: Evidence) -> Found:
+def subspace_angle(evidence: Evidence) -> Worst:
     """Worst angle between a cluster of the truth and the same modes of the solver."""
     clusters = evidence.compared[SOLVED]["clusters"]
     limit = evidence.tolerances["subspace_angle"]
     if not clusters:
-        return Found(None, 0.0 if limit is None else limit)
+        return Worst(None, 0.0 if limit is None else limit)
     groups = [(cluster["first"], cluster["last"]) for cluster in clusters]
     worst, found = _worst(
         np.array([cluster["angle"] for cluster in clusters]),
@@ -84,7 +84,7 @@ def subspace_angle(evidence: Evidence) -> Found:
         limit,
     )
     first, last = groups[worst]
-    return Found(*found, f"mode {first}" if first == last else f"modes {first}–{last}")
+    return Worst(*found, f"mode {first}" if first == last else f"modes {first}–{last}")
 
 
 def angles_allowed(evidence: Evidence, groups: list[tuple[int, int]]) -> Array:
@@ -93,7 +93,7 @@ def angles_allowed(evidence: Evidence, groups: list[tuple[int, int]]) -> Array:
     return angle_limits(evidence.shown[TRUTH].eigenvalues, errors, groups)
 
 
-def response(evidence: Evidence) -> Found:
+def response(evidence: Evidence) -> Worst:
     """Difference of the motion after a strike by the solver's modes from that by the truth's."""
     struck, truth = evidence.response, evidence.shown[TRUTH]
     damping = Damping(struck.attributes["mass_damping"], struck.attributes["stiffness_damping"])
@@ -103,7 +103,7 @@ def response(evidence: Evidence) -> Found:
     allowed = motion_limit(struck.seen, errors, damping, struck.seconds, unknowns)
     limit = evidence.tolerances["response"]
     found = struck.responses[SOLVED].difference
-    return Found(found, allowed if limit is None else limit, allowed)
+    return Worst(found, allowed if limit is None else limit, allowed)
 
 
 def _errors(evidence: Evidence, variant: str) -> Array:

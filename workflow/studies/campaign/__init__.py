@@ -1,0 +1,1 @@
+"""Validations of many solids, materials, seeds and ranks, judged together."""
