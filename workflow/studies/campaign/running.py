@@ -6,6 +6,7 @@ import shlex
 import subprocess
 import sys
 import time
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -48,9 +49,15 @@ def validated(arguments: list[str], folder: Path, cores: int, log: Path) -> dict
         **result,
         **{key: found[key] for key in ("passed", "wrong", "advice")},
         "reason": None,
-        "criteria": [criterion.row for criterion in judge(evidence)],
+        "criteria": [_finite(criterion.row) for criterion in judge(evidence)],
         "page": str(page.relative_to(folder)),
     }
+
+
+def _finite(row: dict[str, Any]) -> dict[str, Any]:
+    """The same without values that JSON has no number for."""
+    odd = {key for key, value in row.items() if isinstance(value, float) and not isfinite(value)}
+    return {key: None if key in odd else value for key, value in row.items()}
 
 
 def reason_of(status: int, said: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from workflow.studies.base.entry import Row
@@ -29,7 +30,8 @@ def cells(study: Campaign) -> Iterator[Row]:
             row["what"] = result["reason"]
         else:
             row["what"] = f"{worst['label']}: {worst['shown']}, required {worst['required']}"
-            row["of"], row["share"] = worst["group"], share_of(worst)
+            share = share_of(worst)
+            row["of"], row["share"] = worst["group"], share if math.isfinite(share) else None
         yield row
 
 
