@@ -200,3 +200,34 @@ def test_bad_input_is_answered_in_one_sentence(words, says, solid, tmp_path, mon
     assert status == cli.EXIT_BAD_INPUT
     assert says in error and len(error.splitlines()) == 1
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("said", "says"),
+    [
+        (
+            'WorkflowError in file "Snakefile", line 28:\nmodels.c.mesh: there is no builtin:gong\n'
+            '  File "Snakefile", line 28, in <module>\n',
+            "the run failed, Snakemake says: models.c.mesh: there is no builtin:gong; all that",
+        ),
+        ("LockException:\nError: Directory cannot be locked.\n", "Directory cannot be locked; all"),
+        (
+            "Error in rule find_modes:\n    jobid: 2\nLogfile modes.log:\n====\n"
+            "solver modes: error correction stagnates\n====\n",
+            "the run failed, solver modes: error correction stagnates; all that it said is in",
+        ),
+        ("Error in rule audit_spectra:\n    jobid: 7\n", "rule audit_spectra ended without a word"),
+        ("", "Snakemake said nothing"),
+    ],
+)
+def test_what_snakemake_says_of_a_run_that_failed_comes_through(
+    said, says, tmp_path, monkeypatch, capsys
+):
+    def failed(command, env, stdout, stderr):
+        stdout.write(said)
+        return SimpleNamespace(returncode=1)
+
+    monkeypatch.setattr("workflow.commands.validate.subprocess.run", failed)
+    out = tmp_path / "out"
+    assert call("builtin:box", "--resolution", 4, "--modes", 12, "--out", out) == 2
+    assert says in capsys.readouterr().err

@@ -349,6 +349,8 @@ hostile(
 )
 hostile("out on a full disk", MODES, "make room", file_size=2000)
 hostile("out on a disk full at once", MODES, "make room", file_size=0)
+for value in ("0", "nan", "2"):
+    hostile(f"audit to a tolerance of {value}", f"audit ZOO/modes.h5 --tolerance {value}")
 hostile("audit into a folder", "audit ZOO/modes.h5 --out audits", files={"audits": Place("folder")})
 hostile("audit onto its input", "audit m.h5 --out m.h5", files={"m.h5": Copy("modes.h5")})
 hostile("audit onto a device", "audit ZOO/modes.h5 --out null", files={"null": Place("null")})

@@ -177,6 +177,8 @@ for option, values in {
     "poisson": ("nan", "0.5", "-1"),
     "seed": ("-1", "1.5", str(2**64)),
     "cores": ("0", "nan", "-1"),
+    "ranks": ("0", "1.5", "5000"),
+    "tolerance": ("0", "nan", "0.5"),
     "mass-damping": ("nan", "-1", "1e300"),
     "stiffness-damping": ("nan", "-1"),
     "fill": ("best",),
