@@ -45,8 +45,8 @@ ARROWS = {
     "solver.analysis": """dataset_gen.objectives solver.coarsening solver.distribution solver.files
         solver.assembly solver.linear solver.subspace solver.hcms solver.correction
         solver.reference""",
-    "solver.refinement": """solver.coarsening solver.distribution solver.assembly solver.linear
-        solver.subspace solver.analysis""",
+    "solver.refinement": """solver.coarsening solver.distribution solver.files solver.assembly
+        solver.linear solver.subspace solver.correction solver.analysis""",
     "solver.accuracy": """solver.distribution solver.files solver.analysis
         solver.refinement""",
     "solver": "solver.analysis",

@@ -17,7 +17,7 @@ from workflow.studies.base.cases import Case, cases_of
 from workflow.studies.base.table import read_table
 from workflow.studies.coarsening.pictures import best_view
 from workflow.studies.coarsening.results import CoarseningStudy
-from workflow.studies.coarsening.tables import filled_cells, rank_correlation
+from workflow.studies.coarsening.tables import filled_cells, rank_correlation, speeds
 
 summary, cases, modes, elements = (
     catalogue.COARSENING.entries[name] for name in ("summary", "cases", "modes", "elements")
@@ -55,6 +55,11 @@ def rated(material: str) -> dict:
         shapes = {**errors, "modes": 12}
         return {"by_index": errors, "expected": expected, "recognised": shapes, "far_off": far}
 
+    def costs(faster: float) -> dict:
+        cost = {"processor_seconds": 2.0, "seconds": 2.1}
+        taken = {"modes": 60, "taken": "fine", "reason": "so", "estimates": 0}
+        return {**taken, "fine": cost, "coarse": cost, "faster": faster}
+
     rms = RMS[material]
     far = [far_off(9, "swap", -0.30), far_off(12, "local", 0.12 if material == "noise" else 0.15)]
     return {
@@ -62,6 +67,7 @@ def rated(material: str) -> dict:
         "goals": {"rms": 0.05, "worst": 0.15, "far_off": 0.1},
         "plain": model(rms, far),
         "refined": model(rms / 4, []),
+        "costs": {"auto": costs(1.0 + rms), "slepc": costs(3.0)},
         "provenance": {"commit": "none"},
     }
 
@@ -98,6 +104,11 @@ def test_every_case_has_a_row_with_both_models(study):
     assert rows[1]["plain_rms"] == 0.20 and rows[1]["refined_rms"] == 0.05
     assert rows[1]["plain_expected_rms"] == pytest.approx(0.22)
     assert rows[1]["plain_shape_modes"] == 12 and rows[1]["plain_far_off"] == 2
+
+
+def test_speeds_are_told_by_method(study):
+    assert speeds(study, "auto") == pytest.approx({"median": 1.13, "least": 1.06, "most": 1.2})
+    assert speeds(study, "slepc")["median"] == 3.0
 
 
 def test_expected_errors_in_the_order_of_the_true_ones_correlate(study):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -16,14 +17,19 @@ from carillon.progress import say
 from solver.accuracy.divide import DividedCells
 from solver.accuracy.voxels import Reference
 from solver.analysis.modes import Modes
+from solver.analysis.options import SolverOptions
 from solver.analysis.problem import Problem, ProblemOptions, build_problem
 from solver.distribution.collective import bcast_from_root, compute_on_root
 from solver.files.modes_file import read_modes
+from solver.refinement.coarse_or_fine import FineStart, solve_coarsened
 from solver.refinement.errors import FROM_FINE, FROM_SOLID, LAST, WORST, ExpectedErrors
-from solver.refinement.refine import Refinable, RefinedModel, RefinementStep, solve_refined
+from solver.refinement.refine import Refinable, RefinementStep, solve_refined
+from solver.refinement.refined_model import RefinedModel
 
 MOST_UNKNOWNS = 400_000
 """Unknowns from which no finer lattice is tried."""
+FINE, DIVIDED = "fine_blocks", "divided_cells"
+"""Attributes that count what was refined."""
 LEAST_STEP, LARGEST_STEP = 1.2, 2.0
 """Factors by which a resolution is raised."""
 
@@ -31,8 +37,10 @@ LEAST_STEP, LARGEST_STEP = 1.2, 2.0
 class Solve(Protocol):
     """Finds modes of a model, as many as are asked for, or `modes` if they are fewer."""
 
-    def __call__(self, model: Solid | None, modes: int | None = None) -> Modes:
-        """Collective; the model is None but on rank 0."""
+    def __call__(
+        self, model: Solid | None, modes: int | None = None, start: FineStart | None = None
+    ) -> Modes:
+        """Collective; the model is None but on rank 0, and the start is for the fine solid."""
 
 
 @dataclass
@@ -46,7 +54,8 @@ class Solved:
     modes
         Of the model.
     achieved
-        Plain values: what is expected of the frequencies' errors.
+        Plain values: what is expected of the frequencies' errors; `fine_taken` is why the fine
+        solid was taken for a coarse one, if that is so.
     """
 
     problem: Problem | None
@@ -68,11 +77,14 @@ class Wishes:
         Whether the distance from the solid is to be told.
     start
         Modes file whose refined mesh is begun from.
+    options
+        What `solve` computes and how, which a coarse model is weighed by; needed to refine one.
     """
 
     refine_to: float | None = None
     estimated: bool = False
     start: str | None = None
+    options: SolverOptions | None = None
 
 
 def solve_solid(
@@ -95,23 +107,17 @@ def solve_solid(
         For anything wrong with the solid.
     """
     problem = compute_on_root(comm, lambda: build_problem(described))
-    if described.discretisation == "finite-cell":
-        prefix, what = FROM_SOLID, "divided_cells"
-    else:
-        prefix, what = FROM_FINE, "fine_blocks"
+    cells = described.discretisation == "finite-cell"
     tolerance = wishes.refine_to
-    if tolerance is None and prefix == FROM_SOLID and wishes.estimated:
+    if tolerance is None and cells and wishes.estimated:
         tolerance = np.inf
     if tolerance is None:
         model = None if problem is None else problem.model
         solved = Solved(problem, model, solve(model), {})
+    elif cells:
+        solved = _divided(problem, solve, tolerance, comm, report)
     else:
-        refined = compute_on_root(comm, lambda: _refinable(problem, described, wishes.start))
-        told = None if report is None else (lambda step: report(what, step))
-        model, modes, steps = solve_refined(solve, refined, tolerance, comm, told)
-        achieved = steps[-1].errors.attributes(prefix)
-        achieved |= {what: steps[-1].refined, "refinement_steps": len(steps) - 1}
-        solved = Solved(problem, model, modes, achieved)
+        solved = _coarsened(problem, described, solve, wishes, comm, report)
     if wishes.estimated and described.discretisation == "voxel":
         solved.achieved |= _distance_of_voxels(described, solved, solve, comm)
     return solved
@@ -156,17 +162,56 @@ def solve_accurately(
         described = replace(described, resolution=int(np.ceil(factor * described.resolution)))
 
 
-def _refinable(
-    problem: Problem | None, described: ProblemOptions, start: str | None
-) -> Refinable[Any]:
-    """The coarse model, with those blocks fine that are so in the file to start from, or cells."""
-    assert problem is not None
-    if problem.covering is not None:
+def _divided(
+    problem: Problem | None,
+    solve: Solve,
+    tolerance: float,
+    comm: MPI.Comm,
+    report: Callable[[str, RefinementStep], None] | None,
+) -> Solved:
+    """Finite cells that are divided where it matters."""
+
+    def cells() -> DividedCells:
+        assert problem is not None and problem.covering is not None
         return DividedCells(problem.covering, problem.finite_cells)
-    coarsening = described.coarsening()
-    assert coarsening is not None
-    mesh = None if start is None else read_modes(start, with_modes=False).mesh
-    return RefinedModel(_fine(problem), coarsening, mesh)
+
+    told = None if report is None else partial(report, DIVIDED)
+    start: Refinable[Any] | None = compute_on_root(comm, cells)
+    model, modes, steps = solve_refined(solve, start, tolerance, comm, told)
+    achieved = steps[-1].errors.attributes(FROM_SOLID)
+    achieved |= {DIVIDED: steps[-1].refined, "refinement_steps": len(steps) - 1}
+    return Solved(problem, model, modes, achieved)
+
+
+def _coarsened(
+    problem: Problem | None,
+    described: ProblemOptions,
+    solve: Solve,
+    wishes: Wishes,
+    comm: MPI.Comm,
+    report: Callable[[str, RefinementStep], None] | None,
+) -> Solved:
+    """A coarse model, with those blocks fine that are so in the file to start from, or the fine."""
+    assert wishes.refine_to is not None and wishes.options is not None
+
+    def coarse() -> RefinedModel:
+        assert problem is not None
+        coarsening = described.coarsening()
+        assert coarsening is not None
+        mesh = None if wishes.start is None else read_modes(wishes.start, with_modes=False).mesh
+        return RefinedModel(_fine(problem), coarsening, mesh)
+
+    told = None if report is None else partial(report, FINE)
+    refined = compute_on_root(comm, coarse)
+    found = solve_coarsened(solve, refined, wishes.refine_to, wishes.options, comm, told)
+    achieved = found.errors.attributes(FROM_FINE)
+    achieved |= {"refinement_steps": max(len(found.steps) - 1, 0)}
+    if found.reason is None:
+        achieved |= {FINE: found.steps[-1].refined}
+    else:
+        blocks = comm.bcast(None if refined is None else refined.all_blocks)
+        achieved |= {FINE: blocks, "fine_taken": found.reason}
+    return Solved(problem, found.model, found.modes, achieved)
 
 
 def _fine(problem: Problem) -> ElasticModel:

@@ -76,14 +76,14 @@ def coarse_start(
     found = ModalSolver(coarse, options, comm).solve()
     whole = found.system.gather(found.vectors[:, RIGID_MODES:])
     found.destroy()
-
-    def prolonged() -> Iterator[Array]:
-        assert blocks is not None and whole is not None
-        interpolation = sp.kron(prolongation(blocks), sp.identity(3), format="csr")
-        for first in range(0, whole.shape[1], COLUMNS):
-            yield interpolation @ np.ascontiguousarray(whole[:, first : first + COLUMNS])
-
     count = len(found.values) - RIGID_MODES
-    blocks_of_columns = prolonged() if comm.rank == 0 else []
-    rows = scatter_rows(blocks_of_columns, count, solver.local_mesh, comm)
+    columns = prolonged(blocks, whole) if blocks is not None and whole is not None else []
+    rows = scatter_rows(columns, count, solver.local_mesh, comm)
     return Approximation(found.values[RIGID_MODES:], rows)
+
+
+def prolonged(blocks: Blocks, modes: Array) -> Iterator[Array]:
+    """Coarse modes (coarse n_dofs, k) on the fine nodes (n_dofs, c), a few at a time."""
+    interpolation = sp.kron(prolongation(blocks), sp.identity(3), format="csr")
+    for first in range(0, modes.shape[1], COLUMNS):
+        yield interpolation @ np.ascontiguousarray(modes[:, first : first + COLUMNS])

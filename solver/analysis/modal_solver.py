@@ -19,6 +19,7 @@ from solver.analysis.bounds import check_mode_count, require_memory
 from solver.analysis.components import ComponentModes, elastic_part, lowest_pairs
 from solver.analysis.modes import Initial, Modes
 from solver.analysis.options import RANDOM, SolverOptions
+from solver.analysis.prepared import Prepared
 from solver.analysis.proof import completed, ground_truth
 from solver.analysis.timing import Phases, peak_memory
 from solver.assembly.system import Layout, System, assemble
@@ -64,6 +65,8 @@ class ModalSolver:
         Ranks that share the work.
     verbose
         Whether to show each phase and its time.
+    prepared
+        Partition and analysis of the same mesh, of use to methods that begin with random vectors.
 
     Attributes
     ----------
@@ -93,6 +96,7 @@ class ModalSolver:
         options: SolverOptions,
         comm: MPI.Comm = MPI.COMM_WORLD,
         verbose: bool = False,
+        prepared: Prepared | None = None,
     ) -> None:
         def checked() -> SolverOptions:
             n_dofs = cast(Solid, model).n_dofs
@@ -109,12 +113,20 @@ class ModalSolver:
         leave_cores(comm)
         reuse_freed_memory()
         phases = Phases(comm, verbose)
+        if options.method not in RANDOM or options.linear_solver != "auto":
+            prepared = None
         with phases("partition"):
             subdomains = comm.size if options.method in RANDOM else options.subdomains
-            self.local_mesh = distribute(model, subdomains, options.seed, comm)
+            if prepared is None:
+                self.local_mesh = distribute(model, subdomains, options.seed, comm)
+            else:
+                self.local_mesh = prepared.local_mesh
         with phases("analysis"):
-            self._layout = Layout.of_local_mesh(self.local_mesh, comm)
-            self._linear = LinearSolver(options.linear_solver, self._layout)
+            if prepared is None:
+                self._layout = Layout.of_local_mesh(self.local_mesh, comm)
+                self._linear = LinearSolver(options.linear_solver, self._layout)
+            else:
+                self._layout, self._linear = prepared.layout, prepared.linear
             if options.method == "lanczos" and not self._linear.indefinite:
                 self.options = options = replace(options, method="lobpcg")
             if options.method == "hcms":

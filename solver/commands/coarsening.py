@@ -53,6 +53,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=LAST,
         help=f"rigid included (default {LAST}, the most)",
     )
+    parser.add_argument(
+        "--timed-modes",
+        type=whole_number(RIGID_MODES + 1),
+        help="modes computed where the coarse model is weighed against the fine one and both are "
+        "timed (default: --modes)",
+    )
     parser.add_argument("--out", help="also write the result to this JSON file")
     parser.add_argument(
         "--pictures",
@@ -68,7 +74,9 @@ def run(arguments: argparse.Namespace) -> None:
         require_outputs(arguments)
         _require_two_files(arguments)
         described = collect(ProblemOptions, arguments)
-        case = rate_coarsening(described, arguments.modes, arguments.refine_to)
+        case = rate_coarsening(
+            described, arguments.modes, arguments.refine_to, arguments.timed_modes
+        )
         origin = measured(parameters(arguments))
         case.values["provenance"] = origin
         if arguments.pictures is not None:
@@ -100,9 +108,21 @@ def _print_errors(case: dict[str, Any]) -> None:
         correlation = model["rank_correlation"]
         shown = "-" if correlation is None else f"{correlation:.2f}"
         print(f"{name:<8s}{model['n_dofs']:10,}{errors}{shown:>18s}")
+    for method, name in (("auto", "the default method"), ("slepc", "SLEPc")):
+        print(_costs(name, case["costs"][method]))
     for name in ("plain", "refined"):
         for mode in case[name]["far_off"]:
             print(f"{name}: {_far_off(mode)}")
+
+
+def _costs(method: str, costs: dict[str, Any]) -> str:
+    reason = "" if costs["reason"] is None else f", since {costs['reason']}"
+    fine, coarse = (costs[name]["processor_seconds"] for name in ("fine", "coarse"))
+    return (
+        f"{costs['modes']} modes by {method}: {fine:.2f} s of processors for the fine solid, "
+        f"{coarse:.2f} s with a coarse model, {costs['faster']:.2f} times as fast; the "
+        f"{costs['taken']} one was taken{reason}"
+    )
 
 
 def _errors(errors: dict[str, Any]) -> str:

@@ -38,6 +38,7 @@ from solver.distribution.collective import compute_on_root
 from solver.files.initial_modes import modes_from_file
 from solver.files.modes_file import ESTIMATE, frequencies, write_modes
 from solver.linear import petsc_options
+from solver.refinement.coarse_or_fine import FineStart
 from solver.refinement.errors import FROM_FINE, FROM_SOLID, in_words
 from solver.refinement.options import RefinementOptions
 from solver.refinement.refine import RefinementStep
@@ -97,22 +98,28 @@ def run(arguments: argparse.Namespace) -> None:
         initial = arguments.initial_modes
         coarsening = compute_on_root(comm, lambda: _coarsening(arguments, described))
 
-        def solve(model: Solid | None, modes: int | None = None) -> Modes:
+        def solve(
+            model: Solid | None, modes: int | None = None, start: FineStart | None = None
+        ) -> Modes:
             nonlocal initial
             asked = options if modes is None else _for_estimate(options, modes)
-            prepared = ModalSolver(model, asked, comm, verbose=sys.stderr.isatty())
-            start: Initial | None = None
+            analysed = None if start is None else start.prepared
+            prepared = ModalSolver(model, asked, comm, sys.stderr.isatty(), analysed)
+            begin: Initial | None = None
             if initial is not None:
-                start = modes_from_file(initial, model, asked.modes, prepared.local_mesh, comm)
+                begin = modes_from_file(initial, model, asked.modes, prepared.local_mesh, comm)
                 initial = None
+            elif start is not None:
+                begin = start.begin(prepared)
             elif arguments.refine and modes is None:  # the cells of an estimate are no voxels
-                start = coarse_start(prepared, model, coarsening)
-            result = prepared.solve(initial_modes=start)
+                begin = coarse_start(prepared, model, coarsening)
+            result = prepared.solve(initial_modes=begin)
             result.seconds = {**prepared.seconds, **result.seconds}
             return result
 
         begin = time.perf_counter()
-        wishes = Wishes(refine_to, accuracy.is_estimated(described, options), initial)
+        estimated = accuracy.is_estimated(described, options)
+        wishes = Wishes(refine_to, estimated, initial, options)
         if accuracy.accuracy is None:
             solved = solve_solid(described, solve, wishes, comm, _report)
         else:
@@ -256,6 +263,9 @@ def _print_summary(
             f"error of {attributes['eigenvalue_error_estimate']:.1e}, "
             f"{attributes['missed_tolerance']:.1e} was asked for"
         )
+    if "fine_taken" in attributes:
+        print(f"the fine solid was solved: {attributes['fine_taken']}")
+        attributes = {k: v for k, v in attributes.items() if not k.startswith(FROM_FINE)}
     for prefix, words in EXPECTED.items():
         if f"{prefix}_rms" in attributes:
             print(f"expected {words} {in_words(attributes, prefix)}{_refined_in_words(attributes)}")

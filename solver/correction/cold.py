@@ -11,7 +11,7 @@ from carillon.errors import ConvergenceError
 from solver.assembly.system import System
 from solver.correction.lanczos import Lanczos, lanczos
 from solver.correction.mixture import mixed
-from solver.correction.shift import AIM, inverse_amid
+from solver.correction.shift import AIM, inverse_amid, is_amid
 from solver.linear import Inverse, LinearSolver
 from solver.subspace.start import start_block
 from solver.subspace.weyl import CountingLaw
@@ -40,10 +40,14 @@ class Approximation:
         (q,) its elastic eigenvalues [rad^2/s^2], which are about those of the fine model.
     vectors
         (local, q) its modes on the fine mesh, which are far too stiff there.
+    inverse
+        Inverse of the fine model's K - mu M, used if mu lies amid the wanted eigenvalues; the
+        iteration owns it then.
     """
 
     values: Array
     vectors: Array
+    inverse: Inverse | None = None
 
 
 @dataclass
@@ -89,9 +93,14 @@ def from_nothing(
     columns = min(_columns(requested, system.n_dofs), elastic)
     start, look = start_block(system, columns, seed), int(RANDOM_LOOK * requested)
     share = AIM
+    given = None if near is None else near.inverse
     for _ in range(ATTEMPTS):
         first = None if near is None else float(near.values[int(share * requested)])
-        inverse = inverse_amid(system, linear, requested, law, share, first)
+        if given is not None and is_amid(given, requested):
+            inverse = given
+        else:
+            inverse = inverse_amid(system, linear, requested, law, share, first)
+        given = None
         if near is not None:
             start, look = mixed(
                 system,

@@ -38,10 +38,15 @@ def inverse_amid(
         if not low < shift < high:
             shift = (low * high) ** 0.5
         inverse = linear.inverse(system, shift)
-        below = inverse.negative - RIGID_MODES
-        if LEAST * requested <= below <= MOST * requested:
+        if is_amid(inverse, requested):
             return inverse
+        below = inverse.negative - RIGID_MODES
         inverse.destroy()
         low, high = (max(low, shift), high) if below < AIM * requested else (low, shift)
         scale = shift / law.eigenvalue(below + RIGID_MODES)
     return linear.inverse(system, scale * law.eigenvalue(share * requested + RIGID_MODES))
+
+
+def is_amid(inverse: Inverse, requested: int) -> bool:
+    """Whether the shift lies amid the `requested` lowest elastic eigenvalues."""
+    return LEAST * requested <= inverse.negative - RIGID_MODES <= MOST * requested

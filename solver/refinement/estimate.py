@@ -1,11 +1,11 @@
 """How far off a coarse model's frequencies are, and through which elements.
 
-`TwoGrid` gives the frequencies of the fine solid to a few tenths of what the coarse ones miss. The
-coarse eigenvalue and the fine one differ by what the elements make of the same motion: with a fine
-mode v and the coarse displacements u that are nearest to it (in the norm of the mass) the strain
-energy of an element, u^T K_c u, ought to be that of its fine cells, v^T K v. How far it is from
-that, relative to the mode's, is the element's share of the error. It tells which elements to keep
-fine; the sum of the shares is not the error, since u is no coarse mode.
+`InverseIteration` gives the frequencies of the fine solid to a few tenths of what the coarse ones
+miss. The coarse eigenvalue and the fine one differ by what the elements make of the same motion:
+with a fine mode v and the coarse displacements u that are nearest to it (in the norm of the mass)
+the strain energy of an element, u^T K_c u, ought to be that of its fine cells, v^T K v. How far it
+is from that, relative to the mode's, is the element's share of the error. It tells which elements
+to keep fine; the sum of the shares is not the error, since u is no coarse mode.
 """
 
 from __future__ import annotations
@@ -19,15 +19,19 @@ from scipy.sparse.linalg import splu
 
 from carillon.fem.geometry import Blocks, prolongation
 from carillon.fem.model import RIGID_MODES, ElasticModel
+from solver.analysis.coarse_start import prolonged
+from solver.analysis.modes import Modes
 from solver.assembly.sparse import sum_blocks
 from solver.refinement.energies import element_energies, fine_energies
 from solver.refinement.errors import LAST, ExpectedErrors
-from solver.refinement.two_grid import TwoGrid
+from solver.refinement.inverse_iteration import InverseIteration, NearModes
 
 Array = NDArray[np.float64]
 
 MODES_USED = LAST + 12
-"""Modes that are corrected, since modes may change places."""
+"""Modes that are looked at, since modes may change places."""
+COLUMNS_USED = LAST - RIGID_MODES + 2
+"""Elastic ones that are iterated; the random vectors beside them find those that are missing."""
 
 
 @dataclass(frozen=True)
@@ -38,28 +42,25 @@ class ErrorEstimate:
     ----------
     errors
         Of the frequencies.
-    shares : (mc,)
-        Root mean square over these modes of each element's share of the eigenvalues' error; 0 for
-        fine cells.
+    fine
+        The fine modes that they were compared with, as many as are rated or more.
     """
 
     errors: ExpectedErrors
-    shares: Array
+    fine: NearModes
 
 
-def estimate_errors(
-    two_grid: TwoGrid, blocks: Blocks, coarse: ElasticModel, values: Array, modes: Array
-) -> ErrorEstimate:
-    """Expected errors of the frequencies of a coarse model, up to mode `LAST`.
+def estimate_errors(solid: InverseIteration, blocks: Blocks | None, modes: Modes) -> ErrorEstimate:
+    """Expected errors of the frequencies of a coarse model, up to mode `LAST`; collective.
 
     Parameters
     ----------
-    two_grid
-        Of the fine solid.
-    blocks, coarse
-        The coarse mesh, plain or mixed, and the model on it.
-    values, modes
-        (k,) eigenvalues [rad^2/s^2] and (coarse n_dofs, k) modes, the six rigid ones included.
+    solid
+        The fine solid.
+    blocks
+        The coarse mesh, plain or mixed, on rank 0; None on the others.
+    modes
+        Of the model on it, the six rigid ones included.
 
     Examples
     --------
@@ -68,26 +69,34 @@ def estimate_errors(
     ...     blocks_from_mesh, builtin_surface, hexmesh_from_voxels, voxelize
     ... )
     >>> from carillon.fem.model import fine_model
+    >>> from solver.analysis.modal_solver import modal_analysis
     >>> from solver.coarsening.choice import make_coarsening
     >>> from solver.coarsening.model import build_model
     >>> mesh = hexmesh_from_voxels(voxelize(builtin_surface("bar"), 16))
     >>> young = np.full(mesh.n_cells, 1e9)
     >>> coarse = build_model(mesh, young, make_coarsening("average"))
-    >>> found = solver.solve(coarse, modes=30, method="slepc")
-    >>> two_grid = TwoGrid(fine_model(mesh, young))
-    >>> blocks = blocks_from_mesh(mesh)
-    >>> estimate = estimate_errors(two_grid, blocks, coarse, found.eigenvalues, found.modes)
+    >>> found = modal_analysis(coarse, solver.SolverOptions(modes=30))
+    >>> solid = InverseIteration(fine_model(mesh, young))
+    >>> estimate = estimate_errors(solid, blocks_from_mesh(mesh), found)
     >>> estimate.errors.last, estimate.errors.rms > 0.1
     (30, True)
     """
-    elastic = np.ascontiguousarray(modes[:, RIGID_MODES:MODES_USED])
-    exact, vectors = two_grid.lowest(blocks, elastic)
-    count = min(len(exact), LAST - RIGID_MODES)
-    exact, vectors = exact[:count], vectors[:, :count]
-    ratio = np.maximum(values[RIGID_MODES : RIGID_MODES + count], 0.0) / exact
-    errors = np.sqrt(ratio) - 1.0
-    shares = error_shares(blocks, coarse, two_grid.fine, exact, vectors)
-    return ErrorEstimate(ExpectedErrors(errors), np.sqrt(np.mean(shares**2, axis=1)))
+    values = modes.values[RIGID_MODES:LAST]
+    start = modes.start()[:, :COLUMNS_USED]
+    whole = modes.system.gather(np.ascontiguousarray(start))
+    columns = prolonged(blocks, whole) if blocks is not None and whole is not None else []
+    fine = solid.lowest(values, columns, start.shape[1])
+    count = min(len(values), len(fine.values))
+    ratio = np.maximum(values[:count], 0.0) / fine.values[:count]
+    return ErrorEstimate(ExpectedErrors(np.sqrt(ratio) - 1.0), fine)
+
+
+def mean_shares(
+    blocks: Blocks, coarse: ElasticModel, fine: ElasticModel, values: Array, vectors: Array
+) -> Array:
+    """Root mean square (mc,) over modes of `error_shares`, which has the parameters."""
+    shares = error_shares(blocks, coarse, fine, values, vectors)
+    return np.asarray(np.sqrt(np.mean(shares**2, axis=1)))
 
 
 def error_shares(

@@ -28,6 +28,7 @@ from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
+from solver.refinement.coarse_or_fine import FineStart
 from solver.refinement.errors import FROM_SOLID
 from solver.studies.accuracy.solids import ANGLES
 from solver.studies.comparison import frequency_errors
@@ -143,7 +144,9 @@ def _rated(described: ProblemOptions, way: str, hertz: Array) -> dict[str, Any]:
 
 
 def _solved(described: ProblemOptions, refine_to: float | None) -> Solved:
-    def solve(model: Solid | None, modes: int | None = None) -> Modes:
+    def solve(
+        model: Solid | None, modes: int | None = None, start: FineStart | None = None
+    ) -> Modes:
         asked = SolverOptions(modes=MODES if modes is None else min(modes, MODES))
         return modal_analysis(model, asked, MPI.COMM_SELF)
 

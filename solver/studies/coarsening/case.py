@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError, UserError
-from carillon.fem.geometry import Blocks
+from carillon.fem.geometry import Blocks, prolongation
 from carillon.fem.model import ElasticModel
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import Problem, ProblemOptions, build_problem
-from solver.coarsening.coarsening import Coarsening
 from solver.files.modes_file import CHECKS, frequencies
 from solver.refinement.errors import LAST, WORST
-from solver.refinement.estimate import MODES_USED
-from solver.refinement.refine import RefinedModel, RefinementStep, solve_refined
+from solver.refinement.estimate import MODES_USED, estimate_errors
+from solver.refinement.inverse_iteration import InverseIteration
+from solver.refinement.refined_model import RefinedModel
+from solver.studies.coarsening.costs import Taken, as_values, compare_costs, take, timed
 from solver.studies.coarsening.matching import FAR_OFF
 from solver.studies.coarsening.pictures import ModePicture
 from solver.studies.coarsening.rating import CoarseRating, SolvedModel
+
+Array = NDArray[np.float64]
 
 SPARE = MODES_USED - LAST
 """Modes found beyond those that are rated, which may be among them in truth."""
@@ -42,62 +45,23 @@ class RatedCase:
 
 
 @dataclass(frozen=True)
-class _Attempt:
+class _Rated:
+    """A model whose modes are rated, and what is expected of them."""
+
     blocks: Blocks
     solution: SolvedModel
-    seconds: dict[str, float]
+    expected: Array
+    described: dict[str, Any]
 
 
-class _Attempts:
-    """The models that a refinement goes through, with wall seconds by phase."""
-
-    def __init__(self, problem: Problem, coarsening: Coarsening, modes: int) -> None:
-        self._modes = modes
-        self._mark = time.perf_counter()
-        self._refined = RefinedModel(problem.hexahedra, coarsening)
-        # The fine matrices are what the estimate needs beforehand.
-        self._before_estimate = self._lap()
-        self.made: list[_Attempt] = []
-        self.steps: list[RefinementStep] = []
-
-    def run(self, tolerance: float) -> None:
-        """Solve, estimate and refine."""
-        _, last, _ = solve_refined(
-            self._solve, self._refined, tolerance, MPI.COMM_SELF, self._report
-        )
-        last.destroy()
-
-    def seconds(self, count: int) -> dict[str, float]:
-        """Wall time of the first `count` attempts by phase."""
-        made = self.made[:count]
-        return {phase: sum(each.seconds[phase] for each in made) for phase in made[0].seconds}
-
-    def _solve(self, model: ElasticModel | None) -> Modes:
-        assert model is not None
-        coarsening = self._lap()
-        modes = _solve(model, self._modes)
-        self._lap()
-        solution = SolvedModel(model, modes.values, _gathered(modes))
-        seconds = {"coarsening": coarsening, "solve": _solve_seconds(modes), "estimate": 0.0}
-        self.made.append(_Attempt(self._refined.blocks, solution, seconds))
-        self._lap()
-        return modes
-
-    def _report(self, step: RefinementStep) -> None:
-        self.made[-1].seconds["estimate"] = self._lap() + self._before_estimate
-        self._before_estimate = 0.0
-        self.steps.append(step)
-
-    def _lap(self) -> float:
-        before, self._mark = self._mark, time.perf_counter()
-        return self._mark - before
-
-
-def rate_coarsening(options: ProblemOptions, modes: int, tolerance: float) -> RatedCase:
+def rate_coarsening(
+    options: ProblemOptions, modes: int, tolerance: float, timed_modes: int | None = None
+) -> RatedCase:
     """Errors of the single modes of one solid's coarse models, true and expected ones.
 
-    The coarse model as it is, and the one whose worst blocks stay fine until the expected error is
-    at most `tolerance`; both and the fine one are solved by SLEPc, on this rank alone.
+    The coarse model as it is, and what is taken for an expected error of at most `tolerance` where
+    SLEPc finds the modes: the same, one with some blocks fine, or the fine solid. What the default
+    method takes, and costs, is told beside it. All of it runs on this rank alone.
 
     Parameters
     ----------
@@ -105,6 +69,8 @@ def rate_coarsening(options: ProblemOptions, modes: int, tolerance: float) -> Ra
         The solid and its coarsening.
     modes
         Number of the last mode rated, the six rigid ones included; at most `LAST`.
+    timed_modes
+        Number of modes computed where the coarse model is chosen and timed; `modes` if not given.
 
     Raises
     ------
@@ -115,14 +81,21 @@ def rate_coarsening(options: ProblemOptions, modes: int, tolerance: float) -> Ra
     if coarsening is None:
         raise UserError("nothing is coarsened: choose a coarsening other than none")
     problem = build_problem(replace(options, coarsen="none"))
-    exact = _solve(problem.hexahedra, min(modes + SPARE, problem.hexahedra.n_dofs))
-    truth = SolvedModel(problem.hexahedra, exact.values, _gathered(exact))
-    attempts = _Attempts(problem, coarsening, modes + SPARE)
-    attempts.run(tolerance)
-    count = len(attempts.made)
+    fine = problem.hexahedra
+    exact, fine_cost = timed(lambda: _solve(fine, modes + SPARE))
+    truth = SolvedModel(fine, exact.values, _gathered(exact))
+    taken, cost = timed(lambda: take(fine, coarsening, tolerance, _slepc(fine, modes + SPARE)))
+    costs = {
+        "auto": compare_costs(fine, coarsening, tolerance, timed_modes or modes),
+        "slepc": as_values(modes + SPARE, taken, fine_cost, cost),
+    }
+    rated = {
+        "plain": _plain(RefinedModel(fine, coarsening), modes),
+        "refined": _taken(taken, truth),
+    }
     ratings = {
-        "plain": _rating(truth, attempts, 0, modes),
-        "refined": _rating(truth, attempts, count - 1, modes),
+        name: CoarseRating(truth, each.blocks, each.solution, each.expected, modes)
+        for name, each in rated.items()
     }
     values = {
         "mesh": options.mesh,
@@ -134,44 +107,64 @@ def rate_coarsening(options: ProblemOptions, modes: int, tolerance: float) -> Ra
         "coarsen": options.coarsen,
         **coarsening.record(),
         "goals": {"rms": tolerance, "worst": WORST * tolerance, "far_off": FAR_OFF},
-        "n_dofs": problem.hexahedra.n_dofs,
+        "n_dofs": fine.n_dofs,
         "cells": problem.fine.n_cells,
         "truth": {
             **exact.evidence,
             "seconds": _solve_seconds(exact),
             "frequencies_hz": frequencies(exact.values)[:modes].tolist(),
         },
-        **{
-            name: {**_described(attempts, at), **rating.as_dict()}
-            for (name, rating), at in zip(ratings.items(), (0, count - 1), strict=True)
-        },
+        "costs": costs,
+        **{name: {**rated[name].described, **each.as_dict()} for name, each in ratings.items()},
     }
     exact.destroy()
     return RatedCase(values, problem, ratings["plain"].pictures(PICTURES))
 
 
-def _rating(truth: SolvedModel, attempts: _Attempts, at: int, modes: int) -> CoarseRating:
-    made, step = attempts.made[at], attempts.steps[at]
-    return CoarseRating(truth, made.blocks, made.solution, step.errors.errors, modes)
+def _plain(refined: RefinedModel, modes: int) -> _Rated:
+    """A coarse model as it is, rated whether that would be worth it or not."""
+    found = _solve(refined.model, modes + SPARE)
+    solid = InverseIteration(refined.fine, MPI.COMM_SELF)
+    expected = estimate_errors(solid, refined.blocks, found).errors.errors
+    solution = SolvedModel(refined.model, found.values, _gathered(found))
+    solid.destroy()
+    found.destroy()
+    return _Rated(refined.blocks, solution, expected, _described(refined))
 
 
-def _described(attempts: _Attempts, at: int) -> dict[str, Any]:
-    made, step = attempts.made[at], attempts.steps[at]
+def _taken(taken: Taken, truth: SolvedModel) -> _Rated:
+    """What was taken: a coarse model, or the fine one, whose modes are the truth."""
+    refined, found = taken.refined, taken.found
+    if found.reason is None:
+        solution = SolvedModel(refined.model, found.modes.values, _gathered(found.modes))
+        expected = found.errors.errors
+    else:
+        refined.refine_all()
+        # As many coarse nodes as fine ones, in another order.
+        nodal = prolongation(refined.blocks).T @ truth.vectors.reshape(truth.model.mesh.n_nodes, -1)
+        solution = SolvedModel(refined.model, truth.values, nodal.reshape(truth.vectors.shape))
+        expected = np.zeros(len(truth.values))
+    found.modes.destroy()
+    return _Rated(refined.blocks, solution, expected, _described(refined))
+
+
+def _described(refined: RefinedModel) -> dict[str, Any]:
     return {
-        "n_dofs": step.unknowns,
-        "elements": made.blocks.coarse.n_cells,
-        "fine_blocks": step.refined,
-        "refinement_steps": at,
-        "seconds": attempts.seconds(at + 1),
+        "n_dofs": refined.n_dofs,
+        "elements": refined.blocks.coarse.n_cells,
+        "fine_blocks": refined.fine_blocks,
     }
 
 
 def _solve(model: ElasticModel, modes: int) -> Modes:
-    options = SolverOptions(method="slepc", modes=min(modes, model.n_dofs))
     try:
-        return modal_analysis(model, options, MPI.COMM_SELF)
+        return modal_analysis(model, _slepc(model, modes), MPI.COMM_SELF)
     except ConvergenceError as error:
         raise ConvergenceError(f"{model.n_dofs:,} unknowns: {error}") from None
+
+
+def _slepc(model: ElasticModel, modes: int) -> SolverOptions:
+    return SolverOptions(method="slepc", modes=min(modes, model.n_dofs))
 
 
 def _gathered(modes: Modes) -> Any:

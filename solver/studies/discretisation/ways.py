@@ -24,8 +24,10 @@ from solver.analysis.options import SolverOptions
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.model import build_model
 from solver.files.modes_file import CHECKS, frequencies
+from solver.refinement.coarse_or_fine import by_options, solve_coarsened
 from solver.refinement.options import ALLOWED_DISTANCE, ALLOWED_ERROR
-from solver.refinement.refine import Refinable, RefinedModel, solve_refined
+from solver.refinement.refine import Refinable, solve_refined
+from solver.refinement.refined_model import RefinedModel
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
     import trimesh
@@ -128,11 +130,18 @@ class Ways:
         return self._solved(model, clock)
 
     def refined(self) -> TimedSpectrum:
-        """The same with blocks fine until the expected error is `ALLOWED_ERROR`."""
+        """The same with blocks fine for an expected error of `ALLOWED_ERROR`, or the voxels."""
         clock = _Clock()
         mesh, young = self._voxels(clock)
-        start = RefinedModel(fine_model(mesh, young, **self._given.constants), self._coarsening)
-        return self._refined(start, ALLOWED_ERROR, clock)
+        fine = fine_model(mesh, young, **self._given.constants)
+        refined = RefinedModel(fine, self._coarsening)
+        clock.end("model")
+        options = self._options
+        solve = by_options(options, MPI.COMM_SELF)
+        found = solve_coarsened(solve, refined, ALLOWED_ERROR, options, MPI.COMM_SELF)
+        clock.end("solve", _checks(found.modes))
+        assert found.model is not None
+        return _spectrum(found.model, found.modes, clock)
 
     def divided(self, factor: float) -> TimedSpectrum:
         """Cells of which some are divided for an expected error of `ALLOWED_DISTANCE`."""
@@ -192,9 +201,11 @@ class Ways:
         return _spectrum(model, modes, clock)
 
     def _modes_of(self, model: Solid) -> Modes:
-        return modal_analysis(
-            model, SolverOptions(modes=self._modes, tolerance=TOLERANCE), MPI.COMM_SELF
-        )
+        return modal_analysis(model, self._options, MPI.COMM_SELF)
+
+    @property
+    def _options(self) -> SolverOptions:
+        return SolverOptions(modes=self._modes, tolerance=TOLERANCE)
 
 
 def _checks(modes: Modes) -> float:

@@ -9,7 +9,7 @@ from workflow.studies.base.page import inline, rendered
 from workflow.studies.base.table import Table
 from workflow.studies.coarsening.pictures import mode_pictures
 from workflow.studies.coarsening.results import CoarseningStudy
-from workflow.studies.coarsening.tables import FIRST, LABELS, rank_correlation
+from workflow.studies.coarsening.tables import FIRST, LABELS, METHODS, rank_correlation, speeds
 
 
 def page(study: CoarseningStudy, tables: dict[str, Table]) -> str:
@@ -26,6 +26,7 @@ def page(study: CoarseningStudy, tables: dict[str, Table]) -> str:
         goals=study.goals,
         without=study.without,
         correlation=rank_correlation(study),
+        speeds={METHODS[method]: speeds(study, method) for method in METHODS},
         span=f"{FIRST}–{study.last}",
         figures={name: inline(study.figure(f"{name}.svg")) for name in ("expected", "errors")},
         solids=[solid for solid in solids if solid],

@@ -19,7 +19,7 @@ ALL = "all"
 LABELS = {"plain": "Coarse", "refined": "Refined"}
 KINDS = ("by_index", "recognised", "expected")
 VERDICTS = ("swap", "local", "error")
-PHASES = ("coarsening", "solve", "estimate")
+METHODS = {"auto": "Default method", "slepc": "SLEPc"}
 
 
 def _records(study: CoarseningStudy) -> dict[str, Record]:
@@ -70,9 +70,19 @@ def cases(study: CoarseningStudy) -> Iterator[Row]:
 
 
 def costs(study: CoarseningStudy) -> Iterator[Row]:
-    """Wall times and what stayed fine, of every case."""
+    """What coarse models cost beside the fine solid, and what is taken, in every case."""
     for case, rating in study.ratings.items():
         yield {**rating, **study.identity(case)}
+
+
+def speeds(study: CoarseningStudy, method: str) -> dict[str, float]:
+    """How many times as fast as the fine solid coarse models are: median, least, most."""
+    ratios = [rating["costs"][method]["faster"] for rating in study.ratings.values()]
+    return {
+        "median": float(np.median(ratios)),
+        "least": float(min(ratios)),
+        "most": float(max(ratios)),
+    }
 
 
 def modes(study: CoarseningStudy) -> Iterator[Row]:

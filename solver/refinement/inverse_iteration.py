@@ -1,0 +1,155 @@
+"""The lowest modes of the fine solid from those of a coarse model: inverse iteration.
+
+Prolonged to the fine nodes, coarse modes are in the right place but far too stiff: what is wrong
+with them oscillates from node to node. Such parts are what (K - mu M)^-1 M removes first, with one
+factorisation and few, wide blocks of right-hand sides.
+
+With mu amid the eigenvalues the same factorisation serves those who want the fine modes after all,
+and its inertia counts the eigenvalues below mu. If fewer are found, the coarse model lacks modes:
+then the iteration goes on with a shift below all of them, where the lowest grow most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from carillon.fem.model import RIGID_MODES, ElasticModel
+from carillon.runtime import limit_threads
+from solver.analysis.prepared import Prepared
+from solver.distribution.collective import ranks_of_machine
+from solver.files.initial_modes import scatter_rows
+from solver.linear import Inverse
+from solver.subspace.rayleigh_ritz import SHIFT_FRACTION, rayleigh_ritz
+from solver.subspace.start import start_block
+
+Array = NDArray[np.float64]
+
+AMID = (0.45, 0.65)
+"""Shares of the rated eigenvalues between which the shift lies, in their widest gap."""
+ITERATIONS = 2
+"""Inverse iterations."""
+RANDOM_VECTORS = 16
+"""Random vectors beside the coarse modes, which lead to modes that the coarse model lacks."""
+NEXT_TO_SHIFT, FAR_FROM_SHIFT = 1e-3, 1e-2
+"""Relative distance from the value below which eigenvalues are counted, within which one may lie on
+either side of it: where that is the shift, and where the shift is below all."""
+
+
+@dataclass(frozen=True)
+class NearModes:
+    """Approximate modes of the fine solid.
+
+    Attributes
+    ----------
+    values
+        (k,) Ritz values [rad^2/s^2], not below the eigenvalues.
+    vectors
+        (local, k) mass-orthonormal, this rank's rows.
+    missed
+        Number of modes below the shift that are not among them.
+    """
+
+    values: Array
+    vectors: Array
+    missed: int
+
+
+class InverseIteration:
+    """A fine solid on all ranks; collective.
+
+    Parameters
+    ----------
+    fine
+        The fine model, on rank 0; None on the others.
+
+    Attributes
+    ----------
+    prepared
+        Partition and symbolic analysis of its mesh.
+    inverse
+        The last factorisation; None before the first.
+    """
+
+    def __init__(self, fine: ElasticModel | None, comm: MPI.Comm = MPI.COMM_WORLD) -> None:
+        threads = limit_threads(ranks_of_machine(comm))
+        self.prepared = Prepared.of_model(fine, comm)
+        self.system = self.prepared.assembled(threads)
+        self.inverse: Inverse | None = None
+        self._counted: tuple[float, int] | None = None
+
+    def lowest(self, values: Array, blocks: Iterable[Array], columns: int) -> NearModes:
+        """Lowest elastic modes from coarse ones.
+
+        Parameters
+        ----------
+        values
+            (k,) elastic eigenvalues [rad^2/s^2] of the coarse modes that are rated.
+        blocks
+            `columns` coarse modes, k or more, prolonged to the fine nodes (n_dofs, c), a few at a
+            time; looked at on rank 0 alone.
+        """
+        system, comm = self.system, self.system.comm
+        below = -SHIFT_FRACTION * float(values[0])
+        if self.inverse is None:
+            self._factorise(_amid(values) if self.prepared.linear.indefinite else below)
+        rows = scatter_rows(blocks, columns, self.prepared.local_mesh, comm)
+        start = np.concatenate([rows, start_block(system, RANDOM_VECTORS, 0)], axis=1)
+        found, vectors = self._iterated(start)
+        if self.missed(found) and self._shift > 0.0:
+            self._factorise(below)
+            found, vectors = self._iterated(vectors)
+        return NearModes(found, vectors, self.missed(found))
+
+    def whole(self, vectors: Array) -> Array | None:
+        """Vectors (n_dofs, k) in the mesh's order of nodes on rank 0, None elsewhere."""
+        return self.system.gather(np.ascontiguousarray(vectors))
+
+    def destroy(self) -> None:
+        """Free what numpy does not."""
+        if self.inverse is not None:
+            self.inverse.destroy()
+        self.system.destroy()
+
+    @property
+    def _shift(self) -> float:
+        return 0.0 if self.inverse is None else self.inverse.shift
+
+    def _factorise(self, shift: float) -> None:
+        if self.inverse is not None:
+            self.inverse.destroy()
+        self.inverse = self.prepared.linear.inverse(self.system, shift)
+        if shift > 0.0:
+            self._counted = shift, self.inverse.negative - RIGID_MODES
+
+    def _iterated(self, vectors: Array) -> tuple[Array, Array]:
+        """Ritz values and vectors of the iterated vectors (local, m)."""
+        assert self.inverse is not None
+        system = self.system
+        for _ in range(ITERATIONS):
+            vectors = self.inverse.solve(system.times_mass(vectors))
+            vectors /= np.sqrt(system.column_products(vectors, vectors))
+        return rayleigh_ritz(system, vectors)
+
+    def missed(self, found: Array) -> int:
+        """Number of eigenvalues that were counted and are not among these (k,)."""
+        if self._counted is None:
+            return 0
+        shift, below = self._counted
+        slack = NEXT_TO_SHIFT if self._shift > 0.0 else FAR_FROM_SHIFT
+        return max(below - int((found < (1.0 + slack) * shift).sum()), 0)
+
+
+def _amid(values: Array) -> float:
+    """A shift amid ascending values (k,), away from all."""
+    first = int(AMID[0] * (len(values) - 1))
+    last = max(int(AMID[1] * (len(values) - 1)), first + 1)
+    if last >= len(values):
+        return 0.5 * float(values[0])
+    gaps = values[first + 1 : last + 1] / values[first:last]
+    place = first + int(gaps.argmax())
+    return float(np.sqrt(values[place] * values[place + 1]))
