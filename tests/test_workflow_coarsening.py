@@ -19,8 +19,9 @@ from workflow.studies.coarsening.pictures import best_view
 from workflow.studies.coarsening.results import CoarseningStudy
 from workflow.studies.coarsening.tables import filled_cells, rank_correlation, speeds
 
-summary, cases, modes, elements = (
-    catalogue.COARSENING.entries[name] for name in ("summary", "cases", "modes", "elements")
+summary, cases, modes, elements, costs = (
+    catalogue.COARSENING.entries[name]
+    for name in ("summary", "cases", "modes", "elements", "costs")
 )
 STUDY = {
     "models": {
@@ -55,7 +56,7 @@ def rated(material: str) -> dict:
         shapes = {**errors, "modes": 12}
         return {"by_index": errors, "expected": expected, "recognised": shapes, "far_off": far}
 
-    def costs(faster: float) -> dict:
+    def spent(faster: float) -> dict:
         cost = {"processor_seconds": 2.0, "seconds": 2.1}
         taken = {"modes": 60, "taken": "fine", "reason": "so", "estimates": 0}
         return {**taken, "fine": cost, "coarse": cost, "faster": faster}
@@ -67,7 +68,7 @@ def rated(material: str) -> dict:
         "goals": {"rms": 0.05, "worst": 0.15, "far_off": 0.1},
         "plain": model(rms, far),
         "refined": model(rms / 4, []),
-        "costs": {"auto": costs(1.0 + rms), "slepc": costs(3.0)},
+        "costs": {"auto": spent(1.0 + rms), "slepc": spent(3.0)},
         "provenance": {"commit": "none"},
     }
 
@@ -104,6 +105,12 @@ def test_every_case_has_a_row_with_both_models(study):
     assert rows[1]["plain_rms"] == 0.20 and rows[1]["refined_rms"] == 0.05
     assert rows[1]["plain_expected_rms"] == pytest.approx(0.22)
     assert rows[1]["plain_shape_modes"] == 12 and rows[1]["plain_far_off"] == 2
+
+
+def test_costs_stand_beside_those_of_the_fine_solid(study):
+    row = costs(study).rows[1]
+    assert row["auto_fine"] == row["auto_coarse"] == 2.0 and row["slepc_faster"] == 3.0
+    assert (row["auto_taken"], row["auto_reason"], row["auto_modes"]) == ("fine", "so", 60)
 
 
 def test_speeds_are_told_by_method(study):
