@@ -53,6 +53,13 @@ def test_what_is_near_to_a_change_is_run_as_far_as_time_lasts(turn):
     assert f"{others[0]} (changed)" in str(part)
 
 
+def test_a_change_is_tried_even_if_the_turn_takes_all_the_time():
+    seconds = {f"test_{number}.py": 2 * tiers.BUDGET_SECONDS for number in range(tiers.TURNS)}
+    seconds["test_new.py"] = tiers.CHANGE_SECONDS
+    turn = next(n for n in range(3) if "test_new.py" not in tiers.choose(seconds, [], n).files)
+    assert tiers.choose(seconds, ["test_new.py"], turn).related == ("test_new.py",)
+
+
 @pytest.mark.parametrize(
     ("changed", "first", "others"),
     [
