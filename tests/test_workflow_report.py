@@ -17,6 +17,7 @@ from workflow.studies.base.numbers import show
 from workflow.studies.base.style import svg
 from workflow.studies.base.table import Column, Table, read_table, write_table
 from workflow.studies.report.design_tables import costs, design, spread_of
+from workflow.studies.report.methods_plot import methods_figure
 from workflow.studies.report.mode_pictures import aligned, cluster
 
 TABLE = Table(
@@ -202,3 +203,9 @@ def test_a_solid_that_is_not_heard_has_a_spectrogram_too():
         levels = decibels(silence, 0.0)
         figure = spectrogram_figure(silence, 0.0, highest_hertz([(silence, rate)]), rate)
     assert (levels == FLOOR_DECIBELS).all() and figure.axes
+
+
+def test_a_run_that_times_nothing_has_an_empty_figure_of_times():
+    empty = Table("methods", "", [Column("model", "Model")], [])
+    (axes,) = methods_figure(SimpleNamespace(table=lambda name: empty)).axes
+    assert not axes.containers

@@ -33,7 +33,7 @@ def methods_figure(results: Results) -> Figure:
     methods = results.table("methods")
     keys = {column.key for column in methods.columns}
     timed = [name for name in METHOD_COLOURS if name in keys]
-    height = 0.8 / len(timed)
+    height = 0.8 / max(len(timed), 1)
     figure, axes = plt.subplots(figsize=(7.6, 1.1 + 1.5 * len(methods.rows)))
     for index, name in enumerate(timed):
         rows = [
@@ -56,5 +56,6 @@ def methods_figure(results: Results) -> Figure:
     axes.set_xscale("log")
     named_rows(axes, [plain(row["title"]).replace(", ", "\n") for row in methods.rows])
     axes.set_xlabel("wall time [s]")
-    figure.legend(loc="outside upper left", ncols=4, columnspacing=1.2)
+    if timed:
+        figure.legend(loc="outside upper left", ncols=4, columnspacing=1.2)
     return figure
