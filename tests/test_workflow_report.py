@@ -183,6 +183,10 @@ def test_where_it_does_not_pay_is_named():
     told = costs(tables)[-1]
     assert "It did not pay: Pitcher (0.38×, 15,228 of 17,745 unknowns left)." in told
     assert "would not have paid" not in told
+    assert told.startswith("A single spectrum to 5 % is another matter")
+    assert costs(tables, 0.0)[-1].startswith(
+        "Single spectra are those of coarse elements throughout"
+    )
 
 
 def test_a_solid_that_was_left_fine_is_told_as_such():

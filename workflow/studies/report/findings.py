@@ -13,7 +13,7 @@ PROVEN_RESIDUAL = 1e-6
 """Residual that ground truth must stay below for the page to call it proven."""
 
 
-def findings(tables: dict[str, Table]) -> dict[str, Any]:
+def findings(tables: dict[str, Table], refine_to: float | None = None) -> dict[str, Any]:
     """Headline numbers over all models, from the tables of a run."""
     summary, coarsening, times, evidence, frequencies = (
         _frame(tables[name])
@@ -34,7 +34,7 @@ def findings(tables: dict[str, Table]) -> dict[str, Any]:
         "galerkin_error": coarsening["galerkin_hcms_ec_rms"].median(),
         # Of the solve of a design: median, least and greatest over the solids, or None.
         "design": {key: spread_of(tables["design"], key) for key in QUANTITIES},
-        "costs": costs(tables),
+        "costs": costs(tables, refine_to),
         # SLEPc's time over that of HCMS + EC on the same mesh.
         "fine_ratio": (times["truth"] / times["hcms_ec"]).median(),
         "coarse_ratio": (times["ddfem_slepc"] / times["ddfem_hcms_ec"]).median(),

@@ -33,7 +33,7 @@ def page(run: Run, tables: Tables) -> str:
         truth=TRUTH,
         config=run.config,
         tables=tables,
-        findings=findings(tables),
+        findings=findings(tables, run.config["solver"]["refine_to"]),
         missed=missed(tables["evidence"], run.config["solver"]["tolerance"]),
         titles=run.titles,
         models=[_model(run, tables, model) for model in run.models],
