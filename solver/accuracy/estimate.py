@@ -4,7 +4,7 @@ Let an error e fall by the factor r when cells are halved: 16 where displacement
 at edges that point inwards and other singular places. If cells were twice and four times as large,
 modes would lose L2 = e (r - 1) and L4 = e (r^2 - 1), which `solver.accuracy.surplus` finds. So,
 place by place, r = L4 / L2 - 1 and e = L2 / (r - 1): Richardson's extrapolation without a second
-solve.
+solve. What none of these cells can do is added, see `solver.accuracy.cubics`.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from carillon.fem.finite_cells.model import FiniteCellModel
 from carillon.fem.model import RIGID_MODES
+from solver.accuracy.cubics import CubicSurplus, cubic_surplus
 from solver.accuracy.surplus import losses
 from solver.refinement.errors import LAST, ExpectedErrors
 
@@ -24,6 +25,8 @@ Array = NDArray[np.float64]
 SLOWEST, FASTEST = 2.0, 16.0
 """Bounds of the factor by which halved cells diminish an error: that of cracks, and of smooth
 displacements."""
+MOST_LOST = 0.9
+"""Share of an eigenvalue that what was left out may take from it, at most."""
 
 
 @dataclass(frozen=True)
@@ -67,12 +70,25 @@ def estimate_cell_errors(model: FiniteCellModel, values: Array, modes: Array) ->
     True
     """
     elastic = slice(RIGID_MODES, min(LAST, len(values)))
-    twice, fourfold, group = losses(model, np.ascontiguousarray(modes[:, elastic]))
+    chosen = np.ascontiguousarray(modes[:, elastic])
+    twice, fourfold, group = losses(model, chosen)
     own = values[elastic]
     lost = np.stack([np.bincount(group, (each / own).sum(axis=1)) for each in (twice, fourfold)])
     ratio = lost[1] / np.maximum(lost[0], np.finfo(float).tiny)
     factors = np.clip(ratio - 1.0, SLOWEST, FASTEST)[group]
     # A frequency's relative error is half its eigenvalue's.
     shares = 0.5 * twice / own / (factors - 1.0)[:, None]
+    shares += _unseen(cubic_surplus(model, own, chosen), own, shares.sum(axis=0))
     errors = ExpectedErrors(shares.sum(axis=0))
     return CellErrors(errors, np.sqrt(np.mean(shares**2, axis=1)), factors)
+
+
+def _unseen(surplus: CubicSurplus, own: Array, errors: Array) -> Array:
+    """Relative errors (c, k) in each cell by which extrapolated ones (k,) are below the surplus's.
+
+    Extrapolation sees nothing of what cells of no size can do.
+    """
+    lost = np.minimum(surplus.gains / own, MOST_LOST)
+    missing = np.maximum(1.0 / np.sqrt(1.0 - lost) - 1.0 - errors, 0.0)
+    total = np.maximum(surplus.shares.sum(axis=0), np.finfo(float).tiny)
+    return np.asarray(missing * surplus.shares / total)

@@ -13,13 +13,12 @@ from mpi4py import MPI
 from carillon.errors import UserError
 from carillon.fem.materials import NAMES
 from carillon.fem.model import ElasticModel, Solid, fine_model
-from carillon.progress import say
 from solver.accuracy.divide import DividedCells
 from solver.accuracy.voxels import Reference
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import Problem, ProblemOptions, build_problem
-from solver.distribution.collective import bcast_from_root, compute_on_root
+from solver.distribution.collective import bcast_from_root, compute_on_root, optional
 from solver.files.modes_file import read_modes
 from solver.refinement.coarse_or_fine import FineStart, solve_coarsened
 from solver.refinement.errors import FROM_FINE, FROM_SOLID, LAST, WORST, ExpectedErrors
@@ -30,6 +29,8 @@ MOST_UNKNOWNS = 400_000
 """Unknowns from which no finer lattice is tried."""
 FINE, DIVIDED = "fine_blocks", "divided_cells"
 """Attributes that count what was refined."""
+UNTOLD = "how far frequencies are from the solid's cannot be told"
+"""What is said where the estimate fails."""
 LEAST_STEP, LARGEST_STEP = 1.2, 2.0
 """Factors by which a resolution is raised."""
 
@@ -119,7 +120,8 @@ def solve_solid(
     else:
         solved = _coarsened(problem, described, solve, wishes, comm, report)
     if wishes.estimated and described.discretisation == "voxel":
-        solved.achieved |= _distance_of_voxels(described, solved, solve, comm)
+        distance = partial(_distance_of_voxels, described, solved, solve, comm)
+        solved.achieved |= optional(comm, UNTOLD, distance) or {}
     return solved
 
 
@@ -178,8 +180,10 @@ def _divided(
     told = None if report is None else partial(report, DIVIDED)
     start: Refinable[Any] | None = compute_on_root(comm, cells)
     model, modes, steps = solve_refined(solve, start, tolerance, comm, told)
-    achieved = steps[-1].errors.attributes(FROM_SOLID)
-    achieved |= {DIVIDED: steps[-1].refined, "refinement_steps": len(steps) - 1}
+    achieved: dict[str, Any] = {}
+    if steps:
+        achieved = steps[-1].errors.attributes(FROM_SOLID)
+        achieved |= {DIVIDED: steps[-1].refined, "refinement_steps": len(steps) - 1}
     return Solved(problem, model, modes, achieved)
 
 
@@ -228,19 +232,13 @@ def _fine(problem: Problem) -> ElasticModel:
 def _distance_of_voxels(
     described: ProblemOptions, solved: Solved, solve: Solve, comm: MPI.Comm
 ) -> dict[str, Any]:
-    """Distance of voxels from the solid; nothing, but a sentence, where there is none to be had."""
+    """Distance of voxels from the solid, as attributes."""
 
-    def reference() -> Reference | None:
+    def reference() -> Reference:
         assert solved.problem is not None
-        try:
-            return Reference.of_voxels(described, solved.problem)
-        except UserError as error:
-            say(f"how far frequencies are from the solid's cannot be told: {error}")
-            return None
+        return Reference.of_voxels(described, solved.problem)
 
     cells = compute_on_root(comm, reference)
-    if not comm.bcast(cells is not None):
-        return {}
     found = solve(None if cells is None else cells.model, LAST)
     modes = found.system.gather(found.vectors)
 
@@ -248,6 +246,7 @@ def _distance_of_voxels(
         assert cells is not None and modes is not None
         return cells.errors(solved.modes.values, found.values, modes)
 
-    achieved = bcast_from_root(comm, errors).attributes(FROM_SOLID)
-    found.destroy()
-    return achieved
+    try:
+        return bcast_from_root(comm, errors).attributes(FROM_SOLID)
+    finally:
+        found.destroy()

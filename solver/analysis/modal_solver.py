@@ -32,9 +32,9 @@ from solver.linear import Inverse, Lasting, LinearSolver
 from solver.reference.truth import SPARE_MODES, Truth, can_count
 from solver.subspace.rayleigh_ritz import rigid_pairs
 from solver.subspace.verification import (
-    count_rigid,
     require_orthonormal,
     require_six_rigid,
+    rigid_modes,
     verify,
 )
 from solver.subspace.weyl import CountingLaw
@@ -227,7 +227,7 @@ class ModalSolver:
             residuals, orthogonality = verify(system, values, vectors)
         evidence["orthogonality"] = orthogonality
         evidence["residual_max"] = float(residuals.max())
-        evidence["rigid_modes"] = count_rigid(values)
+        evidence["rigid_modes"] = rigid_modes(system, values, vectors)
         evidence["peak_memory_bytes"] = peak_memory(self.comm)
         require_orthonormal(orthogonality)
         if self._exact:

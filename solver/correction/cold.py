@@ -88,18 +88,25 @@ def from_nothing(
     ------
     ConvergenceError
         If every shift is an eigenvalue.
+
+    Notes
+    -----
+    Where no shift with enough eigenvalues above it was found, the next one lies amid those that the
+    iteration found, of which the last is an upper bound.
     """
     elastic = system.n_dofs - system.rigid.shape[1]
     columns = min(_columns(requested, system.n_dofs), elastic)
     start, look = start_block(system, columns, seed), int(RANDOM_LOOK * requested)
-    share = AIM
+    share, last = AIM, None
     given = None if near is None else near.inverse
-    for _ in range(ATTEMPTS):
-        first = None if near is None else float(near.values[int(share * requested)])
+    for attempt in range(ATTEMPTS):
         if given is not None and is_amid(given, requested):
             inverse = given
-        else:
+        elif last is None:
+            first = None if near is None else float(near.values[int(share * requested)])
             inverse = inverse_amid(system, linear, requested, law, share, first)
+        else:
+            inverse = linear.inverse(system, share * last)
         given = None
         if near is not None:
             start, look = mixed(
@@ -111,8 +118,10 @@ def from_nothing(
                 tolerance,
                 columns,
             )
-        found = lanczos(system, inverse, start, resolved, width, tolerance, look)
-        if not found.resonant:
+        found = lanczos(system, inverse, start, resolved, width, tolerance, look, seed + 1)
+        if found.too_high and attempt < ATTEMPTS - 1:
+            last = float(found.values[requested - 1])
+        elif not found.resonant:
             return Cold(replace(found, errors=found.errors[:requested]), inverse)
         inverse.destroy()
         share *= OFF_RESONANCE

@@ -41,7 +41,7 @@ class Ritz:
     errors
         (m,) last estimate of each value's relative error.
     active
-        Numbers of the vectors that are not locked, by ascending value.
+        Numbers of the vectors that are not locked, ascending.
     """
 
     def __init__(self, system: System, values: Array, vectors: Array) -> None:
@@ -72,6 +72,10 @@ class Ritz:
     def lock(self, numbers: Index) -> None:
         """Leave these vectors as they are from now on."""
         self.active = self.active[~np.isin(self.active, numbers)]
+
+    def unlock(self, numbers: Index) -> None:
+        """Let these vectors be improved again, as far as they are locked."""
+        self.active = np.union1d(self.active, numbers)
 
     def residual(self, numbers: Index) -> Array:
         """K X - M X Theta of some vectors, whose values become their Rayleigh quotients.

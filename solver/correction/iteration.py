@@ -19,7 +19,7 @@ from solver.correction.correction import (
 )
 from solver.correction.enrichment import Ritz, Step, enrich, relax
 from solver.correction.krylov import ZERO_FRACTION
-from solver.correction.lanczos import HIGHEST_SHIFT, lanczos
+from solver.correction.lanczos import is_too_high, lanczos
 from solver.correction.mixture import mixed
 from solver.distribution.collective import bcast_from_root
 from solver.linear import Approximate, Inverse, Lasting, LinearSolver
@@ -183,7 +183,7 @@ class Iteration:
             )
             self.ritz = Ritz(self.system, result.values, result.vectors)
             self._require_independent(1)
-            if not self._too_high(inverse):
+            if not (result.too_high or self._too_high(inverse)):
                 if missed:
                     # No eigenvalue lies above the start's, so `krylov` has to go on from there.
                     self.ritz = ritz
@@ -225,8 +225,9 @@ class Iteration:
         return self.made
 
     def _too_high(self, inverse: Inverse) -> bool:
-        highest = HIGHEST_TOP_SHIFT if self._only_top_is_left() else HIGHEST_SHIFT
-        return inverse.shift > highest * self._last()
+        if self._only_top_is_left():
+            return inverse.shift > HIGHEST_TOP_SHIFT * self._last()
+        return is_too_high(self.system, inverse, self.requested, self._last())
 
     def lasting(self, tolerance: float) -> Lasting | None:
         """The inverse to keep for a similar material, which only a loose tolerance makes use of."""
@@ -267,13 +268,17 @@ class Iteration:
                 return told, ritz.vectors[:, :0], ritz.active[:0]
             # Far below the shift rounding mixes modes.
             ritz = self.ritz = Ritz(self.system, *rayleigh_ritz(self.system, ritz.vectors))
-        candidates = ritz.active[: max(0, self.improved - ritz.locked)]
+        # A vector may have been locked before others were found below it.
+        order = np.argsort(ritz.values, kind="stable")
+        ritz.unlock(order[self.requested :])
+        candidates = ritz.active[np.isin(ritz.active, order[: self.improved])]
         residual = ritz.residual(candidates)
         estimate = self._estimate(candidates, residual)
         ritz.errors[candidates] = bcast_from_root(self.system.comm, lambda: estimate)
-        errors = ritz.errors[np.argsort(ritz.values, kind="stable")[: self.requested]]
+        wanted = np.argsort(ritz.values, kind="stable")[: self.requested]
+        errors = np.nan_to_num(ritz.errors[wanted], nan=np.inf)
         limit = tolerance if _typical(errors) <= TYPICAL * tolerance else TYPICAL * tolerance
-        inside = candidates[: max(0, self.requested - ritz.locked)]
+        inside = candidates[np.isin(candidates, wanted)]
         accurate = inside[ritz.errors[inside] <= limit]
         chosen = ~np.isin(candidates, accurate)
         ritz.lock(accurate)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import scipy.linalg as la
 from numpy.typing import NDArray
@@ -10,7 +12,7 @@ from solver.assembly.system import System
 from solver.distribution.collective import bcast_from_root
 from solver.linear import Inverse
 from solver.subspace.basis import BlockBasis
-from solver.subspace.orthonormal import WELL_CONDITIONED, is_cancelled, orthonormal
+from solver.subspace.orthonormal import largest_share, orthonormal
 
 Array = NDArray[np.float64]
 
@@ -22,6 +24,13 @@ ROUNDING_FRACTION = 1e-3
 """Share of the shift by which rounding may take a small eigenvalue below zero."""
 ROUNDING = 1e-11
 """Error of an eigenvalue by rounding, as a share of the shift."""
+MOST_PASSES = 3
+"""Times that vectors are made orthogonal again; once is enough unless rounding alone is left."""
+ORTHOGONAL = 1e-11
+"""Overlap with the basis that a block may be left with, at most."""
+INDEPENDENT = 0.03
+"""Condition, see `orthonormal`, above which vectors come out orthonormal to 1e-12 at once."""
+EPSILON = float(np.finfo(float).eps)
 RESOLVED = 1e-2
 """Share (squared) of the residual in the image of a Ritz vector below which it is resolved."""
 
@@ -49,7 +58,10 @@ class KrylovBasis:
         self._operator = np.zeros((capacity, capacity))
         self._pairs: tuple[Array, Array, Array] | None = None
         self.size = self.blocks = 0
+        # How far the basis is from orthonormal, about.
+        self._lost = EPSILON
         self._last = slice(0, 0)
+        start = start.copy()
         self._sweep(start)
         mass_start = system.times_mass(start)
         self._continue_with(start, mass_start, system.inner(start, mass_start))
@@ -70,15 +82,36 @@ class KrylovBasis:
         overlap = self._sweep(image)
         mass_image = system.times_mass(image)
         gram = system.inner(image, mass_image)
-        if is_cancelled(gram, overlap):
-            # The shift is close to an eigenvalue; twice is enough.
-            overlap += self._sweep(image)
+        growth = largest_share(overlap, gram)
+        lost = growth * self._lost
+        for _ in range(MOST_PASSES):
+            if lost <= ORTHOGONAL:
+                break
+            removed = self._sweep(image)
+            overlap += removed
             mass_image = system.times_mass(image)
             gram = system.inner(image, mass_image)
+            # What the first sweep has left tells how far the basis is from orthonormal in truth.
+            again = largest_share(removed, gram)
+            self._lost = max(again / growth, EPSILON)
+            lost, growth = again * max(again, self._lost), again
+        self._lost = max(self._lost, lost)
         diagonal = overlap[self._rigid + here.start :]
         self._operator[here, here] = 0.5 * (diagonal + diagonal.T)
         self._continue_with(image, mass_image, gram)
         self._last = here
+
+    def go_on_with(self, block: Array) -> None:
+        """Let the part of `block` (local, b) that is outside the basis come next.
+
+        The space is invariant then: nothing couples that block to the last one.
+        """
+        for _ in range(2):
+            self._sweep(block)
+        mass_block = self._system.times_mass(block)
+        self._continue_with(block, mass_block, self._system.inner(block, mass_block))
+        self._coupling = np.zeros((self.remainder.shape[1], self._last.stop - self._last.start))
+        self._pairs = None
 
     def _sweep(self, image: Array) -> Array:
         """Make `image` orthogonal to the rigid motions and the basis; returns what it held."""
@@ -93,18 +126,29 @@ class KrylovBasis:
         self.remainder = block @ weights
         self._mass_remainder = mass_block @ weights
         self._coupling = weights.T @ gram
-        if condition <= WELL_CONDITIONED:
-            # Twice is enough.
+        for _ in range(MOST_PASSES):
+            if condition > INDEPENDENT:
+                break
+            # Small differences of large vectors: they are no longer orthogonal to the basis either.
+            self._sweep(self.remainder)
             again = system.inner(self.remainder, system.times_mass(self.remainder))
-            weights, _ = bcast_from_root(system.comm, lambda: orthonormal(again))
+            weights, condition = bcast_from_root(system.comm, partial(orthonormal, again))
             self.remainder = self.remainder @ weights
             self._mass_remainder = system.times_mass(self.remainder)
             self._coupling = system.inner(self._mass_remainder, block)
+        room = system.n_dofs - self._rigid - self.size
+        if self.remainder.shape[1] > room:
+            # In a space that is nearly exhausted the first directions are of rounding alone.
+            rest = slice(self.remainder.shape[1] - room, None)
+            self.remainder = np.ascontiguousarray(self.remainder[:, rest])
+            self._mass_remainder = np.ascontiguousarray(self._mass_remainder[:, rest])
+            self._coupling = self._coupling[rest]
 
     def outlook(self, requested: int) -> tuple[Array, float]:
         """Estimated relative errors (requested,) of the lowest eigenvalues, and the last of these.
 
-        None and infinity as long as there are too few.
+        None and infinity as long as there are too few.  All errors are 1 at least while fewer
+        values are below the shift than inertia counts: some are missing.
         """
         inverted, _, residual = self._operator_pairs()
         mu = self._inverse.shift
@@ -117,10 +161,14 @@ class KrylovBasis:
         # What is not resolved yet lies beyond the first such value.
         first = min([*unresolved[unresolved >= requested], len(order) - 1])
         distance = np.abs(inverted - inverted[first])[:requested]
+        below = np.count_nonzero(values < mu)
         values = values[:requested]
         size = np.maximum(values, ZERO_FRACTION * values[-1])
         error = square[:requested] / distance * (values - mu) ** 2 / size
-        return error / PESSIMISM + ROUNDING * mu / size, float(values[requested - 1])
+        error = error / PESSIMISM + ROUNDING * mu / size
+        if below < self._inverse.negative - self._rigid:
+            error = np.maximum(error, 1.0)
+        return error, float(values[requested - 1])
 
     def _operator_pairs(self) -> tuple[Array, Array, Array]:
         """Ritz values and coefficients of the operator, and those of the residuals in `remainder`.

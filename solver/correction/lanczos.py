@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 
 from solver.assembly.system import System
 from solver.correction.krylov import KrylovBasis
+from solver.correction.shift import MOST
 from solver.linear import Inverse
+from solver.subspace.start import start_block
 
 Array = NDArray[np.float64]
 
@@ -44,6 +46,8 @@ class Lanczos:
     resonant
         Whether the shift is so close to an eigenvalue that its mode drowns the others: then there
         are no values and vectors.
+    too_high
+        Whether the iteration ended early since the shift lies beyond most wanted eigenvalues.
     """
 
     values: Array
@@ -52,6 +56,7 @@ class Lanczos:
     solves: int
     blocks: int
     resonant: bool = False
+    too_high: bool = False
 
 
 def lanczos(
@@ -62,6 +67,7 @@ def lanczos(
     width: int,
     tolerance: float,
     first_look: int,
+    seed: int = 0,
 ) -> Lanczos:
     """Lowest elastic modes by the block Lanczos iteration of (K - mu M)^-1 M.
 
@@ -79,18 +85,30 @@ def lanczos(
         Relative eigenvalue error to stop at.
     first_look
         Dimension of the space at the first look at its Ritz values.
+    seed
+        Of the random vectors that go on where a block is exhausted.
 
     Notes
     -----
+    A space that cannot grow although more is wanted is invariant; random vectors orthogonal to it
+    then go on.  The eigenvalues below the shift are known by inertia: as long as the space holds
+    fewer, copies of repeated ones are missing, whatever the errors are.
+
     Every block is made orthogonal to all before it: so near to an eigenvalue the recurrence alone
     loses orthogonality within three steps.  The stiffness projected on the Ritz vectors of the
     operator follows from that of the last block, so the Ritz values of K itself cost little more.
     """
     columns = start.shape[1]
-    longest = min(LONGEST * (requested + columns), system.n_dofs)
+    elastic = system.n_dofs - system.rigid.shape[1]
+    longest = min(LONGEST * (requested + columns), elastic)
     basis = KrylovBasis(system, inverse, start, longest + columns)
     looks = _Looks(tolerance, first_look, columns)
-    while basis.remainder.shape[1] and basis.size < longest:
+    too_high = False
+    while basis.size < longest:
+        if not basis.remainder.shape[1]:
+            basis.go_on_with(start_block(system, min(columns, elastic - basis.size), seed))
+            seed += 1
+            continue
         basis.extend()
         if basis.blocks == 1 and basis.remainder.shape[1] < min(columns, longest - basis.size):
             none = np.empty(0)
@@ -98,14 +116,28 @@ def lanczos(
         if basis.size < looks.next:
             continue
         errors, last = basis.outlook(requested)
-        # Beyond most wanted modes the shift would take long to find the first ones.
-        too_high = inverse.shift > HIGHEST_SHIFT * last
+        too_high = is_too_high(system, inverse, requested, last)
         if too_high or looks.accurate(basis.size, float(np.max(errors)) if len(errors) else np.inf):
             break
     else:
         errors, _ = basis.outlook(requested)
     ritz_values, vectors = basis.ritz_pairs(width)
-    return Lanczos(ritz_values, vectors, errors, basis.size, basis.blocks)
+    return Lanczos(ritz_values, vectors, errors, basis.size, basis.blocks, too_high=too_high)
+
+
+def is_too_high(system: System, inverse: Inverse, requested: int, last: float) -> bool:
+    """Whether it would take long to find the first modes with this shift.
+
+    Where eigenvalues are crowded, as those of symmetric solids, a good shift may lie close below
+    the last one, so that those below it are counted as well.
+
+    Parameters
+    ----------
+    last
+        About the last of the `requested` elastic eigenvalues.
+    """
+    below = inverse.negative - system.rigid.shape[1]
+    return inverse.shift > HIGHEST_SHIFT * last and below > MOST * requested
 
 
 class _Looks:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import exp, inf, log
+
 from carillon.fem.model import RIGID_MODES
 from solver.assembly.system import System
 from solver.linear import Inverse, LinearSolver
@@ -10,8 +12,10 @@ from solver.subspace.weyl import CountingLaw
 AIM, LEAST, MOST = 0.56, 0.3, 0.72
 """Share of the wanted eigenvalues that is to lie below the shift, and what is as good as that: a
 further factorisation would cost more than it saves."""
-TRIES = 4
-"""Factorisations at most; after them the shift is good enough."""
+TRIES, MOST_TRIES = 4, 8
+"""Factorisations after which few eigenvalues below a shift are good enough, and at most."""
+CROWDED = 1.5
+"""Factor within which too many eigenvalues follow for a shift between: fewer below it will do."""
 
 
 def inverse_amid(
@@ -27,24 +31,38 @@ def inverse_amid(
     Parameters
     ----------
     law
-        Where eigenvalues are expected; a factor of its own is found as counts come in.
+        Where eigenvalues are expected; a factor of its own is found as counts come in, and between
+        two counts the law is a power.
     first
         Shift to begin with, if more is known than the law.
     """
-    low, high, scale = 0.0, float("inf"), 1.0
-    for _ in range(TRIES - 1):
-        shift = first or scale * law.eigenvalue(share * requested + RIGID_MODES)
-        first = None
-        if not low < shift < high:
-            shift = (low * high) ** 0.5
+    target = share * requested + RIGID_MODES
+    # Shifts with too few and with too many eigenvalues below, and how many these are.
+    low, high = (0.0, 0), (inf, 0)
+    shift = first or law.eigenvalue(target)
+    for attempt in range(MOST_TRIES):
         inverse = linear.inverse(system, shift)
-        if is_amid(inverse, requested):
-            return inverse
         below = inverse.negative - RIGID_MODES
+        few = below < LEAST * requested and high[0] > CROWDED * shift
+        if below <= MOST * requested and (attempt >= TRIES - 1 or not few):
+            break
+        if attempt == MOST_TRIES - 1:
+            break
         inverse.destroy()
-        low, high = (max(low, shift), high) if below < AIM * requested else (low, shift)
-        scale = shift / law.eigenvalue(below + RIGID_MODES)
-    return linear.inverse(system, scale * law.eigenvalue(share * requested + RIGID_MODES))
+        low, high = ((shift, below), high) if few else (low, (shift, below))
+        if low[0] > 0.0 and high[0] < inf:
+            # A crowd of eigenvalues is left behind at last.
+            shift = _between(low, high, target) if attempt < TRIES else (low[0] * high[0]) ** 0.5
+        else:
+            shift *= law.eigenvalue(target) / law.eigenvalue(below + RIGID_MODES)
+    return inverse
+
+
+def _between(low: tuple[float, int], high: tuple[float, int], target: float) -> float:
+    """Shift that about `target` eigenvalues lie below, from two shifts and their counts."""
+    below, above = (log(max(count + RIGID_MODES, 1)) for _, count in (low, high))
+    place = (log(target) - below) / (above - below)
+    return exp((1.0 - place) * log(low[0]) + place * log(high[0]))
 
 
 def is_amid(inverse: Inverse, requested: int) -> bool:

@@ -9,6 +9,10 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from carillon.cli import meaning
+from carillon.errors import one_line
+from carillon.progress import say
+
 Number = TypeVar("Number", np.float64, np.int64)
 T = TypeVar("T")
 
@@ -31,6 +35,29 @@ def compute_on_root(comm: MPI.Comm, compute: Callable[[], T]) -> T | None:
     if failure is not None:
         raise failure
     return result
+
+
+def optional(comm: MPI.Comm, told: str, compute: Callable[[], T]) -> T | None:
+    """Result of what is not needed for the main one; None, and a warning, where it fails.
+
+    Only errors that every rank raises are caught: after any other the ranks have lost each other.
+
+    Parameters
+    ----------
+    told
+        What the failure means, as a warning begins.
+    compute
+        Called on every rank.
+    """
+    try:
+        return compute()
+    except Exception as error:
+        if comm.size > 1 and not getattr(error, "collective", False):
+            raise
+        _, sentence = meaning(error)
+        if comm.rank == 0:
+            say(f"warning: {told}: {sentence or f'{type(error).__name__}: {one_line(str(error))}'}")
+        return None
 
 
 def ranks_of_machine(comm: MPI.Comm) -> int:

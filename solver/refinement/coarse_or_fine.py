@@ -28,7 +28,7 @@ from solver.analysis.options import RANDOM, SolverOptions
 from solver.analysis.prepared import Prepared
 from solver.correction.cold import Approximation
 from solver.correction.shift import is_amid
-from solver.distribution.collective import bcast_from_root, compute_on_root
+from solver.distribution.collective import bcast_from_root, compute_on_root, optional
 from solver.files.initial_modes import scatter_rows
 from solver.refinement import work
 from solver.refinement.errors import LAST, ExpectedErrors
@@ -38,6 +38,9 @@ from solver.refinement.refine import RefinementStep
 from solver.refinement.refined_model import RefinedModel
 
 Array = NDArray[np.float64]
+
+UNTOLD = "how far frequencies are off cannot be told"
+"""Why the fine solid is taken where an estimate fails."""
 
 
 @dataclass
@@ -176,7 +179,12 @@ def solve_coarsened(
         if solid is None:
             solid = InverseIteration(None if refined is None else refined.fine, comm)
         blocks = None if refined is None else refined.blocks
-        estimate = estimate_errors(solid, blocks, found)
+        rating = partial(estimate_errors, solid, blocks, found)
+        estimate = optional(comm, f"the fine solid is taken, since {UNTOLD}", rating)
+        if estimate is None:
+            found.destroy()
+            reason = UNTOLD
+            break
         step = bcast_from_root(comm, partial(_step, choice, estimate))
         steps.append(step)
         if report is not None and comm.rank == 0:

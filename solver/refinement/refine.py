@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from carillon.fem.model import Solid
 from solver.analysis.modes import Modes
-from solver.distribution.collective import bcast_from_root
+from solver.distribution.collective import bcast_from_root, compute_on_root, optional
 from solver.refinement.errors import ExpectedErrors
 from solver.refinement.estimate import MODES_USED
 
@@ -68,7 +68,8 @@ def solve_refined(
 ) -> tuple[Model | None, Modes, list[RefinementStep]]:
     """Solve, estimate and refine until the expected error is at most `tolerance`; collective.
 
-    Of coarse models see `solver.refinement.coarse_or_fine.solve_coarsened`.
+    Of coarse models see `solver.refinement.coarse_or_fine.solve_coarsened`.  An estimate that
+    fails, or a refined model that cannot be solved, ends it with a warning: the last modes stand.
 
     Parameters
     ----------
@@ -85,21 +86,32 @@ def solve_refined(
     Returns
     -------
     tuple[Model | None, Modes, list[RefinementStep]]
-        The last model, on rank 0; its modes, and the steps.
+        The last model that was solved, on rank 0; its modes, and the steps that were rated.
     """
     steps: list[RefinementStep] = []
+    model = compute_on_root(comm, lambda: None if refined is None else refined.model)
+    modes = solve(model)
     while True:
-        model = None if refined is None else refined.model
-        modes = solve(model)
         gathered = modes.system.gather(np.ascontiguousarray(modes.vectors[:, :MODES_USED]))
-
-        step, done = bcast_from_root(comm, partial(_advance, refined, modes, gathered, tolerance))
+        rated = optional(
+            comm,
+            "how far frequencies are off cannot be told",
+            partial(bcast_from_root, comm, partial(_advance, refined, modes, gathered, tolerance)),
+        )
+        if rated is None:
+            return model, modes, steps
+        step, done = rated
         steps.append(step)
         if report is not None and comm.rank == 0:
             report(step)
         if done:
             return model, modes, steps
+        finer = compute_on_root(comm, lambda: None if refined is None else refined.model)
+        better = optional(comm, "the model is refined no further", partial(solve, finer))
+        if better is None:
+            return model, modes, steps
         modes.destroy()
+        model, modes = finer, better
 
 
 def _advance(

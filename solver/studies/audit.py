@@ -21,11 +21,14 @@ from carillon.fem.model import RIGID_MODES
 from carillon.petsc import PETSc
 from solver.assembly.petsc_matrix import distributed_matrix
 from solver.assembly.sparse import assembled
+from solver.assembly.system import assemble
 from solver.correction.correction import EIGENVALUE_TOLERANCE
+from solver.distribution.local_mesh import distribute
 from solver.files.modes_file import ModesFile, read_modes
 from solver.linear.factorisation import factorised
 from solver.reference.truth import can_count, count_negative
 from solver.studies.comparison import recomputed_residuals
+from solver.subspace.rayleigh_ritz import first_elastic_estimate
 from solver.subspace.verification import COLUMNS_AT_ONCE, count_rigid, residual_scale
 
 Array = NDArray[np.float64]
@@ -134,7 +137,7 @@ def audit(file: ModesFile, tolerance: float = EIGENVALUE_TOLERANCE) -> Audit:
         _energy_residuals(file, K, M, residuals).tolist(),
         _rounding(file, K).tolist(),
         float(np.abs(gram - np.eye(len(gram))).max()),
-        count_rigid(file.eigenvalues),
+        _count_rigid(file, K),
         value,
         _count(K, M, value) if can_count() else None,
         expected,
@@ -176,6 +179,17 @@ def _rounding(file: ModesFile, K: sp.csr_matrix) -> Array:
         part = np.abs(file.modes[:, few])
         weight[few] = np.einsum("ij,ij->j", part, size @ part)
     return np.asarray(np.finfo(float).eps * weight / residual_scale(file.eigenvalues))
+
+
+def _count_rigid(file: ModesFile, K: sp.csr_matrix) -> int:
+    assert file.modes is not None
+    scales = np.einsum("ij,i,ij->j", file.modes, K.diagonal(), file.modes)
+
+    def estimate() -> float:
+        alone = MPI.COMM_SELF
+        return first_elastic_estimate(assemble(distribute(file.model, 1, comm=alone), alone))
+
+    return count_rigid(file.eigenvalues, scales, estimate)
 
 
 def gap_below_last(values: Array, gap: float = GAP) -> tuple[float, int]:

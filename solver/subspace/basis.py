@@ -32,7 +32,7 @@ class BlockBasis:
     width
         Columns of a block at most.
     capacity
-        Blocks at most.
+        Blocks that there is room for from the beginning.
 
     Attributes
     ----------
@@ -56,6 +56,10 @@ class BlockBasis:
     def append(self, vectors: Array) -> None:
         """Add the columns of `vectors` (local, b), b up to the width."""
         columns = vectors.shape[1]
+        if self._count == len(self._blocks):
+            # Narrow blocks leave room unused.
+            more = np.empty((1 + self._count // 2, *self._blocks.shape[1:]))
+            self._blocks = np.concatenate([self._blocks, more])
         target = self._blocks[self._count]
         target[:, :columns] = vectors
         target[:, columns:] = 0.0

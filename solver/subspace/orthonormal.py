@@ -12,8 +12,8 @@ DEPENDENT = 1e-11
 """Directions whose share (squared) of the vectors is below this are dropped."""
 WELL_CONDITIONED = 1e-3
 """Least diagonal entry of the Cholesky factor of the scaled Gram matrix to rely on it."""
-CANCELLED = 1e-8
-"""Share (squared) of a vector outside a basis below which it is made orthogonal to it twice."""
+CANCELLED = 1e4
+"""Times as long as the rest of a vector from which on what was taken calls for taking twice."""
 
 
 def orthonormal(gram: Array) -> tuple[Array, float]:
@@ -39,15 +39,29 @@ def orthonormal(gram: Array) -> tuple[Array, float]:
     return scale[:, None] * whitening, condition
 
 
+def largest_share(removed: Array, gram: Array) -> float:
+    """How many times as long as what is left of a vector is that which was taken from it, at most.
+
+    So many times larger become errors of the basis that it was taken in.
+
+    Parameters
+    ----------
+    removed
+        Coefficients (m, b) of what was taken, in an orthonormal basis.
+    gram
+        Gram matrix (b, b) of what is left.
+    """
+    taken = np.einsum("ij,ij->j", removed, removed)
+    left = np.maximum(np.diag(gram), np.finfo(float).tiny)
+    return float(np.sqrt((taken / left).max(initial=0.0)))
+
+
 def is_cancelled(gram: Array, removed: Array) -> bool:
     """Whether so much was taken from vectors that what is left has to be made orthogonal again.
 
     Parameters
     ----------
-    gram
-        Gram matrix of what is left.
-    removed
-        Coefficients of what was taken, in an orthonormal basis.
+    gram, removed
+        See `largest_share`.
     """
-    size = np.einsum("ij,ij->j", removed, removed)
-    return bool((np.diag(gram) < CANCELLED * size).any())
+    return largest_share(removed, gram) > CANCELLED

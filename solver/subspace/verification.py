@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,14 +10,21 @@ from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
 from carillon.fem.model import RIGID_MODES
+from solver.subspace.rayleigh_ritz import first_elastic_estimate
 
 if TYPE_CHECKING:
     from solver.assembly.system import System
 
 Array = NDArray[np.float64]
 
-RIGID_TOLERANCE = 1e-9
-"""Eigenvalues below this fraction of the largest computed one count as zero."""
+ROUNDING = 100.0 * float(np.finfo(float).eps)
+"""Eigenvalues below this fraction of what they would be, did strains of neighbours not cancel, are
+zero to rounding."""
+SOFT = 1e-9
+"""Eigenvalues below this fraction of the largest computed one count as zero as well ..."""
+SOFTER = 1e-6
+"""... if they are below this fraction of what smooth displacements of the whole solid make of the
+first elastic one: slender solids are as soft by themselves."""
 ORTHOGONALITY_TOLERANCE = 1e-8
 """Largest accepted entry of X^T M X - I."""
 COLUMNS_AT_ONCE = 64
@@ -57,9 +65,39 @@ def residual_scale(values: Array) -> Array:
     return np.maximum(values, values[RIGID_MODES])
 
 
-def count_rigid(values: Array) -> int:
-    """Number of eigenvalues that are zero to rounding."""
-    return int(np.sum(values < RIGID_TOLERANCE * values[-1]))
+def rigid_modes(system: System, values: Array, vectors: Array) -> int:
+    """Number of modes with a frequency of zero, see `count_rigid`; collective."""
+    diagonal = system.rows.stiffness_diagonal[:, None]
+    scales = np.full(len(values), np.inf)
+    for start in range(0, len(values), COLUMNS_AT_ONCE):
+        few = slice(start, start + COLUMNS_AT_ONCE)
+        scales[few] = system.column_products(vectors[:, few], diagonal * vectors[:, few])
+        if (values[few] > ROUNDING * scales[few]).any():
+            scales[few.stop :] = 0.0
+            break
+    return count_rigid(values, scales, lambda: first_elastic_estimate(system))
+
+
+def count_rigid(values: Array, scales: Array, estimate: Callable[[], float]) -> int:
+    """Number of ascending eigenvalues (k,) that are zero: to rounding, or but for soft joints.
+
+    Parameters
+    ----------
+    scales
+        (k,) x^T diag(K) x of the mass-normalised modes x: a value is known to rounding of it.
+    estimate
+        Makes an upper bound of the first elastic eigenvalue from smooth displacements; asked for
+        where motions of parts are slow beside the last mode.  They are those of a slender solid
+        if the bound is as low, else of parts that hang on a hinge or on next to nothing.
+    """
+    zero = values <= ROUNDING * scales
+    soft = ~zero & (values < SOFT * values[-1])
+    if soft.any():
+        try:
+            zero |= soft & (values < SOFTER * estimate())
+        except ConvergenceError:  # smooth displacements find a hinge, too
+            zero |= soft
+    return int(zero.sum())
 
 
 def require_orthonormal(orthogonality: float) -> None:
