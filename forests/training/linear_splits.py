@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from carillon.fem.element import Array
 from forests.scaling import FEATURES, Features
-from forests.training.moments import ENTRIES, fit_error, products
+from forests.training.moments import ENTRIES, fit_errors, products
 
 BINS = 16
 """Candidate thresholds of a feature, plus one: quantiles of rows drawn from the node."""
@@ -94,10 +94,11 @@ def _best_split(
             for entry in range(ENTRIES):
                 sums[k, chosen, entry] += one[entry]
             count[k, chosen] += 1
-    square, right = np.empty((FEATURES, FEATURES)), np.empty(FEATURES)
     whole = sums[0].sum(axis=0)
-    undivided = fit_error(whole, square, right)
-    best, best_feature, best_threshold = 0.0, -1, 0.0
+    # Of the node, and of both sides of every split in turn.
+    sides = np.empty((1 + 2 * FEATURES * (BINS - 1), ENTRIES))
+    sides[0] = whole
+    splits, found = np.empty((FEATURES * (BINS - 1), 2), dtype=np.int64), 0
     for k in range(FEATURES):
         below, rows_below = np.zeros(ENTRIES), 0
         for b in range(BINS - 1):
@@ -105,11 +106,18 @@ def _best_split(
                 break
             below += sums[k, b]
             rows_below += count[k, b]
-            if min(rows_below, used - rows_below) * step < min_leaf:
-                continue
-            divided = fit_error(below, square, right) + fit_error(whole - below, square, right)
-            if undivided - divided > best:
-                best, best_feature, best_threshold = undivided - divided, k, edges[k, b]
+            if min(rows_below, used - rows_below) * step >= min_leaf:
+                splits[found, 0], splits[found, 1] = k, b
+                sides[1 + 2 * found] = below
+                sides[2 + 2 * found] = whole - below
+                found += 1
+    errors = fit_errors(sides[: 1 + 2 * found])
+    best, best_feature, best_threshold = 0.0, -1, 0.0
+    for split in range(found):
+        gain = errors[0] - (errors[1 + 2 * split] + errors[2 + 2 * split])
+        if gain > best:
+            k, b = splits[split]
+            best, best_feature, best_threshold = gain, k, edges[k, b]
     return best_feature, best_threshold, best * step
 
 

@@ -43,44 +43,51 @@ def products(
 
 
 @numba.njit(cache=True, nogil=True)
-def fit_error(sums: Array, square: Array, right: Array) -> float:
-    """Weighted sum of squared residuals of the linear fit; `square` (7, 7), `right` (7,) scratch.
+def fit_errors(parts: Array) -> Array:
+    """Weighted sums of squared residuals (n,) of linear fits from their sums (n, 45).
 
-    The part of `sum w t^2` that a Cholesky factorisation of the features' scatter leaves.
+    The part of `sum w t^2` that a Cholesky factorisation of the features' scatter leaves. A loop
+    over many, and not a function of one: its unrolled body is long to compile at every call.
     """
-    total = sums[WEIGHT]
-    if total <= 0.0:
-        return 0.0
-    target = TARGET * (TARGET + 1) // 2
-    ones = ONE * (ONE + 1) // 2
-    mean = sums[target + ONE] / total
-    error = sums[target + TARGET] - mean * sums[target + ONE]
-    for i in range(FEATURES):
-        for j in range(i + 1):
-            outer = sums[ones + i] * sums[ones + j] / total
-            square[i, j] = sums[i * (i + 1) // 2 + j] - outer
-        right[i] = sums[target + i] - sums[ones + i] * mean
-        centre = sums[ones + i] / total
-        square[i, i] += RELATIVE_RIDGE * square[i, i] + ROUNDING * total * (1e-2 + centre * centre)
-    for i in range(FEATURES):
-        for j in range(i):
-            value = square[i, j]
-            for k in range(j):
-                value -= square[i, k] * square[j, k]
-            square[i, j] = value / square[j, j]
-        pivot = square[i, i]
-        for k in range(i):
-            pivot -= square[i, k] * square[i, k]
-            right[i] -= square[i, k] * right[k]
-        if pivot <= 0.0:
-            # Scatter of rounding errors only: the feature explains nothing.
-            square[i, i] = np.inf
-            right[i] = 0.0
+    errors = np.zeros(len(parts))
+    square, right = np.empty((FEATURES, FEATURES)), np.empty(FEATURES)
+    for part in range(len(parts)):
+        sums = parts[part]
+        total = sums[WEIGHT]
+        if total <= 0.0:
             continue
-        square[i, i] = np.sqrt(pivot)
-        right[i] /= square[i, i]
-        error -= right[i] * right[i]
-    return max(error, 0.0)
+        target = TARGET * (TARGET + 1) // 2
+        ones = ONE * (ONE + 1) // 2
+        mean = sums[target + ONE] / total
+        error = sums[target + TARGET] - mean * sums[target + ONE]
+        for i in range(FEATURES):
+            for j in range(i + 1):
+                outer = sums[ones + i] * sums[ones + j] / total
+                square[i, j] = sums[i * (i + 1) // 2 + j] - outer
+            right[i] = sums[target + i] - sums[ones + i] * mean
+            centre = sums[ones + i] / total
+            constant = ROUNDING * total * (1e-2 + centre * centre)
+            square[i, i] += RELATIVE_RIDGE * square[i, i] + constant
+        for i in range(FEATURES):
+            for j in range(i):
+                value = square[i, j]
+                for k in range(j):
+                    value -= square[i, k] * square[j, k]
+                square[i, j] = value / square[j, j]
+            pivot = square[i, i]
+            for k in range(i):
+                pivot -= square[i, k] * square[i, k]
+                right[i] -= square[i, k] * right[k]
+            if pivot <= 0.0:
+                # Scatter of rounding errors only: the feature explains nothing.
+                square[i, i] = np.inf
+                right[i] = 0.0
+                continue
+            square[i, i] = np.sqrt(pivot)
+            right[i] /= square[i, i]
+            error -= right[i] * right[i]
+        errors[part] = max(error, 0.0)
+    return errors
 
 
 def solve(sums: Array) -> Array:
