@@ -24,6 +24,8 @@ SMOOTHING = 2
 """Rings of faces that a normal is averaged over, since faces of voxels look along the axes only."""
 REACH = 3.0
 """Cell edges that a point named by a person may be away from the surface."""
+FITTED = 12
+"""Points of the surface of finite cells that a tangent plane is fitted to."""
 OUTSIDE = 0.1
 """Cell edges beyond the surface of finite cells up to which a point counts as on it."""
 VANISHING = 1e-6
@@ -85,6 +87,8 @@ class Surface:
         """
         index = self.nearest(point, what, reach)
         place, outward = self.points[index], self.outward[index]
+        if self.nodes is None:
+            place, outward = self._tangent_plane(index)
         beyond = float((point - place) @ outward)
         along = point - place - beyond * outward
         is_near = np.linalg.norm(along) <= self.edge and beyond >= -REACH * self.edge
@@ -97,6 +101,21 @@ class Surface:
                 f"({_shown(place)}) m is taken instead"
             )
         return place, -outward
+
+    def _tangent_plane(self, index: int) -> tuple[Array, Array]:
+        """Foot (3,) [m] of a point on the plane of its neighbours, and the outward normal (3,).
+
+        Normals of the points themselves are averaged over faces of voxels, and look away from the
+        surface's own where a wall is as thin as a voxel.
+        """
+        point = self.points[index]
+        _, near = cKDTree(self.points).query(point, min(FITTED, len(self.points)))
+        alike = near[self.outward[near] @ self.outward[index] > 0.5]
+        middle = self.points[alike].mean(axis=0)
+        normal = np.linalg.svd(self.points[alike] - middle)[2][2]
+        if normal @ self.outward[index] < 0.0:
+            normal = -normal
+        return point - ((point - middle) @ normal) * normal, normal
 
 
 def surface_of(model: Solid) -> Surface:
