@@ -8,9 +8,11 @@ rule campaign:
         f"{CAMPAIGN}/report.html",
         f"{CAMPAIGN}/junit.xml",
         verdict=f"{CAMPAIGN}/verdict.json",
+    log:
+        f"{LOGS}/campaign/campaign.log",
     localrule: True
     shell:
-        "python -m workflow.studies.campaign.verdict {input.verdict:q}"
+        "python -m workflow.studies.campaign.verdict {input.verdict:q} 2>&1 | tee {log:q}"
 
 
 # Never fails: a cell whose run did is a result as well.
