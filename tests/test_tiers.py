@@ -37,8 +37,8 @@ def test_a_turn_of_the_measured_tests_takes_half_an_hour_at_most():
     """A turn is run whole, even where it takes longer than the budget; not without end."""
     seconds = tiers.measured()
     most = tiers.BUDGET_SECONDS * 30 / 12
-    for part in tiers.turns(seconds):
-        assert sum(seconds[name] for name in part) <= most
+    for turn in range(tiers.TURNS):
+        assert sum(seconds[name] for name in tiers.choose(seconds, [], turn).files) <= most
 
 
 @pytest.mark.parametrize("turn", range(tiers.TURNS))
@@ -54,10 +54,16 @@ def test_what_is_near_to_a_change_is_run_as_far_as_time_lasts(turn):
 
 
 def test_a_change_is_tried_even_if_the_turn_takes_all_the_time():
-    seconds = {f"test_{number}.py": 2 * tiers.BUDGET_SECONDS for number in range(tiers.TURNS)}
+    seconds = {f"test_{number}.py": tiers.BUDGET_SECONDS for number in range(tiers.TURNS)}
     seconds["test_new.py"] = tiers.CHANGE_SECONDS
     turn = next(n for n in range(3) if "test_new.py" not in tiers.choose(seconds, [], n).files)
     assert tiers.choose(seconds, ["test_new.py"], turn).related == ("test_new.py",)
+
+
+def test_what_takes_longer_than_the_budget_has_no_turn():
+    seconds = {**SECONDS, "test_long.py": 2 * tiers.BUDGET_SECONDS}
+    for turn in range(tiers.TURNS):
+        assert "test_long.py" not in tiers.choose(seconds, ["test_long.py"], turn).files
 
 
 @pytest.mark.parametrize(
