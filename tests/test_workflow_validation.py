@@ -176,7 +176,10 @@ def test_a_distance_that_nobody_could_tell_is_said_to_be_unknown(discretisation)
         (["gone.obj"], "gone.obj: no such file"),
         (["builtin:gong"], "gong"),
         (["builtin:bar", "--material", "cheese"], "material 'cheese' is neither a file nor"),
-        (["block.obj", "--material", "short.txt"], "short.txt: 3 values for 64 voxels"),
+        (
+            ["block.obj", "--unit", "0.01", "--material", "short.txt"],
+            "short.txt: 3 values for 64 voxels",
+        ),
         (["builtin:bar", "--strike", "9", "9", "9"], "strike: the point (9, 9, 9) m is"),
         (["builtin:bar", "--poisson", "0.3"], "the default forests are for Poisson's ratio 0.25"),
         (["builtin:bar", "--tolerances", "luck=1"], "'luck=1' names no tolerance"),

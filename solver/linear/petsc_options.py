@@ -25,7 +25,7 @@ _inserted: list[str] = []
 
 
 def insert_options(text: str | None, method: str = "slepc") -> None:
-    """Put options like `-carillon_eps_ncv 400` into PETSc's options database.
+    """Put options like `-carillon_eps_ncv 400` into PETSc's options database; earlier ones leave it.
 
     Raises
     ------
@@ -33,6 +33,9 @@ def insert_options(text: str | None, method: str = "slepc") -> None:
         If an option lacks the prefix, and would be ignored by the method or mean something for the
         whole program.
     """
+    for name in _inserted:
+        PETSc.Options().delValue(name)
+    _inserted.clear()
     if text is None:
         return
     own = method not in GENERAL

@@ -150,7 +150,7 @@ class _MeteredInverse:
 
     def __init__(self, inverse: Inverse, plan: Plan, meter: _Meter) -> None:
         self._inverse, self._plan, self._meter = inverse, plan, meter
-        self.shift = inverse.shift
+        self.shift, self.negative = inverse.shift, inverse.negative
 
     def solve(self, block: Array) -> Array:
         """See `Inverse.solve`."""

@@ -11,6 +11,8 @@ rule campaign:
     log:
         f"{LOGS}/campaign/campaign.log",
     localrule: True
+    params:
+        source=source("workflow.studies.campaign.verdict"),
     shell:
         "python -m workflow.studies.campaign.verdict {input.verdict:q} 2>&1 | tee {log:q}"
 
