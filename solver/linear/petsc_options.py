@@ -25,7 +25,7 @@ _inserted: list[str] = []
 
 
 def insert_options(text: str | None, method: str = "slepc") -> None:
-    """Put options like `-carillon_eps_ncv 400` into PETSc's options database; earlier ones leave it.
+    """Put options like `-carillon_eps_ncv 400` into PETSc's database; earlier ones leave it.
 
     Raises
     ------
