@@ -50,7 +50,7 @@ run: env  ## the default workflow; ends at results/report.html
 	@snakemake --profile workflow/profiles/default --cores $(CORES) $(TARGETS)
 	@echo "report: $(abspath results/report.html)"
 
-test: env  ## the tests that every change needs, ten minutes at most
+test: env  ## the tests that every change needs
 	@bash workflow/envs/packages.sh install tests >/dev/null || echo "tests without them are skipped"
 	@$(PYTHON_OF_VENV) -m workflow compile || true
 	@$(PYTHON_OF_VENV) -m pytest -q -n $(PYTEST_PROCESSES) --dist loadfile \
