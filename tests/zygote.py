@@ -222,7 +222,7 @@ def _be(job: Job, mark: str, libraries: tuple[Any, Any, Any], pipes: list[int]) 
             os.environ.pop(name, None)  # those that the program starts may be several ranks
         os.environ.update({MARK: mark, **job.environment})
         sys.argv = [job.room, *job.arguments]
-        status = _program(job.room)
+        status = run_room(job.room)
         atexit._run_exitfuncs()
         if MPI.Is_initialized() and not MPI.Is_finalized():
             MPI.Finalize()
@@ -237,7 +237,8 @@ def _be(job: Job, mark: str, libraries: tuple[Any, Any, Any], pipes: list[int]) 
         os._exit(status)
 
 
-def _program(room: str) -> int:
+def run_room(room: str) -> int:
+    """Exit status of `python -m ROOM`, run here with the words of sys.argv."""
     try:
         runpy.run_module(room, run_name="__main__", alter_sys=True)
     except SystemExit as end:

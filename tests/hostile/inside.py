@@ -9,14 +9,13 @@ from __future__ import annotations
 import contextlib
 import io
 import os
-import runpy
 import signal
 import sys
 import time
 import traceback
 from collections.abc import Iterator
 
-from tests.zygote import Job, Outcome
+from tests.zygote import Job, Outcome, run_room
 
 
 def run_inside(job: Job) -> Outcome:
@@ -27,23 +26,12 @@ def run_inside(job: Job) -> Outcome:
         sys.stdin = io.StringIO()
         sys.stdout, sys.stderr = printed
         try:
-            status = _status(job.room)
+            status = run_room(job.room)
         except BaseException:
             traceback.print_exc(file=printed[1])
             status = 1
     texts = [_text(each) for each in printed]
     return Outcome(status, *texts, time.process_time() - begin, 0, False, ())
-
-
-def _status(room: str) -> int:
-    try:
-        runpy.run_module(room, run_name="__main__", alter_sys=True)
-    except SystemExit as end:
-        if end.code is None or isinstance(end.code, int):
-            return end.code or 0
-        print(end.code, file=sys.stderr)
-        return 1
-    return 0
 
 
 def _text(printed: io.TextIOWrapper) -> str:
