@@ -8,13 +8,13 @@ from typing import TypeVar
 Made = TypeVar("Made")
 
 BUILTIN_PREFIX = "builtin:"
-"""What stands before such a name where a mesh is asked for."""
+"""Prefix of a built-in solid's name where a mesh is asked for."""
 THICK = ("bar", "bell", "bowl", "box", "frying-pan", "pitcher", "plate", "snare-drum")
-"""Those of `carillon.fem.geometry.builtin`."""
+"""Solids that `carillon.fem.geometry.builtin` makes."""
 THIN = ("cymbal", "handbell", "rin", "skillet", "wine-glass")
-"""Those of `carillon.fem.geometry.thin`."""
+"""Thin-walled solids that `carillon.fem.geometry.thin` makes."""
 TRIALS = ("comb", "cup", "dumbbell", "eared-head", "fork", "slit-ring", "spiral", "stool")
-"""Those of `carillon.fem.geometry.trials`."""
+"""Trial solids that `carillon.fem.geometry.trials` makes."""
 BUILTIN_NAMES = (*THICK, *THIN, *TRIALS)
 
 
