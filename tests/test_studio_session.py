@@ -97,9 +97,12 @@ async def opened(folder: Path, what: str | None = None):
 
 
 async def until(met: Callable[[], object], page: Page) -> None:
-    async with asyncio.timeout(HANG_SECONDS):
-        while not met():
-            await asyncio.sleep(0.02)
+    try:
+        async with asyncio.timeout(HANG_SECONDS):
+            while not met():
+                await asyncio.sleep(0.02)
+    except TimeoutError:
+        pytest.fail(f"no end: {page.state['solid']}, said: {page.said}")
     assert page.last
 
 
@@ -286,6 +289,7 @@ def test_settings_that_name_files_elsewhere_are_refused(folder, forest):
     run(play())
 
 
+@pytest.mark.nightly
 def test_settings_of_other_voxels_begin_anew_and_those_of_a_search_do_not(folder):
     async def play():
         async with opened(folder, str(folder / "bar.yaml")) as (studio, page):
@@ -303,6 +307,7 @@ def test_settings_of_other_voxels_begin_anew_and_those_of_a_search_do_not(folder
     run(play())
 
 
+@pytest.mark.nightly
 def test_materials_are_kept_and_swapped(folder):
     async def play():
         async with opened(folder, str(folder / "bar.yaml")) as (studio, page):
@@ -400,6 +405,7 @@ def _lives(process: psutil.Process) -> bool:
         return False
 
 
+@pytest.mark.nightly
 def test_an_example_opens_and_leaves_its_clips_in_the_workspace(folder):
     async def play():
         async with opened(folder) as (studio, page):

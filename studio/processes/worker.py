@@ -8,11 +8,13 @@ import signal
 import sys
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from importlib import import_module
 from itertools import count
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
+from pathlib import Path
 from threading import Thread
 from typing import Any
 
@@ -27,6 +29,8 @@ os.environ.setdefault("PYTHONWARNINGS", "ignore::UserWarning:multiprocessing.res
 
 NICER = 5
 """Added to the niceness of these processes: the page's sound comes first."""
+LOOK_SECONDS = 0.2
+"""Time between two looks at how long a process has worked."""
 GONE = (
     "the process that worked on this has ended, perhaps for lack of memory; try again, with a "
     "lower resolution or fewer modes"
@@ -66,7 +70,8 @@ class Worker:
         Parameters
         ----------
         seconds
-            After which the process is ended.
+            Of processor time after which the process is ended: on a busy machine, where it hardly
+            gets any, it is waited for longer.
         tell
             Called with news of a method that has some.
 
@@ -86,14 +91,33 @@ class Worker:
             raise UserError(GONE) from None
         self._waiting[number] = (future, tell)
         try:
-            async with asyncio.timeout(seconds):
-                return await future
+            return await self._answer(future, seconds)
         except TimeoutError:
             self.end()
             raise UserError(
                 f"this took longer than {seconds:g} s and was ended; expected something smaller or "
                 "simpler"
             ) from None
+
+    async def _answer(self, future: asyncio.Future[Any], seconds: float | None) -> Any:
+        """Wait for an answer; TimeoutError once the process has worked that long."""
+        if seconds is None:
+            return await future
+        until = self._worked() + seconds
+        try:
+            while not (await asyncio.wait([future], timeout=LOOK_SECONDS))[0]:
+                if self._worked() > until:
+                    raise TimeoutError
+            return future.result()
+        finally:
+            future.cancel()
+
+    def _worked(self) -> float:
+        """Processor time [s] of the process, and of what it has started and waited for."""
+        with suppress(OSError):
+            fields = Path("/proc", str(self.pid), "stat").read_text().rpartition(") ")[2].split()
+            return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
+        return 0.0  # it has just ended, which is told otherwise
 
     def end(self) -> None:
         """End the process at once; what waits for it gets an error, and the next call another one.
