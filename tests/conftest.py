@@ -49,6 +49,8 @@ Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 DUE: pytest.StashKey[frozenset[str]] = pytest.StashKey()
 """Files whose nightly tests are run in the tier `part`."""
+CHANGED: pytest.StashKey[list[str]] = pytest.StashKey()
+"""Files that differ from the main branch."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -64,8 +66,11 @@ def pytest_configure(config: pytest.Config) -> None:
     due: frozenset[str] = frozenset()
     if hasattr(config, "workerinput"):
         due = frozenset(config.workerinput["due"])
-    elif config.getoption("--tier") == "part":
-        due = tiers.due(tiers.measured()).files
+        config.stash[CHANGED] = list(config.workerinput["changed"])
+    else:
+        config.stash[CHANGED] = tiers.changed_files()
+        if config.getoption("--tier") == "part":
+            due = tiers.due(tiers.measured()).files
     config.stash[DUE] = due
     fuzzing.load(long=config.getoption("--tier") == "all" or bool(due & fuzzing.FILES))
 
@@ -73,6 +78,7 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.hookimpl(optionalhook=True)
 def pytest_configure_node(node: Any) -> None:
     node.workerinput["due"] = sorted(node.config.stash[DUE])
+    node.workerinput["changed"] = node.config.stash[CHANGED]
 
 
 def pytest_report_header(config: pytest.Config) -> str | None:
@@ -84,7 +90,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Leave out what is not of the tier; files that take longest first, so that none is left."""
 
     def spared(item: pytest.Item) -> bool:
-        return bool(item.get_closest_marker("nightly")) and item.path.name not in config.stash[DUE]
+        mark = item.get_closest_marker("nightly")
+        return mark is not None and tiers.is_spared(
+            item.path.name, config.stash[DUE], mark.kwargs.get("unless", ()), config.stash[CHANGED]
+        )
 
     if config.getoption("--tier") != "all":
         config.hook.pytest_deselected(items=[item for item in items if spared(item)])

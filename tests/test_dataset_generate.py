@@ -199,6 +199,7 @@ def start(path, program):
         process.communicate()
 
 
+@pytest.mark.nightly
 def test_killed_at_ten_random_moments_it_ends_with_the_same_bytes(path, start, reference):
     """Early ones fall into the fits, later ones, with the journal full, into sealing the shard."""
     generator = np.random.default_rng()

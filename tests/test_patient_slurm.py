@@ -97,6 +97,7 @@ def test_jobs_keep_the_comment_that_tells_a_killed_runs_jobs(slurm):
     assert comment.startswith("rule_a ") and orphans._RUN.fullmatch(RUN)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_run_ends_well_on_a_slurm_that_does_not(slurm, tmp_path):
     """Its first submission gets no answer, the controller none in time, and ended jobs are gone."""

@@ -137,6 +137,7 @@ def test_a_film_has_the_same_bytes_again(film, bouncing, tmp_path, monkeypatch):
     assert again.read_bytes() == film.read_bytes()
 
 
+@pytest.mark.nightly
 def test_a_film_has_the_same_bytes_whatever_memory_held_before(
     film, bouncing, tmp_path, monkeypatch
 ):

@@ -50,6 +50,7 @@ def test_checks(ranks, mpiexec):
     mpiexec(ranks, PROGRAM, ",".join(CHECKS[ranks]), check=True)
 
 
+@pytest.mark.nightly
 def test_file_is_the_same_however_many_columns_travel_together(mpiexec, tmp_path):
     name = "modes_are_the_same_however_many_columns_travel_together"
     mpiexec(3, PROGRAM, name, tmp_path, check=True)

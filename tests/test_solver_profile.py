@@ -19,6 +19,7 @@ def bar():
     return fine_model(mesh, np.full(mesh.n_cells, 1e9))
 
 
+@pytest.mark.nightly
 def test_phases_tell_their_work_and_what_the_machine_can_do(bar):
     found = profile(bar, ProfileOptions(modes=24, runs=2))
     columns = found.right_hand_sides

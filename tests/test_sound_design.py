@@ -376,6 +376,7 @@ def test_more_modes_than_the_clips_have(folder):
         targets_of(project_of({**small_project.PROJECT, "modes": 40}, folder))
 
 
+@pytest.mark.nightly
 def test_workers_end_with_a_killed_parent(folder):
     process = run_design(folder, "--workers", "2", "--evaluations", "1000000")
     workers = workers_of(process)

@@ -201,7 +201,7 @@ def test_a_clip_that_swells_at_its_end_overflows_nowhere():
         assert len(extract(clip, RATE).frequencies) >= 4
 
 
-@pytest.mark.parametrize("gain", [1.6, 2.5])
+@pytest.mark.parametrize("gain", [1.6, pytest.param(2.5, marks=pytest.mark.nightly)])
 def test_clipped_samples_have_no_say(gain):
     true = modes(5, 3000.0, seed=5)
     clip = sampled(true, RATE, 1.0, 60.0)

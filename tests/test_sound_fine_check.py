@@ -201,6 +201,7 @@ def test_the_command_says_what_the_file_says(checked, tmp_path, capsys):
     assert f"{found['fine_rms_cents']:.1f} on the fine one" in out
 
 
+@pytest.mark.nightly
 def test_a_search_ends_where_frequencies_are_met_and_nothing_gets_better(problem):
     design = optimise(with_options(problem, evaluations=4000))
     assert fine_cents(design) < MET_CENTS

@@ -10,6 +10,8 @@ import pytest
 
 from tests.studio_pages import ToldStudio, open_page, serving, until, until_page
 
+pytestmark = pytest.mark.nightly(unless=("studio",))
+
 CALLED = """async ([name, values]) => {
   return studio.connection.call(name, values).then(() => null, (error) => error.message);
 }"""

@@ -19,6 +19,8 @@ from tests.studio_pages import (
     until_still,
 )
 
+pytestmark = pytest.mark.nightly(unless=("studio",))
+
 MIDDLE = "studio.view.drawing.middle()"
 
 

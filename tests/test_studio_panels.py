@@ -19,6 +19,8 @@ from tests.panels_page import NOW, WANTED, bank, progress, ready_clip, state, ta
 from tests.patience import PATIENCE_SECONDS
 from tests.studio_pages import TWO_FRAMES
 
+pytestmark = pytest.mark.nightly(unless=("studio",))
+
 INK = """(place) => {
   const canvas = document.querySelector(place + " canvas");
   const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);

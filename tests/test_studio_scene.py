@@ -26,6 +26,8 @@ from tests.strike_latency import TAP_ADDRESS
 from tests.studio_pages import until_page
 from tests.test_studio_standalone import HOSTILE, samples
 
+pytestmark = pytest.mark.nightly(unless=("studio", "sound"))
+
 FRAME = 1.0 / 60.0
 RATE = 44_100
 SECONDS = 2.5

@@ -25,6 +25,8 @@ from studio.standalone.page import HERE, MANY_TRIANGLES
 from tests.small_design import N_MODES, small_design
 from tests.studio_pages import until_page
 
+pytestmark = pytest.mark.nightly(unless=("studio", "sound"))
+
 RATE = 44_100
 HOSTILE = "</script><script>window.broken = true</script><img src=x onerror='window.broken = 1'>"
 PACKED = """(samples) => {

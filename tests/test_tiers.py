@@ -131,6 +131,21 @@ def test_the_tier_decides_which_tests_are_run(tier):
     assert ("test_there_are_fifty_kills" in done.stdout) == (tier == "all"), done.stdout
 
 
+@pytest.mark.parametrize(
+    ("unless", "changed", "spared"),
+    [
+        ((), ["studio/feed.py"], True),
+        (("studio",), [], True),
+        (("studio",), ["solver/__main__.py"], True),
+        (("studio",), ["studio/page/main.js"], False),
+        (("studio",), ["tests/test_page.py"], False),
+    ],
+)
+def test_pages_are_tried_where_they_have_changed(unless, changed, spared):
+    assert tiers.is_spared("test_page.py", {"test_other.py"}, unless, changed) == spared
+    assert not tiers.is_spared("test_page.py", {"test_page.py"}, unless, changed)
+
+
 def test_files_that_were_never_measured_have_their_turn(tmp_path, monkeypatch):
     (tmp_path / "tests").mkdir()
     (tmp_path / "tests" / "test_new.py").write_text("pytestmark = pytest.mark.nightly")

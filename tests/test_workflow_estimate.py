@@ -368,6 +368,7 @@ def ran(words, folder):
     return ""
 
 
+@pytest.mark.nightly
 def test_what_is_measured_are_rates(monkeypatch, capsys):
     monkeypatch.setattr(measure, "_run", ran)
     rates = checked(measure.measure(), "here")

@@ -127,6 +127,7 @@ def test_a_design_is_bowled_at_pins_that_stand_on_the_ground_and_make_a_scale(tm
     assert -12.0 * np.log2(units / pin["size"]) == pytest.approx(pin["semitones"])
 
 
+@pytest.mark.nightly
 def test_the_pins_stand(tmp_path):
     require_engine()
     scene = read("bowled", tmp_path)

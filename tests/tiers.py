@@ -12,7 +12,7 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -114,6 +114,26 @@ def turns(seconds: Mapping[str, float]) -> list[list[str]]:
     return [sorted(part) for part in parts]
 
 
+def is_spared(
+    name: str, files: Collection[str], unless: Collection[str], changed: Collection[str]
+) -> bool:
+    """Whether a test marked `nightly` is left out.
+
+    Parameters
+    ----------
+    name
+        Of its file.
+    files
+        Those that are due.
+    unless
+        The only folders that it depends on: it is run if something in them, or its own file,
+        is among those that have `changed`.
+    """
+    if name in files:
+        return False
+    return not unless or not touched([*unless, f"{TESTS}/{name}"], changed)
+
+
 # What has changed ---------------------------------------------------------------------------------
 
 
@@ -169,13 +189,27 @@ def nearest(changed: Iterable[str]) -> list[str]:
     return sorted(found, key=lambda name: (found[name], name))
 
 
+def touched(places: Iterable[str], changed: Iterable[str]) -> bool:
+    """Whether something has changed in one of these folders and files.
+
+    Examples
+    --------
+    >>> touched(["studio"], ["studio/page/main.js"]), touched(["studio"], ["studios.md"])
+    (True, False)
+    """
+    return any(
+        path == place or path.startswith(f"{place}/") for place in places for path in changed
+    )
+
+
 def _of_rooms(name: str, changed: Iterable[str]) -> bool:
     """Whether tests of this name are those of a folder in which something has changed."""
+    changed = list(changed)
     return any(
         name.startswith(begin)
         for room, begins in ROOMS.items()
         for begin in begins
-        if any(path == room or path.startswith(f"{room}/") for path in changed)
+        if touched([room], changed)
     )
 
 
