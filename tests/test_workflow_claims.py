@@ -8,15 +8,15 @@ import yaml
 from tests.workflow_runs import CHECKOUT
 from workflow.studies.base.table import Column, Table, read_csv_table, write_table
 from workflow.studies.catalogue import CLAIMS
-from workflow.studies.claims.claims import (
+from workflow.studies.claims.findings import (
     IN_PART,
     LESS,
-    MEASURES,
     NOT,
     REPRODUCED,
     UNMEASURED,
     Finding,
 )
+from workflow.studies.claims.measures import MEASURES
 from workflow.studies.claims.page import page
 from workflow.studies.claims.results import REFERENCE, Claims
 from workflow.studies.claims.tables import TEXTS

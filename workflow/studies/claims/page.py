@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from workflow.studies.base.page import picture_uri, rendered
 from workflow.studies.base.table import Table
-from workflow.studies.claims.claims import IN_PART, LESS, NOT, REPRODUCED
+from workflow.studies.claims.findings import IN_PART, LESS, NOT, REPRODUCED
 from workflow.studies.claims.results import Claims
 from workflow.studies.claims.tables import NO_MESH
 

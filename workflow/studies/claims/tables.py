@@ -11,7 +11,8 @@ from jinja2 import Environment, StrictUndefined
 from carillon.documents import read_own_yaml
 from workflow.studies.base.entry import Row
 from workflow.studies.base.numbers import show
-from workflow.studies.claims.claims import LESS, MEASURES, NOT, REPRODUCED
+from workflow.studies.claims.findings import LESS, NOT, REPRODUCED
+from workflow.studies.claims.measures import MEASURES
 from workflow.studies.claims.results import FULL, MEASURED, SCENE_TABLE, Claims
 
 TEXTS: dict[str, dict[str, str]] = read_own_yaml(Path(__file__).with_name("claims.yaml"))
