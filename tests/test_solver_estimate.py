@@ -20,7 +20,7 @@ from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.coarsening.choice import make_coarsening
 from solver.files.modes_file import read_modes
-from solver.refinement import work
+from solver.refinement import coarse_or_fine, work
 from solver.refinement.coarse_or_fine import by_options, solve_coarsened
 from solver.refinement.energies import element_energies, fine_energies
 from solver.refinement.errors import ExpectedErrors
@@ -265,6 +265,35 @@ def test_a_material_is_followed_in_blocks_of_its_own_and_in_thick_solids():
     assert variation(blocks_from_mesh(uniform.fine), uniform.young) == 1.0
 
 
+@pytest.mark.parametrize("is_rated", [True, False])
+def test_the_coarse_model_stands_where_the_fine_solid_cannot_be_solved(
+    is_rated, monkeypatch, capfd
+):
+    problem = build_problem(ProblemOptions("builtin:bell", 20, "smooth"))
+    refined, options = (
+        RefinedModel(problem.model, make_coarsening("ddfem")),
+        SolverOptions(modes=20),
+    )
+    alone = by_options(options, COMM)
+
+    def solve(model, *, start=None):
+        if model.n_dofs == problem.model.n_dofs:
+            raise UserError("no factorisation fits into the memory")
+        return alone(model, start=start)
+
+    def unrated(*_):
+        raise UserError("there is no memory for that")
+
+    if not is_rated:
+        monkeypatch.setattr(coarse_or_fine, "estimate_errors", unrated)
+    # So small a tolerance that no refined model is worth it.
+    found = solve_coarsened(solve, refined, 1e-6, SolverOptions(modes=250), COMM)
+    assert found.reason is None and (found.errors is not None) == is_rated
+    assert found.model.n_dofs < problem.model.n_dofs and len(found.modes.values) == 20
+    told = capfd.readouterr().err
+    assert "warning: the modes are those of the coarse model: no factorisation fits" in told
+
+
 def test_few_modes_of_few_unknowns_are_found_on_the_fine_mesh_at_once():
     _, found = taken("bar", 16, "uniform", modes=20)
     assert "so few unknowns" in found.reason and not found.steps
@@ -310,7 +339,7 @@ def test_the_summary_says_that_the_fine_solid_was_taken_and_files_can_be_compare
     assert file.attributes["expected_frequency_error_worst"] == 0.0
     capsys.readouterr()
     main(["compare", out, truth, "--json"])
-    compared = json.loads(capsys.readouterr().out)
+    (compared,) = json.loads(capsys.readouterr().out)["comparisons"].values()
     assert compared["frequency_rms_relative_error"] < 1e-6 and "matched" not in compared
 
 

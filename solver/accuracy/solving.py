@@ -208,13 +208,15 @@ def _coarsened(
     told = None if report is None else partial(report, FINE)
     refined = compute_on_root(comm, coarse)
     found = solve_coarsened(solve, refined, wishes.refine_to, wishes.options, comm, told)
-    achieved = found.errors.attributes(FROM_FINE)
+    achieved = {} if found.errors is None else found.errors.attributes(FROM_FINE)
     achieved |= {"refinement_steps": max(len(found.steps) - 1, 0)}
-    if found.reason is None:
-        achieved |= {FINE: found.steps[-1].refined}
-    else:
+    if found.reason is not None:
         blocks = comm.bcast(None if refined is None else refined.all_blocks)
         achieved |= {FINE: blocks, "fine_taken": found.reason}
+    elif found.errors is not None:
+        achieved |= {FINE: found.steps[-1].refined}
+    else:
+        achieved |= {FINE: comm.bcast(None if refined is None else refined.fine_blocks)}
     return Solved(problem, found.model, found.modes, achieved)
 
 

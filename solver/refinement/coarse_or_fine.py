@@ -5,7 +5,8 @@ and modes tell the work of its analysis, of the estimate of its errors, and of t
 Where the first two are not clearly less than the last, the fine solid is solved at once. Where the
 estimate finds errors that are too large, blocks stay fine if the refined model is clearly less work
 too; or else the fine solid is solved from the coarse modes, with the estimate's factorisation. All
-that is decided from counts, moduli and modes, so every machine decides the same.
+that is decided from counts, moduli and modes, so every machine decides the same. Where the fine
+solid cannot be solved, for lack of memory for example, the coarse modes stand, with a warning.
 """
 
 from __future__ import annotations
@@ -118,14 +119,14 @@ class CoarseOrFine:
     reason
         Why the fine solid was taken, as a clause; None for a coarse model.
     errors
-        Expected of the frequencies.
+        Expected of the frequencies; None if they cannot be told.
     """
 
     model: ElasticModel | None
     modes: Modes
     steps: list[RefinementStep]
     reason: str | None
-    errors: ExpectedErrors
+    errors: ExpectedErrors | None
 
 
 def solve_coarsened(
@@ -138,7 +139,7 @@ def solve_coarsened(
 ) -> CoarseOrFine:
     """Modes of a coarse model with an expected error of at most `tolerance`, or of the fine one.
 
-    Collective.
+    Collective.  If neither can be had, those of the last coarse model, with a warning.
 
     Parameters
     ----------
@@ -171,6 +172,7 @@ def solve_coarsened(
     choice = None if refined is None else _Weighing(refined, tolerance, options)
     solid: InverseIteration | None = None
     start: FineStart | None = None
+    coarse: CoarseOrFine | None = None
     steps: list[RefinementStep] = []
     reason = bcast_from_root(comm, lambda: _of(choice).before())
     while reason is None:
@@ -182,7 +184,7 @@ def solve_coarsened(
         rating = partial(estimate_errors, solid, blocks, found)
         estimate = optional(comm, f"the fine solid is taken, since {UNTOLD}", rating)
         if estimate is None:
-            found.destroy()
+            coarse = CoarseOrFine(model, found, steps, None, None)
             reason = UNTOLD
             break
         step = bcast_from_root(comm, partial(_step, choice, estimate))
@@ -198,9 +200,19 @@ def solve_coarsened(
         if reason is not None:
             whole = found.system.gather(np.ascontiguousarray(found.vectors[:, RIGID_MODES:]))
             start = FineStart(solid, found.values[RIGID_MODES:], blocks, whole)
-        found.destroy()
+            coarse = CoarseOrFine(model, found, steps, None, estimate.errors)
+        else:
+            found.destroy()
     fine = None if refined is None else refined.fine
-    found = solve(fine, start=start)
+    solve_fine = partial(solve, fine, start=start)
+    if coarse is None:
+        found = solve_fine()
+    else:
+        better = optional(comm, "the modes are those of the coarse model", solve_fine)
+        if better is None:
+            return coarse
+        coarse.modes.destroy()
+        found = better
     if solid is not None:
         solid.destroy()
     none = np.zeros(max(min(LAST, len(found.values)) - RIGID_MODES, 1))

@@ -137,6 +137,7 @@ def _taken(taken: Taken, truth: SolvedModel) -> _Rated:
     refined, found = taken.refined, taken.found
     if found.reason is None:
         solution = SolvedModel(refined.model, found.modes.values, _gathered(found.modes))
+        assert found.errors is not None  # The fine solid was solved before, and can be rated by.
         expected = found.errors.errors
     else:
         refined.refine_all()
