@@ -7,7 +7,7 @@ import hashlib
 import io
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
@@ -317,3 +317,18 @@ def _require_kind(path: Path, file: h5py.File, kind: str, schema: int) -> None:
             f"{path}: written with {kind} schema {stored_schema}, this version reads schema "
             f"{schema}; generate the file again"
         )
+
+
+def by_stem(paths: Iterable[str | Path]) -> dict[str, str]:
+    """Names of files by their stems, or by themselves where stems are equal.
+
+    Examples
+    --------
+    >>> by_stem(["a/bell.h5", "a/pan.h5"])
+    {'bell': 'a/bell.h5', 'pan': 'a/pan.h5'}
+    >>> by_stem(["a/bell.h5", "b/bell.h5"])
+    {'a/bell.h5': 'a/bell.h5', 'b/bell.h5': 'b/bell.h5'}
+    """
+    names = list(dict.fromkeys(map(str, paths)))
+    stems = [Path(name).stem for name in names]
+    return dict(zip(stems if len(set(stems)) == len(stems) else names, names, strict=True))

@@ -62,13 +62,26 @@ def test_modes_file_is_complete(modes_file):
 
 def test_compare_of_a_file_with_itself(modes_file, run_cli):
     done = run_cli("solver", "compare", modes_file, modes_file, "--json", check=True)
-    result = json.loads(done.stdout)
+    (result,) = json.loads(done.stdout)["comparisons"].values()
     assert set(result["eigenvalue_relative_error"]) == {"median", "p90", "max"}
     assert result["eigenvalue_relative_error"]["max"] == 0.0
     assert result["frequency_rms_relative_error"] == 0.0
     assert result["subspace_angle_max"] < 1e-6
     stored = read_modes(modes_file).residuals.max()
     assert result["residual_max"] == pytest.approx(stored, rel=1e-3, abs=1e-12)
+
+
+def test_several_are_compared_with_one_truth(modes_file, run_cli, tmp_path):
+    other = tmp_path / "other.h5"
+    shutil.copy(modes_file, other)
+    out = tmp_path / "found.json"
+    done = run_cli("solver", "compare", modes_file, other, modes_file, "--out", out, check=True)
+    assert [line for line in done.stdout.splitlines() if line.endswith(":")] == ["modes:", "other:"]
+    found = json.loads(out.read_text())
+    alone = run_cli("solver", "compare", other, modes_file, "--json", check=True)
+    expected = json.loads(alone.stdout)["comparisons"]
+    assert found["comparisons"]["other"] == expected["other"]
+    assert found["provenance"]["parameters"]["truth"] == str(modes_file)
 
 
 def test_summary_as_json(tmp_path, run_cli):

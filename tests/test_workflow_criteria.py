@@ -20,7 +20,7 @@ from solver.response import response_file
 from solver.response.response_file import StrikeOptions, respond, write_response
 from solver.studies.allowance import accepted_errors, angle_limits
 from solver.studies.audit import audit_files
-from solver.studies.comparison import compare_files
+from solver.studies.comparison import compare_each
 from tests.edited_files import edited
 from tests.solids import box_mesh, random_box
 from tests.test_solver_response import all_modes
@@ -106,9 +106,9 @@ def evidence(tmp_path, config, monkeypatch) -> Callable[..., Evidence]:
             attributes = DISTANCE if variant == FROM_SOLID else {}
             none = np.zeros(len(part.values))
             write_modes(paths[variant], part.model, part.values, [part.modes], none, attributes, {})
-        for variant in SHOWN[1:]:
-            compared = compare_files(paths[variant], paths[TRUTH]).as_dict()
-            (folder / f"{variant}.comparison.json").write_text(json.dumps(compared))
+        compared = compare_each([paths[variant] for variant in SHOWN[1:]], paths[TRUTH])
+        content = {"comparisons": {name: each.as_dict() for name, each in compared.items()}}
+        (folder / "comparisons.json").write_text(json.dumps(content | {"provenance": {}}))
         audits = audit_files(paths.values(), TOLERANCE)
         content = {"spectra": {name: audit.as_dict() for name, audit in audits.items()}}
         (folder / "audit.json").write_text(json.dumps(content))

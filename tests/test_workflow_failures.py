@@ -151,7 +151,7 @@ def test_damaged_files_are_named_and_nothing_comes_of_them(folder, assert_as_und
     needing = [
         "results/dataset/uniform-1.json",
         "results/forests/forests.json",
-        "results/models/bar/hcms.comparison.json",
+        "results/models/bar/comparisons.json",
     ]
     done = run(folder, *needing)
     assert done.returncode != 0

@@ -17,7 +17,7 @@ import yaml
 from carillon import cli
 from solver.response.response_file import StrikeOptions, read_response, respond, write_response
 from solver.studies.audit import audit_files
-from solver.studies.comparison import compare_files
+from solver.studies.comparison import compare_each
 from tests.edited_files import edited
 from tests.pages import Page, assert_self_contained
 from workflow.__main__ import main
@@ -136,8 +136,9 @@ def test_a_mode_that_is_missing_fails_in_words(run, tmp_path):
             file[name][9:-1] = file[name][10:]
         file["modes"][:, 9:-1] = file["modes"][:, 10:]
     paths = {variant: folder / f"{variant}.h5" for variant in SHOWN}
-    compared = compare_files(paths["hcms_ec"], paths["truth"]).as_dict()
-    (folder / "hcms_ec.comparison.json").write_text(json.dumps(compared))
+    compared = compare_each([paths[variant] for variant in SHOWN[1:]], paths["truth"])
+    content = {"comparisons": {name: each.as_dict() for name, each in compared.items()}}
+    (folder / "comparisons.json").write_text(json.dumps(content | {"provenance": {}}))
     audits = {name: asdict(audit) for name, audit in audit_files(paths.values()).items()}
     (folder / "audit.json").write_text(json.dumps({"spectra": audits, "provenance": {}}))
     candidates = {variant: paths[variant] for variant in SHOWN[1:]}

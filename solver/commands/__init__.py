@@ -5,7 +5,7 @@ from carillon.commands import Command
 COMMANDS = {
     "modes": Command("solver.commands.modes", "modes of a solid, in a file", ranks=True),
     "compare": Command(
-        "solver.commands.compare", "errors of one modes file against another", ranks=True
+        "solver.commands.compare", "errors of modes files against another", ranks=True
     ),
     "audit": Command(
         "solver.commands.audit",

@@ -1,4 +1,4 @@
-"""Errors of the eigenvalues and modes of one modes file, another being taken for the truth."""
+"""Errors of the eigenvalues and modes of modes files, another being taken for the truth."""
 
 from __future__ import annotations
 
@@ -7,35 +7,46 @@ import json
 from typing import Any
 
 from carillon.provenance import record
-from solver.commands.running import on_ranks, parameters
+from solver.commands.running import on_ranks, parameters, require_outputs, write_json
 from solver.distribution.collective import bcast_from_root
-from solver.studies.comparison import compare_files
+from solver.studies.comparison import compare_each
 
 EXAMPLES = """examples:
   compare bunny.h5 truth.h5
-  compare bunny.h5 truth.h5 --json
+  compare coarse.h5 average.h5 truth.h5 --json
 """
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    parser.add_argument("candidate", help="modes file to judge")
+    parser.add_argument(
+        "candidates", nargs="+", metavar="candidate", help="modes files to judge, one or several"
+    )
     parser.add_argument("truth", help="modes file taken for the truth")
+    parser.add_argument("--out", help="also write the result to this JSON file")
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Compare and print."""
     with on_ranks() as comm:
-        comparison = bcast_from_root(
-            comm, lambda: compare_files(arguments.candidate, arguments.truth).as_dict()
-        )
+        require_outputs(arguments, comm)
+        found = bcast_from_root(comm, lambda: compare_each(arguments.candidates, arguments.truth))
+        comparisons = {name: each.as_dict() for name, each in found.items()}
+        content = {"comparisons": comparisons, "provenance": record(parameters(arguments))}
+        write_json(arguments, content, comm)
         if comm.rank:
             return
     if arguments.json:
-        comparison["provenance"] = record(parameters(arguments))
-        print(json.dumps(comparison, indent=2))
+        print(json.dumps(content, indent=2))
         return
+    for name, comparison in comparisons.items():
+        if len(comparisons) > 1:
+            print(f"{name}:")
+        _print(comparison)
+
+
+def _print(comparison: dict[str, Any]) -> None:
     error = comparison["eigenvalue_relative_error"]
     print(f"modes compared            {comparison['modes_compared']} (elastic)")
     print(

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES
+from carillon.files import by_stem
 from carillon.petsc import PETSc
 from solver.assembly.petsc_matrix import distributed_matrix
 from solver.assembly.sparse import assembled
@@ -90,7 +91,7 @@ class Audit:
 def audit_files(
     paths: Iterable[str | Path], tolerance: float = EIGENVALUE_TOLERANCE
 ) -> dict[str, Audit]:
-    """Audits of modes files by the stems of their names, or by the names where stems are equal.
+    """Audits of modes files, see `carillon.files.by_stem` for their names.
 
     The `tolerance` is that to which the eigenvalues were asked for.
 
@@ -99,10 +100,7 @@ def audit_files(
     UserError
         If a file is unusable, or its audit leaves the range of numbers.
     """
-    names = list(dict.fromkeys(map(str, paths)))
-    stems = [Path(path).stem for path in names]
-    labels = stems if len(set(stems)) == len(stems) else names
-    return {label: _audited(path, tolerance) for label, path in zip(labels, names, strict=True)}
+    return {label: _audited(path, tolerance) for label, path in by_stem(paths).items()}
 
 
 def _audited(path: str, tolerance: float) -> Audit:

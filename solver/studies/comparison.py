@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from carillon.fem.geometry import blocks_with_coarse, prolongation
 from carillon.fem.model import RIGID_MODES, ElasticModel
+from carillon.files import by_stem
 from solver.assembly.sparse import assembled
 from solver.files.modes_file import ModesFile, read_elastic, require_same_solid
 from solver.response.contact import interpolation
@@ -137,19 +139,46 @@ def compare_files(candidate: str | Path, truth: str | Path) -> SpectrumCompariso
     UserError
         If a file is unusable or holds no elastic mode to compare, or they are of other solids.
     """
-    a, b = read_elastic(candidate), read_elastic(truth)
-    require_same_solid([truth, candidate], [b, a])
+    (found,) = compare_each([candidate], truth).values()
+    return found
+
+
+def compare_each(
+    candidates: Iterable[str | Path], truth: str | Path
+) -> dict[str, SpectrumComparison]:
+    """Compare several modes files with one that is taken for the truth.
+
+    See `carillon.files.by_stem` for the names of the comparisons.
+
+    Raises
+    ------
+    UserError
+        See `compare_files`.
+    """
+    exact = read_elastic(truth)
+    matrix = assembled(exact.model)[1]
+    found = {}
+    for label, name in by_stem(candidates).items():
+        candidate = read_elastic(name)
+        require_same_solid([truth, name], [exact, candidate])
+        found[label] = _compared(name, candidate, str(truth), exact, matrix)
+    return found
+
+
+def _compared(
+    candidate: str, a: ModesFile, truth: str, b: ModesFile, M: sp.csr_matrix
+) -> SpectrumComparison:
+    """Errors of a candidate, the mass matrix of the truth being at hand."""
     count = min(len(a.eigenvalues), len(b.eigenvalues))
     elastic = slice(RIGID_MODES, count)
     values, exact = a.eigenvalues[elastic], b.eigenvalues[elastic]
     shift = a.frequencies[elastic] / b.frequencies[elastic] - 1.0
     audible = frequency_errors(shift, AUDIBLE_LAST)
-    _, M = assembled(b.model)
     modes = on_mesh_of(b, a)
     angles = _cluster_angles(modes, b, M, count)
     return SpectrumComparison(
-        str(candidate),
-        str(truth),
+        candidate,
+        truth,
         eigenvalue_errors(values, exact),
         frequency_errors(shift, count).rms,
         audible.rms,

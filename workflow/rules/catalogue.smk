@@ -77,7 +77,7 @@ def measured_for(study):
     ]
     if study is catalogue.REPORT:
         modes = by_variant(variants.variants_of, "{model}/{variant}.h5")
-        compared = by_variant(variants.candidates_of, "{model}/{variant}.comparison.json")
+        compared = expand("{model}/comparisons.json", model=MODELS)
         return [
             f"{folder}/forests/forests.json",
             f"{folder}/forests/table.json",

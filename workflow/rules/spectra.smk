@@ -47,21 +47,21 @@ rule follow_convergence:
 
 rule compare_with_truth:
     input:
-        candidate=f"{RESULTS}/models/{{model}}/{{variant}}.h5",
+        candidates=model_results(variants.candidates_of, "models/{model}/{variant}.h5"),
         truth=f"{RESULTS}/models/{{model}}/{variants.TRUTH}.h5",
     output:
-        f"{RESULTS}/models/{{model}}/{{variant}}.comparison.json",
+        f"{RESULTS}/models/{{model}}/comparisons.json",
     log:
-        f"{LOGS}/models/{{model}}/{{variant}}.comparison.log",
+        f"{LOGS}/models/{{model}}/comparisons.log",
     benchmark:
-        f"{BENCHMARKS}/models/{{model}}/{{variant}}.comparison.tsv"
+        f"{BENCHMARKS}/models/{{model}}/comparisons.tsv"
     resources:
         **limits("compare_with_truth"),
     params:
         source=source("solver.commands.compare"),
     shell:
-        "python -m solver compare {input.candidate:q} {input.truth:q}"
-        " --json > {output:q}.partial 2> {log:q} && mv {output:q}.partial {output:q}"
+        "python -m solver compare {input.candidates:q} {input.truth:q}"
+        " --out {output:q} > {log:q} 2>&1"
 
 
 # Methods in alternating runs, on a solid that may be coarser than the model itself.

@@ -48,10 +48,7 @@ rule validate_model:
         model=model_files,
         config=f"{RESULTS}/config.yaml",
         modes=model_results(variants.shown_of, "models/{model}/{variant}.h5"),
-        comparisons=model_results(
-            lambda model: variants.shown_of(model)[1:],
-            "models/{model}/{variant}.comparison.json",
-        ),
+        comparisons=f"{RESULTS}/models/{{model}}/comparisons.json",
         audit=f"{RESULTS}/models/{{model}}/audit.json",
         response=f"{RESULTS}/models/{{model}}/response.h5",
         pictures=model_results(variants.shown_of, "figures/{model}-mode-{variant}.png"),

@@ -15,7 +15,7 @@ from workflow import settings
 from workflow.studies.base.conditions import Record
 from workflow.studies.base.results import Results
 from workflow.studies.base.skins import skin_of
-from workflow.variants import candidates_of, shown_of, variants_of
+from workflow.variants import shown_of, variants_of
 
 PRECOMPUTATION = ("mesh", "material")
 """Phases that come before any method: they are needed once for a solid."""
@@ -69,10 +69,7 @@ class Run(Results):
     def comparisons(self) -> dict[str, dict[str, Any]]:
         """Output of `solver compare` against the truth, by model and variant."""
         return {
-            model: {
-                variant: self.read_json(f"models/{model}/{variant}.comparison.json")
-                for variant in candidates_of(self.config["models"][model])
-            }
+            model: self.read_json(f"models/{model}/comparisons.json")["comparisons"]
             for model in self.models
         }
 

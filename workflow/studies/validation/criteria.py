@@ -177,7 +177,7 @@ def _criteria(
     names |= {
         "variant": variant,
         "audit": evidence.file("audit.json"),
-        "comparison": evidence.file(f"{variant}.comparison.json"),
+        "comparison": evidence.file("comparisons.json"),
         "response": evidence.file("response.h5"),
         "solved": evidence.file(f"{SOLVED}.h5"),
         "truth": evidence.file(f"{TRUTH}.h5"),

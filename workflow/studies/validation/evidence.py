@@ -62,9 +62,14 @@ class Evidence(Run):
 
     @cached_property
     def compared(self) -> dict[str, dict[str, Any]]:
-        """Output of `solver compare` against the truth by variant."""
-        names = [name for name in self.shown if name != TRUTH]
-        return {name: self.read_json(self.file(f"{name}.comparison.json")) for name in names}
+        """What `solver compare` finds of each variant that is shown beside the truth."""
+        found = self._comparisons["comparisons"]
+        return {name: found[name] for name in self.shown if name != TRUTH}
+
+    @cached_property
+    def _comparisons(self) -> dict[str, Any]:
+        """Output of `solver compare`: `comparisons` by variant, and `provenance`."""
+        return self.read_json(self.file("comparisons.json"))
 
     @cached_property
     def audit(self) -> dict[str, Any]:
@@ -80,8 +85,7 @@ class Evidence(Run):
     def origins(self) -> dict[str, Record]:
         """Provenance of every file that the page draws on."""
         records = {f"{variant}.h5": spectrum.provenance for variant, spectrum in self.shown.items()}
-        for variant, comparison in self.compared.items():
-            records[f"{variant}.comparison.json"] = comparison.get("provenance", {})
+        records["comparisons.json"] = self._comparisons["provenance"]
         records["audit.json"] = self.audit["provenance"]
         records["response.h5"] = self.response.provenance
         return {self.file(name): record for name, record in records.items()}
