@@ -72,7 +72,7 @@ def test_the_reference_tells_what_the_paper_s_averaging_comes_to(run):
     assert blocks.verdict == NOT
     assert "0.796" in blocks.text and "0.636" in blocks.text
     total = found(run, "total")
-    assert "28× to 64× cold, 89× to 235× warm" in total.text
+    assert "26× to 53× cold, 118× to 234× warm" in total.text
     assert total.verdict != REPRODUCED
     assert found(run, "each").verdict == NOT
     for name in ("shapes", "scaling", "convergence", "interactive"):
