@@ -1,7 +1,8 @@
 """What a process that is no rank of several has to do before MPI is loaded.
 
 Open MPI starts a daemon for a process that no launcher started, in case it should spawn ranks,
-which nothing here does; to leave it out saves a tenth of a second or more.
+which nothing here does; to leave it out saves a tenth of a second or more. It looks for networks,
+too, which takes two tenths.
 
 All such processes of a user share a directory, which each makes and removes in steps.  Where one
 begins as another ends, what it has just made may be gone, and it aborts; so commands, and what
@@ -16,7 +17,8 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Mapping, MutableMapping
+from collections.abc import Iterator, Mapping, MutableMapping
+from contextlib import contextmanager
 
 _STEP = ("SLURM_STEP_ID", "SLURM_STEPID")
 _LAUNCHERS = ("PMIX_", "PMI_", "OMPI_COMM_WORLD_")
@@ -36,6 +38,7 @@ _SEVERAL = (
     ),
 )
 """Variables by which launchers tell how many processes they have started, and which one this is."""
+_TRANSPORT = "OMPI_MCA_pml"
 _DIRECTORY = "OMPI_MCA_orte_top_session_dir"
 _OWN = "carillon-mpi"
 
@@ -52,6 +55,32 @@ def start_without_daemon(environment: MutableMapping[str, str]) -> None:
     """
     if not _launched(environment):
         environment.setdefault("OMPI_MCA_ess_singleton_isolated", "1")
+
+
+@contextmanager
+def without_networks(environment: MutableMapping[str, str]) -> Iterator[None]:
+    """Have Open MPI look for no network while it is loaded in the body.
+
+    Of a process that was started as an MPI rank nothing changes, nor of one whose user has chosen.
+    Ranks that the process starts later look for networks as usual.
+
+    Examples
+    --------
+    >>> environment = {}
+    >>> with without_networks(environment):
+    ...     environment
+    {'OMPI_MCA_pml': 'ob1'}
+    >>> environment
+    {}
+    """
+    if _launched(environment) or _TRANSPORT in environment:
+        yield
+        return
+    environment[_TRANSPORT] = "ob1"
+    try:
+        yield
+    finally:
+        environment.pop(_TRANSPORT, None)
 
 
 def keep_apart(environment: MutableMapping[str, str], process: int) -> None:

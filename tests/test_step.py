@@ -53,6 +53,30 @@ def test_a_directory_that_the_user_has_chosen_stays(tmp_path):
     assert [directory for directory, _ in printed(**{DIRECTORY: chosen})] == [chosen, chosen]
 
 
+@pytest.mark.parametrize(
+    "chosen", [{"OMPI_MCA_pml": "cm"}, {"PMIX_RANK": "0"}, {"OMPI_COMM_WORLD_SIZE": "2"}]
+)
+def test_ranks_and_users_choose_their_network(chosen):
+    environment = dict(chosen)
+    with step.without_networks(environment):
+        assert environment == chosen
+    assert environment == chosen
+
+
+def test_what_a_lone_process_starts_looks_for_networks():
+    look = "import os; print(os.environ.get('OMPI_MCA_pml'))"
+    lone = (
+        "import os, subprocess, sys\n"
+        "from carillon import step\n"
+        "with step.without_networks(os.environ):\n"
+        "    from mpi4py import MPI\n"
+        "print(MPI.COMM_SELF.sendrecv('itself', 0), flush=True)\n"
+        f"subprocess.run([sys.executable, '-c', {look!r}], check=True)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", lone], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["itself", "None"]
+
+
 def warned(**variables: str) -> str:
     """What a command says that was started with these variables."""
     done = subprocess.run(
