@@ -81,7 +81,7 @@ def test_several_are_compared_with_one_truth(modes_file, run_cli, tmp_path):
     alone = run_cli("solver", "compare", other, modes_file, "--json", check=True)
     expected = json.loads(alone.stdout)["comparisons"]
     assert found["comparisons"]["other"] == expected["other"]
-    assert found["provenance"]["parameters"]["truth"] == str(modes_file)
+    assert json.loads(found["provenance"]["parameters"])["truth"] == str(modes_file)
 
 
 def test_summary_as_json(tmp_path, run_cli):
