@@ -188,6 +188,25 @@ def test_voxels_carry_the_material():
     assert values[0] < 1e-9
 
 
+def tube(length: float, inner: float, outer: float) -> trimesh.Trimesh:
+    """Along x."""
+    made = trimesh.creation.annulus(inner, outer, length, sections=48)
+    made.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2.0, (0.0, 1.0, 0.0)))
+    return made
+
+
+@pytest.mark.parametrize("resolution", [24, 32, 40])
+def test_a_tube_that_the_lines_see_badly_is_told_a_resolution_that_sees_it(resolution):
+    """Lines along its axis all see the same cross-section, at few places."""
+    thin = tube(1.0, 0.009, 0.01)
+    with pytest.raises(
+        UserError, match=r"find \d+% of its volume; raise --resolution to"
+    ) as caught:
+        finite_cells(thin, resolution)
+    better = int(str(caught.value).split()[-1])
+    assert finite_cells(thin, better).volume == pytest.approx(thin.volume, rel=0.011)
+
+
 SHEET = trimesh.Trimesh([[0, 0, 0], [1, 0, 0.2], [0, 1, 0.7]], [[0, 1, 2]])
 
 

@@ -62,6 +62,7 @@ FORMS = {
     "comments": obj(HALVES, back, end=" # here: f 1 2 3\n"),
     "carriage returns": obj(HALVES, back, end="\r\n"),
     "old carriage returns": obj(HALVES, end="\r"),
+    "byte-order mark": "\ufeff" + obj(HALVES),
 }
 
 
@@ -238,6 +239,29 @@ def test_data_that_are_in_an_extension_alone_are_refused(tmp_path):
     view |= {"buffer": 1, "byteOffset": 0, "extensions": {"EXT_meshopt_compression": {}}}
     with pytest.raises(UserError, match="data in EXT_meshopt_compression alone"):
         load_surface(file.written(tmp_path / "box.glb"))
+
+
+@pytest.mark.parametrize(
+    ("node", "mesh", "sentence"),
+    [
+        ({"skin": 0}, {}, "is bent by a skeleton, .* export it without skin"),
+        ({}, {"weights": [1.0]}, "is mixed from morph targets, .* export it as it is seen"),
+        ({"weights": [0.5]}, {"weights": [0.0]}, "is mixed from morph targets"),
+    ],
+)
+def test_a_mesh_that_something_deforms_is_refused(tmp_path, node, mesh, sentence):
+    file = plain_box()
+    file.header["nodes"][0] |= node
+    file.header["meshes"][0] |= mesh
+    with pytest.raises(UserError, match=sentence):
+        load_surface(file.written(tmp_path / "box.glb"))
+
+
+def test_morph_targets_that_have_no_weight_do_not_matter(tmp_path):
+    file = plain_box()
+    file.header["nodes"][0] |= {"weights": [0.0]}
+    file.header["meshes"][0] |= {"weights": [1.0]}
+    assert same_triangles(load_surface(file.written(tmp_path / "box.glb")), BOX, 1e-7)
 
 
 def test_an_accessor_beyond_its_data_is_refused(tmp_path):

@@ -89,6 +89,14 @@ def test_every_copy_is_found_however_many_modes_are_asked_for(body, discretisati
             assert error.max() <= 1e-8, (method, modes)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_one_of_five_modes_that_are_all_but_equal_is_found(seed):
+    model = model_of("ball", 6, "finite-cell")
+    exact = solids.dense_eigenvalues(model)
+    found = ModalSolver(model, SolverOptions(modes=7, method="hcms", seed=seed), COMM).solve()
+    assert abs(found.values[-1] / exact[RIGID_MODES] - 1.0) <= 1e-7 and len(found.values) == 7
+
+
 @pytest.mark.parametrize("body", ["octahedron", "tetrahedron", "cube"])
 @pytest.mark.parametrize(
     "resolution", [3, *(pytest.param(each, marks=pytest.mark.nightly) for each in (4, 5))]

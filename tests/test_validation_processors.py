@@ -52,4 +52,6 @@ def test_a_solid_of_the_default_run_passes(model, processor, kernels, start_cli,
     found = [(row["group"], row["key"], row["shown"], row["required"]) for row in rows]
     print(*found, sep="\n")
     assert done.returncode == 0, [row for row in rows if row["verdict"] != "met"]
-    assert "criteria are met" in done.stdout and len(rows) == 17
+    assert "criteria are met" in done.stdout
+    # Six are of a coarse model; where none would pay, the fine solid is solved instead.
+    assert len(rows) in (11, 17)

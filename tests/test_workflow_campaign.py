@@ -182,7 +182,7 @@ def test_a_tiny_campaign_goes_on_past_a_cell_that_fails(tmp_path):
     box = {"mesh": "builtin:box", "resolution": 8}
     part = {"models": {"thin": thin, "box": box}, "materials": ["random"], "seeds": [0]}
     config = yaml.safe_load(TINY.read_text())
-    config["campaign"] = {**part, "ranks": [1], "modes": 20}
+    config["campaign"] = {**part, "ranks": [2], "modes": 20}
     (tmp_path / "config.yaml").write_text(yaml.safe_dump(config))
     options = ("--profile", PROFILE, "--configfile", "config.yaml", "--cores", 2)
     done = snakemake(tmp_path, *options, "campaign")

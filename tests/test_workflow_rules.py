@@ -16,7 +16,7 @@ def test_default_run_is_planned_without_a_gap(plan):
     models, shards = 4, 4
     assert jobs["generate_shard"] == shards
     assert jobs["find_modes"] == 7 * models
-    assert jobs["compare_with_truth"] == models
+    assert jobs["compare_with_truth"] == 2 * models
     assert jobs["train_forests"] == jobs["tabulate_report"] == jobs["build_report"] == 1
 
 

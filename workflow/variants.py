@@ -75,6 +75,16 @@ def candidates_of(model: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(name for name in CANDIDATES if name in variants_of(model))
 
 
+def judged_of(model: Mapping[str, Any]) -> tuple[str, ...]:
+    """Those of these that a validation looks at."""
+    return tuple(name for name in candidates_of(model) if name in SHOWN)
+
+
+def further_of(model: Mapping[str, Any]) -> tuple[str, ...]:
+    """The others, which the report compares besides."""
+    return tuple(name for name in candidates_of(model) if name not in SHOWN)
+
+
 def shown_of(model: Mapping[str, Any]) -> tuple[str, ...]:
     """Those of them that are drawn and listed."""
     return tuple(name for name in SHOWN if name in variants_of(model))

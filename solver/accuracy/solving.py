@@ -184,6 +184,8 @@ def _divided(
     if steps:
         achieved = steps[-1].errors.attributes(FROM_SOLID)
         achieved |= {DIVIDED: steps[-1].refined, "refinement_steps": len(steps) - 1}
+        if steps[-1].errors.excess(tolerance) > 1.0:
+            achieved["missed_accuracy"] = tolerance
     return Solved(problem, model, modes, achieved)
 
 

@@ -41,6 +41,10 @@ from solver.subspace.weyl import CountingLaw
 
 Array = NDArray[np.float64]
 
+FEWEST_CORRECTED = 6
+"""Modes that HCMS corrects at least: the first mode of a ball alone, one of five that are all but
+equal, hardly converges."""
+
 
 @dataclass
 class _Solution:
@@ -309,6 +313,7 @@ class ModalSolver:
             if options.corrections == 0:
                 return _Solution(*lowest_pairs(synthesis, options.modes))
             values, start = elastic_part(system, synthesis)
+            requested = max(requested, min(FEWEST_CORRECTED, start.shape[1]))
         with phases("correction"):
             result = correct(
                 system,

@@ -269,6 +269,11 @@ def _print_summary(
     for prefix, words in EXPECTED.items():
         if f"{prefix}_rms" in attributes:
             print(f"expected {words} {in_words(attributes, prefix)}{_refined_in_words(attributes)}")
+    if "missed_accuracy" in attributes:
+        print(
+            f"{100 * attributes['missed_accuracy']:g}% rms was aimed at, which dividing some cells "
+            "does not reach: raise --resolution"
+        )
 
 
 def _refined_in_words(attributes: dict[str, Any]) -> str:

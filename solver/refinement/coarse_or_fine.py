@@ -32,7 +32,7 @@ from solver.correction.shift import is_amid
 from solver.distribution.collective import bcast_from_root, compute_on_root, optional
 from solver.files.initial_modes import scatter_rows
 from solver.refinement import work
-from solver.refinement.errors import LAST, ExpectedErrors
+from solver.refinement.errors import LAST, WORST, ExpectedErrors
 from solver.refinement.estimate import ErrorEstimate, estimate_errors, mean_shares
 from solver.refinement.inverse_iteration import InverseIteration
 from solver.refinement.refine import RefinementStep
@@ -288,9 +288,10 @@ class _Weighing:
                 f"the coarse model lacks {lacks} of the fine solid" if missed else None,
             )
         self._excuse = (
-            f"the coarse model's frequencies are expected to be {errors.rms:.1%} off, worst "
-            f"{errors.worst:+.1%} (mode {errors.worst_mode}), and keeping blocks fine would save "
-            "little"
+            f"the coarse model's frequencies are expected to be {errors.rms:.1%} off "
+            f"({100 * self._tolerance:g}% allowed), the worst {errors.worst:+.1%} "
+            f"({100 * WORST * self._tolerance:g}% allowed, mode {errors.worst_mode}), and keeping "
+            "blocks fine would save little"
         )
         return False, self.after_refining()
 

@@ -141,6 +141,8 @@ def _read(entry: ObjectEntry) -> Body:
 
 def _of_kind(path: str, kind: str) -> str:
     found = kind_of(path, f"a Carillon {kind} file (HDF5)")[0]
+    if not found:
+        raise UserError(f"{path}: is no file of Carillon, expected {kind}; name a mesh by mesh")
     if found != kind:
         raise UserError(f"{path}: is a file of kind {found}, expected {kind}; name it by {found}")
     return path

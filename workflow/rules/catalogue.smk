@@ -78,6 +78,11 @@ def measured_for(study):
     if study is catalogue.REPORT:
         modes = by_variant(variants.variants_of, "{model}/{variant}.h5")
         compared = expand("{model}/comparisons.json", model=MODELS)
+        compared += [
+            f"{name}/further_comparisons.json"
+            for name, model in config["models"].items()
+            if variants.further_of(model)
+        ]
         return [
             f"{folder}/forests/forests.json",
             f"{folder}/forests/table.json",

@@ -41,6 +41,12 @@ def model_results(names, pattern):
     return files
 
 
+def compared_files(wildcards):
+    """Modes files that are compared with the truth."""
+    names = variants.further_of if wildcards.further else variants.judged_of
+    return model_results(names, "models/{model}/{variant}.h5")(wildcards)
+
+
 def variant_files(wildcards):
     """The forests, for the variants that coarsen with them."""
     needs_forests = variants.VARIANTS[wildcards.variant].coarsen == "ddfem"

@@ -45,16 +45,19 @@ rule follow_convergence:
         " --out {output:q} > {log:q} 2>&1"
 
 
+# What a validation looks at, and `further_` what the report needs besides.
 rule compare_with_truth:
     input:
-        candidates=model_results(variants.candidates_of, "models/{model}/{variant}.h5"),
+        candidates=compared_files,
         truth=f"{RESULTS}/models/{{model}}/{variants.TRUTH}.h5",
     output:
-        f"{RESULTS}/models/{{model}}/comparisons.json",
+        f"{RESULTS}/models/{{model}}/{{further}}comparisons.json",
     log:
-        f"{LOGS}/models/{{model}}/comparisons.log",
+        f"{LOGS}/models/{{model}}/{{further}}comparisons.log",
     benchmark:
-        f"{BENCHMARKS}/models/{{model}}/comparisons.tsv"
+        f"{BENCHMARKS}/models/{{model}}/{{further}}comparisons.tsv"
+    wildcard_constraints:
+        further="(further_)?",
     resources:
         **limits("compare_with_truth"),
     params:

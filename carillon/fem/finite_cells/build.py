@@ -22,6 +22,9 @@ if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
 
 LOST = 1.1
 """Ratio of the volumes by two halves of the lines beyond which parts slip between the lines."""
+SEEN, SURELY_SEEN = 0.03, 0.01
+"""Relative error of the volume beyond which the lines are too few for a thin rod or wall, and that
+of a resolution which is proposed."""
 TRIAL_FACTORS = (1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 """Factors by which a resolution is raised in search of one at which nothing is lost, or the solid
 is in one piece."""
@@ -57,6 +60,8 @@ def covering(
     inside = find_inside(surface, grid)
     if not _holds(inside):
         raise UserError(_lost(surface, inside, resolution, grid, name))
+    if not _sees(surface, inside, grid):
+        raise UserError(_unseen(surface, inside, resolution, grid, name))
     cover = cover_of(inside)
     piece, volumes = pieces(cover)
     kept = np.flatnonzero(volumes >= SMALLEST_PIECE)
@@ -125,6 +130,34 @@ def _holds(inside: Inside) -> bool:
     return 0.0 < min(volumes) and max(volumes) <= LOST * min(volumes)
 
 
+def _sees(surface: trimesh.Trimesh, inside: Inside, grid: Grid, most: float = SEEN) -> bool:
+    """Whether the lines find the volume of a surface that is one closed shell; others tell none."""
+    is_told = surface.is_watertight and surface.is_winding_consistent and surface.body_count == 1
+    if not is_told:
+        return True
+    return abs(_seen_share(surface, inside, grid) - 1.0) <= most
+
+
+def _seen_share(surface: trimesh.Trimesh, inside: Inside, grid: Grid) -> float:
+    """Volume by the lines over the surface's own."""
+    full = np.count_nonzero(inside.state == FULL)
+    return float((full + 0.5 * sum(inside.volumes())) * grid.edge**3 / abs(surface.volume))
+
+
+def _unseen(
+    surface: trimesh.Trimesh, inside: Inside, resolution: int, grid: Grid, name: str
+) -> str:
+    better = _better_resolution(surface, resolution, _holds, TRIAL_GRID)
+    remedy = (
+        f"raise --resolution to {better}" if better else "raise --resolution, or turn the solid"
+    )
+    share = _seen_share(surface, inside, grid)
+    return (
+        f"mesh {name!r} at resolution {resolution} is so thin that lines of the lattice, whose "
+        f"spacing is {grid.edge:.3g} m, find {share:.0%} of its volume; {remedy}"
+    )
+
+
 def _lost(surface: trimesh.Trimesh, inside: Inside, resolution: int, grid: Grid, name: str) -> str:
     start = f"mesh {name!r} at resolution {resolution}"
     nothing = f"{start} encloses nothing; expected a surface around a solid, repair the mesh"
@@ -170,6 +203,7 @@ def _better_resolution(
         trial = even_grid(surface, better)
         if np.prod([float(size) for size in trial.shape]) > largest:
             return None
-        if accepts(find_inside(surface, trial)):
+        found = find_inside(surface, trial)
+        if accepts(found) and _sees(surface, found, trial, SURELY_SEEN):
             return better
     return None

@@ -66,6 +66,7 @@ def plain_gltf(content: bytes, beside: Callable[[str], bytes], name: str) -> byt
     """
     header, binary = _parts(content)
     _require_known(header.get("extensionsRequired", []), name)
+    _require_at_rest(header, name)
     if _is_plain(header):
         return None
     reader = _Reader(header, binary, beside, name)
@@ -104,6 +105,19 @@ def _require_known(extensions: list[str], name: str) -> None:
             f"{name}: needs {', '.join(unknown)}, which is not read; export it without "
             "(uncompressed)"
         )
+
+
+def _require_at_rest(header: Header, name: str) -> None:
+    """Refuse meshes that something else than their nodes deforms."""
+    nodes, meshes = header.get("nodes", []), header.get("meshes", [])
+    if any("skin" in node and "mesh" in node for node in nodes):
+        raise UserError(f"{name}: is bent by a skeleton, which is not read; export it without skin")
+    for node in nodes:
+        mesh = meshes[node["mesh"]] if "mesh" in node else {}
+        if any(node.get("weights", mesh.get("weights", []))):
+            raise UserError(
+                f"{name}: is mixed from morph targets, which are not read; export it as it is seen"
+            )
 
 
 def _is_plain(header: Header) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import logging
 import warnings
 from io import BytesIO
@@ -131,7 +132,7 @@ def _loaded(path: Path) -> Any:
     kind = path.suffix.lstrip(".").lower()
     content: bytes | None = None
     if kind == "obj":
-        content = plain_obj(path.read_bytes())
+        content = plain_obj(path.read_bytes().removeprefix(codecs.BOM_UTF8))
     elif kind in ("gltf", "glb"):
         content = plain_gltf(path.read_bytes(), folder.get, str(path))
         kind = "glb"

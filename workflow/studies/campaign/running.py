@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import subprocess
 import sys
@@ -32,8 +33,11 @@ def validated(arguments: list[str], folder: Path, cores: int, log: Path) -> dict
     words = ["validate", *arguments, "--out", str(folder)]
     program = [sys.executable, "-m", "workflow", *words, "--cores", str(cores)]
     begun = time.perf_counter()
+    # Without what MPI, loaded here, has set beside Python: mpiexec would take it for its own.
+    environment = dict(os.environ)
     with log.open("w") as stream:
-        status = subprocess.run(program, stdout=stream, stderr=stream).returncode
+        done = subprocess.run(program, env=environment, stdout=stream, stderr=stream)
+    status = done.returncode
     result: dict[str, Any] = {
         "command": shlex.join(["carillon", *words]),
         "seconds": time.perf_counter() - begun,

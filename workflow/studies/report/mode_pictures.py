@@ -34,7 +34,7 @@ def draw_first_elastic_modes(
     skin = results.skin(model, truth.model)
     view = view_of(truth.mesh, reference, skin)
     description, pictures = {}, []
-    shown = results.shown_variants(model)
+    shown = results.drawn_variants(model)
     for variant in shown:
         file = read_modes(results.modes_path(model, variant))
         motion, likeness = aligned(file, truth, reference, skin)

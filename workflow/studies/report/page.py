@@ -36,6 +36,7 @@ def page(run: Run, tables: Tables) -> str:
         findings=findings(tables, run.config["solver"]["refine_to"]),
         missed=missed(tables["evidence"], run.config["solver"]["tolerance"]),
         titles=run.titles,
+        uncoarsened=[run.titles[model] for model in run.models if run.fine_taken(model)],
         models=[_model(run, tables, model) for model in run.models],
         convergence=plots(run, "convergence", run.convergence),
         sentences=convergence_sentences(tables["convergence"]),

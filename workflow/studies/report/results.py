@@ -15,8 +15,12 @@ from workflow import settings
 from workflow.studies.base.conditions import Record
 from workflow.studies.base.results import Results
 from workflow.studies.base.skins import skin_of
-from workflow.variants import shown_of, variants_of
+from workflow.variants import candidates_of, further_of, shown_of, variants_of
 
+FAST = "ddfem_hcms_ec"
+"""The coarsened variant that is listed."""
+FINE_TAKEN = "fine_taken"
+"""Attribute of a modes file that says why a solid was solved without being coarsened."""
 PRECOMPUTATION = ("mesh", "material")
 """Phases that come before any method: they are needed once for a solid."""
 
@@ -31,9 +35,27 @@ class Run(Results):
         """Names of the models in the order of the configuration."""
         return list(self.config["models"])
 
-    def shown_variants(self, model: str) -> tuple[str, ...]:
-        """Variants of a model that are drawn and listed."""
+    def drawn_variants(self, model: str) -> tuple[str, ...]:
+        """Variants of a model that are drawn."""
         return shown_of(self.config["models"][model])
+
+    def shown_variants(self, model: str) -> tuple[str, ...]:
+        """Those of them that are listed: not a coarse model in whose place the fine was solved."""
+        drawn = self.drawn_variants(model)
+        return drawn if self.fine_taken(model) is None else tuple(n for n in drawn if n != FAST)
+
+    def fine_taken(self, model: str) -> str | None:
+        """Why a model was solved without being coarsened; None if it was, or cannot be."""
+        if FAST not in self.drawn_variants(model):
+            return None
+        if model not in self._fine_taken:
+            file = read_modes(self.modes_path(model, FAST), with_modes=False)
+            self._fine_taken[model] = file.attributes.get(FINE_TAKEN)
+        return self._fine_taken[model]
+
+    @cached_property
+    def _fine_taken(self) -> dict[str, str | None]:
+        return {}
 
     def skin(self, model: str, solid: Solid) -> Skin | None:
         """The surface that a model is drawn as if it is of finite cells; None of voxels."""
@@ -68,10 +90,14 @@ class Run(Results):
     @cached_property
     def comparisons(self) -> dict[str, dict[str, Any]]:
         """Output of `solver compare` against the truth, by model and variant."""
-        return {
-            model: self.read_json(f"models/{model}/comparisons.json")["comparisons"]
-            for model in self.models
-        }
+        return {model: self._compared(model) for model in self.models}
+
+    def _compared(self, model: str) -> dict[str, Any]:
+        part = self.config["models"][model]
+        names = ["comparisons", *(["further_comparisons"] if further_of(part) else [])]
+        files = [self.read_json(f"models/{model}/{name}.json") for name in names]
+        found = {name: each for file in files for name, each in file["comparisons"].items()}
+        return {name: found[name] for name in candidates_of(part)}
 
     @cached_property
     def shards(self) -> dict[str, dict[str, Any]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -10,10 +10,10 @@ from solver.files.modes_file import ModesFile, read_modes
 from solver.refinement.errors import FROM_SOLID as DISTANCE
 from solver.response.response_file import ResponseFile, read_response
 from workflow.studies.base.conditions import Record
-from workflow.studies.report.results import Run
+from workflow.studies.report.results import FAST, Run
 from workflow.variants import FROM_SOLID, TRUTH
 
-SOLVED, COARSENED = "hcms_ec", "ddfem_hcms_ec"
+SOLVED, COARSENED = "hcms_ec", FAST
 """Variants that are judged: the solver on the fine mesh, and on the coarsened one."""
 
 
@@ -78,8 +78,9 @@ class Evidence(Run):
 
     @cached_property
     def response(self) -> ResponseFile:
-        """Output of `solver respond`."""
-        return read_response(self.folder / self.file("response.h5"))
+        """What `solver respond` finds of each variant that is shown."""
+        found = read_response(self.folder / self.file("response.h5"))
+        return replace(found, responses={name: found.responses[name] for name in self.shown})
 
     @property
     def origins(self) -> dict[str, Record]:

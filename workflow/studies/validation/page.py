@@ -38,6 +38,7 @@ def page(evidence: Evidence, tables: dict[str, Table]) -> str:
         config=evidence.config,
         model=evidence.settings,
         verdict=verdict(evidence),
+        fine_taken=evidence.fine_taken(evidence.model),
         distance=distance_in_words(evidence),
         tables=tables,
         listed=listed_modes(tables["errors"].rows),
