@@ -97,7 +97,7 @@ def read_yaml(path: str | Path, what: str) -> dict[str, Any]:
         said = error.reason if isinstance(error, UnicodeDecodeError) else str(error)
         raise UserError(f"{path}: is not readable as YAML ({said}), expected {what}") from None
     if not isinstance(document, dict):
-        raise UserError(f"{path}: expected {what}, keys and values such as mesh: builtin:bell")
+        raise UserError(f"{path}: expected {what}, keys and values (name: value), one in a line")
     return document
 
 

@@ -76,6 +76,20 @@ def test_an_obj_file_is_one_solid_in_all_forms(tmp_path, form):
     assert found.volume == pytest.approx(0.005)
 
 
+@pytest.mark.parametrize("head", ["OFF\n8 7 0\n", "OFF 8 7 0 # a box\n"])
+def test_an_off_file_may_have_faces_of_any_number_of_corners(tmp_path, head):
+    """Five sides of four corners, and one of two triangles."""
+    corners = [[x, y, z] for x in (0, 4) for y in (0, 1) for z in (0, 1)]
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4)]
+    faces += [(1, 5, 7), (1, 7, 3)]
+    lines = [" ".join(map(str, corner)) for corner in corners]
+    lines += [" ".join(map(str, (len(face), *face))) for face in faces]
+    path = tmp_path / "box.off"
+    path.write_text(head + "\n".join(lines) + "\n")
+    found = load_surface(str(path))
+    assert len(found.faces) == 12 and found.volume == pytest.approx(4.0)
+
+
 def test_an_ordinary_obj_file_is_read_as_it_is():
     """Not a byte of it changes, so that its solid keeps its bits."""
     content = (MORE + FORMS["absolute"]).encode()

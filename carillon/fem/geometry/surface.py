@@ -18,6 +18,7 @@ from carillon.errors import UserError
 from carillon.fem.geometry.builtin import builtin_surface
 from carillon.fem.geometry.gltf import plain_gltf
 from carillon.fem.geometry.obj import plain_obj
+from carillon.fem.geometry.off import obj_of_off
 from carillon.fem.geometry.orientation import turned_alike
 from carillon.limits import EXTENTS, FARTHEST, UNITS, require_within
 from carillon.places import require_file
@@ -131,8 +132,13 @@ def _loaded(path: Path) -> Any:
     folder = _MeshFolder(str(path))
     kind = path.suffix.lstrip(".").lower()
     content: bytes | None = None
-    if kind == "obj":
-        content = plain_obj(path.read_bytes().removeprefix(codecs.BOM_UTF8))
+    if kind == "off":
+        content = obj_of_off(path.read_bytes())
+        kind = "obj" if content is not None else kind
+    elif kind == "obj":
+        content = path.read_bytes().removeprefix(codecs.BOM_UTF8)
+    if content is not None:
+        content = plain_obj(content)
     elif kind in ("gltf", "glb"):
         content = plain_gltf(path.read_bytes(), folder.get, str(path))
         kind = "glb"
