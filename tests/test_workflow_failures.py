@@ -151,7 +151,7 @@ def test_damaged_files_are_named_and_nothing_comes_of_them(folder, assert_as_und
     needing = [
         "results/dataset/uniform-1.json",
         "results/forests/forests.json",
-        "results/models/bar/comparisons.json",
+        "results/models/bar/convergence.json",
     ]
     done = run(folder, *needing)
     assert done.returncode != 0
@@ -168,7 +168,7 @@ def test_damaged_files_are_named_and_nothing_comes_of_them(folder, assert_as_und
         "train_forests": 1,
         "describe_forests": 1,
         "find_modes": 1,
-        "compare_with_truth": 1,
+        "follow_convergence": 1,
     }
     assert_as_undisturbed(folder, *SHARDS, FORESTS, TRUTH, HCMS)
 
