@@ -37,7 +37,7 @@ LOOSE = ("frequency_rms=0.5", "frequency_worst=0.9")
 
 
 JUDGED = tuple(variant for variant in SHOWN if variant != COARSENED)
-"""Of a solid as small as that of these tests, which is solved fine."""
+"""Spectra on the page of the block: it is too small to be coarsened, so none is coarse."""
 
 
 def call(*words: object) -> int:

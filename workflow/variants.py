@@ -76,12 +76,12 @@ def candidates_of(model: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def judged_of(model: Mapping[str, Any]) -> tuple[str, ...]:
-    """Those of these that a validation looks at."""
+    """Candidates whose modes a validation judges."""
     return tuple(name for name in candidates_of(model) if name in SHOWN)
 
 
 def further_of(model: Mapping[str, Any]) -> tuple[str, ...]:
-    """The others, which the report compares besides."""
+    """Candidates that the report alone compares with the truth."""
     return tuple(name for name in candidates_of(model) if name not in SHOWN)
 
 

@@ -1,4 +1,4 @@
-"""What is said of a claim: its verdict, its figures, and the tables that they are from."""
+"""Verdict and figures of one claim of the paper, with the tables they were read from."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ EXACT = "HCMS + EC"
 
 @dataclass(frozen=True)
 class Finding:
-    """What was measured of a claim.
+    """Measurement of one claim of the paper, and its verdict.
 
     Attributes
     ----------

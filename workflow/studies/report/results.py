@@ -40,7 +40,7 @@ class Run(Results):
         return shown_of(self.config["models"][model])
 
     def shown_variants(self, model: str) -> tuple[str, ...]:
-        """Those of them that are listed: not a coarse model in whose place the fine was solved."""
+        """Drawn variants without the coarse model, if the fine solid was solved in its place."""
         drawn = self.drawn_variants(model)
         return drawn if self.fine_taken(model) is None else tuple(n for n in drawn if n != FAST)
 

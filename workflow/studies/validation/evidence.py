@@ -62,7 +62,7 @@ class Evidence(Run):
 
     @cached_property
     def compared(self) -> dict[str, dict[str, Any]]:
-        """What `solver compare` finds of each variant that is shown beside the truth."""
+        """Errors against the truth by shown variant, from `solver compare`."""
         found = self._comparisons["comparisons"]
         return {name: found[name] for name in self.shown if name != TRUTH}
 
@@ -78,7 +78,7 @@ class Evidence(Run):
 
     @cached_property
     def response(self) -> ResponseFile:
-        """What `solver respond` finds of each variant that is shown."""
+        """Motion and sound of a strike by shown variant, from `solver respond`."""
         found = read_response(self.folder / self.file("response.h5"))
         return replace(found, responses={name: found.responses[name] for name in self.shown})
 
