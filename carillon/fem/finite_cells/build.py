@@ -60,8 +60,9 @@ def covering(
     inside = find_inside(surface, grid)
     if not _holds(inside):
         raise UserError(_lost(surface, inside, resolution, grid, name))
-    if not _sees(surface, inside, grid):
-        raise UserError(_unseen(surface, inside, resolution, grid, name))
+    share = _seen_share(surface, inside, grid)
+    if abs(share - 1.0) > SEEN:
+        raise UserError(_unseen(surface, share, resolution, grid, name))
     cover = cover_of(inside)
     piece, volumes = pieces(cover)
     kept = np.flatnonzero(volumes >= SMALLEST_PIECE)
@@ -130,31 +131,20 @@ def _holds(inside: Inside) -> bool:
     return 0.0 < min(volumes) and max(volumes) <= LOST * min(volumes)
 
 
-def _sees(surface: trimesh.Trimesh, inside: Inside, grid: Grid, most: float = SEEN) -> bool:
-    """Whether the lines find the volume of a surface that is one closed shell; others tell none."""
-    is_told = surface.is_watertight and surface.is_winding_consistent and surface.body_count == 1
-    if not is_told:
-        return True
-    return abs(_seen_share(surface, inside, grid) - 1.0) <= most
-
-
 def _seen_share(surface: trimesh.Trimesh, inside: Inside, grid: Grid) -> float:
-    """Volume by the lines over the surface's own."""
+    """Volume by the lines over that of the surface; 1 unless this is one closed shell."""
+    if not surface.is_watertight or not surface.is_winding_consistent or surface.body_count != 1:
+        return 1.0
     full = np.count_nonzero(inside.state == FULL)
     return float((full + 0.5 * sum(inside.volumes())) * grid.edge**3 / abs(surface.volume))
 
 
-def _unseen(
-    surface: trimesh.Trimesh, inside: Inside, resolution: int, grid: Grid, name: str
-) -> str:
+def _unseen(surface: trimesh.Trimesh, share: float, resolution: int, grid: Grid, name: str) -> str:
     better = _better_resolution(surface, resolution, _holds, TRIAL_GRID)
-    remedy = (
-        f"raise --resolution to {better}" if better else "raise --resolution, or turn the solid"
-    )
-    share = _seen_share(surface, inside, grid)
+    remedy = f"to {better}" if better else "or turn the solid"
     return (
         f"mesh {name!r} at resolution {resolution} is so thin that lines of the lattice, whose "
-        f"spacing is {grid.edge:.3g} m, find {share:.0%} of its volume; {remedy}"
+        f"spacing is {grid.edge:.3g} m, find {share:.0%} of its volume; raise --resolution {remedy}"
     )
 
 
@@ -204,6 +194,6 @@ def _better_resolution(
         if np.prod([float(size) for size in trial.shape]) > largest:
             return None
         found = find_inside(surface, trial)
-        if accepts(found) and _sees(surface, found, trial, SURELY_SEEN):
+        if accepts(found) and abs(_seen_share(surface, found, trial) - 1.0) <= SURELY_SEEN:
             return better
     return None
