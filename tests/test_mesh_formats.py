@@ -11,6 +11,7 @@ import trimesh
 from carillon.errors import UserError
 from carillon.fem.geometry import load_surface, voxelize
 from carillon.fem.geometry.obj import plain_obj
+from carillon.fem.geometry.orientation import turned_alike
 from solver.analysis.problem import ProblemOptions, build_problem
 from tests.mesh_files import DTYPES, Gltf, block, concatenated
 
@@ -106,6 +107,19 @@ def test_polygons_that_count_back_become_triangles(tmp_path):
     path.write_text("\n".join([*corners, *lines]))
     found = load_surface(str(path))
     assert len(found.faces) == 12 and abs(found.volume) == pytest.approx(0.004)
+
+
+@pytest.mark.parametrize("head", ["v 0.2", "v 0.2\r0.05 0.05", "# all\nv -0.05 0.05"])
+def test_a_vertex_without_three_coordinates_is_refused(tmp_path, head):
+    path = tmp_path / "cut.obj"
+    path.write_bytes(FORMS["absolute"].replace("v 0.2 0.05 0.05", head, 1).encode())
+    with pytest.raises(UserError, match="a vertex does not have three coordinates"):
+        load_surface(str(path))
+
+
+def test_faces_without_an_area_turn_no_others():
+    corners = np.vstack([np.zeros(3), np.eye(3)])
+    assert turned_alike(corners, np.array([[1, 1, 2], [2, 2, 3], [0, 3, 3]]), "lines") is None
 
 
 @pytest.mark.parametrize("corner", ["0", "-4", "9"])

@@ -57,7 +57,8 @@ class Facets:
         follows = np.take_along_axis(
             corners, (corners.argmin(axis=1) + 1)[:, None] % 3, axis=1
         ).ravel()
-        along = np.where(follows == follows[whole[chosen]][of_face], 1, -1)
+        along = np.ones(len(faces), dtype=np.int64)
+        along[whole] = np.where(follows[whole] == follows[whole[chosen]][of_whole], 1, -1)
         return cls(scaled[first], triangles, of_face, along)
 
     def __len__(self) -> int:

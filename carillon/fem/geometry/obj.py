@@ -30,7 +30,7 @@ def plain_obj(content: bytes) -> bytes:
     Raises
     ------
     ValueError
-        If a face names a vertex that is not there.
+        If a vertex does not have three coordinates, or a face names one that is not there.
 
     Examples
     --------
@@ -44,6 +44,8 @@ def plain_obj(content: bytes) -> bytes:
     for line in _ENDS.split(_GOES_ON.sub(" ", content.decode("latin-1"))):
         keyword, *words = line.partition("#")[0].split() or [""]
         if keyword == "v":
+            if len(words) < 3:
+                raise ValueError("a vertex does not have three coordinates")
             vertices.append(f"v {' '.join(words[:3])}\n")
         elif keyword == "f":
             corners = [_number(word, len(vertices)) for word in words]

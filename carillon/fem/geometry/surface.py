@@ -164,7 +164,9 @@ def _require_mesh_file(path: Path) -> None:
 
 
 def _require_vertices(surface: trimesh.Trimesh) -> None:
-    """Raise ValueError if a face names a vertex that is not there."""
+    """Raise ValueError if a vertex is no place, or a face names one that is not there."""
+    if surface.vertices.ndim != 2 or surface.vertices.shape[1] != 3:
+        raise ValueError("a vertex does not have three coordinates")
     count, faces = len(surface.vertices), np.asarray(surface.faces)
     strange = faces[(faces < 0) | (faces >= count)]
     if strange.size:
