@@ -25,8 +25,9 @@ ESTIMATE_MODES = 60
 ESTIMATE, ESTIMATE_AGAIN = 0.5, 0.25
 """Work of the first estimate and of each further one, as shares of finding the modes that are
 rated on the fine mesh."""
-SLOWNESS = {"hcms": 2.0, "slepc": 6.0, "arpack": 6.0}
-"""Work of an analysis by other methods than the fastest, as a multiple of that."""
+SLOWNESS = {"hcms": (2.0, 0.0), "slepc": (3.5, 0.35), "arpack": (4.0, 0.35)}
+"""Work of an analysis by other methods than the fastest, as a multiple of that, at `TYPICAL`
+unknowns, and the exponent by which it grows."""
 CLEARLY, REFINED = 0.6, 0.8
 """Shares of the fine analysis's work below which a coarse model and its estimate are clearly less,
 and a refined one with all that went before."""
@@ -45,7 +46,8 @@ def analysis_work(unknowns: int, modes: int, method: str = "auto") -> float:
     """
     growth = (unknowns / TYPICAL) ** GROWTH
     alone = unknowns * (min(modes, unknowns) + MODES_OF_FACTOR) * growth + OVERHEAD
-    return SLOWNESS.get(method, 1.0) * alone
+    slowness, exponent = SLOWNESS.get(method, (1.0, 0.0))
+    return slowness * (unknowns / TYPICAL) ** exponent * alone
 
 
 def estimate_work(unknowns: int, again: bool = False) -> float:
