@@ -143,6 +143,57 @@ def test_a_pan_with_its_handle_inside_out_is_the_pan(tmp_path, caplog):
     assert found.volume == pytest.approx(pan.volume)
 
 
+WHOLE, INNER = np.array([0.4, 0.3, 0.2]), np.array([0.02, 0.02, 0.02])
+
+
+def slabs() -> list[trimesh.Trimesh]:
+    """Six boards as long and as wide as the box, which overlap along its edges."""
+    ends = [(axis, side) for axis in range(3) for side in (False, True)]
+    low = [np.where(np.eye(3)[axis] * side, WHOLE - INNER, 0.0) for axis, side in ends]
+    high = [np.where(np.eye(3)[axis] * (not side), INNER, WHOLE) for axis, side in ends]
+    return [block(tuple(one), tuple(other)) for one, other in zip(low, high)]
+
+
+def mitred() -> list[trimesh.Trimesh]:
+    """Six boards whose edges are cut aslant, so that each two share a face."""
+    outer, inner = block((0.0, 0.0, 0.0), tuple(WHOLE)), block(tuple(INNER), tuple(WHOLE - INNER))
+    sides = [outer.vertices[:, axis] == end for axis in range(3) for end in (0.0, WHOLE[axis])]
+    return [
+        trimesh.convex.convex_hull(np.concatenate([outer.vertices[side], inner.vertices[side]]))
+        for side in sides
+    ]
+
+
+def merged(surface: trimesh.Trimesh) -> trimesh.Trimesh:
+    """The surface with one vertex at each place."""
+    surface = surface.copy()
+    surface.merge_vertices()
+    return surface
+
+
+def shuffled(surface: trimesh.Trimesh) -> trimesh.Trimesh:
+    """The surface with its faces in another order."""
+    faces = np.random.default_rng(1).permutation(np.asarray(surface.faces))
+    return trimesh.Trimesh(surface.vertices, faces, process=False)
+
+
+@pytest.mark.parametrize("form", [concatenated, soup, merged, shuffled])
+@pytest.mark.parametrize("boards", [slabs, mitred])
+@pytest.mark.parametrize("wrong", [(), (1, 4), (0, 2)])
+def test_boards_that_share_whole_edges_are_turned_each_by_itself(
+    boards, wrong, form, tmp_path, caplog
+):
+    parts = boards()
+    given = [inside_out(part) if at in wrong else part for at, part in enumerate(parts)]
+    surface = form(concatenated(*given))
+    if not wrong:
+        assert turned(surface) is None
+        return
+    found = load_surface(saved(surface, tmp_path / "boards.ply"))
+    assert "2 of 6 parts were inside out" in caplog.text
+    assert found.volume == pytest.approx(sum(part.volume for part in parts))
+
+
 @pytest.mark.parametrize(
     "surface",
     [

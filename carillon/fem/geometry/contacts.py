@@ -55,7 +55,7 @@ def one_body(surface: trimesh.Trimesh, components: str, name: str) -> trimesh.Tr
     UserError
         If there are such bodies and `components` is ``"error"``.
     """
-    facets = Facets.of_surface(np.asarray(surface.vertices), np.asarray(surface.faces))
+    facets = Facets.of_surface(np.asarray(surface.vertices), np.asarray(surface.faces), sheets=True)
     parts = closed_parts(facets) if len(facets) and facets.patches.any() else []
     outer = [part for part in parts if part.volume > 0.0]
     if not 2 <= len(outer) <= MOST_PARTS:

@@ -31,16 +31,25 @@ class Facets:
         Triangle of each face; -1 of faces without an area.
     along : (f,)
         1 for faces that are turned as their triangle, -1 for others.
+    sheet : (t,)
+        Sheet of each triangle. Triangles of two sheets are not one, and share no edges.
     """
 
     vertices: Array
     triangles: Index
     of_face: Index
     along: Index
+    sheet: Index
 
     @classmethod
-    def of_surface(cls, vertices: Array, faces: Index) -> Facets:
-        """Those of faces (f, 3)."""
+    def of_surface(cls, vertices: Array, faces: Index, sheets: bool = False) -> Facets:
+        """Those of faces (f, 3).
+
+        Parameters
+        ----------
+        sheets
+            Tell closed sheets apart, see `closed_sheets`; otherwise all is one sheet.
+        """
         from trimesh.grouping import unique_rows
 
         low, high = vertices[faces].min(axis=(0, 1)), vertices[faces].max(axis=(0, 1))
@@ -49,7 +58,10 @@ class Facets:
         corners = number[faces]
         whole = np.flatnonzero((corners != np.roll(corners, 1, axis=1)).all(axis=1))
         ordered = np.sort(corners[whole], axis=1)
-        chosen, of_whole = unique_rows(ordered)
+        sheet = np.zeros(len(whole), dtype=np.int64)
+        if sheets:
+            sheet = closed_sheets(corners[whole], faces[whole])
+        chosen, of_whole = unique_rows(np.column_stack([ordered, sheet]))
         of_face = np.full(len(faces), -1)
         of_face[whole] = of_whole
         triangles = corners[whole[chosen]]
@@ -59,7 +71,7 @@ class Facets:
         ).ravel()
         along = np.ones(len(faces), dtype=np.int64)
         along[whole] = np.where(follows[whole] == follows[whole[chosen]][of_whole], 1, -1)
-        return cls(scaled[first], triangles, of_face, along)
+        return cls(scaled[first], triangles, of_face, along, sheet[chosen])
 
     def __len__(self) -> int:
         return len(self.triangles)
@@ -83,8 +95,10 @@ class Facets:
         """
         starts, ends = self.triangles.ravel(), np.roll(self.triangles, -1, axis=1).ravel()
         low, high = np.minimum(starts, ends), np.maximum(starts, ends)
-        keys = low * (int(high.max(initial=0)) + 1) + high
-        edge, counts = np.unique(keys, return_inverse=True, return_counts=True)[1:]
+        edge = np.unique(low * (int(high.max(initial=0)) + 1) + high, return_inverse=True)[1]
+        if self.sheet.any():
+            edge = edge * (int(self.sheet.max()) + 1) + np.repeat(self.sheet, 3)
+        edge, counts = np.unique(edge, return_inverse=True, return_counts=True)[1:]
         return edge, np.where(starts < ends, 1, -1), counts
 
     @cached_property
@@ -104,6 +118,47 @@ class Facets:
         """Sum (e,) of the ways in which triangles with these signs (t,), or without, pass edges."""
         edge, way, counts = self.edges
         return np.bincount(edge, way * np.repeat(sign, 3), minlength=len(counts)).astype(np.int64)
+
+
+def closed_sheets(corners: Index, faces: Index) -> Index:
+    """Sheet (f,) of each face of those that are closed by themselves; one if any is open.
+
+    Where sheets share edges, places do not tell which faces go on in which: sheets are told apart
+    by the vertices that their faces have in common, and by the order of the faces, since files
+    hold part after part.
+
+    Parameters
+    ----------
+    corners, faces : (f, 3)
+        Numbers of the places of the faces' corners, and of their vertices.
+
+    Examples
+    --------
+    >>> tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    >>> other = np.array([0, 1, 4, 5])[tetrahedron]  # It shares the edge of 0 and 1.
+    >>> closed_sheets(*[np.concatenate([tetrahedron, other])] * 2)
+    array([0, 0, 0, 0, 1, 1, 1, 1])
+    """
+    count = len(faces)
+    label = connected(
+        count + int(faces.max(initial=0)) + 1, np.repeat(np.arange(count), 3), count + faces.ravel()
+    )[:count]
+    first = np.unique(label, return_index=True)[1]
+    order = np.argsort(first[label], kind="stable")
+    ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2)[order], axis=2)
+    ends = ends.reshape(-1, 2)
+    keys = ends[:, 0] * (int(ends.max(initial=0)) + 1) + ends[:, 1]
+    side = np.argsort(keys, kind="stable")
+    starts = np.flatnonzero(np.diff(keys[side], prepend=-1))
+    before = np.arange(len(keys)) - np.repeat(starts, np.diff(np.append(starts, len(keys))))
+    # An edge that comes again closes what it opened.
+    opened = np.empty(len(keys), dtype=np.int64)
+    opened[side] = 1 - 2 * (before % 2)
+    closed = np.cumsum(opened.reshape(-1, 3).sum(axis=1)) == 0
+    sheet = np.zeros(count, dtype=np.int64)
+    if count and closed[-1]:
+        sheet[order] = np.cumsum(closed) - closed
+    return sheet
 
 
 def connected(count: int, left: Index, right: Index) -> Index:

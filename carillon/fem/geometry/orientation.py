@@ -59,6 +59,8 @@ def turned_alike(vertices: Array, faces: Index, name: str) -> Index | None:
     facets = Facets.of_surface(vertices, faces)
     if not len(facets):
         return None
+    _require_one_side(facets, _both_ways(facets), name)
+    facets = Facets.of_surface(vertices, faces, sheets=True)
     both, sign = _both_ways(facets), np.ones(len(facets), dtype=np.int64)
     patch = facets.patches
     doubled = np.zeros(len(facets), dtype=bool)
@@ -96,10 +98,12 @@ def _only(flags: Flags, patch: Index) -> Flags:
     return np.asarray(np.bincount(patch, ~flags) == 0)
 
 
-def _within_patches(facets: Facets, patch: Index, both: Flags, name: str) -> Index:
-    """Signs (t,) that turn the triangles of each patch alike, as most of its area is turned."""
-    count = len(facets)
+def _require_one_side(facets: Facets, both: Flags, name: str) -> None:
+    """Raise UserError if all triangles, or all of a closed patch, are there both ways."""
+    if not both.any():
+        return
     edge, _, counts = facets.edges
+    patch = facets.patches
     open_patch = np.bincount(patch, (counts[edge] != 2).reshape(-1, 3).any(axis=1)) > 0
     if both.all() or (_only(both, patch) & ~open_patch).any():
         of = "the surface" if both.all() else "a part of it"
@@ -107,6 +111,11 @@ def _within_patches(facets: Facets, patch: Index, both: Flags, name: str) -> Ind
             f"{name}: every face of {of} is there both ways, so that it encloses nothing; keep one "
             "of each two faces, or give its walls a thickness"
         )
+
+
+def _within_patches(facets: Facets, patch: Index, both: Flags, name: str) -> Index:
+    """Signs (t,) that turn the triangles of each patch alike, as most of its area is turned."""
+    count = len(facets)
     left, right, alike = facets.links
     # Every triangle as it is, and turned: which of the two go with which of a neighbour's.
     turned_right = np.where(alike, right, right + count)
