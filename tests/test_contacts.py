@@ -9,7 +9,10 @@ import trimesh
 from carillon.errors import UserError
 from carillon.fem.finite_cells.build import finite_cells
 from carillon.fem.geometry import voxelize
+from carillon.fem.geometry.builtin import BUILTINS, builtin_surface
 from carillon.fem.geometry.contacts import one_body
+from carillon.fem.geometry.thin import THIN
+from carillon.fem.geometry.trials import TRIALS
 from tests.mesh_files import block, concatenated, inside_out, soup
 
 CUBE = block((0.0, 0.0, 0.0), (0.1, 0.1, 0.1))
@@ -91,3 +94,91 @@ def test_bodies_that_a_third_one_joins_are_one():
     bridge = block((0.08, 0.08, 0.02), (0.12, 0.12, 0.08))
     surface = concatenated(CUBE, APART["edge"], bridge)
     assert one_body(surface, "error", "it") is surface
+
+
+SEVEN = [(0, 0), (1, 0), (2, 0), (2, 1), (0, 1), (0, 2), (1, 2)]
+"""Cubes around a hole, the first and the last of which share an edge alone."""
+
+
+def cubes(places: list[tuple[int, int]], edge: float = 0.1) -> trimesh.Trimesh:
+    """A cube for each place, not united."""
+    low = edge * np.array([(*place, 0) for place in places], dtype=float)
+    return concatenated(*[block(tuple(each), tuple(each + edge)) for each in low])
+
+
+def united(places: list[tuple[int, int]], edge: float = 0.1) -> trimesh.Trimesh:
+    """The surface of cubes, with vertices of its own for each face."""
+    whole = soup(cubes(places, edge))
+    middles = np.round(whole.triangles_center / edge, 6)
+    outward = np.round(whole.face_normals)
+    sides = {tuple(row) for row in np.column_stack([middles, outward])}
+    kept = [(*at, *-out) not in sides for at, out in zip(middles, outward)]
+    whole.update_faces(np.array(kept))
+    return whole
+
+
+def merged(surface: trimesh.Trimesh) -> trimesh.Trimesh:
+    """The surface with one vertex at each place."""
+    surface = surface.copy()
+    surface.merge_vertices()
+    return surface
+
+
+C = united(SEVEN)
+SELF = {
+    "vertices of their own": C,
+    "shared vertices": merged(C),
+    "cut triangles": merged(C).subdivide().subdivide(),
+    "inside out": inside_out(C),
+    "blocks": cubes(SEVEN),
+    "overlapping parts": concatenated(
+        merged(united([*SEVEN[:4], *SEVEN[5:]])), block((0.0, 0.099, 0.0), (0.1, 0.201, 0.1))
+    ),
+    "the part that touches overlaps": concatenated(
+        merged(united(SEVEN[:-1])), block((0.099, 0.2, 0.0), (0.2, 0.3, 0.1))
+    ),
+    "holes beside each other": united(
+        [(x, y) for x in range(4) for y in range(4) if (x, y) not in ((1, 1), (2, 2))]
+    ),
+    "a part far away": concatenated(C, block((-0.1, 0.02, 0.02), (0.02, 0.08, 0.08))),
+    "hollow": concatenated(C, inside_out(block((0.12, 0.22, 0.01), (0.19, 0.29, 0.09)))),
+}
+HELD = {
+    "closed ring": united([*SEVEN, (2, 2)]),
+    "corner between": united([*SEVEN, (1, 1)]),
+    "gap": concatenated(merged(united(SEVEN[:-1])), block((0.099, 0.201, 0.0), (0.2, 0.3, 0.1))),
+    "bridged": concatenated(C, block((0.18, 0.18, 0.02), (0.22, 0.22, 0.08))),
+    "bridged at one end": concatenated(C, block((0.18, 0.18, 0.08), (0.22, 0.22, 0.12))),
+    "beside small holes": united(
+        [(x, y) for x in range(100) for y in range(4) if (x, y) not in ((50, 1), (51, 2))], 0.01
+    ),
+}
+
+
+@pytest.mark.parametrize("turn", [np.eye(4), TURN], ids=["straight", "turned"])
+@pytest.mark.parametrize("name", SELF)
+def test_a_body_that_touches_itself_along_an_edge_is_refused(name, turn):
+    surface = SELF[name].copy().apply_transform(turn)
+    for components in ("error", "largest"):
+        with pytest.raises(UserError, match="touches itself along an edge at .* let it overlap"):
+            one_body(surface, components, "it")
+
+
+@pytest.mark.parametrize("turn", [np.eye(4), TURN], ids=["straight", "turned"])
+@pytest.mark.parametrize("name", HELD)
+def test_a_body_that_is_held_together_beside_an_edge_is_one(name, turn):
+    surface = HELD[name].copy().apply_transform(turn)
+    assert one_body(surface, "error", "it") is surface
+
+
+@pytest.mark.parametrize("resolution", [15, 16])
+@pytest.mark.parametrize("make", [voxelize, finite_cells], ids=["voxels", "finite cells"])
+def test_neither_voxels_nor_finite_cells_join_the_ends_of_a_body(make, resolution):
+    with pytest.raises(UserError, match=r"itself along an edge at \(0.2, 0.2, 0.05\) m"):
+        make(C, resolution)
+
+
+@pytest.mark.parametrize("name", [*BUILTINS, *THIN, *TRIALS])
+def test_no_solid_of_the_house_touches_itself(name):
+    surface = builtin_surface(name)
+    assert one_body(surface, "error", name) is surface
