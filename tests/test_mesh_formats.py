@@ -299,6 +299,68 @@ def test_an_accessor_beyond_its_data_is_refused(tmp_path):
         load_surface(file.written(tmp_path / "box.glb"))
 
 
+# STL and PLY --------------------------------------------------------------------------------------
+
+BALL = trimesh.creation.icosphere(subdivisions=1)
+
+
+def exported(surface, path, **how):
+    """Content of a file of the surface, which is written to `path` in full."""
+    content = surface.export(file_type=how.pop("file_type", path.suffix[1:]), **how)
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    assert len(load_surface(str(path)).faces) == len(surface.faces)
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize("share", [0.3, 0.9, 0.999])
+@pytest.mark.parametrize("head", [bytes(80), b"solid of a program".ljust(80)])
+def test_a_binary_stl_file_that_ends_early_says_how_much_of_it_is_there(tmp_path, share, head):
+    path = tmp_path / "ball.stl"
+    content = head + exported(BALL, path)[80:]
+    path.write_bytes(content)
+    assert len(load_surface(str(path)).faces) == 80
+    path.write_bytes(content[: int(share * len(content))])
+    there = (int(share * len(content)) - 84) // 50
+    with pytest.raises(UserError, match=f"shorter than its header says, {there} of 80 triangles"):
+        load_surface(str(path))
+
+
+@pytest.mark.parametrize("share", [0.3, 0.9, 0.999])
+def test_an_stl_file_of_text_that_ends_early_says_so(tmp_path, share):
+    path = tmp_path / "ball.stl"
+    content = exported(BALL, path, file_type="stl_ascii")
+    path.write_bytes(content[: int(share * len(content))])
+    with pytest.raises(UserError, match="ends within a solid, after .* triangles; export or copy"):
+        load_surface(str(path))
+
+
+def test_a_ply_file_of_text_that_ends_early_says_how_much_of_it_is_there(tmp_path):
+    path = tmp_path / "ball.ply"
+    lines = exported(BALL, path, encoding="ascii").splitlines(keepends=True)
+    path.write_bytes(b"".join(lines[:-7]))
+    with pytest.raises(UserError, match="shorter than its header says, 73 of 80 faces"):
+        load_surface(str(path))
+    path.write_bytes(b"".join(lines).rsplit(maxsplit=1)[0])
+    with pytest.raises(UserError, match="79 of 80 faces"):
+        load_surface(str(path))
+    path.write_bytes(b"".join(lines[:-81]))
+    with pytest.raises(UserError, match="41 of 42 vertices"):
+        load_surface(str(path))
+
+
+@pytest.mark.parametrize("faces", ["", "element face 0\nproperty list uchar int vertex_indices\n"])
+def test_a_ply_file_of_triangle_strips_is_refused_as_such(tmp_path, faces):
+    rows = "\n".join(" ".join(map(str, row)) for row in BOX.vertices)
+    path = tmp_path / "strips.ply"
+    path.write_text(
+        "ply\nformat ascii 1.0\nelement vertex 8\nproperty double x\nproperty double y\n"
+        f"property double z\n{faces}element tristrips 1\nproperty list int int vertex_indices\n"
+        f"end_header\n{rows}\n14 3 2 7 6 4 2 0 3 1 7 5 4 1 0\n"
+    )
+    with pytest.raises(UserError, match="triangle strips, which are not read; export triangles"):
+        load_surface(str(path))
+
+
 # Units --------------------------------------------------------------------------------------------
 
 

@@ -17,6 +17,7 @@ from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
 from carillon.fem.geometry.builtin import builtin_surface
 from carillon.fem.geometry.gltf import plain_gltf
+from carillon.fem.geometry.headers import require_plain_ply, require_whole_stl
 from carillon.fem.geometry.obj import plain_obj
 from carillon.fem.geometry.off import obj_of_off
 from carillon.fem.geometry.orientation import turned_alike
@@ -53,10 +54,10 @@ def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
     Raises
     ------
     UserError
-        If the file is missing, not readable as a mesh, without faces, flat, or holds coordinates
-        that are not finite; if its faces are there both ways, or cannot be turned alike; if `unit`
-        is out of range, or the surface too large, too small or too
-        far from the origin (see `carillon.limits`); if the built-in name is unknown.
+        If the file is missing, not readable as a mesh, shorter than it says, without faces, flat,
+        or holds coordinates that are not finite; if its faces are there both ways, or cannot be
+        turned alike; if `unit` is out of range, or the surface too large, too small or too far
+        from the origin (see `carillon.limits`); if the built-in name is unknown.
 
     Examples
     --------
@@ -132,6 +133,10 @@ def _loaded(path: Path) -> Any:
     folder = _MeshFolder(str(path))
     kind = path.suffix.lstrip(".").lower()
     content: bytes | None = None
+    if kind == "stl":
+        require_whole_stl(path.read_bytes(), str(path))
+    elif kind == "ply":
+        require_plain_ply(path.read_bytes(), str(path))
     if kind == "off":
         content = obj_of_off(path.read_bytes())
         kind = "obj" if content is not None else kind
