@@ -143,7 +143,8 @@ def locate_all(
 def inward_normals(surface: trimesh.Trimesh, positions: Array) -> Array:
     """Unit vectors (p, 3) into the solid at vertices that lie at `positions` (p, 3).
 
-    Minus the mean normal of the triangles that meet there, weighted by their angles.
+    Minus the mean normal of the triangles that meet there, weighted by their angles. Triangles of
+    closed parts are turned outwards by the sign of their volume, others by winding numbers.
     """
     import igl
     from scipy.spatial import cKDTree
@@ -154,14 +155,18 @@ def inward_normals(surface: trimesh.Trimesh, positions: Array) -> Array:
     inward = -np.asarray(oriented.vertex_normals)[chosen]
     for index in np.flatnonzero(np.linalg.norm(inward, axis=1) < 0.5):  # a sheet without thickness
         inward[index] = -oriented.face_normals[oriented.vertex_faces[chosen[index], 0]]
-    step = PROBE * longest_side(surface) * inward
+    doubtful = np.flatnonzero(~_in_closed_part(oriented)[chosen])
+    if not len(doubtful):
+        return np.asarray(inward)
+    step = PROBE * longest_side(surface) * inward[doubtful]
     vertices = np.ascontiguousarray(oriented.vertices, dtype=float)
     faces = np.ascontiguousarray(oriented.faces, dtype=np.int64)
     ahead, behind = (
         np.abs(igl.fast_winding_number(vertices, faces, np.ascontiguousarray(points)))
-        for points in (positions + step, positions - step)
+        for points in (positions[doubtful] + step, positions[doubtful] - step)
     )
-    return np.asarray(np.where((behind > ahead + CLEAR)[:, None], -inward, inward))
+    inward[doubtful[behind > ahead + CLEAR]] *= -1.0
+    return np.asarray(inward)
 
 
 def spread(candidates: Array, taken: Array, count: int) -> list[int]:
@@ -265,6 +270,25 @@ def _oriented(surface: trimesh.Trimesh) -> trimesh.Trimesh:
     merged.remove_unreferenced_vertices()
     trimesh.repair.fix_normals(merged, multibody=True)
     return merged
+
+
+def _in_closed_part(oriented: trimesh.Trimesh) -> NDArray[np.bool_]:
+    """Whether all triangles at each vertex (v,) belong to closed parts that face outwards."""
+    from carillon.fem.geometry.facets import Facets
+    from carillon.fem.geometry.parts import parts_of, signed_volumes
+
+    faces = np.asarray(oriented.faces)
+    facets = Facets.of_surface(np.asarray(oriented.vertices), faces)
+    closed = np.zeros(len(faces), dtype=bool)
+    if len(facets):
+        ones = np.ones(len(facets), dtype=np.int64)
+        part, is_closed = parts_of(facets, ones, facets.unbalanced(ones))
+        is_closed &= signed_volumes(facets, part, ones) > 0.0
+        there = facets.of_face >= 0
+        closed[there] = is_closed[part[facets.of_face[there]]]
+        closed &= np.bincount(facets.of_face[there], minlength=len(facets))[facets.of_face] == 1
+    beside = np.bincount(faces[~closed].ravel(), minlength=len(oriented.vertices))
+    return np.asarray(beside == 0)
 
 
 def _shown(point: Array, unit: float) -> str:

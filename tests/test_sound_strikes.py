@@ -64,6 +64,37 @@ def test_inward_is_into_every_built_in_object():
         assert (ahead > 0.5).mean() > 0.95, name
 
 
+TUBE = trimesh.creation.annulus(r_min=0.02, r_max=0.025, height=0.3, sections=96)
+
+
+@pytest.mark.parametrize("change", [lambda s: s, soup, upside_down])
+def test_inward_of_a_closed_surface_takes_no_winding_numbers(change, monkeypatch):
+    """They took a minute for a tube of long triangles."""
+    import igl
+
+    monkeypatch.setattr(igl, "fast_winding_number", None)
+    surface = change(TUBE)
+    vertices = np.asarray(surface.vertices)
+    inward = inward_normals(surface, vertices)
+    radius = np.linalg.norm(vertices[:, :2], axis=1)
+    outwards = (inward[:, :2] * vertices[:, :2]).sum(axis=1) / radius
+    outer = radius > 0.0225
+    assert (outwards[outer] < -0.5).all() and (outwards[~outer] > 0.5).all()
+
+
+def test_inward_of_parts_beside_an_open_one_is_into_each():
+    """Of which the open one alone takes winding numbers."""
+    shell = trimesh.Trimesh(ball().vertices, ball().faces[:-40], process=False)
+    apart = ball().apply_translation((0.3, 0.0, 0.0))
+    both = trimesh.util.concatenate([upside_down(shell), upside_down(apart)])
+    inward = inward_normals(both, np.asarray(both.vertices))
+    outwards = np.concatenate([shell.vertices, ball().vertices]) / 0.1
+    right = (inward * outwards).sum(axis=1) < -0.5
+    used = np.isin(np.arange(len(both.vertices)), both.faces)
+    assert right[len(shell.vertices) :].all()
+    assert right[used].mean() > 0.99  # Those at the rim of the hole see little of the inside.
+
+
 def test_a_struck_surface_is_fine_everywhere_and_keeps_its_vertices():
     plain, fine = builtin_surface("frying-pan"), struck_surface(PAN)
     assert np.array_equal(fine.vertices[: len(plain.vertices)], plain.vertices)
