@@ -15,6 +15,7 @@ from carillon.fem import geometry, materials
 from carillon.fem.element import DEFAULT_POISSON
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.geometry import COMPONENTS, FILLS, HexMesh, hexmesh_from_voxels, voxelize
+from carillon.fem.geometry.bridges import say_bridged
 from carillon.fem.geometry.size import doubt_unit
 from carillon.fem.materials import young_modulus
 from carillon.fem.model import DEFAULT_DENSITY, ElasticModel, Solid
@@ -181,6 +182,7 @@ def discretised(
     match options.discretisation:
         case "voxel":
             voxels = voxelize(surface, options.resolution, options.fill, options.components, name)
+            say_bridged(surface, voxels)
             return hexmesh_from_voxels(voxels), None
         case "finite-cell":
             from carillon.fem.finite_cells.build import covering  # Its import takes long.

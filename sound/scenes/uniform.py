@@ -20,6 +20,7 @@ from carillon.cache import remembered
 from carillon.errors import UserError
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.geometry import hexmesh_from_voxels, voxelize
+from carillon.fem.geometry.bridges import say_bridged
 from carillon.fem.model import RIGID_MODES, ElasticModel, Solid, fine_model
 from carillon.progress import say
 from carillon.threads import one_thread
@@ -162,6 +163,7 @@ def _model(surface: trimesh.Trimesh, name: str, how: Discretised, discretisation
         young = np.full(cells.mesh.n_cells, YOUNG)
         return finite_cell_model(cells, young, how.poisson, DENSITY)
     voxels = voxelize(surface, how.resolution, components=how.components, name=name)
+    say_bridged(surface, voxels)
     mesh = hexmesh_from_voxels(voxels)
     young = np.full(mesh.n_cells, YOUNG)
     return fine_model(mesh, young, poisson=how.poisson, density=DENSITY)
