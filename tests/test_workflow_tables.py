@@ -148,7 +148,9 @@ def test_scaling_keeps_the_slowest_run_beside_the_fastest():
     run = {"ranks": 2, "n_dofs": 900, "subdomains": 4, "seconds": 1.0, "slowest_seconds": 1.5}
     run |= {"repeats": 3, "oversubscribed": False, "cores": 2, "peak_memory_bytes": [5.0, 7.0]}
     modelled = {"ranks": 4, "n_dofs": 900, "subdomains": 4, "total": 0.6}
-    part = {"runs": [run], "model": {"rows": [modelled]}}
+    beside = {**modelled, "ranks": 2, "total": 0.8}
+    model = {"rows": [beside, modelled], "fit": "The model differs by up to 20%."}
+    part = {"runs": [run], "model": model}
     bell = {"strong": part, "weak": None, "provenance": {}}
     results = SimpleNamespace(scaling={"bell": bell}, titles={"bell": "A bell"}, config=CONFIG)
     table = REPORT.entries["scaling"](results)
@@ -156,4 +158,6 @@ def test_scaling_keeps_the_slowest_run_beside_the_fastest():
     assert (measured_row["measured"], measured_row["measured_max"]) == (1.0, 1.5)
     assert measured_row["peak_memory"] == 7.0 and measured_row["note"] == "measured"
     assert modelled_row.get("measured") is None and modelled_row["modelled"] == 0.6
+    assert measured_row["misfit"] == pytest.approx(-0.2) and modelled_row["misfit"] is None
+    assert "A bell, strong scaling: The model differs by up to 20%." in table.caption
     assert table.conditions.runs.startswith("3")

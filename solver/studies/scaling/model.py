@@ -27,6 +27,8 @@ Busiest = dict[str, Tally]
 
 ASSUMED_LATENCY, ASSUMED_BANDWIDTH = 2e-6, 5e9
 """Seconds a message and bytes per second where only one rank was measured."""
+MISFIT_LIMIT = 0.3
+"""Largest relative difference from the measurements with which the model goes beyond them."""
 MODELLED = ("assembly", "local", "merge", "down", "basis", "factor", "solve", "dense")
 """Kinds of phases; every level of the merge tree is of the kind `merge`."""
 ASSUMPTIONS = (
@@ -94,6 +96,11 @@ def kind(phase: str) -> str:
     return phase.split()[0]
 
 
+def runs_with_cores(runs: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Runs on no more ranks than cores; the first of all if there is none."""
+    return [run for run in runs if not run["oversubscribed"]] or list(runs[:1])
+
+
 def fit_machine(
     runs: Sequence[dict[str, Any]], latency: float | None = None, bandwidth: float | None = None
 ) -> MachineRates:
@@ -103,7 +110,7 @@ def fit_machine(
     which the times of these phases add up to what was measured.  Latency and bandwidth are those
     between two ranks, unless given.
     """
-    fair = [run for run in runs if not run["oversubscribed"]] or list(runs[:1])
+    fair = runs_with_cores(runs)
     flops = dict.fromkeys(MODELLED, 0.0)
     seconds = dict.fromkeys(MODELLED, 0.0)
     for run in fair:
@@ -201,3 +208,49 @@ def _surface(sizes: TreeSizes, owner: NDArray[np.integer], ranks: int) -> float:
 def predict(machine: MachineRates, work: Busiest) -> dict[str, float]:
     """Modelled seconds of every phase."""
     return {phase: machine.seconds(phase, tally) for phase, tally in work.items()}
+
+
+def misfit(runs: Sequence[dict[str, Any]], rows: Sequence[dict[str, Any]]) -> float | None:
+    """Largest relative difference of the model's rows from the runs that have their cores.
+
+    None if the model has no row for any of them.
+
+    Examples
+    --------
+    >>> runs = [{"ranks": 1, "seconds": 4.0, "oversubscribed": False}]
+    >>> misfit(runs, [{"ranks": 1, "total": 3.0}, {"ranks": 2, "total": 2.0}])
+    0.25
+    """
+    modelled = {row["ranks"]: row["total"] for row in rows}
+    differences = [
+        abs(modelled[run["ranks"]] / run["seconds"] - 1.0)
+        for run in runs_with_cores(runs)
+        if run["ranks"] in modelled
+    ]
+    return max(differences, default=None)
+
+
+def as_far_as_it_fits(
+    runs: Sequence[dict[str, Any]], rows: Sequence[dict[str, Any]]
+) -> dict[str, Any]:
+    """The model's rows with its misfit and `fit`, a sentence about it.
+
+    Rows of ranks that were not measured are left out where the misfit is above `MISFIT_LIMIT`.
+    """
+    largest = misfit(runs, rows)
+    if largest is not None and largest <= MISFIT_LIMIT:
+        sentence = f"The model differs from the measurements by up to {largest:.0%}."
+        return {"misfit": largest, "fit": sentence, "rows": list(rows)}
+    if largest is None:
+        sentence = "The model has no measurement to be compared with"
+    else:
+        sentence = (
+            f"The model differs from the measurements by up to {largest:.0%}, more than "
+            f"{MISFIT_LIMIT:.0%}"
+        )
+    measured = {run["ranks"] for run in runs}
+    return {
+        "misfit": largest,
+        "fit": f"{sentence}: its times on other numbers of ranks are left out.",
+        "rows": [row for row in rows if row["ranks"] in measured],
+    }

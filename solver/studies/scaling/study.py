@@ -23,6 +23,7 @@ from solver.studies.scaling.model import (
     WEAK_ASSUMPTIONS,
     CorrectionWork,
     MachineRates,
+    as_far_as_it_fits,
     fit_machine,
     predict,
     work_of_busiest,
@@ -34,7 +35,7 @@ PREDICTED = tuple(1 << power for power in range(11))
 """Numbers of ranks that the model is asked for: 1 to 1024."""
 FEWEST_CELLS = 4
 """Cells that a subdomain should have; the model stops where there would be fewer."""
-NOTE = "A model, not a measurement, beyond the runs; see its assumptions."
+NOTE = "A model, not a measurement; see its assumptions and how far it is from the measurements."
 
 Result = dict[str, Any]
 
@@ -119,7 +120,9 @@ def scaling_study(
             "runs": strong,
             "failed": failed,
             "model": _modelled(
-                _strong(problem.model, options.seed, machine, work, strong, scaling), ASSUMPTIONS
+                strong,
+                _strong(problem.model, options.seed, machine, work, strong, scaling),
+                ASSUMPTIONS,
             ),
         },
         "weak": None,
@@ -131,6 +134,7 @@ def scaling_study(
             "runs": weak,
             "failed": failed,
             "model": _modelled(
+                weak,
                 _weak(problem.model.elements, machine, work, strong[0], weak),
                 ASSUMPTIONS + WEAK_ASSUMPTIONS,
             ),
@@ -162,6 +166,7 @@ def study_lines(result: Result) -> list[str]:
             for ranks, seconds in modelled.items()
             if ranks not in measured
         ]
+        lines.append(part["model"]["fit"])
     return lines
 
 
@@ -216,5 +221,5 @@ def _row(ranks: int, n_dofs: float, sizes: TreeSizes, seconds: dict[str, float])
     }
 
 
-def _modelled(rows: list[Result], assumptions: Sequence[str]) -> Result:
-    return {"note": NOTE, "assumptions": list(assumptions), "rows": rows}
+def _modelled(runs: list[Result], rows: list[Result], assumptions: Sequence[str]) -> Result:
+    return {"note": NOTE, "assumptions": list(assumptions), **as_far_as_it_fits(runs, rows)}

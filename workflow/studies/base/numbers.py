@@ -17,7 +17,8 @@ def show(value: Any, kind: str = "text") -> str:
 
     Kinds of errors: `percent` (of a fraction), `fraction`, `small` (also residuals), `angle` (of
     radians). Others: `text`, `count`, `hertz`, `seconds`, `modelled` (seconds that nobody
-    measured), `times` (a ratio, the more the better), `score` (a fraction, likewise), `share` (per
+    measured), `misfit` (of these, a fraction), `times` (a ratio, the more the better), `score` (a
+    fraction, likewise), `share` (per
     cent that are neither good nor bad), `bytes`, `range` (of GPa).
 
     Examples
@@ -90,6 +91,7 @@ _FORMATS: dict[str, Callable[[Any], str]] = {
     "small": _small,
     "angle": _angle,
     "modelled": _seconds,
+    "misfit": _percent,
     "share": _percent,
     "score": lambda value: _digits(value, 3),
     "bytes": _bytes,

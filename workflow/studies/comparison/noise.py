@@ -43,7 +43,7 @@ SAYINGS = {
     "bytes": (LARGER, SMALLER),
 }
 """What is said of a number that moved up, and of one that moved down, by its kind."""
-UNJUDGED = ("modelled",)
+UNJUDGED = ("modelled", "misfit")
 """Kinds of numbers that are not compared."""
 
 _percent, _power = partial(show, kind="percent"), partial(show, kind="small")
@@ -60,7 +60,7 @@ RULES = {
     "frequencies and shares": f"changed by more than {_power(VALUE_TOLERANCE)} of their value; "
     "neither is better",
     "counts and texts": "changed at all; neither is better",
-    "speed-ups of one run, modelled times": "are not judged, as the times themselves are",
+    "speed-ups of one run, modelled times, misfits": "are not judged, as the times themselves are",
 }
 """The rules in words."""
 

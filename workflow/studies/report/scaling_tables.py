@@ -37,6 +37,7 @@ def scaling(results: Any) -> Iterator[Row]:
                 **{key: (run or modelled[ranks])[key] for key in ("ranks", "n_dofs", "subdomains")},
                 **({} if run is None else run),
                 "modelled": modelled[ranks]["total"] if ranks in modelled else None,
+                "misfit": _misfit(run, modelled.get(ranks)),
                 "note": _note(run),
                 "peak_memory": max(run["peak_memory_bytes"]) if run else None,
             }
@@ -48,11 +49,26 @@ def assumptions(results: Any) -> list[str]:
     return list(dict.fromkeys(assumption for each in stated for assumption in each))
 
 
+def fits(results: Any) -> list[str]:
+    """How far the model is from the measurements, a sentence for each solid and scaling."""
+    return [
+        f"{results.titles[model]}, {kind} scaling: {part['model']['fit']}"
+        for model, kind, part in _parts(results)
+    ]
+
+
 def _parts(results: Any) -> Iterator[tuple[str, str, Row]]:
     for model, result in results.scaling.items():
         for kind in KINDS:
             if result[kind] is not None:
                 yield model, kind, result[kind]
+
+
+def _misfit(run: Row | None, modelled: Row | None) -> float | None:
+    """Relative difference of the model from a run that has its cores."""
+    if run is None or modelled is None or run["oversubscribed"]:
+        return None
+    return float(modelled["total"] / run["seconds"] - 1.0)
 
 
 def _note(run: Row | None) -> str:
