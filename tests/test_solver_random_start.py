@@ -127,6 +127,19 @@ def test_conjugate_gradients_end_where_they_no_longer_get_on(box):
         lobpcg(box.system, np.array, start, 30, 1e-6, 200)
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("modes", [20, 40, 60, 90, 130, 143, 144])
+@pytest.mark.parametrize("inertia", [False, True])
+def test_conjugate_gradients_find_nearly_all_modes_of_a_tiny_solid(modes, inertia):
+    tiny = Case(solids.uniform_box(5, 2, 1, 0.01, 1e9))
+    assert tiny.system.n_dofs == 108
+    modes = min(modes, 108)
+    options = SolverOptions(modes=modes, method="lobpcg", check_inertia=inertia)
+    found = ModalSolver(tiny.model, options, COMM).solve()
+    expected = tiny.exact[: modes - RIGID_MODES]
+    np.testing.assert_allclose(found.values[RIGID_MODES:], expected, rtol=1e-7)
+
+
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("columns", [1, 6, 24, 37])
 def test_blocks_of_a_basis_are_one_matrix(box, threads, columns):

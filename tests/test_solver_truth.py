@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from mpi4py import MPI
 
 import solver.analysis.modal_solver as analysis
@@ -52,6 +54,19 @@ SYMMETRIC = {
     "plate": (solids.uniform_box(7, 7, 1, 0.01), 12),
 }
 """Solids and numbers of modes at which one search by one of the methods misses some."""
+
+
+@pytest.mark.filterwarnings("error")
+@given(
+    zeros=st.integers(6, 12),
+    steps=st.lists(st.floats(1e-3, 10.0), min_size=2, max_size=10),
+    modes=st.integers(7, 12),
+)
+def test_the_widest_gap_is_none_between_values_of_zero(zeros, steps, modes):
+    values = np.concatenate([np.zeros(zeros), np.cumsum(steps)])
+    value, below = truth._gap(values, modes, 1000)
+    if len(values) > modes:
+        assert below >= modes and below == (values < value).sum()
 
 
 def system_of(model):

@@ -279,7 +279,7 @@ class ModalSolver:
         options = self.options
         requested = options.modes - RIGID_MODES
         if options.check_inertia:
-            requested += SPARE_MODES
+            requested = min(requested + SPARE_MODES, local_mesh.n_dofs - RIGID_MODES)
         tolerance = EIGENVALUE_TOLERANCE if options.tolerance is None else options.tolerance
         values: Array | None = None
         similar: Lasting | None = None

@@ -16,9 +16,12 @@ from solver.correction.iteration import Iteration
 from solver.correction.lobpcg import lobpcg
 from solver.linear import Lasting, LinearSolver
 from solver.subspace.rayleigh_ritz import rayleigh_ritz, safe_shift
-from solver.subspace.start import start_block
+from solver.subspace.start import every_unknown, start_block
 
 Array = NDArray[np.float64]
+
+BLOCKS_OF_A_STEP = 3
+"""Blocks that a step of conjugate gradients spans: modes, residuals and directions."""
 
 
 def correct(
@@ -111,10 +114,7 @@ def correct(
     if observe is not None:
         observe(0, values[:requested])
     if len(values) == system.n_dofs - system.rigid.shape[1]:
-        # The subspace is the whole space, where Ritz pairs are eigenpairs.
-        exact = np.full(requested, np.finfo(float).eps)
-        vectors = np.ascontiguousarray(start[:, :requested])
-        return Correction(values[:requested], vectors, exact, start[:, requested:])
+        return _whole(values, start, requested)
     ritz = Ritz(system, values, start)
     iteration = Iteration(system, linear, ritz, requested, acceleration, similar)
     if begun is not None:
@@ -136,9 +136,20 @@ def _by_gradients(
     max_steps: int,
     report: Callable[[int, float], None] | None,
 ) -> Correction:
-    """What multigrid does best: many cheap steps, each with one cycle of it."""
-    inverse = linear.iterative(system, -safe_shift(system))
+    """What multigrid does best: many cheap steps, each with one cycle of it.
+
+    Where one step's blocks would be all of the space, its Ritz pairs are taken at once.
+    """
     width = requested + default_guard(requested)
+    if BLOCKS_OF_A_STEP * width >= system.n_dofs - system.rigid.shape[1]:
+        values, vectors = rayleigh_ritz(system, every_unknown(system))
+        if len(values) < requested:
+            raise ConvergenceError(
+                f"{len(values)} elastic modes of {system.n_dofs} unknowns could be told apart, "
+                f"{requested} are wanted; ask for fewer --modes or use --method auto"
+            )
+        return _whole(values[:width], vectors[:, :width], requested)
+    inverse = linear.iterative(system, -safe_shift(system))
     try:
         if start is None:
             start = inverse.precondition(system.times_mass(start_block(system, width, 0)))
@@ -156,3 +167,10 @@ def _by_gradients(
         found.steps + 1,
         found.history,
     )
+
+
+def _whole(values: Array, vectors: Array, requested: int) -> Correction:
+    """Ritz pairs of the whole space, which are eigenpairs."""
+    exact = np.full(requested, np.finfo(float).eps)
+    wanted = np.ascontiguousarray(vectors[:, :requested])
+    return Correction(values[:requested], wanted, exact, vectors[:, requested:])

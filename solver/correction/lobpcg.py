@@ -185,6 +185,11 @@ class _Trial:
         weights = np.concatenate([weights[:, :width], of_directions], axis=1)
         for array in (self._block, self._stiff, self._mass):
             self._rotate(array, weights)
+        if len(values) < width or not np.isfinite(values[:width]).all():
+            raise ConvergenceError(
+                f"conjugate gradients lost some of their {width} vectors, which became linearly "
+                "dependent; ask for fewer --modes or use --method auto"
+            )
         self.values = values[:width]
         self._used = weights.shape[1]
 

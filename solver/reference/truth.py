@@ -239,7 +239,9 @@ def _gap(values: Array, modes: int, n_dofs: int) -> tuple[float, int]:
     """Middle of the widest relative gap after the last wanted value, and the count below it."""
     if len(values) <= modes or len(values) == n_dofs:
         return float(values[-1] * (1.0 + ABOVE_ALL)), len(values)
-    gaps = np.diff(values[modes - 1 :]) / values[modes:]
+    above = values[modes:]
+    # Where a solid hangs on hinges, more values than those of its rigid motions are zero.
+    gaps = np.divide(np.diff(values[modes - 1 :]), above, np.zeros(len(above)), where=above > 0.0)
     widest = int(np.argmax(gaps)) + modes
     return float(0.5 * (values[widest - 1] + values[widest])), widest
 

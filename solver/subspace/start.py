@@ -31,3 +31,10 @@ def start_block(system: System, columns: int, seed: int) -> Array:
     for number in range(columns):
         block[:, number] = start_vector(system, seed, number)
     return block
+
+
+def every_unknown(system: System) -> Array:
+    """Block (local unknowns, n_dofs) whose columns move one unknown each: the whole space."""
+    block = np.zeros((len(system.rigid), system.n_dofs))
+    block[np.arange(len(block)), degrees_of_freedom(system.nodes)] = 1.0
+    return block
