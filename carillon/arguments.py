@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
+from difflib import get_close_matches
 from typing import Any, NoReturn
 
 from carillon.errors import UserError
@@ -17,6 +18,9 @@ MOST_WORKERS = 64
 """Processes or threads that one command may start on a machine of few cores."""
 WORKERS_OF_CORE = 4
 """The same for each core of a machine with more."""
+
+ALIKE = 0.7
+"""Share of letters in common (difflib) from which a word is taken for a mistyped one."""
 
 _NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$", re.ASCII)
 _WHOLE = re.compile(r"[-+]?[0-9]{1,30}", re.ASCII)
@@ -32,9 +36,48 @@ class Parser(argparse.ArgumentParser):
         super().__init__(*arguments, **options)
         self._negative_number_matcher = _NEGATIVE
 
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse as argparse does, once no option is one that is mistyped."""
+        if args is not None and self._subparsers is None:
+            self._refuse_mistyped(args)
+        return super().parse_known_args(args, namespace)
+
+    def _refuse_mistyped(self, words: Sequence[str]) -> None:
+        known = list(self._option_string_actions)
+        for word in words:
+            if word == "--":
+                break
+            name = word.partition("=")[0]
+            if not name.startswith("--") or any(each.startswith(name) for each in known):
+                continue
+            if suggestion := _alike(name, known):
+                self.error(f"no option {name}, did you mean {suggestion}?")
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            suggestion = _alike(str(value), map(str, action.choices))
+            if suggestion and isinstance(action, argparse._SubParsersAction):
+                self.error(f"no command {value!r}, did you mean {suggestion!r}?")
+            if suggestion:
+                shown = ", ".join(map(repr, action.choices))
+                meant = f"did you mean {suggestion!r}? (choose from {shown})"
+                raise argparse.ArgumentError(action, f"invalid choice: {value!r}, {meant}")
+        super()._check_value(action, value)
+
     def error(self, message: str) -> NoReturn:
         """Raise the mistake as a UserError; `carillon.cli.run` prints it and exits with 2."""
         raise UserError(f"{message} (see {self.prog} --help)")
+
+
+def _alike(word: str, words: Iterable[str]) -> str | None:
+    """The one of `words` that a mistyped word is most like, if it is like any.
+
+    Examples
+    --------
+    >>> _alike("validte", ["modes", "validate"]), _alike("ring", ["modes", "validate"])
+    ('validate', None)
+    """
+    return next(iter(get_close_matches(word, list(words), 1, ALIKE)), None)
 
 
 def whole_number(minimum: int, maximum: int = LARGEST) -> Callable[[str], int]:

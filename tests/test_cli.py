@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from carillon import cli
 from carillon.arguments import Parser
@@ -42,6 +44,52 @@ def test_negative_numbers_are_no_options():
         assert parser.parse_args(["--at", *words]).at == [float(word) for word in words]
     with pytest.raises(UserError, match="unrecognized|expected 3"):
         parser.parse_args(["--at", "0", "0", "-e3"])
+
+
+COMMANDS = ("modes", "compare", "validate", "environment")
+OPTIONS = ("--resolution", "--material", "--mass-damping", "--out")
+
+
+def refused(*words: str) -> str:
+    """What a program with these commands and options says of a command line."""
+    parser = Parser(prog="program")
+    parts = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for name in COMMANDS:
+        part = parts.add_parser(name)
+        for option in OPTIONS:
+            part.add_argument(option, required=option == "--out")
+        part.add_argument("--fill", choices=("winding", "centre"))
+    with pytest.raises(UserError) as told:
+        parser.parse_args(words)
+    return str(told.value)
+
+
+@given(word=st.sampled_from(COMMANDS), place=st.integers(0, 4))
+def test_a_command_that_lacks_a_letter_is_guessed(word, place):
+    typed = word[:place] + word[place + 1 :]
+    assert refused(typed).startswith(f"no command {typed!r}, did you mean {word!r}?")
+
+
+@given(option=st.sampled_from(OPTIONS), place=st.integers(2, 3), value=st.sampled_from(" ="))
+def test_an_option_that_lacks_a_letter_is_guessed(option, place, value):
+    typed = option[:place] + option[place + 1 :]
+    words = f"{typed}{value}8".split(" ")
+    assert refused("modes", *words).startswith(f"no option {typed}, did you mean {option}?")
+
+
+def test_what_is_like_nothing_is_not_guessed():
+    assert "invalid choice: 'gong' (choose from" in refused("gong")
+    assert "unrecognized arguments: --gong" in refused("modes", "--out", "x", "--gong", "3")
+    assert "'centr', did you mean 'centre'?" in refused("modes", "--out", "x", "--fill", "centr")
+
+
+def test_abbreviated_options_and_values_that_look_like_options_are_taken():
+    parser = Parser()
+    parser.add_argument("--resolution")
+    parser.add_argument("--petsc")
+    parser.add_argument("words", nargs="*")
+    found = parser.parse_args(["--res", "8", "--petsc", "-carillon_eps_ncv 4", "--", "--resoluton"])
+    assert (found.resolution, found.words) == ("8", ["--resoluton"])
 
 
 def too_much():
