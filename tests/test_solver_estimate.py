@@ -19,7 +19,7 @@ from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.coarsening.choice import make_coarsening
-from solver.files.modes_file import read_modes
+from solver.files.modes_file import FINE_TAKEN, read_modes
 from solver.refinement import coarse_or_fine, work
 from solver.refinement.coarse_or_fine import by_options, solve_coarsened
 from solver.refinement.energies import element_energies, fine_energies
@@ -151,7 +151,7 @@ def test_frequencies_are_as_near_as_was_asked_for(tmp_path):
         assert np.abs(errors).max() < 3.0 * tolerance
         assert file.attributes["expected_frequency_error_rms"] <= tolerance
         fine_blocks.append(file.attributes["fine_blocks"])
-        assert ("fine_taken" in file.attributes) == (file.mesh.n_nodes == exact.mesh.n_nodes)
+        assert (FINE_TAKEN in file.attributes) == (file.mesh.n_nodes == exact.mesh.n_nodes)
     assert fine_blocks[0] <= fine_blocks[1]
 
 
@@ -189,7 +189,7 @@ def head(tmp_path_factory):
 def test_a_refined_model_is_started_from(head, tmp_path):
     again = str(tmp_path / "again.h5")
     before = read_modes(head)
-    assert before.attributes["refinement_steps"] > 0 and "fine_taken" not in before.attributes
+    assert before.attributes["refinement_steps"] > 0 and FINE_TAKEN not in before.attributes
     main(["modes", *HEAD, "--initial-modes", head, "--out", again])
     after = read_modes(again)
     assert after.attributes["refinement_steps"] == 0
@@ -203,8 +203,8 @@ def test_the_fine_solid_is_started_from(tmp_path):
     main(["modes", *solid, "--out", first])
     main(["modes", *solid, "--initial-modes", first, "--out", again])
     before, after = read_modes(first), read_modes(again)
-    assert "few unknowns" in before.attributes["fine_taken"]
-    assert "to start from" in after.attributes["fine_taken"]
+    assert "few unknowns" in before.attributes[FINE_TAKEN]
+    assert "to start from" in after.attributes[FINE_TAKEN]
     np.testing.assert_allclose(before.eigenvalues[6:], after.eigenvalues[6:], rtol=1e-5)
 
 
@@ -227,7 +227,7 @@ def test_any_number_of_ranks_goes_on_to_the_fine_solid(ranks, mpiexec, tmp_path)
     script, out = script_with(tmp_path / "fine.py", 10.0, 0.0), tmp_path / "modes.h5"
     mpiexec(ranks, script, "modes", *HEAD, "--out", out, check=True)
     found = read_modes(out)
-    assert "keeping blocks fine would save little" in found.attributes["fine_taken"]
+    assert "keeping blocks fine would save little" in found.attributes[FINE_TAKEN]
     assert found.attributes["ranks"] == ranks
     exact = solved(build_problem(ProblemOptions("builtin:eared-head", 16)).model, 40).values
     np.testing.assert_allclose(found.eigenvalues[6:], exact[6:], rtol=1e-6)

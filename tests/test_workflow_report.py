@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from solver.files.modes_file import FINE_TAKEN
 from solver.response.response import FLOOR_DECIBELS, decibels
 from workflow.studies.base import numbers
 from workflow.studies.base.colours import COLOURS, themed
@@ -190,7 +191,7 @@ def test_where_it_does_not_pay_is_named():
 
 
 def test_a_solid_that_was_left_fine_is_told_as_such():
-    rows = [single("Pitcher", 1.0, 17745), {**single("Jug", 1.1, 17745), "fine_taken": "too soft"}]
+    rows = [single("Pitcher", 1.0, 17745), {**single("Jug", 1.1, 17745), FINE_TAKEN: "too soft"}]
     tables = headlines({"Bell": timed(4.0, 0.2, 0.02)}, rows)
     told = costs(tables)[-1]
     assert "and the fine model was solved: Pitcher; Jug (too soft)." in told

@@ -13,7 +13,7 @@ import pytest
 import yaml
 from markupsafe import escape
 
-from solver.files.modes_file import read_modes
+from solver.files.modes_file import FINE_TAKEN, read_modes
 from tests.pages import Page, assert_same_numbers, assert_self_contained
 from tests.workflow_runs import PROFILE, TINY, planned, snakemake
 from workflow.settings import config_hash
@@ -134,9 +134,7 @@ def test_page_shows_every_model_with_its_pictures(page, results):
             assert (results / "figures" / f"{model}-mode-{variant}.png").stat().st_size > 1000
         assert (results / "figures" / f"{model}-overview.png").is_file()
     coarse = [results / "models" / model / "ddfem_hcms_ec.h5" for model in MODELS]
-    taken = [
-        path for path in coarse if path.exists() and "fine_taken" in read_modes(path).attributes
-    ]
+    taken = [path for path in coarse if path.exists() and FINE_TAKEN in read_modes(path).attributes]
     # What a solid was not coarsened to is drawn for nobody.
     drawn = sum(len(of_model(shown_of, model)) for model in MODELS) - len(taken)
     assert page.source.count("data:image/png;base64,") == drawn
@@ -170,7 +168,7 @@ def test_spectra_satisfy_what_the_page_claims(results):
         if DISCRETISED[row["model"]] == "voxel":
             coarse = read_modes(results / "models" / row["model"] / "ddfem_hcms_ec.h5")
             fewer = row["coarse_unknowns"] < row["unknowns"]
-            assert fewer != ("fine_taken" in coarse.attributes)
+            assert fewer != (FINE_TAKEN in coarse.attributes)
         else:
             assert "coarse_unknowns" not in row and "ddfem_error" not in row
     for row in read_table(results / "tables" / "evidence.json").rows:

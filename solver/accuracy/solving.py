@@ -19,7 +19,7 @@ from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import Problem, ProblemOptions, build_problem
 from solver.distribution.collective import bcast_from_root, compute_on_root, optional
-from solver.files.modes_file import read_modes
+from solver.files.modes_file import FINE_TAKEN, read_modes
 from solver.refinement.coarse_or_fine import FineStart, solve_coarsened
 from solver.refinement.errors import FROM_FINE, FROM_SOLID, LAST, WORST, ExpectedErrors
 from solver.refinement.refine import Refinable, RefinementStep, solve_refined
@@ -214,7 +214,7 @@ def _coarsened(
     achieved |= {"refinement_steps": max(len(found.steps) - 1, 0)}
     if found.reason is not None:
         blocks = comm.bcast(None if refined is None else refined.all_blocks)
-        achieved |= {FINE: blocks, "fine_taken": found.reason}
+        achieved |= {FINE: blocks, FINE_TAKEN: found.reason}
     elif found.errors is not None:
         achieved |= {FINE: found.steps[-1].refined}
     else:

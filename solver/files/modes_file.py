@@ -27,6 +27,8 @@ KIND = "modes"
 SCHEMA = 1
 ESTIMATE = "estimate"
 """Phase that tells how far frequencies are from the solid's."""
+FINE_TAKEN = "fine_taken"
+"""Attribute that says why the fine solid was solved in place of a coarse one."""
 CHECKS = ("inertia", "completion", "verification", ESTIMATE)
 """Phases that check modes, and find those that the check misses; no method is charged for them."""
 ROUNDING = 1e-6

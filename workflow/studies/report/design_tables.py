@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from solver.files.modes_file import FINE_TAKEN
 from workflow.studies.base.entry import Row
 from workflow.studies.base.numbers import show
 from workflow.studies.base.table import Table
@@ -150,7 +151,7 @@ def _single_spectra(tables: Mapping[str, Table], goal: float) -> str:
 
 
 def _fallen(row: Row) -> str:
-    reason = row.get("fine_taken")
+    reason = row.get(FINE_TAKEN)
     return f"{row['title']} ({reason})" if reason else str(row["title"])
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from carillon.fem.geometry import load_surface
 from carillon.fem.geometry.picture import Skin
 from carillon.fem.model import Solid
-from solver.files.modes_file import CHECKS, ModesFile, read_modes
+from solver.files.modes_file import CHECKS, FINE_TAKEN, ModesFile, read_modes
 from workflow import settings
 from workflow.studies.base.conditions import Record
 from workflow.studies.base.results import Results
@@ -19,8 +19,6 @@ from workflow.variants import candidates_of, further_of, shown_of, variants_of
 
 FAST = "ddfem_hcms_ec"
 """The coarsened variant that is listed."""
-FINE_TAKEN = "fine_taken"
-"""Attribute of a modes file that says why a solid was solved without being coarsened."""
 PRECOMPUTATION = ("mesh", "material")
 """Phases that come before any method: they are needed once for a solid."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from carillon.fem.model import RIGID_MODES
+from solver.files.modes_file import FINE_TAKEN
 from solver.refinement.errors import FROM_SOLID as DISTANCE
 from workflow.studies.base.conditions import NOT_TIMED, ONE_COLD_RUN, measured
 from workflow.studies.base.entry import Row
@@ -50,8 +51,8 @@ def summary(run: Run) -> Iterator[Row]:
         if FAST in spectra:
             fast = solve_seconds(spectra[FAST])
             row |= {"fast_seconds": fast, "speed_up": truth / fast}
-            row["fine_taken"] = run.fine_taken(model)
-            if row["fine_taken"] is None:
+            row[FINE_TAKEN] = run.fine_taken(model)
+            if row[FINE_TAKEN] is None:
                 row["ddfem_error"] = compared[FAST]["frequency_rms_relative_error_7_60"]
         yield row
 
