@@ -39,6 +39,7 @@ def describe() -> dict[str, Any]:
         "cholmod": bool(PETSc.Sys.hasExternalPackage("suitesparse")),
         "arpack": bool(SLEPc.Sys.hasExternalPackage("arpack")),
         "blas": runtime.blas_name(),
+        "blas_by_user": runtime.blas_by_user(),
         "reference_blas": runtime.is_reference_blas(),
         "processor": provenance.processor(),
         "cores": len(os.sched_getaffinity(0)),
@@ -61,7 +62,7 @@ def _print_table(description: dict[str, Any]) -> None:
             f"{label} {'yes' if description[key] else 'no'}"
             for key, label in (("mumps", "MUMPS"), ("cholmod", "CHOLMOD"), ("arpack", "ARPACK"))
         ),
-        "BLAS": description["blas"],
+        "BLAS": ", ".join(f"{user} {name}" for user, name in description["blas_by_user"].items()),
         "processor": f"{description['processor']}, {description['cores']} cores usable",
     }
     for name, text in rows.items():

@@ -91,6 +91,24 @@ def blas_name() -> str:
     return f"{chosen[0]['internal_api']} {chosen[0].get('version') or ''}".strip()
 
 
+def blas_by_user() -> dict[str, str]:
+    """Name and version of the BLAS of numpy, of scipy, and of PETSc where it is loaded."""
+    # Libraries are seen once they are loaded.
+    import numpy  # noqa: F401
+    import scipy.linalg  # noqa: F401
+
+    found: dict[str, str] = {}
+    for info in loaded_blas():
+        folder = os.path.basename(os.path.dirname(info["filepath"]))
+        user = folder.removesuffix(".libs") if folder.endswith(".libs") else "PETSc"
+        found.setdefault(user, f"{info['internal_api']} {info.get('version') or ''}".strip())
+    if system_blas_path() is not None:
+        found["PETSc"] = blas_name()
+        # Without copies of their own they use that of the system.
+        return {user: found.get(user, found["PETSc"]) for user in ("PETSc", "numpy", "scipy")}
+    return {user: found[user] for user in ("numpy", "scipy") if user in found}
+
+
 def warn_about_reference_blas() -> None:
     """Print a warning when PETSc, already imported, runs on the slow reference BLAS."""
     if is_reference_blas():

@@ -64,6 +64,12 @@ def test_petsc_does_not_run_on_the_reference_blas(environment):
     assert "reference" not in environment["blas"]
 
 
+def test_the_blas_of_each_package_is_named(environment):
+    users = environment["blas_by_user"]
+    assert list(users) == ["PETSc", "numpy", "scipy"] and users["PETSc"] == environment["blas"]
+    assert all(re.match(r"[a-z]+ \d", name) for name in users.values()), users
+
+
 def test_the_start_up_check_is_readable(start_cli):
     done = start_cli("carillon", "environment", check=True)
     for word in ("Carillon", "PETSc", "SLEPc", "BLAS", "MUMPS"):
