@@ -60,6 +60,30 @@ def test_modes_file_is_complete(modes_file):
         )
 
 
+@pytest.mark.parametrize("discretisation", ["voxel", "finite-cell"])
+@pytest.mark.parametrize("resolution", [7, 10])
+def test_the_summary_tells_mesh_from_voxels_and_names_the_norm(
+    discretisation, resolution, run_cli, tmp_path
+):
+    out = tmp_path / "modes.h5"
+    command = ["modes", "builtin:plate", "--resolution", resolution, "--modes", 12, "--out", out]
+    command += ["--no-estimate", "--discretisation", discretisation]
+    told = run_cli("solver", *command, check=True).stdout
+    assert "; mesh 0.24 x " in told and "largest 2-norm residual" in told
+    assert (" m, voxels " in told) == (discretisation == "voxel")
+    found = json.loads(run_cli("solver", *command, "--json", check=True).stdout)
+    mesh, voxels = found["extents_m"], found["voxel_extents_m"]
+    if discretisation == "finite-cell":
+        assert voxels is None
+    else:
+        edge = max(mesh) / resolution
+        assert (np.subtract(voxels, mesh) <= edge * (1.0 + 1e-9)).all()
+        counts = np.array(voxels) / read_modes(out).mesh.edge
+        np.testing.assert_allclose(counts, np.round(counts), atol=1e-6)
+    audited = run_cli("solver", "audit", out, check=True).stdout
+    assert "largest 2-norm residual" in audited and ", energy residual" in audited
+
+
 def test_compare_of_a_file_with_itself(modes_file, run_cli):
     done = run_cli("solver", "compare", modes_file, modes_file, "--json", check=True)
     (result,) = json.loads(done.stdout)["comparisons"].values()

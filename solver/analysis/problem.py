@@ -119,6 +119,13 @@ class Problem:
     extents: tuple[float, ...] = ()
 
     @property
+    def voxel_extents(self) -> tuple[float, ...] | None:
+        """Sides (3,) of the box around the voxels [m]; None of finite cells."""
+        if self.covering is not None:
+            return None
+        return tuple(float(side) for side in np.ptp(self.fine.nodes, axis=0))
+
+    @property
     def hexahedra(self) -> ElasticModel:
         """The model, which is one of hexahedra."""
         assert isinstance(self.model, ElasticModel)

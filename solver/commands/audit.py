@@ -47,7 +47,8 @@ def run(arguments: argparse.Namespace) -> None:
     for name, audit in audits.items():
         print(
             f"{name}: {audit['modes']} modes of {audit['unknowns']:,} unknowns, "
-            f"{audit['rigid_modes']} rigid; largest residual {audit['residual_max']:.1e}, "
+            f"{audit['rigid_modes']} rigid; largest 2-norm residual {audit['residual_max']:.1e}, "
+            f"energy residual {max(audit['energy_residuals']):.1e}, "
             f"orthogonal to {audit['orthogonality']:.1e}; {audit['expected']} below "
             f"{audit['counted_below']:.6g} rad^2/s^2, counted {audit['counted']}"
         )

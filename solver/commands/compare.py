@@ -61,7 +61,7 @@ def _print(comparison: dict[str, Any]) -> None:
     if "matched" in comparison:
         print(f"modes matched by shape    {_matched(comparison['matched'])}")
     print(f"largest subspace angle    {comparison['subspace_angle_max']:.2e} rad")
-    print(f"largest residual          {comparison['residual_max']:.2e}")
+    print(f"largest 2-norm residual   {comparison['residual_max']:.2e}")
 
 
 def _matched(errors: dict[str, Any]) -> str:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from carillon.arguments import whole_number
 from carillon.errors import UserError
-from carillon.fem.geometry.size import size_in_words
+from carillon.fem.geometry.size import sizes_in_words
 from carillon.fem.model import Solid
 from carillon.options import add_options, collect
 from carillon.progress import say
@@ -36,7 +36,7 @@ from solver.coarsening.forest import forest_or_reason
 from solver.commands.running import add_solid, on_ranks, parameters, require_outputs
 from solver.distribution.collective import compute_on_root
 from solver.files.initial_modes import modes_from_file
-from solver.files.modes_file import ESTIMATE, frequencies, write_modes
+from solver.files.modes_file import ESTIMATE, FINE_TAKEN, frequencies, write_modes
 from solver.linear import petsc_options
 from solver.refinement.coarse_or_fine import FineStart
 from solver.refinement.errors import FROM_FINE, FROM_SOLID, in_words
@@ -155,7 +155,7 @@ def run(arguments: argparse.Namespace) -> None:
         if comm.rank == 0:
             assert problem is not None
             _warn_about_options()
-            _print_summary(attributes, problem.extents, result.values, arguments)
+            _print_summary(attributes, problem, result.values, arguments)
 
 
 def _coarsening(arguments: argparse.Namespace, described: ProblemOptions) -> Coarsening | None:
@@ -235,13 +235,17 @@ def _attributes(
 
 def _print_summary(
     attributes: dict[str, Any],
-    extents: tuple[float, ...],
+    problem: Problem,
     values: NDArray[np.float64],
     arguments: argparse.Namespace,
 ) -> None:
     hertz = frequencies(values)
     if arguments.json:
-        found = {"extents_m": extents, "frequencies_hz": hertz.tolist()}
+        found = {
+            "extents_m": problem.extents,
+            "voxel_extents_m": problem.voxel_extents,
+            "frequencies_hz": hertz.tolist(),
+        }
         summary = {**attributes, **found, "out": arguments.out}
         print(json.dumps(summary))
         return
@@ -252,10 +256,10 @@ def _print_summary(
     late = f", {added} found after the first search" if added else ""
     print(
         f"{arguments.out}: {len(values)} modes of {attributes['n_dofs']:,} unknowns, {span}{late}; "
-        f"a solid of {size_in_words(extents)}, "
-        f"{attributes['rigid_modes']} rigid, largest residual {attributes['residual_max']:.1e}, "
-        f"orthogonal to {attributes['orthogonality']:.1e}, {total:.1f} s on {attributes['ranks']} "
-        f"rank{'s' if attributes['ranks'] > 1 else ''}"
+        f"{sizes_in_words(problem.extents, problem.voxel_extents)}; "
+        f"{attributes['rigid_modes']} rigid, largest 2-norm residual "
+        f"{attributes['residual_max']:.1e}, orthogonal to {attributes['orthogonality']:.1e}, "
+        f"{total:.1f} s on {attributes['ranks']} rank{'s' if attributes['ranks'] > 1 else ''}"
     )
     if "missed_tolerance" in attributes:
         print(
@@ -263,8 +267,8 @@ def _print_summary(
             f"error of {attributes['eigenvalue_error_estimate']:.1e}, "
             f"{attributes['missed_tolerance']:.1e} was asked for"
         )
-    if "fine_taken" in attributes:
-        print(f"the fine solid was solved: {attributes['fine_taken']}")
+    if FINE_TAKEN in attributes:
+        print(f"the fine solid was solved: {attributes[FINE_TAKEN]}")
         attributes = {k: v for k, v in attributes.items() if not k.startswith(FROM_FINE)}
     for prefix, words in EXPECTED.items():
         if f"{prefix}_rms" in attributes:

@@ -1,4 +1,4 @@
-"""How large a solid is, in words, and whether its unit looks wrong."""
+"""How large a mesh and its voxels are, in words, and whether its unit looks wrong."""
 
 from __future__ import annotations
 
@@ -21,6 +21,22 @@ def size_in_words(extents: Sequence[float]) -> str:
     '0.4 x 0.1 x 0.05 m'
     """
     return f"{' x '.join(f'{side:.4g}' for side in extents)} m"
+
+
+def sizes_in_words(mesh: Sequence[float], voxels: Sequence[float] | None) -> str:
+    """Sides of the boxes around a mesh and around the voxels that stand for it [m].
+
+    Finite cells take the solid as it is, and have no voxels (None).
+
+    Examples
+    --------
+    >>> sizes_in_words([0.4, 0.1, 0.05], [0.4, 0.12, 0.04])
+    'mesh 0.4 x 0.1 x 0.05 m, voxels 0.4 x 0.12 x 0.04 m'
+    >>> sizes_in_words([0.4, 0.1, 0.05], None)
+    'mesh 0.4 x 0.1 x 0.05 m'
+    """
+    beside = "" if voxels is None else f", voxels {size_in_words(voxels)}"
+    return f"mesh {size_in_words(mesh)}{beside}"
 
 
 def doubt_unit(mesh: str, extents: Sequence[float], unit: float) -> None:

@@ -79,6 +79,7 @@ def _solid(evidence: Evidence) -> dict[str, Any]:
         "finite_cells": len(cells) if cells else None,
         "edge": mesh.edge,
         "sides": np.ptp(np.asarray(surface.bounds), axis=0).tolist(),
+        "voxel_sides": None if cells else np.ptp(mesh.nodes, axis=0).tolist(),
         "mass": model.mass,
         "moduli": (float(young.min()), float(np.median(young)), float(young.max())),
         "coarse_cells": None if coarse is None else coarse.mesh.n_cells,

@@ -74,7 +74,14 @@ def shapes(evidence: Evidence) -> Iterator[Row]:
 def audits(evidence: Evidence) -> list[Row]:
     """What each modes file proves, found anew from the file alone."""
     spectra = evidence.audit["spectra"]
-    return [{"method": VARIANTS[name].label, **spectra[name]} for name in evidence.shown]
+    return [
+        {
+            "method": VARIANTS[name].label,
+            **spectra[name],
+            "energy_max": max(spectra[name]["energy_residuals"]),
+        }
+        for name in evidence.shown
+    ]
 
 
 def responses(evidence: Evidence) -> Iterator[Row]:
