@@ -13,6 +13,11 @@ import pytest
 
 from carillon.errors import UserError
 from dataset_gen.objectives import DATASET_OBJECTIVES, SAMPLED
+from solver.analysis.options import SolverOptions
+from solver.analysis.problem import ProblemOptions, build_problem
+from solver.coarsening.choice import make_coarsening
+from solver.refinement.coarse_or_fine import _Weighing
+from solver.refinement.refined_model import RefinedModel
 from workflow.__main__ import main
 from workflow.commands import estimate as command
 from workflow.commands.estimate import CONFIGURATIONS, estimate, load
@@ -100,6 +105,43 @@ def test_totals_add_up(configs):
             total = sum(stage[name] for stage in result["stages"])
             assert result["totals"][name] == pytest.approx(total)
         assert result["totals"]["memory_gb"] == max(s["memory_gb"] for s in result["stages"])
+
+
+def test_the_run_has_a_total_of_its_own(configs):
+    for config in configs.values():
+        result = values(config)
+        run = [stage for stage in result["stages"] if stage["target"] == "all"]
+        for name in summary.SUMMED:
+            total = sum(stage[name] for stage in run)
+            assert result["run_totals"][name] == pytest.approx(total)
+            assert total <= result["totals"][name] * (1.0 + 1e-12)
+        assert result["run_totals"]["memory_gb"] == max(stage["memory_gb"] for stage in run)
+
+
+@pytest.mark.parametrize("mesh", ["builtin:box", "builtin:bell", "builtin:plate"])
+@pytest.mark.parametrize("material", ["uniform", "smooth", "random", "noise"])
+@pytest.mark.parametrize("resolution", [12, 20])
+def test_a_solid_is_solved_in_full_where_the_solver_does_so(mesh, material, resolution):
+    problem = build_problem(ProblemOptions(mesh, resolution, material, seed=3))
+    refined = RefinedModel(problem.hexahedra, make_coarsening("galerkin"))
+    command = f"python -m solver modes {mesh} --resolution {resolution} --material {material} "
+    command += "--seed 3 --coarsen ddfem --method hcms --modes {modes}"
+    for modes in (24, 256):
+        decided = _Weighing(refined, 0.05, SolverOptions("hcms", modes)).before()
+        told = reading.is_solved_in_full(command.format(modes=modes))
+        assert told == (decided is not None), decided
+        assert not reading.is_solved_in_full(command.format(modes=modes) + " --refine-to 0")
+
+
+def test_what_is_solved_in_full_takes_what_the_fine_solid_takes(config):
+    jobs = jobs_of(config, "find_modes").set_index("command")
+    pitcher = jobs[jobs.index.str.contains("builtin:pitcher")].set_index("variant")
+    assert pitcher.loc["ddfem_hcms_ec", "law"] == "find_modes hcms_ec"
+    assert pitcher.loc["ddfem_slepc", "hours"] == pytest.approx(pitcher.loc["truth", "hours"])
+    bell = jobs[jobs.index.str.contains("builtin:bell")].set_index("variant")
+    assert bell.loc["ddfem_hcms_ec", "law"] == "find_modes ddfem_hcms_ec"
+    named = values(config)["solids"]
+    assert named["pitcher 32"]["in_full"] == ("random",) and named["bell 32"]["in_full"] == ()
 
 
 def test_every_number_has_a_basis(configs):
@@ -264,6 +306,7 @@ def test_the_command_prints_text_and_json(capsys):
     assert main(["estimate", "--preset", "tiny"]) == 0
     text = capsys.readouterr().out
     assert "data generation" in text and "core-hours" in text and "528 unknowns" in text
+    assert "total of target all" in text and "total with figures" in text
     assert main(["estimate", "--preset", "tiny", "--nodes", "2", "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
     assert result["machine"]["nodes"] == 2 and result["solids"]["bar 16"]["fine"] == 528

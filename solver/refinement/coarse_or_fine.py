@@ -266,7 +266,8 @@ class _Weighing:
                 "the material varies from voxel to voxel, by a factor of "
                 f"{ratio:,.0f} in a typical block, which coarse elements cannot follow"
             )
-        if self._coarse_work() + self._estimate_work() > work.CLEARLY * self._fine_work:
+        unknowns, options = (refined.fine.n_dofs, refined.n_dofs), self._options
+        if not work.is_clearly_less(*unknowns, options.modes, options.method):
             return (
                 "the fine solid has so few unknowns that a coarse one and its check would save "
                 "little"

@@ -56,6 +56,25 @@ def estimate_work(unknowns: int, again: bool = False) -> float:
     return share * analysis_work(unknowns, ESTIMATE_MODES)
 
 
+def is_clearly_less(fine: int, coarse: int, modes: int, method: str = "auto") -> bool:
+    """Whether a coarse model and the estimate of its errors are clearly less work than the fine.
+
+    Parameters
+    ----------
+    fine, coarse
+        Unknowns of both.
+    modes, method
+        That are asked for.
+
+    Examples
+    --------
+    >>> is_clearly_less(18_000, 4_500, 256), is_clearly_less(3_000, 800, 60)
+    (True, False)
+    """
+    spent = analysis_work(coarse, modes, method) + estimate_work(fine)
+    return spent <= CLEARLY * analysis_work(fine, modes, method)
+
+
 def variation(blocks: Blocks, young: Array) -> float:
     """Median over all elements of the ratio of the largest to the smallest modulus in them."""
     moduli = block_moduli(blocks, young)

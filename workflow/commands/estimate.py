@@ -20,8 +20,8 @@ from workflow.estimate.costs import Machine, costs
 from workflow.estimate.laws import Rates
 from workflow.estimate.plan import plan
 from workflow.estimate.rates import PACKAGED, checked, load_rates
-from workflow.estimate.sizes import solid_of
-from workflow.estimate.solids import Size, size_of
+from workflow.estimate.sizes import is_solved_in_full, options_of, solid_of
+from workflow.estimate.solids import NamedSolid, Size, size_of
 
 CONFIGURATIONS = Path(__file__).parent.parent / "config"
 DEFAULT_PRESET, PAPER = "laptop", "paper"
@@ -73,7 +73,12 @@ def run(arguments: argparse.Namespace) -> int:
     rates = _rates(arguments.rates, arguments.measure)
     machine = Machine(arguments.nodes, arguments.cores_per_node)
     jobs, solids = estimate(config, rates, machine)
-    result = {"configuration": str(path), **summary.plain(jobs, solids, rates, machine)}
+    run_name = "make run" if path == CONFIGURATIONS / f"{DEFAULT_PRESET}.yaml" else "target all"
+    result = {
+        "configuration": str(path),
+        "run_name": run_name,
+        **summary.plain(jobs, solids, rates, machine),
+    }
     if path.stem == PAPER:
         result["paper"] = summary.beside_the_paper(jobs, machine)
     objective = config["dataset"]["objective"]
@@ -109,8 +114,15 @@ def estimate(
     """
     jobs = plan(config, machine.cores_per_node, machine.cores)
     solids = filter(None, dict.fromkeys(map(solid_of, jobs["command"])))
-    named = {f"{surface_name(each.mesh)} {each.resolution}": size_of(each) for each in solids}
+    named = {f"{surface_name(each.mesh)} {each.resolution}": _sized(each, jobs) for each in solids}
     return costs(jobs, rates, machine), named
+
+
+def _sized(solid: NamedSolid, jobs: pd.DataFrame) -> Size:
+    """Unknowns of a solid, and the materials with which its coarsening would not pay."""
+    commands = [each for each in jobs["command"] if solid_of(each) == solid]
+    in_full = {options_of(each)["material"] for each in commands if is_solved_in_full(each)}
+    return size_of(solid)._replace(in_full=tuple(sorted(in_full)))
 
 
 def _rates(path: str | None, here: bool) -> Rates:

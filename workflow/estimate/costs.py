@@ -10,7 +10,8 @@ import pandas as pd
 
 from workflow.estimate.laws import KNOWN, Rates, amounts, known_of
 from workflow.estimate.plan import TARGETS
-from workflow.estimate.sizes import sizes_of
+from workflow.estimate.sizes import is_solved_in_full, sizes_of
+from workflow.variants import VARIANTS
 
 
 class Machine(NamedTuple):
@@ -54,6 +55,7 @@ class Machine(NamedTuple):
 def costs(jobs: pd.DataFrame, rates: Rates, machine: Machine) -> pd.DataFrame:
     """The jobs of `plan` with what they take.
 
+    A solid that is solved in full where a coarse one would not pay takes what the fine one takes.
     Columns beside theirs are `sizes`, `stage`, `law` (empty if it is not measured), `granted`
     cores, `hours` of wall time, `core_hours`, `memory_gb` (peak), `kept_gb` (files that stay) and
     `journal_gb` (files until the job is done).
@@ -66,9 +68,12 @@ def costs(jobs: pd.DataFrame, rates: Rates, machine: Machine) -> pd.DataFrame:
 
 def _cost(job: Any, rates: Rates, machine: Machine) -> dict[str, Any]:
     known, cores = known_of(job.rule, job.variant), machine.granted(job.cores, job.ranks)
-    rate, law, files = rates["laws"].get(known["law"]), "", 0.0
+    name = known["law"]
+    if is_solved_in_full(job.command):
+        name = known_of(job.rule, _fine_variant(job.variant))["law"]
+    rate, law, files = rates["laws"].get(name), "", 0.0
     if rate is not None:
-        law, (seconds, memory, files) = known["law"], amounts(rate, job.sizes)
+        law, (seconds, memory, files) = name, amounts(rate, job.sizes)
         serial = known.get("serial", serial_share(rates))
         copies = {"cores": cores, "ranks": job.ranks}.get(known.get("each", ""), 1)
         seconds = rate["seconds"]["start"] + (serial + (1.0 - serial) / cores) * seconds
@@ -87,6 +92,23 @@ def _cost(job: Any, rates: Rates, machine: Machine) -> dict[str, Any]:
         "kept_gb": files / 1000.0,
         "journal_gb": files / 1000.0 if known.get("journal") else 0.0,
     }
+
+
+def _fine_variant(variant: str) -> str:
+    """The variant that solves the fine solid as this one solves a coarse one.
+
+    Examples
+    --------
+    >>> _fine_variant("ddfem_hcms_ec"), _fine_variant("ddfem_slepc")
+    ('hcms_ec', 'truth')
+    """
+    asked = VARIANTS[variant]
+    how = ("none", asked.method, asked.corrected)
+    return next(
+        name
+        for name, each in VARIANTS.items()
+        if (each.coarsen, each.method, each.corrected) == how
+    )
 
 
 def serial_share(rates: Rates) -> float:

@@ -17,6 +17,7 @@ from typing import Any
 import pandas as pd
 
 from carillon.errors import UserError, one_line
+from carillon.fem.materials import NAMES as MATERIALS
 from workflow import settings, solids
 
 TARGETS = ("all", "figures")
@@ -62,7 +63,8 @@ def _placeless(config: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any],
     meshes: dict[str, str] = {}
     for part in (values, *(values[section] for section in solids.STUDIED)):
         for model in part["models"].values():
-            if "material" in model:
+            # Of a material from a file is only known that it varies.
+            if "material" in model and model["material"] not in MATERIALS:
                 model["material"] = "smooth"
             if not model["mesh"].startswith(settings.BUILTIN_PREFIX):
                 place = str(folder / f"mesh-{len(meshes)}.obj")

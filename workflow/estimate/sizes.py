@@ -9,7 +9,9 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from workflow.estimate.solids import NamedSolid, size_of
+from solver.coarsening.forest import FOREST
+from solver.refinement.work import is_clearly_less
+from workflow.estimate.solids import NamedSolid, is_followed, size_of
 
 ORIGINS = 8
 """Rows of a sample, one for each corner of the block."""
@@ -39,6 +41,19 @@ def solid_of(command: str) -> NamedSolid | None:
     names = ("fill", "components", "discretisation")
     how = {name: options[name] for name in names if name in options}
     return NamedSolid(words[words.index("solver") + 2], int(options["resolution"]), **how)
+
+
+def is_solved_in_full(command: str) -> bool:
+    """Whether a command that coarsens a solid solves the fine one at once, as it decides itself."""
+    options, solid = options_of(command), solid_of(command)
+    if solid is None or options.get("coarsen") != FOREST or solid.discretisation != "voxel":
+        return False
+    if "refine_to" in options and float(options["refine_to"]) == 0.0:
+        return False
+    if not is_followed(solid, options["material"], int(options.get("seed", 0))):
+        return True
+    size = size_of(solid)
+    return not is_clearly_less(size.fine, size.coarse, int(options["modes"]), options["method"])
 
 
 def sizes_of(jobs: pd.DataFrame, fits_per_second: Mapping[str, float]) -> list[dict[str, float]]:

@@ -12,7 +12,15 @@ import numpy as np
 from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
 from carillon.fem.finite_cells.build import finite_cells
-from carillon.fem.geometry import blocks_from_mesh, hexmesh_from_voxels, load_surface, voxelize
+from carillon.fem.geometry import (
+    HexMesh,
+    blocks_from_mesh,
+    hexmesh_from_voxels,
+    load_surface,
+    voxelize,
+)
+from carillon.fem.materials import young_modulus
+from solver.refinement import work
 
 TYPICAL = 0.8, 0.15
 """Unknowns of a compact solid such as the Stanford bunny on the fine and the coarse mesh, over the
@@ -23,11 +31,15 @@ LARGEST_COUNTED = 32
 
 
 class Size(NamedTuple):
-    """Unknowns of a solid on its fine mesh and on that of its blocks, and where they are from."""
+    """Unknowns of a solid on its fine mesh and on that of its blocks, and where they are from.
+
+    `in_full` are the materials with which the fine solid is solved in place of the coarse one.
+    """
 
     fine: int
     coarse: int
     basis: str
+    in_full: tuple[str, ...] = ()
 
 
 class NamedSolid(NamedTuple):
@@ -66,6 +78,29 @@ def size_of(solid: NamedSolid) -> Size:
     return Size(int(fine), int(coarse), _basis(solid))
 
 
+@cache
+def is_followed(solid: NamedSolid, material: str, seed: int) -> bool:
+    """Whether coarse elements follow a material; taken for granted where the mesh is absent.
+
+    Voxels are no finer than those that are counted.
+    """
+    if not solid.mesh.startswith(BUILTIN_PREFIX) and not Path(solid.mesh).is_file():
+        return True
+    coarser = solid
+    if solid.resolution > LARGEST_COUNTED:
+        coarser = solid._replace(resolution=LARGEST_COUNTED, components="largest")
+    try:
+        cells = _voxels(coarser)
+    except UserError:
+        return True
+    return work.is_followed(blocks_from_mesh(cells), young_modulus(material, cells, seed))
+
+
+def _voxels(solid: NamedSolid) -> HexMesh:
+    mesh, resolution, fill, components, _ = solid
+    return hexmesh_from_voxels(voxelize(load_surface(mesh), resolution, fill, components, mesh))
+
+
 def _basis(solid: NamedSolid) -> str:
     return f"counted on its {'voxels' if solid.discretisation == 'voxel' else 'finite cells'}"
 
@@ -76,12 +111,10 @@ def _counted(solid: NamedSolid) -> tuple[np.ndarray, np.ndarray]:
 
     Finite cells have no coarse mesh; theirs counts as it is.
     """
-    mesh, resolution, fill, components, discretisation = solid
-    surface = load_surface(mesh)
+    mesh, resolution, _, components, discretisation = solid
     if discretisation != "voxel":
-        cut = finite_cells(surface, resolution, components, mesh)
+        cut = finite_cells(load_surface(mesh), resolution, components, mesh)
         return np.full(2, cut.mesh.n_dofs), np.full(2, 3.0 * cut.fractions.sum())
-    voxels = voxelize(surface, resolution, fill, components, mesh)
-    cells = hexmesh_from_voxels(voxels)
+    cells = _voxels(solid)
     unknowns = np.array([cells.n_dofs, 3 * blocks_from_mesh(cells).coarse.n_nodes])
-    return unknowns, 3.0 * voxels.n_cells * np.array([1.0, 0.125])
+    return unknowns, 3.0 * cells.n_cells * np.array([1.0, 0.125])

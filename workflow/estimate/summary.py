@@ -11,6 +11,7 @@ from jinja2 import Environment, StrictUndefined
 
 from workflow.estimate.costs import Machine, serial_share
 from workflow.estimate.laws import KNOWN, QUANTITIES, Rates
+from workflow.estimate.plan import TARGETS
 from workflow.estimate.solids import Size
 
 SUMMED, LARGEST = ["jobs", "core_hours", "wall_hours", "kept_gb"], ["memory_gb", "scratch_gb"]
@@ -31,10 +32,8 @@ def plain(
         "machine": machine._asdict(),
         "solids": {name: size._asdict() for name, size in solids.items()},
         "stages": rows.to_dict("records"),
-        "totals": {
-            **{name: rows[name].sum().item() for name in SUMMED},
-            **{name: rows[name].max() for name in LARGEST},
-        },
+        "totals": _totals(rows),
+        "run_totals": _totals(rows[rows["target"] == TARGETS[0]]),
         "cautions": cautions,
         "rates": {
             "origin": KNOWN["origin"].format(**made),
@@ -42,6 +41,14 @@ def plain(
             "how": {name: f"{law['jobs']} jobs of measured runs" for name, law in laws.items()},
             "up_to": {name: law["up_to"] for name, law in laws.items()},
         },
+    }
+
+
+def _totals(rows: pd.DataFrame) -> dict[str, Any]:
+    """What stages take together."""
+    return {
+        **{name: rows[name].sum().item() for name in SUMMED},
+        **{name: rows[name].max() for name in LARGEST},
     }
 
 
