@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 import shutil
+import subprocess
+import sys
 from dataclasses import asdict
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,6 +16,8 @@ import numpy as np
 import pytest
 import trimesh
 import yaml
+from hypothesis import given
+from hypothesis import strategies as st
 
 from carillon import cli
 from solver.response.response_file import StrikeOptions, read_response, respond, write_response
@@ -21,6 +26,7 @@ from solver.studies.comparison import compare_each
 from tests.edited_files import edited
 from tests.pages import Page, assert_self_contained
 from workflow.__main__ import main
+from workflow.commands import validate
 from workflow.studies.base.table import read_table
 from workflow.studies.catalogue import VALIDATION
 from workflow.studies.validation.criteria import Criterion
@@ -211,6 +217,37 @@ def test_bad_input_is_answered_in_one_sentence(words, says, solid, tmp_path, mon
     assert not (tmp_path / "out").exists()
 
 
+def printing(said, status):
+    """In place of Popen: Snakemake that prints this and ends."""
+
+    class Printing(subprocess.Popen):
+        def __init__(self, command, env, stdout, stderr):
+            program = f"import sys; print({said!r}, end=''); sys.exit({status})"
+            super().__init__([sys.executable, "-c", program], stdout=stdout, stderr=stderr)
+
+    return Printing
+
+
+@given(done=st.lists(st.integers(1, 6), max_size=6), total=st.integers(1, 40))
+def test_steps_are_counted_as_they_are_done(tmp_path_factory, done, total):
+    log = tmp_path_factory.mktemp("steps") / "log"
+    numbers = list(itertools.accumulate(done))
+    looks = iter(numbers)
+
+    class Run:
+        def wait(self, _):
+            """One more line a look, the last of which sees the end."""
+            if (number := next(looks, None)) is None:
+                return
+            with log.open("a") as file:
+                file.write(f"{number} of {total} steps (50%) done\n")
+            raise subprocess.TimeoutExpired("snakemake", 0.5)
+
+    log.write_text(f"job  count\n---- -----\ntotal  {total}\n")
+    assert validate._number(validate._PLANNED, log) == total
+    assert list(validate._steps(Run(), log)) == list(range(1, sum(done) + 1))
+
+
 @pytest.mark.parametrize(
     ("said", "says"),
     [
@@ -232,11 +269,7 @@ def test_bad_input_is_answered_in_one_sentence(words, says, solid, tmp_path, mon
 def test_what_snakemake_says_of_a_run_that_failed_comes_through(
     said, says, tmp_path, monkeypatch, capsys
 ):
-    def failed(command, env, stdout, stderr):
-        stdout.write(said)
-        return SimpleNamespace(returncode=1)
-
-    monkeypatch.setattr("workflow.commands.validate.subprocess.run", failed)
+    monkeypatch.setattr("workflow.commands.validate.subprocess.Popen", printing(said, status=1))
     out = tmp_path / "out"
     assert call("builtin:box", "--resolution", 4, "--modes", 12, "--out", out) == 2
     assert says in capsys.readouterr().err

@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,11 +25,11 @@ from carillon.arguments import (
 from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
 from carillon.fem.geometry import surface_name
-from carillon.fem.geometry.size import size_in_words
+from carillon.fem.geometry.size import sizes_in_words
 from carillon.fem.materials import NAMES as MATERIALS
 from carillon.files import atomic_path
 from carillon.options import REQUIRED, add_options, collect, option
-from carillon.progress import say
+from carillon.progress import say, track
 from carillon.runtime import allowed_cores
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.coarsening.forest import load_forest
@@ -47,6 +48,11 @@ FAILED = 1
 """Exit status if a criterion is missed."""
 LONGEST_NAME = 64
 """Characters of a model's name; a title may be longer."""
+LOOK_SECONDS = 0.5
+"""Time between two looks at what Snakemake has done."""
+_PLANNED = re.compile(r"^total\s+(\d+)$", re.MULTILINE)
+_DONE = re.compile(r"^(\d+) of \d+ steps \(", re.MULTILINE)
+"""Snakemake's words for how many steps there are, and are done."""
 _SECTION = settings.schema()["properties"]["validation"]["properties"]
 TOLERANCES = tuple(_SECTION["tolerances"]["properties"])
 """Names of the limits of the criteria."""
@@ -105,6 +111,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Compute the modes of one solid in several ways, prove and compare them, and build a page "
         "that says how far they can be trusted. The same command goes on where it was stopped. "
+        "Finite cells are those of `modes --refine-to 0`, undivided, so that all ways are about "
+        "one mesh. "
         f"Exit status 0 if all criteria are met, {FAILED} if one is missed."
     )
     own = ("coarsen", "forest", "objective", "lumped")
@@ -122,6 +130,7 @@ def run(arguments: argparse.Namespace) -> int:
     """
     config = configuration(arguments)
     settings.check(config)
+    say("reading the mesh, making its voxels", sys.stderr.isatty())
     size = _checked_size(arguments)
     name = next(iter(config["models"]))
     folder = Path(arguments.out).resolve()
@@ -181,15 +190,15 @@ def _path(text: str) -> str:
 
 
 def _checked_size(arguments: argparse.Namespace) -> str:
-    """The size of the solid, made once to tell all that is wrong with it before anything runs."""
+    """Sizes of mesh and voxels, made once to tell all that is wrong before anything runs."""
     load_forest(arguments.forest, arguments.poisson)
     solid = build_problem(collect(ProblemOptions, arguments))
     for name in ("strike", "observed"):
         point = getattr(arguments, name)
         if point is not None:
             surface_of(solid.model).nearest(arguments.unit * np.array(point), name)
-    size = size_in_words(solid.extents)
-    return f"{size}, {solid.fine.n_cells:,} voxels, {solid.fine.n_dofs:,} unknowns"
+    sizes = sizes_in_words(solid.extents, solid.voxel_extents)
+    return f"{sizes}: {solid.fine.n_cells:,} voxels, {solid.fine.n_dofs:,} unknowns"
 
 
 def _run_rules(folder: Path, cores: int) -> None:
@@ -203,7 +212,51 @@ def _run_rules(folder: Path, cores: int) -> None:
     environment = {**os.environ, "PYTHONPATH": str(settings.FOLDER.parent)}
     log = folder / "validate.log"
     say(f"running on {cores} cores, see {log}")
-    with open(log, "w") as stream:
-        done = subprocess.run(command, env=environment, stdout=stream, stderr=stream)
-    if done.returncode:
+    with (
+        open(log, "w") as stream,
+        subprocess.Popen(command, env=environment, stdout=stream, stderr=stream) as run,
+    ):
+        try:
+            _show_steps(run, log)
+        except BaseException:
+            run.kill()
+            raise
+    if run.returncode:
         raise UserError(f"the run failed, {cause(log.read_text())}; all that it said is in {log}")
+
+
+def _show_steps(run: subprocess.Popen[bytes], log: Path) -> None:
+    """Show how many of Snakemake's steps are done, until it ends."""
+    say("planning the steps", sys.stderr.isatty())
+    total = None
+    while total is None and _goes_on(run):
+        total = _number(_PLANNED, log)
+    if total is not None:
+        for _ in track(_steps(run, log), "validation", total, "steps"):
+            pass
+    run.wait()
+
+
+def _steps(run: subprocess.Popen[bytes], log: Path) -> Iterator[int]:
+    """Numbers of Snakemake's steps as they are done."""
+    told, going = 0, True
+    while going:
+        going = _goes_on(run)
+        done = _number(_DONE, log) or 0
+        yield from range(told + 1, done + 1)
+        told = max(told, done)
+
+
+def _goes_on(run: subprocess.Popen[bytes]) -> bool:
+    """Whether a program still runs after a while."""
+    try:
+        run.wait(LOOK_SECONDS)
+    except subprocess.TimeoutExpired:
+        return True
+    return False
+
+
+def _number(pattern: re.Pattern[str], log: Path) -> int | None:
+    """The number that a log named last, if it did."""
+    found = pattern.findall(log.read_text(errors="replace"))
+    return int(found[-1]) if found else None
