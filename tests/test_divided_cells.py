@@ -205,6 +205,22 @@ def test_voxels_are_told_their_distance(tmp_path, capsys):
     assert "distance" not in capsys.readouterr().out
 
 
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", ["plate", "rin", "handbell"])
+@pytest.mark.parametrize("resolution", [4, 6])
+def test_far_too_large_cells_say_that_they_are_far_off(name, resolution, tmp_path, capsys):
+    out = str(tmp_path / "modes.h5")
+    command = ["modes", f"builtin:{name}", "--modes", "36", *CELLS, "--out", out, "--json"]
+    told = []
+    for spacings in (resolution, 32):
+        main([*command, "--resolution", str(spacings)])
+        told.append(json.loads(capsys.readouterr().out))
+    here, near = (np.array(each["frequencies_hz"][6:]) for each in told)
+    ratio = told[0]["solid_frequency_error_rms"] / np.sqrt(np.mean((here / near - 1.0) ** 2))
+    # As docs/explanation/finite-cells.md says: large, but perhaps less than half of the true one.
+    assert told[0]["solid_frequency_error_rms"] > 0.14 and 0.4 < ratio < 2.2
+
+
 def test_cells_stay_whole_where_dividing_them_fails(tmp_path, capsys, monkeypatch):
     def fails(*_):
         raise UserError("it falls apart")
