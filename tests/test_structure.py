@@ -102,7 +102,8 @@ ARROWS = {
         studio.server studio.session""",
     #
     "workflow": "dataset_gen dataset_gen.objectives forests forests.studies",
-    "workflow.estimate": "dataset_gen.objectives workflow",
+    "workflow.estimate": """dataset_gen.objectives solver.coarsening solver.refinement
+        workflow""",
     "workflow.studies.base": "solver.response workflow",
     "workflow.studies": "workflow.studies.base",
     "workflow.studies.report": """solver.files solver.hcms solver.refinement
