@@ -334,6 +334,40 @@ def test_an_stl_file_of_text_that_ends_early_says_so(tmp_path, share):
         load_surface(str(path))
 
 
+@pytest.mark.parametrize("end", ["endsolid", "endsolid box facet", "end solid box", "\r"])
+def test_an_stl_file_of_text_is_read_whole_however_it_ends(tmp_path, end):
+    path = tmp_path / "box.stl"
+    lines = exported(BOX, path, file_type="stl_ascii").strip().splitlines()
+    text = b"\r".join(lines) if end == "\r" else b"\n".join([*lines[:-1], end.encode()])
+    path.write_bytes(b"\xef\xbb\xbf" + text)
+    assert load_surface(str(path)).volume == pytest.approx(0.004)
+
+
+@pytest.mark.parametrize("share", [0.2, 0.55, 0.9])
+def test_a_second_solid_that_ends_early_is_seen(tmp_path, share):
+    path = tmp_path / "two.stl"
+    content = exported(BOX, path, file_type="stl_ascii")
+    path.write_bytes(content + b"\n" + content[: int(share * len(content))])
+    with pytest.raises(UserError, match="ends within a solid, after"):
+        load_surface(str(path))
+
+
+@pytest.mark.parametrize("more", [1, 49])
+def test_a_few_bytes_after_an_stl_file_do_not_matter(tmp_path, more):
+    path = tmp_path / "box.stl"
+    path.write_bytes(exported(BOX, path) + bytes(more))
+    assert load_surface(str(path)).volume == pytest.approx(0.004)
+
+
+@pytest.mark.parametrize("count", [0, 6])
+def test_a_header_that_counts_too_few_triangles_is_refused(tmp_path, count):
+    path = tmp_path / "box.stl"
+    content = exported(BOX, path)
+    path.write_bytes(content[:80] + count.to_bytes(4, "little") + content[84:])
+    with pytest.raises(UserError, match=f"says {count} triangles, and there is room for 12"):
+        load_surface(str(path))
+
+
 def test_a_ply_file_of_text_that_ends_early_says_how_much_of_it_is_there(tmp_path):
     path = tmp_path / "ball.ply"
     lines = exported(BALL, path, encoding="ascii").splitlines(keepends=True)

@@ -133,6 +133,9 @@ def _holds(inside: Inside) -> bool:
 
 def _seen_share(surface: trimesh.Trimesh, inside: Inside, grid: Grid) -> float:
     """Volume by the lines over that of the surface; 1 unless this is one closed shell."""
+    if not surface.is_watertight:  # Triangles may have vertices of their own.
+        surface = surface.copy(include_cache=False)
+        surface.merge_vertices(merge_tex=True, merge_norm=True)
     if not surface.is_watertight or not surface.is_winding_consistent or surface.body_count != 1:
         return 1.0
     full = np.count_nonzero(inside.state == FULL)

@@ -1,4 +1,4 @@
-"""Bodies that touch others, or themselves, along edges alone, where nothing holds them together.
+"""Bodies of a surface that touch along edges or in points alone, where nothing holds them together.
 
 Voxels and finite cells that both have a share in would join them, stiffly, wherever the lattice
 happens to lie.
@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
+from carillon.fem.geometry.crossings import line_crossings
 from carillon.fem.geometry.facets import Facets, connected
-from carillon.fem.geometry.overlap import common_box, distances, joined
 from carillon.fem.geometry.parts import ClosedPart, closed_parts, winding_numbers
-from carillon.fem.geometry.pinches import pinch
+from carillon.fem.geometry.pinches import MOST_EDGES, pinches
+from carillon.logs import warn_once
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
     import trimesh
@@ -27,12 +28,24 @@ Flags = NDArray[np.bool_]
 
 TOUCHING = 1e-7
 """Distance, over the longest side, of a corner from another body up to which the two touch."""
+MEETING = 3e-7
+"""Gap on a line from one body into another up to which it goes from one into the other."""
+LINES = 48
+"""Lines across each side of the box that two bodies have in common."""
+SHIFT = 0.41421
+"""Place of the first line between the edge of the box and the next one, so that none is special."""
+DEEP = 0.9
+"""Winding number of points inside a body; on its faces and edges it is less."""
+SAMPLE = 1000
+"""Corners that are looked at for being inside another body."""
 MOST_PARTS = 100
 """Parts beyond which no contacts are sought."""
 
 
 def one_body(surface: trimesh.Trimesh, components: str, name: str) -> trimesh.Trimesh:
     """The surface, without bodies that touch its largest one along edges or in points alone.
+
+    A body that touches itself along edges is warned of.
 
     Parameters
     ----------
@@ -44,22 +57,30 @@ def one_body(surface: trimesh.Trimesh, components: str, name: str) -> trimesh.Tr
     Raises
     ------
     UserError
-        If there are such bodies and `components` is ``"error"``, or a body touches itself along an
-        edge.
+        If there are such bodies and `components` is ``"error"``.
     """
     facets = Facets.of_surface(np.asarray(surface.vertices), np.asarray(surface.faces), sheets=True)
     kept = _without_others(surface, facets, components, name)
     if kept is not surface or facets.sheet.any():
         facets = Facets.of_surface(np.asarray(kept.vertices), np.asarray(kept.faces))
-    middle = pinch(facets) if len(facets) else None
-    if middle is not None:
-        low = kept.vertices[kept.faces].min(axis=(0, 1))
-        at = ", ".join(f"{x:.4g}" for x in low + kept.extents.max() * middle)
-        raise UserError(
-            f"mesh {name!r} touches itself along an edge at ({at}) m, where nothing holds it "
-            "together; let it overlap there, or move what touches apart"
-        )
+    _say_pinched(kept, facets, name)
     return kept
+
+
+def _say_pinched(surface: trimesh.Trimesh, facets: Facets, name: str) -> None:
+    """Warn of edges along which a surface touches itself."""
+    edges = pinches(facets) if len(facets) else np.empty((0, 2, 3))
+    if not len(edges):
+        return
+    low = surface.vertices[surface.faces].min(axis=(0, 1))
+    at = ", ".join(f"{x:.4g}" for x in low + surface.extents.max() * edges[0].mean(axis=0))
+    many = f"{len(edges):,} edges{' or more' if len(edges) == MOST_EDGES else ''}, the longest"
+    along = "an edge" if len(edges) == 1 else many
+    warn_once(
+        f"mesh {name!r} touches itself along {along} at ({at}) m; the model joins the two sides "
+        "there, so frequencies are too high if little else does: let them overlap or move them "
+        "apart"
+    )
 
 
 def _without_others(
@@ -96,26 +117,92 @@ def _without_others(
 
 def _bodies(facets: Facets, parts: list[ClosedPart]) -> Index:
     """Body of each part: those that overlap, or share an area, are one."""
-    pairs: list[tuple[int, int]] = []
+    joined: list[tuple[int, int]] = []
     body = np.arange(len(parts))
     for i, j in combinations(range(len(parts)), 2):
-        if body[i] != body[j] and joined(facets, parts[i], parts[j]):
-            pairs.append((i, j))
-            body = connected(len(parts), *np.array(pairs).T)
+        if body[i] != body[j] and _joined(facets, parts[i], parts[j]):
+            joined.append((i, j))
+            body = connected(len(parts), *np.array(joined).T)
     return body
+
+
+def _common_box(one: ClosedPart, other: ClosedPart) -> tuple[Array, Array]:
+    return np.maximum(one.low, other.low), np.minimum(one.high, other.high)
+
+
+def _joined(facets: Facets, one: ClosedPart, other: ClosedPart) -> bool:
+    low, high = _common_box(one, other)
+    if (high - low < -MEETING).any() or np.count_nonzero(high - low <= MEETING) > 1:
+        return False
+    return any(_meet_on_lines(facets, one, other, low, high, axis) for axis in range(3)) or any(
+        _holds_corners(facets, *pair, low, high) for pair in ((one, other), (other, one))
+    )
+
+
+def _meet_on_lines(
+    facets: Facets, one: ClosedPart, other: ClosedPart, low: Array, high: Array, axis: int
+) -> bool:
+    """Whether a line along an axis goes from one part into the other, or through both at once."""
+    across = [(axis + 1) % 3, (axis + 2) % 3]
+    if (high - low)[across].min() <= MEETING:
+        return False
+    share = (np.arange(LINES) + SHIFT) / LINES
+    rows, columns = (low[b] + share * (high[b] - low[b]) for b in across)
+    starts, ends, lines = [], [], []
+    for part in (one, other):
+        triangles = facets.triangles[part.triangles]
+        start, place, step = line_crossings(facets.vertices, triangles, rows, columns, axis)
+        line = np.repeat(np.arange(len(start) - 1), np.diff(start))
+        total = np.cumsum(step.astype(np.int64))
+        inside = np.flatnonzero((total[:-1] != 0) & (line[1:] == line[:-1]))
+        starts.append(place[inside])
+        ends.append(place[inside + 1])
+        lines.append(line[inside])
+    first, last = (np.searchsorted(lines[1], lines[0], side) for side in ("left", "right"))
+    pairs = np.repeat(np.arange(len(first)), last - first)
+    offset = np.arange(len(pairs)) - np.repeat(
+        np.cumsum(last - first) - (last - first), last - first
+    )
+    mate = first[pairs] + offset
+    gap = np.maximum(starts[0][pairs], starts[1][mate]) - np.minimum(ends[0][pairs], ends[1][mate])
+    return bool((gap <= MEETING).any())
+
+
+def _holds_corners(
+    facets: Facets, one: ClosedPart, other: ClosedPart, low: Array, high: Array
+) -> bool:
+    """Whether corners of one part are inside the other."""
+    corners = facets.vertices[np.unique(facets.triangles[one.triangles])]
+    corners = corners[((corners >= low) & (corners <= high)).all(axis=1)]
+    corners = corners[:: -(-len(corners) // SAMPLE) or 1]
+    if not len(corners):
+        return False
+    corners = corners[np.abs(winding_numbers(facets, other.triangles, corners)) > DEEP]
+    return bool((_distances(facets, other, corners) > MEETING).any())
 
 
 def _touch(facets: Facets, one: ClosedPart, other: ClosedPart) -> bool:
     """Whether a corner of one part lies on the other."""
-    low, high = common_box(one, other)
+    low, high = _common_box(one, other)
     if (high - low < -TOUCHING).any():
         return False
     for own, others in ((one, other), (other, one)):
         corners = facets.vertices[np.unique(facets.triangles[own.triangles])]
         near = ((corners >= low - TOUCHING) & (corners <= high + TOUCHING)).all(axis=1)
-        if (distances(facets, others, corners[near]) <= TOUCHING).any():
+        if (_distances(facets, others, corners[near]) <= TOUCHING).any():
             return True
     return False
+
+
+def _distances(facets: Facets, part: ClosedPart, points: Array) -> Array:
+    """Distances (k,) of points (k, 3) from the surface of a part."""
+    import igl
+
+    if not len(points):
+        return np.empty(0)
+    arrays = (points, facets.vertices, facets.triangles[part.triangles])
+    squares = igl.point_mesh_squared_distance(*map(np.ascontiguousarray, arrays))[0]
+    return np.sqrt(np.atleast_1d(squares))
 
 
 def _lies_in(facets: Facets, cavity: ClosedPart, parts: list[ClosedPart]) -> bool:

@@ -2,41 +2,64 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 
 from carillon.errors import UserError
 
 STL_HEADER, STL_TRIANGLE = 84, 50
 """Bytes of a binary STL file before its triangles, and of each."""
+TEXT_START = 4000
+"""Bytes at the start of a text file, of which none is zero and the first triangle is among them."""
+_FACET = re.compile(rb"^\s*facet\b", re.MULTILINE)
 _STRIPS = re.compile(rb"^element\s+(tristrips?)\s+(\d+)", re.MULTILINE)
 _ELEMENT = re.compile(rb"^element\s+(\S+)\s+(\d+)", re.MULTILINE)
 _END = re.compile(rb"^end_header[^\n]*\n", re.MULTILINE)
 
 
-def require_whole_stl(content: bytes, path: str) -> None:
-    """Refuse STL files that end before they are complete.
+def whole_stl(content: bytes, path: str) -> bytes:
+    """The content of an STL file in the form that trimesh reads.
+
+    Lines of a text end with a line feed, and a few bytes after a binary file's triangles are left
+    out.
 
     Raises
     ------
     UserError
-        If there are fewer triangles than the header of a binary file says, or a text file ends
-        within a solid.
+        If there are fewer triangles than the header of a binary file says, or more, or a text file
+        ends within a solid.
 
     Examples
     --------
-    >>> require_whole_stl(bytes(80) + b"\\x02\\0\\0\\0" + bytes(50), "half.stl")
+    >>> whole_stl(bytes(80) + b"\x02\0\0\0" + bytes(50), "half.stl")
     Traceback (most recent call last):
     carillon.errors.UserError: half.stl: is shorter than its header says, 1 of 2 triangles; ...
     """
-    if content.lstrip()[:5].lower() == b"solid" and b"facet" in content[:1000].lower():
-        if b"endsolid" not in content[-1000:].lower():
-            raise UserError(
-                f"{path}: ends within a solid, after {content.lower().count(b'endfacet'):,} "
-                "triangles; export or copy it again"
-            )
-        return
+    start = content[:TEXT_START].lower()
+    if b"\0" not in start and b"facet" in start:
+        return _whole_text(content.removeprefix(codecs.BOM_UTF8), path)
     count = int.from_bytes(content[STL_HEADER - 4 : STL_HEADER], "little")
-    _require_as_many(max(len(content) - STL_HEADER, 0) // STL_TRIANGLE, count, "triangles", path)
+    there = max(len(content) - STL_HEADER, 0) // STL_TRIANGLE
+    _require_as_many(there, count, "triangles", path)
+    if there > count:
+        raise UserError(
+            f"{path}: its header says {count:,} triangles, and there is room for {there:,}; export "
+            "it again"
+        )
+    return content[: STL_HEADER + STL_TRIANGLE * count]
+
+
+def _whole_text(content: bytes, path: str) -> bytes:
+    text = re.sub(rb"\r\n?", b"\n", content)
+    text = re.sub(rb"\bend\s+solid\b", b"endsolid", text, flags=re.IGNORECASE)
+    lower = text.lower()
+    after = lower[lower.rfind(b"endfacet") :].removeprefix(b"endfacet")
+    if b"endsolid" not in after or _FACET.search(after):
+        raise UserError(
+            f"{path}: ends within a solid, after {lower.count(b'endfacet'):,} triangles; export or "
+            "copy it again"
+        )
+    return text
 
 
 def require_plain_ply(content: bytes, path: str) -> None:

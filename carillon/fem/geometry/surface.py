@@ -17,7 +17,7 @@ from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
 from carillon.fem.geometry.builtin import builtin_surface
 from carillon.fem.geometry.gltf import plain_gltf
-from carillon.fem.geometry.headers import require_plain_ply, require_whole_stl
+from carillon.fem.geometry.headers import require_plain_ply, whole_stl
 from carillon.fem.geometry.obj import plain_obj
 from carillon.fem.geometry.off import obj_of_off
 from carillon.fem.geometry.orientation import turned_alike
@@ -133,20 +133,19 @@ def _loaded(path: Path) -> Any:
     folder = _MeshFolder(str(path))
     kind = path.suffix.lstrip(".").lower()
     content: bytes | None = None
-    if kind == "stl":
-        require_whole_stl(path.read_bytes(), str(path))
-    elif kind == "ply":
-        require_plain_ply(path.read_bytes(), str(path))
-    if kind == "off":
-        content = obj_of_off(path.read_bytes())
-        kind = "obj" if content is not None else kind
-    elif kind == "obj":
-        content = path.read_bytes().removeprefix(codecs.BOM_UTF8)
-    if content is not None:
-        content = plain_obj(content)
-    elif kind in ("gltf", "glb"):
-        content = plain_gltf(path.read_bytes(), folder.get, str(path))
-        kind = "glb"
+    match kind:
+        case "stl":
+            content = whole_stl(path.read_bytes(), str(path))
+        case "ply":
+            require_plain_ply(path.read_bytes(), str(path))
+        case "off":
+            written = obj_of_off(path.read_bytes())
+            if written is not None:
+                content, kind = plain_obj(written), "obj"
+        case "obj":
+            content = plain_obj(path.read_bytes().removeprefix(codecs.BOM_UTF8))
+        case "gltf" | "glb":
+            content, kind = plain_gltf(path.read_bytes(), folder.get, str(path)), "glb"
     if content is None:
         return trimesh.load(path, resolver=folder, process=False)
     return trimesh.load(BytesIO(content), file_type=kind, resolver=folder, process=False)
