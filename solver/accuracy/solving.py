@@ -147,6 +147,8 @@ def solve_accurately(
         rms, worst = (solved.achieved[f"{FROM_SOLID}_{name}"] for name in ("rms", "worst"))
         excess = max(rms, abs(worst) / WORST) / accuracy
         if excess <= 1.0:
+            # Cells need not be divided as far as without an accuracy.
+            solved.achieved.pop("missed_accuracy", None)
             return described, solved
         if described.material not in NAMES:
             raise UserError(

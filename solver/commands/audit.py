@@ -1,6 +1,7 @@
 """Check modes files by themselves: residuals, orthogonality, and a count of eigenvalues by inertia.
 
-The matrices are assembled anew from what the files say of the solid.
+What is wrong is said in a sentence each; with --strict it makes the exit status 1. The matrices are
+assembled anew from what the files say of the solid.
 """
 
 from __future__ import annotations
@@ -18,6 +19,9 @@ EXAMPLES = """example:
   audit bunny.h5 truth.h5
 """
 
+FAULTY = 1
+"""Exit status with --strict if anything is wrong."""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
@@ -29,11 +33,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="relative error that the eigenvalues were asked for to, which decides how wide the "
         "gap has to be below which they are counted (default: %(default)g)",
     )
+    parser.add_argument(
+        "--strict", action="store_true", help="exit with status 1 if anything is wrong"
+    )
     parser.add_argument("--out", help="also write the result to this JSON file")
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: argparse.Namespace) -> int:
     """Audit and print."""
     with on_ranks():
         require_outputs(arguments)
@@ -41,9 +48,11 @@ def run(arguments: argparse.Namespace) -> None:
         audits = {name: audit.as_dict() for name, audit in found.items()}
     content = {"spectra": audits, "provenance": record(parameters(arguments))}
     write_json(arguments, content)
+    wrong = any(audit["faults"] for audit in audits.values())
+    status = FAULTY if wrong and arguments.strict else 0
     if arguments.json:
         print(json.dumps(content, indent=2))
-        return
+        return status
     for name, audit in audits.items():
         print(
             f"{name}: {audit['modes']} modes of {audit['unknowns']:,} unknowns, "
@@ -52,3 +61,6 @@ def run(arguments: argparse.Namespace) -> None:
             f"orthogonal to {audit['orthogonality']:.1e}; {audit['expected']} below "
             f"{audit['counted_below']:.6g} rad^2/s^2, counted {audit['counted']}"
         )
+        for fault in audit["faults"] or ["nothing is wrong"]:
+            print(f"    {fault}")
+    return status

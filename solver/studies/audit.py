@@ -7,7 +7,7 @@ run that wrote it; nothing that the run said about itself is used.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,7 @@ from solver.files.modes_file import ModesFile, read_modes
 from solver.linear.factorisation import factorised
 from solver.reference.truth import can_count, count_negative
 from solver.studies.comparison import recomputed_residuals
+from solver.studies.faults import faults
 from solver.subspace.rayleigh_ritz import first_elastic_estimate
 from solver.subspace.verification import COLUMNS_AT_ONCE, count_rigid, residual_scale
 
@@ -59,6 +60,9 @@ class Audit:
     rounding
         (k,) by how much each eigenvalue changes, relatively, if every product with an entry of K is
         rounded once: the unit roundoff times |x|^T |K| |x| / lambda.
+    quotient_errors
+        (k,) relative difference of each eigenvalue from the Rayleigh quotient of its mode; 0 of
+        rigid ones.
     orthogonality
         Largest entry of |X^T M X - I|.
     rigid_modes
@@ -68,6 +72,8 @@ class Audit:
         the number that the file holds; None where PETSc cannot count.
     mass
         Of the solid [kg].
+    faults
+        What is wrong, a sentence each, see `solver.studies.faults`.
     """
 
     modes: int
@@ -76,12 +82,14 @@ class Audit:
     residual_median: float
     energy_residuals: list[float]
     rounding: list[float]
+    quotient_errors: list[float]
     orthogonality: float
     rigid_modes: int
     counted_below: float
     counted: int | None
     expected: int
     mass: float
+    faults: list[str]
 
     def as_dict(self) -> dict[str, Any]:
         """Plain dictionary, ready for JSON."""
@@ -127,20 +135,23 @@ def audit(file: ModesFile, tolerance: float = EIGENVALUE_TOLERANCE) -> Audit:
         raise ArithmeticError("residuals or products of the modes are not finite numbers")
     gap = max(GAP, GAP_OF_TOLERANCE * tolerance)
     value, expected = gap_below_last(file.eigenvalues, gap)
-    return Audit(
+    found = Audit(
         len(file.eigenvalues),
         file.mesh.n_dofs,
         float(residuals.max()),
         float(np.median(residuals)),
         _energy_residuals(file, K, M, residuals).tolist(),
         _rounding(file, K).tolist(),
+        _quotient_errors(file, K, gram).tolist(),
         float(np.abs(gram - np.eye(len(gram))).max()),
         _count_rigid(file, K),
         value,
         _count(K, M, value) if can_count() else None,
         expected,
         file.model.mass,
+        [],
     )
+    return replace(found, faults=faults(file, found, tolerance))
 
 
 def _energy_residuals(file: ModesFile, K: sp.csr_matrix, M: sp.csr_matrix, ratios: Array) -> Array:
@@ -167,6 +178,16 @@ def _energy_residuals(file: ModesFile, K: sp.csr_matrix, M: sp.csr_matrix, ratio
     factorisation.destroy()
     matrix.destroy()
     return found
+
+
+def _quotient_errors(file: ModesFile, K: sp.csr_matrix, gram: Array) -> Array:
+    assert file.modes is not None
+    elastic = slice(RIGID_MODES, None)
+    modes = file.modes[:, elastic]
+    errors = np.zeros(len(file.eigenvalues))
+    quotients = np.einsum("ik,ik->k", modes, K @ modes) / np.diag(gram)[elastic]
+    errors[elastic] = np.abs(file.eigenvalues[elastic] / quotients - 1.0)
+    return errors
 
 
 def _rounding(file: ModesFile, K: sp.csr_matrix) -> Array:

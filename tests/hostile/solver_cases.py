@@ -177,7 +177,7 @@ for option in (
     "fill",
     "components",
     "interface",
-    "linear_solver",
+    "linear-solver",
 ):
     hostile(f"no such {option}", f"{MODES} --{option} best", option, "best")
 hostile("no such acceleration", f"{MODES} --acceleration ''", "acceleration")

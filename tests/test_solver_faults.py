@@ -1,0 +1,115 @@
+"""An audit says in a sentence each what is wrong with a spectrum, and nothing of a right one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.__main__ import main
+from solver.files.modes_file import read_modes
+from solver.studies.audit import audit
+
+BAR = "modes builtin:bar --resolution 12 --modes 20 --no-estimate --out bar.h5".split()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("faults")
+
+
+@pytest.fixture(scope="module")
+def file(folder):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        assert main(BAR) == 0
+    return read_modes(folder / "bar.h5")
+
+
+def without(file, mode):
+    values, frequencies, residuals = (
+        np.delete(each, mode) for each in (file.eigenvalues, file.frequencies, file.residuals)
+    )
+    modes = np.ascontiguousarray(np.delete(file.modes, mode, axis=1))
+    return replace(
+        file, eigenvalues=values, frequencies=frequencies, residuals=residuals, modes=modes
+    )
+
+
+def twice(file, mode):
+    modes = file.modes.copy()
+    modes[:, mode + 1] = modes[:, mode]
+    return replace(file, modes=modes)
+
+
+def swapped(file, mode):
+    modes = file.modes.copy()
+    modes[:, [mode, mode + 3]] = modes[:, [mode + 3, mode]]
+    return replace(file, modes=modes)
+
+
+def shifted(file, mode):
+    values = file.eigenvalues.copy()
+    values[mode] *= 1.0001
+    return replace(file, eigenvalues=values)
+
+
+def misnamed(file, mode):
+    frequencies = file.frequencies.copy()
+    frequencies[mode] *= 1.0001
+    return replace(file, frequencies=frequencies)
+
+
+DAMAGES = {
+    "a mode is missing": (lambda file: without(file, 9), ["1 eigenvalue is missing"]),
+    "a rigid motion is missing": (
+        lambda file: without(file, 2),
+        ["1 eigenvalue is missing", "5 of 6 rigid motions are there"],
+    ),
+    "one is there twice": (
+        lambda file: twice(file, 9),
+        [
+            "modes are orthonormal to 1.0e+00",
+            "1 mode has too large a residual, mode 11",
+            "the eigenvalue of mode 11 is",
+        ],
+    ),
+    "shapes are swapped": (
+        lambda file: swapped(file, 9),
+        ["2 modes have too large a residual", "the eigenvalue of mode 10 is"],
+    ),
+    "a value is shifted": (
+        lambda file: shifted(file, 9),
+        ["the eigenvalue of mode 10 is 1.0e-04 off", "frequency of mode 10"],
+    ),
+    "a frequency is another": (
+        lambda file: misnamed(file, 9),
+        ["the frequency of mode 10 is not that of its eigenvalue"],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_each_damage_is_told_and_nothing_else(file, name):
+    damage, sentences = DAMAGES[name]
+    faults = audit(damage(file)).faults
+    assert len(faults) == len(sentences)
+    for fault, sentence in zip(faults, sentences):
+        assert sentence in fault
+
+
+def test_nothing_is_wrong_with_a_right_spectrum(folder, monkeypatch, capsys):
+    monkeypatch.chdir(folder)
+    assert main(["audit", "--strict", "bar.h5"]) == 0
+    assert "nothing is wrong" in capsys.readouterr().out
+
+
+def test_strict_tells_a_program(folder, file, monkeypatch, capsys):
+    """Component mode synthesis without a correction is not as accurate as the default asks."""
+    monkeypatch.chdir(folder)
+    rough = [*BAR[:-1], "rough.h5", "--method", "hcms", "--corrections", "0"]
+    assert main(rough) == 0
+    assert main(["audit", "rough.h5"]) == 0
+    assert main(["audit", "rough.h5", "--strict"]) == 1
+    assert "too large a residual" in capsys.readouterr().out
