@@ -50,12 +50,12 @@ class Parser(argparse.ArgumentParser):
             name = word.partition("=")[0]
             if not name.startswith("--") or any(each.startswith(name) for each in known):
                 continue
-            if suggestion := _alike(name, known):
+            if suggestion := alike(name, known):
                 self.error(f"no option {name}, did you mean {suggestion}?")
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
-            suggestion = _alike(str(value), map(str, action.choices))
+            suggestion = alike(str(value), map(str, action.choices))
             if suggestion and isinstance(action, argparse._SubParsersAction):
                 self.error(f"no command {value!r}, did you mean {suggestion!r}?")
             if suggestion:
@@ -69,15 +69,17 @@ class Parser(argparse.ArgumentParser):
         raise UserError(f"{message} (see {self.prog} --help)")
 
 
-def _alike(word: str, words: Iterable[str]) -> str | None:
+def alike(word: str, words: Iterable[str]) -> str | None:
     """The one of `words` that a mistyped word is most like, if it is like any.
 
     Examples
     --------
-    >>> _alike("validte", ["modes", "validate"]), _alike("ring", ["modes", "validate"])
+    >>> alike("Validte", ["modes", "validate"]), alike("ring", ["modes", "validate"])
     ('validate', None)
     """
-    return next(iter(get_close_matches(word, list(words), 1, ALIKE)), None)
+    lower = {each.lower(): each for each in words}
+    found = get_close_matches(word.lower(), list(lower), 1, ALIKE)
+    return lower[found[0]] if found else None
 
 
 def whole_number(minimum: int, maximum: int = LARGEST) -> Callable[[str], int]:

@@ -11,7 +11,7 @@ from functools import partial
 from importlib import import_module
 from types import ModuleType
 
-from carillon import cli, step
+from carillon import __version__, cli, step
 from carillon.arguments import Parser
 from carillon.errors import UserError
 from carillon.progress import say
@@ -89,6 +89,7 @@ def _parser(
 ) -> Parser:
     """Parser of a program, with the arguments of the one command that `words` begin with."""
     parser = Parser(prog=name, description=description)
+    parser.add_argument("--version", action="version", version=f"Carillon {__version__}")
     parts = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for each, command in commands.items():
         module = _loaded(command) if words and words[0] == each else None

@@ -13,9 +13,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from carillon import cli
+from carillon import __version__, cli
 from carillon.arguments import Parser
+from carillon.commands import run_program
 from carillon.errors import ConvergenceError, LocalUserError, UserError
+from carillon.fem.geometry.builtin import builtin_surface
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 
@@ -81,6 +83,18 @@ def test_what_is_like_nothing_is_not_guessed():
     assert "invalid choice: 'gong' (choose from" in refused("gong")
     assert "unrecognized arguments: --gong" in refused("modes", "--out", "x", "--gong", "3")
     assert "'centr', did you mean 'centre'?" in refused("modes", "--out", "x", "--fill", "centr")
+
+
+def test_names_of_solids_and_capital_letters_are_guessed():
+    assert refused("MODES").startswith("no command 'MODES', did you mean 'modes'?")
+    with pytest.raises(UserError, match=r"no such built-in object \(did you mean bell\?\)"):
+        builtin_surface("bel")
+
+
+def test_the_version_is_told(capsys):
+    with pytest.raises(SystemExit) as ended:
+        run_program("program", "", {}, ["--version"])
+    assert ended.value.code == 0 and __version__ in capsys.readouterr().out
 
 
 def test_abbreviated_options_and_values_that_look_like_options_are_taken():

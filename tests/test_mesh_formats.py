@@ -382,6 +382,23 @@ def test_a_ply_file_of_text_that_ends_early_says_how_much_of_it_is_there(tmp_pat
         load_surface(str(path))
 
 
+def test_a_binary_ply_file_of_triangles_and_squares_says_what_is_not_read(tmp_path):
+    path = tmp_path / "mixed.ply"
+    triangles = BOX.faces[:-2].tolist()
+    square = [*BOX.faces[-2], next(each for each in BOX.faces[-1] if each not in BOX.faces[-2])]
+    header = (
+        "ply\nformat binary_little_endian 1.0\nelement vertex 8\nproperty float x\n"
+        f"property float y\nproperty float z\nelement face {len(triangles) + 1}\n"
+        "property list uchar int vertex_indices\nend_header\n"
+    )
+    rows = b"".join(
+        bytes([len(each)]) + np.array(each, dtype="<i4").tobytes() for each in [*triangles, square]
+    )
+    path.write_bytes(header.encode() + BOX.vertices.astype("<f4").tobytes() + rows)
+    with pytest.raises(UserError, match="different numbers of corners, which are read from text"):
+        load_surface(str(path))
+
+
 @pytest.mark.parametrize("faces", ["", "element face 0\nproperty list uchar int vertex_indices\n"])
 def test_a_ply_file_of_triangle_strips_is_refused_as_such(tmp_path, faces):
     rows = "\n".join(" ".join(map(str, row)) for row in BOX.vertices)

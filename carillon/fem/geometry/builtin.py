@@ -12,6 +12,7 @@ import numpy as np
 import trimesh
 
 from carillon import builtin_names
+from carillon.arguments import alike
 from carillon.errors import UserError
 from carillon.fem.geometry.sweep import SECTIONS, joined, spline, sweep, tube, turned
 from carillon.fem.geometry.thin import THIN
@@ -178,8 +179,10 @@ def builtin_surface(name: str) -> trimesh.Trimesh:
     """
     known = {**BUILTINS, **THIN, **TRIALS}
     if name not in known:
+        meant = alike(name, known)
+        hint = f" (did you mean {meant}?)" if meant else ""
         raise UserError(
-            f"builtin:{name}: no such built-in object, expected one of {', '.join(known)}"
+            f"builtin:{name}: no such built-in object{hint}, expected one of {', '.join(known)}"
         )
     return known[name]()
 

@@ -18,7 +18,7 @@ _END = re.compile(rb"^end_header[^\n]*\n", re.MULTILINE)
 
 
 def whole_stl(content: bytes, path: str) -> bytes:
-    """The content of an STL file in the form that trimesh reads.
+    r"""The content of an STL file in the form that trimesh reads.
 
     Lines of a text end with a line feed, and a few bytes after a binary file's triangles are left
     out.

@@ -87,6 +87,10 @@ def surface_name(mesh: str) -> str:
     return mesh.removeprefix(BUILTIN_PREFIX) if mesh.startswith(BUILTIN_PREFIX) else Path(mesh).stem
 
 
+_PLY_LENGTH = "PLY is unexpected length"
+"""What trimesh says of binary PLY files whose faces are not all of one length."""
+
+
 class _MeshFolder(FilePathResolver):
     """Other files that a mesh names: regular ones in its folder, which end, as pipes may not."""
 
@@ -116,6 +120,11 @@ def _read(path: Path) -> trimesh.Trimesh:
         raise
     except Exception as error:  # parsers of a dozen formats raise anything
         reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
+        if _PLY_LENGTH in reason:
+            reason = (
+                "it is shorter or longer than its header says, or its faces have different numbers "
+                "of corners, which are read from text alone"
+            )
         raise UserError(
             f"{path}: could not be read as a mesh ({reason}); check or export the file again"
         ) from None
