@@ -26,7 +26,7 @@ each(
     "extract VALUE --out o.json --residual r.wav",
     [
         *("ZOO/silence.wav", "ZOO/none.wav", "ZOO/one.wav", "ZOO/brief.wav", "ZOO/constant.wav"),
-        *("ZOO/clipped.wav", "ZOO/opposed.wav", "ZOO/nan.wav", "ZOO/inf.wav", "ZOO/huge.wav"),
+        *("ZOO/clipped.wav", "ZOO/nan.wav", "ZOO/inf.wav", "ZOO/huge.wav"),
         *("ZOO/large.wav", "ZOO/all-huge.wav", "ZOO/tiny.wav", "ZOO/slow.wav", "ZOO/head.wav"),
         *("ZOO/empty.wav", "ZOO/junk.wav", "ZOO/riff.wav", "ZOO/text.wav", "ZOO/rate-zero.wav"),
         *("ZOO/rate-huge.wav", "ZOO/no-channels.wav", "ZOO/many-channels.wav", "ZOO/claims.wav"),
@@ -499,6 +499,7 @@ hostile("no such format", "export ZOO/design.h5 --out o.glb --format obj", "--fo
 control("extract", "extract ZOO/metal.wav ZOO/wood.wav --out o.json", "o.json")
 control("extract with its residual", "extract ZOO/tone.wav --modes 1 --residual r.wav", "r.wav")
 control("extract from 24 bits", "extract ZOO/24-bit.wav")
+control("extract from opposite channels", "extract ZOO/opposed.wav")
 control("clip", "clip metal --seconds 0.3 --note F#3 --out o.wav", "o.wav")
 control(
     "clip under an odd name",
