@@ -43,6 +43,8 @@ _NONSENSE = (
 )
 """What HDF5, numpy and JSON raise where a file holds something else than is read from it."""
 _SEAL = b"Carillon: the bytes behind the first 512 have the SHA-256 "
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+"""First bytes of what HDF5 reads, which follows on a seal."""
 
 
 @contextmanager
@@ -210,6 +212,12 @@ def _is_version_sealed(path: Path, inode: int, size: int, changed: int) -> bool:
     with open(path, "rb") as stream:
         seal = stream.read(SEAL_BYTES)
         if not seal.startswith(_SEAL):
+            if stream.read(len(_HDF5)) == _HDF5:
+                # HDF5 may crash on bytes that nothing vouches for.
+                raise UserError(
+                    f"{path}: is damaged (its checksum is gone); remove it and generate the file "
+                    "again"
+                )
             return False
         if seal != _seal_of(stream):
             raise UserError(
