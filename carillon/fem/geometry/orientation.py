@@ -218,7 +218,8 @@ def _facing(facets: Facets, part: Index, closed: Flags, sign: Index) -> Index:
         chosen = own[:: -(-len(own) // SAMPLE)]
         middles = facets.vertices[facets.triangles[chosen]].mean(axis=1)
         # On both sides, so that a triangle has no say in its own middle.
-        beside = BESIDE * facets.normals[chosen] / np.sqrt(facets.areas[chosen])[:, None]
+        size = np.sqrt(np.maximum(facets.areas[chosen], np.finfo(float).tiny))
+        beside = BESIDE * facets.normals[chosen] / size[:, None]
         points = np.concatenate([middles - beside, middles + beside])
         numbers = winding_numbers(facets, own, points, sign).reshape(2, -1).mean(axis=0)
         mean = np.average(numbers, weights=facets.areas[chosen])
