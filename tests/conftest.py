@@ -72,7 +72,8 @@ def pytest_configure(config: pytest.Config) -> None:
         if config.getoption("--tier") == "part":
             due = tiers.due(tiers.measured()).files
     config.stash[DUE] = due
-    fuzzing.load(long=config.getoption("--tier") == "all" or bool(due & fuzzing.FILES))
+    all_tests = config.getoption("--tier") == "all"
+    fuzzing.load("nightly" if all_tests else "part" if due & fuzzing.FILES else "change")
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -17,7 +17,7 @@ Result = TypeVar("Result")
 FILES = frozenset({"test_properties.py", "test_properties_files.py"})
 """Tests that take the profiles of Hypothesis below."""
 MORE = 20
-"""How many times more examples the nightly profile takes, others on every run."""
+"""How many times more examples the profiles part and nightly take, the latter others each time."""
 ONCE = 100
 EXTRA_BYTES = 1 << 30
 """Memory that reading may take beyond what the process has: files here are far below a megabyte."""
@@ -32,17 +32,14 @@ settings.register_profile(
     print_blob=True,
     suppress_health_check=list(HealthCheck),
 )
-settings.register_profile(
-    "nightly",
-    settings.get_profile("change"),
-    max_examples=ONCE * MORE,
-    derandomize=False,
-)
+# The same on every machine, so that a change is not refused for what it has nothing to do with.
+settings.register_profile("part", settings.get_profile("change"), max_examples=ONCE * MORE)
+settings.register_profile("nightly", settings.get_profile("part"), derandomize=False)
 
 
-def load(long: bool) -> None:
-    """Take the profile of every change, or the long one, for tests that are loaded later."""
-    settings.load_profile("nightly" if long else "change")
+def load(profile: str) -> None:
+    """Take a profile for tests that are loaded later: of a change, a part of the rest, or all."""
+    settings.load_profile(profile)
 
 
 def examples(count: int) -> settings:
