@@ -124,7 +124,7 @@ ARROWS = {
         workflow.studies.base workflow.studies.sounds""",
     "workflow.studies.recordings": "solver.response sound.clips workflow.studies.base",
     "workflow.studies.validation": """solver.files solver.refinement solver.response
-        solver.studies solver.subspace workflow workflow.studies.base workflow.studies.report""",
+        solver.studies workflow workflow.studies.base workflow.studies.report""",
     "workflow.studies.campaign": """workflow workflow.studies.base
         workflow.studies.validation""",
     "workflow.studies.comparison": "workflow workflow.studies.base",

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.fem.model import RIGID_MODES
+from solver.subspace.verification import ORTHOGONALITY_TOLERANCE
 
 Array = NDArray[np.float64]
 
@@ -40,6 +41,11 @@ def accepted_errors(values: Array, rounding: Array, tolerance: float) -> Array:
     errors = values * (tolerance + OPERATIONS * rounding)
     errors[:RIGID_MODES] = 0.0
     return np.asarray(errors)
+
+
+def orthogonality_limit(unknowns: int) -> float:
+    """Largest entry of |X^T M X - I| that a solver accepts, and rounding of a sum anew."""
+    return ORTHOGONALITY_TOLERANCE + float(np.finfo(float).eps) * unknowns
 
 
 def residual_limits(values: Array, errors: Array) -> Array:

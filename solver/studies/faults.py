@@ -11,8 +11,12 @@ import numpy as np
 
 from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import ModesFile, frequencies
-from solver.studies.allowance import ACCEPTED, accepted_errors, residual_limits
-from solver.subspace.verification import ORTHOGONALITY_TOLERANCE
+from solver.studies.allowance import (
+    ACCEPTED,
+    accepted_errors,
+    orthogonality_limit,
+    residual_limits,
+)
 
 if TYPE_CHECKING:  # It imports this module.
     from solver.studies.audit import Audit
@@ -33,7 +37,7 @@ def faults(file: ModesFile, audit: Audit, tolerance: float) -> list[str]:
         found.append(f"{things} {'missing' if audit.counted > audit.expected else 'too many'}")
     if audit.rigid_modes < RIGID_MODES:
         found.append(f"{audit.rigid_modes} of {RIGID_MODES} rigid motions are there")
-    limit = ORTHOGONALITY_TOLERANCE + float(np.finfo(float).eps) * audit.unknowns
+    limit = orthogonality_limit(audit.unknowns)
     if audit.orthogonality > limit:
         found.append(f"modes are orthonormal to {audit.orthogonality:.1e}, {limit:.1e} is required")
     values, residuals = file.eigenvalues, np.array(audit.energy_residuals)

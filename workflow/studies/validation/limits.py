@@ -13,8 +13,13 @@ from numpy.typing import NDArray
 from carillon.fem.model import RIGID_MODES
 from solver.response.allowed_motion import motion_limit
 from solver.response.response import Damping
-from solver.studies.allowance import ACCEPTED, accepted_errors, angle_limits, residual_limits
-from solver.subspace.verification import ORTHOGONALITY_TOLERANCE
+from solver.studies.allowance import (
+    ACCEPTED,
+    accepted_errors,
+    angle_limits,
+    orthogonality_limit,
+    residual_limits,
+)
 from workflow.studies.validation.evidence import SOLVED, Evidence
 from workflow.variants import TRUTH
 
@@ -54,7 +59,7 @@ def residual(evidence: Evidence, variant: str) -> Worst:
 def orthogonality(evidence: Evidence, variant: str) -> Worst:
     """Largest entry of |X^T M X - I|, as the solver itself demands it."""
     audit = evidence.audit["spectra"][variant]
-    allowed = ORTHOGONALITY_TOLERANCE + float(np.finfo(float).eps) * audit["unknowns"]
+    allowed = orthogonality_limit(audit["unknowns"])
     limit = evidence.tolerances["orthogonality"]
     return Worst(audit["orthogonality"], allowed if limit is None else limit, allowed)
 
