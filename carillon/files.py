@@ -43,6 +43,7 @@ _NONSENSE = (
 )
 """What HDF5, numpy and JSON raise where a file holds something else than is read from it."""
 _SEAL = b"Carillon: the bytes behind the first 512 have the SHA-256 "
+_UNSEALED = "is damaged (its checksum is gone); remove it and generate the file again"
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 """First bytes of what HDF5 reads, which follows on a seal."""
 
@@ -214,10 +215,7 @@ def _is_version_sealed(path: Path, inode: int, size: int, changed: int) -> bool:
         if not seal.startswith(_SEAL):
             if stream.read(len(_HDF5)) == _HDF5:
                 # HDF5 may crash on bytes that nothing vouches for.
-                raise UserError(
-                    f"{path}: is damaged (its checksum is gone); remove it and generate the file "
-                    "again"
-                )
+                raise UserError(f"{path}: {_UNSEALED}")
             return False
         if seal != _seal_of(stream):
             raise UserError(
@@ -256,9 +254,7 @@ def open_h5(path: str | Path, kind: str, schema: int, sealed: bool = False) -> I
     with file:
         _require_kind(path, file, kind, schema)
         if sealed and not found_seal:
-            raise UserError(
-                f"{path}: is damaged (its checksum is gone); remove it and generate the file again"
-            )
+            raise UserError(f"{path}: {_UNSEALED}")
         _require_whole(path, file)
         try:
             yield file
