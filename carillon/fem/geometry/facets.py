@@ -43,7 +43,7 @@ class Facets:
 
     @classmethod
     def of_surface(cls, vertices: Array, faces: Index, sheets: bool = False) -> Facets:
-        """Those of faces (f, 3).
+        """Distinct triangles of a surface with vertices (v, 3) and faces (f, 3).
 
         Parameters
         ----------

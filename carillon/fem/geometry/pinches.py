@@ -14,7 +14,6 @@ from carillon.fem.geometry.parts import winding_numbers
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 COINCIDENT = 1e-6
 """Angle [rad] around an edge within which two triangles lie on each other."""
