@@ -95,6 +95,36 @@ def test_compare_of_a_file_with_itself(modes_file, run_cli):
     assert result["residual_max"] == pytest.approx(stored, rel=1e-3, abs=1e-12)
 
 
+def test_compare_tells_another_material(modes_file, run_cli, tmp_path):
+    other = tmp_path / "other.h5"
+    options = ("--modes", "30", "--poisson", "0.3", "--out", other)
+    run_cli("solver", "modes", *BAR, *options, check=True)
+    done = run_cli("solver", "compare", other, modes_file, "--json", check=True)
+    (result,) = json.loads(done.stdout)["comparisons"].values()
+    found = result["material"]
+    assert 0 < found["young"]["cells"] <= found["young"]["all"]
+    assert found["poisson"][0] == 0.3 and "density_kg_per_m3" not in found
+    told = run_cli("solver", "compare", other, modes_file, check=True).stdout
+    assert "material                  another one: Young's modulus of " in told
+    assert "Poisson's ratio 0.3, the truth's" in told
+
+
+def test_compare_tells_that_a_mode_is_missing(modes_file, run_cli, tmp_path):
+    keep = np.arange(30) != 11
+    lacking = tmp_path / "lacking.h5"
+    shutil.copy(modes_file, lacking)
+    with edited(lacking) as file:
+        for name in ("eigenvalues", "frequencies", "residuals", "modes"):
+            values, attributes = file[name][()], dict(file[name].attrs)
+            del file[name]
+            file[name] = values[..., keep]
+            file[name].attrs.update(attributes)
+    told = run_cli("solver", "compare", lacking, modes_file, check=True).stdout
+    assert "modes of other shapes " in told and "the first is 12: modes crossed, one is" in told
+    assert "another one" not in told
+    assert "other shapes" not in run_cli("solver", "compare", modes_file, modes_file).stdout
+
+
 def test_several_are_compared_with_one_truth(modes_file, run_cli, tmp_path):
     other = tmp_path / "other.h5"
     shutil.copy(modes_file, other)

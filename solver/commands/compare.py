@@ -11,6 +11,9 @@ from solver.commands.running import on_ranks, parameters, require_outputs, write
 from solver.distribution.collective import bcast_from_root
 from solver.studies.comparison import compare_each
 
+OTHER_SHAPE = 0.5
+"""Angle [rad] between modes from which they are not the same."""
+
 EXAMPLES = """examples:
   compare bunny.h5 truth.h5
   compare coarse.h5 average.h5 truth.h5 --json
@@ -62,6 +65,40 @@ def _print(comparison: dict[str, Any]) -> None:
         print(f"modes matched by shape    {_matched(comparison['matched'])}")
     print(f"largest subspace angle    {comparison['subspace_angle_max']:.2e} rad")
     print(f"largest 2-norm residual   {comparison['residual_max']:.2e}")
+    if "material" in comparison:
+        print(f"material                  {_differences(comparison['material'])}")
+    if "matched" not in comparison and (lost := _lost(comparison["clusters"])):
+        print(f"modes of other shapes     {lost}")
+
+
+def _differences(material: dict[str, Any]) -> str:
+    parts = []
+    if "young" in material:
+        young = material["young"]
+        parts.append(
+            f"Young's modulus of {young['cells']:,} of {young['all']:,} cells, by up to "
+            f"{young['largest']:.2g} of the truth's"
+        )
+    for name, noun in (("poisson", "Poisson's ratio"), ("density_kg_per_m3", "density [kg/m3]")):
+        if name in material:
+            own, truth = material[name]
+            parts.append(f"{noun} {own:.6g}, the truth's {truth:.6g}")
+    return f"another one: {'; '.join(parts)}"
+
+
+def _lost(clusters: list[dict[str, Any]]) -> str:
+    """Modes of the truth that those of the same numbers are not, in words; empty if there are none.
+
+    Both are on one mesh, so that a mode that is left out or there twice shifts all later ones.
+    """
+    lost = [cluster for cluster in clusters if cluster["angle"] > OTHER_SHAPE]
+    if not lost:
+        return ""
+    count = sum(cluster["last"] - cluster["first"] + 1 for cluster in lost)
+    return (
+        f"{count}, the first is {lost[0]['first']}: modes crossed, one is missing or there twice, "
+        "or the material is another; see `carillon audit`"
+    )
 
 
 def _matched(errors: dict[str, Any]) -> str:

@@ -18,6 +18,7 @@ from solver.assembly.sparse import assembled
 from solver.files.modes_file import ModesFile, read_elastic, require_same_solid
 from solver.response.contact import interpolation
 from solver.studies.matching import SAME, match_clusters, mode_overlaps, recognised
+from solver.studies.materials import material_difference, on_one_mesh
 from solver.subspace.spectrum import clusters
 from solver.subspace.verification import residual_scale
 
@@ -55,6 +56,8 @@ class SpectrumComparison:
         Frequency errors of the modes that are the same by their shapes, whatever their numbers, see
         `solver.studies.matching.recognised`, and how many of these have `moved` to another number;
         None on the truth's own mesh, where numbers tell.
+    material
+        In what the material differs, see `solver.studies.materials`; None where it is the same.
     """
 
     candidate: str
@@ -68,6 +71,7 @@ class SpectrumComparison:
     modes_compared: int
     clusters: list[dict[str, Any]]
     matched: dict[str, Any] | None = None
+    material: dict[str, Any] | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Plain dictionary, ready for JSON, without what there is not."""
@@ -188,6 +192,7 @@ def _compared(
         count - RIGID_MODES,
         angles,
         None if modes is a.modes else _matched(modes, a, b, M),
+        material_difference(a.model, b.model),
     )
 
 
@@ -276,8 +281,7 @@ def on_mesh_of(fine: ModesFile, file: ModesFile) -> Array:
     Those of a coarsening are prolonged, and those of any other mesh or discretisation interpolated.
     """
     assert file.modes is not None
-    same = np.array_equal(file.model.connectivity, fine.model.connectivity)
-    if same and np.array_equal(file.mesh.node_grid, fine.mesh.node_grid):
+    if on_one_mesh(file.model, fine.model):
         return file.modes
     blocks = None
     if isinstance(fine.model, ElasticModel) and isinstance(file.model, ElasticModel):
