@@ -91,6 +91,17 @@ def test_an_off_file_may_have_faces_of_any_number_of_corners(tmp_path, head):
     assert len(found.faces) == 12 and found.volume == pytest.approx(4.0)
 
 
+@pytest.mark.parametrize(
+    ("face", "sentence"),
+    [("3 0 1 -2", "names vertex -2"), ("4 0 1 2", "a face of 4 corners has 3")],
+)
+def test_an_off_file_with_a_strange_face_is_refused(tmp_path, face, sentence):
+    path = tmp_path / "strange.off"
+    path.write_text(f"OFF\n4 3 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n4 0 1 2 3\n{face}\n")
+    with pytest.raises(UserError, match=sentence):
+        load_surface(str(path))
+
+
 def test_an_ordinary_obj_file_is_read_as_it_is():
     """Not a byte of it changes, so that its solid keeps its bits."""
     content = (MORE + FORMS["absolute"]).encode()

@@ -13,7 +13,8 @@ def obj_of_off(content: bytes) -> bytes | None:
     Raises
     ------
     ValueError, IndexError
-        If the file ends early, or has something else in the place of a number.
+        If the file ends early, has something else in the place of a number, or a face names a
+        negative vertex.
 
     Examples
     --------
@@ -32,5 +33,9 @@ def obj_of_off(content: bytes) -> bytes | None:
     text = [f"v {' '.join(line[:3])}" for line in rest[:vertices]]
     for line in corners:
         numbers = [int(word) + 1 for word in line[1 : 1 + int(line[0])]]
+        if len(numbers) < int(line[0]):
+            raise ValueError(f"a face of {line[0]} corners has {len(numbers)}")
+        if min(numbers, default=1) < 1:
+            raise ValueError(f"a face names vertex {min(numbers) - 1}")
         text.append(f"f {' '.join(map(str, numbers))}")
     return "\n".join([*text, ""]).encode()
