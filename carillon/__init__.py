@@ -8,10 +8,12 @@ import os as _os
 
 from carillon import kernel_cache as _kernel_cache
 from carillon import openblas as _openblas
+from carillon import present_folder as _present_folder
 from carillon import step as _step
 
 # Before anything loads numpy, and with it OpenBLAS, or numba, or MPI.
 _openblas.configure(_os.environ)
+_present_folder.ignore_settings()
 _kernel_cache.configure(_os.environ)
 _step.leave_lonely_step(_os.environ)
 _step.start_without_daemon(_os.environ)

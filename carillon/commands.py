@@ -11,7 +11,7 @@ from functools import partial
 from importlib import import_module
 from types import ModuleType
 
-from carillon import __version__, cli, step
+from carillon import __version__, cli, present_folder, step
 from carillon.arguments import Parser
 from carillon.errors import UserError
 from carillon.progress import say
@@ -51,6 +51,7 @@ def run_program(
     words
         The command line, that of this process if None.
     """
+    present_folder.ignore_modules(os.environ, sys.path)
     step.keep_apart(os.environ, os.getpid())
     chosen: list[argparse.Namespace] = []
     given = sys.argv[1:] if words is None else list(words)

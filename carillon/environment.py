@@ -22,9 +22,9 @@ def describe() -> dict[str, Any]:
     """
     try:
         from mpi4py import MPI
-        from slepc4py import SLEPc
 
         from carillon.petsc import PETSc
+        from carillon.slepc import SLEPc
     except ImportError as error:
         raise UserError(
             f"{error}; expected MPI, PETSc and SLEPc in the environment of {sys.executable}, "

@@ -1,14 +1,25 @@
-"""PETSc, as it is loaded here: it leaves a pipe that nobody reads any more to Python.
+"""PETSc, as it is loaded here: without settings from files, and without its own signal of pipes.
 
-PETSc takes the signal of such a pipe for a crash, says so in ten lines and ends all ranks: of what
-is printed into `... | head`, of an answer to a page that is gone, or of word to a process that has
-just ended.  Python ignores the signal and raises BrokenPipeError, which programs can deal with.
+PETSc reads `.petscrc` and `petscrc` in the present folder, which may be a stranger's: options there
+can load libraries and write files anywhere. It is told to skip them, and `~/.petscrc` with them;
+options of the variable PETSC_OPTIONS and of the command line hold.
+
+PETSc takes the signal of a pipe that nobody reads any more for a crash, says so in ten lines and
+ends all ranks: of what is printed into `... | head`, of an answer to a page that is gone, or of
+word to a process that has just ended.  Python ignores the signal and raises BrokenPipeError, which
+programs can deal with.
 """
 
 from __future__ import annotations
 
 import signal
+import sys
 import threading
+
+import petsc4py
+
+if "petsc4py.PETSc" not in sys.modules:  # else whoever has loaded it has chosen
+    petsc4py.init(["-skip_petscrc"])
 
 from petsc4py import PETSc
 

@@ -1,1 +1,3 @@
 """Sound design: targets from clips, material optimisation, synthesis and export."""
+
+import carillon

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
 from collections.abc import Iterator
 from functools import cache
 from graphlib import TopologicalSorter
@@ -212,11 +214,20 @@ def test_class_names_are_told_apart():
     assert {name: where for name, where in named.items() if len(where) > 1} == {}
 
 
-def test_petsc_is_had_from_one_module():
-    """Which has it leave broken pipes to Python."""
+@pytest.mark.parametrize("library", ["petsc", "slepc"])
+def test_petsc_and_slepc_are_had_from_one_module_each(library):
+    """Which have them read no files of settings, and leave broken pipes to Python."""
     found = []
     for path in (*modules().values(), *(CHECKOUT / "tests").rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.ImportFrom) and node.module == "petsc4py":
+            if isinstance(node, ast.ImportFrom) and node.module == f"{library}4py":
                 found.append(_module_of(path))
-    assert found == ["carillon.petsc"]
+    assert found == [f"carillon.{library}"]
+
+
+@pytest.mark.parametrize("room", ROOMS[1:])
+def test_rooms_begin_with_carillon(room):
+    """Whose import has libraries, loaded later, read no settings in the present folder."""
+    program = f"import sys, {room}; print('carillon.present_folder' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.stdout == "True\n", done.stderr

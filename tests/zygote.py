@@ -215,7 +215,7 @@ def _be(job: Job, mark: str, libraries: tuple[Any, Any, Any], pipes: list[int]) 
             del sys.modules["mpi4py"]  # by which they tell that nobody else needs it
         else:
             MPI.Init_thread(MPI.THREAD_MULTIPLE)
-            PETSc._initialize()
+            PETSc._initialize([job.room, "-skip_petscrc"])
             SLEPc._initialize()
             importlib.import_module("carillon.petsc").leave_pipes_to_python()
         for name in _ALONE:

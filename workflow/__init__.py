@@ -1,1 +1,3 @@
 """The Snakemake workflow: rules, configuration, schemas, scripts and the report."""
+
+import carillon

@@ -208,6 +208,8 @@ def _run_rules(folder: Path, cores: int) -> None:
         *("--snakefile", str(settings.FOLDER / "Snakefile"), "--directory", str(folder)),
         *("--configfile", str(folder / CONFIGURATION), "--cores", str(cores)),
         *("--profile", str(settings.FOLDER / "profiles" / "default")),
+        # None of the present folder, where anybody may have written it.
+        *("--workflow-profile", "none"),
     ]
     environment = {**os.environ, "PYTHONPATH": str(settings.FOLDER.parent)}
     log = folder / "validate.log"

@@ -15,9 +15,9 @@ import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
 from numpy.typing import NDArray
-from slepc4py import SLEPc
 
 from carillon.errors import one_line
+from carillon.slepc import SLEPc
 from solver.assembly.petsc_matrix import distributed_matrix
 from solver.linear.factorisation import factor_package
 from solver.studies.accuracy.measurement import Spectrum

@@ -8,11 +8,11 @@ from importlib import import_module
 
 import numpy as np
 from mpi4py import MPI
-from slepc4py import SLEPc
 
 from carillon.errors import ConvergenceError, one_line
 from carillon.fem.model import RIGID_MODES
 from carillon.petsc import PETSc
+from carillon.slepc import SLEPc
 from solver.reference.truth import Truth, can_count, complete, count_beyond
 from solver.studies.benchmark import primme_rivals, scipy_rivals, slepc_rivals
 from solver.studies.benchmark.search import Array, Pairs, RivalSearch

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
-from slepc4py import SLEPc
 
 from carillon.errors import ConvergenceError
 from carillon.fem.model import RIGID_MODES, ElasticModel
 from carillon.petsc import PETSc
+from carillon.slepc import SLEPc
 from solver.assembly.system import System, assemble
 from solver.distribution.local_mesh import distribute
 from solver.linear.factorisation import definite_packages

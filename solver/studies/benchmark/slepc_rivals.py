@@ -8,10 +8,10 @@ from functools import partial
 import numpy as np
 import scipy.sparse.linalg as sla
 from mpi4py import MPI
-from slepc4py import SLEPc
 
 from carillon.errors import ConvergenceError
 from carillon.petsc import PETSc
+from carillon.slepc import SLEPc
 from solver.assembly.petsc_matrix import distributed_matrix
 from solver.linear.factorisation import definite_packages
 from solver.studies.benchmark.search import Array, Pairs, RivalSearch, TimeLimit, ascending
