@@ -2,12 +2,14 @@
 
 Entries are named by a hash of all that they depend on, so none is ever out of date.  The cache
 saves time and nothing else: what is damaged in it is made anew, and where it cannot be written,
-everything is found every time.
+everything is found every time. Nothing of another user's is read, nor what others can write: an
+entry is as good as a result that nobody checks again.
 """
 
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -41,18 +43,23 @@ def remembered(
     find
         Called unless its result is in the cache.  What it raises is not kept.
     read, write
-        Read and write an entry (HDF5).  Errors of the file are raised as UserError or OSError.
+        Read and write an entry (HDF5).  Errors of the file are raised as UserError or OSError;
+        what is read is checked as if a user had given it.
     """
     folder = folder_of(kind)
     path = folder / f"{key}.h5"
     with suppress(UserError, OSError):
-        kept = read(path)
-        os.utime(path)
-        return kept
+        if _is_private(folder, stat.S_ISDIR) and _is_private(path, stat.S_ISREG):
+            kept = read(path)
+            os.utime(path)
+            return kept
     found = find()
     if folder.is_absolute():  # else the user has no home
         with suppress(UserError, OSError):
-            folder.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if not _is_own(folder.lstat(), stat.S_ISDIR):
+                return found
+            folder.chmod(0o700)
             write(path, found)
             _make_room(folder)
     return found
@@ -64,6 +71,17 @@ def folder_of(kind: str) -> Path:
 
     named = os.environ.get(PLACE)
     return (Path(named).absolute() if named else user_cache_path("carillon")) / kind
+
+
+def _is_private(path: Path, is_kind: Callable[[int], bool]) -> bool:
+    """Whether a folder or file is this user's, and nobody else can write it."""
+    status = path.lstat()
+    return _is_own(status, is_kind) and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+
+
+def _is_own(status: os.stat_result, is_kind: Callable[[int], bool]) -> bool:
+    """Whether a folder or file is this user's, and no link to one."""
+    return is_kind(status.st_mode) and status.st_uid == os.geteuid()
 
 
 def _make_room(folder: Path) -> None:

@@ -16,6 +16,7 @@ from carillon.fem.geometry import builtin_surface
 from sound.scenes import convex, cuttable
 from sound.scenes.convex import MOST_VERTICES, convex_parts
 from sound.surface import struck_surface
+from tests.edited_files import edited
 
 POINTS = 20_000
 """Random ones, by which volumes are measured: to 1 % of a solid that fills a fifth of its box."""
@@ -187,3 +188,14 @@ def test_a_failure_of_coacd_is_one_sentence(cache: Path, monkeypatch: pytest.Mon
         "the surface could not be cut into convex parts (CoACD: what(): Wrong clip!); repair it"
     )
     assert not cache.exists()
+
+
+@pytest.mark.parametrize(("name", "place"), [("vertices", (0, 0)), ("counts", 0)])
+def test_hulls_that_nobody_cut_are_not_taken_from_the_cache(cache: Path, name, place) -> None:
+    surface = builtin_surface("slit-ring")
+    first = parts_of(surface)
+    (entry,) = cache.iterdir()
+    with edited(entry) as file:
+        file[name][place] = np.nan if name == "vertices" else 2
+    for one, other in zip(parts_of(surface), first, strict=True):
+        np.testing.assert_array_equal(one, other)

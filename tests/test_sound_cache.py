@@ -17,6 +17,7 @@ from sound.clips.damped import damped_sinusoids
 from sound.clips.extraction import ModalSound, extract
 from sound.clips.files import extract_file
 from sound.clips.wav import write_wav
+from tests.edited_files import edited
 
 RATE = 8000
 
@@ -91,6 +92,46 @@ def test_a_damaged_entry_is_made_anew(clip, folder, searches, damage):
     for _ in range(2):
         assert_same(extract_file(clip), first)
     assert len(searches) == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("frequencies", np.nan), ("frequencies", -1.0), ("dampings", -1.0)]
+)
+def test_an_entry_that_no_search_finds_is_made_anew(clip, folder, searches, name, value):
+    first = extract_file(clip)
+    (entry,) = folder.iterdir()
+    with edited(entry) as file:
+        file[name][0] = value
+    assert_same(extract_file(clip), first)
+    assert len(searches) == 2
+
+
+def test_the_cache_is_for_its_user_alone(clip, folder, searches, monkeypatch):
+    extract_file(clip)
+    (entry,) = folder.iterdir()
+    assert folder.stat().st_mode & 0o777 == 0o700
+    extract_file(clip)
+    assert len(searches) == 1
+    user = os.geteuid()
+    monkeypatch.setattr(os, "geteuid", lambda: user + 1)
+    extract_file(clip)
+    assert len(searches) == 2, "what another user has written was read"
+
+
+@pytest.mark.parametrize("which", ["folder", "entry"])
+def test_what_others_can_write_or_have_linked_is_not_read(clip, folder, searches, which):
+    extract_file(clip)
+    (entry,) = folder.iterdir()
+    place = folder if which == "folder" else entry
+    place.chmod(place.stat().st_mode | 0o020)
+    extract_file(clip)
+    assert len(searches) == 2
+    extract_file(clip)
+    assert len(searches) == 2, "it is private again"
+    moved = place.rename(place.with_name("elsewhere"))
+    place.symlink_to(moved)
+    extract_file(clip)
+    assert len(searches) == 3
 
 
 @pytest.mark.parametrize("place", ["/dev/null", "/proc/nowhere", "clip.wav", "x" * 300, "~"])

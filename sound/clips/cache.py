@@ -13,13 +13,15 @@ from numpy.typing import NDArray
 
 from carillon import provenance
 from carillon.cache import remembered
+from carillon.datasets import number, read, refused
 from carillon.files import create_h5, open_h5
 from sound.clips.extraction import ModalSound
 
 Array = NDArray[np.float64]
 
 _KIND, _SCHEMA = "clip", 1
-_ARRAYS = ("frequencies", "dampings", "amplitudes", "phases", "residual")
+_MODES = ("frequencies", "dampings", "amplitudes", "phases")
+_ARRAYS = (*_MODES, "residual")
 
 
 def remembered_modes(
@@ -60,9 +62,21 @@ def _origin() -> bytes:
 
 def _read(path: Path) -> ModalSound:
     with open_h5(path, _KIND, _SCHEMA, sealed=True) as file:
-        arrays = {name: file[name][()] for name in _ARRAYS}
-        evidence = json.loads(file.attrs["evidence"])
-        return ModalSound(**arrays, rate=int(file.attrs["rate"]), evidence=evidence)
+        arrays = {name: read(file, name, (None,)) for name in _ARRAYS}
+        rate = int(number(file, "rate", 1.0))
+        if len({len(arrays[name]) for name in _MODES}) != 1:
+            raise refused(file, "has arrays of different lengths")
+        values = arrays["frequencies"]
+        ascend = (
+            (np.diff(values) >= 0.0).all() and (values > 0.0).all() and (values < rate / 2).all()
+        )
+        if not ascend or (arrays["dampings"] < 0.0).any():
+            raise refused(file, "holds modes that no clip has")
+        try:
+            evidence = json.loads(file.attrs["evidence"])
+        except (KeyError, TypeError, ValueError):
+            raise refused(file, "has no evidence") from None
+        return ModalSound(**arrays, rate=rate, evidence=evidence)
 
 
 def _write(path: Path, sound: ModalSound) -> None:

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from carillon.cache import remembered
 from carillon.children import run_child
+from carillon.datasets import INTEGER, read, refused
 from carillon.errors import UserError
 from carillon.files import create_h5, open_h5
 from carillon.limits import require_within
@@ -204,8 +205,12 @@ def _key(vertices: Array, faces: Faces, concavity: float, seed: int) -> str:
 
 def _read(path: Path) -> list[Array]:
     with open_h5(path, _KIND, _SCHEMA, sealed=True) as file:
-        ends = np.cumsum(file["counts"][()])
-        return np.split(file["vertices"][()], ends[:-1])
+        counts = read(file, "counts", (None,), INTEGER)
+        vertices = read(file, "vertices", (None, 3))
+        few, many = counts.min(initial=MOST_VERTICES), counts.max(initial=0)
+        if few < 4 or many > MOST_VERTICES or counts.sum() != len(vertices):
+            raise refused(file, "holds parts that are no hulls")
+        return np.split(vertices, np.cumsum(counts)[:-1])
 
 
 def _write(path: Path, parts: Sequence[Array]) -> None:

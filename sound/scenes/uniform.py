@@ -203,7 +203,10 @@ def _resized(model: Solid, size: float) -> Solid:
 
 def _read(path: Path) -> UniformSolid:
     file = read_modes(path)
-    return UniformSolid(file.model, file.eigenvalues, file.modes, file.attributes["accuracy"])
+    accuracy = file.attributes.get("accuracy")
+    if not isinstance(accuracy, dict):
+        raise UserError(f"{path}: is incomplete, it does not say how accurate it is")
+    return UniformSolid(file.model, file.eigenvalues, file.modes, accuracy)
 
 
 def _write(path: Path, solid: UniformSolid) -> None:
