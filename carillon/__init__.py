@@ -15,6 +15,7 @@ from carillon import step as _step
 _openblas.configure(_os.environ)
 _present_folder.ignore_settings()
 _kernel_cache.configure(_os.environ)
+_step.keep_off_networks()
 _step.leave_lonely_step(_os.environ)
 _step.start_without_daemon(_os.environ)
 _step.stay_apart(_os.environ, _os.getpid())

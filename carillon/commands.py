@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
-from types import ModuleType
 
 from carillon import __version__, cli, present_folder, step
 from carillon.arguments import Parser
@@ -93,7 +92,7 @@ def _parser(
     parser.add_argument("--version", action="version", version=f"Carillon {__version__}")
     parts = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for each, command in commands.items():
-        module = _loaded(command) if words and words[0] == each else None
+        module = import_module(command.module) if words and words[0] == each else None
         part = parts.add_parser(
             each,
             help=command.summary,
@@ -104,9 +103,3 @@ def _parser(
         if module is not None:
             module.add_arguments(part)
     return parser
-
-
-def _loaded(command: Command) -> ModuleType:
-    """The module of a command, and with it MPI if it needs that."""
-    with step.without_networks(os.environ):
-        return import_module(command.module)

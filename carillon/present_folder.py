@@ -12,23 +12,19 @@ import os
 import sys
 from collections.abc import Iterator, MutableMapping, Sequence
 from contextlib import contextmanager
-from importlib.abc import MetaPathFinder
-from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from pathlib import Path
-from types import ModuleType
+
+from carillon.loading import while_loading
 
 _NUMBA = "numba.core.config"
-READERS = (_NUMBA, "matplotlib")
-"""Modules that read settings in the present folder when they are loaded."""
-
 _ROOT = Path(__file__).resolve().parent.parent
 _ELSEWHERE = "/"
 
 
 def ignore_settings() -> None:
-    """Have modules that are loaded later read no settings in the present folder."""
-    if not any(isinstance(finder, _Elsewhere) for finder in sys.meta_path):
-        sys.meta_path.insert(0, _Elsewhere())
+    """Have numba and matplotlib, if loaded later, read no settings in the present folder."""
+    while_loading("matplotlib", _elsewhere)
+    while_loading(_NUMBA, _without_file)
 
 
 def ignore_modules(environment: MutableMapping[str, str], path: Sequence[str]) -> None:
@@ -53,31 +49,9 @@ def ignore_modules(environment: MutableMapping[str, str], path: Sequence[str]) -
     environment["PYTHONSAFEPATH"] = "1"
 
 
-class _Elsewhere(MetaPathFinder):
-    """Finds the readers, as others do, and has them loaded in another folder."""
-
-    def find_spec(
-        self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
-    ) -> ModuleSpec | None:
-        if name not in READERS:
-            return None
-        spec = PathFinder.find_spec(name, path, target)
-        if spec is not None and isinstance(spec.loader, SourceFileLoader):
-            spec.loader = _LoaderElsewhere(spec.loader.name, spec.loader.path)
-        return spec
-
-
-class _LoaderElsewhere(SourceFileLoader):
-    def exec_module(self, module: ModuleType) -> None:
-        with _elsewhere():
-            super().exec_module(module)
-        if module.__name__ == _NUMBA:  # which looks again whenever it compiles
-            module.__dict__["_config_fname"] = os.devnull
-
-
 @contextmanager
 def _elsewhere() -> Iterator[None]:
-    """Another present folder, of all threads, while a module is loaded."""
+    """Another present folder, of all threads, in the body."""
     here = os.open(".", os.O_PATH | os.O_DIRECTORY)
     try:
         os.chdir(_ELSEWHERE)
@@ -85,3 +59,12 @@ def _elsewhere() -> Iterator[None]:
     finally:
         os.fchdir(here)
         os.close(here)
+
+
+@contextmanager
+def _without_file() -> Iterator[None]:
+    """Likewise, and numba looks for its file nowhere later, which it does whenever it compiles."""
+    with _elsewhere():
+        yield
+    if config := sys.modules.get(_NUMBA):
+        config.__dict__["_config_fname"] = os.devnull

@@ -2,7 +2,8 @@
 
 Open MPI starts a daemon for a process that no launcher started, in case it should spawn ranks,
 which nothing here does; to leave it out saves a tenth of a second or more. It looks for networks,
-too, which takes two tenths.
+too, which takes two tenths, and listens on all of them: whoever connects can make the process wait.
+Such a process needs none, and ranks of one machine talk through its memory.
 
 All such processes of a user share a directory, which each makes and removes in steps.  Where one
 begins as another ends, what it has just made may be gone, and it aborts; so commands, and what
@@ -18,7 +19,9 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterator, Mapping, MutableMapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+
+from carillon.loading import while_loading
 
 _STEP = ("SLURM_STEP_ID", "SLURM_STEPID")
 _LAUNCHERS = ("PMIX_", "PMI_", "OMPI_COMM_WORLD_")
@@ -38,7 +41,7 @@ _SEVERAL = (
     ),
 )
 """Variables by which launchers tell how many processes they have started, and which one this is."""
-_TRANSPORT = "OMPI_MCA_pml"
+_TRANSPORT, _WAYS = "OMPI_MCA_pml", "OMPI_MCA_btl"
 _DIRECTORY = "OMPI_MCA_orte_top_session_dir"
 _OWN = "carillon-mpi"
 
@@ -57,51 +60,72 @@ def start_without_daemon(environment: MutableMapping[str, str]) -> None:
         environment.setdefault("OMPI_MCA_ess_singleton_isolated", "1")
 
 
+def keep_off_networks() -> None:
+    """Have Open MPI, if it is loaded later, neither look for networks nor listen on them."""
+    while_loading("mpi4py.MPI", lambda: without_networks(os.environ))
+
+
 @contextmanager
 def without_networks(environment: MutableMapping[str, str]) -> Iterator[None]:
-    """Have Open MPI look for no network while it is loaded in the body.
+    """Have Open MPI neither look for networks nor listen on them while it is loaded in the body.
 
-    Of a process that was started as an MPI rank nothing changes, nor of one whose user has chosen.
-    Ranks that the process starts later look for networks as usual.
+    Ranks on one machine keep to its memory. Of ranks on several nothing changes, nor of what the
+    user has chosen. Ranks that the process starts later look for networks as usual.
 
     Examples
     --------
     >>> environment = {}
     >>> with without_networks(environment):
     ...     environment
-    {'OMPI_MCA_pml': 'ob1'}
+    {'OMPI_MCA_pml': 'ob1', 'OMPI_MCA_btl': 'self'}
     >>> environment
     {}
+    >>> environment = {"OMPI_COMM_WORLD_SIZE": "2", "OMPI_COMM_WORLD_LOCAL_SIZE": "2"}
+    >>> with without_networks(environment):
+    ...     environment["OMPI_MCA_btl"]
+    'self,vader'
     """
-    if _launched(environment) or _TRANSPORT in environment:
-        yield
-        return
-    environment[_TRANSPORT] = "ob1"
+    if not _launched(environment):
+        chosen = {_TRANSPORT: "ob1", _WAYS: "self"}
+    elif _on_one_machine(environment):
+        chosen = {_TRANSPORT: "ob1", _WAYS: "self,vader"}
+    else:
+        chosen = {}
+    # A user who has chosen the transport has chosen the ways that it takes, too.
+    if _TRANSPORT in environment:
+        chosen = {}
+    own = {name: value for name, value in chosen.items() if name not in environment}
+    environment.update(own)
     try:
         yield
     finally:
-        environment.pop(_TRANSPORT, None)
+        for name in own:
+            environment.pop(name, None)
 
 
 def keep_apart(environment: MutableMapping[str, str], process: int) -> None:
     """Have Open MPI give a process that was not started as an MPI rank a directory of its own.
 
     A directory that the user has chosen stays. Others are in a folder for temporary files that can
-    be written, or else in the present one.
+    be written, or else in the present one, under a name that nobody can guess and take before.
 
     Examples
     --------
     >>> environment = {"TMPDIR": "/dev"}
     >>> keep_apart(environment, 17)
     >>> directory = environment["OMPI_MCA_orte_top_session_dir"]
-    >>> "/carillon-mpi." in directory, directory.endswith(".17")
-    (True, True)
+    >>> "/carillon-mpi." in directory, directory.split(".")[-2]
+    (True, '17')
     """
     if _launched(environment) or not _is_own(environment.get(_DIRECTORY, _OWN)):
         return
     folder = _temporary_folder(environment)
-    name = f"{_OWN}.{os.uname().nodename}.{os.getuid()}.{process}"
-    environment[_DIRECTORY] = os.path.join(folder, name)
+    environment[_DIRECTORY] = f"{os.path.join(folder, _name(process))}{os.urandom(8).hex()}"
+
+
+def _name(process: int) -> str:
+    """What names of a process's directories begin with."""
+    return f"{_OWN}.{os.uname().nodename}.{os.getuid()}.{process}."
 
 
 def _temporary_folder(environment: Mapping[str, str]) -> str:
@@ -133,8 +157,20 @@ def stay_apart(environment: MutableMapping[str, str], process: int) -> None:
 def leave_nothing(environment: Mapping[str, str], process: int) -> None:
     """Remove the directory of a process that was started from here, and was killed."""
     directory = environment.get(_DIRECTORY, "")
-    if _is_own(directory):  # that of this process, beside which its children's are
-        shutil.rmtree(f"{directory.rpartition('.')[0]}.{process}", ignore_errors=True)
+    if not _is_own(directory):
+        return
+    # Beside that of this process.
+    with suppress(OSError), os.scandir(os.path.dirname(directory)) as entries:
+        for entry in entries:
+            if entry.name.startswith(_name(process)) and _is_mine(entry):
+                shutil.rmtree(entry.path, ignore_errors=True)
+
+
+def _is_mine(entry: os.DirEntry[str]) -> bool:
+    """Whether an entry of a folder is a folder, no link to one, of this user's."""
+    return entry.is_dir(follow_symlinks=False) and (
+        entry.stat(follow_symlinks=False).st_uid == os.getuid()
+    )
 
 
 def _is_own(directory: str) -> bool:
@@ -182,3 +218,9 @@ def _launched(environment: Mapping[str, str]) -> bool:
     return any(
         name.startswith(_LAUNCHERS) and not name.startswith(_SETTINGS) for name in environment
     )
+
+
+def _on_one_machine(environment: Mapping[str, str]) -> bool:
+    """Whether all ranks of a launcher are on this machine, as far as it tells."""
+    size, here = (environment.get(f"OMPI_COMM_WORLD_{name}SIZE") for name in ("", "LOCAL_"))
+    return (size is not None and size == here) or environment.get("SLURM_STEP_NUM_NODES") == "1"
