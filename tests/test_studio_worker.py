@@ -14,6 +14,7 @@ from mpi4py import MPI
 
 from carillon.errors import UserError
 from studio.processes.worker import Worker
+from tests.listening import listening
 from tests.patience import HANG_SECONDS, wait_for
 
 BENCH = "tests.test_studio_worker:Bench"
@@ -53,12 +54,19 @@ class Bench:
     def directory(self):
         return MPI.Is_initialized(), os.environ["OMPI_MCA_orte_top_session_dir"]
 
+    def listening(self):
+        return MPI.Is_initialized(), listening([psutil.Process()])
+
 
 @pytest.fixture
 def worker():
     made = Worker(BENCH)
     yield made
     made.end()
+
+
+def test_a_process_listens_on_no_network(worker):
+    assert asyncio.run(worker.call("listening")) == (True, [])
 
 
 def test_calls_are_answered_in_order_by_one_object(worker):
@@ -154,7 +162,7 @@ def test_what_a_process_is_asked_that_has_just_ended_fails_likewise(worker):
 def test_a_process_that_is_ended_leaves_nothing_on_the_disk(worker):
     async def call():
         is_initialised, directory = await worker.call("directory")
-        assert is_initialised and directory.endswith(f".{worker.pid}")
+        assert is_initialised and f".{worker.pid}." in directory
         Path(directory).mkdir(exist_ok=True)  # whichever MPI it is
         worker.end()
         assert not Path(directory).exists()

@@ -1,0 +1,166 @@
+"""A folder of a stranger's: nothing in it is run, or read as settings of a library."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+import yaml
+
+from carillon import present_folder
+from tests.listening import has_loaded, listening
+from tests.patience import HANG_SECONDS, wait_for
+from tests.rank_counts import SEVERAL
+from tests.small_project import PROJECT, write_clips
+
+CHECKOUT = Path(present_folder.__file__).resolve().parent.parent
+PROGRAM = Path(sys.executable).with_name("carillon")
+"""As it is installed; `python -m` takes modules from the present folder before anything can be said
+against it."""
+PACKAGES = ("numpy", "scipy", "numba", "h5py", "yaml", "joblib", "sklearn", "mpi4py", "petsc4py")
+BAR = ("builtin:bar", "--resolution", "12", "--modes", "12", "--out", "modes.h5")
+
+
+@pytest.fixture
+def planted(tmp_path: Path) -> Path:
+    """A folder with a module for every one of Python's, and settings of PETSc and numba."""
+    folder, mark = tmp_path / "folder", tmp_path / "mark"
+    folder.mkdir()
+    for name in sorted({*sys.stdlib_module_names, *PACKAGES, "carillon", "solver", "sound"}):
+        (folder / f"{name}.py").write_text(f"open({str(mark)!r}, 'a').write('{name} ')\n")
+    for name in (".petscrc", "petscrc"):
+        (folder / name).write_text(f"-log_view :{mark}\n")
+    (folder / ".numba_config.yaml").write_text("cache_dir: kernels\n")
+    return folder
+
+
+def carillon(folder: Path, *words: str, check: bool = True) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [PROGRAM, *words],
+        cwd=folder,
+        check=check,
+        capture_output=True,
+        text=True,
+        timeout=HANG_SECONDS,
+    )
+
+
+def project(folder: Path, workers: int) -> None:
+    """A design problem in a folder, which takes that many processes."""
+    search = {"seconds": None, "evaluations": 4, "workers": workers}
+    (folder / "p.yaml").write_text(yaml.safe_dump({**PROJECT, "optimiser": search}))
+    write_clips(folder, np.array([700.0, 1200.0, 1900.0, 2500.0, 3300.0, 4100.0]))
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("modes", *BAR),
+        ("modes", *BAR, "--method", "slepc"),
+        pytest.param(("design", "p.yaml", "--workers", "2", "--out", "d.h5"), id="design"),
+    ],
+)
+def test_nothing_in_the_folder_runs(planted, tmp_path, words):
+    project(planted, workers=2)
+    before = set(planted.iterdir())
+    carillon(planted, *words)
+    assert not (tmp_path / "mark").exists(), (tmp_path / "mark").read_text()
+    made = {path.name for path in planted.iterdir() if path not in before}
+    assert made == {words[words.index("--out") + 1]}
+
+
+def test_planted_files_are_what_would_run(planted, tmp_path):
+    """The control: without protection each of them does."""
+    for program in ("import signal", "from petsc4py import PETSc", "import numba.core.config as c"):
+        told = f"{program}; print(getattr(globals().get('c'), 'CACHE_DIR', ''))"
+        plain = {name: value for name, value in os.environ.items() if name != "PYTHONSAFEPATH"}
+        done = subprocess.run(
+            [sys.executable, *(() if "signal" in program else ("-P",)), "-c", told],
+            cwd=planted,
+            env=plain,
+            capture_output=True,
+            text=True,
+            timeout=HANG_SECONDS,
+        )
+        marked = (tmp_path / "mark").exists() or "kernels" in done.stdout
+        assert marked, (program, done.stderr)
+        (tmp_path / "mark").unlink(missing_ok=True)
+
+
+def test_a_plot_looks_the_same_beside_settings_of_matplotlib(tmp_path):
+    (tmp_path / "matplotlibrc").write_text("backend: module://planted\nfigure.facecolor: red\n")
+    program = (
+        "import carillon, os, matplotlib as m\n"
+        "print(m.rcParams['figure.facecolor'], os.getcwd(), m.__loader__.__class__.__name__)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, check=True, capture_output=True, text=True
+    )
+    assert done.stdout.split() == ["white", str(tmp_path), "SourceFileLoader"]
+
+
+@pytest.mark.nightly
+def test_a_profile_of_snakemake_in_the_folder_is_not_taken(tmp_path):
+    profile = tmp_path / "profiles" / "default"
+    profile.mkdir(parents=True)
+    mark = tmp_path / "mark"
+    (profile / "config.yaml").write_text(
+        f"default-resources:\n  - \"mem_mb=open({str(mark)!r}, 'a').write('x')\"\n"
+        "no-such-option: 1\n"
+    )
+    words = ("validate", "builtin:bar", "--resolution", "8", "--modes", "12", "--out", "found")
+    done = carillon(tmp_path, *words, check=False)
+    assert not mark.exists()
+    assert "no-such-option" not in done.stderr
+    assert (tmp_path / "found" / "validation" / "bar.html").is_file(), done.stderr
+
+
+def test_a_checkout_is_found_by_what_is_started_in_it():
+    root = str(CHECKOUT)
+    environment = {"PYTHONPATH": "/more"}
+    present_folder.ignore_modules(environment, [root])
+    assert environment == {"PYTHONSAFEPATH": "1", "PYTHONPATH": f"{root}{os.pathsep}/more"}
+    again = dict(environment)
+    present_folder.ignore_modules(again, [root])
+    assert again == environment
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("ranks", SEVERAL)
+def test_ranks_of_one_machine_listen_nowhere(ranks, mpiexec):
+    told = json.loads(mpiexec(ranks, "tests.listening", check=True).stdout)
+    assert told == {"sum": ranks * (ranks - 1) // 2, "listening": [[]] * ranks}
+
+
+def test_a_lone_process_listens_nowhere():
+    command = [sys.executable, "-m", "tests.listening"]
+    done = subprocess.run(command, cwd=CHECKOUT, check=True, capture_output=True, text=True)
+    assert json.loads(done.stdout) == {"sum": 0, "listening": [[]]}
+
+
+def test_processes_of_a_studio_listen_at_its_address_alone(tmp_path):
+    project(tmp_path, workers=1)
+    words = ("studio", "p.yaml", "--no-browser")
+    with subprocess.Popen(
+        [PROGRAM, *words], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    ) as studio:
+        try:
+            assert studio.stdout is not None
+            address = studio.stdout.readline().split("?")[0]
+            process = psutil.Process(studio.pid)
+
+            def solids() -> list[psutil.Process]:
+                begun = process.children(recursive=True)
+                return [each for each in begun if has_loaded(each, "libmpi")]
+
+            wait_for(solids, "a process of the studio that has MPI")
+            found = listening([process, *process.children(recursive=True)])
+        finally:
+            studio.terminate()
+    assert [f"http://{each}/" for each in found] == [address]
