@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from carillon.errors import UserError
+from sound.scenes.contact import engine
 from sound.scenes.contact.bounce import damping_ratio, restitution_of
 from sound.scenes.hertz import approach, bounce_seconds, stiffness
 from sound.scenes.performance import GROUND
@@ -257,3 +258,17 @@ def _with_ground(described, restitution):
 
     material = replace(described.ground_material, restitution=restitution)
     return replace(described, ground_material=material)
+
+
+def test_the_engine_leaves_no_file_of_warnings(tmp_path, monkeypatch, caplog):
+    """Which might be a link of a stranger's to some other file."""
+    monkeypatch.chdir(tmp_path)
+    mujoco = engine.loaded()
+    body = "<body><freejoint/><geom size='1'/></body>"
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    data = mujoco.MjData(model)
+    data.qpos[:] = np.nan
+    with caplog.at_level("WARNING"):
+        mujoco.mj_step(model, data)
+    assert list(tmp_path.iterdir()) == []
+    assert "MuJoCo says: Nan, Inf or huge value in QPOS" in caplog.text

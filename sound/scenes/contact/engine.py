@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.errors import UserError
+from carillon.errors import UserError, one_line
+from carillon.logs import warn_once
 from carillon.progress import track
 from sound.scenes.bodies import Body
 from sound.scenes.contact.bounce import damping_ratio
@@ -74,7 +75,7 @@ def simulate(scene: Scene, bodies: list[Body], visible: bool = True) -> Course:
     UserError
         If two bodies overlap much at the start, if anything flies apart, or touches too often.
     """
-    mujoco = scene_package("mujoco")
+    mujoco = loaded()
     model = _model(mujoco, scene, bodies)
     data = mujoco.MjData(model)
     moved = start(mujoco, model, data, scene, bodies)
@@ -95,6 +96,13 @@ def simulate(scene: Scene, bodies: list[Body], visible: bool = True) -> Course:
         if step % every == 0:
             recorder.require_calm(step * scene.engine.step_seconds)
     return recorder.course(every * scene.engine.step_seconds, moved)
+
+
+def loaded() -> Any:
+    """MuJoCo, whose warnings are logged; it would add them to a file in the present folder."""
+    mujoco = scene_package("mujoco")
+    mujoco.set_mju_user_warning(lambda text: warn_once(one_line(f"MuJoCo says: {text}")))
+    return mujoco
 
 
 def _model(mujoco: ModuleType, scene: Scene, bodies: list[Body]) -> Any:
