@@ -17,12 +17,10 @@ import h5py
 
 from carillon.datasets import require_whole
 from carillon.errors import ConvergenceError, UserError
+from carillon.leftovers import remove_leftovers, temporary_name
 from carillon.places import cause as cause
 from carillon.places import first_line, require_file, target_of
 from carillon.places import require_writable as require_writable
-
-LONGEST_ENDING = 10
-"""Characters of a format's ending, which temporary names keep."""
 
 SEAL_BYTES = 512
 """Length of the seal, which stands before the HDF5 file proper (its user block)."""
@@ -59,7 +57,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     path = require_writable(path)
     try:
         target = target_of(path)
-        _remove_leftovers(target)
+        _clear(target)
         handle, temporary = _new_temporary(target)
         try:
             yield temporary
@@ -88,12 +86,21 @@ def sync_folder(folder: Path) -> None:
             os.close(handle)
 
 
+def _clear(target: Path) -> None:
+    """Remove what killed writers of `target` have left."""
+    folder = os.open(target.parent, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        remove_leftovers(folder, target.name)
+    finally:
+        os.close(folder)
+
+
 def _new_temporary(path: Path) -> tuple[int, Path]:
     """A new file beside `path` and its handle, which holds a lock as long as its writer lives.
 
     The lock is shared, as HDF5 readers may find the file under its final name before it ends.
     """
-    start, end = _temporary_name(path)
+    start, end = temporary_name(path.name)
     while True:
         handle, name = tempfile.mkstemp(prefix=start, suffix=end, dir=path.parent)
         with suppress(OSError):  # a file system without locks, where leftovers stay
@@ -101,21 +108,6 @@ def _new_temporary(path: Path) -> tuple[int, Path]:
         if os.path.exists(name):
             return handle, Path(name)
         os.close(handle)  # another writer took it for a leftover, before it was locked
-
-
-def _remove_leftovers(path: Path) -> None:
-    """Remove temporary files of `path` that nobody holds a lock on."""
-    start, end = _temporary_name(path)
-    for other in path.parent.iterdir():
-        if other.name.startswith(start) and other.name.endswith(end):
-            with suppress(OSError), open(other, "rb+") as stream:
-                fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                other.unlink()
-
-
-def _temporary_name(path: Path) -> tuple[str, str]:
-    ending = path.suffix if len(path.suffix) <= LONGEST_ENDING else ""
-    return f".{path.name}.", f".partial{ending}"
 
 
 class _Disk(io.FileIO):
