@@ -18,6 +18,7 @@ LONGEST_NAME = 200
 
 _OTHER_KINDS = (
     (stat.S_ISDIR, "folder"),
+    (stat.S_ISLNK, "link"),
     (stat.S_ISCHR, "device"),
     (stat.S_ISBLK, "device"),
     (stat.S_ISFIFO, "pipe"),
@@ -65,7 +66,7 @@ def require_file(path: str | Path, what: str) -> Path:
         said = cause(error) if isinstance(error, OSError) else str(error)
         raise UserError(f"{path}: cannot be read ({said}), expected {what}") from None
     if not stat.S_ISREG(mode):
-        raise UserError(f"{path}: is a {_kind_of(mode)}, expected {what}")
+        raise UserError(f"{path}: is a {kind_of_mode(mode)}, expected {what}")
     return path
 
 
@@ -90,7 +91,7 @@ def require_writable(path: str | Path, inputs: Iterable[str | Path] = ()) -> Pat
     if str(path).endswith(os.sep):
         raise UserError(f"{path}: names a folder, expected the name of a file to write")
     path = Path(path)
-    _require_name(path)
+    require_plain(path)
     for each in inputs:
         with suppress(OSError, ValueError):
             if os.path.samefile(each, path):
@@ -110,8 +111,14 @@ def require_writable(path: str | Path, inputs: Iterable[str | Path] = ()) -> Pat
     return path
 
 
-def _require_name(path: Path) -> None:
-    """Refuse names that terminals, file systems or formats of text cannot hold."""
+def require_plain(path: Path) -> None:
+    """Check that a name is one that terminals, file systems and formats of text can hold.
+
+    Raises
+    ------
+    UserError
+        If it has line breaks, control characters, bytes that are no text, or is too long.
+    """
     text = str(path)
     if any(unicodedata.category(c) in ("Cc", "Cs", "Zl", "Zp") for c in text):
         raise UserError(
@@ -140,9 +147,10 @@ def target_of(path: Path) -> Path:
     except FileNotFoundError:  # nothing there, a link to nothing, or no folder
         return Path(os.path.realpath(path)) if path.is_symlink() else path
     if not stat.S_ISREG(mode):
-        raise UserError(f"{path}: is a {_kind_of(mode)}, expected the name of a file to write")
+        raise UserError(f"{path}: is a {kind_of_mode(mode)}, expected the name of a file to write")
     return Path(os.path.realpath(path)) if path.is_symlink() else path
 
 
-def _kind_of(mode: int) -> str:
+def kind_of_mode(mode: int) -> str:
+    """What something is that is no regular file, in a word: "folder", "link", "pipe"."""
     return next(name for is_such, name in _OTHER_KINDS if is_such(mode))
