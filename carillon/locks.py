@@ -50,12 +50,15 @@ def take(name: Path, refusal: str) -> int:
     ------
     UserError
         With the sentence `refusal` if another process has it; if it cannot be opened or is no
-        regular file.
+        regular file, but a link, pipe or device.
     """
+    flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
     while True:
         try:
-            file = os.open(name, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+            file = os.open(name, flags, 0o666)
         except OSError as error:
+            if error.errno == errno.ELOOP:
+                raise UserError(f"{name}: cannot be written (it is a link); remove it") from None
             raise UserError(f"{name}: cannot be written ({cause(error)})") from None
         try:
             if not stat.S_ISREG(os.fstat(file).st_mode):
@@ -82,5 +85,5 @@ def _lock(name: Path, file: int, refusal: str) -> None:
 
 def _is_at(name: Path, file: int) -> bool:
     with suppress(FileNotFoundError):
-        return os.path.samestat(os.stat(name), os.fstat(file))
+        return os.path.samestat(os.lstat(name), os.fstat(file))
     return False

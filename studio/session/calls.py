@@ -14,7 +14,7 @@ from studio.interface import NotFoundError
 from studio.session.document import Document, Material, Target, document_of, files_of, merged
 from studio.session.examples import EXAMPLES
 from studio.session.files import save
-from studio.session.workspace import Workspace, require_name
+from studio.session.workspace import Workspace
 
 if TYPE_CHECKING:
     from studio.session.studio import DesignStudio
@@ -63,7 +63,7 @@ class Calls:
         self._studio.saved = self._studio.document
 
     async def _save(self, name: str) -> None:
-        await save(self._studio, require_name(name))
+        await save(self._studio, name)
 
     def _add_target(self, vertex: int, name: str | None = None, clip: str | None = None) -> None:
         document = self._studio.document

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import shutil
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from carillon.errors import UserError
-from carillon.files import atomic_path
 
 if TYPE_CHECKING:
     from studio.session.studio import DesignStudio
@@ -18,15 +17,16 @@ async def save(studio: DesignStudio, name: str) -> None:
     Raises
     ------
     UserError
-        If there is nothing to save yet, or a search goes on.
+        If there is nothing to save yet, a search goes on, or files of this name are not the
+        studio's to write: links for instance.  Nothing has been written then.
     """
     document = studio.document
     if document.mesh is None:
         raise UserError("there is no solid yet; open one first")
     document.project(studio.workspace.folder)
+    studio.workspace.require_savable(name)
     if document.material is not None:
         design = await studio.designed()
-        with atomic_path(studio.workspace.design(name)) as temporary:
-            shutil.copyfile(design, temporary)
+        studio.workspace.write_design(name, Path(design))
     studio.workspace.write_project(name, studio.document.described())
     studio.is_saved_as(name)

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from carillon.builtin_names import BUILTIN_PREFIX
-from carillon.errors import UserError
+from carillon.errors import UserError, one_line
 from carillon.fem.geometry.surface import surface_name
 from carillon.files import kind_of
+from carillon.progress import say
 from sound.project.design_file import read_design
+from sound.project.schema import check, project_schema
 from studio.session.calls import fit_name, opened, with_design
 from studio.session.document import Document, document_of, files_of
+from studio.session.restoring import NONSENSE
 from studio.session.studio import DesignStudio
-from studio.session.workspace import PROJECT_ENDINGS, Workspace
+from studio.session.workspace import OWN_FOLDER, PROJECT_ENDINGS, SESSION, OutsideError, Workspace
 
 DESIGN_ENDINGS = (".h5", ".hdf5")
 UNTITLED = "untitled"
@@ -37,18 +40,17 @@ def open_studio(what: str | None, folder: Path) -> DesignStudio:
     Raises
     ------
     UserError
-        If it cannot be opened, or another studio works in the folder.
+        If it cannot be opened, another studio works in the folder, or what it was left with names
+        files outside of the folder.
     """
     workspace = Workspace(folder)
     try:
         name, document = _begun(what, workspace)
         session = workspace.read_session()
+        studio = DesignStudio(workspace, name, document)
         if session is not None and _goes_on(session, what, name):
-            with contextlib.suppress(LookupError, TypeError, ValueError, UserError):
-                studio = DesignStudio(workspace, str(session["name"]), document)
-                studio.restore(session)
-                return studio
-        return DesignStudio(workspace, name, document)
+            _go_on(studio, session)
+        return studio
     except BaseException:
         workspace.close()
         raise
@@ -60,6 +62,20 @@ def _goes_on(session: Mapping[str, Any], what: str | None, name: str) -> bool:
     return what is None or bool(session.get("name") == name and is_under_way)
 
 
+def _go_on(studio: DesignStudio, session: Mapping[str, Any]) -> None:
+    """Go on with a session, unless nothing can be made of it."""
+    file = studio.workspace.folder / OWN_FOLDER / SESSION
+    try:
+        studio.restore(session)
+    except OutsideError as error:
+        raise UserError(
+            f"{file}: what the studio was left with names files that are not its own ({error}); "
+            "remove this file to begin anew"
+        ) from None
+    except NONSENSE as error:
+        say(f"{file}: cannot be gone on with ({one_line(str(error))}), all begins anew")
+
+
 def _begun(what: str | None, workspace: Workspace) -> tuple[str, Document]:
     """Name and document of what is asked for."""
     if what is None:
@@ -68,17 +84,30 @@ def _begun(what: str | None, workspace: Workspace) -> tuple[str, Document]:
         name = surface_name(what)
         return fit_name(name), Document({"mesh": what}).require_sound(workspace.folder)
     path = Path(what)
-    if not path.is_file():
+    if not _is_file(path):
         raise UserError(
             f"{what}: no such file, expected a project (YAML), a mesh, a design (.h5) or "
             f"{BUILTIN_PREFIX}NAME"
         )
     file = _inside(path, workspace)
     if path.suffix.lower() in PROJECT_ENDINGS:
+        if path.parent.resolve() != workspace.folder:
+            raise UserError(
+                f"{path}: lies in a folder below the workspace {workspace.folder}, expected a "
+                "project directly in it; leave --workspace out"
+            )
         return path.stem, opened(workspace, path.stem)
     if path.suffix.lower() in DESIGN_ENDINGS:
         return path.stem, _of_design(path, workspace)
     return fit_name(path.stem), Document({"mesh": file}).require_sound(workspace.folder)
+
+
+def _is_file(path: Path) -> bool:
+    """Whether a name is one of a file at all."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # too long, or a null byte
+        return False
 
 
 def _inside(path: Path, workspace: Workspace) -> str:
@@ -99,11 +128,18 @@ def _of_design(path: Path, workspace: Workspace) -> Document:
     if kind_of(path, "a Carillon design (HDF5)")[0] != "design":
         raise UserError(f"{path}: is no design, expected one that carillon design wrote")
     settings = dict(read_design(path).settings)
+    try:
+        check(settings, project_schema())
+    except UserError as error:
+        raise UserError(
+            f"{path}: tells no project that it was made for ({error}); open its project or its "
+            "mesh instead"
+        ) from None
     folder = workspace.folder
     for entry in (settings, *settings["targets"]):
         for key in ("mesh", "forest", "clip"):
-            if entry.get(key) is not None and not str(entry[key]).startswith(BUILTIN_PREFIX):
-                entry[key] = _relative(str(entry[key]), folder)
+            if entry.get(key) is not None and not entry[key].startswith(BUILTIN_PREFIX):
+                entry[key] = _relative(entry[key], folder)
     document = document_of(settings)
     for file in files_of(document):
         workspace.path(file)
@@ -113,7 +149,8 @@ def _of_design(path: Path, workspace: Workspace) -> Document:
 def _relative(name: str, folder: Path) -> str:
     """The path of a file from a folder, where a design names it from where it was made."""
     for path in (Path(name), folder / name, folder / Path(name).name):
-        resolved = path.resolve()
-        if resolved.is_file() and resolved.is_relative_to(folder):
-            return str(resolved.relative_to(folder))
+        with suppress(OSError, ValueError, RuntimeError):  # no name of a file
+            resolved = path.resolve()
+            if resolved.is_file() and resolved.is_relative_to(folder):
+                return str(resolved.relative_to(folder))
     return name

@@ -21,6 +21,7 @@ from studio.session.examples import EXAMPLES
 from studio.session.history import History
 from studio.session.listening import Clips
 from studio.session.pages import Pages
+from studio.session.restoring import kept, restored, restored_name
 from studio.session.searching import Searching
 from studio.session.upkeep import Upkeep
 from studio.session.workspace import Workspace
@@ -180,12 +181,10 @@ class DesignStudio:
     async def export(self, kind: str, target: str | None) -> Download:
         """The design in another form."""
         design = await self.designed()
-        out = self.workspace.temporary(f"export.{kind}")
-        try:
+        with self.workspace.exporting() as folder:
+            out = folder / f"export.{kind}"
             await self._exports.call("make", design, kind, target, str(out), seconds=EXPORT_SECONDS)
             content = out.read_bytes()
-        finally:
-            out.unlink(missing_ok=True)
         stem = self.name if target is None or kind != "wav" else f"{self.name}-{target}"
         return Download(f"{stem}.{kind}", MEDIA_TYPES[kind], content)
 
@@ -334,7 +333,7 @@ class DesignStudio:
             "saved": self.saved == self.document,
             "searching": self.is_searching,
             "fine": self.fine,
-            "history": self.history.as_json(),
+            "history": kept(self.history, self.workspace),
         }
 
     def restore(self, session: Mapping[str, Any]) -> None:
@@ -342,14 +341,16 @@ class DesignStudio:
 
         Raises
         ------
-        LookupError, TypeError, ValueError, UserError
+        OutsideError
+            If it names files outside of the workspace.
+        LookupError, TypeError, ValueError, AttributeError, ArithmeticError, UserError
             If it is none.
         """
-        history = History.from_json(session["history"])
-        history.document.require_sound(self.workspace.folder)
-        self.history, self.saved = history, history.document if session["saved"] else None
+        name, history = restored_name(session["name"]), restored(session["history"], self.workspace)
+        saved, fine = bool(session["saved"]), bool(session["fine"])
         self.is_searching = bool(session["searching"])
-        self.fine = bool(session["fine"])
+        self.name, self.fine = name, fine
+        self.history, self.saved = history, history.document if saved else None
 
 
 _OF_VOXELS = ("mesh", "unit", "resolution", "fill", "components", "discretisation")

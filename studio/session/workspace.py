@@ -5,14 +5,18 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 from collections.abc import Mapping
+from contextlib import AbstractContextManager, ExitStack
+from itertools import count
 from pathlib import Path
 from typing import Any
 
-from carillon.documents import read_yaml
-from carillon.errors import UserError
-from carillon.files import atomic_path
+from carillon.documents import MOST_BYTES, parse_yaml, read_yaml
+from carillon.errors import UserError, one_line
+from carillon.held_folder import HeldFolder
 from carillon.locks import take
+from carillon.places import cause, require_plain
 from sound.project.template import project_text
 
 OWN_FOLDER = ".studio"
@@ -21,66 +25,103 @@ PROJECT_ENDINGS = (".yaml", ".yml")
 MOST_PROJECTS = 200
 """That are listed."""
 LONGEST_NAME = 64
+SESSION = "session.json"
+MOST_SESSION_BYTES = 1 << 28
+"""Of a session that is gone on with: one of thousands of unknowns and all its steps has less."""
+_DESIGNS, _LOCK, _EXPORT = "designs", "lock", "export-"
 _NAME = re.compile(r"[A-Za-z0-9_-]+")
+_NUMBERED = re.compile(r"[0-9]{1,20}\.h5")
+"""Designs that the studio itself has named."""
+
+
+class OutsideError(UserError):
+    """A file that is named and lies outside of the workspace."""
 
 
 class Workspace:
     """Files of a workspace, which nothing leads out of.
 
+    The folder itself may be a link, or be reached through links, as its user has named it.  What
+    the studio writes or removes in it may not, since folders come from others, too.
+
     Raises
     ------
     UserError
-        If the folder cannot be written, or another studio works in it.
+        If the folder cannot be written, another studio works in it, or what the studio keeps there
+        for itself is no folder or file, but a link for instance.
     """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder.resolve()
-        try:
-            self._own = self.folder / OWN_FOLDER
-            (self._own / "designs").mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise UserError(
-                f"{folder}: cannot be written ({error.strerror}), expected a folder for the "
-                "studio's files; name another by --workspace"
-            ) from None
-        self._lock = take(
-            self._own / "lock", f"{folder}: another studio works in this folder; use that one"
-        )
+        require_plain(self.folder)
+        with ExitStack() as ending:
+            try:
+                self.folder.mkdir(parents=True, exist_ok=True)
+                self._files = HeldFolder(self.folder)
+                ending.callback(self._files.close)
+                self._own = self._files.child(OWN_FOLDER)
+                ending.callback(self._own.close)
+                self._designs = self._own.child(_DESIGNS)
+                ending.callback(self._designs.close)
+            except OSError as error:
+                raise UserError(
+                    f"{folder}: cannot be written ({cause(error)}), expected a folder for the "
+                    "studio's files; name another by --workspace"
+                ) from None
+            for name in (SESSION, _LOCK):
+                self._own.require_replaceable(name)
+            self._lock = take(
+                self._own.path / _LOCK,
+                f"{folder}: another studio works in this folder; use that one",
+            )
+            self._ending = ending.pop_all()
+        self._own.remove_passing(_EXPORT)
 
     def close(self) -> None:
         """Let another studio have the folder."""
-        (self._own / "lock").unlink(missing_ok=True)
+        self._own.remove(_LOCK)
         os.close(self._lock)
+        self._ending.close()
 
     def path(self, name: str) -> Path:
         """Where a file is that a project names.
 
         Raises
         ------
-        UserError
+        OutsideError
             If that is outside of the folder, by whatever way.
+        UserError
+            If there can be no such file.
         """
-        path = (self.folder / name).resolve()
-        if not path.is_relative_to(self.folder):
+        try:
+            path = (self.folder / name).resolve()
+        except (OSError, ValueError, RuntimeError) as error:  # a null byte, a link to itself
             raise UserError(
+                f"{name:.200}: is no name of a file ({one_line(str(error))}), expected one in the "
+                "workspace"
+            ) from None
+        if not path.is_relative_to(self.folder):
+            raise OutsideError(
                 f"{name}: lies outside of the workspace {self.folder.name}, expected a file in it; "
                 "copy it there"
             )
         return path
 
     def put(self, name: str, content: bytes) -> str:
-        """Write an uploaded file under its name, or another one if that has another content."""
+        """Write an uploaded file under its name, or another one if something else has that."""
         stem, suffix = Path(name).stem, Path(name).suffix
         for number in range(1, 10_000):
             free = name if number == 1 else f"{stem}-{number}{suffix}"
-            path = self.path(free)
-            if path.is_file() and path.read_bytes() == content:
+            if self._files.has_file(free) and self._holds(free, content):
                 return free
-            if not path.exists():
-                with atomic_path(path) as temporary:
-                    temporary.write_bytes(content)
+            if not self._files.has(free):
+                self._files.write(free, content)
                 return free
         raise UserError(f"{name}: there are too many files of this name; give it another")
+
+    def _holds(self, name: str, content: bytes) -> bool:
+        with self._files.reading(name) as stream:
+            return stream.read(len(content) + 1) == content
 
     def projects(self) -> list[str]:
         """Names of the projects, without ending."""
@@ -101,56 +142,93 @@ class Workspace:
                 return read_yaml(path, "a project")
         raise UserError(f"{name}: there is no such project in the workspace")
 
+    def require_savable(self, name: str) -> None:
+        """Check that all files of a project may be written.
+
+        Raises
+        ------
+        UserError
+            If the name is none for a project, or one of its files is a link or something else that
+            the studio does not write to.
+        """
+        require_name(name)
+        for file in (f"{name}.yaml", f"{name}.yaml~", f"{name}.h5"):
+            self._files.require_replaceable(file)
+
     def write_project(self, name: str, described: Mapping[str, Any]) -> None:
-        """Write a project's file; one that was edited by hand stays beside it, as NAME.yaml~."""
-        path = self.path(f"{require_name(name)}.yaml")
-        if path.is_file() and _is_edited(path):
-            with atomic_path(path.with_name(f"{path.name}~")) as temporary:
-                temporary.write_bytes(path.read_bytes())
-        with atomic_path(path) as temporary:
-            temporary.write_text(project_text(described), encoding="utf-8")
+        """Write a project's file; one that was edited by hand stays beside it, as NAME.yaml~.
+
+        Raises
+        ------
+        UserError
+            As `require_savable` does, or if a file cannot be written.
+        """
+        self.require_savable(name)
+        file = f"{name}.yaml"
+        if self._files.has_file(file) and self._is_edited(file):
+            self._copy(file, f"{file}~")
+        self._files.write(file, project_text(described).encode())
+
+    def write_design(self, name: str, design: Path) -> None:
+        """Write a project's design, a copy of another file.
+
+        Raises
+        ------
+        UserError
+            As `require_savable` does, or if a file cannot be read or written.
+        """
+        self.require_savable(name)
+        try:
+            with open(design, "rb") as source, self._files.writing(f"{name}.h5") as copy:
+                shutil.copyfileobj(source, copy)
+        except OSError as error:
+            raise UserError(f"{design}: cannot be read ({cause(error)})") from None
+
+    def _copy(self, name: str, other: str) -> None:
+        with self._files.reading(name) as source, self._files.writing(other) as copy:
+            shutil.copyfileobj(source, copy)
+
+    def _is_edited(self, name: str) -> bool:
+        """Whether a project's file has anything in it that writing it again would lose."""
+        try:
+            text = self._files.read(name, MOST_BYTES).decode()
+            return text != project_text(parse_yaml(text))
+        except (UserError, UnicodeDecodeError, LookupError, TypeError, AttributeError):
+            return True
 
     def design(self, name: str) -> Path:
         """The design that goes with a project."""
         return self.path(f"{name}.h5")
 
     def new_design(self) -> Path:
-        """A name for a design that undo may go back to."""
-        folder = self._own / "designs"
-        taken = [int(path.stem) for path in folder.glob("*.h5") if path.stem.isdigit()]
-        return folder / f"{max(taken, default=0) + 1}.h5"
+        """A name for a design that undo may go back to, which nothing has yet."""
+        taken = set(self._designs.names())
+        numbers = [int(Path(name).stem) for name in taken if _NUMBERED.fullmatch(name)]
+        free = (f"{number}.h5" for number in count(max(numbers, default=0) + 1))
+        return self._designs.path / next(name for name in free if name not in taken)
 
     def forget_designs(self, kept: set[str]) -> None:
         """Remove all such designs but those that are `kept`."""
-        for path in (self._own / "designs").glob("*.h5"):
-            if str(path) not in kept:
-                path.unlink(missing_ok=True)
+        for name in self._designs.names():
+            is_own = _NUMBERED.fullmatch(name) and self._designs.has_file(name)
+            if is_own and str(self._designs.path / name) not in kept:
+                self._designs.remove(name)
 
-    def temporary(self, name: str) -> Path:
-        """A place for a file that is soon removed."""
-        return self._own / name
+    def exporting(self) -> AbstractContextManager[Path]:
+        """A new folder for a file that is soon removed, and it with it."""
+        return self._own.passing(_EXPORT)
 
     def write_session(self, session: Mapping[str, Any]) -> None:
         """Write what the studio goes on with when it is started again."""
-        with atomic_path(self._own / "session.json") as temporary:
-            temporary.write_text(json.dumps(session), encoding="utf-8")
+        self._own.write(SESSION, json.dumps(session).encode())
 
     def read_session(self) -> dict[str, Any] | None:
         """What `write_session` wrote last; None if there is nothing that can be used."""
         try:
-            session = json.loads((self._own / "session.json").read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            session = json.loads(self._own.read(SESSION, MOST_SESSION_BYTES))
+        except (UserError, ValueError, RecursionError):
             return None
         return session if isinstance(session, dict) else None
-
-
-def _is_edited(path: Path) -> bool:
-    """Whether a project's file has anything in it that writing it again would lose."""
-    try:
-        values = read_yaml(path, "a project")
-        return path.read_text(encoding="utf-8") != project_text(values)
-    except (UserError, UnicodeDecodeError, LookupError, TypeError, AttributeError):
-        return True
 
 
 def require_name(name: str) -> str:

@@ -1,0 +1,127 @@
+"""Sessions as they are kept between two runs, and gone on with: nothing in them leads elsewhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from carillon.errors import UserError
+from studio.session.document import Document, Material, files_of
+from studio.session.history import History
+from studio.session.workspace import OWN_FOLDER, OutsideError, Workspace
+
+NONSENSE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, UserError)
+"""What is raised where a session is none, or one of another version."""
+LONGEST_NAME = 255
+"""Characters of a project's name, as long as that of a file."""
+
+
+def kept(history: History, workspace: Workspace) -> dict[str, Any]:
+    """A history as plain values, designs by their paths from the workspace's folder.
+
+    So the folder may be moved, or given to somebody else.
+    """
+    return _with_designs(history, lambda design: _from_folder(design, workspace)).as_json()
+
+
+def restored(values: Mapping[str, Any], workspace: Workspace) -> History:
+    """The history that `kept` told.
+
+    Raises
+    ------
+    OutsideError
+        If any document in it names a file outside of the workspace.
+    LookupError, TypeError, ValueError, AttributeError, ArithmeticError, UserError
+        If it is none.
+    """
+    history = History.from_json(dict(values))
+    sound: list[tuple[Any, Any]] = []
+    for document in _documents(history):
+        # Most steps have the settings and targets of the one before.
+        if (document.settings, document.targets) not in sound[-1:]:
+            for file in files_of(document):
+                workspace.path(file)
+            if document.mesh is not None or document.settings or document.targets:
+                document.require_sound(workspace.folder)
+            sound.append((document.settings, document.targets))
+        if document.heard not in (None, "A", "B"):
+            raise ValueError(f"a material is heard as {document.heard!r}")
+        for material in _materials(document):
+            _require_finite(material)
+    return _with_designs(history, lambda design: str(_found(design, workspace)))
+
+
+def restored_name(name: Any) -> str:
+    """The project's name in a session.
+
+    Raises
+    ------
+    ValueError
+        If it is none.
+    """
+    if not isinstance(name, str) or not 0 < len(name) <= LONGEST_NAME:
+        raise ValueError("the name is none")
+    return name
+
+
+def _documents(history: History) -> Iterator[Document]:
+    yield history.document
+    yield from (document for _, document in (*history.before, *history.after))
+
+
+def _materials(document: Document) -> list[Material]:
+    return [each for each in (document.material, document.kept) if each is not None]
+
+
+def _require_finite(material: Material) -> None:
+    if not all(map(math.isfinite, material.z)):
+        raise ValueError("a material has coordinates that are not finite")
+    if material.design is not None and not isinstance(material.design, str):
+        raise TypeError(f"a design is named {material.design!r}")
+
+
+def _with_designs(history: History, named: Callable[[str], str]) -> History:
+    """The history, each design of it by another name."""
+
+    def changed(document: Document) -> Document:
+        return replace(document, material=renamed(document.material), kept=renamed(document.kept))
+
+    def renamed(material: Material | None) -> Material | None:
+        if material is None or material.design is None:
+            return material
+        return replace(material, design=named(material.design))
+
+    return History(
+        changed(history.document),
+        [(name, changed(document)) for name, document in history.before],
+        [(name, changed(document)) for name, document in history.after],
+    )
+
+
+def _from_folder(design: str, workspace: Workspace) -> str:
+    path = Path(design)
+    inside = path.is_relative_to(workspace.folder)
+    return str(path.relative_to(workspace.folder)) if inside else design
+
+
+def _found(design: str, workspace: Workspace) -> Path:
+    """Where a design is that a session names, if only by where it was before the folder was moved.
+
+    Raises
+    ------
+    OutsideError
+        If it is outside of the workspace, and there is none of its name inside.
+    """
+    own = Path(OWN_FOLDER, "designs", Path(design).name)
+    names = [design, str(own) if Path(design).parts[-3:] == own.parts else Path(design).name]
+    for name in names:
+        try:
+            path = workspace.path(name)
+        except OutsideError:
+            continue
+        if path.is_file() or name == design:
+            return path
+    raise OutsideError(f"the design {design} lies outside of the workspace {workspace.folder.name}")
