@@ -9,7 +9,6 @@ import secrets
 import socket
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qs
 
 from starlette.datastructures import MutableHeaders
@@ -140,12 +139,24 @@ class Guard:
     def _has_cookie(self, scope: Scope) -> bool:
         found = False
         for header in _values(scope, b"cookie"):
-            try:
-                morsel = SimpleCookie(header).get(self._cookie)
-            except CookieError:
-                continue
-            found = found or (morsel is not None and _same(morsel.value, self._keys.cookie))
+            for value in cookie_values(header, self._cookie):
+                found |= _same(value, self._keys.cookie)
         return found
+
+
+def cookie_values(header: str, name: str) -> list[str]:
+    """Values of all cookies of a name in a header of a browser.
+
+    Cookies of other programs of this machine are sent along, whatever they hold: they are for all
+    of its ports, and libraries give up on those that no standard allows.
+
+    Examples
+    --------
+    >>> cookie_values('a=b c; key=1; d={"e": [1, 2]}; key=2; keys=3', "key")
+    ['1', '2']
+    """
+    parts = (part.partition("=") for part in header.split(";"))
+    return [value.strip(" \t") for key, _, value in parts if key.strip(" \t") == name]
 
 
 _NO_COOKIE = (
@@ -179,6 +190,7 @@ def _is_address(name: str) -> bool:
 
 
 def _same(given: str, secret: str) -> bool:
+    """Whether a secret was given, in a time that tells nothing of it."""
     return hmac.compare_digest(given.encode(errors="surrogateescape"), secret.encode())
 
 
