@@ -113,6 +113,15 @@ def test_missing_and_other_files_are_answered_in_one_sentence(tmp_path):
         read_wav(tmp_path / "text.wav")
 
 
+@pytest.mark.parametrize("name", ["c.raw", "c.RAW", "c.wav", "c"])
+def test_samples_without_a_header_are_answered_in_one_sentence(tmp_path, samples, name):
+    path = tmp_path / name
+    path.write_bytes(samples.astype("<i2").tobytes())
+    with pytest.raises(UserError) as caught:
+        read_wav(path)
+    assert re.fullmatch(rf"{path}: [^\n]*expected a sound clip \(WAV\)[^\n]*", str(caught.value))
+
+
 def with_field(field: bytes, offset: int, value: int) -> Callable[[bytes], bytes]:
     """Changes a number of four bytes behind the name of a chunk."""
 

@@ -123,3 +123,30 @@ def test_a_design_is_replaced_whole(path: Path) -> None:
     other: Design = replace(small_design(), evidence={"stopped": "later"})
     write_design(path, other)
     assert read_design(path).evidence == {"stopped": "later"}
+
+
+SETTINGS = {
+    "[]": "settings",
+    "5": "settings",
+    "null": "settings",
+    '"text"': "settings",
+    '{"mesh": 5}': "mesh",
+    '{"unit": "metre"}': "unit",
+    '{"unit": 0}': "unit",
+    '{"unit": NaN}': "unit",
+    '{"unit": true}': "unit",
+    '{"material": 5}': "material",
+    '{"damping": []}': "damping",
+    '{"damping": {"source": ["clips"]}}': "damping.source",
+}
+EVIDENCE = {"[]": "evidence", '{"cost": "low"}': "cost", '{"cost_start": []}': "cost_start"}
+
+
+@pytest.mark.parametrize("name", ["settings", "evidence"])
+def test_settings_and_evidence_of_another_kind_are_told(path: Path, name: str) -> None:
+    given = SETTINGS if name == "settings" else EVIDENCE
+    for text, key in given.items():
+        with edited(path) as file:
+            file[name][()] = text
+        with pytest.raises(UserError, match=rf"design.h5: holds .*{key} .*, expected .*; make"):
+            read_design(path)

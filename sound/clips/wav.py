@@ -115,6 +115,11 @@ def _channels(path: Path) -> tuple[Array, int]:
             channels = file.read(dtype="float64", always_2d=True)
             missing = missing or file.frames - len(channels)
             rate = int(file.samplerate)
+    except TypeError:  # how the library asks for what a header tells
+        raise UserError(
+            "has samples alone by its name, without a header that tells their rate and kind; "
+            "expected a sound clip (WAV), convert it to one"
+        ) from None
     except (soundfile.LibsndfileError, OSError) as error:
         said = cause(error) if isinstance(error, OSError) else str(error).rsplit(": ", 1)[-1]
         raise UserError(

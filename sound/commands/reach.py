@@ -57,7 +57,13 @@ def run(arguments: argparse.Namespace) -> int:
     project = with_optimiser(load_project(options.project), workers=options.workers)
     design = read_design(options.design)
     _require_same_targets(options, [target.name for target in project.targets], design)
-    content: dict[str, Any] = {"fall": fall(design.evidence["cost_start"], design.evidence["cost"])}
+    start, cost = (design.evidence.get(key) for key in ("cost_start", "cost"))
+    if start is None or cost is None:
+        raise UserError(
+            f"{options.design}: does not tell how its cost fell, expected a design that carillon "
+            "design found; design it anew"
+        )
+    content: dict[str, Any] = {"fall": fall(start, cost)}
     if options.unless_fall is None or content["fall"] < options.unless_fall:
         problem = prepare(project, design.targets)
         require_same_voxels(problem, design)

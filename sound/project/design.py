@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -167,6 +169,8 @@ class Design:
 
 def fault(design: Design) -> str:
     """What does not fit together in a design, in a few words; nothing if all does."""
+    if said := _fault_of_texts(design):
+        return said
     targets = design.targets
     T, N = len(targets.names), len(targets.frequencies)
     kept = RIGID_MODES + N
@@ -211,6 +215,42 @@ def fault(design: Design) -> str:
         if not 0 <= vertex < count:
             return f"names the surface's vertex {vertex}, of which there are {count}"
     return ""
+
+
+_SETTINGS: Mapping[str, tuple[str, Callable[[Any], bool]]] = {
+    "mesh": ("a text", lambda value: isinstance(value, str)),
+    "unit": ("a number above 0", lambda value: _is_number(value) and value > 0.0),
+    "material": ("keys and values", lambda value: isinstance(value, Mapping)),
+    "damping": ("keys and values", lambda value: isinstance(value, Mapping)),
+}
+"""What is used of a design's settings, if it is there."""
+SOURCES = ("clips", "material")
+"""Of dampings."""
+
+
+def _fault_of_texts(design: Design) -> str:
+    """What cannot be used of settings and evidence, which are JSON of any kind in a file."""
+    texts: dict[str, Any] = {"settings": design.settings, "evidence": design.evidence}
+    for name, found in texts.items():
+        if not isinstance(found, Mapping):
+            return f"holds {name} {found!r:.100}, expected keys and values"
+    for key, (expected, is_such) in _SETTINGS.items():
+        value = design.settings.get(key)
+        if key in design.settings and not is_such(value):
+            return f"holds the setting {key} {value!r:.100}, expected {expected}"
+    source = design.settings.get("damping", {}).get("source", SOURCES[0])
+    if source not in SOURCES:
+        return f"holds the setting damping.source {source!r:.100}, expected {' or '.join(SOURCES)}"
+    for key in ("cost", "cost_start"):
+        value = design.evidence.get(key, 0.0)
+        if not _is_number(value):
+            return f"holds the evidence {key} {value!r:.100}, expected a number"
+    return ""
+
+
+def _is_number(value: Any) -> bool:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return is_number and math.isfinite(value)
 
 
 def _shape_of_moduli(model: Solid) -> tuple[int, ...]:

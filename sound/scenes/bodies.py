@@ -155,7 +155,7 @@ def _of_design(entry: ObjectEntry, design: Design) -> Body:
     young = design.young_near(design.surface_vertices)
     giving = compliance(young, design.model.poisson)
     listening = Listening.of_design(design, solid)
-    body = _assembled(entry, rigid, shape, giving, solid, upright(design.settings["mesh"]))
+    body = _assembled(entry, rigid, shape, giving, solid, upright(design.settings.get("mesh", "")))
     return replace(body, listening=listening)
 
 
