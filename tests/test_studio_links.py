@@ -14,9 +14,12 @@ import pytest
 
 from carillon.errors import UserError
 from carillon.files import atomic_path
+from sound.project.design_file import write_design
 from studio.session import open_studio
 from studio.session.files import save
 from studio.session.workspace import OWN_FOLDER
+from tests.edited_files import edited
+from tests.small_design import small_design
 
 DIARY = "what nobody else writes to"
 PROJECT = "# mine\nmesh: builtin:bar\ntargets:\n  - {name: end, vertex: 0, clip: end.wav}\n"
@@ -390,3 +393,31 @@ def test_names_that_lead_out_are_one_sentence(folder, name):
         assert "expected" in str(caught.value)
 
     begin_and_end(folder, do=look)
+
+
+DESIGNS = {
+    "a list": [],
+    "targets that are a number": {"mesh": "builtin:bar", "targets": 5},
+    "targets of another kind": {"mesh": "builtin:bar", "targets": [5]},
+    "no targets": {"mesh": "builtin:bar"},
+    "a forest with a null byte": {
+        "mesh": "builtin:bar",
+        "forest": "a\0b",
+        "targets": [{"name": "a", "vertex": 0, "clip": "a.wav"}],
+    },
+    "a mesh elsewhere": {
+        "mesh": "../home/diary",
+        "targets": [{"name": "a", "vertex": 0, "clip": "a.wav"}],
+    },
+}
+
+
+@pytest.mark.parametrize("what", DESIGNS)
+def test_a_design_of_odd_settings_is_refused_in_one_sentence(folder, what):
+    path = folder / "design.h5"
+    write_design(path, small_design())
+    with edited(path) as file:
+        file["settings"][()] = json.dumps(DESIGNS[what])
+    with pytest.raises(UserError) as caught:
+        open_studio(str(path), folder)
+    assert "expected" in sentence(caught)

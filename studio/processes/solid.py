@@ -177,7 +177,7 @@ class SolidBench:
             sounding.pushed(found.model, found.elastic_modes, self._inward),
             self._at_vertices(found.young),
         )
-        cost = {"cost": found.evidence["cost"]}
+        cost = {"cost": found.evidence.get("cost")}
         return bank(heard, self._positions, self._aimed(), {**cost, **header})
 
     def fine_bank_of(self, design: str, header: dict[str, Any]) -> bytes:

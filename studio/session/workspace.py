@@ -98,7 +98,7 @@ class Workspace:
         except (OSError, ValueError, RuntimeError) as error:  # a null byte, a link to itself
             raise UserError(
                 f"{name:.200}: is no name of a file ({one_line(str(error))}), expected one in the "
-                "workspace"
+                "workspace; name another"
             ) from None
         if not path.is_relative_to(self.folder):
             raise OutsideError(
