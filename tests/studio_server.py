@@ -15,6 +15,7 @@ from urllib.parse import quote
 
 from websockets.sync.client import ClientConnection, connect
 
+from studio.server.connections import Connections
 from studio.server.guard import Keys
 from studio.server.serve import listen, make_server, serve_and_close
 from studio.server.uploads import Limits
@@ -132,12 +133,16 @@ class Served:
 
 
 @contextmanager
-def served(limits: Limits | None = None, host: str = "127.0.0.1") -> Iterator[Served]:
+def served(
+    limits: Limits | None = None,
+    host: str = "127.0.0.1",
+    connections: Connections | None = None,
+) -> Iterator[Served]:
     """A made-up studio, served by a thread."""
     studio, keys, limits = StubStudio(), Keys(), limits or Limits()
     with listen(host, None) as listener:
         port = listener.getsockname()[1]
-        server = make_server(studio, listener, host, keys, limits)
+        server = make_server(studio, listener, host, keys, limits, connections)
         loop = asyncio.new_event_loop()
         started = threading.Event()
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 from urllib.parse import quote
 
@@ -35,7 +35,12 @@ LONGEST_NUMBER = 15
 
 
 def make_app(
-    studio: Studio, keys: Keys, host: str, port: int, limits: Limits | None = None
+    studio: Studio,
+    keys: Keys,
+    host: str,
+    port: int,
+    limits: Limits | None = None,
+    let_in: Callable[[Any], None] | None = None,
 ) -> Guard:
     """The studio as an ASGI application, guarded.
 
@@ -47,6 +52,8 @@ def make_app(
         Where the server listens.
     limits
         What it bears.
+    let_in
+        Told the address of a client that may ask.
     """
     routes = _Routes(studio, limits or Limits())
     app = Starlette(
@@ -65,7 +72,7 @@ def make_app(
         exception_handlers=_HANDLERS,
     )
     app.router.redirect_slashes = False
-    return Guard(app, keys, host, port)
+    return Guard(app, keys, host, port, let_in)
 
 
 class _Routes:

@@ -7,8 +7,9 @@ import ipaddress
 import re
 import secrets
 import socket
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from typing import Any
 from urllib.parse import parse_qs
 
 from starlette.datastructures import MutableHeaders
@@ -69,10 +70,19 @@ class Guard:
         Address that the server listens on.
     port
         Port that it listens on; the cookie is named after it, as cookies are the same for all.
+    let_in
+        Told the address of each client that may ask, before it is answered.
     """
 
-    def __init__(self, app: ASGIApp, keys: Keys, host: str, port: int) -> None:
-        self._app, self._keys = app, keys
+    def __init__(
+        self,
+        app: ASGIApp,
+        keys: Keys,
+        host: str,
+        port: int,
+        let_in: Callable[[Any], None] | None = None,
+    ) -> None:
+        self._app, self._keys, self._let_in = app, keys, let_in
         self._names = host_names(host)
         self._addresses = not is_loopback(host)
         self._cookie = f"carillon_studio_{port}"
@@ -84,6 +94,7 @@ class Guard:
         send = _with_headers(send)
         said = self._fault(scope)
         if scope["type"] == "http" and said is None and self._is_entrance(scope):
+            self._welcome(scope)
             answer = entrance(self._cookie, self._keys.cookie)
             await answer(scope, receive, send)
         elif said is None and not self._has_cookie(scope):
@@ -91,7 +102,12 @@ class Guard:
         elif said is not None:
             await refusal(scope, receive, send, 403, said)
         else:
+            self._welcome(scope)
             await self._app(scope, receive, send)
+
+    def _welcome(self, scope: Scope) -> None:
+        if self._let_in is not None:
+            self._let_in(scope.get("client"))
 
     def _fault(self, scope: Scope) -> str | None:
         """What is wrong with where a request is sent, or with where it comes from."""

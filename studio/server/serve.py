@@ -16,6 +16,7 @@ from carillon.errors import UserError
 from carillon.places import cause
 from studio.interface import Studio
 from studio.server.app import make_app
+from studio.server.connections import BURST, Connections, most_connections, protocols
 from studio.server.guard import Keys
 from studio.server.uploads import Limits
 
@@ -23,8 +24,8 @@ FIRST_PORT = 8620
 """Port that is tried first, and the next ones after it."""
 PORTS = 20
 """How many are tried before the system chooses one."""
-CONNECTIONS = 200
-"""Of browsers at a time."""
+QUEUE = 128
+"""Connections that wait in the system until they are accepted."""
 ENDING_SECONDS = 3
 """Time for answers under way when the server ends."""
 CLOSING_SECONDS = 20
@@ -63,7 +64,7 @@ def listen(host: str, port: int | None) -> socket.socket:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             listener.bind((address[0], each, *address[2:]))
-            listener.listen(128)
+            listener.listen(QUEUE)
         except OSError as error:
             listener.close()
             failure = error
@@ -103,22 +104,31 @@ def serve(
 
 
 def make_server(
-    studio: Studio, listener: socket.socket, host: str, keys: Keys, limits: Limits
+    studio: Studio,
+    listener: socket.socket,
+    host: str,
+    keys: Keys,
+    limits: Limits,
+    connections: Connections | None = None,
 ) -> uvicorn.Server:
-    """The server, which has not begun yet."""
+    """The server, which has not begun yet; `connections` are made from the limits if not given."""
+    if connections is None:
+        most = most_connections(limits.connections)
+        connections = Connections(most, limits.waiting_seconds)
+    http, page = protocols(connections)
     # Of what uvicorn tells, faults of the program's alone are of use to people.
     logging.getLogger("uvicorn.error").addFilter(_is_fault)
     config = uvicorn.Config(
-        make_app(studio, keys, host, listener.getsockname()[1], limits),
-        http="h11",
-        ws="websockets-sansio",
+        make_app(studio, keys, host, listener.getsockname()[1], limits, connections.let_in),
+        http=http,
+        ws=page,
         loop="asyncio",
         lifespan="off",
         log_config=None,
         access_log=False,
         server_header=False,
         proxy_headers=False,
-        limit_concurrency=CONNECTIONS,
+        backlog=BURST,
         ws_max_size=limits.message_bytes,
         ws_per_message_deflate=False,
         timeout_graceful_shutdown=ENDING_SECONDS,
@@ -152,8 +162,11 @@ async def _serve(
         signal.signal(signal.SIGHUP, server.handle_exit)
     while not (server.started or serving.done()):
         await asyncio.sleep(0.01)
-    if ready is not None and not serving.done():
-        ready()
+    if not serving.done():
+        # Of those that wait, the server takes few at a time.
+        listener.listen(QUEUE)
+        if ready is not None:
+            ready()
     await serving
 
 

@@ -35,6 +35,10 @@ class Limits:
         Time in which it has to end.
     uploads
         How many may go on at a time.
+    connections
+        How many may be open at a time.
+    waiting_seconds
+        Time in which a connection has to ask for something that it may have.
     """
 
     mesh_bytes: int = 64 << 20
@@ -43,6 +47,8 @@ class Limits:
     idle_seconds: float = 10.0
     upload_seconds: float = 600.0
     uploads: int = 4
+    connections: int = 200
+    waiting_seconds: float = 10.0
 
 
 class UploadError(Exception):
