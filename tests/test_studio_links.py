@@ -15,6 +15,7 @@ import pytest
 from carillon.errors import UserError
 from carillon.files import atomic_path
 from sound.project.design_file import write_design
+from studio.server import browser
 from studio.session import open_studio
 from studio.session.files import save
 from studio.session.workspace import OWN_FOLDER
@@ -421,3 +422,29 @@ def test_a_design_of_odd_settings_is_refused_in_one_sentence(folder, what):
     with pytest.raises(UserError) as caught:
         open_studio(str(path), folder)
     assert "expected" in sentence(caught)
+
+
+@pytest.mark.parametrize(
+    "name", ["a\nb", "\udcff", "-", "~", "..", "a b", "é", "x" * 250, "a.yaml"]
+)
+def test_projects_of_odd_names_are_listed_and_opened_or_refused(folder, name):
+    (folder / "pan.yaml").rename(folder / f"{name}.yaml")
+
+    async def look(studio):
+        (listed,) = studio.state()["projects"]
+        assert listed["name"] == name
+        await studio.call("open_project", {"project": listed["project"]})
+        json.dumps(studio.state()).encode()
+        with pytest.raises(UserError):
+            await written(studio, f"{name}/")
+
+    begin_and_end(folder, do=look)
+    assert (folder / f"{name}.yaml").read_text() == PROJECT
+
+
+def test_the_page_that_leads_the_browser_is_written_through_no_link(folder, monkeypatch):
+    link = plant(folder, browser.NAME, "diary")
+    monkeypatch.setenv("BROWSER", "made-up")
+    monkeypatch.setattr("studio.server.browser.webbrowser.open", lambda address: True)
+    assert browser.open_page("http://127.0.0.1:1/?token=secret", folder) == link
+    assert not link.is_symlink() and "secret" in link.read_text()
