@@ -20,29 +20,6 @@ REAL, INTEGER = "f", "iu"
 _NAMES = {REAL: "real numbers", INTEGER: "integers"}
 
 
-def require_whole(group: h5py.Group) -> None:
-    """Check that what a group holds lies in its file, where a checksum covers it, and is all there.
-
-    Raises
-    ------
-    UserError
-        If there is a link other than the names of its own content, or a dataset whose numbers are
-        those of other files, or of which some were never written.
-    """
-    for name in group:
-        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-            raise refused(group, f"holds a link, {name!r}, expected what it names")
-        entry = group[name]
-        if isinstance(entry, h5py.Group):
-            require_whole(entry)
-        elif not isinstance(entry, h5py.Dataset):
-            continue
-        elif entry.is_virtual or entry.external:
-            raise refused(group, f"dataset {name!r} takes its numbers from another file")
-        elif entry.id.get_storage_size() < entry.nbytes:
-            raise refused(group, f"dataset {name!r} is incomplete")
-
-
 def find(
     group: h5py.Group, name: str, shape: Sequence[int | None], kind: str = REAL
 ) -> h5py.Dataset:

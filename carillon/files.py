@@ -15,12 +15,15 @@ from typing import Any
 
 import h5py
 
-from carillon.datasets import require_whole
+from carillon.content import require_whole
 from carillon.errors import ConvergenceError, UserError
 from carillon.leftovers import remove_leftovers, temporary_name
 from carillon.places import cause as cause
 from carillon.places import first_line, require_file, target_of
 from carillon.places import require_writable as require_writable
+
+LONGEST_KIND = 40
+"""Characters of what a file says it is, in messages."""
 
 SEAL_BYTES = 512
 """Length of the seal, which stands before the HDF5 file proper (its user block)."""
@@ -275,9 +278,24 @@ def kind_of(path: str | Path, what: str) -> tuple[str, int]:
     require_file(path, what)
     try:
         with _opened(path) as file:
-            return str(file.attrs["kind"]), int(file.attrs["schema_version"])
+            return str(_claimed(file, "kind")), int(_claimed(file, "schema_version"))
     except Exception:  # HDF5 has many ways to say that bytes make no sense
         return "", -1
+
+
+def _claimed(file: h5py.File, name: str, otherwise: Any = None) -> Any:
+    """An attribute of a file, if it is a single value: a list may be of any length.
+
+    Raises
+    ------
+    KeyError
+        If there is none, and nothing to take otherwise.
+    """
+    if name in file.attrs and file.attrs.get_id(name).shape == ():
+        return file.attrs[name]
+    if otherwise is None:
+        raise KeyError(name)
+    return otherwise
 
 
 def _opened(path: str | Path) -> h5py.File:
@@ -300,14 +318,16 @@ def _require_whole(path: Path, file: h5py.File) -> None:
 
 def _require_kind(path: Path, file: h5py.File, kind: str, schema: int) -> None:
     try:
-        stored_kind = str(file.attrs.get("kind", "something else"))
-        stored_schema = int(file.attrs.get("schema_version", -1))
+        stored_kind = str(_claimed(file, "kind", "something else"))
+        stored_schema = int(_claimed(file, "schema_version", -1))
     except Exception as error:  # HDF5 has many ways to say that bytes make no sense
         raise UserError(
             f"{path}: is damaged ({first_line(error)}); generate the file again"
         ) from None
     if stored_kind != kind:
-        raise UserError(f"{path}: holds {stored_kind!r}, expected a Carillon {kind} file")
+        raise UserError(
+            f"{path}: holds {stored_kind[:LONGEST_KIND]!r}, expected a Carillon {kind} file"
+        )
     if stored_schema != schema:
         raise UserError(
             f"{path}: written with {kind} schema {stored_schema}, this version reads schema "

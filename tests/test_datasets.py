@@ -6,7 +6,8 @@ import h5py
 import numpy as np
 import pytest
 
-from carillon.datasets import INTEGER, number, read, require_whole
+from carillon.content import require_whole
+from carillon.datasets import INTEGER, number, read
 from carillon.errors import UserError
 
 
