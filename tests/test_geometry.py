@@ -58,8 +58,8 @@ def random_mesh(seed: int = 3):
     ("file", "text", "expected"),
     [
         ("absent.obj", None, "no such file"),
-        ("notes.txt", "hello", "format '.txt' is unknown"),
-        ("noending", "hello", "is unknown"),
+        ("notes.txt", "hello", "format '.txt' is not read"),
+        ("noending", "hello", "is not read"),
         ("damaged.ply", "ply\nthis is no header", "could not be read"),
         ("damaged.glb", "x" * 40, "could not be read"),
         ("empty.obj", "", "has no faces"),

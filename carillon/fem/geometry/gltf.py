@@ -1,5 +1,6 @@
 """glTF files in the plain form that trimesh reads rightly: triangles of floating-point positions.
 
+Nothing else of them is handed on: neither pictures, nor what no triangle uses, nor files beside it.
 Legal, but not read as what they say: positions in integers, normalised or not
 (KHR_mesh_quantization), sparse accessors, fans of triangles, lines beside triangles, meshes at a
 camera's node. What takes an extension that is not known here is refused (Khronos: glTF 2.0, 3.12).
@@ -10,6 +11,7 @@ from __future__ import annotations
 import base64
 import json
 import struct
+from collections import Counter
 from collections.abc import Callable
 from typing import Any
 from urllib.parse import unquote
@@ -46,38 +48,52 @@ _DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", _UINT32: "<u4", _
 _COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 
+_CORNERS = {_TRIANGLES: 1, _STRIP: 3, _FAN: 3}
+"""Modes that are read, and corners of triangles for an index."""
+_POSITION_BYTES, _CORNER_BYTES = 12, 4
 
-def plain_gltf(content: bytes, beside: Callable[[str], bytes], name: str) -> bytes | None:
-    """A GLB with the triangles of a glTF file, text or binary; None if the file is plain itself.
+DEEPEST = 128
+"""Nodes inside each other."""
+SHARED_BYTES, GROWTH = 1 << 27, 4
+"""Bytes of triangles that any file may stand for, and how often its own length a longer one may.
+
+Nodes share meshes, and meshes share positions, so a few bytes can stand for any number.
+"""
+_KEPT = ("mesh", "children", "name", "matrix", "translation", "rotation", "scale")
+"""Of a node."""
+
+Beside = Callable[[str, int | None], bytes]
+
+
+def plain_gltf(content: bytes, beside: Beside, name: str) -> bytes:
+    """A GLB with the triangles of a glTF file, text or binary.
 
     Parameters
     ----------
     beside
-        Reads a file in the mesh's folder.
+        Reads as many bytes of a file in the mesh's folder.
     name
         Of the mesh, for messages.
 
     Raises
     ------
     UserError
-        If the triangles are in an extension that is not read.
+        If the triangles are in an extension that is not read, or far more than the file is long;
+        nothing is allocated for them then.
     Exception
         Of any kind, for a file that is no glTF.
     """
     header, binary = _parts(content)
     _require_known(header.get("extensionsRequired", []), name)
     _require_at_rest(header, name)
-    if _is_plain(header):
-        return None
+    _require_tree(header.get("nodes", []))
     reader = _Reader(header, binary, beside, name)
+    reader.require_proportion(len(content))
     data, meshes = _Data(), []
     for mesh in header.get("meshes", []):
         primitives = [reader.triangles(each, data) for each in mesh["primitives"]]
         meshes.append({"primitives": [each for each in primitives if each is not None]})
-    nodes = [
-        {key: value for key, value in node.items() if key not in ("camera", "extensions")}
-        for node in header.get("nodes", [])
-    ]
+    nodes = [{key: node[key] for key in _KEPT if key in node} for node in header.get("nodes", [])]
     kept: Header = {key: header[key] for key in ("asset", "scene", "scenes") if key in header}
     return data.glb({**kept, "nodes": nodes, "meshes": meshes})
 
@@ -120,25 +136,23 @@ def _require_at_rest(header: Header, name: str) -> None:
             )
 
 
-def _is_plain(header: Header) -> bool:
-    accessors = header.get("accessors", [])
-    for mesh in header.get("meshes", []):
-        for primitive in mesh["primitives"]:
-            if primitive.get("mode", _TRIANGLES) not in (_TRIANGLES, _STRIP):
-                return False
-            positions = accessors[primitive["attributes"]["POSITION"]]
-            used = [positions]
-            used += [accessors[primitive["indices"]]] if "indices" in primitive else []
-            if positions["componentType"] != _FLOAT:
-                return False
-            if any("sparse" in each or "bufferView" not in each for each in used):
-                return False
-    if any("camera" in node and "mesh" in node for node in header.get("nodes", [])):
-        return False
-    views = header.get("bufferViews", [])
-    uris = [each.get("uri", "") for each in header.get("buffers", [])]
-    named = any("%" in uri and not uri.startswith("data:") for uri in uris)
-    return not named and not any("extensions" in view for view in views)
+def _require_tree(nodes: list[Header]) -> None:
+    """Check that no node is in two others, or too deep: each one's place is a product of those."""
+    above = dict[int, int]()
+    for number, node in enumerate(nodes):
+        for child in node.get("children", []):
+            if above.setdefault(child, number) != number:
+                raise ValueError(f"node {child} is in two others")
+    depths = dict[int, int]()
+    for number in range(len(nodes)):
+        way: list[int] = []
+        while number in above and number not in depths and len(way) <= DEEPEST:
+            way.append(number)
+            number = above[number]
+        depth = depths.get(number, 0) + len(way)
+        if depth > DEEPEST:
+            raise ValueError(f"its nodes are more than {DEEPEST} deep, or in themselves")
+        depths.update({each: depth - at for at, each in enumerate(way)})
 
 
 class _Data:
@@ -187,16 +201,53 @@ class _Data:
 class _Reader:
     """Values of the accessors of a glTF file."""
 
-    def __init__(
-        self, header: Header, binary: bytes, beside: Callable[[str], bytes], name: str
-    ) -> None:
+    def __init__(self, header: Header, binary: bytes, beside: Beside, name: str) -> None:
         self._header, self._binary, self._beside, self._name = header, binary, beside, name
-        self._read: dict[int, bytes] = {}
+        self._read: dict[str, bytes] = {}
+
+    def require_proportion(self, length: int) -> None:
+        """Check that the triangles take no more than some multiple of the bytes that there are.
+
+        Parameters
+        ----------
+        length
+            Of the file, to which the files are added that it names.
+
+        Raises
+        ------
+        UserError
+            If they take more.
+        """
+        accessors = self._header.get("accessors", [])
+        uses = Counter(node.get("mesh") for node in self._header.get("nodes", []))
+        taken = 0
+        for number, mesh in enumerate(self._header.get("meshes", [])):
+            for primitive in mesh["primitives"]:
+                if primitive.get("mode", _TRIANGLES) in _CORNERS:
+                    taken += max(uses[number], 1) * self._bytes_of(primitive, accessors)
+        there = length + sum(map(len, self._read.values()))
+        if taken > SHARED_BYTES + GROWTH * there:
+            raise UserError(
+                f"{self._name}: its triangles take {taken:,} bytes, far more than the {there:,} of "
+                "the file; leave out parts, or export one part alone"
+            )
+
+    def _bytes_of(self, primitive: Header, accessors: list[Header]) -> int:
+        """Bytes of positions and triangles, whose buffers are read."""
+        used = [accessors[primitive["attributes"]["POSITION"]]]
+        used += [accessors[primitive["indices"]]] if "indices" in primitive else []
+        for each, kind in zip(used, ("VEC3", "SCALAR")):
+            if each["type"] != kind or int(each["count"]) < 1:
+                raise ValueError(f"found {each['count']} {each['type']}, expected some {kind}")
+            if "bufferView" in each:
+                self._buffer(self._header["bufferViews"][each["bufferView"]])
+        corners = _CORNERS[primitive.get("mode", _TRIANGLES)] * int(used[-1]["count"])
+        return _POSITION_BYTES * int(used[0]["count"]) + _CORNER_BYTES * corners
 
     def triangles(self, primitive: Header, data: _Data) -> Header | None:
         """The primitive as triangles, whose values go into `data`; None of points and lines."""
         mode = primitive.get("mode", _TRIANGLES)
-        if mode not in (_TRIANGLES, _STRIP, _FAN):
+        if mode not in _CORNERS:
             return None
         extensions = list(primitive.get("extensions", {}))
         positions = self._values(primitive["attributes"]["POSITION"], extensions)
@@ -238,13 +289,15 @@ class _Reader:
     def _rows(self, place: Header, component: int, count: int, columns: int) -> NDArray[Any]:
         dtype = np.dtype(_DTYPES[component])
         view = self._header["bufferViews"][place["bufferView"]]
-        start = view.get("byteOffset", 0)
-        content = self._buffer(view)[start : start + view["byteLength"]]
-        stride = view.get("byteStride") or columns * dtype.itemsize
+        start, row = view.get("byteOffset", 0), columns * dtype.itemsize
+        content = memoryview(self._buffer(view))[start : start + view["byteLength"]]
+        stride = view.get("byteStride") or row
         begin = place.get("byteOffset", 0)
-        end = begin + (count - 1) * stride + columns * dtype.itemsize
-        if begin < 0 or count < 1 or end > len(content):
+        end = begin + (count - 1) * stride + row
+        if start < 0 or begin < 0 or count < 1 or end > len(content):
             raise ValueError(f"an accessor reaches to byte {end} of {len(content)}")
+        if stride < row:
+            raise ValueError(f"its rows of {row} bytes begin every {stride} bytes")
         rows: NDArray[Any] = np.ndarray(
             (count, columns), dtype, content, begin, (stride, dtype.itemsize)
         )
@@ -252,18 +305,19 @@ class _Reader:
 
     def _buffer(self, view: Header) -> bytes:
         number = view["buffer"]
-        if number not in self._read:
-            uri = self._header["buffers"][number].get("uri")
-            if uri is None and (number > 0 or not self._binary):
-                extensions = ", ".join(view.get("extensions", {})) or "another file"
-                raise UserError(
-                    f"{self._name}: has data in {extensions} alone, which is not read; export it "
-                    "again, uncompressed"
-                )
-            if uri is None:
-                self._read[number] = self._binary
-            elif uri.startswith("data:"):
-                self._read[number] = base64.b64decode(uri.partition("base64,")[2])
+        buffer = self._header["buffers"][number]
+        uri = buffer.get("uri")
+        if uri is None and (number > 0 or not self._binary):
+            extensions = ", ".join(view.get("extensions", {})) or "another file"
+            raise UserError(
+                f"{self._name}: has data in {extensions} alone, which is not read; export it "
+                "again, uncompressed"
+            )
+        if uri is None:
+            return self._binary
+        if uri not in self._read:
+            if uri.startswith("data:"):
+                self._read[uri] = base64.b64decode(uri.partition("base64,")[2])
             else:
-                self._read[number] = self._beside(unquote(uri))
-        return self._read[number]
+                self._read[uri] = self._beside(unquote(uri), buffer.get("byteLength"))
+        return self._read[uri]

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from trimesh.resolvers import FilePathResolver
 
 from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
+from carillon.fem.geometry.beside import MOST_BYTES, Beside, NoFiles
 from carillon.fem.geometry.builtin import builtin_surface
 from carillon.fem.geometry.gltf import plain_gltf
 from carillon.fem.geometry.headers import require_plain_ply, whole_stl
@@ -27,11 +27,12 @@ from carillon.places import require_file
 # A box thinner than this fraction of its longest side holds no solid that voxels could show.
 FLATNESS = 1e-6
 
-# A few bytes of them may stand for any number.
-_ARCHIVES = {"bz2", "zip", "tar.bz2", "tar.gz"}
+FORMATS = ("glb", "gltf", "obj", "off", "ply", "stl", "stl_ascii")
+"""Endings of mesh files.
 
-# Of a mesh file; triangles take about 50 bytes each.
-MOST_BYTES = 2 << 30
+Of others that trimesh reads, depending on what else is installed, a few bytes may stand for any
+number: archives (zip, 3mf), parts that hold each other (3mf, dae), entities (xaml, dae).
+"""
 
 
 def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
@@ -40,7 +41,7 @@ def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
     Parameters
     ----------
     mesh
-        Path of a file that trimesh reads (obj, stl, ply, off, glb, ...; the objects of a scene are
+        Path of a file in one of `FORMATS` (obj, stl, ply, off, glb, ...; the objects of a scene are
         concatenated), or ``builtin:NAME`` for a built-in object.
     unit
         Metres per unit of the mesh's coordinates; built-in objects are in metres already, so for
@@ -54,7 +55,8 @@ def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
     Raises
     ------
     UserError
-        If the file is missing, not readable as a mesh, shorter than it says, without faces, flat,
+        If the file is missing, not readable as a mesh, longer than `MOST_BYTES` with those that it
+        names, shorter than it says, without faces, flat,
         or holds coordinates that are not finite; if its faces are there both ways, or cannot be
         turned alike; if `unit` is out of range, or the surface too large, too small or too far
         from the origin (see `carillon.limits`); if the built-in name is unknown.
@@ -89,17 +91,6 @@ def surface_name(mesh: str) -> str:
 
 _PLY_LENGTH = "PLY is unexpected length"
 """What trimesh says of binary PLY files whose faces are not all of one length."""
-
-
-class _MeshFolder(FilePathResolver):
-    """Other files that a mesh names: regular ones in its folder, which end, as pipes may not."""
-
-    def absolute(self, name: str) -> Path:
-        """Where the file `name` is; ValueError if it is none."""
-        path = Path(super().absolute(name))
-        if not path.is_file():
-            raise ValueError(f"no file {name!r} beside it")
-        return path
 
 
 def _read(path: Path) -> trimesh.Trimesh:
@@ -139,7 +130,7 @@ def _read(path: Path) -> trimesh.Trimesh:
 
 def _loaded(path: Path) -> Any:
     """What trimesh reads of a file, in a form that it reads rightly."""
-    folder = _MeshFolder(str(path))
+    nothing = NoFiles(str(path))
     kind = path.suffix.lstrip(".").lower()
     content: bytes | None = None
     match kind:
@@ -154,19 +145,18 @@ def _loaded(path: Path) -> Any:
         case "obj":
             content = plain_obj(path.read_bytes().removeprefix(codecs.BOM_UTF8))
         case "gltf" | "glb":
-            content, kind = plain_gltf(path.read_bytes(), folder.get, str(path)), "glb"
+            content, kind = plain_gltf(path.read_bytes(), Beside(path).get, str(path)), "glb"
     if content is None:
-        return trimesh.load(path, resolver=folder, process=False)
-    return trimesh.load(BytesIO(content), file_type=kind, resolver=folder, process=False)
+        return trimesh.load(path, resolver=nothing, process=False)
+    return trimesh.load(BytesIO(content), file_type=kind, resolver=nothing, process=False)
 
 
 def _require_mesh_file(path: Path) -> None:
-    require_file(path, "a mesh (obj, stl, ply, off, glb, ...) or builtin:NAME")
-    formats = sorted(trimesh.available_formats() - _ARCHIVES)
-    if path.suffix.lstrip(".").lower() not in formats:
+    require_file(path, "a mesh (obj, stl, ply, off, glb or gltf) or builtin:NAME")
+    if path.suffix.lstrip(".").lower() not in FORMATS:
         raise UserError(
-            f"{path}: the mesh format {path.suffix or '(no ending)'!r} is unknown; "
-            f"convert the mesh to one of {', '.join(formats)}"
+            f"{path}: the mesh format {path.suffix or '(no ending)'!r} is not read; convert the "
+            f"mesh to one of {', '.join(FORMATS)}"
         )
     size = path.stat().st_size
     if size > MOST_BYTES:

@@ -1,0 +1,69 @@
+"""Files that a mesh names: in its folder, and together with it no longer than a mesh may be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from trimesh.resolvers import FilePathResolver
+
+from carillon.errors import UserError
+
+MOST_BYTES = 2 << 30
+"""Of a mesh file with those that it names; triangles take about 50 bytes each."""
+
+
+class Beside:
+    """Regular files in the folder of a mesh, which end, as pipes may not.
+
+    Attributes
+    ----------
+    read : bytes that they have taken so far, the mesh itself included.
+    """
+
+    def __init__(self, mesh: Path) -> None:
+        self._mesh = mesh
+        self._folder = FilePathResolver(str(mesh))
+        self.read = mesh.stat().st_size
+
+    def get(self, name: str, length: int | None) -> bytes:
+        """The first `length` bytes of the file `name`, all of them if that is None.
+
+        Raises
+        ------
+        UserError
+            If they are too many, which is seen before they are read.
+        ValueError
+            If there is no such file in the folder, or it is shorter.
+        """
+        path = self._found(name)
+        size = path.stat().st_size
+        length = size if length is None else length
+        if not 0 <= length <= size:
+            raise ValueError(f"the file {name!r} has {size:,} bytes, the mesh says {length:,}")
+        if self.read + length > MOST_BYTES:
+            raise UserError(
+                f"{self._mesh}: is {self.read + length:,} bytes with the file {name!r} that it "
+                f"names, expected at most {MOST_BYTES:,}; simplify the mesh"
+            )
+        self.read += length
+        with open(path, "rb") as stream:
+            return stream.read(length)
+
+    def _found(self, name: str) -> Path:
+        for candidate in (name.strip(), name.strip().lstrip("/"), Path(name).name):
+            try:
+                path = self._folder.absolute(candidate)
+            except ValueError:  # it lies elsewhere
+                continue
+            if path.is_file():
+                return path
+        raise ValueError(f"no file {name!r} beside it")
+
+
+class NoFiles(FilePathResolver):  # type: ignore[misc]
+    """What trimesh reads beside a mesh: nothing, since a shape has no need of materials."""
+
+    def get(self, name: str) -> Any:
+        """Raise FileNotFoundError, which trimesh takes for a file that is not there."""
+        raise FileNotFoundError(name)
