@@ -14,6 +14,8 @@ EDGES = (1e-16, 1e9)
 """Edge of a cell [m]."""
 FARTHEST = 1e8
 """Distance of a solid from the origin, in multiples of its longest side."""
+MESH_BYTES = 2 << 30
+"""Length of a mesh file with those that it names; triangles take about 50 bytes each."""
 UNITS = (1e-12, 1e12)
 """Metres per unit of a mesh."""
 MODULI = (1e-3, 1e15)

@@ -11,6 +11,7 @@ from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError, one_line
 from carillon.fem.geometry.surface import surface_name
 from carillon.files import kind_of
+from carillon.limits import MESH_BYTES
 from carillon.progress import say
 from sound.project.design_file import read_design
 from sound.project.schema import check, project_schema
@@ -120,6 +121,9 @@ def _inside(path: Path, workspace: Workspace) -> str:
             f"{path}: lies outside of the workspace {workspace.folder}, expected a file in it; "
             "leave --workspace out, or copy it and what it names"
         )
+    size = path.stat().st_size
+    if size > MESH_BYTES:
+        raise UserError(f"{path}: {size:,} bytes, expected a mesh of at most {MESH_BYTES:,}")
     return workspace.put(path.name, path.read_bytes())
 
 

@@ -18,6 +18,8 @@ PACKAGED = Path(__file__).with_name("rates.json")
 """Rates that come with the package."""
 
 VERSION = 3
+MOST_BYTES = 1 << 20
+"""Of a file."""
 
 
 def checked(values: Any, where: str) -> Rates:
@@ -47,7 +49,11 @@ def load_rates(path: str | Path = PACKAGED) -> Rates:
         If it cannot be read, is no JSON, or holds anything else.
     """
     try:
-        values = json.loads(require_file(path, "rates (JSON)").read_text())
+        with open(require_file(path, "rates (JSON)"), "rb") as stream:
+            content = stream.read(MOST_BYTES + 1)
+        if len(content) > MOST_BYTES:
+            raise UserError(f"{path}: longer than {MOST_BYTES:,} bytes, expected rates (JSON)")
+        values = json.loads(content)
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({cause(error)}), expected rates") from None
     except (ValueError, RecursionError) as error:

@@ -8,9 +8,7 @@ from typing import Any
 from trimesh.resolvers import FilePathResolver
 
 from carillon.errors import UserError
-
-MOST_BYTES = 2 << 30
-"""Of a mesh file with those that it names; triangles take about 50 bytes each."""
+from carillon.limits import MESH_BYTES
 
 
 class Beside:
@@ -41,10 +39,10 @@ class Beside:
         length = size if length is None else length
         if not 0 <= length <= size:
             raise ValueError(f"the file {name!r} has {size:,} bytes, the mesh says {length:,}")
-        if self.read + length > MOST_BYTES:
+        if self.read + length > MESH_BYTES:
             raise UserError(
                 f"{self._mesh}: is {self.read + length:,} bytes with the file {name!r} that it "
-                f"names, expected at most {MOST_BYTES:,}; simplify the mesh"
+                f"names, expected at most {MESH_BYTES:,}; simplify the mesh"
             )
         self.read += length
         with open(path, "rb") as stream:

@@ -14,14 +14,14 @@ import trimesh
 
 from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
-from carillon.fem.geometry.beside import MOST_BYTES, Beside, NoFiles
+from carillon.fem.geometry.beside import Beside, NoFiles
 from carillon.fem.geometry.builtin import builtin_surface
 from carillon.fem.geometry.gltf import plain_gltf
 from carillon.fem.geometry.headers import require_plain_ply, whole_stl
 from carillon.fem.geometry.obj import plain_obj
 from carillon.fem.geometry.off import obj_of_off
 from carillon.fem.geometry.orientation import turned_alike
-from carillon.limits import EXTENTS, FARTHEST, UNITS, require_within
+from carillon.limits import EXTENTS, FARTHEST, MESH_BYTES, UNITS, require_within
 from carillon.places import require_file
 
 # A box thinner than this fraction of its longest side holds no solid that voxels could show.
@@ -55,7 +55,7 @@ def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
     Raises
     ------
     UserError
-        If the file is missing, not readable as a mesh, longer than `MOST_BYTES` with those that it
+        If the file is missing, not readable as a mesh, longer than `MESH_BYTES` with those that it
         names, shorter than it says, without faces, flat,
         or holds coordinates that are not finite; if its faces are there both ways, or cannot be
         turned alike; if `unit` is out of range, or the surface too large, too small or too far
@@ -159,9 +159,9 @@ def _require_mesh_file(path: Path) -> None:
             f"mesh to one of {', '.join(FORMATS)}"
         )
     size = path.stat().st_size
-    if size > MOST_BYTES:
+    if size > MESH_BYTES:
         raise UserError(
-            f"{path}: {size:,} bytes, expected at most {MOST_BYTES:,}; simplify the mesh, whose "
+            f"{path}: {size:,} bytes, expected at most {MESH_BYTES:,}; simplify the mesh, whose "
             "details are far smaller than voxels"
         )
 
