@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import resource
 import signal
 import time
 from pathlib import Path
@@ -13,6 +14,8 @@ import pytest
 from mpi4py import MPI
 
 from carillon.errors import UserError
+from carillon.measurement import memory_bytes
+from carillon.memory import FIRST_TO_GO
 from studio.processes.worker import Worker
 from tests.listening import listening
 from tests.patience import HANG_SECONDS, wait_for
@@ -51,6 +54,11 @@ class Bench:
     def pid(self):
         return os.getpid()
 
+    def limits(self):
+        return resource.getrlimit(resource.RLIMIT_DATA)[0], Path(
+            "/proc/self/oom_score_adj"
+        ).read_text()
+
     def directory(self):
         return MPI.Is_initialized(), os.environ["OMPI_MCA_orte_top_session_dir"]
 
@@ -74,6 +82,12 @@ def test_calls_are_answered_in_order_by_one_object(worker):
         return await asyncio.gather(*(worker.call("add", number) for number in (1, 2, 3)))
 
     assert asyncio.run(call()) == [1, 3, 6]
+
+
+def test_a_worker_spares_the_memory_of_its_machine(worker):
+    limit, score = asyncio.run(worker.call("limits"))
+    assert limit > 2 * memory_bytes()  # infinite is -1
+    assert int(score) >= FIRST_TO_GO
 
 
 def test_news_come_before_the_answer(worker):

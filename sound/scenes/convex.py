@@ -27,6 +27,7 @@ from carillon.datasets import INTEGER, read, refused
 from carillon.errors import UserError
 from carillon.files import create_h5, open_h5
 from carillon.limits import require_within
+from carillon.memory import spare_the_machine
 from sound.scenes.cuttable import (
     GRIDS,
     HOLLOW,
@@ -167,6 +168,7 @@ def _search(task: str, result: str) -> None:
     """What the process of its own does: read solids, let CoACD cut them, write the parts."""
     import coacd
 
+    spare_the_machine()
     coacd.set_log_level("error")
     parts: list[Array] = []
     with np.load(task) as given:

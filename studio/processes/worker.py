@@ -21,6 +21,7 @@ from typing import Any
 from carillon.children import end_with_parent
 from carillon.cli import meaning
 from carillon.errors import UserError, one_line
+from carillon.memory import spare_the_machine
 from carillon.step import leave_nothing
 
 # Processes are ended at once, whatever they hold. That this is then cleaned up need not be
@@ -201,6 +202,7 @@ def _serve(pipe: Connection, work: str) -> None:
     os.environ["OMP_NUM_THREADS"] = "1"
     module, name = work.split(":")
     done = getattr(import_module(module), name)()
+    spare_the_machine()
     while True:
         try:
             number, method, arguments, has_news = pipe.recv()
