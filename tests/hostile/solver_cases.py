@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from tests.hostile import zoo_growing
 from tests.hostile.cases import NO_NUMBERS, NO_WHOLE_NUMBERS, Copy, Place, Table
 from tests.hostile.zoo_meshes import VALID_NAMES
 
@@ -219,6 +220,15 @@ each(
     ],
 )
 each(
+    "mesh that grows",
+    MESH,
+    [
+        *(f"ZOO/grows-{name}.glb" for name in ("zeros", "sparse", "instances", "chain", "circle")),
+        *("ZOO/grows-rows.glb", "ZOO/grows-buffer.gltf", "ZOO/grows-parts.3mf"),
+        "ZOO/grows-parts.dae",
+    ],
+)
+each(
     "mesh absurd",
     MESH,
     [
@@ -395,6 +405,7 @@ NO_MODES = (
 )
 each("audit of", "audit VALUE", [f"ZOO/modes-{damage}.h5" for damage in DAMAGES])
 each("audit of", "audit VALUE", NO_MODES)
+each("audit of", "audit VALUE", [f"ZOO/{name}" for name in zoo_growing.FILES])
 hostile("audit of a long name", ["audit", "x" * 300 + ".h5"])
 hostile("audit of a good and a bad one", "audit ZOO/modes.h5 ZOO/modes-cut.h5", "modes-cut.h5")
 control(

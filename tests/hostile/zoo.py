@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tests.hostile import zoo_hdf5, zoo_meshes, zoo_numbers, zoo_texts
+from tests.hostile import zoo_growing, zoo_hdf5, zoo_meshes, zoo_numbers, zoo_texts
 from tests.hostile.cases import Place
 from tests.hostile.places import KINDS, put_place
 from tests.zygote import Job, Zygote
@@ -72,6 +72,7 @@ class Zoo:
         zoo_meshes.make(folder)
         zoo_numbers.make(folder, VOXELS)
         zoo_hdf5.make(folder)
+        zoo_growing.make(folder)
         zoo_texts.make(folder, PROJECT, CONFIGURATION)
         _make_odd_places(folder)
         return cls(folder)
