@@ -16,7 +16,8 @@ class Beside:
 
     Attributes
     ----------
-    read : bytes that they have taken so far, the mesh itself included.
+    read
+        Bytes that they have taken so far, the mesh itself included.
     """
 
     def __init__(self, mesh: Path) -> None:

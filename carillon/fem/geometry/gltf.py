@@ -62,10 +62,10 @@ Nodes share meshes, and meshes share positions, so a few bytes can stand for any
 _KEPT = ("mesh", "children", "name", "matrix", "translation", "rotation", "scale")
 """Of a node."""
 
-Beside = Callable[[str, int | None], bytes]
+ReadBeside = Callable[[str, int | None], bytes]
 
 
-def plain_gltf(content: bytes, beside: Beside, name: str) -> bytes:
+def plain_gltf(content: bytes, beside: ReadBeside, name: str) -> bytes:
     """A GLB with the triangles of a glTF file, text or binary.
 
     Parameters
@@ -201,7 +201,7 @@ class _Data:
 class _Reader:
     """Values of the accessors of a glTF file."""
 
-    def __init__(self, header: Header, binary: bytes, beside: Beside, name: str) -> None:
+    def __init__(self, header: Header, binary: bytes, beside: ReadBeside, name: str) -> None:
         self._header, self._binary, self._beside, self._name = header, binary, beside, name
         self._read: dict[str, bytes] = {}
 
