@@ -75,6 +75,54 @@ def test_nothing_in_the_folder_runs(planted, tmp_path, words):
     assert made == {words[words.index("--out") + 1]}
 
 
+CHAIN = (
+    *(("modes", *BAR, "--method", method) for method in ("hcms", "lobpcg", "arpack")),
+    ("modes", *BAR, "--coarsen", "ddfem"),
+    ("compare", "modes.h5", "modes.h5"),
+    ("audit", "modes.h5"),
+    ("respond", "modes.h5", "--out", "motion.h5"),
+    ("extract", "end.wav", "--out", "end.json"),
+    ("init", "new.yaml", "--mesh", "builtin:bar", "--clips", "end.wav"),
+    ("design", "p.yaml", "--workers", "2", "--out", "d.h5"),
+    ("check", "d.h5"),
+    ("render", "d.h5", "--target", "end", "--out", "heard.wav"),
+    *(("export", "d.h5", "--out", f"d.{ending}") for ending in ("glb", "dsp", "npy")),
+    ("generate", "--samples", "600", "--workers", "2", "--out", "shard.h5"),
+    ("inspect-shard", "shard.h5"),
+    ("train", "shard.h5", "--trees", "2", "--out", "forests.h5"),
+    ("inspect-forests", "forests.h5"),
+)
+"""Commands, one after another: later ones take what earlier ones have made."""
+
+
+@pytest.mark.nightly
+def test_nothing_in_the_folder_runs_whatever_the_command(planted, tmp_path):
+    project(planted, workers=2)
+    for words in CHAIN:
+        done = carillon(planted, *words, check=False)
+        assert done.returncode == 0, (words, done.stderr)
+        assert not (tmp_path / "mark").exists(), (words, (tmp_path / "mark").read_text())
+    assert not (planted / "kernels").exists()
+
+
+@pytest.mark.nightly
+def test_an_archive_brings_nothing_to_life(planted, tmp_path):
+    """Modules, settings and links survive in an archive; so does the project, the control."""
+    project(planted, workers=1)
+    diary = tmp_path / "diary"
+    diary.write_text("dear diary")
+    for name in ("MUJOCO_LOG.TXT", ".d.h5.partial", "d.h5.lock"):
+        (planted / name).symlink_to(diary)
+    archive, opened = tmp_path / "gift.tar", tmp_path / "opened"
+    subprocess.run(["tar", "-cf", archive, "-C", planted, "."], check=True)
+    opened.mkdir()
+    subprocess.run(["tar", "-xf", archive, "-C", opened], check=True)
+    carillon(opened, "design", "p.yaml", "--workers", "2", "--out", "d.h5")
+    assert (opened / "d.h5").is_file()
+    assert diary.read_text() == "dear diary"
+    assert not (tmp_path / "mark").exists()
+
+
 def test_planted_files_are_what_would_run(planted, tmp_path):
     """The control: without protection each of them does."""
     for program in ("import signal", "from petsc4py import PETSc", "import numba.core.config as c"):
