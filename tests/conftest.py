@@ -120,8 +120,11 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 
 def _environment(threads: int, extra: Mapping[str, str] | None) -> dict[str, str]:
+    # What a command that was called in this process has set is not handed on: with a safe path,
+    # `python -m mpi4py SCRIPT` looks for modules beside the script in place of PYTHONPATH.
+    given = {name: value for name, value in os.environ.items() if name != "PYTHONSAFEPATH"}
     own = {"OMP_NUM_THREADS": str(threads), "PYTHONPATH": str(CHECKOUT)}
-    return {**os.environ, **own, **RANKS, **(extra or {})}
+    return {**given, **own, **RANKS, **(extra or {})}
 
 
 def _run(
