@@ -98,11 +98,11 @@ def _require_numbers_here(group: h5py.Group, name: str, dataset: h5py.Dataset, s
     """Refuse a dataset that is not all in the file as it is read."""
     if dataset.is_virtual or dataset.external:
         raise refused(group, f"dataset {name!r} takes its numbers from another file")
-    if dataset.id.get_storage_size() < _bytes_of(dataset):
-        raise refused(group, f"dataset {name!r} is incomplete")
     made = dataset.id.get_create_plist()
     if {made.get_filter(n)[0] for n in range(made.get_nfilters())} - _SAME_LENGTH:
         raise refused(group, f"dataset {name!r} is compressed, expected plain numbers")
+    if dataset.id.get_storage_size() < _bytes_of(dataset):
+        raise refused(group, f"dataset {name!r} is incomplete")
     chunk = math.prod(dataset.chunks or ()) * dataset.dtype.itemsize
     longest = max(dataset.shape or (0,))
     if max(chunk, longest) > size:

@@ -2,7 +2,8 @@
 
 PETSc reads `.petscrc` and `petscrc` in the present folder, which may be a stranger's: options there
 can load libraries and write files anywhere. It is told to skip them, and `~/.petscrc` with them;
-options of the variable PETSC_OPTIONS and of the command line hold.
+options of the variable PETSC_OPTIONS and of the command line hold. Of a `petsc.cfg` there petsc4py
+would learn where its compiled part is: it is loaded in another folder.
 
 PETSc takes the signal of a pipe that nobody reads any more for a crash, says so in ten lines and
 ends all ranks: of what is printed into `... | head`, of an answer to a page that is gone, or of
@@ -18,8 +19,11 @@ import threading
 
 import petsc4py
 
+from carillon.present_folder import elsewhere
+
 if "petsc4py.PETSc" not in sys.modules:  # else whoever has loaded it has chosen
-    petsc4py.init(["-skip_petscrc"])
+    with elsewhere():
+        petsc4py.init(["-skip_petscrc"])
 
 from petsc4py import PETSc
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import carillon.petsc  # noqa: F401
+from carillon.present_folder import elsewhere
 
-from slepc4py import SLEPc  # isort: skip
+with elsewhere():
+    from slepc4py import SLEPc
 
 __all__ = ["SLEPc"]

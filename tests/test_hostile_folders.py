@@ -18,6 +18,7 @@ from tests.listening import has_loaded, listening
 from tests.patience import HANG_SECONDS, wait_for
 from tests.rank_counts import SEVERAL
 from tests.small_project import PROJECT, write_clips
+from workflow.room import MODULES
 
 CHECKOUT = Path(present_folder.__file__).resolve().parent.parent
 PROGRAM = Path(sys.executable).with_name("carillon")
@@ -37,6 +38,9 @@ def planted(tmp_path: Path) -> Path:
     for name in (".petscrc", "petscrc"):
         (folder / name).write_text(f"-log_view :{mark}\n")
     (folder / ".numba_config.yaml").write_text("cache_dir: kernels\n")
+    (folder / "petsc.cfg").write_text("PETSC_ARCH = /proc/self/cwd/evil\n")
+    (folder / "evil").mkdir()
+    (folder / "evil" / "PETSc.py").write_text(f"open({str(mark)!r}, 'a').write('PETSc ')\n")
     return folder
 
 
@@ -167,6 +171,77 @@ def test_a_profile_of_snakemake_in_the_folder_is_not_taken(tmp_path):
     assert not mark.exists()
     assert "no-such-option" not in done.stderr
     assert (tmp_path / "found" / "validation" / "bar.html").is_file(), done.stderr
+    assert carillon(tmp_path, *words, check=False).returncode == done.returncode, "it goes on"
+
+
+def test_settings_that_a_user_names_hold(tmp_path):
+    (tmp_path / "mine").write_text("figure.facecolor: green\n")
+    program = "import carillon, matplotlib as m; print(m.rcParams['figure.facecolor'])"
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=tmp_path,
+        env={**os.environ, "MATPLOTLIBRC": "mine"},
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    assert done.stdout == "green\n"
+
+
+def test_a_folder_that_nobody_may_enter_is_no_error(monkeypatch):
+    def forbidden(*_):
+        raise PermissionError
+
+    here = os.getcwd()
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "open", forbidden)
+        with present_folder.elsewhere():
+            assert os.getcwd() == here
+
+
+def test_snakemake_adds_no_modules_of_the_present_folder(tmp_path):
+    modules = tmp_path / MODULES
+    modules.mkdir(parents=True)
+    (modules / "planted.py").write_text("print('run')\n")
+    program = "import carillon, snakemake\ntry: import planted\nexcept ImportError: print('not')"
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, check=True, capture_output=True, text=True
+    )
+    assert done.stdout == "not\n"
+
+
+@pytest.mark.parametrize("name", ["validate.log", "models", ".snakemake", "logs/deep.log"])
+def test_a_folder_of_results_leads_nowhere_else(tmp_path, name):
+    (tmp_path / "found" / name).parent.mkdir(parents=True)
+    (tmp_path / "found" / name).symlink_to(tmp_path / "elsewhere")
+    words = ("validate", "builtin:bar", "--resolution", "8", "--modes", "12", "--out", "found")
+    done = carillon(tmp_path, *words, check=False)
+    assert done.returncode == 2
+    assert f"found/{name}: is a link, expected files and folders of a run" in done.stderr
+    assert not (tmp_path / "elsewhere").exists()
+
+
+def test_a_folder_of_results_brings_no_modules(tmp_path):
+    (tmp_path / "found" / MODULES).mkdir(parents=True)
+    words = ("validate", "builtin:bar", "--resolution", "8", "--modes", "12", "--out", "found")
+    done = carillon(tmp_path, *words, check=False)
+    assert done.returncode == 2 and "holds modules that would be run" in done.stderr
+
+
+def test_sounds_of_a_search_follow_no_link(tmp_path):
+    project(tmp_path, workers=1)
+    (tmp_path / "d-end.wav").symlink_to(tmp_path / "diary")
+    done = carillon(tmp_path, "design", "p.yaml", "--watch", "--out", "d.h5", check=False)
+    assert done.returncode == 2 and "d-end.wav: is a link, expected a sound" in done.stderr
+    assert not (tmp_path / "diary").exists()
+
+
+def test_the_studio_follows_no_link_that_nobody_has_named(tmp_path):
+    (tmp_path / "data").mkdir()
+    (tmp_path / "carillon-studio").symlink_to("data")
+    done = carillon(tmp_path, "studio", "--no-browser", check=False)
+    assert done.returncode == 2 and "carillon-studio: is a link" in done.stderr
+    assert list((tmp_path / "data").iterdir()) == []
 
 
 def test_a_checkout_is_found_by_what_is_started_in_it():

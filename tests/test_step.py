@@ -63,6 +63,14 @@ def test_ranks_and_users_choose_their_network(chosen):
     assert environment == chosen
 
 
+@pytest.mark.parametrize("chosen", [{"OMPI_MCA_pml": "ob1"}, {"OMPI_MCA_btl": "tcp,self"}])
+def test_what_a_user_chooses_of_a_network_is_all_that_is_chosen(chosen):
+    environment = dict(chosen)
+    with step.without_networks(environment):
+        assert environment == {"OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "self", **chosen}
+    assert environment == chosen
+
+
 def test_what_a_lone_process_starts_looks_for_networks():
     look = "import os; print(os.environ.get('OMPI_MCA_pml'))"
     lone = (

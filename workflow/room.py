@@ -12,6 +12,8 @@ from carillon.progress import say
 
 ENOUGH = 1 << 20
 """Bytes that a run can do nothing without."""
+MODULES = ".snakemake/pip-deployments"
+"""Where Snakemake, and scripts of its rules, look for modules in the folder of a run."""
 
 
 def make_folder(folder: Path) -> None:
@@ -26,6 +28,28 @@ def make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UserError(f"{folder}: cannot be made ({cause(error)}); name another folder") from None
+
+
+def require_own(folder: Path) -> None:
+    """Check that nothing in a folder of results leads a run out of it, or into code of others.
+
+    Raises
+    ------
+    UserError
+        If there is a link anywhere in it, or a folder from which Snakemake would load modules.
+    """
+    if (folder / MODULES).exists():
+        raise UserError(
+            f"{folder / MODULES}: holds modules that would be run; remove it, or name another one"
+        )
+    for place, folders, files in os.walk(folder):
+        for name in sorted((*folders, *files)):
+            path = Path(place, name)
+            if path.is_symlink():
+                raise UserError(
+                    f"{path}: is a link, expected files and folders of a run alone; remove it, or "
+                    "name another folder"
+                )
 
 
 def require_place(folder: Path, what: str) -> None:

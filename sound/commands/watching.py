@@ -160,6 +160,8 @@ class _Writer:
         self._files = sound_files(out, [target.name for target in project.targets])
         clips = [target.clip for target in project.targets]
         for path in self._files.values():
+            if path.is_symlink():  # which nobody has named
+                raise UserError(f"{path}: is a link, expected a sound or nothing; remove it")
             require_output(path, ENDINGS, clips)
         self._cost = float("inf")
 

@@ -145,6 +145,11 @@ def _workspace(options: StudioOptions) -> Path:
     if named is None:
         is_file = options.what is not None and not options.what.startswith(BUILTIN)
         folder = Path(options.what).parent if is_file and options.what else Path(WORKSPACE)
+        if not is_file and folder.is_symlink():
+            raise UserError(
+                f"{folder}: is a link, expected a folder or nothing; name where it leads by "
+                "--workspace, or remove it"
+            )
     else:
         folder = Path(named)
     try:

@@ -37,7 +37,7 @@ from solver.correction.correction import EIGENVALUE_TOLERANCE
 from solver.response.surface import surface_of
 from workflow import settings
 from workflow.failure import cause
-from workflow.room import make_folder
+from workflow.room import make_folder, require_own
 from workflow.settings import DEFAULT_FORESTS
 from workflow.studies.base.table import read_table
 from workflow.studies.report.findings import headline
@@ -135,6 +135,7 @@ def run(arguments: argparse.Namespace) -> int:
     name = next(iter(config["models"]))
     folder = Path(arguments.out).resolve()
     make_folder(folder)
+    require_own(folder)
     with atomic_path(folder / CONFIGURATION) as temporary:
         temporary.write_text(yaml.safe_dump(config, sort_keys=False))
     say(size)
@@ -216,7 +217,8 @@ def _run_rules(folder: Path, cores: int) -> None:
     say(f"running on {cores} cores, see {log}")
     with (
         open(log, "w") as stream,
-        subprocess.Popen(command, env=environment, stdout=stream, stderr=stream) as run,
+        # In the folder of the results, as its jobs are.
+        subprocess.Popen(command, env=environment, cwd=folder, stdout=stream, stderr=stream) as run,
     ):
         try:
             _show_steps(run, log)

@@ -54,6 +54,8 @@ _POSITION_BYTES, _CORNER_BYTES = 12, 4
 
 DEEPEST = 128
 """Nodes inside each other."""
+MOST_PRIMITIVES = 10_000
+"""Groups of triangles of all meshes: each takes about a millisecond."""
 SHARED_BYTES, GROWTH = 1 << 27, 4
 """Bytes of triangles that any file may stand for, and how often its own length a longer one may.
 
@@ -221,6 +223,12 @@ class _Reader:
         accessors = self._header.get("accessors", [])
         uses = Counter(node.get("mesh") for node in self._header.get("nodes", []))
         taken = 0
+        many = sum(len(mesh["primitives"]) for mesh in self._header.get("meshes", []))
+        if many > MOST_PRIMITIVES:
+            raise UserError(
+                f"{self._name}: its meshes have {many:,} primitives, expected at most "
+                f"{MOST_PRIMITIVES:,}; join them"
+            )
         for number, mesh in enumerate(self._header.get("meshes", [])):
             for primitive in mesh["primitives"]:
                 if primitive.get("mode", _TRIANGLES) in _CORNERS:
