@@ -190,7 +190,10 @@ def test_a_failure_of_coacd_is_one_sentence(cache: Path, monkeypatch: pytest.Mon
     assert not cache.exists()
 
 
-@pytest.mark.parametrize(("name", "place"), [("vertices", (0, 0)), ("counts", 0)])
+@pytest.mark.parametrize(
+    ("name", "place"),
+    [("vertices", (0, 0)), pytest.param("counts", 0, marks=pytest.mark.nightly)],
+)
 def test_hulls_that_nobody_cut_are_not_taken_from_the_cache(cache: Path, name, place) -> None:
     surface = builtin_surface("slit-ring")
     first = parts_of(surface)

@@ -221,7 +221,7 @@ def printing(said, status):
     """In place of Popen: Snakemake that prints this and ends."""
 
     class Printing(subprocess.Popen):
-        def __init__(self, command, env, stdout, stderr):
+        def __init__(self, command, env, cwd, stdout, stderr):
             program = f"import sys; print({said!r}, end=''); sys.exit({status})"
             super().__init__([sys.executable, "-c", program], stdout=stdout, stderr=stderr)
 
