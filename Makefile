@@ -56,9 +56,10 @@ test: env  ## the tests that every change needs
 	@$(PYTHON_OF_VENV) -m pytest -q -n $(PYTEST_PROCESSES) --dist loadfile \
 		--no-loadscope-reorder --tier $(TIER) $(PYTEST_OPTIONS)
 
-test-all:  ## all tests, an hour or so; those of a clean root, too, where one can be made
+test-all:  ## all tests, an hour or so, the documentation, and a clean root where one can be made
 	@bash workflow/envs/packages.sh install faust >/dev/null || echo "tests without it are skipped"
 	@$(MAKE) test TIER=all
+	@$(MAKE) docs
 	@.ci/bare-root --reuse || { status=$$?; [ $$status -eq 77 ] || exit $$status; }
 
 check: env  ## lint, formatting, types (of the page, too), Snakemake rules
