@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from contextlib import suppress
 
 import psutil
 
@@ -12,9 +13,10 @@ def listening(processes: Iterable[psutil.Process]) -> list[str]:
     """Addresses, as `127.0.0.1:8620`, at which processes await connections or datagrams."""
     found = []
     for process in processes:
-        for each in process.net_connections(kind="inet"):
-            if each.status in (psutil.CONN_LISTEN, psutil.CONN_NONE):
-                found.append(f"{each.laddr.ip}:{each.laddr.port}")
+        with suppress(psutil.Error):  # it has ended
+            for each in process.net_connections(kind="inet"):
+                if each.status in (psutil.CONN_LISTEN, psutil.CONN_NONE):
+                    found.append(f"{each.laddr.ip}:{each.laddr.port}")
     return found
 
 
@@ -22,7 +24,7 @@ def has_loaded(process: psutil.Process, library: str) -> bool:
     """Whether a process has a library in its memory; not once it has ended."""
     try:
         return any(library in each.path for each in process.memory_maps())
-    except psutil.NoSuchProcess:
+    except psutil.Error:
         return False
 
 

@@ -266,6 +266,17 @@ def test_a_lone_process_listens_nowhere():
     assert json.loads(done.stdout) == {"sum": 0, "listening": [[]]}
 
 
+def listening_of(process: psutil.Process, run: subprocess.Popen[str]) -> list[str]:
+    """Where a process and those that it has started listen, once one of those has MPI."""
+
+    def solvers() -> list[psutil.Process]:
+        begun = process.children(recursive=True)
+        return [each for each in begun if has_loaded(each, "libmpi")]
+
+    wait_for(solvers, "a process that has MPI", run)
+    return listening([process, *process.children(recursive=True)])
+
+
 def test_processes_of_a_studio_listen_at_its_address_alone(tmp_path):
     project(tmp_path, workers=1)
     words = ("studio", "p.yaml", "--no-browser")
@@ -275,14 +286,19 @@ def test_processes_of_a_studio_listen_at_its_address_alone(tmp_path):
         try:
             assert studio.stdout is not None
             address = studio.stdout.readline().split("?")[0]
-            process = psutil.Process(studio.pid)
-
-            def solids() -> list[psutil.Process]:
-                begun = process.children(recursive=True)
-                return [each for each in begun if has_loaded(each, "libmpi")]
-
-            wait_for(solids, "a process of the studio that has MPI")
-            found = listening([process, *process.children(recursive=True)])
+            found = listening_of(psutil.Process(studio.pid), studio)
         finally:
             studio.terminate()
     assert [f"http://{each}/" for each in found] == [address]
+
+
+def test_processes_of_a_search_listen_nowhere(tmp_path):
+    project(tmp_path, workers=2)
+    words = ("design", "p.yaml", "--evaluations", "100000", "--out", "d.h5")
+    with subprocess.Popen(
+        [PROGRAM, *words], cwd=tmp_path, stderr=subprocess.PIPE, text=True
+    ) as run:
+        try:
+            assert listening_of(psutil.Process(run.pid), run) == []
+        finally:
+            run.kill()
