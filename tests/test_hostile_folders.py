@@ -262,7 +262,8 @@ def test_ranks_of_one_machine_listen_nowhere(ranks, mpiexec):
 
 def test_a_lone_process_listens_nowhere():
     command = [sys.executable, "-m", "tests.listening"]
-    done = subprocess.run(command, cwd=CHECKOUT, check=True, capture_output=True, text=True)
+    environment = {**os.environ, "PYTHONPATH": str(CHECKOUT)}
+    done = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
     assert json.loads(done.stdout) == {"sum": 0, "listening": [[]]}
 
 
