@@ -61,6 +61,7 @@ def remembered(
                 return found
             folder.chmod(0o700)
             write(path, found)
+            path.chmod(0o600)  # whatever the user lets others do with other files
             _make_room(folder)
     return found
 

@@ -106,6 +106,16 @@ def test_an_entry_that_no_search_finds_is_made_anew(clip, folder, searches, name
     assert len(searches) == 2
 
 
+def test_entries_are_found_again_where_files_are_for_a_group(clip, folder, searches):
+    before = os.umask(0o002)
+    try:
+        extract_file(clip)
+        extract_file(clip)
+    finally:
+        os.umask(before)
+    assert len(searches) == 1
+
+
 def test_the_cache_is_for_its_user_alone(clip, folder, searches, monkeypatch):
     extract_file(clip)
     (entry,) = folder.iterdir()
