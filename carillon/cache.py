@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from carillon.errors import UserError
+from carillon.places import is_own
 
 Found = TypeVar("Found")
 
@@ -57,7 +58,7 @@ def remembered(
     if folder.is_absolute():  # else the user has no home
         with suppress(UserError, OSError):
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            if not _is_own(folder.lstat(), stat.S_ISDIR):
+            if not is_own(folder.lstat(), stat.S_ISDIR):
                 return found
             folder.chmod(0o700)
             write(path, found)
@@ -77,12 +78,7 @@ def folder_of(kind: str) -> Path:
 def _is_private(path: Path, is_kind: Callable[[int], bool]) -> bool:
     """Whether a folder or file is this user's, and nobody else can write it."""
     status = path.lstat()
-    return _is_own(status, is_kind) and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
-
-
-def _is_own(status: os.stat_result, is_kind: Callable[[int], bool]) -> bool:
-    """Whether a folder or file is this user's, and no link to one."""
-    return is_kind(status.st_mode) and status.st_uid == os.geteuid()
+    return is_own(status, is_kind) and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
 def _make_room(folder: Path) -> None:

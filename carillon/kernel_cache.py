@@ -18,6 +18,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from carillon.places import is_own
+
 logger = logging.getLogger(__name__)
 
 FOLDER = "carillon-cache"
@@ -92,8 +94,7 @@ def private_folder() -> Path | None:
         with suppress(OSError):
             folder.mkdir(mode=0o700, exist_ok=True)
             status = folder.lstat()
-            own = stat.S_ISDIR(status.st_mode) and status.st_uid == os.geteuid()
-            if own and not status.st_mode & 0o077:
+            if is_own(status, stat.S_ISDIR) and not status.st_mode & 0o077:
                 tempfile.TemporaryFile(dir=folder).close()
                 return folder
     return None

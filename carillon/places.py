@@ -7,7 +7,7 @@ import os
 import stat
 import tempfile
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 
@@ -25,6 +25,11 @@ _OTHER_KINDS = (
     (stat.S_ISSOCK, "socket"),
 )
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+
+def is_own(status: os.stat_result, is_kind: Callable[[int], bool]) -> bool:
+    """Whether what `lstat` tells of is of a kind, as by `stat.S_ISDIR`, and this user's."""
+    return is_kind(status.st_mode) and status.st_uid == os.geteuid()
 
 
 def first_line(error: BaseException) -> str:

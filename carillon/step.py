@@ -18,10 +18,12 @@ from __future__ import annotations
 
 import os
 import shutil
+import stat
 from collections.abc import Iterator, Mapping, MutableMapping
 from contextlib import contextmanager, suppress
 
 from carillon.loading import while_loading
+from carillon.places import is_own
 
 _STEP = ("SLURM_STEP_ID", "SLURM_STEPID")
 _LAUNCHERS = ("PMIX_", "PMI_", "OMPI_COMM_WORLD_")
@@ -162,15 +164,9 @@ def leave_nothing(environment: Mapping[str, str], process: int) -> None:
     # Beside that of this process.
     with suppress(OSError), os.scandir(os.path.dirname(directory)) as entries:
         for entry in entries:
-            if entry.name.startswith(_name(process)) and _is_mine(entry):
+            named = entry.name.startswith(_name(process))
+            if named and is_own(entry.stat(follow_symlinks=False), stat.S_ISDIR):
                 shutil.rmtree(entry.path, ignore_errors=True)
-
-
-def _is_mine(entry: os.DirEntry[str]) -> bool:
-    """Whether an entry of a folder is a folder, no link to one, of this user's."""
-    return entry.is_dir(follow_symlinks=False) and (
-        entry.stat(follow_symlinks=False).st_uid == os.getuid()
-    )
 
 
 def _is_own(directory: str) -> bool:
