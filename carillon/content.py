@@ -1,4 +1,4 @@
-"""What an HDF5 file holds, looked at before it is read: all there, and no more than the file.
+"""Check of an HDF5 file before it is read: its content is all there, and no more than the file.
 
 A few kilobytes of HDF5 can stand for any number of bytes: one group under many names, chunks that
 are compressed or far larger than their dataset, many texts that are one.
@@ -21,7 +21,7 @@ from carillon.datasets import refused
 MOST_OBJECTS, DEEPEST = 100_000, 16
 """Groups and datasets of a file, and groups inside each other; files have dozens, four deep."""
 MOST_ATTRIBUTES = 1024
-"""Of a group or dataset."""
+"""Attributes that a group or dataset may have."""
 LIST_BYTES = 1 << 28
 """Bytes that a list of texts in an attribute may take, as far as can be told before it is read."""
 

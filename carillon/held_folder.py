@@ -113,7 +113,7 @@ class HeldFolder:
             raise UserError(f"{self.path / name}: cannot be read ({cause(error)})") from None
 
     def read(self, name: str, most: int) -> bytes:
-        """What is in a file.
+        """Content of a file.
 
         Parameters
         ----------
@@ -194,7 +194,7 @@ class HeldFolder:
                 shutil.rmtree(name, ignore_errors=True, dir_fd=self._folder)
 
     def _mode(self, name: str) -> int:
-        """What has a name, links not followed; `_MISSING` if nothing has."""
+        """File mode of the entry of a name, links not followed; `_MISSING` if there is none."""
         try:
             return os.stat(_plain(name), dir_fd=self._folder, follow_symlinks=False).st_mode
         except FileNotFoundError:

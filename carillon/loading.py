@@ -1,4 +1,4 @@
-"""What holds while a module of a library is loaded, whoever imports it first."""
+"""Context managers in which modules of libraries are loaded, whoever imports them first."""
 
 from __future__ import annotations
 

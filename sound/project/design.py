@@ -223,9 +223,9 @@ _SETTINGS: Mapping[str, tuple[str, Callable[[Any], bool]]] = {
     "material": ("keys and values", lambda value: isinstance(value, Mapping)),
     "damping": ("keys and values", lambda value: isinstance(value, Mapping)),
 }
-"""What is used of a design's settings, if it is there."""
+"""Settings of a design that are used: what each is to be, and a test of it."""
 SOURCES = ("clips", "material")
-"""Of dampings."""
+"""Places that a design's dampings may come from."""
 
 
 def _fault_of_texts(design: Design) -> str:

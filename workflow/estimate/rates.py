@@ -19,7 +19,7 @@ PACKAGED = Path(__file__).with_name("rates.json")
 
 VERSION = 3
 MOST_BYTES = 1 << 20
-"""Of a file."""
+"""Bytes that a file of rates may have."""
 
 
 def checked(values: Any, where: str) -> Rates:

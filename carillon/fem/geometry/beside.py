@@ -61,7 +61,7 @@ class Beside:
 
 
 class NoFiles(FilePathResolver):  # type: ignore[misc]
-    """What trimesh reads beside a mesh: nothing, since a shape has no need of materials."""
+    """A folder in which trimesh finds no file beside a mesh: a shape has no need of materials."""
 
     def get(self, name: str) -> Any:
         """Raise FileNotFoundError, which trimesh takes for a file that is not there."""

@@ -62,7 +62,7 @@ SHARED_BYTES, GROWTH = 1 << 27, 4
 Nodes share meshes, and meshes share positions, so a few bytes can stand for any number.
 """
 _KEPT = ("mesh", "children", "name", "matrix", "translation", "rotation", "scale")
-"""Of a node."""
+"""Keys of a node that are handed on."""
 
 ReadBeside = Callable[[str, int | None], bytes]
 

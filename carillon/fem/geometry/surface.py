@@ -90,7 +90,7 @@ def surface_name(mesh: str) -> str:
 
 
 _PLY_LENGTH = "PLY is unexpected length"
-"""What trimesh says of binary PLY files whose faces are not all of one length."""
+"""Message of trimesh about binary PLY files whose faces are not all of one length."""
 
 
 def _read(path: Path) -> trimesh.Trimesh:
