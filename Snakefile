@@ -5,8 +5,9 @@ from pathlib import Path
 from snakemake.utils import min_version, validate
 
 from carillon.errors import UserError
-from carillon.progress import say
-from workflow import orphans, patient_slurm, pinned_meshes, room, settings, submission
+from carillon.command_line.progress import say
+import studies
+from workflow import disk_space, patient_slurm, pinned_meshes, settings, slurm_cleanup, submission
 
 min_version("9.0")
 
@@ -30,33 +31,24 @@ except UserError as error:
     raise WorkflowError(str(error)) from None
 
 
-report: f"{settings.FOLDER}/studies/captions/workflow.rst"
-
-
 include: f"{RULES}/common.smk"
 include: f"{RULES}/dataset.smk"
 include: f"{RULES}/forests.smk"
 include: f"{RULES}/model.smk"
 include: f"{RULES}/spectra.smk"
-include: f"{RULES}/catalogue.smk"
-include: f"{RULES}/studies.smk"
-include: f"{RULES}/validation.smk"
-include: f"{RULES}/figures.smk"
-include: f"{RULES}/claims.smk"
-include: f"{RULES}/scaling.smk"
-include: f"{RULES}/objectives.smk"
-include: f"{RULES}/coarsening.smk"
-include: f"{RULES}/discretisation.smk"
-include: f"{RULES}/accuracy.smk"
-include: f"{RULES}/campaign.smk"
 include: f"{RULES}/default_forest.smk"
-include: f"{RULES}/forests_study.smk"
-include: f"{RULES}/recordings.smk"
-include: f"{RULES}/examples.smk"
-include: f"{RULES}/sound.smk"
-include: f"{RULES}/scenes.smk"
-include: f"{RULES}/scene_spectra.smk"
-include: f"{RULES}/compare.smk"
+include: f"{studies.FOLDER}/base/catalogue.smk"
+include: f"{RULES}/validation.smk"
+include: f"{RULES}/report.smk"
+
+
+# A study is a folder, its rules as well.
+for rules_of_study in studies.rules():
+
+    include: str(rules_of_study)
+
+
+include: f"{studies.FOLDER}/base/rules.smk"
 
 
 onstart:
@@ -71,11 +63,11 @@ onstart:
     for sentence in pinned_meshes.of_run(config):
         say(sentence)
     if ALONE:
-        orphans.cancel(Path.cwd())
+        slurm_cleanup.cancel(Path.cwd())
 
 
 onerror:
-    room.check_disk(RESULTS)
+    disk_space.check_disk(RESULTS)
 
 
 rule all:

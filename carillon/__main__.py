@@ -1,7 +1,8 @@
 """Command line: `carillon COMMAND`, all commands by one name; `--help` lists them.
 
 `python -m dataset_gen`, `forests`, `solver`, `sound`, `studio` and `workflow` have the same
-commands, some of them by shorter names.
+commands, some of them by shorter names. `carillon study` lists the studies; those that were
+commands of a room before are still found by their names alone.
 """
 
 from __future__ import annotations
@@ -11,32 +12,46 @@ from collections.abc import Sequence
 from importlib import import_module
 
 from carillon import ROOMS
-from carillon.commands import Command, run_program
+from carillon.command_line.commands import Command, run_program
 
 LONGER = {
-    "dataset_gen": {"benchmark": "benchmark-fits", "inspect": "inspect-shard"},
-    "forests": {"benchmark": "benchmark-forests", "inspect": "inspect-forests"},
-    "sound": {"benchmark": "benchmark-design"},
-    "workflow": {"compare": "compare-runs"},
+    "dataset_gen": {"inspect": "inspect-shard"},
+    "forests": {"inspect": "inspect-forests"},
 }
 """Names of commands of a room that another room has too."""
+STUDY = "study"
 
 
 def commands() -> dict[str, Command]:
-    """All commands by name."""
-    by_name = {"environment": Command("carillon.environment", "versions, BLAS and cores in use")}
-    for room in ROOMS[1:]:
+    """All commands by name, but those of the studies."""
+    by_name = {
+        "environment": Command(
+            "carillon.command_line.environment", "versions, BLAS and cores in use"
+        )
+    }
+    for room in ROOMS[1:-1]:
         own: dict[str, Command] = import_module(f"{room}.commands").COMMANDS
         by_name |= {LONGER.get(room, {}).get(name, name): command for name, command in own.items()}
-    return by_name
+    return by_name | {STUDY: Command("studies", "run a study; `carillon study --help` lists them")}
+
+
+def studies() -> dict[str, Command]:
+    """Commands of the studies by name."""
+    found: dict[str, Command] = import_module("studies").commands()
+    return found
 
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status, the same on every rank."""
+    given = sys.argv[1:] if words is None else list(words)
+    if given[:1] == [STUDY]:
+        description = "Experiments: what was measured, and the pages that show it."
+        return run_program(f"carillon {STUDY}", description, studies(), given[1:])
     description = (
         "Vibration modes of solids with spatially varying material, fast enough to design sound."
     )
-    return run_program("carillon", description, commands(), words)
+    older = {name: command for name, command in studies().items() if command.room}
+    return run_program("carillon", description, commands(), given, older)
 
 
 if __name__ == "__main__":

@@ -5,13 +5,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from carillon.commands import run_program
-from dataset_gen.commands import COMMANDS
+from carillon.command_line.commands import run_room
 
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status, the same on every rank."""
-    return run_program("dataset_gen", "Training data of the coarsening forests.", COMMANDS, words)
+    return run_room("dataset_gen", "Training data of the coarsening forests.", words)
 
 
 if __name__ == "__main__":

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from carillon.command_line.progress import track
 from carillon.errors import UserError
-from carillon.files import require_writable
-from carillon.progress import track
+from carillon.files.paths import require_writable
 from dataset_gen.journal import Journal, discard_journal, journal_of
 from dataset_gen.settings import ShardOptions, settings_of
 from dataset_gen.shards import Shard, origin_of, read_settings, shard_of, write_rows

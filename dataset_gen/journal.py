@@ -20,8 +20,9 @@ from pathlib import Path
 from typing import Any
 
 from carillon.errors import UserError
-from carillon.files import cause, sync_folder
-from carillon.locks import take
+from carillon.files.atomic import sync_folder
+from carillon.files.locks import take
+from carillon.files.paths import cause
 from dataset_gen.settings import settings_from
 from dataset_gen.tasks import ShardPlan
 

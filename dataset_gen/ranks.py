@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from carillon.errors import LocalUserError, UserError
-from carillon.ranks import Comm, alone
+from carillon.processes.ranks import Comm, alone
 from dataset_gen import task_farm
 from dataset_gen.generate import Engine
 from dataset_gen.tasks import ShardPlan
@@ -29,7 +29,7 @@ def run_on_ranks(comm: Comm, make: Callable[[Engine], int]) -> int:
     UserError
         On every rank if `make` raises it before the ranks have begun to work.
     LocalUserError
-        On the one rank that raised it later, see `carillon.cli.run`, which ends all of them.
+        On the one rank that raised it later, see `exit_status.run`, which ends all of them.
     """
     _warn_about_cores(comm)
     if comm.rank > 0:

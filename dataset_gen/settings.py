@@ -10,16 +10,16 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 from carillon import __version__
-from carillon.arguments import (
+from carillon.command_line.arguments import (
     non_negative_number,
     poisson_ratio,
     positive_number,
     whole_number,
 )
+from carillon.command_line.options import REQUIRED, option
 from carillon.errors import UserError
 from carillon.fem import block, element
 from carillon.fem.element import DEFAULT_POISSON
-from carillon.options import REQUIRED, option
 from dataset_gen import objectives, sampling
 from dataset_gen.objectives import (
     DATASET_OBJECTIVES,

@@ -12,10 +12,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon import provenance
 from carillon.errors import UserError
 from carillon.fem.element import Array
-from carillon.files import create_h5, open_h5
+from carillon.files.hdf5 import create_h5, open_h5
+from carillon.records import provenance
 from dataset_gen.sampling import Moduli
 from dataset_gen.settings import Settings, ShardOptions, settings_from
 from dataset_gen.tasks import ROW

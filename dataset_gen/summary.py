@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.progress import track
+from carillon.command_line.progress import track
 from dataset_gen.objectives.quadratic import MODULUS_FLOOR
 from dataset_gen.shards import UNIT, Shard, iterate_shard
 

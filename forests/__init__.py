@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from carillon import lazily
+from carillon import lazy_exports
 
 if TYPE_CHECKING:
     from forests.evaluate import coarsen, coarsen_with_derivatives
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Model", "coarsen", "coarsen_with_derivatives", "load_model", "save_model"]
 
-__getattr__ = lazily.exports(
+__getattr__ = lazy_exports.exports(
     __name__,
     {
         "coarsen": "evaluate",

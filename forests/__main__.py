@@ -5,13 +5,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from carillon.commands import run_program
-from forests.commands import COMMANDS
+from carillon.command_line.commands import run_room
 
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status, the same on every rank."""
-    return run_program("forests", "Regression forests that coarsen 2x2x2 blocks.", COMMANDS, words)
+    return run_room("forests", "Regression forests that coarsen 2x2x2 blocks.", words)
 
 
 if __name__ == "__main__":

@@ -12,9 +12,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon import provenance
 from carillon.errors import UserError
-from carillon.files import create_h5, open_h5
+from carillon.files.hdf5 import create_h5, open_h5
+from carillon.records import provenance
 from forests import default
 from forests.layout import FEATURE_BITS, FEATURE_MASK, NODE, aligned
 from forests.scaling import FEATURES, PATTERNS, TRANSFORMS

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from carillon import lazily
+from carillon import lazy_exports
 
 if TYPE_CHECKING:
     from solver.analysis.library import Solution, solve
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ModalSolver", "Modes", "Solution", "SolverOptions", "solve"]
 
-__getattr__ = lazily.exports(
+__getattr__ = lazy_exports.exports(
     __name__,
     {
         "Solution": "analysis.library",

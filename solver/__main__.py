@@ -5,15 +5,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from carillon.commands import run_program
-from solver.commands import COMMANDS
+from carillon.command_line.commands import run_room
 
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run one command; every rank returns the same status, or the whole job is aborted."""
-    return run_program(
-        "solver", "Vibration modes of solids with spatially varying material.", COMMANDS, words
-    )
+    return run_room("solver", "Vibration modes of solids with spatially varying material.", words)
 
 
 if __name__ == "__main__":

@@ -5,13 +5,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from carillon.commands import run_program
-from sound.commands import COMMANDS
+from carillon.command_line.commands import run_room
 
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status."""
-    return run_program("sound", "From example clips to a material to a sound.", COMMANDS, words)
+    return run_room("sound", "From example clips to a material to a sound.", words)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from carillon.arguments import whole_number
+from carillon.command_line.arguments import whole_number
 from carillon.errors import UserError
 
 LOWEST_RATE, HIGHEST_RATE = 1_000, 768_000

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from carillon.errors import UserError
-from carillon.places import require_writable
+from carillon.files.paths import require_writable
 
 
 def require_output(

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.command_line.progress import say
 from carillon.errors import UserError
-from carillon.progress import say
 from sound.surface import longest_side
 
 if TYPE_CHECKING:  # Its import takes long, and most of the room needs no surface.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from carillon.commands import run_program
+from carillon.command_line.commands import run_program
 from studio.commands import COMMANDS
 
 

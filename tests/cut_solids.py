@@ -12,7 +12,7 @@ from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
-from solver.studies.accuracy.solids import ANGLES, DENSITY, POISSON, YOUNG
+from studies.accuracy.solids import ANGLES, DENSITY, POISSON, YOUNG
 
 
 def box(*sides: float, at: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> trimesh.Trimesh:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from carillon.fem.geometry import builtin_surface
-from tests.conftest import MESH_FILES
+from conftest import MESH_FILES
 from tests.patience import HANG_SECONDS
 
 CHECKOUT = Path(__file__).resolve().parent.parent

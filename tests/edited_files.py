@@ -8,7 +8,7 @@ from pathlib import Path
 
 import h5py
 
-from carillon import files
+from carillon.files import hdf5
 
 
 @contextmanager
@@ -22,4 +22,4 @@ def edited(path: Path) -> Iterator[h5py.File]:
 def reseal(path: Path) -> None:
     """Make the checksum match, so that what it would have caught gets past it."""
     with open(path, "rb+") as stream:
-        stream.write(files._seal_of(stream))
+        stream.write(hdf5._seal_of(stream))

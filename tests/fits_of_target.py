@@ -7,7 +7,7 @@ import sys
 
 import numpy as np
 
-from carillon.registers import LANES
+from carillon.numerics.simd_width import LANES
 from dataset_gen.objectives import fit
 from dataset_gen.objectives.compiled import PANEL
 from dataset_gen.sampling import samples

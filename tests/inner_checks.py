@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from carillon.errors import ConvergenceError
 from carillon.fem.model import ElasticModel
-from carillon.petsc import PETSc
+from carillon.processes.petsc import PETSc
 from solver.assembly.sparse import assembled
 from solver.assembly.system import System, assemble
 from solver.distribution.local_mesh import distribute

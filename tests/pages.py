@@ -7,9 +7,9 @@ import re
 from html.parser import HTMLParser
 from pathlib import Path
 
-from workflow.studies.base.numbers import show
-from workflow.studies.base.page import unbroken
-from workflow.studies.base.table import kind_in, read_table
+from studies.base.numbers import show
+from studies.base.page import unbroken
+from studies.base.table import kind_in, read_table
 
 
 class Page(HTMLParser):

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from conftest import Run
 from dataset_gen.shards import Shard
 from forests.model import Model
 from forests.training.dataset import Dataset, dataset_of
 from forests.training.ranks import Ranks
 from forests.training.train import TrainingOptions, model_of, train_trees
-from tests.conftest import Run
 
 
 def train(

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from carillon.children import run_child
+from carillon.processes.children import run_child
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 
@@ -22,7 +22,7 @@ signal.pause()
 """
 PARENT = """
 import os, signal, sys
-from carillon.children import run_child
+from carillon.processes.children import run_child
 signal.signal(signal.SIGINT, signal.default_int_handler)  # which a job in the background ignores
 run_child([sys.executable, "-c", sys.argv[1], sys.argv[2]], os.environ)
 """

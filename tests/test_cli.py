@@ -13,9 +13,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from carillon import __version__, cli
-from carillon.arguments import Parser
-from carillon.commands import run_program
+from carillon import __version__
+from carillon.command_line import exit_status
+from carillon.command_line.arguments import Parser
+from carillon.command_line.commands import run_program
 from carillon.errors import ConvergenceError, LocalUserError, UserError
 from carillon.fem.geometry.builtin import builtin_surface
 
@@ -128,20 +129,20 @@ def too_much():
     ],
 )
 def test_errors_are_one_sentence_and_a_status(main, status, said, capsys):
-    assert cli.run("program", main) == status
+    assert exit_status.run("program", main) == status
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"program: {said}")
 
 
 def test_a_fault_of_the_program_keeps_its_traceback():
     with pytest.raises(ZeroDivisionError):
-        cli.run("program", raising(ZeroDivisionError()))
+        exit_status.run("program", raising(ZeroDivisionError()))
 
 
 def test_what_all_ranks_raise_is_told_by_the_first_and_aborts_nothing(capsys):
     for rank in range(3):
         ranks = Ranks(rank, 3)
-        assert cli.run("program", raising(UserError("bad")), ranks) == 2
+        assert exit_status.run("program", raising(UserError("bad")), ranks) == 2
         assert ranks.aborted is None
     assert capsys.readouterr().err == "program: bad\n"
 
@@ -152,7 +153,7 @@ def test_what_all_ranks_raise_is_told_by_the_first_and_aborts_nothing(capsys):
 )
 def test_what_one_rank_alone_raises_ends_the_others(error, status, capsys):
     ranks = Ranks(1, 2)
-    cli.run("program", raising(error), ranks)
+    exit_status.run("program", raising(error), ranks)
     assert ranks.aborted == status
     assert capsys.readouterr().err
 
@@ -161,15 +162,15 @@ def test_what_one_rank_alone_raises_ends_the_others(error, status, capsys):
 
 PROGRAM = """
 import sys
-from carillon import cli
-from carillon.arguments import Parser
+from carillon.command_line import exit_status
+from carillon.command_line.arguments import Parser
 
 def main():
     with open(sys.argv[1], "w") as file:
         print(file.fileno(), file=file)
         print("results " * int(sys.argv[2]))
 
-sys.exit(cli.run("program", main))
+sys.exit(exit_status.run("program", main))
 """
 
 
@@ -216,6 +217,8 @@ def test_files_do_not_take_the_place_of_closed_streams(tmp_path):
 
 def test_complaints_that_nobody_takes_change_no_status(tmp_path):
     command = '"$0" -c "from carillon import cli; from carillon.errors import UserError\n'
-    command += 'def main(): raise UserError(1)\nraise SystemExit(cli.run(1, main))" 2> /dev/full'
+    command += (
+        'def main(): raise UserError(1)\nraise SystemExit(exit_status.run(1, main))" 2> /dev/full'
+    )
     done = subprocess.run(["bash", "-c", command, sys.executable], cwd=CHECKOUT)
     assert done.returncode == 2

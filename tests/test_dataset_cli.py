@@ -100,8 +100,8 @@ def test_one_shard_of_very_many_samples_is_made(tmp_path):
 
 @pytest.fixture
 def quick(monkeypatch):
-    monkeypatch.setattr("dataset_gen.benchmark.RUNS", 2)
-    monkeypatch.setattr("dataset_gen.benchmark.MATRIX", 64)
+    monkeypatch.setattr("studies.fits.measure.RUNS", 2)
+    monkeypatch.setattr("studies.fits.measure.MATRIX", 64)
 
 
 def test_benchmark_reports_every_objective(capsys, quick):

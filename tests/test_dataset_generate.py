@@ -131,7 +131,8 @@ def test_a_shard_finished_elsewhere_says_so(begun, reference, monkeypatch):
 
 PROGRAM = f"""
 import sys, time
-from carillon import cli, files
+from carillon.command_line import exit_status
+from carillon.files import hdf5
 from dataset_gen import journal
 from dataset_gen.generate import engine_of, generate, generate_file
 from dataset_gen.settings import ShardOptions, settings_of
@@ -150,18 +151,18 @@ def slowly(self, read=journal.Journal.work):
         time.sleep(seconds / 10)
         yield work
 
-def sealed_slowly(stream, seal=files._seal_of):
+def sealed_slowly(stream, seal=hdf5._seal_of):
     time.sleep(10 * seconds)
     return seal(stream)
 
 def main():
-    journal.Journal.work, files._seal_of = slowly, sealed_slowly
+    journal.Journal.work, hdf5._seal_of = slowly, sealed_slowly
     plan = ShardPlan(settings_of(ShardOptions({SAMPLES}, 4)), {TASK})
     print("begin", flush=True)
     generate_file(path, plan, origin_of(plan.settings, ShardOptions({SAMPLES})), slow)
 
 if __name__ == "__main__":
-    sys.exit(cli.run("program", main))
+    sys.exit(exit_status.run("program", main))
 """
 """Makes the shard of the tests, with time to interrupt it."""
 

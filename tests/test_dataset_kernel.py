@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from carillon.fem.block import CELL_NODES
-from carillon.lanes import LANES, empty
+from carillon.numerics.simd import LANES, empty
 from dataset_gen.objectives import (
     bounded,
     coarse_response,

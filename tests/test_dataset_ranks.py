@@ -18,7 +18,7 @@ SAMPLES, TASK = 3000, 128
 PROGRAM = f"""
 import sys, time
 from carillon.errors import UserError
-from carillon import ranks
+from carillon.processes import ranks
 from dataset_gen import tasks
 from dataset_gen.__main__ import main
 from dataset_gen.commands import generate as program

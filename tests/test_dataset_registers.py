@@ -13,8 +13,8 @@ import dataset_gen
 import forests
 import solver
 import sound
-from carillon import lanes, registers
-from carillon.registers import LANES, OTHERS, X86, registers_in
+from carillon.numerics import simd, simd_width
+from carillon.numerics.simd_width import LANES, OTHERS, X86, registers_in
 from dataset_gen.objectives.compiled import PANEL, panel_of
 from dataset_gen.objectives.kernel import COLUMNS
 from dataset_gen.objectives.oversampled import RIGID_SHARE
@@ -47,13 +47,13 @@ def test_a_tile_fits_the_registers_and_panels_divide_the_columns(kind):
 
 
 def test_a_lane_takes_one_register():
-    assert LANES == registers.REGISTERS.doubles and PANEL == panel_of(registers.REGISTERS)
+    assert LANES == simd_width.REGISTERS.doubles and PANEL == panel_of(simd_width.REGISTERS)
 
 
 def test_another_width_is_compiled_under_another_name(monkeypatch):
-    name = lanes.digest_of()
-    monkeypatch.setattr(lanes, "REGISTERS", OTHERS)
-    assert lanes.digest_of() != name
+    name = simd.digest_of()
+    monkeypatch.setattr(simd, "REGISTERS", OTHERS)
+    assert simd.digest_of() != name
 
 
 def test_no_closure_is_compiled():

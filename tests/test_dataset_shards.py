@@ -6,8 +6,8 @@ import h5py
 import numpy as np
 import pytest
 
-from carillon import files
 from carillon.errors import UserError
+from carillon.files import hdf5
 from dataset_gen import shards as shards_module
 from dataset_gen.generate import generate
 from dataset_gen.objectives import DEFAULT_OBJECTIVE
@@ -134,7 +134,7 @@ def test_unfit_shards_are_refused_in_a_sentence(path, change, message):
 def test_a_shard_of_the_first_schema_is_refused(tmp_path):
     """As version 0.1.0 began to write them: without a seal."""
     path = tmp_path / "old.h5"
-    with files.create_h5(path, "dataset", 1) as file:
+    with hdf5.create_h5(path, "dataset", 1) as file:
         file.attrs["sample_range"] = (0, 10)
     with pytest.raises(UserError, match="schema 1, this version reads schema 2"):
         read_shard(path)

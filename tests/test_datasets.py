@@ -6,9 +6,9 @@ import h5py
 import numpy as np
 import pytest
 
-from carillon.content import require_whole
-from carillon.datasets import INTEGER, number, read
 from carillon.errors import UserError
+from carillon.files.content import require_whole
+from carillon.files.datasets import INTEGER, number, read
 
 
 @pytest.fixture

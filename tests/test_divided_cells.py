@@ -24,7 +24,7 @@ from solver.accuracy.estimate import estimate_cell_errors
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.files.modes_file import read_modes
-from solver.studies.accuracy.solids import SOLIDS
+from studies.accuracy.solids import SOLIDS
 from tests import cut_solids
 from tests.cut_solids import spaced, uniform
 from tests.rank_counts import TO_THREE

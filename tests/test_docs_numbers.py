@@ -11,10 +11,10 @@ import pytest
 import yaml
 
 from carillon.fem.geometry.builtin import BUILTINS, THIN, TRIALS
+from studies.base.numbers import show
+from studies.base.table import Table, read_csv_table
+from studies.claims.results import MEASURED, REFERENCE
 from tests.documentation import CHECKOUT
-from workflow.studies.base.numbers import show
-from workflow.studies.base.table import Table, read_csv_table
-from workflow.studies.claims.results import MEASURED, REFERENCE
 
 QUOTED = yaml.safe_load((CHECKOUT / "tests" / "quoted_numbers.yaml").read_text())
 WALL_TIMES = {

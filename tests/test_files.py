@@ -16,10 +16,12 @@ import h5py
 import numpy as np
 import pytest
 
-from carillon import ROOMS, files
+from carillon import ROOMS
 from carillon.errors import UserError
-from carillon.files import atomic_path, create_h5, kind_of, open_h5, require_writable
-from carillon.places import require_file
+from carillon.files import atomic, hdf5
+from carillon.files.atomic import atomic_path
+from carillon.files.hdf5 import create_h5, kind_of, open_h5
+from carillon.files.paths import require_file, require_writable
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 
@@ -210,8 +212,8 @@ def test_a_flipped_bit_breaks_the_seal(sealed, place):
 
 def test_a_seal_is_read_once_unless_the_file_changes(sealed, monkeypatch):
     read = []
-    seal_of = files._seal_of
-    monkeypatch.setattr(files, "_seal_of", lambda stream: read.append(1) or seal_of(stream))
+    seal_of = hdf5._seal_of
+    monkeypatch.setattr(hdf5, "_seal_of", lambda stream: read.append(1) or seal_of(stream))
     for _ in range(3):
         with open_h5(sealed, "shard", 3, sealed=True):
             pass
@@ -231,8 +233,8 @@ def test_a_file_without_a_seal_is_refused_where_one_is_demanded(shard):
 FULL_DISK = """
 import resource, sys
 import numpy as np
-from carillon import cli
-from carillon.files import create_h5
+from carillon.command_line import exit_status
+from carillon.files.hdf5 import create_h5
 
 def main():
     resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]),) * 2)
@@ -241,7 +243,7 @@ def main():
         for start in range(0, 100_000, 1000):
             column[start : start + 1000] = np.random.rand(1000)
 
-sys.exit(cli.run("program", main))
+sys.exit(exit_status.run("program", main))
 """
 
 
@@ -286,7 +288,7 @@ def test_a_writer_under_way_is_no_leftover(tmp_path):
 
 
 def test_a_new_file_that_is_taken_for_a_leftover_is_made_anew(tmp_path, monkeypatch):
-    lock = files.fcntl.flock
+    lock = atomic.fcntl.flock
     taken = []
 
     def late(file, operation):
@@ -295,7 +297,7 @@ def test_a_new_file_that_is_taken_for_a_leftover_is_made_anew(tmp_path, monkeypa
             taken[0].unlink()
         lock(file, operation)
 
-    monkeypatch.setattr(files.fcntl, "flock", late)
+    monkeypatch.setattr(atomic.fcntl, "flock", late)
     with atomic_path(tmp_path / "text") as temporary:
         temporary.write_text("whole")
     assert (tmp_path / "text").read_text() == "whole"
@@ -432,7 +434,7 @@ WRITERS, ROUNDS = 3, 20
 
 WRITER = """
 import sys
-from carillon.files import atomic_path
+from carillon.files.atomic import atomic_path
 path, letter, rounds = sys.argv[1], sys.argv[2].encode(), int(sys.argv[3])
 print("ready", flush=True)
 sys.stdin.readline()
@@ -509,4 +511,4 @@ def test_all_rooms_open_files_in_one_way():
         for path in (CHECKOUT / room).rglob("*.py")
         if "h5py.File(" in path.read_text()
     }
-    assert openers == {Path("carillon/files.py")}
+    assert openers == {Path("carillon/files/hdf5.py")}

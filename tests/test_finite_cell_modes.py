@@ -22,10 +22,10 @@ from solver.files.modes_file import read_modes, write_modes
 from solver.hcms.condense import INTERFACES
 from solver.refinement.options import ALLOWED_DISTANCE
 from solver.response.contact import interpolation
-from solver.studies.accuracy import domains
-from solver.studies.accuracy.ritz import free_eigenvalues
-from solver.studies.accuracy.solids import SOLIDS
-from solver.studies.comparison import compare_files
+from solver.verification.comparison import compare_files
+from studies.accuracy import domains
+from studies.accuracy.ritz import free_eigenvalues
+from studies.accuracy.solids import SOLIDS
 from tests import cut_solids, solids
 from tests.cut_solids import box, spaced, turned, uniform
 from tests.edited_files import edited

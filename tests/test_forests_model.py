@@ -8,7 +8,7 @@ import pytest
 
 from carillon.errors import UserError
 from carillon.fem.block import symmetries
-from carillon.files import create_h5
+from carillon.files.hdf5 import create_h5
 from dataset_gen.generate import generate
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, fit
 from dataset_gen.sampling import samples

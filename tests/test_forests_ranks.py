@@ -92,7 +92,7 @@ def test_bad_input_is_one_sentence_on_all_ranks(arguments, message, folder, mpie
 PROGRAM = """
 import sys
 from carillon.errors import UserError
-from carillon import ranks
+from carillon.processes import ranks
 from forests.__main__ import main
 from forests.training import dataset
 

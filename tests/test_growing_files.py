@@ -15,12 +15,12 @@ import h5py
 import numpy as np
 import pytest
 
-from carillon.content import require_whole
 from carillon.errors import UserError
 from carillon.fem.geometry import hexmesh_from_grid, load_surface
 from carillon.fem.model import fine_model
-from carillon.files import kind_of, open_h5
-from carillon.memory import require_less_than
+from carillon.files.content import require_whole
+from carillon.files.hdf5 import kind_of, open_h5
+from carillon.processes.memory import require_less_than
 from solver.files.modes_file import KIND, SCHEMA, read_modes, write_modes
 from tests.hostile import zoo_growing
 
@@ -156,7 +156,7 @@ def test_all_growing_files_are_tried():
 
 def test_texts_that_have_heaps_of_their_own_are_no_growth(tmp_path, monkeypatch):
     """Also where a list of them is too long to be sure at once."""
-    monkeypatch.setattr("carillon.content.LIST_BYTES", 1 << 18)
+    monkeypatch.setattr("carillon.files.content.LIST_BYTES", 1 << 18)
     with h5py.File(tmp_path / "file.h5", "w") as file:
         file.attrs["order"] = [f"{n}" for n in range(20)]
         file["numbers"] = np.ones(100_000)
@@ -193,8 +193,8 @@ def test_a_process_with_little_memory_is_told_so():
     """What it has room for it gets, and a sentence ends it else."""
     program = (
         "import numpy as np\n"
-        "from carillon.cli import meaning\n"
-        "from carillon.memory import require_less_than\n"
+        "from carillon.command_line.exit_status import meaning\n"
+        "from carillon.processes.memory import require_less_than\n"
         f"require_less_than({ROOM})\n"
         f"np.ones({ROOM // 2}, np.uint8)\n"
         "try:\n"

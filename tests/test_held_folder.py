@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from carillon.errors import UserError
-from carillon.held_folder import HeldFolder
+from carillon.files.held_folder import HeldFolder
 
 
 @pytest.fixture

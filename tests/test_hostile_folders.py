@@ -13,13 +13,13 @@ import psutil
 import pytest
 import yaml
 
-from carillon import present_folder
 from carillon.errors import UserError
+from carillon.processes import present_folder
 from tests.listening import has_loaded, listening
 from tests.patience import HANG_SECONDS, wait_for
 from tests.rank_counts import SEVERAL
 from tests.small_project import PROJECT, write_clips
-from workflow.room import MODULES, require_own
+from workflow.disk_space import MODULES, require_own
 
 CHECKOUT = Path(present_folder.__file__).resolve().parent.parent
 PROGRAM = Path(sys.executable).with_name("carillon")

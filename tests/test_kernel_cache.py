@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from carillon import kernel_cache
+from carillon.processes import kernel_cache
 from tests.patience import HANG_SECONDS
 
 KERNEL = """
@@ -22,7 +22,8 @@ def twice(x):
 SCRIPT = """
 import logging, sys
 import carillon
-from carillon import kernel_cache, logs
+from carillon.processes import kernel_cache
+from carillon.command_line import logs
 logs.show()
 kernel_cache.PLACES = ()
 from numba.core import caching

@@ -10,7 +10,7 @@ from carillon.fem import aggregation, laplacian
 from carillon.fem.aggregation import ShiftedInverse, levels_of
 from carillon.fem.geometry import hexmesh_from_grid
 from carillon.fem.laplacian import cell_laplacian, laplacian_modes, rough_modes
-from carillon.threads import one_thread
+from carillon.processes.threads import one_thread
 from solver.distribution import partition
 from tests import solids
 

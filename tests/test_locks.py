@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 
 from carillon.errors import UserError
-from carillon.locks import locked
+from carillon.files.locks import locked
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 
 HOLDER = """
 import sys
-from carillon.locks import locked
+from carillon.files.locks import locked
 with locked(sys.argv[1]):
     print("held", flush=True)
     sys.stdin.read()

@@ -12,12 +12,12 @@ import scipy.linalg
 from carillon.errors import UserError
 from carillon.fem.geometry import hexmesh_from_grid
 from carillon.fem.model import fine_model
-from carillon.files import SEAL_BYTES
+from carillon.files.hdf5 import SEAL_BYTES
 from solver.assembly.sparse import assembled
 from solver.files.modes_file import read_modes, write_modes
 from solver.response.response_file import StrikeOptions, respond
-from solver.studies.audit import audit, audit_files
-from solver.studies.comparison import compare_files
+from solver.verification.audit import audit, audit_files
+from solver.verification.comparison import compare_files
 from tests.edited_files import edited
 
 MODES = 12

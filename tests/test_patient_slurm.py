@@ -12,7 +12,7 @@ import pytest
 from tests import slurm_cluster, slurm_standin
 from tests.patience import HANG_SECONDS
 from tests.workflow_runs import CHECKOUT
-from workflow import orphans, patient_slurm
+from workflow import patient_slurm, slurm_cleanup
 
 RUN = "1b4e28ba-2fa1-11d2-883f-0016d3cca427"
 SUBMIT = ["sbatch", "--parsable", "--job-name", RUN, "--comment", "rule_a", "--wrap=true"]
@@ -94,7 +94,7 @@ def test_jobs_keep_the_comment_that_tells_a_killed_runs_jobs(slurm):
     folder, run = slurm()
     run(SUBMIT)
     comment = (folder / "1.comment").read_text()
-    assert comment.startswith("rule_a ") and orphans._RUN.fullmatch(RUN)
+    assert comment.startswith("rule_a ") and slurm_cleanup._RUN.fullmatch(RUN)
 
 
 @pytest.mark.nightly

@@ -32,7 +32,7 @@ def test_a_reader_of_modes_who_has_seen_enough_is_no_error(tmp_path, both):
 
 
 def test_python_raises_what_it_does_without_petsc():
-    program = "import os\nfrom carillon.petsc import PETSc\nread, write = os.pipe()\n"
+    program = "import os\nfrom carillon.processes.petsc import PETSc\nread, write = os.pipe()\n"
     program += "os.close(read)\ntry: os.write(write, b'x')\n"
     program += "except BrokenPipeError: print('told', PETSc.Sys.isInitialized())\n"
     done = subprocess.run(

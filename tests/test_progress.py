@@ -6,8 +6,8 @@ import io
 
 import pytest
 
-from carillon import progress
-from carillon.progress import track
+from carillon.command_line import progress
+from carillon.command_line.progress import track
 
 
 class Clock:

@@ -14,13 +14,13 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from carillon import arguments
-from carillon.documents import parse_yaml
+from carillon.command_line import arguments
 from carillon.errors import LONGEST_MESSAGE, one_line
-from forests.studies.training import require_counts
-from solver.studies.scaling.study import rank_counts
+from carillon.files.yaml_input import parse_yaml
 from sound.clips.instruments import note_hertz
 from sound.project.project import project_of
+from studies.forests.training import require_counts
+from studies.scaling.study import rank_counts
 from tests.hostile.fuzzing import damaged, examples, or_refused, values, yaml_texts
 from tests.hostile.zoo import CONFIGURATION, PROJECT
 from workflow import settings as configuration

@@ -39,7 +39,7 @@ from solver.files.modes_file import read_modes, write_modes
 from solver.hcms.condense import INTERFACES, restrict_stiffness
 from solver.hcms.synthesis import synthesize
 from solver.response.contact import interpolation
-from solver.studies.comparison import compare_files, on_mesh_of
+from solver.verification.comparison import compare_files, on_mesh_of
 from tests import solids
 from tests.edited_files import edited
 from tests.rank_counts import TO_THREE

@@ -21,7 +21,7 @@ from tests import slurm_cluster, workflow_runs
 from tests.patience import HANG_SECONDS, wait_for, words_of
 from tests.slurm_cluster import Cluster
 from tests.workflow_runs import CHECKOUT
-from workflow import orphans
+from workflow import slurm_cleanup
 from workflow.commands.digest import digest
 
 pytestmark = [pytest.mark.slurm, pytest.mark.mpi, pytest.mark.nightly]
@@ -139,12 +139,12 @@ def test_jobs_of_a_killed_run_are_cancelled_by_the_next(cluster: Cluster, tmp_pa
     killed = slurm_cluster.snakemake(tmp_path, *options)
     wait_for(lambda: worker(shard), "the job", killed)
     os.kill(worker(shard), signal.SIGSTOP)
-    (left,) = orphans.jobs(tmp_path)
+    (left,) = slurm_cleanup.jobs(tmp_path)
     killed.kill()
     killed.wait()
     output = finish(slurm_cluster.snakemake(tmp_path, *options), tmp_path)
     assert f"cancelled 1 jobs of SLURM that a killed run has left ({left})" in output
-    assert "CANCELLED" in cluster.ends() and orphans.jobs(tmp_path) == []
+    assert "CANCELLED" in cluster.ends() and slurm_cleanup.jobs(tmp_path) == []
     queue = subprocess.run(["squeue", "--noheader", "--format=%A"], capture_output=True, text=True)
     assert queue.stdout.split() == [other]
     subprocess.run(["scancel", other], check=True)

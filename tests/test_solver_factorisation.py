@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sp
 
 from carillon.errors import ConvergenceError
-from carillon.petsc import PETSc
+from carillon.processes.petsc import PETSc
 from solver.linear import factorisation
 from solver.linear.factorisation import factorised
 

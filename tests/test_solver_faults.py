@@ -9,7 +9,7 @@ import pytest
 
 from solver.__main__ import main
 from solver.files.modes_file import read_modes
-from solver.studies.audit import audit
+from solver.verification.audit import audit
 
 BAR = "modes builtin:bar --resolution 12 --modes 20 --no-estimate --out bar.h5".split()
 

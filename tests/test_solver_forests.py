@@ -16,8 +16,9 @@ from solver.analysis.problem import ProblemOptions, build_problem
 from solver.coarsening.forest import forest_or_reason, load_forest
 from solver.coarsening.model import block_moduli
 from solver.files.modes_file import read_modes
-from solver.studies.benchmark import BenchmarkOptions, benchmark_row
-from solver.studies.objectives import BASELINES, rate_objectives
+from studies.benchmark.options import BenchmarkOptions
+from studies.benchmark.row import benchmark_row
+from studies.objectives.measure import BASELINES, rate_objectives
 from tests.small_forests import train_small_forests
 
 BOX = ProblemOptions("builtin:box", 8, "noise")

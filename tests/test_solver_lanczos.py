@@ -13,7 +13,7 @@ from solver.analysis.options import SolverOptions
 from solver.assembly.system import Layout, assemble
 from solver.correction.correct import correct
 from solver.correction.lanczos import lanczos
-from solver.correction.mixture import mixed
+from solver.correction.starting_block import mixed
 from solver.distribution.local_mesh import distribute
 from solver.linear import Approximate, LinearSolver
 from solver.subspace.rayleigh_ritz import rayleigh_ritz

@@ -12,7 +12,7 @@ import solver
 from carillon.errors import UserError
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
-from solver.studies.comparison import compare_files
+from solver.verification.comparison import compare_files
 from tests import solids
 from tests.rank_counts import TO_THREE
 

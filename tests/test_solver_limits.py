@@ -13,13 +13,13 @@ from mpi4py import MPI
 from carillon.errors import UserError
 from carillon.fem.geometry import hexmesh_from_grid, load_surface, voxelize
 from carillon.fem.model import fine_model
-from carillon.petsc import PETSc
+from carillon.processes.petsc import PETSc
 from solver.analysis import bounds
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.linear import petsc_options
-from solver.studies.scaling.launch import require_ranks
+from studies.scaling.launch import require_ranks
 
 BOX = trimesh.creation.box()
 OBJ = BOX.export(file_type="obj")

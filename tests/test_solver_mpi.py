@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from solver.files.modes_file import read_modes
-from solver.studies.comparison import compare_files
+from solver.verification.comparison import compare_files
 from tests.patience import HANG_SECONDS
 from tests.rank_counts import SEVERAL
 

@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sp
 from mpi4py import MPI
 
-from carillon.registers import LANES
+from carillon.numerics.simd_width import LANES
 from solver.assembly.row_products import ROWS_NEAR, multiply
 from solver.assembly.system import assemble
 from solver.distribution.local_mesh import distribute

@@ -19,8 +19,8 @@ from solver.analysis.options import SolverOptions
 from solver.assembly.system import Layout, assemble
 from solver.coarsening.choice import make_coarsening
 from solver.correction.lobpcg import lobpcg
-from solver.correction.mixture import mixed
 from solver.correction.shift import LEAST, MOST, inverse_amid
+from solver.correction.starting_block import mixed
 from solver.distribution.local_mesh import distribute
 from solver.linear import LinearSolver
 from solver.reference.truth import count_below as mumps_count

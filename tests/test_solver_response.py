@@ -39,7 +39,7 @@ from solver.response.response import (
 )
 from solver.response.response_file import StrikeOptions, read_response, respond, write_response
 from solver.response.surface import surface_normals, surface_of
-from solver.studies.audit import audit
+from solver.verification.audit import audit
 from tests import cut_solids
 from tests.edited_files import edited
 from tests.solids import box_mesh, random_box

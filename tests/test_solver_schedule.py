@@ -8,7 +8,7 @@ import pytest
 from solver.distribution.tree import Merge, MergeTree, assign_ranks
 from solver.hcms import schedule as scheduling
 from solver.hcms.counts import eigen_flops
-from solver.hcms.crew import row_slices
+from solver.hcms.distributed_products import row_slices
 from solver.hcms.scalapack import BLOCK, available, grid_side, places
 from solver.hcms.schedule import Schedule, planned_modes, schedule
 

@@ -15,10 +15,10 @@ from solver.__main__ import main
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
 from solver.files.modes_file import write_modes
-from solver.studies.accuracy import domains
-from solver.studies.accuracy.ritz import free_eigenvalues
-from solver.studies.audit import audit_files
-from solver.subspace.verification import count_rigid
+from solver.verification.audit import audit_files
+from solver.verification.residuals import count_rigid
+from studies.accuracy import domains
+from studies.accuracy.ritz import free_eigenvalues
 from tests import cut_solids, solids
 
 COMM = MPI.COMM_SELF

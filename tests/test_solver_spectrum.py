@@ -23,10 +23,10 @@ from solver.distribution.local_mesh import distribute
 from solver.hcms.condense import restrict_stiffness
 from solver.hcms.synthesis import synthesize
 from solver.linear import LinearSolver, iterative
-from solver.studies.accuracy import domains
-from solver.studies.accuracy.ritz import free_eigenvalues
-from solver.studies.comparison import subspace_angles
 from solver.subspace.spectrum import clusters
+from solver.verification.comparison import subspace_angles
+from studies.accuracy import domains
+from studies.accuracy.ritz import free_eigenvalues
 from tests import solids
 
 COMM = MPI.COMM_SELF

@@ -16,7 +16,7 @@ from solver.__main__ import main
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import Layout, assemble
-from solver.correction import cold
+from solver.correction import random_start
 from solver.correction.enrichment import Ritz
 from solver.correction.krylov import KrylovBasis
 from solver.correction.shift import MOST, inverse_amid
@@ -168,7 +168,7 @@ def test_a_shift_beyond_most_wanted_eigenvalues_is_taken_back(monkeypatch):
         shifts.append(1.2 * exact[53])
         return linear.inverse(system, shifts[-1])
 
-    monkeypatch.setattr(cold, "inverse_amid", beyond)
+    monkeypatch.setattr(random_start, "inverse_amid", beyond)
     found = ModalSolver(model, SolverOptions(modes=60, method="lanczos"), COMM).solve()
     assert np.abs(found.values[RIGID_MODES:] / exact[:54] - 1.0).max() <= 1e-7
     assert len(shifts) == 1

@@ -22,7 +22,7 @@ from solver.assembly.system import assemble
 from solver.distribution.local_mesh import distribute
 from solver.reference import eigensolver
 from solver.reference.truth import complete, count_below, count_beyond, solve_truth, start_vector
-from solver.subspace.verification import verify
+from solver.verification.residuals import verify
 from tests import solids
 from tests.rank_counts import TO_THREE
 

@@ -9,13 +9,13 @@ import pytest
 
 from carillon.errors import ConvergenceError
 from sound.design import pool
-from sound.design.benchmark import _medians, compare_optimisers
 from sound.design.descent import DescentLimits, StepOptions, cost_of
 from sound.design.optimise import optimise
 from sound.design.optimisers import OPTIMISERS
 from sound.design.pool import Pool
 from sound.design.preparation import prepare
 from sound.design.tasks import Task
+from studies.design.measure import _medians, compare_optimisers
 from tests import small_project
 from tests.counted_analyses import counted
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from carillon import cache
 from carillon.errors import UserError
+from carillon.files import cache
 from sound.clips import cache as clips
 from sound.clips import files
 from sound.clips.damped import damped_sinusoids

@@ -22,8 +22,8 @@ from solver.coarsening.choice import make_coarsening
 from solver.coarsening.model import build_model
 from solver.files.modes_file import read_modes
 from solver.response.contact import interpolation
-from solver.studies.audit import audit
-from solver.studies.comparison import compare_files
+from solver.verification.audit import audit
+from solver.verification.comparison import compare_files
 from sound.__main__ import main
 from sound.export.gltf import EXTENSION, UNSIGNED_INT
 from sound.project.design_file import write_design

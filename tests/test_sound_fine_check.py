@@ -25,11 +25,11 @@ from sound.design.reduced_model import ReducedModel, descend_by_model
 from sound.design.space_mapping import MET_CENTS
 from sound.project.design import FineFrequencies
 from sound.project.design_file import read_design, write_design
+from studies.sounds.pictures import fine_mesh
 from tests import small_project
 from tests.edited_files import edited
 from tests.small_design import small_design
 from tests.solids import box_mesh
-from workflow.studies.sounds.pictures import fine_mesh
 
 EVALUATIONS = 200
 

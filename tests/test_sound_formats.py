@@ -7,7 +7,7 @@ import pytest
 
 from sound.clips.damped import damped_sinusoids
 from sound.clips.files import extract_file
-from workflow.studies.recordings.formats import RATES, SUBTYPES, Format, write_as
+from studies.recordings.formats import RATES, SUBTYPES, Format, write_as
 
 HIGHEST_RATE = 192_000
 FREQUENCIES = np.array([220.0, 415.0, 1130.0, 2620.0, 4875.0, 7440.0])

@@ -12,8 +12,8 @@ from solver.assembly.sparse import assembled
 from sound.clips.targets import Targets
 from sound.design.bark import bark, bark_slope
 from sound.design.material import LAWS, ReducedMaterial
+from sound.design.modal_truncation import lies_between, shift_between
 from sound.design.objective import Objective
-from sound.design.outside import lies_between, shift_between
 from sound.design.poisson import FreePoisson
 from sound.design.simulation import Simulation
 from sound.project.project import Weights

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from carillon import step
+from carillon.processes import mpi_environment
 from tests.patience import HANG_SECONDS
 
 DIRECTORY = "OMPI_MCA_orte_top_session_dir"
@@ -20,8 +20,8 @@ print(os.environ["{DIRECTORY}"], MPI.COMM_WORLD.size)
 """
 PARENT = f"""
 import os, subprocess, sys
-from carillon import step
-step.keep_apart(os.environ, os.getpid())
+from carillon.processes import mpi_environment
+mpi_environment.keep_apart(os.environ, os.getpid())
 from mpi4py import MPI
 print(os.environ["{DIRECTORY}"], MPI.COMM_WORLD.size, flush=True)
 subprocess.run([sys.executable, "-c", sys.argv[1]], check=True)
@@ -58,7 +58,7 @@ def test_a_directory_that_the_user_has_chosen_stays(tmp_path):
 )
 def test_ranks_and_users_choose_their_network(chosen):
     environment = dict(chosen)
-    with step.without_networks(environment):
+    with mpi_environment.without_networks(environment):
         assert environment == chosen
     assert environment == chosen
 
@@ -66,7 +66,7 @@ def test_ranks_and_users_choose_their_network(chosen):
 @pytest.mark.parametrize("chosen", [{"OMPI_MCA_pml": "ob1"}, {"OMPI_MCA_btl": "tcp,self"}])
 def test_what_a_user_chooses_of_a_network_is_all_that_is_chosen(chosen):
     environment = dict(chosen)
-    with step.without_networks(environment):
+    with mpi_environment.without_networks(environment):
         assert environment == {"OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "self", **chosen}
     assert environment == chosen
 
@@ -76,7 +76,7 @@ def test_what_a_lone_process_starts_looks_for_networks():
     lone = (
         "import os, subprocess, sys\n"
         "from carillon import step\n"
-        "with step.without_networks(os.environ):\n"
+        "with mpi_environment.without_networks(os.environ):\n"
         "    from mpi4py import MPI\n"
         "print(MPI.COMM_SELF.sendrecv('itself', 0), flush=True)\n"
         f"subprocess.run([sys.executable, '-c', {look!r}], check=True)\n"
@@ -116,4 +116,6 @@ def test_one_of_several_processes_that_do_not_find_each_other_says_so(variables,
 
 def test_a_process_that_was_started_alone_has_nothing_to_say():
     assert "MPI finds no other" not in warned(**{**SLURM, "SLURM_STEP_NUM_TASKS": "1"})
-    assert step.lonely_among({"SLURM_NTASKS": "4", "SLURM_JOB_ID": "7"}) is None  # a batch script
+    assert (
+        mpi_environment.lonely_among({"SLURM_NTASKS": "4", "SLURM_JOB_ID": "7"}) is None
+    )  # a batch script

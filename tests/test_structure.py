@@ -8,20 +8,38 @@ import sys
 from collections.abc import Iterator
 from functools import cache
 from graphlib import TopologicalSorter
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
-CHECKOUT = Path(__file__).resolve().parent.parent
-ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "studio", "workflow")
+import studies
 
-EVERYBODY = ("carillon", "carillon.fem", "carillon.fem.geometry", "carillon.fem.finite_cells")
+CHECKOUT = Path(__file__).resolve().parent.parent
+ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "studio", "workflow", "studies")
+
+EVERYBODY = (
+    "carillon",
+    "carillon.command_line",
+    "carillon.files",
+    "carillon.records",
+    "carillon.processes",
+    "carillon.numerics",
+    "carillon.fem",
+    "carillon.fem.geometry",
+    "carillon.fem.finite_cells",
+)
 """Packages that all others may import."""
 
 ARROWS = {
     "carillon": "",
-    "carillon.fem.geometry": "carillon",
-    "carillon.fem": "carillon carillon.fem.geometry",
+    "carillon.numerics": "",
+    "carillon.files": "carillon",
+    "carillon.processes": "carillon carillon.files",
+    "carillon.records": "carillon carillon.numerics carillon.processes",
+    "carillon.command_line": "carillon carillon.files carillon.processes carillon.records",
+    "carillon.fem.geometry": "carillon carillon.command_line carillon.files",
+    "carillon.fem": "carillon carillon.fem.geometry carillon.files carillon.processes",
     "carillon.fem.finite_cells": "carillon carillon.fem carillon.fem.geometry",
     #
     "dataset_gen.objectives": "",
@@ -30,113 +48,73 @@ ARROWS = {
     #
     "forests": "",
     "forests.training": "dataset_gen dataset_gen.objectives forests",
-    "forests.comparison": "dataset_gen dataset_gen.objectives forests",
-    "forests.studies": "dataset_gen forests forests.training",
-    "forests.commands": "forests forests.training forests.comparison forests.studies",
+    "forests.commands": "forests forests.training",
     #
-    "solver.coarsening": "dataset_gen.objectives forests",
     "solver.distribution": "",
-    "solver.files": "solver.distribution",
-    "solver.response": "solver.files solver.subspace",
+    "solver.coarsening": "dataset_gen.objectives forests",
     "solver.assembly": "solver.distribution",
-    "solver.linear": "solver.distribution solver.assembly",
-    "solver.subspace": "solver.distribution solver.assembly",
-    "solver.hcms": "solver.distribution solver.assembly solver.linear solver.subspace",
-    "solver.correction": "solver.distribution solver.assembly solver.linear solver.subspace",
+    "solver.files": "solver.distribution",
+    "solver.subspace": "solver.assembly solver.distribution",
+    "solver.linear": "solver.assembly solver.distribution",
+    "solver.response": "solver.files solver.subspace",
     "solver.reference": "solver.assembly solver.linear solver.subspace",
-    "solver.analysis": """dataset_gen.objectives solver.coarsening solver.distribution solver.files
-        solver.assembly solver.linear solver.subspace solver.hcms solver.correction
-        solver.reference""",
-    "solver.refinement": """solver.coarsening solver.distribution solver.files solver.assembly
-        solver.linear solver.subspace solver.correction solver.analysis""",
-    "solver.accuracy": """solver.distribution solver.files solver.analysis
-        solver.refinement""",
+    "solver.correction": "solver.assembly solver.distribution solver.linear solver.subspace",
+    "solver.hcms": "solver.assembly solver.distribution solver.linear solver.subspace",
+    "solver.verification": """solver.assembly solver.correction solver.distribution solver.files
+        solver.linear solver.reference solver.response solver.subspace""",
+    "solver.analysis": """dataset_gen.objectives solver.assembly solver.coarsening
+        solver.correction solver.distribution solver.files solver.hcms solver.linear
+        solver.reference solver.subspace solver.verification""",
     "solver": "solver.analysis",
-    "solver.studies": """solver.coarsening solver.distribution solver.files solver.response
-        solver.assembly solver.linear solver.subspace solver.hcms solver.correction
-        solver.reference solver.analysis""",
-    "solver.studies.accuracy": """solver.assembly solver.linear solver.analysis solver.refinement
-        solver.accuracy solver.studies""",
-    "solver.studies.benchmark": """solver.coarsening solver.distribution solver.files
-        solver.assembly solver.linear solver.subspace solver.reference solver.correction
-        solver.analysis solver.studies""",
-    "solver.studies.calibration": """dataset_gen.objectives solver.coarsening solver.assembly
-        solver.analysis""",
-    "solver.studies.coarsening": """solver.coarsening solver.files solver.analysis
-        solver.refinement solver.studies""",
-    "solver.studies.discretisation": """solver.coarsening solver.files solver.analysis
-        solver.refinement solver.accuracy solver.studies""",
-    "solver.studies.scaling": """solver.distribution solver.assembly solver.linear solver.hcms
-        solver.correction solver.analysis""",
-    "solver.commands": """dataset_gen.objectives solver.distribution solver.files solver.response
-        solver.linear solver.correction solver.analysis solver.refinement solver.accuracy
-        solver.studies solver.studies.benchmark
-        solver.studies.calibration solver.studies.scaling solver.coarsening
-        solver.studies.accuracy solver.studies.coarsening solver.studies.discretisation""",
+    "solver.refinement": """solver.analysis solver.assembly solver.coarsening solver.correction
+        solver.distribution solver.files solver.linear solver.subspace""",
+    "solver.accuracy": "solver.analysis solver.distribution solver.files solver.refinement",
+    "solver.commands": """solver.accuracy solver.analysis solver.coarsening solver.correction
+        solver.distribution solver.files solver.linear solver.refinement solver.response
+        solver.verification""",
     #
     "sound": "",
     "sound.clips": "sound",
-    "sound.project": "solver.files solver.analysis sound sound.clips",
-    "sound.design": """solver.coarsening solver.distribution solver.files solver.response
-        solver.linear solver.subspace solver.analysis sound sound.clips sound.project""",
+    "sound.project": "solver.analysis solver.files sound sound.clips",
+    "sound.design": """solver.analysis solver.coarsening solver.distribution solver.files
+        solver.linear solver.response solver.subspace sound sound.clips sound.project""",
     "sound.rendering": """solver.files solver.response solver.subspace sound sound.clips
         sound.project""",
-    "sound.scenes": """solver.analysis solver.files solver.refinement solver.response
-        solver.accuracy sound sound.project sound.rendering""",
-    "sound.scenes.contact": "sound.scenes",
-    "sound.scenes.audible": "solver.response sound.rendering sound.scenes sound.scenes.contact",
+    "sound.scenes": """solver.accuracy solver.analysis solver.files solver.refinement
+        solver.response sound sound.project sound.rendering""",
     "sound.scenes.film": "sound sound.scenes",
-    "sound.scenes.playing": "sound.clips sound.scenes sound.scenes.audible sound.scenes.contact",
-    "sound.export": """solver.files solver.response solver.assembly solver.studies sound
+    "sound.scenes.contact": "sound.scenes",
+    "sound.export": """solver.assembly solver.files solver.response solver.verification sound
         sound.project sound.rendering sound.scenes""",
-    "sound.commands": """solver.response sound sound.clips sound.project sound.design
-        sound.rendering sound.export""",
+    "sound.scenes.audible": "solver.response sound.rendering sound.scenes sound.scenes.contact",
+    "sound.commands": """solver.response sound sound.clips sound.design sound.export
+        sound.project sound.rendering""",
+    "sound.scenes.playing": "sound.clips sound.scenes sound.scenes.audible sound.scenes.contact",
     #
     "studio": "",
-    "studio.standalone": "sound sound.project sound.design sound.rendering studio",
-    "studio.scene": "solver.refinement sound.scenes studio studio.standalone",
-    "studio.processes": """solver.files solver.response solver.analysis sound sound.clips
-        sound.project sound.design sound.rendering sound.export studio studio.standalone""",
-    "studio.session": "sound sound.clips sound.project studio studio.processes",
     "studio.server": "sound.project studio",
-    "studio.commands": """solver.refinement sound sound.clips sound.project sound.scenes
-        sound.scenes.film sound.scenes.playing sound.export studio.standalone studio.scene
-        studio.server studio.session""",
+    "studio.standalone": "sound sound.design sound.project sound.rendering studio",
+    "studio.scene": "solver.refinement sound.scenes studio studio.standalone",
+    "studio.processes": """solver.analysis solver.files solver.response sound sound.clips
+        sound.design sound.export sound.project sound.rendering studio studio.standalone""",
+    "studio.session": "sound sound.clips sound.project studio studio.processes",
+    "studio.commands": """solver.refinement sound sound.clips sound.export sound.project
+        sound.scenes sound.scenes.film sound.scenes.playing studio.scene studio.server
+        studio.session studio.standalone""",
     #
-    "workflow": "dataset_gen dataset_gen.objectives forests forests.studies",
-    "workflow.estimate": """dataset_gen.objectives solver.coarsening solver.refinement
-        workflow""",
-    "workflow.studies.base": "solver.response workflow",
-    "workflow.studies": "workflow.studies.base",
-    "workflow.studies.report": """solver.files solver.hcms solver.refinement
-        solver.studies.scaling workflow workflow.studies.base""",
-    "workflow.studies.figures": "workflow.studies.base workflow.studies.report",
-    "workflow.studies.claims": "forests workflow workflow.studies.base workflow.studies.report",
-    "workflow.studies.forests": """dataset_gen.objectives workflow.studies.base
-        workflow.studies.report""",
-    "workflow.studies.objectives": """dataset_gen.objectives solver.coarsening
-        workflow.studies.base""",
-    "workflow.studies.coarsening": "solver.studies.coarsening workflow.studies.base",
-    "workflow.studies.discretisation": "workflow.studies.base",
-    "workflow.studies.accuracy": "workflow.studies.base",
-    "workflow.studies.sounds": """solver.files solver.response sound sound.clips sound.project
-        sound.design sound.rendering workflow workflow.studies.base""",
-    "workflow.studies.scenes": "workflow workflow.studies.base workflow.studies.sounds",
-    "workflow.studies.scene_spectra": """solver.files solver.response workflow
-        workflow.studies.base workflow.studies.sounds""",
-    "workflow.studies.recordings": "solver.response sound.clips workflow.studies.base",
-    "workflow.studies.validation": """solver.files solver.refinement solver.response
-        solver.studies workflow workflow.studies.base workflow.studies.report""",
-    "workflow.studies.campaign": """workflow workflow.studies.base
-        workflow.studies.validation""",
-    "workflow.studies.comparison": "workflow workflow.studies.base",
-    "workflow.commands": """dataset_gen.objectives solver.coarsening solver.correction
-        solver.response
-        solver.analysis workflow workflow.studies.base workflow.studies.comparison workflow.estimate
-        workflow.studies.report workflow.studies.recordings""",
-    "workflow.scripts": """solver.analysis sound.clips workflow.studies.base
-        workflow.studies.campaign workflow.studies.report workflow.studies.comparison
-        workflow.studies.sounds workflow.studies.recordings""",
+    "workflow": "dataset_gen dataset_gen.objectives forests forests.training",
+    "workflow.report": "solver.files solver.hcms solver.refinement workflow studies.base",
+    "workflow.estimate": "dataset_gen.objectives solver.coarsening solver.refinement workflow",
+    "workflow.scripts": "workflow.report studies.base",
+    "workflow.validation": """solver.files solver.refinement solver.response solver.verification
+        workflow workflow.report studies.base""",
+    "workflow.commands": """dataset_gen.objectives solver.analysis solver.coarsening
+        solver.correction solver.response workflow workflow.estimate workflow.report
+        studies.base""",
+    #
+    "studies": "",
+    "studies.base": "solver.response workflow studies",
+    "studies.base.scripts": "studies.base",
 }
 """Packages, from the bottom to the top, with those that they import beside `EVERYBODY`."""
 
@@ -144,8 +122,8 @@ ARROWS = {
 @cache
 def modules() -> dict[str, Path]:
     """Source files of all rooms by module name."""
-    files = (path for room in ROOMS for path in (CHECKOUT / room).rglob("*.py"))
-    return {_module_of(path): path for path in files}
+    files = [path for room in ROOMS for path in (CHECKOUT / room).rglob("*.py")]
+    return {_module_of(path): path for path in files if not path.name.startswith("test_")}
 
 
 def _module_of(path: Path) -> str:
@@ -170,12 +148,22 @@ def imported(module: str) -> Iterator[str]:
         yield from (name for name in names if name in modules())
 
 
+def study_of(module: str) -> str | None:
+    """Name of the study that a module belongs to; what all studies share belongs to none."""
+    room, _, rest = module.partition(".")
+    name = rest.partition(".")[0]
+    return name if room == "studies" and name not in ("", "base") else None
+
+
 @cache
 def arrows() -> dict[str, set[str]]:
-    """Packages that each package imports."""
+    """Packages that each package imports; studies are told apart by `study_of`.
+
+    `carillon` itself prepares the process before anything is loaded, so it is left out.
+    """
     found: dict[str, set[str]] = {}
     for module in modules():
-        if not module.endswith(".__main__"):
+        if module != "carillon" and not module.endswith(".__main__") and not study_of(module):
             others = {package_of(name) for name in imported(module)}
             found.setdefault(package_of(module), set()).update(others)
     return {package: others - {package} for package, others in found.items()}
@@ -199,17 +187,54 @@ def test_no_arrow_points_back():
     assert set(order) == set(ARROWS)
 
 
+PLACES = (
+    *ROOMS[:-2],
+    "workflow",
+    "studies",
+    "studies.base",
+    "workflow.report",
+    "workflow.validation",
+)
+"""The chain of rooms; the report is made as studies are, and imports what these share."""
+
+
+def _place(package: str) -> int:
+    """Number of the last place in the chain that a package belongs to."""
+    return max(k for k, each in enumerate(PLACES) if f"{package}.".startswith(f"{each}."))
+
+
 @pytest.mark.parametrize("package", ARROWS)
 def test_rooms_stand_in_one_chain(package):
-    place = ROOMS.index(package.split(".")[0])
-    assert {other.split(".")[0] for other in arrows()[package]} <= set(ROOMS[: place + 1])
+    """But for commands and scripts, which are where all comes together."""
+    if package in ("studies", "workflow.commands", "workflow.scripts"):
+        return
+    assert all(_place(other) <= _place(package) for other in arrows()[package])
 
 
-def test_class_names_are_told_apart():
+@pytest.mark.parametrize("study", studies.names())
+def test_a_study_imports_the_product_and_those_studies_that_it_needs(study):
+    needs = getattr(import_module(f"studies.{study}"), "NEEDS", ())
+    own = [module for module in modules() if study_of(module) == study]
+    others = {study_of(name) for module in own for name in imported(module)}
+    assert others <= {None, study, *needs}
+
+
+def test_nothing_of_the_product_imports_a_study():
+    found = {
+        (module, name)
+        for module in modules()
+        if study_of(module) is None
+        for name in imported(module)
+        if study_of(name)
+    }
+    assert found == set()
+
+
+def test_public_class_names_are_told_apart():
     named: dict[str, list[str]] = {}
     for name, path in modules().items():
         for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.ClassDef):
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 named.setdefault(node.name, []).append(name)
     assert {name: where for name, where in named.items() if len(where) > 1} == {}
 
@@ -222,12 +247,12 @@ def test_petsc_and_slepc_are_had_from_one_module_each(library):
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.ImportFrom) and node.module == f"{library}4py":
                 found.append(_module_of(path))
-    assert found == [f"carillon.{library}"]
+    assert found == [f"carillon.processes.{library}"]
 
 
 @pytest.mark.parametrize("room", ROOMS[1:])
 def test_rooms_begin_with_carillon(room):
     """Whose import has libraries, loaded later, read no settings in the present folder."""
-    program = f"import sys, {room}; print('carillon.present_folder' in sys.modules)"
+    program = f"import sys, {room}; print('carillon.processes.present_folder' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert done.stdout == "True\n", done.stderr

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from carillon.errors import UserError
-from carillon.files import atomic_path
+from carillon.files.atomic import atomic_path
 from sound.project.design_file import write_design
 from studio.server import browser
 from studio.session import open_studio

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from carillon.narrow import block, lanes_of, subtract
-from carillon.registers import LANES
-from carillon.threads import in_tree
+from carillon.numerics.simd_width import LANES
+from carillon.numerics.small_gemm import block, lanes_of, subtract
+from carillon.processes.threads import in_tree
 
 PARENTS = [2, 2, 6, 5, 5, 6, -1, 8, -1]
 

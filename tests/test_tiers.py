@@ -16,7 +16,7 @@ PYTEST_SECONDS = """
 12.50s call     tests/test_a.py::test_one[x]
 2.25s setup    tests/test_a.py::test_two
 0.50s teardown tests/test_b.py::test_three
-9.00s call     carillon/step.py::carillon.step
+9.00s call     carillon/processes/mpi_environment.py::carillon.processes.mpi_environment
 """
 
 

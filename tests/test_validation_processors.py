@@ -8,8 +8,8 @@ import pytest
 import yaml
 from llvmlite import binding
 
+from studies.base.table import read_table
 from tests.test_workflow_config import CONFIGS
-from workflow.studies.base.table import read_table
 
 MODELS = yaml.safe_load((CONFIGS / "laptop.yaml").read_text())["models"]
 PROCESSORS = {

@@ -7,12 +7,12 @@ import json
 import pytest
 from mpi4py import MPI
 
-from carillon.waiting import leave_cores
+from carillon.processes.waiting import leave_cores
 
 PROGRAM = """
 import json, os, sys, time
 from mpi4py import MPI
-from carillon.waiting import leave_cores
+from carillon.processes.waiting import leave_cores
 comm = MPI.COMM_WORLD
 if sys.argv[1] == "share":
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})

@@ -9,10 +9,10 @@ import yaml
 
 from forests.training.train import TrainingOptions
 from solver.files.modes_file import read_modes
+from studies.base.table import read_table
 from tests.pages import Page, assert_self_contained
 from tests.workflow_runs import CHECKOUT, PROFILE, planned, snakemake
 from workflow import settings, training
-from workflow.studies.base.table import read_table
 
 PRESET = CHECKOUT / "workflow" / "config" / "as-printed.yaml"
 TINY = {

@@ -19,8 +19,8 @@ from forests.training.train import TrainingOptions
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
 from solver.response.response_file import StrikeOptions
-from solver.studies.benchmark.options import BenchmarkOptions
-from solver.studies.scaling.study import ScalingOptions
+from studies.benchmark.options import BenchmarkOptions
+from studies.scaling.study import ScalingOptions
 from workflow import settings, solids
 
 CHECKOUT = Path(__file__).resolve().parent.parent
@@ -207,15 +207,15 @@ LISTS = {
     "acceleration": "solver.correction.correction:ACCELERATIONS",
     "linear_solver": "solver.linear:METHODS",
     "missed_tolerance": "solver.analysis.options:MISSED",
-    "rivals": "solver.studies.benchmark.further:RIVALS",
-    "quantity": "workflow.studies.objectives.goals:LABELS",
-    "solids": "solver.studies.accuracy.solids:SOLIDS",
+    "rivals": "studies.benchmark.further:RIVALS",
+    "quantity": "studies.objectives.goals:LABELS",
+    "solids": "studies.accuracy.solids:SOLIDS",
 }
 """Where the code holds what a key of the schema enumerates, by the name of the key."""
 EXAMPLES = {
-    "sound.examples": "workflow/studies/sounds/examples.yaml",
-    "sound.recordings": "workflow/studies/sounds/examples.yaml",
-    "scenes.examples": "workflow/studies/scenes/examples.yaml",
+    "sound.examples": "studies/sounds/examples.yaml",
+    "sound.recordings": "studies/sounds/examples.yaml",
+    "scenes.examples": "studies/scenes/examples.yaml",
 }
 """The same of those that are entries of a file."""
 

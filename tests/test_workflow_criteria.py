@@ -18,15 +18,15 @@ from solver.coarsening.model import build_model
 from solver.files.modes_file import write_modes
 from solver.response import response_file
 from solver.response.response_file import StrikeOptions, respond, write_response
-from solver.studies.allowance import accepted_errors, angle_limits
-from solver.studies.audit import audit_files
-from solver.studies.comparison import compare_each
+from solver.verification.allowance import accepted_errors, angle_limits
+from solver.verification.audit import audit_files
+from solver.verification.comparison import compare_each
 from tests.edited_files import edited
 from tests.solids import box_mesh, random_box
 from tests.test_solver_response import all_modes
 from workflow import settings
-from workflow.studies.validation.criteria import judge, verdict
-from workflow.studies.validation.evidence import Evidence
+from workflow.validation.criteria import judge, verdict
+from workflow.validation.evidence import Evidence
 from workflow.variants import FROM_SOLID, SHOWN, TRUTH
 
 MODES, COARSE_MODES = 30, 24

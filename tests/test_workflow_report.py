@@ -11,15 +11,15 @@ import pytest
 
 from solver.files.modes_file import FINE_TAKEN
 from solver.response.response import FLOOR_DECIBELS, decibels
-from workflow.studies.base import numbers
-from workflow.studies.base.colours import COLOURS, themed
-from workflow.studies.base.media import cropped, highest_hertz, spectrogram_figure
-from workflow.studies.base.numbers import show
-from workflow.studies.base.style import svg
-from workflow.studies.base.table import Column, Table, read_table, write_table
-from workflow.studies.report.design_tables import costs, design, spread_of
-from workflow.studies.report.methods_plot import methods_figure
-from workflow.studies.report.mode_pictures import aligned, cluster
+from studies.base import numbers
+from studies.base.colours import COLOURS, themed
+from studies.base.media import cropped, highest_hertz, spectrogram_figure
+from studies.base.numbers import show
+from studies.base.style import svg
+from studies.base.table import Column, Table, read_table, write_table
+from workflow.report.design_tables import costs, design, spread_of
+from workflow.report.methods_plot import methods_figure
+from workflow.report.mode_pictures import aligned, cluster
 
 TABLE = Table(
     "demo",

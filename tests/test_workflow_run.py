@@ -14,13 +14,13 @@ import yaml
 from markupsafe import escape
 
 from solver.files.modes_file import FINE_TAKEN, read_modes
+from studies.base.catalogue import REPORT
+from studies.base.conditions import LABELS
+from studies.base.numbers import MISSING
+from studies.base.table import read_table
 from tests.pages import Page, assert_same_numbers, assert_self_contained
 from tests.workflow_runs import PROFILE, TINY, planned, snakemake
 from workflow.settings import config_hash
-from workflow.studies.base.conditions import LABELS
-from workflow.studies.base.numbers import MISSING
-from workflow.studies.base.table import read_table
-from workflow.studies.catalogue import REPORT
 from workflow.variants import candidates_of, shown_of, variants_of
 
 pytestmark = pytest.mark.slow

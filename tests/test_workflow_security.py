@@ -17,10 +17,10 @@ import yaml
 from carillon import limits
 from carillon.errors import UserError
 from carillon.fem.geometry import builtin_surface
-from forests.comparison.database import MOST_MATERIALS
 from forests.evaluate import MOST_BLOCKS
 from forests.layout import MOST_LEAVES
-from solver.studies.scaling import launch
+from studies.blocks.database import MOST_MATERIALS
+from studies.scaling import launch
 from tests.workflow_runs import CHECKOUT, snakemake
 from workflow import settings
 from workflow.arguments import options, path_word, quoted
@@ -385,7 +385,7 @@ TABLE = {"name": "t", "caption": "", "columns": [{"key": "a", "label": "A"}], "r
     ],
 )
 def test_a_table_that_is_none_is_named(tmp_path, text):
-    from workflow.studies.comparison.folders import read_folder
+    from studies.comparison.folders import read_folder
 
     path = tmp_path / "tables" / "t.json"
     path.parent.mkdir()

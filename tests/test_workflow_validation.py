@@ -19,20 +19,20 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from carillon import cli
+from carillon.command_line import exit_status
 from solver.response.response_file import StrikeOptions, read_response, respond, write_response
-from solver.studies.audit import audit_files
-from solver.studies.comparison import compare_each
+from solver.verification.audit import audit_files
+from solver.verification.comparison import compare_each
+from studies.base.catalogue import VALIDATION
+from studies.base.table import read_table
 from tests.edited_files import edited
 from tests.pages import Page, assert_self_contained
 from workflow.__main__ import main
 from workflow.commands import validate
-from workflow.studies.base.table import read_table
-from workflow.studies.catalogue import VALIDATION
-from workflow.studies.validation.criteria import Criterion
-from workflow.studies.validation.distance import distance_in_words
-from workflow.studies.validation.evidence import COARSENED, Evidence
-from workflow.studies.validation.page import page as rendered
+from workflow.validation.criteria import Criterion
+from workflow.validation.distance import distance_in_words
+from workflow.validation.evidence import COARSENED, Evidence
+from workflow.validation.page import page as rendered
 from workflow.variants import SHOWN
 
 SIDES = (80.0, 40.0, 20.0)
@@ -212,7 +212,7 @@ def test_bad_input_is_answered_in_one_sentence(words, says, solid, tmp_path, mon
     (solid / "short.txt").write_text("1e9 1e9 1e9")
     status = call(*words, "--resolution", RESOLUTION, "--out", tmp_path / "out")
     error = capsys.readouterr().err.strip()
-    assert status == cli.EXIT_BAD_INPUT
+    assert status == exit_status.EXIT_BAD_INPUT
     assert says in error and len(error.splitlines()) == 1
     assert not (tmp_path / "out").exists()
 

@@ -52,7 +52,7 @@ _ALONE = {
 _LATER = (
     *("sound.design.optimise", "sound.export.faust", "sound.export.gltf", "sound.export.embedded"),
     *("sound.rendering.render", "sound.project.project", "sound.project.design_file"),
-    *("solver.studies.calibration.gauss_newton", "solver.studies.scaling.plot"),
+    "studies.scaling.plot",
     *("snakemake.cli", "snakemake.utils", "soundfile", "igl", "trimesh"),
     *("scipy.signal", "scipy.optimize"),
     *("networkx", "multiprocessing.pool", "matplotlib.pyplot"),
@@ -217,7 +217,7 @@ def _be(job: Job, mark: str, libraries: tuple[Any, Any, Any], pipes: list[int]) 
             MPI.Init_thread(MPI.THREAD_MULTIPLE)
             PETSc._initialize([job.room, "-skip_petscrc"])
             SLEPc._initialize()
-            importlib.import_module("carillon.petsc").leave_pipes_to_python()
+            importlib.import_module("carillon.processes.petsc").leave_pipes_to_python()
         for name in _ALONE:
             os.environ.pop(name, None)  # those that the program starts may be several ranks
         os.environ.update({MARK: mark, **job.environment})

@@ -5,15 +5,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from carillon.commands import run_program
-from workflow.commands import COMMANDS
+from carillon.command_line.commands import run_room
 
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status."""
-    return run_program(
-        "workflow", "Around the rules: before, after, and for one solid.", COMMANDS, words
-    )
+    return run_room("workflow", "Around the rules: before, after, and for one solid.", words)
 
 
 if __name__ == "__main__":

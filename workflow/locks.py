@@ -15,7 +15,7 @@ import socket
 from pathlib import Path
 from typing import Any, TextIO
 
-from carillon.progress import say
+from carillon.command_line.progress import say
 
 FOLDER = Path(".snakemake")
 _held: list[TextIO] = []

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from carillon.documents import read_own_yaml
+from carillon.files.yaml_input import read_own_yaml
 from workflow import settings, solids
 
 PINNED: dict[str, dict[str, str]] = read_own_yaml(Path(__file__).with_suffix(".yaml"))

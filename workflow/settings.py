@@ -10,16 +10,16 @@ from typing import Any
 from jsonschema.exceptions import ValidationError
 from snakemake.utils import update_config, validate
 
-from carillon import provenance
-from carillon.builtin_names import BUILTIN_NAMES, BUILTIN_PREFIX
-from carillon.documents import read_own_yaml, read_yaml
 from carillon.errors import UserError
+from carillon.fem.geometry.builtin_names import BUILTIN_NAMES, BUILTIN_PREFIX
 from carillon.fem.materials import NAMES as MATERIALS
+from carillon.files.yaml_input import read_own_yaml, read_yaml
+from carillon.records import provenance
 from dataset_gen.objectives import OBJECTIVES, require_objective
 from forests import default as default_forests
 from workflow import training
 from workflow.arguments import path_word
-from workflow.room import require_place
+from workflow.disk_space import require_place
 from workflow.strict_schema import first_mistake, reason
 
 PLACES = ("results_dir", "mesh_folder", "baseline")
@@ -57,7 +57,7 @@ def read(files: Iterable[str | Path], given: Mapping[str, Any]) -> dict[str, Any
     Raises
     ------
     UserError
-        If a file cannot be read, see `carillon.documents.read_yaml`.
+        If a file cannot be read, see `carillon.files.yaml_input.read_yaml`.
     """
     config: dict[str, Any] = {}
     for values in (*(read_yaml(file, CONFIGURATION) for file in files), given):

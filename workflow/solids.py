@@ -56,6 +56,15 @@ def named(config: Config, where: str) -> list[str]:
     return [name for name in names if name not in absent]
 
 
+def measured_files(config: Config, study: str) -> list[str]:
+    """Files of what a study measures of its solids, below its folder."""
+    return [
+        f"models/{solid}/{file}.json"
+        for file, where in MEASURED[study].items()
+        for solid in named(config, where)
+    ]
+
+
 def without(config: Config, section: str) -> str:
     """One sentence about the solids that are left out; empty if there are none."""
     absent = absent_meshes(config, section)

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from carillon.errors import UserError
-from carillon.files import atomic_path
+from carillon.files.atomic import atomic_path
 
 KEPT = Path(__file__).parent / "__pycache__" / f"{Path(__file__).stem}-{sys.hexversion:x}.json"
 _TEXTS = frozenset({"help", "description", "metavar"})

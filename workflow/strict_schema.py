@@ -12,7 +12,7 @@ from jsonschema import Draft202012Validator, FormatChecker
 from jsonschema.exceptions import ValidationError, best_match
 from jsonschema.validators import extend
 
-from carillon.places import LONGEST_NAME
+from carillon.files.paths import LONGEST_NAME
 from workflow.arguments import quoted
 
 LONGEST_PATH = 1000

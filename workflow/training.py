@@ -8,7 +8,7 @@ from typing import Any
 
 from carillon.errors import UserError
 from dataset_gen.sampling import moduli
-from forests.studies.variants import VARIANTS
+from forests.training.variants import VARIANTS
 from workflow.arguments import options
 
 TRAINING = (

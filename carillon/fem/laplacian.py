@@ -16,7 +16,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from carillon.fem.aggregation import COARSEST, Level, ShiftedInverse, levels_of
 from carillon.fem.geometry.faces import face_neighbours
-from carillon.threads import blas_threads
+from carillon.processes.threads import blas_threads
 
 if TYPE_CHECKING:
     from carillon.fem.geometry import HexMesh

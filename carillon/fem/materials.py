@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from carillon.errors import UserError
 from carillon.fem.moduli_file import read_moduli
-from carillon.places import require_file
+from carillon.files.paths import require_file
 
 if TYPE_CHECKING:  # Geometry needs trimesh, whose import takes long; names of materials do without.
     from carillon.fem.geometry import HexMesh

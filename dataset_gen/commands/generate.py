@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import argparse
 
-from carillon import cli
-from carillon.arguments import number_of_workers
+from carillon.command_line import exit_status
+from carillon.command_line.arguments import number_of_workers
+from carillon.command_line.options import add_options, collect
+from carillon.command_line.progress import say
 from carillon.errors import UserError
-from carillon.options import add_options, collect
-from carillon.progress import say
-from carillon.ranks import world
+from carillon.processes.ranks import world
 from dataset_gen.generate import Engine, engine_of, generate_file
 from dataset_gen.ranks import run_on_ranks
 from dataset_gen.settings import ShardOptions, settings_of
@@ -61,7 +61,7 @@ def _generate(arguments: argparse.Namespace, engine: Engine) -> int:
         )
     except KeyboardInterrupt:
         say(f"{arguments.out}: interrupted; the same command goes on from here")
-        return cli.EXIT_INTERRUPTED
+        return exit_status.EXIT_INTERRUPTED
     what = f"samples {settings.start}..{settings.stop - 1}, {settings.objective}"
     if fitted is None:
         say(f"{arguments.out}: holds {what} already, nothing to do")

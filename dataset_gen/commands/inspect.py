@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
-from carillon.progress import say
+from carillon.command_line.progress import say
 from dataset_gen import summary
 from dataset_gen.speed import Speed
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from carillon import lazily
+from carillon import lazy_exports
 from carillon.errors import UserError
 from dataset_gen.objectives.calibration import default_calibration
 
@@ -87,7 +87,7 @@ def require_poisson(poisson: float) -> None:
         raise UserError(f"Poisson's ratio {poisson} is outside (-1, 0.5)")
 
 
-__getattr__ = lazily.exports(
+__getattr__ = lazy_exports.exports(
     __name__,
     dict.fromkeys(
         ("Fits", "fit", "fit_samples", "orientations"),

@@ -6,7 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.fem.element import Array
-from carillon.lanes import LANES, Vector, empty, larger, load, root, spread, store, where_less
+from carillon.numerics.simd import (
+    LANES,
+    Vector,
+    empty,
+    larger,
+    load,
+    root,
+    spread,
+    store,
+    where_less,
+)
 from dataset_gen.objectives.compiled import compiled
 
 EXCHANGES = 12

@@ -1,4 +1,4 @@
-"""Constants of the objective `calibrated`, found by `python -m solver calibrate`.
+"""Constants of the objective `calibrated`, fitted once to spectra of random solids.
 
 They are few: per class of void patterns one factor for every set of octants that the pattern's
 symmetries exchange, two exponents, and one share of lumped mass.
@@ -21,7 +21,7 @@ from carillon.fem.block import least_patterns, pattern_images, symmetries
 from carillon.fem.element import Array
 
 FILE = "calibration.json"
-"""Beside this module; written by `python -m solver calibrate`."""
+"""Beside this module; `carillon calibrate` of version 0.1 wrote it."""
 
 
 @dataclass(frozen=True)
@@ -88,8 +88,7 @@ def parse(content: Mapping[str, Any]) -> Calibration:
         )
     except (KeyError, TypeError, ValueError) as error:
         raise UserError(
-            f"calibration: {error!r} is missing or not a number; write the file with "
-            "python -m solver calibrate"
+            f"calibration: {error!r} is missing or not a number; take {FILE} of this version"
         ) from None
 
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from carillon.fem.block import CORNER_NODES, degrees_of_freedom
 from carillon.fem.element import Array
-from carillon.lanes import LANES, empty, spread, store
-from carillon.serial import serial_blas
+from carillon.numerics.simd import LANES, empty, spread, store
+from carillon.processes.serial import serial_blas
 from dataset_gen.objectives import flops
 from dataset_gen.objectives.compiled import compiled
 from dataset_gen.objectives.elimination import TILE, elimination_of

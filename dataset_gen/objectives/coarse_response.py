@@ -13,8 +13,8 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from carillon.fem.element import Array
-from carillon.lanes import LANES, empty, load, root, spread, store
-from carillon.serial import serial_blas
+from carillon.numerics.simd import LANES, empty, load, root, spread, store
+from carillon.processes.serial import serial_blas
 from dataset_gen.objectives.compiled import compiled
 from dataset_gen.objectives.descent import CURVATURE, GRADIENT
 from dataset_gen.objectives.elimination import Sum, elimination_of, lower_tiles_of, sum_of

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from carillon.lanes import compiler
-from carillon.registers import REGISTERS, Registers
+from carillon.numerics.simd import compiler
+from carillon.numerics.simd_width import REGISTERS, Registers
 
 MODULES = ("compiled", "kernel", "bounded", "descent", "free_block", "coarse_response")
 """Those whose compiled functions call each other."""

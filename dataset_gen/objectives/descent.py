@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from carillon.fem.element import Array
-from carillon.lanes import LANES, Vector, empty, larger, load, spread, store, where_less
+from carillon.numerics.simd import LANES, Vector, empty, larger, load, spread, store, where_less
 from dataset_gen.objectives.bounded import solve_free
 from dataset_gen.objectives.compiled import compiled
 

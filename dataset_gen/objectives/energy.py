@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.fem.element import Array
-from carillon.lanes import LANES, Vector, empty, load, spread, store
+from carillon.numerics.simd import LANES, Vector, empty, load, spread, store
 from dataset_gen.objectives.coarse_response import (
     Coarse,
     CoarseResponse,

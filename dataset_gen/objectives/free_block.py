@@ -14,8 +14,8 @@ from scipy.linalg import qr
 
 from carillon.fem.block import cell_stiffness
 from carillon.fem.element import Array
-from carillon.lanes import Vector, empty, load, spread, store
-from carillon.serial import serial_blas
+from carillon.numerics.simd import Vector, empty, load, spread, store
+from carillon.processes.serial import serial_blas
 from dataset_gen.objectives.compiled import compiled
 from dataset_gen.objectives.elimination import (
     FactorStructure,

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from carillon.fem.element import Array
-from carillon.lanes import LANES, empty
-from carillon.serial import serial_blas
+from carillon.numerics.simd import LANES, empty
+from carillon.processes.serial import serial_blas
 from dataset_gen.objectives import flops
 from dataset_gen.objectives.compiled import compiled
 from dataset_gen.objectives.elimination import TILE, elimination_of

@@ -1,7 +1,7 @@
 """What the compiled fits share: sparse Cholesky, small products, normal equations, in lanes.
 
 Every number stands for `LANES` blocks, one row of an array of lanes (see
-`carillon.lanes`). A matrix has its numbers row by row; operands of products are
+`carillon.numerics.simd`). A matrix has its numbers row by row; operands of products are
 tuples (array, first entry, stride, stride). The factorised matrices consist of 3x3 tiles in the
 order of `dataset_gen.objectives.elimination`.
 """
@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from carillon.fem.element import Array
-from carillon.lanes import (
+from carillon.numerics.simd import (
     LANES,
     Vector,
     add_product,

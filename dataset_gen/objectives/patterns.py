@@ -26,7 +26,7 @@ from carillon.fem.element import (
     shape_gradients,
     strain_displacement,
 )
-from carillon.serial import serial_blas
+from carillon.processes.serial import serial_blas
 
 NULL_TOLERANCE = 1e-10
 """Eigenvalues below this share of the largest count as motions without strain."""

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from carillon.fem.element import DEFAULT_POISSON, Array
-from carillon.lanes import LANES, add_product, empty, load, spread, store, store_tile, zeros
-from carillon.serial import serial_blas
+from carillon.numerics.simd import LANES, add_product, empty, load, spread, store, store_tile, zeros
+from carillon.processes.serial import serial_blas
 from dataset_gen.objectives.coarse_response import (
     Coarse,
     CoarseResponse,

@@ -9,8 +9,8 @@ from importlib import import_module
 
 from carillon import ROOMS
 from carillon.__main__ import LONGER, commands
-from carillon.arguments import Parser
-from carillon.commands import Command
+from carillon.command_line.arguments import Parser
+from carillon.command_line.commands import Command
 
 COLUMNS = "76"
 """Width of the help: what fits beside the contents on a screen."""

@@ -13,7 +13,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from carillon import cli
+from carillon.command_line import exit_status
 from carillon.errors import UserError
 from workflow import settings
 
@@ -88,4 +88,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(cli.run(PROGRAM, main))
+    sys.exit(exit_status.run(PROGRAM, main))

@@ -8,10 +8,10 @@ from __future__ import annotations
 import argparse
 import time
 
-from carillon.arguments import whole_number
+from carillon.command_line.arguments import whole_number
+from carillon.command_line.progress import say
 from carillon.errors import UserError
-from carillon.files import require_writable
-from carillon.progress import say
+from carillon.files.paths import require_writable
 from forests.commands.training import add_training, training_of
 from forests.training.dataset import open_dataset
 from forests.training.train import grow_trees, parameters_of

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import argparse
 
-from carillon.files import require_writable
-from carillon.progress import say
-from carillon.ranks import alone, world
+from carillon.command_line.progress import say
+from carillon.files.paths import require_writable
+from carillon.processes.ranks import alone, world
 from forests.commands.training import add_training, add_workers, training_of
 from forests.model import save_model
 from forests.training.dataset import Dataset, open_dataset

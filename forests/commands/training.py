@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from carillon.arguments import number_of_workers
-from carillon.options import add_options, collect
+from carillon.command_line.arguments import number_of_workers
+from carillon.command_line.options import add_options, collect
 from forests.training.train import TrainingOptions
 
 

@@ -12,11 +12,11 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from joblib import Parallel, delayed
 
-from carillon import provenance
-from carillon.arguments import number_between, whole_number
+from carillon.command_line.arguments import number_between, whole_number
+from carillon.command_line.options import option
+from carillon.command_line.progress import track
 from carillon.errors import UserError
-from carillon.options import option
-from carillon.progress import track
+from carillon.records import provenance
 from forests.layout import MOST_LEAVES
 from forests.model import FILLED, VOID, Model
 from forests.scaling import TRANSFORMS

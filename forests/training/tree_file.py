@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from carillon import provenance
-from carillon.datasets import INTEGER, REAL, read
 from carillon.errors import UserError
-from carillon.files import create_h5, open_h5
+from carillon.files.datasets import INTEGER, REAL, read
+from carillon.files.hdf5 import create_h5, open_h5
+from carillon.records import provenance
 from forests.scaling import FEATURES, PATTERNS
 from forests.training.structure import Tree
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.command_line.progress import say
 from carillon.errors import UserError
 from carillon.fem.finite_cells.covering import Covering
 from carillon.fem.finite_cells.model import FiniteCellModel
-from carillon.progress import say
 from solver.accuracy.estimate import CellErrors, estimate_cell_errors
 from solver.refinement.refine import RefinementStep
 

@@ -34,7 +34,7 @@ class Solution:
         (n_dofs, k) mass-normalised modes [kg^-1/2], row 3 n + i is node n of the mesh along axis i;
         None on other ranks than 0.
     residuals
-        (k,) residual ratios, see `solver.subspace.verification.residual_ratios`.
+        (k,) residual ratios, see `solver.verification.residuals.residual_ratios`.
     evidence
         What the solver achieved.
     seconds

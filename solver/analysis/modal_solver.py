@@ -10,11 +10,11 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from carillon.command_line.progress import say
 from carillon.fem.model import RIGID_MODES, Solid
 from carillon.fem.moduli import require_coarse_moduli
-from carillon.progress import say
-from carillon.runtime import limit_threads, reuse_freed_memory
-from carillon.waiting import leave_cores
+from carillon.processes.cores import limit_threads, reuse_freed_memory
+from carillon.processes.waiting import leave_cores
 from solver.analysis.bounds import check_mode_count, require_memory
 from solver.analysis.components import ComponentModes, elastic_part, lowest_pairs
 from solver.analysis.modes import Initial, Modes
@@ -23,21 +23,21 @@ from solver.analysis.prepared import Prepared
 from solver.analysis.proof import completed, ground_truth
 from solver.analysis.timing import Phases, peak_memory
 from solver.assembly.system import Layout, System, assemble
-from solver.correction.cold import Approximation, Cold, from_nothing
 from solver.correction.correct import correct
 from solver.correction.correction import EIGENVALUE_TOLERANCE, carried, resolved
+from solver.correction.random_start import Approximation, Cold, from_nothing
 from solver.distribution.collective import bcast_from_root, compute_on_root, ranks_of_machine
 from solver.distribution.local_mesh import LocalMesh, distribute, scatter_moduli, with_poisson
 from solver.linear import Inverse, Lasting, LinearSolver
 from solver.reference.truth import SPARE_MODES, Truth, can_count
 from solver.subspace.rayleigh_ritz import rigid_pairs
-from solver.subspace.verification import (
+from solver.subspace.weyl import CountingLaw
+from solver.verification.residuals import (
     require_orthonormal,
     require_six_rigid,
     rigid_modes,
     verify,
 )
-from solver.subspace.weyl import CountingLaw
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from carillon.fem.model import RIGID_MODES
 from solver.assembly.system import System
-from solver.correction.cold import Approximation
+from solver.correction.random_start import Approximation
 from solver.linear import Lasting
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ class Modes:
     vectors
         (local, k) mass-normalised modes, this rank's rows of `system`, row-major.
     residuals
-        (k,) residual ratios, see `solver.subspace.verification.residual_ratios`.
+        (k,) residual ratios, see `solver.verification.residuals.residual_ratios`.
     evidence
         What the solver achieved: orthogonality, error estimate, steps, inertia, rigid modes, ranks,
         peak memory.

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from carillon.arguments import number_between, whole_number
+from carillon.command_line.arguments import number_between, whole_number
+from carillon.command_line.options import option
 from carillon.errors import UserError
-from carillon.options import option
 from solver import linear
 from solver.correction.correction import ACCELERATIONS, EIGENVALUE_TOLERANCE
 from solver.hcms.condense import DEFAULT_INTERFACE, INTERFACES

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.arguments import whole_number
+from carillon.command_line.arguments import whole_number
+from carillon.command_line.options import REQUIRED, option
 from carillon.errors import UserError
 from carillon.fem import geometry, materials
 from carillon.fem.element import DEFAULT_POISSON
@@ -20,7 +21,6 @@ from carillon.fem.geometry.size import doubt_unit
 from carillon.fem.materials import young_modulus
 from carillon.fem.model import DEFAULT_DENSITY, ElasticModel, Solid
 from carillon.limits import require_constants
-from carillon.options import REQUIRED, option
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, OBJECTIVES
 from solver.coarsening.choice import METHODS as COARSENINGS
 from solver.coarsening.choice import make_coarsening

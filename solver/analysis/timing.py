@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 from mpi4py import MPI
 
-from carillon.progress import say
+from carillon.command_line.progress import say
 
 
 class Phases:

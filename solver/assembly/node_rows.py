@@ -17,8 +17,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.fem.elements import Elements
-from carillon.registers import LANES
-from carillon.threads import in_parallel, split
+from carillon.numerics.simd_width import LANES
+from carillon.processes.threads import in_parallel, split
 from solver.assembly.row_products import multiply
 
 Array = NDArray[np.float64]

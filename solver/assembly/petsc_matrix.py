@@ -6,7 +6,7 @@ from typing import Any
 
 import scipy.sparse as sp
 
-from carillon.petsc import PETSc
+from carillon.processes.petsc import PETSc
 
 
 def distributed_matrix(rows: sp.csr_matrix, comm: Any) -> Any:

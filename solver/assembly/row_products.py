@@ -14,15 +14,15 @@ import numpy as np
 from numba import literally
 from numpy.typing import NDArray
 
-from carillon import narrow
-from carillon.lanes import add_gathered, compiler, sliding, store_tile, zeros
-from carillon.narrow import WIDE
-from carillon.registers import LANES
+from carillon.numerics import small_gemm
+from carillon.numerics.simd import add_gathered, compiler, sliding, store_tile, zeros
+from carillon.numerics.simd_width import LANES
+from carillon.numerics.small_gemm import WIDE
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-compiled = compiler(Path(__file__), Path(narrow.__file__))
+compiled = compiler(Path(__file__), Path(small_gemm.__file__))
 
 STRIPS = (8, 4, 3, 2, 1)
 """Registers to a strip of columns."""

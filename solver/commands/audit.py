@@ -9,11 +9,11 @@ from __future__ import annotations
 import argparse
 import json
 
-from carillon.arguments import number_between
-from carillon.provenance import record
+from carillon.command_line.arguments import number_between
+from carillon.records.provenance import record
 from solver.commands.running import on_ranks, parameters, require_outputs, write_json
 from solver.correction.correction import EIGENVALUE_TOLERANCE
-from solver.studies.audit import audit_files
+from solver.verification.audit import audit_files
 
 EXAMPLES = """example:
   audit bunny.h5 truth.h5

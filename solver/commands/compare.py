@@ -6,10 +6,10 @@ import argparse
 import json
 from typing import Any
 
-from carillon.provenance import record
+from carillon.records.provenance import record
 from solver.commands.running import on_ranks, parameters, require_outputs, write_json
 from solver.distribution.collective import bcast_from_root
-from solver.studies.comparison import compare_each
+from solver.verification.comparison import compare_each
 
 OTHER_SHAPE = 0.5
 """Angle [rad] between modes from which they are not the same."""

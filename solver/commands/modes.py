@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.arguments import whole_number
+from carillon.command_line.arguments import whole_number
+from carillon.command_line.options import add_options, collect
+from carillon.command_line.progress import say
 from carillon.errors import UserError
 from carillon.fem.geometry.size import sizes_in_words
 from carillon.fem.model import Solid
-from carillon.options import add_options, collect
-from carillon.progress import say
 from solver.accuracy.options import FIRST_RESOLUTION, DistanceOptions
 from solver.accuracy.solving import Wishes, solve_accurately, solve_solid
 from solver.analysis.coarse_start import coarse_start

@@ -10,11 +10,11 @@ from typing import Any
 
 from mpi4py import MPI
 
-from carillon import outputs
-from carillon.files import atomic_path
-from carillon.options import add_options
-from carillon.petsc import PETSc
-from carillon.runtime import limit_threads, warn_about_reference_blas
+from carillon.command_line import outputs
+from carillon.command_line.options import add_options
+from carillon.files.atomic import atomic_path
+from carillon.processes.cores import limit_threads, warn_about_reference_blas
+from carillon.processes.petsc import PETSc
 from solver.analysis.problem import ProblemOptions
 from solver.distribution.collective import bcast_from_root, ranks_of_machine
 from solver.linear import petsc_options

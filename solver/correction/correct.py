@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
 from solver.assembly.system import System
-from solver.correction.cold import Cold
 from solver.correction.correction import EIGENVALUE_TOLERANCE, Correction, default_guard
 from solver.correction.enrichment import Ritz
 from solver.correction.iteration import Iteration
 from solver.correction.lobpcg import lobpcg
+from solver.correction.random_start import Cold
 from solver.linear import Lasting, LinearSolver
 from solver.subspace.rayleigh_ritz import rayleigh_ritz, safe_shift
 from solver.subspace.start import every_unknown, start_block

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
 from solver.assembly.system import System
-from solver.correction.cold import Cold
 from solver.correction.correction import (
     IMPROVED_GUARDS,
     LOOSE,
@@ -20,7 +19,8 @@ from solver.correction.correction import (
 from solver.correction.enrichment import Ritz, Step, enrich, relax
 from solver.correction.krylov import ZERO_FRACTION
 from solver.correction.lanczos import is_too_high, lanczos
-from solver.correction.mixture import mixed
+from solver.correction.random_start import Cold
+from solver.correction.starting_block import mixed
 from solver.distribution.collective import bcast_from_root
 from solver.linear import Approximate, Inverse, Lasting, LinearSolver
 from solver.subspace.rayleigh_ritz import rayleigh_ritz, safe_shift

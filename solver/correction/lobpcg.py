@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
-from carillon.threads import in_parallel, split
+from carillon.processes.threads import in_parallel, split
 from solver.assembly.system import System
 from solver.distribution.collective import bcast_from_root
 from solver.subspace.orthonormal import orthonormal

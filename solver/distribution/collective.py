@@ -9,9 +9,9 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.cli import meaning
+from carillon.command_line.exit_status import meaning
+from carillon.command_line.progress import say
 from carillon.errors import one_line
-from carillon.progress import say
 
 Number = TypeVar("Number", np.float64, np.int64)
 T = TypeVar("T")

@@ -13,7 +13,7 @@ from carillon.fem.aggregation import levels_of
 from carillon.fem.geometry import HexMesh
 from carillon.fem.laplacian import FEW_CELLS, cell_laplacian, laplacian_modes, rough_modes
 from carillon.fem.model import Solid
-from carillon.threads import one_thread
+from carillon.processes.threads import one_thread
 
 EMBEDDING_MODES = 12
 """Laplacian eigenvectors that span the clustering space, the constant left out."""

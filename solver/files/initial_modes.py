@@ -9,11 +9,11 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.datasets import INTEGER, find, finite, read
 from carillon.errors import LocalUserError, UserError
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.model import Solid
-from carillon.files import open_h5
+from carillon.files.datasets import INTEGER, find, finite, read
+from carillon.files.hdf5 import open_h5
 from solver.distribution.collective import bcast_from_root
 from solver.distribution.local_mesh import LocalMesh
 from solver.distribution.messages import receive_arrays, send_arrays

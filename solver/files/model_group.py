@@ -8,7 +8,6 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.datasets import INTEGER, number, read, refused
 from carillon.fem.block import ALL_FILLED, NODES
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
@@ -17,6 +16,7 @@ from carillon.fem.geometry import CORNER_OFFSETS, HexMesh
 from carillon.fem.geometry.hanging import kinds_of_cells, makes_sense, node_places
 from carillon.fem.model import ElasticModel, Solid
 from carillon.fem.moduli import at_points
+from carillon.files.datasets import INTEGER, number, read, refused
 from carillon.limits import DENSITIES, EDGES, POISSON
 
 Array = NDArray[np.float64]

@@ -12,13 +12,13 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon import provenance
-from carillon.datasets import find, finite, read, refused
 from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
 from carillon.fem.model import RIGID_MODES, Solid
-from carillon.files import create_h5, open_h5
-from carillon.measurement import measured
+from carillon.files.datasets import find, finite, read, refused
+from carillon.files.hdf5 import create_h5, open_h5
+from carillon.records import provenance
+from carillon.records.measurement import measured
 from solver.files.model_group import get_model, put, put_model
 
 Array = NDArray[np.float64]

@@ -25,7 +25,7 @@ from solver.distribution.local_mesh import Cells
 from solver.distribution.messages import AnyArray
 from solver.hcms.condense import restrict_stiffness
 from solver.hcms.counts import Tally, eigen_flops, sparse_product_flops
-from solver.hcms.crew import Crew
+from solver.hcms.distributed_products import Crew
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]

@@ -16,7 +16,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.petsc import PETSc
+from carillon.processes.petsc import PETSc
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -17,15 +17,15 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.fem.block import degrees_of_freedom
-from carillon.threads import in_parallel
+from carillon.processes.threads import in_parallel
 from solver.distribution.local_mesh import LocalMesh
 from solver.distribution.messages import receive_arrays, send_arrays
-from solver.hcms.ascent import Ascent
 from solver.hcms.condense import DEFAULT_INTERFACE
 from solver.hcms.counts import Counts, krylov_flops, product_flops
 from solver.hcms.local import Subdomain
 from solver.hcms.lowest import FEWER_STEPS, STEPS
 from solver.hcms.merge import Group, boundary_of
+from solver.hcms.merge_tree import Ascent
 from solver.hcms.schedule import modes_to_keep, schedule
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.threads import in_parallel, split
+from carillon.processes.threads import in_parallel, split
 
 Array = NDArray[np.floating]
 

@@ -9,8 +9,8 @@ import scipy.linalg as la
 from numpy.typing import NDArray
 
 from carillon.errors import LocalConvergenceError
-from carillon.lanes import compiler
-from carillon.threads import in_parallel, split
+from carillon.numerics.simd import compiler
+from carillon.processes.threads import in_parallel, split
 from solver.linear import plan as plans
 from solver.linear.plan import PANEL, STRIP, Part, Plan, packed_size
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from carillon.errors import ConvergenceError, UserError
-from carillon.petsc import PETSc
+from carillon.processes.petsc import PETSc
 
 ROOM = (50, 200, 800)
 """Percent by which MUMPS's guess of the memory it needs is exceeded, tried one after the other.

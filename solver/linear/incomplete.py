@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.petsc import PETSc
+from carillon.processes.petsc import PETSc
 
 Array = NDArray[np.float64]
 

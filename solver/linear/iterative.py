@@ -16,8 +16,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
-from carillon.petsc import PETSc
-from carillon.threads import in_parallel, split
+from carillon.processes.petsc import PETSc
+from carillon.processes.threads import in_parallel, split
 from solver.linear.incomplete import IncompleteCholesky
 from solver.linear.multigrid import Multigrid
 

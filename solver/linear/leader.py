@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.threads import blas_threads
+from carillon.processes.threads import blas_threads
 from solver.distribution.collective import compute_on_root, gather_rows
 from solver.linear.multifrontal import Factor, count_below
 from solver.linear.plan import Plan

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import LocalConvergenceError
-from carillon.narrow import block, lanes_of
-from carillon.runtime import available_memory
-from carillon.threads import in_parallel, in_tree, split
+from carillon.numerics.small_gemm import block, lanes_of
+from carillon.processes.cores import available_memory
+from carillon.processes.threads import in_parallel, in_tree, split
 from solver.linear.elimination import eliminate_fronts
 from solver.linear.plan import Part, Plan
 from solver.linear.sweeps import (

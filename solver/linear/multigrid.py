@@ -15,8 +15,8 @@ import scipy.linalg as la
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.petsc import PETSc
-from carillon.threads import in_parallel, split
+from carillon.processes.petsc import PETSc
+from carillon.processes.threads import in_parallel, split
 from solver.linear.block_rows import BlockRows
 from solver.linear.petsc_options import MULTIGRID_PREFIX
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.petsc import PETSc
+from carillon.processes.petsc import PETSc
 from solver.assembly.system import System
 from solver.linear.factorisation import factorised
 from solver.linear.petsc_options import INNER_PREFIX

@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from carillon.errors import LocalUserError, UserError
-from carillon.petsc import PETSc
+from carillon.processes.petsc import PETSc
 
 OPTIONS_PREFIX = "carillon_"
 """What the names of PETSc's options for this program begin with."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.threads import split
+from carillon.processes.threads import split
 from solver.linear.dissection import Fronts, dissect
 
 Index = NDArray[np.int64]

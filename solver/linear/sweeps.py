@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from carillon import narrow
-from carillon.lanes import compiler
-from carillon.narrow import block, subtract
-from carillon.registers import LANES
+from carillon.numerics import small_gemm
+from carillon.numerics.simd import compiler
+from carillon.numerics.simd_width import LANES
+from carillon.numerics.small_gemm import block, subtract
 from solver.linear import plan
 from solver.linear.plan import PANEL, STRIP
 
-compiled = compiler(Path(__file__), Path(narrow.__file__), Path(plan.__file__))
+compiled = compiler(Path(__file__), Path(small_gemm.__file__), Path(plan.__file__))
 
 
 @compiled

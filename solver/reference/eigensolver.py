@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from carillon.petsc import PETSc
-from carillon.slepc import SLEPc
+from carillon.processes.petsc import PETSc
+from carillon.processes.slepc import SLEPc
 from solver.assembly.system import System
 from solver.linear.factorisation import definite_packages
 from solver.linear.petsc_options import OPTIONS_PREFIX, require_known_options

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
 from carillon.fem.model import RIGID_MODES
-from carillon.petsc import PETSc
+from carillon.processes.petsc import PETSc
 from solver.assembly.system import System
 from solver.linear.factorisation import factorised
 from solver.reference.eigensolver import smallest_eigenpairs

@@ -27,7 +27,7 @@ from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Modes
 from solver.analysis.options import RANDOM, SolverOptions
 from solver.analysis.prepared import Prepared
-from solver.correction.cold import Approximation
+from solver.correction.random_start import Approximation
 from solver.correction.shift import is_amid
 from solver.distribution.collective import bcast_from_root, compute_on_root, optional
 from solver.files.initial_modes import scatter_rows

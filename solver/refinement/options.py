@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from carillon.arguments import number_between
+from carillon.command_line.arguments import number_between
+from carillon.command_line.options import option
 from carillon.errors import UserError
-from carillon.options import option
 from solver.coarsening.forest import FOREST
 
 ALLOWED_ERROR = 0.05

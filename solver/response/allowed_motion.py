@@ -24,7 +24,7 @@ def motion_limit(
         Exact modes at the struck point, the watched one, and maybe more.
     errors
         (k,) accepted errors of the eigenvalues [rad^2/s^2], see
-        `solver.studies.allowance.accepted_errors`.
+        `solver.verification.allowance.accepted_errors`.
     damping
         Of the motion.
     seconds

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon import provenance
-from carillon.arguments import number_between
+from carillon.command_line.arguments import number_between
+from carillon.command_line.options import option
 from carillon.errors import UserError
-from carillon.files import create_h5, open_h5
+from carillon.files.hdf5 import create_h5, open_h5
 from carillon.limits import EXTENTS, FARTHEST
-from carillon.options import option
+from carillon.records import provenance
 from solver.files.modes_file import read_elastic, require_same_solid
 from solver.response.contact import Contact, choose_contacts
 from solver.response.response import (

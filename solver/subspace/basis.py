@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon import narrow
-from carillon.lanes import compiler
-from carillon.narrow import DEPTH, ROWS_NEAR, lanes_of, subtract
-from carillon.registers import LANES
-from carillon.threads import in_parallel, split
+from carillon.numerics import small_gemm
+from carillon.numerics.simd import compiler
+from carillon.numerics.simd_width import LANES
+from carillon.numerics.small_gemm import DEPTH, ROWS_NEAR, lanes_of, subtract
+from carillon.processes.threads import in_parallel, split
 from solver.assembly.system import System
 
 Array = NDArray[np.float64]
 
-compiled = compiler(Path(__file__), Path(narrow.__file__))
+compiled = compiler(Path(__file__), Path(small_gemm.__file__))
 
 ROWS_COMBINED = 512
 """Rows of all blocks that are brought together for a product."""

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon import provenance
-from carillon.cache import remembered
-from carillon.datasets import number, read, refused
-from carillon.files import create_h5, open_h5
+from carillon.files.cache import remembered
+from carillon.files.datasets import number, read, refused
+from carillon.files.hdf5 import create_h5, open_h5
+from carillon.records import provenance
 from sound.clips.extraction import ModalSound
 
 Array = NDArray[np.float64]

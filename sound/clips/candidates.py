@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.progress import track
+from carillon.command_line.progress import track
 from sound.clips.bands import Band, bands
 from sound.clips.esprit import esprit
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from carillon.threads import blas_threads
+from carillon.processes.threads import blas_threads
 from sound.bounds import require_level
 from sound.clips.candidates import LEAST_DECAY
 from sound.clips.clipping import is_clipped, restored

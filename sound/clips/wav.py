@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from carillon.files import atomic_path
-from carillon.places import cause, require_file
+from carillon.files.atomic import atomic_path
+from carillon.files.paths import cause, require_file
 from sound.bounds import (
     HIGHEST_RATE,
     LOWEST_RATE,

@@ -1,6 +1,6 @@
 """Commands from example clips to a material to a sound."""
 
-from carillon.commands import Command
+from carillon.command_line.commands import Command
 
 COMMANDS = {
     "extract": Command(
@@ -19,5 +19,4 @@ COMMANDS = {
     "export": Command(
         "sound.commands.export", "modes on the mesh, glTF, Faust or moduli, for other tools"
     ),
-    "benchmark": Command("sound.commands.benchmark", "time of an evaluation, optimisers compared"),
 }

@@ -11,7 +11,7 @@ import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from carillon.options import REQUIRED, add_options, collect, option
+from carillon.command_line.options import REQUIRED, add_options, collect, option
 
 if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     from sound.project.design import Design, FineFrequencies

@@ -6,9 +6,9 @@ import argparse
 import json
 from dataclasses import dataclass
 
-from carillon.arguments import positive_number, whole_number
+from carillon.command_line.arguments import positive_number, whole_number
+from carillon.command_line.options import REQUIRED, add_options, collect, option
 from carillon.errors import UserError
-from carillon.options import REQUIRED, add_options, collect, option
 from sound.bounds import sample_rate
 
 NAMES = ("metal", "wood", "piano")

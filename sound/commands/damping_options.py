@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from carillon.options import option
+from carillon.command_line.options import option
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from carillon.command_line.options import REQUIRED, add_options, collect, option
+from carillon.command_line.progress import LINE_SECONDS, say
 from carillon.errors import UserError
-from carillon.locks import locked
-from carillon.options import REQUIRED, add_options, collect, option
-from carillon.progress import LINE_SECONDS, say
+from carillon.files.locks import locked
 from sound.commands.search_options import SearchOptions
 from sound.design.interrupts import ended_by_interrupts
 from sound.design.objective import fall

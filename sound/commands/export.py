@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from carillon.arguments import whole_number
+from carillon.command_line.arguments import whole_number
+from carillon.command_line.options import REQUIRED, add_options, collect, option
 from carillon.errors import UserError
-from carillon.options import REQUIRED, add_options, collect, option
 from sound.commands.damping_options import DampingOptions
 
 if TYPE_CHECKING:  # Its import takes long, and `--help` needs none.

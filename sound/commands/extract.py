@@ -8,9 +8,9 @@ import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from carillon.arguments import whole_number
+from carillon.command_line.arguments import whole_number
+from carillon.command_line.options import REQUIRED, add_options, collect, option
 from carillon.errors import UserError
-from carillon.options import REQUIRED, add_options, collect, option
 
 if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     from sound.clips.extraction import ModalSound
@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Extract, write and print."""
-    from carillon.files import atomic_path
+    from carillon.files.atomic import atomic_path
     from sound.clips.files import clip_names, extract_file
     from sound.clips.targets import share_frequencies
     from sound.clips.wav import ENDINGS, write_wav

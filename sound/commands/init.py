@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from carillon.command_line.options import REQUIRED, add_options, collect, option
 from carillon.errors import UserError
-from carillon.options import REQUIRED, add_options, collect, option
 
 ENDINGS = (".yaml", ".yml")
 """Of projects."""
@@ -51,8 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Look at mesh and clips, write the project and say what to do next."""
-    from carillon.documents import parse_yaml
-    from carillon.files import atomic_path
+    from carillon.files.atomic import atomic_path
+    from carillon.files.yaml_input import parse_yaml
     from sound.outputs import require_output
     from sound.project.project import project_of
     from sound.project.schema import check, project_schema
@@ -82,7 +82,7 @@ def _file_of(path: str) -> str:
 
 def _values(options: InitOptions, folder: Path) -> dict[str, Any]:
     """Keys and values that are not left to their defaults."""
-    from carillon.builtin_names import BUILTIN_PREFIX
+    from carillon.fem.geometry.builtin_names import BUILTIN_PREFIX
 
     builtin = options.mesh.startswith(BUILTIN_PREFIX)
     mesh = options.mesh if builtin else _seen_from(folder, options.mesh)

@@ -12,10 +12,15 @@ import json
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from carillon.arguments import number_between, number_of_workers, positive_number, whole_number
+from carillon.command_line.arguments import (
+    number_between,
+    number_of_workers,
+    positive_number,
+    whole_number,
+)
+from carillon.command_line.options import REQUIRED, add_options, collect, option
 from carillon.errors import UserError
-from carillon.measurement import measured
-from carillon.options import REQUIRED, add_options, collect, option
+from carillon.records.measurement import measured
 
 if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     from sound.design.reach import Reach

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from carillon.arguments import number_between, positive_number, whole_number
+from carillon.command_line.arguments import number_between, positive_number, whole_number
+from carillon.command_line.options import REQUIRED, add_options, collect, option
 from carillon.errors import UserError
-from carillon.options import REQUIRED, add_options, collect, option
 from sound.bounds import (
     LARGEST_IMPULSE,
     LEAST_IMPULSE,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from carillon.arguments import number_of_workers, positive_number, whole_number
-from carillon.options import option
+from carillon.command_line.arguments import number_of_workers, positive_number, whole_number
+from carillon.command_line.options import option
 
 
 @dataclass(frozen=True)

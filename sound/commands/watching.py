@@ -8,9 +8,9 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from carillon.documents import MOST_BYTES
+from carillon.command_line.progress import say
 from carillon.errors import UserError
-from carillon.progress import say
+from carillon.files.yaml_input import MOST_BYTES
 from solver.response.response import SAMPLE_RATE_HERTZ
 from sound.clips.wav import ENDINGS, write_wav
 from sound.design.interrupts import interruptible

@@ -12,7 +12,7 @@ from scipy.optimize import linear_sum_assignment
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.geometry import hexmesh_from_grid
 from carillon.fem.model import RIGID_MODES, ElasticModel, Solid, fine_model
-from carillon.threads import one_thread
+from carillon.processes.threads import one_thread
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
-from carillon.threads import one_thread
+from carillon.processes.threads import one_thread
 from solver.files.modes_file import frequencies
 from sound.design.cents import common_factor
 from sound.design.damping import material_damping

@@ -25,10 +25,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.children import end_with_parent
 from carillon.errors import ConvergenceError, UserError
-from carillon.step import leave_nothing
-from carillon.threads import one_thread
+from carillon.processes.children import end_with_parent
+from carillon.processes.mpi_environment import leave_nothing
+from carillon.processes.threads import one_thread
 from sound.design.descent import (
     DesignDescent,
     LimitedMemory,

@@ -4,7 +4,7 @@ With M-orthonormal modes, d lambda_k = u_k^T dK u_k and the derivative of u_k is
 other modes j of u_j (u_j^T dK u_k) / (lambda_k - lambda_j).  Of a pushed mode f^T u_k that is one
 product u_k^T dK x_k, with x_k the sum of u_j (u_j^T f) / (lambda_k - lambda_j).  Modes close to k,
 which the differences in the denominators would magnify, are left out of x_k, and their products
-u_i^T dK u_j are found one by one; modes that were not computed are for `sound.design.outside`.
+u_i^T dK u_j are found one by one; modes that were not computed are for `modal_truncation`.
 """
 
 from __future__ import annotations

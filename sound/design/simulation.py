@@ -23,8 +23,8 @@ from solver.linear import Inverse, Lasting
 from solver.response.contact import interpolation
 from sound.design.elements import analysed_elements
 from sound.design.material import ReducedMaterial
+from sound.design.modal_truncation import lies_between, outside_response, shift_between
 from sound.design.objective import Sensitivity
-from sound.design.outside import lies_between, outside_response, shift_between
 from sound.design.poisson import FIRST, SECOND, elasticity_slope
 from sound.design.sensitivity import all_pairs, close_pairs, inside_response, projected_stiffness
 from sound.strikes import Strike

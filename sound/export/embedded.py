@@ -12,7 +12,7 @@ from solver.assembly.sparse import assembled
 from solver.files.model_group import FINITE_CELLS, put
 from solver.files.modes_file import ModesFile, frequencies, write_modes
 from solver.response.contact import embedding
-from solver.studies.comparison import recomputed_residuals
+from solver.verification.comparison import recomputed_residuals
 from sound.project.design import Design
 from sound.project.design_file import put_object
 from sound.rendering.listening import Listening

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon import __version__
-from carillon.files import atomic_path
+from carillon.files.atomic import atomic_path
 from sound.project.design import Design
 from sound.rendering.listening import Listening
 from sound.rendering.render import DECAY_NEPERS

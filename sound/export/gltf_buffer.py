@@ -10,7 +10,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from carillon.files import atomic_path
+from carillon.files.atomic import atomic_path
 
 FLOAT, UNSIGNED_INT = 5126, 5125
 VERTICES, TRIANGLES = 34962, 34963

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from carillon.files import atomic_path
+from carillon.files.atomic import atomic_path
 from sound.project.design import Design
 
 

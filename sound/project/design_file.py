@@ -10,10 +10,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon import provenance
 from carillon.errors import UserError
-from carillon.files import create_h5, open_h5
-from carillon.measurement import measured
+from carillon.files.hdf5 import create_h5, open_h5
+from carillon.records import provenance
+from carillon.records.measurement import measured
 from solver.files.model_group import get_model, put, put_model
 from solver.files.modes_file import put_eigenvalues, put_modes
 from sound.clips.targets import Targets

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from jsonschema import Draft202012Validator
 
-from carillon.documents import read_own_yaml
 from carillon.errors import UserError
+from carillon.files.yaml_input import read_own_yaml
 
 if TYPE_CHECKING:
     from jsonschema.exceptions import ValidationError

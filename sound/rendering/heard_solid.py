@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from carillon.errors import UserError
 from carillon.fem.model import Solid
-from carillon.files import kind_of
+from carillon.files.hdf5 import kind_of
 from solver.files.modes_file import read_modes
 from solver.response.response import Damping
 from sound.project.design import Design

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from carillon.errors import UserError
-from carillon.places import cause, require_file
+from carillon.files.paths import cause, require_file
 from sound.bounds import LARGEST_IMPULSE, LEAST_IMPULSE, LONGEST_SOUND
 
 MOST_STRIKES = 10_000

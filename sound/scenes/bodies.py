@@ -12,7 +12,7 @@ from carillon.errors import ConvergenceError, UserError
 from carillon.fem.geometry.size import doubt_unit
 from carillon.fem.model import RIGID_MODES, Solid
 from carillon.fem.rigid import MassProperties, mass_properties
-from carillon.files import kind_of
+from carillon.files.hdf5 import kind_of
 from carillon.limits import EXTENTS
 from solver.files.modes_file import read_modes, require_same_solid
 from solver.refinement.errors import FROM_SOLID

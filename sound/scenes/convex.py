@@ -21,13 +21,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.cache import remembered
-from carillon.children import run_child
-from carillon.datasets import INTEGER, read, refused
 from carillon.errors import UserError
-from carillon.files import create_h5, open_h5
+from carillon.files.cache import remembered
+from carillon.files.datasets import INTEGER, read, refused
+from carillon.files.hdf5 import create_h5, open_h5
 from carillon.limits import require_within
-from carillon.memory import spare_the_machine
+from carillon.processes.children import run_child
+from carillon.processes.memory import spare_the_machine
 from sound.scenes.cuttable import (
     GRIDS,
     HOLLOW,

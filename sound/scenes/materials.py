@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from carillon.documents import read_own_yaml
 from carillon.errors import UserError
+from carillon.files.yaml_input import read_own_yaml
 from solver.response.response import Damping
 
 _NUMBERS = (

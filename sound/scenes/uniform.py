@@ -16,14 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon import __version__
-from carillon.cache import remembered
+from carillon.command_line.progress import say
 from carillon.errors import UserError
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.geometry import hexmesh_from_voxels, voxelize
 from carillon.fem.geometry.bridges import say_bridged
 from carillon.fem.model import RIGID_MODES, ElasticModel, Solid, fine_model
-from carillon.progress import say
-from carillon.threads import one_thread
+from carillon.files.cache import remembered
+from carillon.processes.threads import one_thread
 from solver.accuracy.estimate import estimate_cell_errors
 from solver.accuracy.lattices import covering_on, voxel_lattice
 from solver.accuracy.voxels import Reference

@@ -1,6 +1,6 @@
 """Commands of the studio."""
 
-from carillon.commands import Command
+from carillon.command_line.commands import Command
 
 COMMANDS = {
     "studio": Command(

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from carillon.command_line.options import REQUIRED, add_options, collect, option
 from carillon.errors import UserError
-from carillon.options import REQUIRED, add_options, collect, option
 
 if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     from sound.scenes.performance import Performance

@@ -13,10 +13,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from carillon.arguments import whole_number
+from carillon.command_line.arguments import whole_number
+from carillon.command_line.options import add_options, collect, option
+from carillon.command_line.progress import say
 from carillon.errors import UserError, one_line
-from carillon.options import add_options, collect, option
-from carillon.progress import say
 
 if TYPE_CHECKING:
     import socket

@@ -14,7 +14,7 @@ from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
 from carillon.fem.model import RIGID_MODES, Solid
-from carillon.threads import one_thread
+from carillon.processes.threads import one_thread
 from solver.analysis.modes import Modes
 from solver.analysis.problem import ProblemOptions
 from solver.files.modes_file import frequencies

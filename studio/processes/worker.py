@@ -18,11 +18,11 @@ from pathlib import Path
 from threading import Thread
 from typing import Any
 
-from carillon.children import end_with_parent
-from carillon.cli import meaning
+from carillon.command_line.exit_status import meaning
 from carillon.errors import UserError, one_line
-from carillon.memory import spare_the_machine
-from carillon.step import leave_nothing
+from carillon.processes.children import end_with_parent
+from carillon.processes.memory import spare_the_machine
+from carillon.processes.mpi_environment import leave_nothing
 
 # Processes are ended at once, whatever they hold. That this is then cleaned up need not be
 # told.

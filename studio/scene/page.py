@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from carillon.files import atomic_path
-from carillon.progress import say
+from carillon.command_line.progress import say
+from carillon.files.atomic import atomic_path
 from sound.scenes.performance import Performance
 from studio.scene.content import content
 from studio.standalone.modules import PAGE

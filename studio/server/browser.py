@@ -9,7 +9,7 @@ import webbrowser
 from html import escape
 from pathlib import Path
 
-from carillon.progress import say
+from carillon.command_line.progress import say
 
 NAME = "open-studio.html"
 """File that leads to the page; in the workspace, as some browsers may read in homes alone."""

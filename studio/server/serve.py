@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 import uvicorn
 
 from carillon.errors import UserError
-from carillon.places import cause
+from carillon.files.paths import cause
 from studio.interface import Studio
 from studio.server.app import make_app
 from studio.server.connections import BURST, Connections, most_connections, protocols

@@ -8,7 +8,7 @@ from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from carillon import cli
+from carillon.command_line import exit_status
 from carillon.errors import UserError
 from studio.feed import Feed
 from studio.interface import Studio
@@ -91,7 +91,7 @@ def _number(message: dict[str, Any]) -> int:
 
 def sentence_of(error: Exception) -> str:
     """What a person is told of an error; faults of the program's are printed as well."""
-    _, sentence = cli.meaning(error)
+    _, sentence = exit_status.meaning(error)
     if sentence is None:
         traceback.print_exception(error)
     return sentence or OWN_FAULT

@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
+from carillon.command_line.progress import say
 from carillon.errors import UserError
-from carillon.progress import say
 
 SOON_SECONDS = 0.3
 """After a change; more of them may come together."""

@@ -7,12 +7,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from carillon.builtin_names import BUILTIN_PREFIX
+from carillon.command_line.progress import say
 from carillon.errors import UserError, one_line
+from carillon.fem.geometry.builtin_names import BUILTIN_PREFIX
 from carillon.fem.geometry.surface import surface_name
-from carillon.files import kind_of
+from carillon.files.hdf5 import kind_of
 from carillon.limits import MESH_BYTES
-from carillon.progress import say
 from sound.project.design_file import read_design
 from sound.project.schema import check, project_schema
 from studio.session.calls import fit_name, opened, with_design

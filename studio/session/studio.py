@@ -14,16 +14,16 @@ from studio.feed import Feed
 from studio.interface import Download, NotFoundError
 from studio.processes.worker import Worker
 from studio.session.autosave import Autosave
-from studio.session.bench import Bench
 from studio.session.calls import Calls
 from studio.session.document import Document, Material
 from studio.session.examples import EXAMPLES
 from studio.session.history import History
 from studio.session.listening import Clips
 from studio.session.pages import Pages
+from studio.session.reconcile import Upkeep
 from studio.session.restoring import kept, restored, restored_name
 from studio.session.searching import Searching
-from studio.session.upkeep import Upkeep
+from studio.session.solid_client import Bench
 from studio.session.workspace import Workspace
 
 EXPORT_SECONDS = 600.0

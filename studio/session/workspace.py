@@ -12,11 +12,11 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from carillon.documents import MOST_BYTES, parse_yaml, read_yaml
 from carillon.errors import UserError, one_line
-from carillon.held_folder import HeldFolder
-from carillon.locks import take
-from carillon.places import cause, require_plain
+from carillon.files.held_folder import HeldFolder
+from carillon.files.locks import take
+from carillon.files.paths import cause, require_plain
+from carillon.files.yaml_input import MOST_BYTES, parse_yaml, read_yaml
 from sound.project.template import project_text
 
 OWN_FOLDER = ".studio"

@@ -10,8 +10,8 @@ from pathlib import Path
 from string import Template
 
 from carillon import __version__
-from carillon.files import atomic_path
-from carillon.progress import say
+from carillon.command_line.progress import say
+from carillon.files.atomic import atomic_path
 from sound.project.design import Design
 from studio.standalone.content import content, name_of
 from studio.standalone.modules import PAGE, gathered, joined

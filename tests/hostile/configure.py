@@ -7,7 +7,7 @@ import sys
 from snakemake.common.configfile import load_configfile
 from snakemake.utils import validate
 
-from carillon import cli
+from carillon.command_line import exit_status
 from workflow import settings
 
 
@@ -20,4 +20,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(cli.run("configure", main))
+    sys.exit(exit_status.run("configure", main))

@@ -160,15 +160,6 @@ each(
     ["-1", "nan", str(10**30)],
     "--steps",
 )
-for option, values in {
-    "solids": ("0", "-1", "nan", str(2**64)),
-    "steps": ("0", "1e3"),
-    "workers": ("0", "-1", str(10**30), "1000000"),
-    "seed": ("-1", str(2**64)),
-}.items():
-    given = f"calibrate --cases cases --out out.json --{option} VALUE"
-    each(f"calibration's {option}", given, values, option)
-
 # Choices ------------------------------------------------------------------------------------------
 
 for option in (
@@ -382,13 +373,6 @@ hostile("scaling into nowhere", "scaling builtin:box --resolution 4 --out nowher
 hostile("plot of no format", "scaling builtin:box --resolution 4 --plot scaling.mp3", "scaling.mp3")
 hostile("plot into nowhere", "scaling builtin:box --resolution 4 --plot nowhere/scaling.png")
 hostile("convergence into nowhere", "convergence builtin:box --resolution 4 --out nowhere/c.json")
-hostile("calibration into nowhere", "calibrate --cases cases --out nowhere/c.json", "nowhere")
-hostile(
-    "calibration of a file",
-    "calibrate --cases cases --out c.json",
-    "cases",
-    files={"cases": "no folder\n"},
-)
 
 # Files that it reads ------------------------------------------------------------------------------
 

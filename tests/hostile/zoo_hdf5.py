@@ -9,7 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from carillon.files import SEAL_BYTES
+from carillon.files.hdf5 import SEAL_BYTES
 from tests.edited_files import edited
 
 KINDS = ("shard", "forests", "tree0", "modes", "design")

@@ -1,6 +1,6 @@
 """Commands around the rules: before, after, and for one solid."""
 
-from carillon.commands import Command
+from carillon.command_line.commands import Command
 
 COMMANDS = {
     "rules": Command(
@@ -10,20 +10,12 @@ COMMANDS = {
         "workflow.commands.estimate",
         "core-hours, memory and storage of a configuration, before anything runs",
     ),
-    "compare": Command(
-        "workflow.commands.compare",
-        "two folders of results side by side, and what moved beyond noise",
-    ),
     "compile": Command(
         "workflow.commands.compile", "kernels, once and side by side, before many jobs start"
     ),
     "digest": Command(
         "workflow.commands.digest",
         "what result files say, as one number: equal for runs that found the same bits",
-    ),
-    "recordings": Command(
-        "workflow.commands.recordings",
-        "real recordings of strikes, on which the extraction of modes is measured",
     ),
     "validate": Command(
         "workflow.commands.validate",

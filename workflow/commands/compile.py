@@ -16,11 +16,11 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
+from carillon.command_line.progress import say
 from carillon.errors import UserError
-from carillon.files import atomic_path
-from carillon.progress import say
-from carillon.provenance import compiled_for
-from carillon.runtime import allowed_cores
+from carillon.files.atomic import atomic_path
+from carillon.processes.cores import allowed_cores
+from carillon.records.provenance import compiled_for
 
 EXAMPLES = """examples:
   compile

@@ -12,7 +12,8 @@ import h5py
 import numpy as np
 
 from carillon.errors import UserError
-from carillon.files import cause, kind_of, open_h5
+from carillon.files.hdf5 import kind_of, open_h5
+from carillon.files.paths import cause
 
 CIRCUMSTANCES = {
     *("provenance", "timings", "hcms", "peak_memory_bytes", "ranks", "threads"),

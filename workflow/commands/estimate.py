@@ -9,10 +9,11 @@ from typing import Any
 
 import pandas as pd
 
-from carillon.arguments import whole_number
+from carillon.command_line.arguments import whole_number
 from carillon.fem.geometry import surface_name
-from carillon.files import atomic_path, require_writable
-from carillon.runtime import allowed_cores
+from carillon.files.atomic import atomic_path
+from carillon.files.paths import require_writable
+from carillon.processes.cores import allowed_cores
 from dataset_gen.objectives import DATASET_OBJECTIVES
 from workflow import settings, training
 from workflow.estimate import summary

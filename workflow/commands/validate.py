@@ -15,32 +15,32 @@ from typing import Any
 import numpy as np
 import yaml
 
-from carillon.arguments import (
+from carillon.command_line.arguments import (
     non_negative_number,
     number_between,
     number_of_workers,
     positive_number,
     whole_number,
 )
-from carillon.builtin_names import BUILTIN_PREFIX
+from carillon.command_line.options import REQUIRED, add_options, collect, option
+from carillon.command_line.progress import say, track
 from carillon.errors import UserError
 from carillon.fem.geometry import surface_name
+from carillon.fem.geometry.builtin_names import BUILTIN_PREFIX
 from carillon.fem.geometry.size import sizes_in_words
 from carillon.fem.materials import NAMES as MATERIALS
-from carillon.files import atomic_path
-from carillon.options import REQUIRED, add_options, collect, option
-from carillon.progress import say, track
-from carillon.runtime import allowed_cores
+from carillon.files.atomic import atomic_path
+from carillon.processes.cores import allowed_cores
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.coarsening.forest import load_forest
 from solver.correction.correction import EIGENVALUE_TOLERANCE
 from solver.response.surface import surface_of
+from studies.base.table import read_table
 from workflow import settings
+from workflow.disk_space import make_folder, require_own
 from workflow.failure import cause
-from workflow.room import make_folder, require_own
+from workflow.report.findings import headline
 from workflow.settings import DEFAULT_FORESTS
-from workflow.studies.base.table import read_table
-from workflow.studies.report.findings import headline
 
 CONFIGURATION = "validate.yaml"
 """File in the folder of the results that the run is started with."""

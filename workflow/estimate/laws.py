@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from carillon.documents import read_own_yaml
+from carillon.files.yaml_input import read_own_yaml
 
 Rates = Mapping[str, Any]
 """See `workflow/schemas/rates.schema.yaml`."""

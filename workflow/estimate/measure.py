@@ -15,12 +15,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from carillon import provenance
-from carillon.documents import read_own_yaml
+from carillon.command_line.progress import say
 from carillon.errors import UserError, one_line
-from carillon.measurement import memory_bytes
-from carillon.progress import say
-from carillon.runtime import allowed_cores, blas_name
+from carillon.files.yaml_input import read_own_yaml
+from carillon.processes.cores import allowed_cores, blas_name, memory_bytes
+from carillon.records import provenance
 from dataset_gen.objectives import SAMPLED
 from workflow import settings
 from workflow.estimate.laws import QUANTITIES, fit, known_of

@@ -6,10 +6,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from carillon.documents import read_own_yaml
 from carillon.errors import UserError
-from carillon.files import cause
-from carillon.places import require_file
+from carillon.files.paths import cause, require_file
+from carillon.files.yaml_input import read_own_yaml
 from workflow.estimate.laws import Rates
 from workflow.strict_schema import first_mistake, reason
 

@@ -72,13 +72,6 @@ def training_memory(plan):
     return plan.forests["ranks"] * (tree_memory(plan) + int(leaves))
 
 
-def templates(room, *names):
-    """Templates of a study's page: its own, and what all pages share."""
-    shared = ["base/base.html.j2", "base/macros.html.j2", "base/page.css"]
-    files = [f"{room}/{name}" for name in names or ["page.html.j2"]]
-    return [settings.FOLDER / "studies" / name for name in [*files, *shared]]
-
-
 def growing(first):
     """Resource that doubles with every try: a job that ran out of it gets more."""
     return lambda wildcards, attempt: first * 2 ** (attempt - 1)

@@ -35,24 +35,3 @@ rule describe_forests:
     shell:
         "python -m forests inspect {input:q} --json > {output:q}.partial 2> {log:q}"
         " && mv {output:q}.partial {output:q}"
-
-
-# Takes all cores although it uses one: its costs per block are timed.
-rule rate_forests:
-    input:
-        FORESTS,
-    output:
-        f"{RESULTS}/forests/table.json",
-    log:
-        f"{LOGS}/forests/rate.log",
-    benchmark:
-        f"{BENCHMARKS}/forests/rate.tsv"
-    threads: SOLVER_CORES
-    resources:
-        **limits("rate_forests"),
-    params:
-        source=source("forests.commands.table"),
-        blocks=block_arguments(OWN.forests),
-    shell:
-        "python -m forests table --model {input:q} {params.blocks:q}"
-        " --out {output:q} > {log:q} 2>&1"

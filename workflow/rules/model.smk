@@ -1,6 +1,5 @@
 # From a model in the configuration to the solver's arguments.
 
-LEAST_RESOLUTION = 4
 SOLID_OPTIONS = ("unit", "density", "lumped", "seed", "fill", "components")
 HCMS_OPTIONS = ("interface", "retained_modes", "subdomains")
 CORRECTION_OPTIONS = ("corrections", "acceleration", "linear_solver", "missed_tolerance")
@@ -91,39 +90,6 @@ def hcms_arguments(corrected):
         return options(how | {"corrections": 0})
     corrections = {key: solver[key] for key in CORRECTION_OPTIONS}
     return options(how | {"tolerance": solver["tolerance"]} | corrections)
-
-
-def timed_resolution(wildcards):
-    """Resolution at which a model is timed."""
-    part, own = config["times"], config["models"][wildcards.model]["resolution"]
-    return part["resolution"] or max(LEAST_RESOLUTION, round(part["share"] * own))
-
-
-def timed_methods(wildcards):
-    """How a model of the run is timed: by every method, or by those of a design and their rivals."""
-    part = config["times"]
-    every = part["all_methods"] is None or wildcards.model in part["all_methods"]
-    how = {} if every else {"design": True, "fine_runs": part["slow_runs"]}
-    return [*times_arguments(part), *options(how)]
-
-
-def times_arguments(part):
-    """How methods are timed, from a part of the configuration."""
-    keys = ("modes", "runs", "slow_runs", "tune", "arpack_regular", "rough", "rivals")
-    return options({key: part.get(key) for key in keys})
-
-
-def scaling_arguments(part):
-    """How the scaling is measured, from a part of the configuration."""
-    ranks = ",".join(map(str, part["ranks"]))
-    return options({"modes": part["modes"], "ranks": ranks, "weak": part.get("weak")})
-
-
-def convergence_arguments(wildcards, input):
-    """How the convergence of a model is followed; of no more modes than it has."""
-    part = config["convergence"]
-    modes = min(part["modes"], model_modes(wildcards))
-    return options({"modes": modes, "steps": part["steps"], "truth": input.truth})
 
 
 def model_modes(wildcards):

@@ -1,4 +1,6 @@
 # A page for every model that judges its spectra: `snakemake validation`, part of the default run too.
+from workflow.validation import study as validation_study
+
 VALIDATION = f"{RESULTS}/validation"
 
 
@@ -53,18 +55,16 @@ rule validate_model:
         response=f"{RESULTS}/models/{{model}}/response.h5",
         pictures=model_results(variants.shown_of, "figures/{model}-mode-{variant}.png"),
         description=f"{RESULTS}/figures/{{model}}-mode.json",
-        templates=templates("validation", "page.html.j2", "tables.yaml"),
+        templates=templates(validation_study.VALIDATION, "page.html.j2", "tables.yaml"),
     output:
-        marks.page(
-            catalogue.VALIDATION, f"{VALIDATION}/{{model}}.html", "Validation", model="{model}"
-        ),
+        f"{VALIDATION}/{{model}}.html",
         criteria=f"{VALIDATION}/tables/{{model}}-criteria.json",
         solid=f"{VALIDATION}/tables/{{model}}-solid.json",
     log:
         f"{LOGS}/validation/{{model}}.log",
     localrule: True
     params:
-        source=made_by("page", *pages_of(catalogue.VALIDATION)),
-        study=told(catalogue.VALIDATION, "tables", "page"),
+        source=made_with_tables(validation_study.VALIDATION),
+        study=described(validation_study.VALIDATION, "tables", "page"),
     script:
-        "../scripts/page.py"
+        "../../studies/base/scripts/page.py"

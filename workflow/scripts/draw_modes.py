@@ -3,10 +3,10 @@
 import json
 from pathlib import Path
 
-from carillon.files import atomic_path
-from workflow.studies.base.study import logged
-from workflow.studies.report.mode_pictures import draw_first_elastic_modes
-from workflow.studies.report.results import Run
+from carillon.files.atomic import atomic_path
+from studies.base.study import logged
+from workflow.report.mode_pictures import draw_first_elastic_modes
+from workflow.report.results import Run
 
 with logged(snakemake.log):
     run, pictures = Run(Path(snakemake.input.config).parent), snakemake.output.pictures

@@ -2,14 +2,14 @@
 
 from typing import TYPE_CHECKING
 
-from carillon import lazily
-from carillon.builtin_names import BUILTIN_NAMES, BUILTIN_PREFIX
+from carillon import lazy_exports
 from carillon.fem.geometry.blocks import (
     Blocks,
     blocks_from_mesh,
     blocks_with_coarse,
     prolongation,
 )
+from carillon.fem.geometry.builtin_names import BUILTIN_NAMES, BUILTIN_PREFIX
 from carillon.fem.geometry.hexmesh import (
     CORNER_OFFSETS,
     HexMesh,
@@ -44,7 +44,7 @@ __all__ = [
 ]
 
 # They need trimesh.
-__getattr__ = lazily.exports(
+__getattr__ = lazy_exports.exports(
     __name__,
     {
         "BUILTINS": "builtin",

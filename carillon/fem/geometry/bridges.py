@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.command_line.logs import warn_once
 from carillon.fem.geometry.fill import SAMPLES
 from carillon.fem.geometry.grid import Grid
 from carillon.fem.geometry.samples import SamplePoints
 from carillon.fem.geometry.touching import touched_voxels
 from carillon.fem.geometry.voxels import VoxelModel
-from carillon.logs import warn_once
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
     import trimesh

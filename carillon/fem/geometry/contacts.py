@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.command_line.logs import warn_once
 from carillon.errors import UserError
 from carillon.fem.geometry.crossings import line_crossings
 from carillon.fem.geometry.facets import Facets, connected
 from carillon.fem.geometry.parts import ClosedPart, closed_parts, winding_numbers
 from carillon.fem.geometry.pinches import MOST_EDGES, pinches
-from carillon.logs import warn_once
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
     import trimesh

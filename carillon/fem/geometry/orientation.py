@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.command_line.logs import warn_once
 from carillon.errors import UserError
 from carillon.fem.geometry.facets import Facets, connected
 from carillon.fem.geometry.parts import parts_of, signed_volumes, winding_numbers
-from carillon.logs import warn_once
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from carillon.logs import warn_once
+from carillon.command_line.logs import warn_once
 
 LARGE = 3.0
 """Longest side [m] from which a mesh may be in millimetres: of what is struck, most is smaller."""

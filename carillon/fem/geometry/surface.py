@@ -12,17 +12,17 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
 from carillon.fem.geometry.beside import Beside, NoFiles
 from carillon.fem.geometry.builtin import builtin_surface
+from carillon.fem.geometry.builtin_names import BUILTIN_PREFIX
 from carillon.fem.geometry.gltf import plain_gltf
 from carillon.fem.geometry.headers import require_plain_ply, whole_stl
 from carillon.fem.geometry.obj import plain_obj
 from carillon.fem.geometry.off import obj_of_off
 from carillon.fem.geometry.orientation import turned_alike
+from carillon.files.paths import require_file
 from carillon.limits import EXTENTS, FARTHEST, MESH_BYTES, UNITS, require_within
-from carillon.places import require_file
 
 # A box thinner than this fraction of its longest side holds no solid that voxels could show.
 FLATNESS = 1e-6

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from sound.rendering.solid import struck_amplitudes
 from sound.scenes.audible.damping import moved_along, pushed_modes
-from sound.scenes.audible.lying import Rest
-from sound.scenes.audible.pressing import Pressed
+from sound.scenes.audible.resting_contact import Rest
 from sound.scenes.audible.ringing import BLOCK, Excitation
+from sound.scenes.audible.sustained_contact import Pressed
 from sound.scenes.bodies import Body
 from sound.scenes.contact.impacts import Blow
 

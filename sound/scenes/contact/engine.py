@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.command_line.logs import warn_once
+from carillon.command_line.progress import track
 from carillon.errors import UserError, one_line
-from carillon.logs import warn_once
-from carillon.progress import track
 from sound.scenes.bodies import Body
 from sound.scenes.contact.bounce import damping_ratio
 from sound.scenes.contact.contact_log import ContactLog

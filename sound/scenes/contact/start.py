@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.command_line.progress import say
 from carillon.errors import UserError
-from carillon.progress import say
 from sound.scenes.bodies import Body
 from sound.scenes.contact.impacts import SLOWEST
 from sound.scenes.performance import GROUND

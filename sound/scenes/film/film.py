@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from carillon.command_line.progress import track
 from carillon.errors import UserError
-from carillon.files import atomic_path
-from carillon.progress import track
-from carillon.threads import blas_threads
+from carillon.files.atomic import atomic_path
+from carillon.processes.threads import blas_threads
 from sound.outputs import require_output
 from sound.scenes.film.frames import Stage
 from sound.scenes.packages import scene_package

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from carillon.files import atomic_path
+from carillon.files.atomic import atomic_path
 from sound.scenes.performance import GROUND, Performance
 
 COLUMNS = (

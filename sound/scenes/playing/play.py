@@ -8,17 +8,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.command_line.progress import say
 from carillon.errors import UserError
-from carillon.progress import say
-from carillon.runtime import allowed_threads
-from carillon.serial import serial_blas
-from carillon.threads import in_parallel
+from carillon.processes.cores import allowed_threads
+from carillon.processes.serial import serial_blas
+from carillon.processes.threads import in_parallel
 from sound.scenes.audible.excitation import excitation
 from sound.scenes.audible.hearing import Head, along, heard, towards
 from sound.scenes.audible.loudness import CHANNELS, click, clip_noise, mode_gains, voice
-from sound.scenes.audible.lying import rests_of
-from sound.scenes.audible.pressing import pressed
+from sound.scenes.audible.resting_contact import rests_of
 from sound.scenes.audible.ringing import ring
+from sound.scenes.audible.sustained_contact import pressed
 from sound.scenes.bodies import Body, body_of
 from sound.scenes.contact.engine import Course, simulate
 from sound.scenes.contact.impacts import Blow, Pressing, told_apart

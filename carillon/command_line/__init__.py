@@ -1,0 +1,1 @@
+"""Commands: their options, how they end, what they print."""

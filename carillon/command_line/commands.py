@@ -1,0 +1,134 @@
+"""Programs made of commands, each a module that is imported only when it is asked for."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
+from types import MappingProxyType
+
+from carillon import __version__
+from carillon.command_line import exit_status
+from carillon.command_line.arguments import Parser
+from carillon.command_line.progress import say
+from carillon.errors import UserError
+from carillon.processes import mpi_environment, present_folder
+from carillon.processes.ranks import world
+from carillon.processes.waiting import leave_cores
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command and where it is found.
+
+    Attributes
+    ----------
+    module
+        Has `add_arguments(parser)` and `run(arguments)`, which returns an exit status or None for
+        success; its docstring is the command's description, `EXAMPLES` ends its help.
+    summary
+        What it does, for the list of commands.
+    ranks
+        Whether it may be started on several MPI ranks.
+    room, in_room
+        Of a study's command: the room that lists it, too, and its name there if that is another.
+    """
+
+    module: str
+    summary: str
+    ranks: bool = False
+    room: str = ""
+    in_room: str = ""
+
+
+def run_room(room: str, description: str, words: Sequence[str] | None = None) -> int:
+    """Run a command of a room, or one of those that studies add to it, see `run_program`."""
+    own: dict[str, Command] = import_module(f"{room}.commands").COMMANDS
+    studied: dict[str, Command] = import_module("studies").commands()
+    added = {each.in_room or name: each for name, each in studied.items() if each.room == room}
+    return run_program(room, description, own | added, words)
+
+
+def run_program(
+    name: str,
+    description: str,
+    commands: Mapping[str, Command],
+    words: Sequence[str] | None = None,
+    unlisted: Mapping[str, Command] = MappingProxyType({}),
+) -> int:
+    """Run the command that a command line names; returns the exit status, the same on every rank.
+
+    Parameters
+    ----------
+    name
+        Of the program, for messages and help.
+    words
+        The command line, that of this process if None.
+    unlisted
+        Further commands, which the help does not list.
+    """
+    present_folder.ignore_modules(os.environ, sys.path)
+    mpi_environment.keep_apart(os.environ, os.getpid())
+    chosen: list[argparse.Namespace] = []
+    given = sys.argv[1:] if words is None else list(words)
+    try:
+        comm = world()
+    except UserError as error:
+        say(f"{name}: {error}")
+        return exit_status.EXIT_BAD_INPUT
+    if comm is not None:
+        leave_cores(comm)
+    elif lonely := mpi_environment.lonely_among(os.environ):
+        say(f"warning: {lonely}")
+
+    everything = {**commands, **unlisted}
+
+    def parse() -> None:
+        chosen.append(_parser(name, description, commands, unlisted, given).parse_args(given))
+        command = chosen[0].command
+        if comm is not None and not everything[command].ranks:
+            chosen.clear()
+            raise UserError(
+                f"{command} runs as one process, {comm.size} ranks were started; of the commands "
+                f"{', '.join(each for each in everything if everything[each].ranks) or 'none'} "
+                "run on several"
+            )
+
+    status = exit_status.run(name, parse, comm)
+    if comm is not None and not chosen:
+        comm.Barrier()  # nobody ends before the first rank has told what is wrong
+    for arguments in chosen:
+        module = import_module(everything[arguments.command].module)
+        status = exit_status.run(
+            f"{name} {arguments.command}", partial(module.run, arguments), comm
+        )
+    return status
+
+
+def _parser(
+    name: str,
+    description: str,
+    commands: Mapping[str, Command],
+    unlisted: Mapping[str, Command],
+    words: Sequence[str],
+) -> Parser:
+    """Parser of a program, with the arguments of the one command that `words` begin with."""
+    parser = Parser(prog=name, description=description)
+    parser.add_argument("--version", action="version", version=f"Carillon {__version__}")
+    parts = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for each, command in {**commands, **unlisted}.items():
+        module = import_module(command.module) if words and words[0] == each else None
+        part = parts.add_parser(
+            each,
+            description=None if module is None else module.__doc__,
+            epilog=getattr(module, "EXAMPLES", None),
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+            **({"help": command.summary} if each in commands else {}),
+        )
+        if module is not None:
+            module.add_arguments(part)
+    return parser

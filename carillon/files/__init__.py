@@ -1,0 +1,1 @@
+"""Files: names, atomic writing, HDF5, YAML, locks, where results come from."""

@@ -1,0 +1,89 @@
+"""Locks that die with their process: who comes second is told so, instead of doing work twice."""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import logging
+import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from carillon.errors import UserError
+from carillon.files.paths import cause, require_writable
+
+logger = logging.getLogger(__name__)
+
+_NO_LOCKS = (errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOLCK, errno.EINVAL)
+
+
+@contextmanager
+def locked(path: str | Path) -> Iterator[None]:
+    """Hold the result `path` for this process alone, while it works out what to write there.
+
+    For results that a later run goes on from.  The lock is a file beside `path`, removed at the
+    end; what a killed process has left is taken over by the next one.
+
+    Raises
+    ------
+    UserError
+        If another process holds it, or it cannot be made.
+    """
+    path = require_writable(path)
+    name = Path(f"{path.parent}/.{path.name}.lock")
+    file = take(name, f"{path}: another process is working on it; wait for it, or name another")
+    try:
+        yield
+    finally:
+        name.unlink(missing_ok=True)
+        os.close(file)
+
+
+def take(name: Path, refusal: str) -> int:
+    """Open the file `name`, made if need be, for this process alone; closing it gives it back.
+
+    Who removes the file must do so before closing it.
+
+    Raises
+    ------
+    UserError
+        With the sentence `refusal` if another process has it; if it cannot be opened or is no
+        regular file, but a link, pipe or device.
+    """
+    flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
+    while True:
+        try:
+            file = os.open(name, flags, 0o666)
+        except OSError as error:
+            if error.errno == errno.ELOOP:
+                raise UserError(f"{name}: cannot be written (it is a link); remove it") from None
+            raise UserError(f"{name}: cannot be written ({cause(error)})") from None
+        try:
+            if not stat.S_ISREG(os.fstat(file).st_mode):
+                raise UserError(f"{name}: is no regular file, remove it")
+            _lock(name, file, refusal)
+            if _is_at(name, file):
+                return file
+        except BaseException:
+            os.close(file)
+            raise
+        os.close(file)  # who had it before has finished and removed it
+
+
+def _lock(name: Path, file: int, refusal: str) -> None:
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise UserError(refusal) from None
+    except OSError as error:
+        if error.errno not in _NO_LOCKS:
+            raise UserError(f"{name}: cannot be locked ({cause(error)})") from None
+        logger.warning(f"{name}: this file system has no locks; write no result twice at a time")
+
+
+def _is_at(name: Path, file: int) -> bool:
+    with suppress(FileNotFoundError):
+        return os.path.samestat(os.lstat(name), os.fstat(file))
+    return False

@@ -1,0 +1,1 @@
+"""Small products and sums on the registers of the processor."""

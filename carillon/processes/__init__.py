@@ -1,0 +1,1 @@
+"""Processes, threads and ranks, and the libraries that start them."""

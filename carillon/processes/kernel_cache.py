@@ -1,0 +1,155 @@
+"""Where caches are kept if the user's cannot be written, those of compiled kernels above all.
+
+Numba keeps them in the folder that NUMBA_CACHE_DIR names, beside the source, or in the user's cache
+(`~/.cache/numba`), and refuses to work where none of these can be written: in a checkout of another
+user's, or a container, without a home. Then they go into a private folder for temporary files, and
+where there is none either, they are compiled every time.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import shutil
+import stat
+import tempfile
+from collections.abc import Iterator, MutableMapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from carillon.files.paths import is_own
+
+logger = logging.getLogger(__name__)
+
+FOLDER = "carillon-cache"
+"""Name of the private folder, before the number of its user."""
+PLACES = ("/tmp", "/var/tmp", "/dev/shm")
+"""Where it may be, besides TMPDIR."""
+
+_CLASSES = "NUMBA_CACHE_LOCATOR_CLASSES"
+_DIRECTORY = "NUMBA_CACHE_DIR"
+_RANKS = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
+_COMPILED = ("*.nbc", "*.nbi")
+"""Files of numba's: code, and after it the index that names it."""
+
+
+def configure(environment: MutableMapping[str, str]) -> None:
+    """Have numba ask `Locator` where to keep kernels, if the user's cache cannot be written.
+
+    Others, such as Snakemake, which ends without a cache, get the private folder for theirs.
+    """
+    cache = environment.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    if _can_be_made(os.path.join(cache, "numba")):
+        return
+    environment.setdefault(_CLASSES, f"{__name__}.Locator")
+    if folder := private_folder():
+        environment["XDG_CACHE_HOME"] = str(folder)
+
+
+class Locator:
+    """What numba asks for a kernel's place, instead of its own list of such classes.
+
+    Attributes
+    ----------
+    folder
+        Within the private one, once it is used.
+    """
+
+    folder: Path | None = None
+
+    @classmethod
+    def from_function(cls, function: Any, source: str) -> Any:
+        """The place of a kernel: by numba's own rules, in a private folder, or nowhere."""
+        caching, config = _numba()
+        # Numba has read it; programs that are started from here may not know this package.
+        if os.environ.get(_CLASSES) == f"{__name__}.{cls.__name__}":
+            del os.environ[_CLASSES]
+        if config.CACHE_DIR != str(cls.folder):
+            for known in caching.CacheImpl._locator_classes:
+                own = "UserWide" not in known.__name__  # that cannot be written
+                if own and (found := known.from_function(function, source)):
+                    return found
+            folder = private_folder()
+            if folder is None:
+                return _kept_nowhere(function, source)
+            cls.folder = folder / "kernels"
+            cls.folder.mkdir(exist_ok=True)
+            _say(f"compiled kernels are kept in {cls.folder}, as the user's cache is not writable")
+            config.CACHE_DIR = os.environ[_DIRECTORY] = str(cls.folder)
+        place = caching.UserProvidedCacheLocator(function, source)
+        with suppress(OSError):
+            _take_over(Path(source).parent / "__pycache__", Path(place.get_cache_path()))
+        place.ensure_cache_path()
+        return place
+
+
+def private_folder() -> Path | None:
+    """A folder for temporary files that this user alone can write; None if there is none.
+
+    What others could write is not used: kernels in it are code that would be run.
+    """
+    for place in filter(None, (os.environ.get("TMPDIR"), *PLACES)):
+        folder = Path(place).absolute() / f"{FOLDER}-{os.geteuid()}"
+        with suppress(OSError):
+            folder.mkdir(mode=0o700, exist_ok=True)
+            status = folder.lstat()
+            if is_own(status, stat.S_ISDIR) and not status.st_mode & 0o077:
+                tempfile.TemporaryFile(dir=folder).close()
+                return folder
+    return None
+
+
+def _kept_nowhere(function: Any, source: str) -> Any:
+    """Kernels that are beside the source are used; what is compiled now is forgotten."""
+    caching, _ = _numba()
+    if caching.Cache.save_overload is not _forget:
+        _say(
+            f"compiled kernels are kept nowhere and are compiled every time, as no folder for them "
+            f"can be written; name one by {_DIRECTORY}"
+        )
+        caching.Cache.save_overload = _forget
+    return caching.InTreeCacheLocator(function, source)
+
+
+def _numba() -> tuple[Any, Any]:
+    """Numba's modules of the cache and of its settings."""
+    from numba.core import caching, config
+
+    return caching, config
+
+
+def _forget(*_: Any) -> None:
+    return None
+
+
+def _take_over(old: Path, new: Path) -> None:
+    """Copy kernels that were compiled beside the source, as numba knows them again by its hash."""
+    if new.is_dir() or not old.is_dir():
+        return
+    with tempfile.TemporaryDirectory(dir=new.parent) as folder:
+        for each in _files(old):
+            shutil.copyfile(each, Path(folder) / each.name)
+        new.mkdir(mode=0o700, exist_ok=True)
+        for each in _files(Path(folder)):
+            os.replace(each, new / each.name)
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    for pattern in _COMPILED:
+        yield from folder.glob(pattern)
+
+
+def _can_be_made(folder: str) -> bool:
+    """Whether this user may write to a folder, or make it; "~" is none, of unknown users."""
+    if not os.path.isabs(folder):
+        return False
+    while not os.path.lexists(folder):
+        folder = os.path.dirname(folder)
+    return os.path.isdir(folder) and os.access(folder, os.W_OK | os.X_OK, effective_ids=True)
+
+
+def _say(sentence: str) -> None:
+    """Log a sentence, once on all ranks."""
+    if all(os.environ.get(name, "0") == "0" for name in _RANKS):
+        logger.warning(sentence)

@@ -1,0 +1,36 @@
+"""Provenance of what was timed: also vector registers, memory, ranks, threads and date."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import Any
+
+from carillon.processes.cores import allowed_threads, memory_bytes
+from carillon.records.provenance import compiled_for, record
+
+
+def measured(
+    parameters: dict[str, Any], ranks: int | Sequence[int] = 1, threads: int | None = None
+) -> dict[str, Any]:
+    """Provenance of a measurement made just now: plain values, ready for JSON or HDF5.
+
+    Parameters
+    ----------
+    ranks
+        MPI ranks, or several numbers of them that were measured one after the other.
+    threads
+        Of each rank; what the process may use if None.
+    """
+    from carillon.numerics.simd_width import LANES  # whose import takes half a second
+
+    counts = [ranks] if isinstance(ranks, int) else ranks
+    return {
+        **record(parameters),
+        "compiled_for": compiled_for(),
+        "vector_bits": 64 * LANES,
+        "memory_bytes": memory_bytes(),
+        "ranks": ", ".join(map(str, counts)),
+        "threads": allowed_threads() if threads is None else threads,
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+    }

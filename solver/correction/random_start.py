@@ -1,0 +1,136 @@
+"""Modes of which little is known: block Lanczos from random vectors, or modes of a coarser mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.errors import ConvergenceError
+from solver.assembly.system import System
+from solver.correction.lanczos import Lanczos, lanczos
+from solver.correction.shift import AIM, inverse_amid, is_amid
+from solver.correction.starting_block import mixed
+from solver.linear import Inverse, LinearSolver
+from solver.subspace.start import start_block
+from solver.subspace.weyl import CountingLaw
+
+Array = NDArray[np.float64]
+
+MODES_OF_EIGHT, FEWEST_COLUMNS, MOST_COLUMNS = 100, 8, 24
+"""Modes for every eight columns of the first block, and its least and greatest width: the narrower,
+the fewer right-hand sides."""
+NEAR = 20_000
+"""Unknowns beyond which a factorisation leaves the cache, and eight columns take as long as twice
+as many."""
+RANDOM_LOOK = 1.75
+"""Dimension of the space at the first look, as a share of the modes wanted."""
+ATTEMPTS, OFF_RESONANCE = 3, 0.97
+"""Shifts that are tried, and by what the next is moved off an eigenvalue that one has hit."""
+
+
+@dataclass(frozen=True)
+class Approximation:
+    """Modes of a coarser model.
+
+    Attributes
+    ----------
+    values
+        (q,) its elastic eigenvalues [rad^2/s^2], which are about those of the fine model.
+    vectors
+        (local, q) its modes on the fine mesh, which are far too stiff there.
+    inverse
+        Inverse of the fine model's K - mu M, used if mu lies amid the wanted eigenvalues; the
+        iteration owns it then.
+    """
+
+    values: Array
+    vectors: Array
+    inverse: Inverse | None = None
+
+
+@dataclass
+class Cold:
+    """What was found, and the inverse that it was found with."""
+
+    found: Lanczos
+    inverse: Inverse
+
+
+def from_nothing(
+    system: System,
+    linear: LinearSolver,
+    requested: int,
+    resolved: int,
+    width: int,
+    law: CountingLaw,
+    tolerance: float,
+    seed: int = 0,
+    near: Approximation | None = None,
+) -> Cold:
+    """Lowest elastic modes from random vectors, or from the modes of a coarser model.
+
+    Parameters
+    ----------
+    requested, resolved, width
+        Modes wanted, to become accurate, and to return.
+    law
+        Where eigenvalues are expected, for the shift.
+    tolerance
+        Relative eigenvalue error to stop at.
+    seed
+        Of the random vectors, which do not depend on the number of ranks.
+    near
+        Modes to begin with, more than requested.
+
+    Raises
+    ------
+    ConvergenceError
+        If every shift is an eigenvalue.
+
+    Notes
+    -----
+    Where no shift with enough eigenvalues above it was found, the next one lies amid those that the
+    iteration found, of which the last is an upper bound.
+    """
+    elastic = system.n_dofs - system.rigid.shape[1]
+    columns = min(_columns(requested, system.n_dofs), elastic)
+    start, look = start_block(system, columns, seed), int(RANDOM_LOOK * requested)
+    share, last = AIM, None
+    given = None if near is None else near.inverse
+    for attempt in range(ATTEMPTS):
+        if given is not None and is_amid(given, requested):
+            inverse = given
+        elif last is None:
+            first = None if near is None else float(near.values[int(share * requested)])
+            inverse = inverse_amid(system, linear, requested, law, share, first)
+        else:
+            inverse = linear.inverse(system, share * last)
+        given = None
+        if near is not None:
+            start, look = mixed(
+                system,
+                near.values,
+                near.vectors,
+                requested,
+                inverse.shift,
+                tolerance,
+                columns,
+            )
+        found = lanczos(system, inverse, start, resolved, width, tolerance, look, seed + 1)
+        if found.too_high and attempt < ATTEMPTS - 1:
+            last = float(found.values[requested - 1])
+        elif not found.resonant:
+            return Cold(replace(found, errors=found.errors[:requested]), inverse)
+        inverse.destroy()
+        share *= OFF_RESONANCE
+    raise ConvergenceError(
+        f"{ATTEMPTS} shifts amid the wanted eigenvalues were too close to one; use --method hcms"
+    )
+
+
+def _columns(requested: int, n_dofs: int) -> int:
+    """Width of the first block, in whole vector registers."""
+    fewest = FEWEST_COLUMNS if n_dofs <= NEAR else 2 * FEWEST_COLUMNS
+    return min(max(8 * -(-requested // MODES_OF_EIGHT), fewest), MOST_COLUMNS)

@@ -1,0 +1,225 @@
+"""The way up the merge tree: every merge by the ranks that the schedule has for it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from solver.distribution.local_mesh import Cells, LocalMesh
+from solver.distribution.messages import AnyArray, Sent, receive_arrays, send_arrays
+from solver.distribution.tree import Merge
+from solver.hcms.counts import Counts, Tally
+from solver.hcms.distributed_products import Crew, help_with_products
+from solver.hcms.merge import (
+    Group,
+    Interface,
+    Reduced,
+    across_mass,
+    all_pairs,
+    group_from_arrays,
+    interface,
+    join,
+    number_kept,
+    project,
+    reduced_pencil,
+)
+from solver.hcms.schedule import Schedule, modes_to_keep
+from solver.hcms.shared import shared_pairs
+
+Array = NDArray[np.float64]
+
+_UP = 11
+
+
+class _Whole(NamedTuple):
+    """Two groups that one rank has, and the reduced pencil of their merge."""
+
+    left: Group
+    right: Group
+    pencil: Reduced
+
+
+class Ascent:
+    """One rank's part in all merges.
+
+    Parameters
+    ----------
+    local_mesh
+        This rank's part of the solid.
+    plan
+        Who makes which merge.
+    groups
+        The subdomains of this rank, by number; merged ones are taken out, and the others' put in.
+    keep, cutoff, treatment
+        As `solver.hcms.synthesis.synthesize` has them.
+
+    Attributes
+    ----------
+    coefficients
+        Q of the merges that this rank holds, split between left and right.
+    """
+
+    def __init__(
+        self,
+        local_mesh: LocalMesh,
+        plan: Schedule,
+        groups: dict[int, Group],
+        keep: int,
+        cutoff: float | None,
+        treatment: str,
+        comm: MPI.Comm,
+    ) -> None:
+        self.local_mesh = local_mesh
+        self.tree = local_mesh.decomposition.tree
+        self.ranges = local_mesh.decomposition.row_ranges()
+        self.plan = plan
+        self.groups = groups
+        self.keep = keep
+        self.cutoff = cutoff
+        self.treatment = treatment
+        self.comm = comm
+        self.coefficients: dict[int, tuple[Array, Array]] = {}
+        self._sent: list[Sent] = []
+
+    def merge_groups(self, counts: Counts) -> None:
+        """Make the merges that this rank has a part in, in the order of the tree.
+
+        All ranks keep this order, so whoever waits does so for an earlier merge, or for this one.
+        """
+        levels = self.tree.levels()
+        for number, step in enumerate(self.tree.merges):
+            tally = counts.merges[levels[step.group] - 1]
+            if self.comm.rank in self.plan.ranks_of(number, step):
+                with tally.running():
+                    self._merge(step, number, tally)
+        with counts.down.running(), counts.down.idle():
+            for messages in self._sent:
+                messages.wait()
+
+    def _merge(self, step: Merge, number: int, tally: Tally) -> None:
+        holder, crews = self.plan.holder, self.plan.crews[number]
+        here = holder[step.group]
+        sides = holder[step.left], holder[step.right]
+        helped = [crew for crew in crews if self.comm.rank in crew]
+        whole = None
+        if helped:
+            there = sides[0] if sides[1] == here else sides[1]
+            help_with_products(self.comm, here if helped[0] is crews[0] else there, tally)
+        elif sides[0] == sides[1]:
+            whole = self._reduce_alone(step, Crew(self.comm, (), tally))
+        elif self.comm.rank in sides:
+            crew = Crew(self.comm, crews[0 if self.comm.rank == here else 1], tally)
+            whole = self._reduce_together(step, crew)
+            crew.dismiss()
+        pairs = self._pairs(self.plan.teams[number], whole, tally)
+        if helped:
+            help_with_products(self.comm, here, tally)
+        elif whole is not None and pairs is not None:
+            crew = Crew(self.comm, (*crews[0], *crews[1]), tally)
+            self._join(step, whole, pairs, crew)
+            crew.dismiss()
+
+    def _reduce_alone(self, step: Merge, crew: Crew) -> _Whole | None:
+        """Pencil of two groups of the same rank, on the holder of what becomes of them."""
+        there, here = self.plan.holder[step.left], self.plan.holder[step.group]
+        if self.comm.rank == there != here:
+            for child in (step.left, step.right):
+                self._send(self.groups.pop(child).arrays(), here, crew.tally)
+        if self.comm.rank != here:
+            return None
+        left, right = (
+            self.groups.pop(child)
+            if there == here
+            else self._receive_group(child, there, crew.tally)
+            for child in (step.left, step.right)
+        )
+        between = self._interface(step, left.cells)
+        modes = left.modes_at(between.left), right.modes_at(between.right)
+        stiffness = (
+            project(modes[0], between.stiffness_left, modes[0], crew),
+            project(modes[1], between.stiffness_right, modes[1], crew),
+            project(modes[1], between.stiffness_across, modes[0], crew),
+        )
+        mass = across_mass(left, right, between, crew)
+        return _Whole(left, right, reduced_pencil((left.values, right.values), stiffness, mass))
+
+    def _reduce_together(self, step: Merge, crew: Crew) -> _Whole | None:
+        """Pencil of two groups of different ranks, on the holder of what becomes of them.
+
+        Either forms the stiffness of its own group; in addition the holder the mass across, the
+        other rank the stiffness.
+        """
+        holder, tally = self.plan.holder, crew.tally
+        here = self.comm.rank == holder[step.group]
+        ours, theirs = step.left, step.right
+        if self.comm.rank != holder[ours]:
+            ours, theirs = theirs, ours
+        partner, mine = holder[theirs], self.groups.pop(ours)
+        if not here:
+            self._send(mine.arrays(), partner, tally)
+        between = self._interface(step, mine.cells)
+        if ours == step.left:
+            rows, stiffness = between.left, between.stiffness_left
+        else:
+            rows, stiffness = between.right, between.stiffness_right
+        modes = mine.modes_at(rows)
+        if here:
+            self._send([modes], partner, tally)
+        own = project(modes, stiffness, modes, crew)
+        if not here:
+            (others,) = self._receive(partner, tally)
+            left_modes, right_modes = (modes, others) if ours == step.left else (others, modes)
+            across = project(right_modes, between.stiffness_across, left_modes, crew)
+            self._send([own, across], partner, tally)
+            return None
+        other = self._receive_group(theirs, partner, tally)
+        left, right = (mine, other) if ours == step.left else (other, mine)
+        mass = across_mass(left, right, between, crew)
+        others, across = self._receive(partner, tally)
+        sides = (own, others) if ours == step.left else (others, own)
+        pencil = reduced_pencil((left.values, right.values), (*sides, across), mass)
+        return _Whole(left, right, pencil)
+
+    def _pairs(
+        self, team: tuple[int, ...], whole: _Whole | None, tally: Tally
+    ) -> tuple[Array, Array] | None:
+        """All eigenpairs of the pencil that the first of the team has, there."""
+        pencil = None if whole is None else whole.pencil
+        if len(team) == 1:
+            return None if pencil is None else all_pairs(pencil, tally)
+        if self.comm.rank not in team:
+            return None
+        comm = self.comm.Create_group(self.comm.group.Incl(team))
+        pairs = shared_pairs(comm, pencil, tally)
+        comm.Free()
+        return pairs
+
+    def _join(self, step: Merge, whole: _Whole, pairs: tuple[Array, Array], crew: Crew) -> None:
+        start, stop = self.ranges[step.group]
+        root = step.group == len(self.ranges) - 1
+        keep = modes_to_keep((stop - start) / self.ranges[-1][1], self.keep)
+        # The groups below the root keep their modes up to a cutoff, the whole a number.
+        count = number_kept(pairs[0], keep, None if root else self.cutoff)
+        values, Q = pairs[0][:count], pairs[1][:, :count]
+        self.groups[step.group] = join(whole.left, whole.right, values, Q, crew)
+        split = len(whole.left.values)
+        self.coefficients[step.group] = Q[:split], Q[split:]
+
+    def _interface(self, step: Merge, cells: Cells) -> Interface:
+        start, middle = self.ranges[step.left]
+        _, stop = self.ranges[step.right]
+        return interface(cells, start, middle, stop, self.treatment)
+
+    def _send(self, arrays: list[AnyArray], rank: int, tally: Tally) -> None:
+        self._sent.append(tally.sent(send_arrays(self.comm, arrays, rank, _UP)))
+
+    def _receive(self, rank: int, tally: Tally) -> list[AnyArray]:
+        with tally.idle():
+            return receive_arrays(self.comm, rank, _UP)
+
+    def _receive_group(self, group: int, rank: int, tally: Tally) -> Group:
+        arrays = self._receive(rank, tally)
+        return group_from_arrays(arrays, *self.ranges[group], self.local_mesh.cells)

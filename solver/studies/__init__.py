@@ -1,1 +1,0 @@
-"""What spectra are worth: compared, audited, timed, scaled, and calibrated."""

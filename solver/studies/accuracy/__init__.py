@@ -1,1 +1,0 @@
-"""Frequencies of both discretisations and of tetrahedra against those that no mesh made."""

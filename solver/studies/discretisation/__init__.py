@@ -1,1 +1,0 @@
-"""Which discretisation for which material: voxels, DDFEM* and finite cells against one truth."""

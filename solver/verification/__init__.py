@@ -1,0 +1,1 @@
+"""What shows that a spectrum is right: residuals, audits, comparison with another."""

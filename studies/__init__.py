@@ -1,0 +1,49 @@
+"""Every experiment, each whole in a folder of its own; `carillon study` lists them.
+
+A folder is a study: its command or commands (`COMMANDS` in `__init__.py`), what it measures, its
+tables, plots and page (`study.py` says where they are), its rules (`rules.smk`) and tests. Whoever
+adds or removes the folder adds or removes the study. `base` is what all of them stand on.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+
+from carillon.command_line.commands import Command
+
+FOLDER = Path(__file__).resolve().parent
+
+
+def names() -> list[str]:
+    """Names of all studies' folders."""
+    folders = sorted(path.parent.name for path in FOLDER.glob("*/__init__.py"))
+    return [name for name in folders if name != "base"]
+
+
+def names_with(file: str) -> list[str]:
+    """Names of those folders that hold a file."""
+    return [name for name in names() if (FOLDER / name / file).is_file()]
+
+
+def rules() -> list[Path]:
+    """Files of rules; those of a study after those of the studies in its `NEEDS`."""
+    ordered: list[str] = []
+
+    def add(name: str) -> None:
+        for other in getattr(import_module(f"studies.{name}"), "NEEDS", ()):
+            add(other)
+        if name not in ordered:
+            ordered.append(name)
+
+    for name in names_with("rules.smk"):
+        add(name)
+    return [FOLDER / name / "rules.smk" for name in ordered]
+
+
+def commands() -> dict[str, Command]:
+    """Commands of all studies by name."""
+    found: dict[str, Command] = {}
+    for name in names():
+        found |= getattr(import_module(f"studies.{name}"), "COMMANDS", {})
+    return found

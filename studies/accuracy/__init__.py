@@ -1,0 +1,16 @@
+"""The study of discretisations against frequencies that no mesh made."""
+
+from carillon.command_line.commands import Command
+
+COMMANDS = {
+    "accuracy": Command(
+        "studies.accuracy.command",
+        "errors of voxels, finite cells and tetrahedra against frequencies that no mesh made",
+        room="solver",
+    ),
+    "distance": Command(
+        "studies.accuracy.distance_command",
+        "distances from the solid that spectra expect, beside those from a much finer lattice",
+        room="solver",
+    ),
+}

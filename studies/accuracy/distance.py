@@ -1,0 +1,189 @@
+"""Distances from the solid that spectra expect, beside those from a much finer lattice."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from carillon.command_line.arguments import whole_number
+from carillon.command_line.options import option
+from carillon.command_line.progress import track
+from carillon.errors import ConvergenceError, UserError
+from carillon.fem.finite_cells.model import FiniteCellModel
+from carillon.fem.geometry import load_surface, surface_name
+from carillon.fem.geometry.builtin import BUILTINS
+from carillon.fem.geometry.thin import THIN
+from carillon.fem.geometry.trials import TRIALS
+from carillon.fem.model import RIGID_MODES, Solid
+from solver.accuracy.estimate import estimate_cell_errors
+from solver.accuracy.solving import Solved, Wishes, solve_solid
+from solver.analysis.modal_solver import modal_analysis
+from solver.analysis.modes import Modes
+from solver.analysis.options import SolverOptions
+from solver.analysis.problem import ProblemOptions
+from solver.refinement.coarse_or_fine import FineStart
+from solver.refinement.errors import FROM_SOLID
+from solver.verification.comparison import frequency_errors
+from studies.accuracy.solids import ANGLES
+
+Array = NDArray[np.float64]
+
+ELASTIC = 30
+"""Frequencies compared."""
+MODES = RIGID_MODES + ELASTIC
+OBJECTS = tuple(f"builtin:{name}" for name in (*BUILTINS, *THIN, *TRIALS))
+
+WAYS = {
+    "cells": ("finite-cell", None),
+    "divided": ("finite-cell", 0.01),
+    "voxels": ("voxel", None),
+}
+"""Discretisation, and the expected error down to which its cells are divided."""
+REFERENCE = 0.002
+"""The same of references."""
+FACTOR = 3.0
+"""An expected error that is wrong by no more counts as right."""
+
+
+@dataclass(frozen=True)
+class DistanceStudyOptions:
+    """What is measured."""
+
+    resolution: int = option(32, "lattice spacings along the longest side", type=whole_number(4))
+    reference: int = option(48, "those of the spectra that count as true", type=whole_number(6))
+    turned: bool = option(False, "each solid also turned by 25, 35 and 15 degrees")
+
+
+def measure_distances(objects: tuple[str, ...], options: DistanceStudyOptions) -> dict[str, Any]:
+    """Expected and true errors of the first frequencies of solids, by every way.
+
+    Parameters
+    ----------
+    objects
+        Mesh files or built-in objects.
+
+    Returns
+    -------
+    dict[str, Any]
+        Plain values: `solids`, each with its reference and `ways`; `right`, of every way the number
+        of expected errors within a factor of `FACTOR` and of all.
+
+    Raises
+    ------
+    UserError
+        If an object is no use, or the reference's lattice is not finer.
+    """
+    if options.reference <= options.resolution:
+        raise UserError(
+            f"--reference {options.reference} is no finer than --resolution {options.resolution}"
+        )
+    with tempfile.TemporaryDirectory() as folder:
+        meshes = list(_meshes(objects, options.turned, Path(folder)))
+        solids = [_measured(name, mesh, options) for name, mesh in track(meshes, "solids")]
+    return {
+        "elastic_modes": ELASTIC,
+        "resolution": options.resolution,
+        "factor": FACTOR,
+        "solids": solids,
+        "right": {way: _right(solids, way) for way in WAYS},
+    }
+
+
+def _meshes(objects: tuple[str, ...], turned: bool, folder: Path) -> Iterator[tuple[str, str]]:
+    """Names and meshes of the solids; turned ones lie in a folder."""
+    from trimesh.transformations import euler_matrix
+
+    for mesh in objects:
+        surface, name = load_surface(mesh), surface_name(mesh)
+        yield name, mesh
+        if turned:
+            path = folder / f"turned-{name}.stl"
+            surface.apply_transform(euler_matrix(*np.radians(ANGLES))).export(path)
+            yield path.stem, str(path)
+
+
+def _measured(name: str, mesh: str, options: DistanceStudyOptions) -> dict[str, Any]:
+    described = ProblemOptions(mesh, options.resolution, discretisation="finite-cell")
+    try:
+        truth = _solved(replace(described, resolution=options.reference), REFERENCE)
+    except (UserError, ConvergenceError) as error:
+        return {"solid": name, "problem": str(error), "ways": {}}
+    assert isinstance(truth.model, FiniteCellModel)
+    vectors = truth.modes.system.gather(truth.modes.vectors)
+    assert vectors is not None
+    left = estimate_cell_errors(truth.model, truth.modes.values, vectors).errors.errors
+    # Half of what the reference expects of itself is taken off, the other half is doubt.
+    hertz = _hertz(truth.modes) * (1.0 - 0.5 * left)
+    truth.modes.destroy()
+    ways = {way: _rated(described, way, hertz) for way in WAYS}
+    reference = {"unknowns": truth.model.n_dofs, "doubt": 0.5 * float(np.sqrt(np.mean(left**2)))}
+    return {"solid": name, "reference": reference, "ways": ways}
+
+
+def _rated(described: ProblemOptions, way: str, hertz: Array) -> dict[str, Any]:
+    discretisation, refine_to = WAYS[way]
+    try:
+        found = _solved(replace(described, discretisation=discretisation), refine_to)
+    except (UserError, ConvergenceError) as error:
+        return {"problem": str(error)}
+    assert found.model is not None
+    true = frequency_errors(_hertz(found.modes) / hertz - 1.0, MODES).rms
+    found.modes.destroy()
+    return {
+        "unknowns": found.model.n_dofs,
+        "rms": true,
+        "expected": found.achieved.get(f"{FROM_SOLID}_rms"),
+    }
+
+
+def _solved(described: ProblemOptions, refine_to: float | None) -> Solved:
+    def solve(
+        model: Solid | None, modes: int | None = None, start: FineStart | None = None
+    ) -> Modes:
+        asked = SolverOptions(modes=MODES if modes is None else min(modes, MODES))
+        return modal_analysis(model, asked, MPI.COMM_SELF)
+
+    return solve_solid(described, solve, Wishes(refine_to, estimated=True), MPI.COMM_SELF)
+
+
+def _hertz(modes: Modes) -> Array:
+    return np.asarray(np.sqrt(np.maximum(modes.values[RIGID_MODES:MODES], 0.0)) / (2.0 * np.pi))
+
+
+def _right(solids: list[dict[str, Any]], way: str) -> dict[str, int]:
+    """Number of expected errors within the factor, of all that there are."""
+    found = [solid["ways"][way] for solid in solids if "expected" in solid["ways"].get(way, {})]
+    ratios = [each["expected"] / each["rms"] for each in found if each["expected"] is not None]
+    right = sum(1.0 / FACTOR <= ratio <= FACTOR for ratio in ratios)
+    return {"within": right, "of": len(ratios)}
+
+
+def as_text(result: dict[str, Any]) -> str:
+    """The result in columns."""
+    lines = [
+        f"rms errors of {result['elastic_modes']} elastic frequencies at resolution "
+        f"{result['resolution']}: expected of the spectrum itself / against the reference",
+        f"{'':<22}" + "".join(f"{way:>18}" for way in WAYS) + f"{'reference':>12}",
+    ]
+    for solid in result["solids"]:
+        if "problem" in solid:
+            lines.append(f"{solid['solid']:<22}  {solid['problem']}")
+            continue
+        shown = "".join(f"{_shown(solid['ways'][way]):>18}" for way in WAYS)
+        lines.append(f"{solid['solid']:<22}{shown}{solid['reference']['doubt']:>11.2%}")
+    counts = "".join(f"{'{within} of {of}'.format(**result['right'][way]):>18}" for way in WAYS)
+    lines.append(f"{f'within a factor of {FACTOR:g}':<22}{counts}")
+    return "\n".join(lines)
+
+
+def _shown(way: dict[str, Any]) -> str:
+    if way.get("expected") is None:
+        return "-"
+    return f"{way['expected']:.2%} / {way['rms']:.2%}"

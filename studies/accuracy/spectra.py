@@ -1,0 +1,82 @@
+"""Spectra of a solid by both discretisations, with what they take."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
+from carillon.fem.model import Solid, fine_model
+from solver.accuracy.estimate import estimate_cell_errors
+from solver.analysis.modal_solver import modal_analysis
+from solver.analysis.options import SolverOptions
+from solver.analysis.problem import DISCRETISATIONS, ProblemOptions, discretised
+from studies.accuracy.solids import DENSITY, POISSON, YOUNG
+
+if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
+    import trimesh
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Eigenvalues (k,) [rad^2/s^2], rigid motions first, and what they took.
+
+    Attributes
+    ----------
+    spacing
+        Between neighbouring nodes [m]; of tetrahedra as it was asked for.
+    unknowns
+        Of the model.
+    build_seconds, solve_seconds
+        Wall time from the surface to the mesh, and from there to the eigenvalues.
+    expected
+        Root mean square error that finite cells expect of themselves.
+    """
+
+    values: Array
+    spacing: float
+    unknowns: int
+    build_seconds: float
+    solve_seconds: float
+    expected: float | None = None
+
+
+def cells(surface: trimesh.Trimesh, name: str, spacing: float, kind: str, modes: int) -> Spectrum:
+    """Lowest eigenvalues by a discretisation on a lattice of about this spacing [m].
+
+    Raises
+    ------
+    UserError
+        If the solid falls apart in such a lattice.
+    """
+    assert kind in DISCRETISATIONS
+    longest = float(np.ptp(surface.bounds, axis=0).max())
+    resolution = max(2, round(longest / spacing))
+    begin = time.perf_counter()
+    model = _model(surface, ProblemOptions(name, resolution, discretisation=kind))
+    built = time.perf_counter()
+    found = modal_analysis(model, SolverOptions(modes=modes), MPI.COMM_SELF)
+    seconds = time.perf_counter() - built
+    expected = None
+    if isinstance(model, FiniteCellModel):
+        vectors = found.system.gather(found.vectors)
+        assert vectors is not None
+        expected = estimate_cell_errors(model, found.values, vectors).errors.rms
+    found.destroy()
+    spacing = longest / resolution
+    return Spectrum(found.values, spacing, model.n_dofs, built - begin, seconds, expected)
+
+
+def _model(surface: trimesh.Trimesh, options: ProblemOptions) -> Solid:
+    mesh, cells = discretised(surface, options, options.mesh)
+    young = np.full(mesh.n_cells, YOUNG)
+    if cells is None:
+        return fine_model(mesh, young, poisson=POISSON, density=DENSITY)
+    return finite_cell_model(cells.cells, young, POISSON, DENSITY)

@@ -1,0 +1,19 @@
+"""What the study is made of."""
+
+from __future__ import annotations
+
+from studies.base.study import Figure, Study
+
+ACCURACY = Study(
+    name="accuracy",
+    package="studies.accuracy",
+    folder="accuracy",
+    title="Discretisations against references that no mesh made",
+    results="results:AccuracyStudy",
+    page="page:page",
+    measured=lambda config: ["accuracy.json"],
+    figures=(
+        Figure("unknowns", "plots:unknowns_figure", "accuracy.json"),
+        Figure("seconds", "plots:seconds_figure", "accuracy.json"),
+    ),
+)

@@ -1,0 +1,24 @@
+"""All studies that have a page: those of the folders in `studies`, the report, the validation."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+import studies
+from studies.base.study import Study, no_files
+
+OF_THE_RUN = ("workflow.report", "workflow.validation")
+"""Packages of the main chain that are made of tables, figures and a page as studies are."""
+
+
+def all_studies() -> dict[str, Study]:
+    """All of them by name."""
+    packages = [*OF_THE_RUN, *(f"studies.{name}" for name in studies.names_with("study.py"))]
+    modules = [import_module(f"{package}.study") for package in packages]
+    found = [each for module in modules for each in vars(module).values()]
+    return {study.name: study for study in found if isinstance(study, Study)}
+
+
+def in_steps() -> list[Study]:
+    """Those whose tables, figures and page are made by one rule after the other."""
+    return [study for study in all_studies().values() if study.measured is not no_files]

@@ -1,0 +1,104 @@
+"""Where a study keeps its results, and how they are read."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar
+
+import yaml
+
+from studies.base.conditions import Record
+from studies.base.table import Table, read_table
+from workflow import pinned_meshes, solids
+
+
+@dataclass(frozen=True)
+class Results:
+    """The folder of a study; files are read when asked for.
+
+    Attributes
+    ----------
+    folder
+        It, or the one above, holds the run's `config.yaml`.
+    section
+        Of the configuration that holds the study's `models`; all of it if empty.
+    study
+        What `workflow.solids.MEASURED` calls the study, if it measures any of these.
+    """
+
+    folder: Path
+    section: ClassVar[str] = ""
+    study: ClassVar[str] = ""
+
+    @cached_property
+    def config(self) -> dict[str, Any]:
+        """The resolved configuration of the run."""
+        places = (folder / "config.yaml" for folder in (self.folder, self.folder.parent))
+        return yaml.safe_load(next(filter(Path.exists, places)).read_text())
+
+    @property
+    def part(self) -> dict[str, Any]:
+        """The study's own part of the configuration."""
+        return self.config[self.section] if self.section else self.config
+
+    @property
+    def without(self) -> str:
+        """What is said of solids that are left out, and of meshes that are not the pinned ones."""
+        if self.section not in solids.STUDIED:
+            return ""
+        others = pinned_meshes.of_study(self.config, self.section)
+        return " ".join(filter(None, [solids.without(self.config, self.section), *others]))
+
+    @property
+    def titles(self) -> dict[str, str]:
+        """Names of the solids for people."""
+        models = self.part["models"]
+        return {name: models[name]["title"] or spelt(name) for name in models}
+
+    def read_json(self, path: str | Path) -> Any:
+        """Content of a JSON file, by its path below the folder."""
+        return json.loads((self.folder / path).read_text())
+
+    @cached_property
+    def methods(self) -> dict[str, Any]:
+        """Output of `solver benchmark` for the solids that have one."""
+        return self._measured("methods")
+
+    @cached_property
+    def convergence(self) -> dict[str, Any]:
+        """Output of `solver convergence` for the solids that have one."""
+        return self._measured("convergence")
+
+    @cached_property
+    def scaling(self) -> dict[str, Any]:
+        """Output of `solver scaling` for the solids that have one."""
+        return self._measured("scaling")
+
+    def _measured(self, file: str) -> dict[str, Any]:
+        names = solids.named(self.config, solids.MEASURED[self.study][file])
+        return {name: self.read_json(f"models/{name}/{file}.json") for name in names}
+
+    @property
+    def origins(self) -> dict[str, Record]:
+        """Provenance of the result files by name."""
+        return {
+            f"models/{name}/{file}.json": output["provenance"]
+            for file in solids.MEASURED[self.study]
+            for name, output in getattr(self, file).items()
+        }
+
+    def table(self, name: str) -> Table:
+        """A table that was written before."""
+        return read_table(self.folder / "tables" / f"{name}.json")
+
+    def figure(self, name: str) -> Path:
+        """A figure, by file name."""
+        return self.folder / "figures" / name
+
+
+def spelt(name: str) -> str:
+    """A name with hyphens as the beginning of a sentence."""
+    return name.replace("-", " ").capitalize()

@@ -1,0 +1,159 @@
+"""Further general eigensolvers by name, each as an expert would set it up; on one rank."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+
+import numpy as np
+from mpi4py import MPI
+
+from carillon.errors import ConvergenceError, one_line
+from carillon.fem.model import RIGID_MODES
+from carillon.processes.petsc import PETSc
+from carillon.processes.slepc import SLEPc
+from solver.reference.truth import Truth, can_count, complete, count_beyond
+from solver.subspace.rayleigh_ritz import rigid_pairs
+from studies.benchmark import primme_rivals, scipy_rivals, slepc_rivals
+from studies.benchmark.search import Array, Pairs, RivalSearch
+
+REQUIREMENTS = "workflow/envs/requirements-rivals.txt"
+
+
+class UnavailableError(ConvergenceError):
+    """A rival that cannot be tried here; told like one that fails."""
+
+
+@dataclass(frozen=True)
+class FurtherRival:
+    """A general eigensolver.
+
+    Attributes
+    ----------
+    meaning
+        What it is, for the row.
+    search
+        Finds the elastic pairs asked for, or raises ConvergenceError.
+    packages
+        Optional Python packages that it needs.
+    eps_type
+        SLEPc's eigensolver that it needs, which may not be built in.
+    interval
+        Whether it finds what is in an interval, and no number of pairs.
+    lumped
+        Whether it needs a diagonal mass.
+    """
+
+    meaning: str
+    search: Callable[[RivalSearch], Pairs]
+    packages: tuple[str, ...] = ()
+    eps_type: str | None = None
+    interval: bool = False
+    lumped: bool = False
+
+    def require(self, ranks: int) -> None:
+        """Raise UnavailableError unless it runs here."""
+        if ranks > 1:
+            raise UnavailableError(f"runs on one rank, not on {ranks}")
+        for package in self.packages:
+            try:
+                import_module(package)
+            except (ImportError, OSError) as error:  # OSError: a library that it needs.
+                raise UnavailableError(
+                    f"{package} cannot be loaded ({one_line(str(error))}); install it by pip "
+                    f"install -r {REQUIREMENTS}"
+                ) from None
+        if self.eps_type is not None and not _built_in(self.eps_type):
+            raise UnavailableError(f"this SLEPc was built without {self.eps_type}")
+
+
+RIVALS = {
+    "scipy_superlu": FurtherRival(
+        "ARPACK by SciPy in shift-and-invert mode, factorised by SuperLU",
+        scipy_rivals.arpack_superlu,
+    ),
+    "scipy_lobpcg": FurtherRival(
+        "LOBPCG by SciPy, preconditioned by PyAMG's smoothed aggregation",
+        scipy_rivals.lobpcg_multigrid,
+        ("pyamg",),
+    ),
+    "primme_direct": FurtherRival(
+        "PRIMME's block Davidson method (GD+k), preconditioned by Carillon's own factorisation",
+        primme_rivals.davidson_direct,
+        ("primme",),
+    ),
+    "primme_multigrid": FurtherRival(
+        "the same, preconditioned by PyAMG's smoothed aggregation",
+        primme_rivals.davidson_multigrid,
+        ("primme", "pyamg"),
+    ),
+    "slepc_lobpcg": FurtherRival(
+        "LOBPCG by SLEPc, preconditioned by a sparse Cholesky factorisation",
+        slepc_rivals.lobpcg,
+    ),
+    "slepc_gd": FurtherRival(
+        "generalised Davidson by SLEPc, preconditioned likewise", slepc_rivals.davidson
+    ),
+    "slepc_jd": FurtherRival(
+        "Jacobi-Davidson by SLEPc, preconditioned likewise", slepc_rivals.jacobi_davidson
+    ),
+    "slepc_ciss": FurtherRival(
+        "contour integrals by SLEPc over an interval that it is told",
+        slepc_rivals.contour_integrals,
+        interval=True,
+    ),
+    "slepc_filter": FurtherRival(
+        "Krylov-Schur by SLEPc with a polynomial filter for an interval that it is told",
+        slepc_rivals.filtered,
+        interval=True,
+        lumped=True,
+    ),
+    "slepc_evsl": FurtherRival(
+        "filtered Lanczos by EVSL for an interval that it is told",
+        slepc_rivals.evsl,
+        eps_type=SLEPc.EPS.Type.EVSL,
+        interval=True,
+        lumped=True,
+    ),
+}
+"""In the order of the table."""
+ALL = "all"
+"""Stands for every one of them."""
+
+
+def _built_in(eps_type: str) -> bool:
+    solver = SLEPc.EPS().create(MPI.COMM_SELF)
+    try:
+        solver.setType(eps_type)
+    except PETSc.Error:
+        return False
+    finally:
+        solver.destroy()
+    return True
+
+
+def completed(search: RivalSearch, pairs: Pairs, modes: int) -> tuple[Array, int]:
+    """Lowest eigenvalues (modes,), and the number of those that a rival had missed.
+
+    What it found is judged by the count of eigenvalues, and others find what it lacks.
+
+    Raises
+    ------
+    ConvergenceError
+        If it found too few, or some of its values are no eigenvalues.
+    """
+    if RIGID_MODES + len(pairs[0]) < modes:
+        raise ConvergenceError(f"found {RIGID_MODES + len(pairs[0])} of {modes} modes")
+    system = search.system
+    values, vectors = rigid_pairs(system)
+    truth = Truth(
+        np.concatenate([values, pairs[0]]),
+        np.concatenate([vectors, search.scale[:, None] * pairs[1]], axis=1),
+        modes,
+        0,
+    )
+    inertia = count_beyond(system, truth) if can_count() else None
+    if inertia is None or inertia.counted != inertia.computed:
+        truth, _ = complete(system, truth, inertia, search.tolerance, search.seed)
+    return truth.values[:modes], truth.added

@@ -1,0 +1,325 @@
+"""One timed run of each method, from moduli to modes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from carillon.fem.model import RIGID_MODES, Solid
+from solver.analysis.coarse_start import coarse_start
+from solver.analysis.modal_solver import ModalSolver
+from solver.analysis.modes import Modes
+from solver.analysis.options import SolverOptions
+from solver.assembly.system import Layout, assemble
+from solver.correction.correction import INTERACTIVE_TOLERANCE
+from solver.distribution.collective import compute_on_root
+from solver.distribution.local_mesh import distribute
+from solver.files.modes_file import CHECKS
+from solver.linear import LinearSolver
+from solver.reference.truth import SPARE_MODES, can_count
+from studies.benchmark.further import RIVALS, completed
+from studies.benchmark.rivals import (
+    SlepcConfiguration,
+    smallest_without_factor,
+    without_purification,
+)
+from studies.benchmark.search import RivalSearch, TimeLimit
+from studies.benchmark.solid import BenchmarkSolid
+
+Array = NDArray[np.float64]
+
+CORRECTED_TOLERANCE = 1e-6
+"""Eigenvalue error of HCMS with error correction on the fine mesh."""
+RIVAL_TOLERANCE = 1e-6
+"""Relative residual of SLEPc and ARPACK; their eigenvalues are far better, at no cost."""
+ROUGH_TOLERANCE = 1e-3
+"""Either's, where the fine solid is wanted roughly."""
+RIVAL_SECONDS = 300.0
+"""Wall time [s] after which a further rival is given up."""
+BELOW_ELASTIC, ABOVE_LAST = 0.5, 1.0 + 1e-4
+"""Ends of the interval that rivals are told: of the first elastic and the last eigenvalue."""
+
+
+@dataclass(frozen=True)
+class MethodRun:
+    """One run of a method.
+
+    Attributes
+    ----------
+    seconds
+        Wall time from moduli to modes, without checks.
+    values
+        (k,) eigenvalues found.
+    before
+        Wall time [s] of what needs the mesh alone.
+    phases
+        Wall time [s] by phase, checks left out.
+    added
+        Modes that the method missed, and that were found when its result was checked.
+    """
+
+    seconds: float
+    values: Array
+    before: float = 0.0
+    phases: dict[str, float] = field(default_factory=dict)
+    added: int = 0
+
+
+class Methods:
+    """Every way to the lowest modes of one solid; all ranks call the same.
+
+    Parameters
+    ----------
+    solid
+        On rank 0, None elsewhere.
+    modes
+        Number of modes, rigid ones included.
+    configuration
+        Of SLEPc's Krylov-Schur, wherever it is used.
+    seed
+        Of the partition.
+    brief
+        Whether one correction will do, as it does to compile and load everything.
+    rival_seconds
+        Wall time [s] after which a further rival is given up.
+    """
+
+    def __init__(
+        self,
+        solid: BenchmarkSolid | None,
+        modes: int,
+        configuration: SlepcConfiguration,
+        seed: int = 0,
+        comm: MPI.Comm = MPI.COMM_WORLD,
+        brief: bool = False,
+        rival_seconds: float = RIVAL_SECONDS,
+    ) -> None:
+        self.solid = solid
+        self.modes = modes
+        self.configuration = configuration
+        self.seed = seed
+        self.comm = comm
+        self.brief = brief
+        self.rival_seconds = rival_seconds
+        self._exact: Array | None = None
+        self._warm: tuple[ModalSolver, Modes] | None = None
+
+    def slepc(self, coarsening: str = "none", changed: bool = False) -> MethodRun:
+        """SLEPc's Krylov-Schur in shift-and-invert mode."""
+        with self.configuration.in_force(self.modes):
+            run = self._rival("slepc", *self._model(coarsening, changed))
+        if coarsening == "none":
+            self._exact = run.values
+        return run
+
+    def slepc_rough(self) -> MethodRun:
+        """SLEPc's Krylov-Schur to the rough tolerance."""
+        with self.configuration.in_force(self.modes):
+            return self._rival("slepc", *self._model("none"), ROUGH_TOLERANCE)
+
+    def ddfem_rough(self) -> MethodRun:
+        """SLEPc's Krylov-Schur on the coarse mesh, to the interactive tolerance."""
+        with self.configuration.in_force(self.modes):
+            return self._rival("slepc", *self._model("ddfem"), INTERACTIVE_TOLERANCE)
+
+    def arpack(self) -> MethodRun:
+        """ARPACK in shift-and-invert mode."""
+        with without_purification():
+            return self._rival("arpack", *self._model("none"))
+
+    def arpack_regular(self) -> MethodRun:
+        """ARPACK without a factorisation, on the fine mesh with a diagonal mass."""
+        model = compute_on_root(self.comm, lambda: self._root.lumped())
+        begin = self._now()
+        values = smallest_without_factor(model, self.modes, RIVAL_TOLERANCE, self.seed, self.comm)
+        return MethodRun(self._now() - begin, values)
+
+    def further(self, name: str) -> MethodRun:
+        """One of `RIVALS`, asked for what SLEPc is asked for, on the fine mesh.
+
+        Modes that it missed are found off the clock, see `_rival`.
+
+        Raises
+        ------
+        ConvergenceError
+            If it cannot be tried here, takes too long or fails.
+        """
+        rival = RIVALS[name]
+        rival.require(self.comm.size)
+        exact = self.slepc().values if self._exact is None else self._exact
+        model = self._root.lumped() if rival.lumped else self._root.fine
+        local_mesh = distribute(model, None, self.seed, self.comm)
+        layout = Layout.of_local_mesh(local_mesh, self.comm)
+        linear = LinearSolver("auto", layout)
+        wanted = min(self.modes + (SPARE_MODES if can_count() else 0), model.n_dofs)
+        begin = self._now()
+        search = RivalSearch(
+            assemble(local_mesh, self.comm, layout),
+            linear,
+            (self.modes if rival.interval else wanted) - RIGID_MODES,
+            (BELOW_ELASTIC * exact[RIGID_MODES], ABOVE_LAST * exact[-1]),
+            RIVAL_TOLERANCE,
+            self.seed,
+            TimeLimit(self.rival_seconds),
+        )
+        try:
+            pairs = rival.search(search)
+            seconds = self._now() - begin
+            search.limit.check()  # not every search asks in between
+            values, added = completed(search, pairs, self.modes)
+        finally:
+            search.system.destroy()
+        return MethodRun(seconds, values, added=added)
+
+    def hcms(self) -> MethodRun:
+        """Component mode synthesis alone."""
+        return self._cold(*self._model("none"), self._options(method="hcms", corrections=0))
+
+    def hcms_ec(self) -> MethodRun:
+        """Component mode synthesis and error correction."""
+        options = self._options(method="hcms", tolerance=CORRECTED_TOLERANCE)
+        return self._cold(*self._model("none"), options)
+
+    def fastest(self) -> MethodRun:
+        """What `--method auto` takes: block Lanczos from random vectors."""
+        return self._cold(*self._model("none"), self._options(tolerance=CORRECTED_TOLERANCE))
+
+    def fastest_rough(self) -> MethodRun:
+        """The same to the rough tolerance."""
+        return self._cold(*self._model("none"), self._options(tolerance=ROUGH_TOLERANCE))
+
+    def refined(self) -> MethodRun:
+        """The same from the modes of the solid coarsened by forests."""
+        options = self._options(tolerance=ROUGH_TOLERANCE)
+        return self._cold(*self._model("none"), options, from_coarse=True)
+
+    def ddfem_ec_accurate(self) -> MethodRun:
+        """The same on the mesh coarsened by forests."""
+        return self._cold(*self._model("ddfem"), self._options(tolerance=CORRECTED_TOLERANCE))
+
+    def ddfem_ec(self) -> MethodRun:
+        """The same on the mesh coarsened by forests, to the interactive tolerance."""
+        return self._cold(*self._model("ddfem"), self._interactive)
+
+    def ddfem_ec_warm(self) -> MethodRun:
+        """The same for the changed material, from the modes of the unchanged one."""
+        solver, start = self._prepared()
+        model, coarsened = self._model("ddfem", changed=True)
+        begin = self._now()
+        result = solver.solve_coarse(None if model is None else model.young, start)
+        return self._run(result, begin, coarsened)
+
+    def release(self) -> None:
+        """Free what warm runs start from."""
+        if self._warm is not None:
+            self._warm[1].system.destroy()
+            self._warm = None
+
+    def _prepared(self) -> tuple[ModalSolver, Modes]:
+        if self._warm is None:
+            model, _ = self._model("ddfem")
+            solver = ModalSolver(model, self._interactive, self.comm)
+            self._warm = solver, solver.solve()
+        return self._warm
+
+    @property
+    def _interactive(self) -> SolverOptions:
+        return self._options(tolerance=INTERACTIVE_TOLERANCE)
+
+    def _options(self, **changes: Any) -> SolverOptions:
+        options = SolverOptions(modes=self.modes, seed=self.seed, **changes)
+        if self.brief and options.method == "hcms":
+            options = replace(options, tolerance=0.0, corrections=min(1, options.corrections))
+        elif self.brief and options.method == "auto":
+            options = replace(options, tolerance=INTERACTIVE_TOLERANCE)
+        return options
+
+    @property
+    def _root(self) -> BenchmarkSolid:
+        assert self.solid is not None
+        return self.solid
+
+    def _model(self, coarsening: str, changed: bool = False) -> tuple[Solid | None, float]:
+        """Model on rank 0, and the seconds that coarsening took, on every rank."""
+        if coarsening == "none":
+            return (None if self.solid is None else self.solid.fine), 0.0
+        made = compute_on_root(self.comm, lambda: self._root.coarsened(coarsening, changed))
+        model, seconds = made or (None, 0.0)
+        return model, self.comm.bcast(seconds)
+
+    def _cold(
+        self,
+        model: Solid | None,
+        coarsened: float,
+        options: SolverOptions,
+        from_coarse: bool = False,
+    ) -> MethodRun:
+        begin = self._now()
+        solver = ModalSolver(model, options, self.comm)
+        prepared = self._now()
+        start = None
+        if from_coarse:
+            forest = None if self.solid is None else self.solid.forest
+            start = coarse_start(solver, model, forest)
+        result = solver.solve(initial_modes=start)
+        return replace(self._run(result, prepared, coarsened), before=prepared - begin)
+
+    def _rival(
+        self,
+        method: str,
+        model: Solid | None,
+        coarsened: float,
+        tolerance: float = RIVAL_TOLERANCE,
+    ) -> MethodRun:
+        """A general eigensolver, which needs nothing of what is prepared of the mesh.
+
+        It is given the rigid motions, finds a few modes to spare, and is charged for one search.
+        Modes that this missed, by the count of eigenvalues, are found by others off the clock: its
+        eigenvalues are a reference, which must be complete, and its time is favoured.
+        """
+        options = self._options(method=method, tolerance=tolerance)
+        return replace(self._cold(model, coarsened, options), before=0.0)
+
+    def _run(self, result: Modes, begin: float, coarsened: float) -> MethodRun:
+        elapsed = self._now() - begin
+        phases = {name: time for name, time in result.seconds.items() if name not in CHECKS}
+        checking = sum(result.seconds.values()) - sum(phases.values())
+        values = result.values
+        result.system.destroy()
+        if coarsened:
+            phases = {"coarsening": coarsened, **phases}
+        added = result.evidence.get("modes_added", 0)
+        return MethodRun(coarsened + elapsed - checking, values, phases=phases, added=added)
+
+    def _now(self) -> float:
+        """Time at which all ranks are here."""
+        self.comm.barrier()
+        return time.perf_counter()
+
+
+def named(methods: Methods) -> dict[str, Callable[[], MethodRun]]:
+    """The methods of the table by name, in its order."""
+    return {
+        "arpack": methods.arpack,
+        "slepc": methods.slepc,
+        "ddfem": partial(methods.slepc, "ddfem"),
+        "ddfem_rough": methods.ddfem_rough,
+        "hcms": methods.hcms,
+        "hcms_ec": methods.hcms_ec,
+        "fastest": methods.fastest,
+        "slepc_rough": methods.slepc_rough,
+        "fastest_rough": methods.fastest_rough,
+        "refined": methods.refined,
+        "ddfem_ec_accurate": methods.ddfem_ec_accurate,
+        "ddfem_ec": methods.ddfem_ec,
+        "ddfem_ec_warm": methods.ddfem_ec_warm,
+        "arpack_regular": methods.arpack_regular,
+        **{name: partial(methods.further, name) for name in RIVALS},
+    }

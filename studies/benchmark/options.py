@@ -1,0 +1,79 @@
+"""How a row of the time table is measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from carillon.command_line.arguments import positive_number, whole_number
+from carillon.command_line.options import option
+from solver.analysis.options import number_of_modes
+from studies.benchmark.further import ALL, RIVALS
+from studies.benchmark.methods import RIVAL_SECONDS
+
+SLOW = ("arpack", "arpack_regular", *RIVALS)
+ROUGH = ("slepc_rough", "fastest_rough", "refined")
+COARSE = ("ddfem", "ddfem_rough", "ddfem_ec_accurate", "ddfem_ec", "ddfem_ec_warm")
+"""Methods on the coarse mesh; all others are on the fine one."""
+BESIDE_DESIGN = ("arpack", "hcms", "hcms_ec")
+"""What `design` leaves out."""
+
+number_of_rounds = whole_number(1, 10_000)
+"""Argument type: a number of rounds."""
+
+
+@dataclass(frozen=True)
+class BenchmarkOptions:
+    """How a row is measured."""
+
+    modes: int = option(256, "number of modes, rigid ones included", type=number_of_modes)
+    runs: int = option(5, "rounds; in each, every method runs once", type=number_of_rounds)
+    slow_runs: int | None = option(
+        None,
+        "rounds that ARPACK and --rivals take part in (default: all)",
+        type=number_of_rounds,
+    )
+    fine_runs: int | None = option(
+        None,
+        "rounds that methods on the fine mesh take part in (default: all)",
+        type=number_of_rounds,
+    )
+    design: bool = option(
+        False, "only what a design does on the coarse mesh, and --method auto and SLEPc beside it"
+    )
+    arpack: bool = option(True, "run ARPACK, the slowest method, too")
+    arpack_regular: bool = option(False, "also ARPACK without a factorisation, on a lumped mass")
+    rough: bool = option(False, "also the fine mesh to 1e-3, from random vectors and coarse modes")
+    rivals: list[str] | None = option(
+        None, "further general eigensolvers, on one rank", nargs="+", choices=(*RIVALS, ALL)
+    )
+    rival_seconds: float = option(
+        RIVAL_SECONDS, "wall time after which one of these is given up [s]", type=positive_number
+    )
+    tune: bool = option(
+        False, "SLEPc in its fastest configuration of several, each tried once before"
+    )
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Methods that the options leave out."""
+        choices = {"arpack": self.arpack, "arpack_regular": self.arpack_regular}
+        choices |= dict.fromkeys(ROUGH, self.rough)
+        choices |= {name: name in self.further for name in RIVALS}
+        if self.design:
+            choices |= dict.fromkeys(BESIDE_DESIGN, False)
+        return tuple(name for name, runs in choices.items() if not runs)
+
+    @property
+    def further(self) -> tuple[str, ...]:
+        """Further rivals that the options ask for."""
+        asked = self.rivals or []
+        return tuple(name for name in RIVALS if name in asked or ALL in asked)
+
+    def rounds(self, method: str) -> int:
+        """Runs of a method."""
+        limits = [self.runs]
+        if method in SLOW and self.slow_runs is not None:
+            limits.append(self.slow_runs)
+        if method not in COARSE and self.fine_runs is not None:
+            limits.append(self.fine_runs)
+        return min(limits)

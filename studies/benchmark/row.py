@@ -1,0 +1,310 @@
+"""One row of the time table: all methods in alternating runs, with what they are worth."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, cast
+
+from mpi4py import MPI
+
+from carillon.command_line.progress import track
+from carillon.errors import ConvergenceError
+from carillon.fem.geometry import surface_name
+from carillon.processes.cores import blas_name, loaded_blas
+from solver.analysis.problem import ProblemOptions
+from solver.distribution.collective import bcast_from_root, compute_on_root
+from solver.verification.comparison import AUDIBLE_LAST
+from studies.benchmark.further import RIVALS
+from studies.benchmark.methods import MethodRun, Methods, named
+from studies.benchmark.options import COARSE, ROUGH, BenchmarkOptions
+from studies.benchmark.rivals import SlepcConfiguration, configurations
+from studies.benchmark.scores import BASES, median, spectrum_error, speedups, spread, tone_error
+from studies.benchmark.solid import BenchmarkSolid, make_solid
+
+logger = logging.getLogger(__name__)
+
+Runs = dict[str, list[MethodRun]]
+
+NEED_FORESTS = ("refined", *COARSE)
+LUMPED = tuple(name for name, rival in RIVALS.items() if rival.lumped)
+NEED_VOXELS = (*NEED_FORESTS, "arpack_regular", *LUMPED)
+WARM_UP_MODES = 20
+"""Modes of the runs that compile the kernels and load what they need."""
+
+_LUMPED_MASS = (
+    "fine mesh with a row-sum lumped mass, which {} needs to do without any factorisation; its "
+    "spectrum is another than that of the consistent mass"
+)
+PROBLEMS = {
+    "arpack_regular": _LUMPED_MASS.format("ARPACK"),
+    **{name: _LUMPED_MASS.format("a filter") for name in LUMPED},
+}
+"""What a method solves, where it is another problem than its name says."""
+
+MEANING = {
+    "seconds": "median wall time from moduli to modes: coarsening, assembly and solution; what "
+    "needs the mesh alone is in precompute, checks of the result are in neither",
+    "precompute": "voxels or cells, material, blocks, and for each mesh partition, sparsity and "
+    "elimination plan, made once for any material",
+    "speedup": "seconds of the inner name over seconds of the outer name",
+    "speedup_with_precompute": "the same, with the partition, sparsity and elimination plan of the "
+    "outer name added to its seconds, and nothing to those of the inner name",
+    "ddfem": "coarsened by forests, then SLEPc on the coarse model (DDFEM* alone)",
+    "ddfem_rough": "the same to a residual of 1e-2",
+    "fastest": "what --method auto takes: block Lanczos from random vectors",
+    "slepc_rough": "SLEPc to a residual of 1e-3",
+    "fastest_rough": "the fastest to an eigenvalue error of 1e-3",
+    "refined": "the same from the modes of the solid coarsened by forests, which is solved before",
+    "ddfem_ec_accurate": "coarsened by forests, then the fastest to the same accuracy as on the "
+    "fine mesh",
+    "ddfem_ec": "coarsened by forests, then the fastest to the interactive tolerance, from nothing",
+    "ddfem_ec_warm": "the same for moduli that differ by a smooth field of 5 %, starting from "
+    "the modes of the unchanged ones",
+    "eigenvalue_error": "relative to SLEPc's eigenvalues of the same operator, fine or coarse",
+    "missed": "modes that a general eigensolver's search missed in some run, found by further "
+    "searches that it is not charged for",
+    "frequency_error": "of the coarse model, by mode number, relative to SLEPc on the fine mesh",
+}
+"""What the figures of a row mean, for the row itself."""
+
+
+def benchmark_row(
+    options: ProblemOptions,
+    benchmark: BenchmarkOptions = BenchmarkOptions(),
+    comm: MPI.Comm = MPI.COMM_WORLD,
+) -> dict[str, Any]:
+    """Time every method on one solid and compare what they find.
+
+    Without forests, neither named nor default ones, the methods that need them are left out with a
+    sentence, and their figures are None.
+
+    Returns
+    -------
+    dict[str, Any]
+        Plain values: `seconds`, `spread`, `eigenvalue_error`, `frequency_error`, `speedup` by
+        method, sizes, the machine; `meaning` explains them.
+
+    Raises
+    ------
+    UserError
+        For anything wrong with the solid, the forests or the number of modes.
+    ConvergenceError
+        If SLEPc fails; another method that does is told in `failed` and has no figures.
+    """
+    solid = compute_on_root(comm, partial(make_solid, options, benchmark.modes))
+    reason, voxels = comm.bcast(None if solid is None else (solid.reason, solid.blocks is not None))
+    if comm.rank == 0 and reason:
+        logger.warning(reason)
+    left_out = benchmark.left_out
+    if reason:
+        left_out += NEED_FORESTS if voxels else NEED_VOXELS
+    default = SlepcConfiguration.default(comm.size)
+    # Rivals may fail, and compile nothing.
+    brief = Methods(solid, _few(benchmark.modes), default, options.seed, comm, True)
+    _run_once(brief, (*left_out, *RIVALS))
+    methods = Methods(
+        solid,
+        benchmark.modes,
+        default,
+        options.seed,
+        comm,
+        rival_seconds=benchmark.rival_seconds,
+    )
+    tried = _tune(methods) if benchmark.tune else {}
+    if tried:
+        methods.configuration = min(tried, key=tried.__getitem__)
+    runs, failed = _alternate(methods, benchmark, left_out)
+    spectra = _references(methods, runs, averages=voxels, forests=not reason)
+    row = {
+        **bcast_from_root(comm, lambda: _describe(options, cast(BenchmarkSolid, solid))),
+        "modes": benchmark.modes,
+        **_times(runs, comm.bcast(None if solid is None else solid.seconds), benchmark.further),
+        **_errors(runs, spectra, benchmark.further),
+        "slepc_configuration": methods.configuration.as_dict(),
+        "slepc_configurations_tried": [
+            {**configuration.as_dict(), "seconds": seconds}
+            for configuration, seconds in tried.items()
+        ],
+        "runs": {name: len(results) for name, results in runs.items()},
+        "failed": failed,
+        "missed": {name: most for name, results in runs.items() if (most := _missed(results))},
+        "ranks": comm.size,
+        "threads": max((int(library["num_threads"]) for library in loaded_blas()), default=1),
+        "blas": blas_name(),
+        "problem": {name: text for name, text in PROBLEMS.items() if name not in left_out},
+        "meaning": MEANING | {name: RIVALS[name].meaning for name in benchmark.further},
+    }
+    methods.release()
+    return row
+
+
+def row_lines(row: Mapping[str, Any]) -> list[str]:
+    """A row as people read it."""
+    coarse = "" if row["dof_coarse"] is None else f", coarsened {row['dof_coarse']:,}"
+    lines = [f"{row['dof_fine']:,} unknowns{coarse}, {row['modes']} modes"]
+    for name, seconds in row["seconds"].items():
+        if seconds is None:
+            continue
+        between = row["spread"].get(name)
+        shown = f" ({between['min']:.2f} to {between['max']:.2f})" if between else ""
+        error = row["eigenvalue_error"].get(name)
+        worst = f"  worst eigenvalue error {error['max']:.1e}" if error else ""
+        lines.append(f"{name:<20s}{seconds:8.2f} s{shown}{worst}")
+    lines += [
+        f"{name:<20s}missed {count} modes, found off the clock"
+        for name, count in row["missed"].items()
+    ]
+    lines += [f"{name:<20s}failed: {reason}" for name, reason in row["failed"].items()]
+    last = min(AUDIBLE_LAST, row["modes"])
+    for name, error in row["frequency_error"].items():
+        lines.append(
+            f"{name:<20s}frequencies of modes 7 to {last} off by {error['rms_7_60']:.2%} rms"
+        )
+    return lines
+
+
+def _few(modes: int) -> int:
+    return min(WARM_UP_MODES, modes)
+
+
+def _chosen(methods: Methods, left_out: tuple[str, ...]) -> dict[str, Callable[[], MethodRun]]:
+    return {name: run for name, run in named(methods).items() if name not in left_out}
+
+
+def _run_once(methods: Methods, left_out: tuple[str, ...]) -> None:
+    """Compile and load what every method needs."""
+    for run in _chosen(methods, left_out).values():
+        run()
+    methods.release()
+
+
+def _tune(methods: Methods) -> dict[SlepcConfiguration, float]:
+    """Seconds of SLEPc on the fine mesh in each configuration, tried once."""
+    visible = methods.comm.rank == 0
+    tried = {}
+    for configuration in track(configurations(methods.comm.size), "tuning", visible=visible):
+        methods.configuration = configuration
+        tried[configuration] = methods.comm.bcast(methods.slepc().seconds)
+        if visible:
+            logger.info(f"SLEPc with {configuration}: {tried[configuration]:.2f} s")
+    return tried
+
+
+def _alternate(
+    methods: Methods, benchmark: BenchmarkOptions, left_out: tuple[str, ...]
+) -> tuple[Runs, dict[str, str]]:
+    """Runs of every method, one a round, and why a method has none."""
+    chosen = _chosen(methods, left_out)
+    runs: Runs = {name: [] for name in chosen}
+    plan = [
+        name
+        for number in range(benchmark.runs)
+        for name in chosen
+        if number < benchmark.rounds(name)
+    ]
+    failed: dict[str, str] = {}
+    for name in track(plan, "runs", visible=methods.comm.rank == 0):
+        if name in failed:
+            continue
+        try:
+            runs[name].append(chosen[name]())
+        except ConvergenceError as error:
+            # The others are worth knowing; without SLEPc's there is nothing to compare with.
+            if name == "slepc" or not error.collective:
+                raise
+            failed[name] = str(error)
+            runs.pop(name)
+            if methods.comm.rank == 0:
+                logger.warning(f"{name}: {error}")
+    return runs, failed
+
+
+def _references(
+    methods: Methods, runs: Runs, averages: bool, forests: bool
+) -> dict[str, MethodRun]:
+    """Spectra by SLEPc that the others are compared with."""
+    spectra = {"fine": runs["slepc"][0]}
+    if averages:
+        spectra["average"] = methods.slepc("average")
+    if forests:
+        spectra["coarse"] = runs["ddfem"][0] if "ddfem" in runs else methods.slepc("ddfem")
+        spectra["coarse_changed"] = methods.slepc("ddfem", changed=True)
+    return spectra
+
+
+def _missed(runs: list[MethodRun]) -> int:
+    return max((run.added for run in runs), default=0)
+
+
+def _describe(options: ProblemOptions, solid: BenchmarkSolid) -> dict[str, Any]:
+    return {
+        "model": surface_name(options.mesh),
+        "mesh": options.mesh,
+        "resolution": options.resolution,
+        "material": options.material,
+        "discretisation": options.discretisation,
+        "lumped": options.lumped,
+        "dof_fine": solid.fine.n_dofs,
+        "dof_coarse": None if solid.blocks is None else 3 * solid.blocks.coarse.n_nodes,
+        "forest": None if solid.forest is None else solid.forest.record(),
+        "without_forest": solid.reason,
+    }
+
+
+def _times(runs: Runs, before: dict[str, float], further: tuple[str, ...]) -> dict[str, Any]:
+    """Medians, spreads and ratios; `before` is what the mesh alone needed."""
+    seconds = {name: median([run.seconds for run in results]) for name, results in runs.items()}
+    planned = {
+        name: median([run.before for run in results]) or 0.0 for name, results in runs.items()
+    }
+    parts = {
+        **before,
+        "fine_solver": planned.get("fastest", 0.0),
+        "coarse_solver": planned.get("ddfem_ec", 0.0),
+    }
+    asked = [name for name in (*BASES, "slepc_rough") if name not in ROUGH or name in seconds]
+    names = ["arpack", "slepc", *asked]
+    if "arpack_regular" in seconds:
+        names.append("arpack_regular")
+    names += further
+    return {
+        "seconds": {
+            "precompute": sum(parts.values()),
+            **{name: seconds.get(name) for name in names},
+        },
+        "spread": {
+            name: spread([run.seconds for run in results]) for name, results in runs.items()
+        },
+        "precompute_parts": parts,
+        "phases": {name: results[-1].phases for name, results in runs.items()},
+        "speedup": speedups(seconds),
+        "speedup_with_precompute": speedups(seconds, planned),
+    }
+
+
+def _errors(runs: Runs, spectra: dict[str, MethodRun], further: tuple[str, ...]) -> dict[str, Any]:
+    same_operator = {
+        "arpack": "fine",
+        "hcms": "fine",
+        "hcms_ec": "fine",
+        "fastest": "fine",
+        **dict.fromkeys(ROUGH, "fine"),
+        "ddfem_rough": "coarse",
+        "ddfem_ec_accurate": "coarse",
+        "ddfem_ec": "coarse",
+        "ddfem_ec_warm": "coarse_changed",
+        **{name: "fine" for name in further if name not in LUMPED},
+    }
+    fine = spectra["fine"].values
+    names = {"average": "average", "ddfem": "coarse"}
+    coarse = {name: spectra[key].values for name, key in names.items() if key in spectra}
+    return {
+        "eigenvalue_error": {
+            name: spectrum_error(runs[name][-1].values, spectra[operator].values)
+            for name, operator in same_operator.items()
+            if name in runs
+        },
+        "frequency_error": {name: tone_error(values, fine) for name, values in coarse.items()},
+    }

@@ -1,0 +1,102 @@
+"""SciPy's eigensolvers: ARPACK with SuperLU, and LOBPCG with algebraic multigrid by PyAMG."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+import scipy.sparse.linalg as sla
+
+from carillon.errors import ConvergenceError
+from carillon.fem.model import RIGID_MODES
+from studies.benchmark.search import Array, Pairs, RivalSearch, ascending
+
+LANCZOS_VECTORS = 1.5
+"""Lanczos vectors for each mode wanted."""
+FEWEST_MORE = 24
+"""Lanczos vectors beyond the modes wanted, however few these are."""
+COARSEST = 300
+"""Unknowns of multigrid's coarsest level, which is solved directly."""
+LOBPCG_STEPS = 1000
+"""Iterations that LOBPCG may make; each applies the preconditioner to all vectors left."""
+MISSED = 10.0
+"""Times its tolerance that LOBPCG's last Rayleigh-Ritz step may leave a residual."""
+
+
+def arpack_superlu(search: RivalSearch) -> Pairs:
+    """`eigsh` in shift-and-invert mode, with SuperLU told that the matrix is symmetric."""
+    size = search.K.shape[0]
+    factor = sla.splu(
+        search.shifted.tocsc(),
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
+    )
+
+    def solve(rhs: Array) -> Array:
+        search.limit.check()
+        return np.asarray(factor.solve(rhs))
+
+    wanted = search.count + RIGID_MODES
+    vectors = max(round(LANCZOS_VECTORS * wanted), wanted + FEWEST_MORE)
+    values, modes = sla.eigsh(
+        search.K,
+        wanted,
+        search.M,
+        sigma=-search.shift,
+        OPinv=sla.LinearOperator((size, size), matvec=solve, dtype=float),
+        v0=search.start(1)[:, 0],
+        ncv=min(vectors, size),
+        tol=search.tolerance,
+    )
+    values, modes = ascending(values, modes)
+    return values[RIGID_MODES:], modes[:, RIGID_MODES:]
+
+
+def lobpcg_multigrid(search: RivalSearch) -> Pairs:
+    """`lobpcg` with smoothed aggregation that knows the rigid motions, which are constraints.
+
+    Its tolerance is one residual for all pairs, that of the highest.
+    """
+    preconditioner = multigrid(search)
+
+    def apply(block: Array) -> Array:
+        search.limit.check()
+        return np.asarray(search.K @ block)
+
+    size = search.K.shape[0]
+    stiffness = sla.LinearOperator((size, size), matvec=apply, matmat=apply, dtype=float)
+    largest = search.tolerance * search.interval[1]
+    with warnings.catch_warnings():
+        # It warns of what is an error here.
+        warnings.simplefilter("ignore", UserWarning)
+        values, modes, history = sla.lobpcg(
+            stiffness,
+            search.start(search.count),
+            B=search.M,
+            M=preconditioner,
+            Y=search.rigid,
+            tol=largest,
+            maxiter=LOBPCG_STEPS,
+            largest=False,
+            retResidualNormsHistory=True,
+        )
+    residual = np.linalg.norm(search.K @ modes - (search.M @ modes) * values, axis=0)
+    unconverged = int(np.sum(residual > MISSED * largest))
+    if unconverged:
+        raise ConvergenceError(
+            f"LOBPCG converged {len(values) - unconverged} of {len(values)} modes in "
+            f"{len(history)} iterations"
+        )
+    return ascending(values, modes)
+
+
+def multigrid(search: RivalSearch) -> Any:
+    """Smoothed aggregation of K + sigma M, as an operator that is one V-cycle."""
+    import pyamg
+
+    hierarchy = pyamg.smoothed_aggregation_solver(
+        search.shifted.tobsr((3, 3)), B=search.rigid, max_coarse=COARSEST
+    )
+    return hierarchy.aspreconditioner()

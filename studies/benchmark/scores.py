@@ -1,0 +1,92 @@
+"""What a row of the time table is judged by: spreads, errors and ratios whose base is named."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.fem.model import RIGID_MODES
+from solver.files.modes_file import frequencies
+from solver.verification.comparison import AUDIBLE_LAST, eigenvalue_errors, frequency_errors
+
+Array = NDArray[np.float64]
+
+BASES = {
+    "hcms": ("arpack", "slepc"),
+    "hcms_ec": ("arpack", "slepc"),
+    "fastest": ("arpack", "slepc", "hcms_ec"),
+    "fastest_rough": ("slepc_rough",),
+    "refined": ("slepc_rough", "fastest_rough"),
+    "ddfem": ("arpack", "slepc"),
+    "ddfem_rough": ("arpack", "slepc"),
+    "ddfem_ec_accurate": ("arpack", "slepc", "ddfem"),
+    "ddfem_ec": ("arpack", "slepc", "ddfem", "ddfem_rough", "fastest"),
+    "ddfem_ec_warm": ("arpack", "slepc", "ddfem", "ddfem_rough", "ddfem_ec"),
+}
+"""Methods that a speed-up is told of, and what it may be told over."""
+
+
+def median(seconds: Sequence[float]) -> float | None:
+    """Median, None of nothing."""
+    return float(np.median(seconds)) if len(seconds) else None
+
+
+def spread(seconds: Sequence[float]) -> dict[str, float] | None:
+    """Least and greatest, None of nothing."""
+    return {"min": min(seconds), "max": max(seconds)} if len(seconds) else None
+
+
+def spectrum_error(values: Array, exact: Array) -> dict[str, float]:
+    """Median, 90th percentile and maximum relative error of the elastic eigenvalues."""
+    return eigenvalue_errors(*_elastic(values, exact))
+
+
+def tone_error(values: Array, exact: Array) -> dict[str, float]:
+    """Relative errors of the frequencies, matched by index: of modes 7 to 60, and of all."""
+    computed, true = _elastic(values, exact)
+    errors = frequencies(computed) / frequencies(true) - 1.0
+    audible = frequency_errors(errors, AUDIBLE_LAST)
+    everything = frequency_errors(errors, RIGID_MODES + len(errors))
+    return {
+        "rms_7_60": audible.rms,
+        "worst_7_60": audible.worst,
+        "rms": everything.rms,
+        "worst": everything.worst,
+    }
+
+
+def speedups(
+    seconds: Mapping[str, float | None], added: Mapping[str, float] | None = None
+) -> dict[str, Any]:
+    """Time of a base over the time of a method, by method and base.
+
+    Parameters
+    ----------
+    seconds
+        Medians by method.
+    added
+        What is added to a method's own time, such as its precomputation.
+
+    Examples
+    --------
+    >>> speedups({"slepc": 8.0, "arpack": None, "hcms_ec": 2.0})
+    {'hcms_ec': {'slepc': 4.0}}
+    """
+    ratios = {}
+    for method, bases in BASES.items():
+        own = seconds.get(method)
+        if own is None:
+            continue
+        own += (added or {}).get(method, 0.0)
+        over = {base: time / own for base in bases if (time := seconds.get(base)) is not None}
+        if over:
+            ratios[method] = over
+    return ratios
+
+
+def _elastic(values: Array, exact: Array) -> tuple[Array, Array]:
+    count = min(len(values), len(exact))
+    return values[RIGID_MODES:count], exact[RIGID_MODES:count]

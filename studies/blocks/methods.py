@@ -1,0 +1,231 @@
+"""The coarsenings of Fig. 9 under one interface."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from carillon.errors import UserError
+from carillon.fem.element import Array
+from carillon.files.paths import require_writable
+from carillon.processes.cores import allowed_threads
+from carillon.processes.threads import in_parallel
+from dataset_gen.objectives import closed_form, fit
+from forests.baselines import average, galerkin
+from forests.default import default_path
+from forests.evaluate import coarsen
+from forests.model import Model, load_model
+from studies.blocks.cases import BlockCase
+from studies.blocks.condensation import condense, corner_flexibility
+from studies.blocks.database import (
+    MATERIALS,
+    Database,
+    base_materials,
+    build,
+    load_databases,
+    look_up,
+    save_databases,
+)
+
+
+@dataclass(frozen=True)
+class Method:
+    """A coarsening of blocks (n, 8).
+
+    Attributes
+    ----------
+    name
+        Unique among the methods of a table.
+    coarsen
+        What is timed: moduli (n, 8), or whatever else the method keeps of each block.
+    storage_bytes
+        Kept beforehand.
+    training_seconds
+        Spent beforehand; None if unknown.
+    flexibility
+        Coarse flexibility (n, 18, 18) for the errors, of methods without moduli.
+    clamped
+        Whether blocks have moduli beyond the range that the method was made for.
+    """
+
+    name: str
+    coarsen: Callable[[Array], Array]
+    storage_bytes: int = 0
+    training_seconds: float | None = 0.0
+    flexibility: Callable[[Array], Array] | None = None
+    clamped: bool = False
+
+    def response(self, young: Array) -> Array:
+        """What `block_error` wants: moduli (n, 8) or flexibilities (n, 18, 18)."""
+        return (self.flexibility or self.coarsen)(young)
+
+
+def direct_fit(objective: str, poisson: float) -> Method:
+    """The fit of an objective to every block on the spot."""
+
+    def moduli(young: Array) -> Array:
+        return fit(objective, young, poisson).moduli
+
+    return Method(f"{objective}, fitted on the spot", moduli)
+
+
+def static_condensation(poisson: float) -> Method:
+    """Condensation to the corners, with a dense stiffness for every block."""
+
+    def stiffness(young: Array) -> Array:
+        return condense(young, poisson)
+
+    def flexibility(young: Array) -> Array:
+        return corner_flexibility(young, poisson)
+
+    return Method("static condensation", stiffness, flexibility=flexibility)
+
+
+def trained(name: str, model: Model) -> Method:
+    """Regression forests."""
+
+    def moduli(young: Array) -> Array:
+        return coarsen(model, young)
+
+    seconds = {**model.provenance, **model.scores}.get("training_seconds")
+    return Method(name, moduli, model.nbytes, None if seconds is None else float(seconds))
+
+
+def methods_of(models: dict[str, Model]) -> list[Method]:
+    """All coarsenings that hold for any range of moduli; `models` by the names of their files.
+
+    The objectives fitted on the spot are the paper's, Chen's, and those that the models learned.
+
+    Raises
+    ------
+    UserError
+        See `common_poisson`.
+    """
+    poisson = common_poisson(models)
+    learned = (closed_form(model.objective) for model in models.values())
+    objectives = dict.fromkeys(["energy", "chen2015", *learned])
+    methods = [
+        Method("average", average),
+        Method("Galerkin", galerkin),
+        static_condensation(poisson),
+        *(direct_fit(objective, poisson) for objective in objectives),
+    ]
+    for name, model in models.items():
+        suffix = f" of {name}" if len(models) > 1 else ""
+        methods.append(trained(f"{model.objective}, forests{suffix}", model))
+    return methods
+
+
+def metamaterials(database: Database, name: str, clamped: bool = False) -> Method:
+    """Lookup in a database of metamaterials [GPa]."""
+
+    def moduli(young: Array) -> Array:
+        return look_up(database, young)
+
+    return Method(name, moduli, database.nbytes, database.seconds, clamped=clamped)
+
+
+def databases_of(
+    cases: Sequence[BlockCase],
+    poisson: float,
+    path: str | Path | None = None,
+    materials: int = MATERIALS,
+) -> dict[BlockCase, Database]:
+    """A database made for each case that is not another one scaled.
+
+    Parameters
+    ----------
+    path
+        File to read them from; if there is none, they are built and written to it.
+    materials
+        Base materials of each, void included.
+
+    Raises
+    ------
+    UserError
+        If the file has other databases, or cannot be written.
+    """
+    bases = {
+        case: base_materials(case.moduli, materials, case.void)
+        for case in cases
+        if case.scaled_by == 1.0
+    }
+    if path is not None and Path(path).exists():
+        stored = load_databases(path)
+        return {case: _stored(stored, base, poisson, path) for case, base in bases.items()}
+    if path is not None:
+        require_writable(path)
+    # Compiled code fills them.  One bar for each of several at a time would be unreadable.
+    threads = min(allowed_threads(), len(bases))
+
+    def filled(case: BlockCase) -> Database:
+        label = f"database of {case.name}"
+        return build(bases[case], poisson, label=label, progress=threads == 1)
+
+    made = in_parallel(filled, [(case,) for case in bases], threads)
+    databases = dict(zip(bases, made, strict=True))
+    if path is not None:
+        save_databases(path, list(databases.values()))
+    return databases
+
+
+def _stored(
+    databases: Sequence[Database], materials: Array, poisson: float, path: str | Path
+) -> Database:
+    for database in databases:
+        if database.poisson == poisson and np.array_equal(database.materials, materials):
+            return database
+    low, high = materials[materials > 0.0][[0, -1]]
+    raise UserError(
+        f"{path}: has no database of {len(materials)} materials from {low:g} to {high:g} GPa for "
+        f"Poisson's ratio {poisson:g}; name a file that does not exist yet, to be written"
+    )
+
+
+def database_methods(case: BlockCase, databases: dict[BlockCase, Database]) -> list[Method]:
+    """The database made for the blocks of a case, and those made for a lower range of such blocks.
+
+    The latter take moduli beyond their range for their stiffest material.
+    """
+    methods = []
+    for other, database in databases.items():
+        low, high = other.range_gpa
+        name = f"Chen et al. 2015, database {low:g}..{high:g} GPa"
+        if other == case:
+            methods.append(metamaterials(database, name))
+        elif other.alike(case) and high < case.range_gpa[1]:
+            methods.append(metamaterials(database, f"{name}, clamped", clamped=True))
+    return methods
+
+
+def common_poisson(models: dict[str, Model]) -> float:
+    """Poisson's ratio of all models.
+
+    Raises
+    ------
+    UserError
+        If there is no model, or they differ.
+    """
+    ratios = {name: model.poisson for name, model in models.items()}
+    if not ratios:
+        raise UserError("there are no forests to compare: name a model file with --model")
+    if len(set(ratios.values())) > 1:
+        listed = ", ".join(f"{name} has {value:g}" for name, value in ratios.items())
+        raise UserError(f"forests of different Poisson's ratios ({listed}): make a table of each")
+    return next(iter(ratios.values()))
+
+
+def load_models(paths: Sequence[str] | None) -> dict[str, Model]:
+    """Forests by file, or the default ones.
+
+    Raises
+    ------
+    UserError
+        If a file is not a model, or none is named and there are no default forests.
+    """
+    if not paths:
+        paths = [str(default_path())]
+    return {path: load_model(path) for path in dict.fromkeys(paths)}

@@ -1,0 +1,16 @@
+"""What the study is made of."""
+
+from __future__ import annotations
+
+from studies.base.study import Study
+from studies.campaign.cells import cells_of
+
+CAMPAIGN = Study(
+    name="campaign",
+    package="studies.campaign",
+    folder="campaign",
+    title="Validations of solids, materials, seeds and ranks",
+    results="results:Campaign",
+    page="page:page",
+    measured=lambda config: [f"cells/{cell.path}.json" for cell in cells_of(config)],
+)

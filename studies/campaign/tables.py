@@ -1,0 +1,43 @@
+"""Tables of the campaign: every cell, and the solids."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from studies.base.entry import Row
+from studies.campaign.results import ENDS, PASSED, Campaign, end_of, nearest, share_of
+from studies.campaign.results import FAILED as FAILED
+
+
+def cells(study: Campaign) -> Iterator[Row]:
+    """Every cell, the worst first."""
+    for cell, result in study.found.items():
+        end, worst = end_of(result), nearest(result)
+        row: Row = {
+            "title": study.titles[cell.solid],
+            "model": cell.solid,
+            "material": cell.material,
+            "seed": cell.seed,
+            "ranks": cell.ranks,
+            "end": end,
+            "end_mark": "met" if end == PASSED else "missed",
+            "seconds": result["seconds"],
+            "command": result["command"],
+            "missed": sum(each["verdict"] == "missed" for each in result["criteria"]),
+        }
+        if worst is None:
+            row["what"] = result["reason"]
+        else:
+            row["what"] = f"{worst['label']}: {worst['shown']}, required {worst['required']}"
+            share = share_of(worst)
+            row["of"], row["share"] = worst["group"], share if math.isfinite(share) else None
+        yield row
+
+
+def solids(study: Campaign) -> Iterator[Row]:
+    """How the cells of every solid ended."""
+    for solid in study.solids:
+        ends = [end_of(each) for cell, each in study.found.items() if cell.solid == solid]
+        row: Row = {"model": solid, "title": study.titles[solid], "cells": len(ends)}
+        yield row | {end.replace(" ", "_"): ends.count(end) for end in ENDS}

@@ -1,0 +1,11 @@
+"""The study of the worst single modes of coarse models, and of the errors expected of them."""
+
+from carillon.command_line.commands import Command
+
+COMMANDS = {
+    "coarsening": Command(
+        "studies.coarsening.command",
+        "errors of a coarse model's single modes, true and expected, and what they are due to",
+        room="solver",
+    ),
+}

@@ -1,0 +1,190 @@
+"""A comparison as files: Markdown and a page for people, CSV and JSON for programs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from carillon.files.atomic import atomic_path
+from studies.base.conditions import LABELS
+from studies.base.entry import Row, tables_of
+from studies.base.numbers import show
+from studies.base.page import rendered
+from studies.base.table import Table
+from studies.comparison.cells import ENDS, KEYS
+from studies.comparison.comparison import SIDES, Comparison
+from studies.comparison.differences import Difference, dates
+from studies.comparison.noise import BETTER, OTHER, RULES, VERDICTS, WORSE
+from workflow.disk_space import make_folder
+
+NAME = "comparison"
+MACHINE = ("processor", "cores", "memory", "ranks", "threads", "blas")
+"""Conditions on which times depend, whatever the code."""
+MOST_MOVED = 25
+"""Moved numbers of a table that people are told; all are in the CSV file."""
+MOST_LISTED = 200
+"""Numbers of a table up to which the page lists all of them."""
+TITLE = "What moved"
+TABLES = tables_of("studies.comparison")
+RAW = [*KEYS, "kind", *(f"{side}{end}" for side in SIDES for end in ENDS), "ratio", "verdict"]
+CLASSES = {"worse": WORSE, "better": BETTER, "other": OTHER}
+MARKS = {**dict.fromkeys(WORSE, "worse"), **dict.fromkeys(BETTER, "better")}
+"""How verdicts are marked on a page."""
+
+
+def write(comparison: Comparison, folder: Path) -> None:
+    """Write `comparison.csv`, `comparison.md` and `comparison.html`."""
+    make_folder(folder)
+    for ending, text in (
+        ("csv", TABLES[NAME](comparison.cells).as_csv()),
+        ("md", as_markdown(comparison)),
+        ("html", as_page(comparison)),
+    ):
+        with atomic_path(folder / f"{NAME}.{ending}") as temporary:
+            temporary.write_text(text, encoding="utf-8")
+
+
+def as_json(comparison: Comparison) -> dict[str, Any]:
+    """What differs and what moved, as plain values."""
+    before, now = comparison.before, comparison.now
+    return {
+        "before": str(before.path),
+        "now": str(now.path),
+        "conditions": comparison.conditions,
+        "configuration": comparison.configuration,
+        "compared": len(comparison.cells),
+        "moved": comparison.moved.sort_index()[RAW].to_dict("records"),
+        "only_before": comparison.only_before,
+        "only_now": comparison.only_now,
+    }
+
+
+def as_text(comparison: Comparison) -> str:
+    """The short form, for a terminal."""
+    before, now = comparison.before, comparison.now
+    lines = [f"{before.path} (baseline) and {now.path} (this run)"]
+    for item in (*comparison.conditions, *comparison.configuration):
+        where = f" ({_cut(item['where'])})" if item["where"] else ""
+        lines.append(f"  {item['what']}: {_cut(item['before'])} -> {_cut(item['now'])}{where}")
+    lines += [*_caution(comparison), summary(comparison)]
+    for cell in comparison.moved.head(MOST_MOVED).to_dict("records"):
+        place = f"{cell['verdict']}: {cell['table']}, {cell['row']}, {cell['label']}"
+        lines.append(f"  {place}: {cell['before_shown']} -> {cell['now_shown']}")
+    if len(comparison.moved) > MOST_MOVED:
+        lines.append(f"  and {len(comparison.moved) - MOST_MOVED:,} more")
+    sides = _one_sided(comparison).items()
+    lines += [f"{side}: {len(only)}, such as {only[0]}" for side, only in sides]
+    return "\n".join(lines)
+
+
+def as_markdown(comparison: Comparison) -> str:
+    """The comparison for a pull request or a log."""
+    parts = [f"# {TITLE}", _sides(comparison), f"**{summary(comparison)}.**", "## Conditions"]
+    parts += [each.as_markdown() for each in _differing(comparison)] or ["The same."]
+    parts += [*_caution(comparison), "## Moved"]
+    for path, moved in _by_table(comparison.moved):
+        parts += [f"### {path}", _listed(path, moved.head(MOST_MOVED)).as_markdown()]
+        if len(moved) > MOST_MOVED:
+            parts.append(f"And {len(moved) - MOST_MOVED:,} more, see {NAME}.csv.")
+    if comparison.moved.empty:
+        parts.append("Nothing.")
+    parts += ["## By table", TABLES["counts"](comparison.cells).as_markdown()]
+    for side, only in _one_sided(comparison).items():
+        parts += [f"## {side}", "\n".join(f"- {name}" for name in only)]
+    parts += ["## Rules", "\n".join(f"- {kind}: {rule}." for kind, rule in RULES.items())]
+    return "\n\n".join(part.strip("\n") for part in parts) + "\n"
+
+
+def as_page(comparison: Comparison) -> str:
+    """The comparison as one self-contained page."""
+    by_table = _by_table(comparison.cells)
+    return rendered(
+        "studies/comparison/page.html.j2",
+        title=TITLE,
+        sides=_sides(comparison),
+        summary=summary(comparison),
+        differing=_differing(comparison),
+        cautions=_caution(comparison),
+        moved=[
+            (path, _listed(f"{path}-moved", moved.head(MOST_MOVED)), len(moved))
+            for path, moved in _by_table(comparison.moved)
+        ],
+        most=MOST_MOVED,
+        counts=TABLES["counts"](comparison.cells),
+        listed=[_listed(path, cells) for path, cells in by_table if len(cells) <= MOST_LISTED],
+        unlisted=[path for path, cells in by_table if len(cells) > MOST_LISTED],
+        one_sided=_one_sided(comparison),
+        rules=RULES,
+    )
+
+
+def summary(comparison: Comparison) -> str:
+    """What became of the numbers, in one sentence."""
+    counted = comparison.moved["verdict"].value_counts()
+    parts = [f"{show(counted[name], 'count')} {name}" for name in VERDICTS if name in counted]
+    numbers = f"{show(len(comparison.cells), 'count')} numbers compared"
+    return f"{numbers}: {', '.join(parts) if parts else 'none moved beyond noise'}"
+
+
+def records(cells: pd.DataFrame) -> list[Row]:
+    """Numbers side by side."""
+    rows: list[Row] = cells.assign(mark=cells["verdict"].map(MARKS).fillna("")).to_dict("records")
+    return rows
+
+
+def counts(cells: pd.DataFrame) -> list[Row]:
+    """How many numbers of each table were compared, and what became of them."""
+    of = {name: cells["verdict"].isin(verdicts) for name, verdicts in CLASSES.items()}
+    summed = pd.DataFrame({"compared": 1, **of}).groupby(cells["table"], sort=False).sum()
+    rows: list[Row] = summed.reset_index().to_dict("records")
+    return rows
+
+
+def differing(differences: list[Difference]) -> list[Row]:
+    """What is not the same, for people."""
+    return [{**each, "where": each["where"] or "all"} for each in differences]
+
+
+def _listed(name: str, cells: pd.DataFrame) -> Table:
+    return replace(TABLES["listed"](cells), name=name)
+
+
+def _by_table(cells: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
+    order = list(dict.fromkeys(cells.sort_index()["table"]))
+    return [(path, cells[cells["table"] == path]) for path in order]
+
+
+def _sides(comparison: Comparison) -> str:
+    before, now = comparison.before, comparison.now
+    return (
+        f"Baseline {before.path}, measured {dates(before)}; this run {now.path}, measured "
+        f"{dates(now)}."
+    )
+
+
+def _caution(comparison: Comparison) -> list[str]:
+    """A sentence about times where the machine is not the same; none otherwise."""
+    differing_labels = {item["what"] for item in comparison.conditions}
+    different = [LABELS[key] for key in MACHINE if LABELS[key] in differing_labels]
+    if not different:
+        return []
+    return [f"Not the same: {', '.join(different)}; times that moved may tell about these alone."]
+
+
+def _differing(comparison: Comparison) -> list[Table]:
+    tables = (TABLES[name](getattr(comparison, name)) for name in ("conditions", "configuration"))
+    return [table for table in tables if table.rows]
+
+
+def _one_sided(comparison: Comparison) -> dict[str, list[str]]:
+    """What one folder has alone, by words for it."""
+    before, now = comparison.only_before, comparison.only_now
+    sides = {"Only in the baseline": before, "Only in this run": now}
+    return {side: only for side, only in sides.items() if only}
+
+
+def _cut(text: str, length: int = 60) -> str:
+    return text if len(text) <= length else f"{text[: length - 1]}…"

@@ -1,0 +1,11 @@
+"""Where the results for the figures are kept."""
+
+from __future__ import annotations
+
+from studies.base.results import Results
+
+
+class Figures(Results):
+    """The folder of the figures; solids whose mesh does not exist are left out."""
+
+    section = study = "figures"

@@ -1,0 +1,76 @@
+# The paper's Fig. 10 and 11 and the scaling over ranks, in full: `snakemake figures`, no part of the
+# default run.
+from studies.figures import study as figures_study
+
+
+wildcard_constraints:
+    shape="|".join(config["figures"]["models"]),
+
+
+def shape_mesh(wildcards):
+    """Mesh file of a solid of the figures; none for a built-in object."""
+    return solids.mesh_files(config, "figures", wildcards.shape)
+
+
+def shape_arguments(wildcards):
+    """What the solid of a figure is: mesh, resolution, material."""
+    model = config["figures"]["models"][wildcards.shape]
+    how = {key: model[key] for key in ("resolution", "material", "components")}
+    mesh = settings.mesh_of(config, wildcards.shape, "figures")
+    return [mesh, *options(how | {"poisson": config["poisson"]})]
+
+
+rule figures:
+    input:
+        f"{place(figures_study.FIGURES)}/report.html",
+
+
+# Rules that time what they do take all cores, although some use one. The forests are those of the
+# package.
+use rule time_methods as time_methods_in_full with:
+    input:
+        model=shape_mesh,
+        forests=settings.forest_files(),
+    output:
+        f"{place(figures_study.FIGURES)}/models/{{shape}}/methods.json",
+    log:
+        f"{LOGS}/{figures_study.FIGURES.folder}/{{shape}}/methods.log",
+    benchmark:
+        f"{BENCHMARKS}/{figures_study.FIGURES.folder}/{{shape}}/methods.tsv"
+    params:
+        source=source("studies.benchmark.command"),
+        model=shape_arguments,
+        how=times_arguments(config["figures"]),
+        forest=forest_argument,
+
+
+use rule follow_convergence as follow_convergence_in_full with:
+    input:
+        shape_mesh,
+    output:
+        f"{place(figures_study.FIGURES)}/models/{{shape}}/convergence.json",
+    log:
+        f"{LOGS}/{figures_study.FIGURES.folder}/{{shape}}/convergence.log",
+    benchmark:
+        f"{BENCHMARKS}/{figures_study.FIGURES.folder}/{{shape}}/convergence.tsv"
+    resources:
+        **limits("follow_convergence_in_full"),
+    params:
+        source=source("studies.convergence.command"),
+        model=shape_arguments,
+        how=options({key: config["figures"][key] for key in ("modes", "steps")}),
+
+
+use rule measure_scaling_of_run as measure_scaling with:
+    input:
+        shape_mesh,
+    output:
+        f"{place(figures_study.FIGURES)}/models/{{shape}}/scaling.json",
+    log:
+        f"{LOGS}/{figures_study.FIGURES.folder}/{{shape}}/scaling.log",
+    benchmark:
+        f"{BENCHMARKS}/{figures_study.FIGURES.folder}/{{shape}}/scaling.tsv"
+    params:
+        source=source("studies.scaling.command"),
+        model=shape_arguments,
+        how=scaling_arguments(config["figures"]),

@@ -1,0 +1,31 @@
+"""What the study is made of."""
+
+from __future__ import annotations
+
+from studies.base.study import Figure, Study
+from workflow import solids
+
+FIGURES = Study(
+    name="figures",
+    package="studies.figures",
+    folder="paper",
+    title="Times, convergence and scaling in full",
+    results="results:Figures",
+    page="page:page",
+    measured=lambda config: solids.measured_files(config, "figures"),
+    figures=(
+        Figure("times", "workflow.report.methods_plot:methods_figure", "tables/methods.json"),
+        Figure(
+            "{shape}-convergence",
+            "workflow.report.convergence_plot:convergence_figure",
+            "models/{shape}/convergence.json",
+            of="figures.convergence",
+        ),
+        Figure(
+            "{shape}-scaling",
+            "studies.scaling.figure:scaling_figure",
+            "models/{shape}/scaling.json",
+            of="figures.scaling",
+        ),
+    ),
+)

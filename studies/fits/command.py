@@ -1,0 +1,21 @@
+"""Time the fits of every objective on one core, and compare them with what the core can do."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from carillon.command_line.options import add_options, collect
+from studies.fits import measure
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command line."""
+    add_options(parser, measure.FitBenchmarkOptions)
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Measure and print."""
+    result = measure.benchmark(collect(measure.FitBenchmarkOptions, arguments))
+    print(json.dumps(result, indent=2) if arguments.json else measure.as_text(result))

@@ -1,0 +1,321 @@
+"""What forests cost: time of a block, of loading, against scikit-learn, and over their size."""
+
+from __future__ import annotations
+
+import logging
+import statistics
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from carillon.command_line.arguments import number_between, whole_number
+from carillon.command_line.options import option
+from carillon.command_line.progress import track
+from carillon.fem.element import Array
+from carillon.records import provenance
+from forests.default import default_path
+from forests.evaluate import MOST_BLOCKS, coarsen, coarsen_with_derivatives
+from forests.model import FILLED, VOID, Model, load_model
+from forests.scaling import FEATURES, prepare
+from forests.training.join import join
+from studies.forests.synthetic import coherent_blocks, complete_forests, random_blocks
+
+logger = logging.getLogger(__name__)
+
+RUNS = 7
+"""Timed runs, after one that is not; medians are reported."""
+
+THREADS = (1, 2)
+
+CACHE_FOLDER = Path("/sys/devices/system/cpu/cpu0/cache")
+
+SIZES = ((3, 11), (3, 13), (3, 15), (3, 17), (3, 18), (3, 19), (3, 20), (5, 20))
+"""Trees of a forest and their depth: from 0.7 to 590 MB, 56 bytes a leaf."""
+
+BYTES_OF_LEAF = 56
+
+DEPTH = 20
+"""Splits on the longest way down scikit-learn's trees, as in the paper."""
+
+BLOCKS_PER_LEAF = 5
+"""Random blocks to grow scikit-learn's trees on: ten rows a leaf where the origin is void."""
+
+
+@dataclass(frozen=True)
+class ForestBenchmarkOptions:
+    """What is measured."""
+
+    forest: str | None = option(
+        None, "forests to measure (HDF5; default: those of the package)", metavar="FILE"
+    )
+    blocks: int = option(100_000, "evaluated in one run", type=whole_number(1, MOST_BLOCKS))
+    largest: float = option(
+        600.0, "of the largest forest [MB]", type=number_between(1e-3, 1e6), metavar="MB"
+    )
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Microseconds of a block in warm runs, and how many runs there were."""
+
+    median: float
+    min: float
+    max: float
+    runs: int
+
+
+@dataclass(frozen=True)
+class Rival:
+    """scikit-learn's `predict` and ours for the same trees on the same blocks, on one core.
+
+    Attributes
+    ----------
+    trees : int
+        Of each forest.
+    leaves : int
+        Of all trees.
+    predict, coarsen : Timing
+        `coarsen` also computes the features, which `predict` is given.
+    ratio : float
+        How many times as fast ours is.
+    difference : float
+        Largest relative one of the moduli.
+    """
+
+    trees: int
+    leaves: int
+    predict: Timing
+    coarsen: Timing
+    ratio: float
+    difference: float
+
+
+@dataclass(frozen=True)
+class SizeTiming:
+    """A forest of complete trees; microseconds of a block, nanoseconds of one walk down a tree."""
+
+    megabytes: float
+    trees: int
+    depth: int
+    random: Timing
+    coherent: Timing
+    random_walk_ns: float
+    coherent_walk_ns: float
+
+
+@dataclass(frozen=True)
+class Result:
+    """All measurements.
+
+    Attributes
+    ----------
+    evaluation : dict
+        Timings by name and threads.
+    load_ms : float
+        Median time of loading the model [ms], checks included.
+    compiled_for : str
+        Processor that numba compiles for.
+    """
+
+    model: str
+    megabytes: float
+    trees: int
+    leaves: int
+    blocks: int
+    load_ms: float
+    evaluation: dict[str, Timing]
+    rival: Rival
+    sizes: list[SizeTiming]
+    caches: dict[str, str]
+    processor: str
+    compiled_for: str
+
+
+def _warm_seconds(function: Callable[[], object]) -> list[float]:
+    """Seconds of each of the timed runs of a function."""
+    function()
+    seconds = []
+    for _ in range(RUNS):
+        start = time.perf_counter()
+        function()
+        seconds.append(time.perf_counter() - start)
+    return seconds
+
+
+def timed(function: Callable[[], object], blocks: int) -> Timing:
+    """Time a function that works on so many blocks."""
+    seconds = _warm_seconds(function)
+    low, middle, high = (1e6 * pick(seconds) / blocks for pick in (min, statistics.median, max))
+    return Timing(middle, low, high, RUNS)
+
+
+def caches(folder: Path = CACHE_FOLDER) -> dict[str, str]:
+    """Size of each cache that the first core uses, such as `{"L1 Data": "48K"}`."""
+    sizes = {}
+    for entry in sorted(folder.glob("index*")):
+        try:
+            level, kind, size = (
+                (entry / name).read_text().strip() for name in ("level", "type", "size")
+            )
+        except OSError:
+            continue
+        sizes[f"L{level}" if kind == "Unified" else f"L{level} {kind}"] = size
+    return sizes
+
+
+def _scikit_forests(trees: int, leaves: int) -> tuple[list[Any], Model]:
+    """Forests of scikit-learn, one for void and one for filled origins, and the same as a model."""
+    from sklearn.ensemble import ExtraTreesRegressor
+
+    from forests.training.leaves import Leaves
+    from forests.training.structure import flatten
+
+    prepared = prepare(random_blocks(BLOCKS_PER_LEAF * leaves, seed=1), "log")
+    generator = np.random.default_rng(0)
+    estimators, parts = [], []
+    for kind in (VOID, FILLED):
+        features = prepared.features[prepared.filled == bool(kind)]
+        target = features.mean(axis=1) + generator.uniform(-1.0, 1.0, len(features))
+        forest = ExtraTreesRegressor(
+            trees, max_leaf_nodes=max(2, leaves), max_depth=DEPTH, random_state=0
+        )
+        forest.fit(features, target)
+        joined = []
+        for estimator in forest.estimators_:
+            tree = flatten(estimator.tree_)
+            value = estimator.tree_.value[tree.left < 0, 0, 0]
+            coefficients = np.zeros((tree.leaves, FEATURES + 1))
+            coefficients[:, FEATURES] = value
+            # Bounds as wide as values: what is constant needs none.
+            bound = np.full(tree.leaves, np.abs(value).max() + 1.0)
+            joined.append((tree, Leaves(coefficients, -bound, bound)))
+        estimators.append(forest)
+        parts.append(joined)
+    return estimators, Model("none", 0.25, "log", join(*parts), {}, {})
+
+
+def against_scikit_learn(young: Array, trees: int, leaves: int) -> Rival:
+    """Measure both on blocks (m, 8), with trees of so many leaves that scikit-learn grows here."""
+    estimators, model = _scikit_forests(trees, leaves)
+    prepared = prepare(young, model.transform)
+    features = [prepared.features[prepared.filled == bool(kind)] for kind in (VOID, FILLED)]
+
+    def predict() -> list[Array]:
+        return [forest.predict(rows) for forest, rows in zip(estimators, features)]
+
+    expected = np.empty_like(young)
+    for kind, target in zip((VOID, FILLED), predict()):
+        expected[prepared.filled == bool(kind)] = np.exp(target)
+    expected *= prepared.scale
+    theirs = timed(predict, len(young))
+    ours = timed(lambda: coarsen(model, young), len(young))
+    return Rival(
+        trees,
+        len(model.forests.leaves),
+        theirs,
+        ours,
+        theirs.median / ours.median,
+        float(np.abs(coarsen(model, young) / expected - 1.0).max()),
+    )
+
+
+def over_size(sizes: Sequence[tuple[int, int]], young: Array, mesh: Array) -> list[SizeTiming]:
+    """Measure forests of complete trees on random blocks and on those of a mesh."""
+    timings = []
+    for trees, depth in track(sizes, "forests of growing size", unit="forests"):
+        model = complete_forests(trees, depth)
+        random = timed(partial(coarsen, model, young), len(young))
+        coherent = timed(partial(coarsen, model, mesh), len(mesh))
+        walks = [1e3 * timing.median / (8 * trees) for timing in (random, coherent)]
+        timings.append(
+            SizeTiming(model.nbytes / 1e6, trees, depth, random, coherent, walks[0], walks[1])
+        )
+    return timings
+
+
+def benchmark(options: ForestBenchmarkOptions) -> Result:
+    """Measure forests.
+
+    Raises
+    ------
+    UserError
+        See `forests.model.load_model`.
+    """
+    path = default_path() if options.forest is None else Path(options.forest)
+    blocks = options.blocks
+    model = load_model(path)
+    young, mesh = random_blocks(blocks), coherent_blocks(blocks)
+    functions = {"coarsen": coarsen, "coarsen with derivatives": coarsen_with_derivatives}
+    evaluation = {
+        f"{name}, {threads} thread{'s' if threads > 1 else ''}": timed(
+            partial(function, model, young, threads), blocks
+        )
+        for name, function in functions.items()
+        for threads in THREADS
+    }
+    evaluation["coarsen, 1 thread, blocks of a mesh"] = timed(partial(coarsen, model, mesh), blocks)
+    leaves = len(model.forests.leaves)
+    logger.info("growing trees of scikit-learn")
+    rival = against_scikit_learn(young, model.forests.trees, leaves // (2 * model.forests.trees))
+    sizes = [
+        (trees, depth)
+        for trees, depth in SIZES
+        if 2 * trees * BYTES_OF_LEAF * 2**depth <= 1e6 * options.largest
+    ]
+    return Result(
+        model=str(path),
+        megabytes=model.nbytes / 1e6,
+        trees=model.forests.trees,
+        leaves=leaves,
+        blocks=blocks,
+        load_ms=1e3 * statistics.median(_warm_seconds(partial(load_model, path))),
+        evaluation=evaluation,
+        rival=rival,
+        sizes=over_size(sizes, young, mesh),
+        caches=caches(),
+        processor=provenance.processor(),
+        compiled_for=provenance.compiled_for(),
+    )
+
+
+def as_json(result: Result) -> dict[str, Any]:
+    """The result as plain values."""
+    return asdict(result)
+
+
+def _line(name: str, timing: Timing) -> str:
+    return f"{name:<42}{timing.median:>8.2f}{timing.min:>8.2f}{timing.max:>8.2f}"
+
+
+def as_text(result: Result) -> str:
+    """The result in columns."""
+    rival = result.rival
+    lines = [
+        f"{result.processor}, compiled for {result.compiled_for}, caches "
+        + ", ".join(f"{level} {size}" for level, size in result.caches.items()),
+        f"{result.model}: 2 x {result.trees} trees, {result.leaves:,} leaves, "
+        f"{result.megabytes:.1f} MB, loaded in {result.load_ms:.1f} ms",
+        f"{result.blocks:,} random blocks, {RUNS} warm runs",
+        f"{'microseconds of a block':<42}{'median':>8}{'min':>8}{'max':>8}",
+        *(_line(name, timing) for name, timing in result.evaluation.items()),
+        "",
+        f"trees of scikit-learn, 2 x {rival.trees} with {rival.leaves:,} leaves, one core",
+        _line("predict of scikit-learn, features given", rival.predict),
+        _line("coarsen, the same trees", rival.coarsen),
+        f"{rival.ratio:.1f} times as fast, moduli differ by {rival.difference:.1e} at most",
+        "",
+        f"{'complete trees, one core':<28}{'random blocks':>20}{'blocks of a mesh':>20}",
+        f"{'MB':>8}{'trees':>10}{'depth':>10}" + 2 * f"{'us/block':>10}{'ns/walk':>10}",
+    ]
+    lines += [
+        f"{size.megabytes:>8.1f}{f'2 x {size.trees}':>10}{size.depth:>10}"
+        f"{size.random.median:>10.2f}{size.random_walk_ns:>10.1f}"
+        f"{size.coherent.median:>10.2f}{size.coherent_walk_ns:>10.1f}"
+        for size in result.sizes
+    ]
+    return "\n".join(lines)

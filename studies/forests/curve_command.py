@@ -1,0 +1,32 @@
+"""Train on more and more rows, and follow the error."""
+
+from __future__ import annotations
+
+import argparse
+
+from carillon.command_line.outputs import require_outputs
+from forests.commands.training import add_training, add_workers, training_of
+from forests.training.dataset import open_dataset
+from studies.base.command_results import add_outputs, publish
+from studies.forests import training
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command line."""
+    add_training(parser)
+    parser.add_argument("--rows", default="1e5,3e5,1e6,3e6,1e7", help="(default %(default)s)")
+    parser.add_argument("--plot", metavar="FILE", help="the curve, as .png, .svg or .pdf")
+    add_workers(parser)
+    add_outputs(parser)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Train on each number of rows and print the scores."""
+    require_outputs(arguments, arguments.datasets)
+    how = training_of(arguments)
+    dataset = open_dataset(arguments.datasets)
+    counts = training.require_counts(arguments.rows)
+    rows = training.learning_curve(dataset, how, counts, arguments.workers)
+    if arguments.plot:
+        training.error_over_rows(rows, arguments.plot)
+    publish(arguments, rows, training.as_text(rows), arguments.workers)

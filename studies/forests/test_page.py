@@ -1,0 +1,102 @@
+"""The default forests and their study: what is planned, mistakes, and a miniature end to end."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+import yaml
+
+from carillon.errors import UserError
+from forests import default as default_forests
+from studies.base.catalogue import FORESTS
+from studies.base.table import read_table
+from tests.pages import Page, assert_same_numbers, assert_self_contained
+from tests.workflow_runs import CHECKOUT, PROFILE, TINY, snakemake
+from workflow import settings
+
+FOLDER = "results-tiny"
+FIGURES = [figure.file for figure in FORESTS.figures]
+
+
+def test_default_forests_are_trained_tree_by_tree_and_not_in_the_default_run(plan):
+    jobs = plan("default_forest")
+    assert jobs["generate_default_shard"] == 2 * 8
+    assert jobs["grow_tree"] == 2 * 3
+    assert jobs["train_default_forest"] == jobs["describe_default_forest"] == 1
+    assert "generate_shard" not in jobs and "find_modes" not in jobs
+    default = plan()
+    assert not {"grow_tree", "compare_on_blocks", "rate_objectives"} & set(default)
+
+
+def test_the_default_forests_are_named_as_seen_from_the_checkout(monkeypatch):
+    monkeypatch.chdir(CHECKOUT)
+    assert settings.forest_files() == ["forests/default.h5"]
+    monkeypatch.chdir(CHECKOUT / "tests")
+    assert settings.forest_files() == [str(CHECKOUT / "forests" / "default.h5")]
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_the_study_takes_forests_that_are_named_or_the_default_ones(tmp_path, monkeypatch, named):
+    config = yaml.safe_load((CHECKOUT / "workflow" / "config" / "laptop.yaml").read_text())
+    monkeypatch.setattr(default_forests, "default_path", lambda: tmp_path / "default.h5")
+    config["forests_study"]["model"] = "own.h5" if named else None
+    files = settings.forest_files(config["forests_study"]["model"])
+    assert files == ["own.h5" if named else str(tmp_path / "default.h5")]
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"shards": 9}, "forests_study.shards: 9 of 8 shards"),
+        ({"curve_rows": [1000, 10**9]}, "forests_study.curve_rows: 1,000,000,000 rows, but"),
+        ({"variants": ["magic"]}, "forests_study.variants: 'magic' is unknown"),
+    ],
+)
+def test_a_study_beyond_its_data_is_answered_in_one_sentence(changes, says):
+    config = yaml.safe_load((CHECKOUT / "workflow" / "config" / "laptop.yaml").read_text())
+    config["forests_study"] |= changes
+    settings.check(config)
+    with pytest.raises(UserError, match=says):
+        settings.check_links(config)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """Folder of the results of tiny default forests and of their study."""
+    folder = tmp_path_factory.mktemp("forests-study")
+    targets = ["default_forest", "forests_study"]
+    done = snakemake(folder, *targets, "--profile", PROFILE, "--configfile", TINY)
+    assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-6000:]
+    return folder / FOLDER
+
+
+@pytest.mark.nightly
+def test_tiny_default_forests_hold_the_trees_grown_apart(finished):
+    summary = json.loads((finished / "default_forest" / "forests.json").read_text())
+    assert summary["trees"] == 1
+    assert summary["scores"]["r2_log_solid"] > 0.8
+    assert len(list((finished / "default_forest" / "trees").iterdir())) == 2
+
+
+@pytest.mark.nightly
+def test_the_page_of_a_miniature_study_holds_its_tables_and_figures(finished):
+    study = finished / "forests_study"
+    page = Page(study / "report.html")
+    assert_self_contained(page)
+    assert {f"plot-{name}" for name in FIGURES} <= set(page.ids)
+    for name in FORESTS.entries:
+        assert_same_numbers(page, study / "tables", name)
+    for name in FIGURES:
+        assert (study / "figures" / f"{name}.png").stat().st_size > 5000
+
+
+@pytest.mark.nightly
+def test_a_miniature_study_finds_that_more_rows_help(finished):
+    few, many = read_table(finished / "forests_study" / "tables" / "curve.json").rows
+    assert few["rows"] < many["rows"] <= 24000
+    assert many["scores0_rms_log_solid"] < few["scores0_rms_log_solid"]
+    variants = read_table(finished / "forests_study" / "tables" / "variants.json").rows
+    assert [row["variant"] for row in variants] == ["logarithms", "logarithms, linear splits"]
+    for row in read_table(finished / "forests_study" / "tables" / "provenance.json").rows:
+        assert row["command"] and row["commit"] and row["config_hash"] and row["versions"]

@@ -1,0 +1,28 @@
+"""Train in other ways, with leaves of equal storage in all, and compare their errors."""
+
+from __future__ import annotations
+
+import argparse
+
+from carillon.command_line.outputs import require_outputs
+from forests.commands.training import add_training, add_workers, training_of
+from forests.training.dataset import open_dataset
+from studies.base.command_results import add_outputs, publish
+from studies.forests import training
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command line."""
+    add_training(parser)
+    parser.add_argument("--only", action="append", metavar="NAME", help="may be repeated")
+    add_workers(parser)
+    add_outputs(parser)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Train every variant and print their scores."""
+    require_outputs(arguments, arguments.datasets)
+    how = training_of(arguments)
+    names = arguments.only or tuple(training.VARIANTS)
+    rows = training.variants(open_dataset(arguments.datasets), how, arguments.workers, names)
+    publish(arguments, rows, training.as_text(rows), arguments.workers)

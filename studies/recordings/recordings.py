@@ -1,0 +1,59 @@
+"""The recordings: what was struck, and in which package it lies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from carillon.files.yaml_input import read_own_yaml
+from studies.recordings.packages import SOUNDS
+
+LIST = Path(__file__).with_name("recordings.yaml")
+FOLDER = "recordings"
+"""Folder of the study below that of a run."""
+PACKAGES = "packages"
+"""Folder of the unpacked packages below that of the study."""
+CALIBRATION, HELD_BACK = SPLITS = ("calibration", "held back")
+"""What a recording may be used for."""
+
+
+@dataclass(frozen=True)
+class RecordedStrike:
+    """A file of a package that holds one strike.
+
+    Attributes
+    ----------
+    name
+        Of its page.
+    package, file
+        The package, and the file below the package's folder of sounds.
+    kind
+        What was struck.
+    tonal
+        Whether a few modes ring clear of each other and of the noise.
+    split
+        One of `SPLITS`.
+    """
+
+    name: str
+    package: str
+    file: str
+    kind: str
+    tonal: bool
+    split: str
+
+    @property
+    def title(self) -> str:
+        """The name for people."""
+        return self.name.replace("-", " ").capitalize()
+
+    def path(self, packages: Path) -> Path:
+        """The file below a folder that holds the unpacked packages."""
+        return packages / self.package / SOUNDS[self.package] / self.file
+
+
+@cache
+def recordings() -> dict[str, RecordedStrike]:
+    """All recordings by name."""
+    return {name: RecordedStrike(name, **each) for name, each in read_own_yaml(LIST).items()}

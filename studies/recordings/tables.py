@@ -1,0 +1,34 @@
+"""Tables of a recording's page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from studies.base.entry import Row
+from studies.recordings.results import RecordingResults
+
+
+def modes(results: RecordingResults) -> Iterator[Row]:
+    """The modes that were found, their levels below the loudest one."""
+    found = results.found
+    amplitudes = np.array(found["amplitudes"][0])
+    levels = 20.0 * np.log10(amplitudes / amplitudes.max())
+    deviations = found["clips"][0]["frequency_deviations_hz"]
+    columns = (found["frequencies_hz"], deviations, found["dampings_per_second"], levels.tolist())
+    for number, (hertz, deviation, damping, level) in enumerate(zip(*columns), 1):
+        yield {
+            "mode": number,
+            "frequency": hertz,
+            "deviation": deviation,
+            "damping": damping,
+            "level": level,
+        }
+
+
+def missed(results: RecordingResults) -> Iterator[Row]:
+    """Strong peaks that no mode accounts for."""
+    peaks = results.peaks
+    for index in np.flatnonzero(results.missed):
+        yield {"frequency": float(peaks.hertz[index]), "level": float(peaks.decibels[index])}

@@ -1,0 +1,29 @@
+# Wall time over MPI ranks, in the report of the run: a small solid on few ranks. More of both are
+# part of target figures.
+
+
+def scaling_arguments(part):
+    """How the scaling is measured, from a part of the configuration."""
+    ranks = ",".join(map(str, part["ranks"]))
+    return options({"modes": part["modes"], "ranks": ranks, "weak": part.get("weak")})
+
+
+# It starts the ranks itself, one thread each.
+rule measure_scaling_of_run:
+    input:
+        model_files,
+    output:
+        f"{RESULTS}/models/{{model}}/scaling.json",
+    log:
+        f"{LOGS}/models/{{model}}/scaling.log",
+    benchmark:
+        f"{BENCHMARKS}/models/{{model}}/scaling.tsv"
+    threads: SOLVER_CORES
+    resources:
+        **limits("measure_scaling"),
+    params:
+        source=source("studies.scaling.command"),
+        model=lambda wildcards: model_arguments(wildcards, config["scaling"]["resolution"]),
+        how=scaling_arguments(config["scaling"]),
+    shell:
+        "python -m solver scaling {params.model:q} {params.how:q} --out {output:q} > {log:q} 2>&1"

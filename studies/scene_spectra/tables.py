@@ -1,0 +1,48 @@
+"""Rows of the table of the scene that is heard by several modes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from carillon.fem.model import RIGID_MODES
+from solver.files.modes_file import ESTIMATE
+from studies.base.entry import Row
+from studies.scene_spectra.results import SceneSpectra
+from studies.scene_spectra.scene import RENDERINGS
+from studies.sounds.spectral_distance import log_spectral_distance
+from workflow.variants import TRUTH
+
+
+def scene_spectra(results: SceneSpectra) -> Iterator[Row]:
+    """One row for every kind of modes: what they cost, and how far their sound is off."""
+    truth = results.pressures[TRUTH]
+    for name, rendering in RENDERINGS.items():
+        files = results.spectra[name]
+        row = {
+            "rendering": name,
+            "title": rendering.title,
+            "about": rendering.about,
+            "unknowns": sum(each.model.n_dofs for each in files),
+            "solve_seconds": sum(
+                sum(value for key, value in each.attributes["timings"].items() if key != ESTIMATE)
+                for each in files
+            ),
+            "impacts": results.told[name]["impacts"],
+        }
+        if name != TRUTH:
+            sound = results.pressures[name]
+            row["distance_decibels"] = log_spectral_distance(sound, truth, results.rate)
+            row["frequency_error"] = _frequency_error(results, name)
+        yield row
+
+
+def _frequency_error(results: SceneSpectra, name: str) -> float:
+    """Rms relative error of the elastic frequencies of all bodies, number by number."""
+    errors = []
+    for found, true in zip(results.spectra[name], results.spectra[TRUTH]):
+        count = min(len(found.frequencies), len(true.frequencies))
+        chosen = slice(RIGID_MODES, count)
+        errors.append(found.frequencies[chosen] / true.frequencies[chosen] - 1.0)
+    return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))

@@ -1,0 +1,108 @@
+"""Pictures of the first elastic mode by every variant, turned and scaled alike (Fig. 8)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from carillon.fem.geometry import HexMesh
+from carillon.fem.geometry.faces import surface_quads
+from carillon.fem.geometry.picture import DRAWN_AMPLITUDE, Skin, draw, guess_up
+from carillon.fem.model import RIGID_MODES
+from solver.files.modes_file import ModesFile, read_modes
+from studies.base.media import cropped, save_pixels, solid_picture
+from workflow.report.results import Run
+from workflow.variants import TRUTH
+
+Array = NDArray[np.float64]
+
+CLUSTER_WIDTH = 0.05
+"""Modes whose frequencies lie this close above the first elastic one count as one space with it."""
+
+
+def draw_first_elastic_modes(
+    results: Run, model: str, paths: Sequence[str]
+) -> dict[str, dict[str, Any]]:
+    """Draw mode 7 of every shown variant to `paths`; return frequency and likeness of each."""
+    truth = read_modes(results.modes_path(model, TRUTH))
+    reference = displacement(truth, RIGID_MODES)
+    skin = results.skin(model, truth.model)
+    view = view_of(truth.mesh, reference, skin)
+    description, pictures = {}, []
+    shown = results.drawn_variants(model)
+    for variant in shown:
+        file = read_modes(results.modes_path(model, variant))
+        motion, likeness = aligned(file, truth, reference, skin)
+        drawn = partial(draw, mesh=file.mesh, displacement=motion, **view)
+        pictures.append(solid_picture(drawn))
+        description[variant] = {
+            "hertz": float(file.frequencies[RIGID_MODES]),
+            "likeness": likeness,
+            "combined": len(cluster(truth.frequencies)),
+        }
+    for variant, path, picture in zip(shown, paths, cropped(pictures), strict=True):
+        save_pixels(picture, path)
+        description[variant] |= {"height": picture.shape[0], "width": picture.shape[1]}
+    return description
+
+
+def displacement(file: ModesFile, index: int) -> Array:
+    """Mode `index` as displacements (n, 3) of the nodes."""
+    assert file.modes is not None
+    return file.modes[:, index].reshape(-1, 3)
+
+
+def cluster(frequencies: Array) -> list[int]:
+    """Indices of the modes that share the first elastic frequency, as in symmetric bodies."""
+    first = frequencies[RIGID_MODES]
+    near = np.abs(frequencies[RIGID_MODES:] / first - 1.0) <= CLUSTER_WIDTH
+    return [RIGID_MODES + int(index) for index in np.flatnonzero(near)]
+
+
+def aligned(
+    file: ModesFile, truth: ModesFile, reference: Array, skin: Skin | None = None
+) -> tuple[Array, float]:
+    """First elastic motion of `file`, signed and turned within its cluster to match the truth's.
+
+    Seen at the nodes, or on the skin that both are drawn as: nodes of cut cells lie outside.
+
+    Returns
+    -------
+    tuple[Array, float]
+        Displacements (n, 3) on the file's own nodes, as long as the truth's there, and their
+        likeness: the cosine between both, 1 for the same shape.
+    """
+    assert file.modes is not None
+    basis = file.modes[:, cluster(truth.frequencies)]
+    if skin is None:
+        # Nodes of a coarsened mesh lie on those of the fine one, or beside them where cells are
+        # void.
+        target = reference[cKDTree(truth.mesh.nodes).query(file.mesh.nodes)[1]].ravel()
+        seen = basis
+    else:
+        target = skin.seen(reference).ravel()
+        seen = skin.seen(basis.reshape(len(reference), -1)).reshape(len(target), -1)
+    factors = np.linalg.lstsq(seen, target, rcond=None)[0]
+    motion = seen @ factors
+    length, target_length = np.linalg.norm(motion), np.linalg.norm(target)
+    likeness = float(motion @ target / (length * target_length)) if length > 0 else 0.0
+    scale = target_length / max(float(length), 1e-300)
+    return (basis @ factors * scale).reshape(-1, 3), likeness
+
+
+def view_of(mesh: HexMesh, motion: Array, skin: Skin | None = None) -> dict[str, Any]:
+    """How all pictures of one mode are drawn, decided by the truth's `mesh` and `motion` (n, 3).
+
+    Arguments of `carillon.fem.geometry.picture.draw`. Colours end at the largest motion that can be
+    seen: inside, a body may move more than its surface does.
+    """
+    seen = motion[np.unique(surface_quads(mesh))] if skin is None else skin.seen(motion)
+    largest = float(np.linalg.norm(seen, axis=1).max())
+    diagonal = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+    scale = DRAWN_AMPLITUDE * diagonal / largest
+    return {"scale": scale, "limits": (0.0, largest), "up": guess_up(mesh), "skin": skin}

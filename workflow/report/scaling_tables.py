@@ -1,0 +1,77 @@
+"""Wall time over MPI ranks, measured and modelled."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from studies.base.conditions import Repeats, measured
+from studies.base.entry import Row
+
+KINDS = ("strong", "weak")
+
+
+def _repeats(results: Any) -> Repeats:
+    runs = {run["repeats"] for each in results.scaling.values() for run in each["strong"]["runs"]}
+    times = " or ".join(map(str, sorted(runs)))
+    return Repeats(f"{times}, after a small one", "fastest and slowest run")
+
+
+MEASURED = measured(
+    lambda results: {name: each["provenance"] for name, each in results.scaling.items()},
+    _repeats,
+)
+
+
+def scaling(results: Any) -> Iterator[Row]:
+    """Wall time over ranks."""
+    for model, kind, part in _parts(results):
+        runs = {run["ranks"]: run for run in part["runs"]}
+        modelled = {row["ranks"]: row for row in part["model"]["rows"]}
+        for ranks in sorted({*runs, *modelled}):
+            run = runs.get(ranks)
+            yield {
+                "model": model,
+                "title": results.titles[model],
+                "kind": kind,
+                **{key: (run or modelled[ranks])[key] for key in ("ranks", "n_dofs", "subdomains")},
+                **({} if run is None else run),
+                "modelled": modelled[ranks]["total"] if ranks in modelled else None,
+                "misfit": _misfit(run, modelled.get(ranks)),
+                "note": _note(run),
+                "peak_memory": max(run["peak_memory_bytes"]) if run else None,
+            }
+
+
+def assumptions(results: Any) -> list[str]:
+    """What the model takes for granted, each once."""
+    stated = (part["model"]["assumptions"] for _, _, part in _parts(results))
+    return list(dict.fromkeys(assumption for each in stated for assumption in each))
+
+
+def fits(results: Any) -> list[str]:
+    """How far the model is from the measurements, a sentence for each solid and scaling."""
+    return [
+        f"{results.titles[model]}, {kind} scaling: {part['model']['fit']}"
+        for model, kind, part in _parts(results)
+    ]
+
+
+def _parts(results: Any) -> Iterator[tuple[str, str, Row]]:
+    for model, result in results.scaling.items():
+        for kind in KINDS:
+            if result[kind] is not None:
+                yield model, kind, result[kind]
+
+
+def _misfit(run: Row | None, modelled: Row | None) -> float | None:
+    """Relative difference of the model from a run that has its cores."""
+    if run is None or modelled is None or run["oversubscribed"]:
+        return None
+    return float(modelled["total"] / run["seconds"] - 1.0)
+
+
+def _note(run: Row | None) -> str:
+    if run is None:
+        return "model alone"
+    return f"oversubscribed: {run['cores']} cores" if run["oversubscribed"] else "measured"

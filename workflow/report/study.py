@@ -1,0 +1,73 @@
+"""The report of a run as a study: what it is made from, and which figures it draws."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from studies.base.study import Config, Figure, Study
+from workflow import settings, solids, variants
+
+
+def _by_variant(
+    config: Config, names: Callable[[Mapping[str, Any]], Iterable[str]], pattern: str
+) -> list[str]:
+    """Files of all models by the variants that `names` tells of each."""
+    return [
+        pattern.format(model=name, variant=variant)
+        for name, model in config["models"].items()
+        for variant in names(model)
+    ]
+
+
+def _measured(config: Config) -> list[str]:
+    models = config["models"]
+    further = [name for name in models if variants.further_of(models[name])]
+    return [
+        "forests/forests.json",
+        "forests/table.json",
+        *(f"dataset/{name}.json" for name in settings.own_shards(config)),
+        *_by_variant(config, variants.variants_of, "models/{model}/{variant}.h5"),
+        *(f"models/{name}/comparisons.json" for name in models),
+        *(f"models/{name}/further_comparisons.json" for name in further),
+        *solids.measured_files(config, "report"),
+    ]
+
+
+def _beside(config: Config) -> list[str]:
+    """Pictures of modes, and what the validations say."""
+    models = config["models"]
+    return [
+        *_by_variant(config, variants.shown_of, "figures/{model}-mode-{variant}.png"),
+        *(f"figures/{model}-mode.json" for model in models),
+        *(f"validation/tables/{model}-criteria.json" for model in models),
+    ]
+
+
+REPORT = Study(
+    name="report",
+    package="workflow.report",
+    folder="",
+    title="This run",
+    results="results:Run",
+    page="page:page",
+    measured=_measured,
+    beside=_beside,
+    figures=(
+        Figure("{model}-spectrum", "plots:spectrum_figure", "tables/frequencies.json", of="models"),
+        Figure(
+            "{model}-convergence",
+            "convergence_plot:convergence_figure",
+            "models/{model}/convergence.json",
+            of="convergence.models",
+        ),
+        Figure(
+            "{model}-scaling",
+            "studies.scaling.figure:scaling_figure",
+            "models/{model}/scaling.json",
+            of="scaling.models",
+        ),
+        Figure("times", "plots:times_figure", "tables/times.json"),
+        Figure("methods", "methods_plot:methods_figure", "tables/methods.json"),
+    ),
+)

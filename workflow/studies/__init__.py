@@ -1,1 +1,0 @@
-"""Studies: results -> tables -> figures -> page, each in a room of its own."""

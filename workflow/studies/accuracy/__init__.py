@@ -1,1 +1,0 @@
-"""The study of discretisations against frequencies that no mesh made."""

@@ -1,1 +1,0 @@
-"""Validations of many solids, materials, seeds and ranks, judged together."""

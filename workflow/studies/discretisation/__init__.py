@@ -1,1 +1,0 @@
-"""The study of voxels, coarse elements and finite cells by material."""

@@ -1,1 +1,0 @@
-"""The paper's Fig. 10 and 11 and the scaling over ranks, in full and on a page of their own."""

@@ -1,1 +1,0 @@
-"""The study that chooses the fit objective by the spectra it leads to."""

@@ -1,1 +1,0 @@
-"""One scene, heard by the truth's modes and by coarse ones, and its page (the paper's Fig. 13)."""

@@ -1,1 +1,0 @@
-"""Scenes of designs and bars that fall, roll and strike each other, and their page."""

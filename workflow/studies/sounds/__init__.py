@@ -1,1 +1,0 @@
-"""Examples of sound design, each with a page: `snakemake sounds`."""

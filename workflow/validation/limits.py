@@ -1,0 +1,137 @@
+"""Limits of the criteria: what the tolerance that the run asked for allows, unless others are set.
+
+The derivations are in docs/explanation/trust.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.fem.model import RIGID_MODES
+from solver.response.allowed_motion import motion_limit
+from solver.response.response import Damping
+from solver.verification.allowance import (
+    ACCEPTED,
+    accepted_errors,
+    angle_limits,
+    orthogonality_limit,
+    residual_limits,
+)
+from workflow.validation.evidence import SOLVED, Evidence
+from workflow.variants import TRUTH
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Worst:
+    """The worst value of a criterion beside its limit.
+
+    Attributes
+    ----------
+    value, limit
+        Worst, and required; None if nothing was found.
+    allowed
+        What the tolerance of the run allows; None if nothing follows from it.
+    where
+        The modes that have it.
+    """
+
+    value: float | None
+    limit: float
+    allowed: float | None = None
+    where: str = ""
+
+
+def residual(evidence: Evidence, variant: str) -> Worst:
+    """Worst residual in energy of the elastic modes."""
+    values = evidence.shown[variant].eigenvalues
+    allowed = residual_limits(values, _errors(evidence, variant))[RIGID_MODES:]
+    values = np.array(evidence.audit["spectra"][variant]["energy_residuals"])[RIGID_MODES:]
+    key = "truth_residual" if variant == TRUTH else "residual"
+    worst, found = _worst(values, allowed, evidence.tolerances[key])
+    return Worst(*found, f"mode {RIGID_MODES + 1 + worst}")
+
+
+def orthogonality(evidence: Evidence, variant: str) -> Worst:
+    """Largest entry of |X^T M X - I|, as the solver itself demands it."""
+    audit = evidence.audit["spectra"][variant]
+    allowed = orthogonality_limit(audit["unknowns"])
+    limit = evidence.tolerances["orthogonality"]
+    return Worst(audit["orthogonality"], allowed if limit is None else limit, allowed)
+
+
+def eigenvalue_error(evidence: Evidence) -> Worst:
+    """Worst relative error of an eigenvalue of the solver."""
+    exact, values = (evidence.shown[name].eigenvalues for name in (TRUTH, SOLVED))
+    elastic = slice(RIGID_MODES, min(len(exact), len(values)))
+    errors = np.abs(values[elastic] / exact[elastic] - 1.0)
+    rounding = np.array(evidence.audit["spectra"][TRUTH]["rounding"])
+    tolerance = ACCEPTED * evidence.config["solver"]["tolerance"]
+    allowed = accepted_errors(exact, rounding, tolerance)[elastic] / exact[elastic]
+    worst, found = _worst(errors, allowed, evidence.tolerances["eigenvalue_error"])
+    return Worst(*found, f"mode {RIGID_MODES + 1 + worst}")
+
+
+def subspace_angle(evidence: Evidence) -> Worst:
+    """Worst angle between a cluster of the truth and the same modes of the solver."""
+    clusters = evidence.compared[SOLVED]["clusters"]
+    limit = evidence.tolerances["subspace_angle"]
+    if not clusters:
+        return Worst(None, 0.0 if limit is None else limit)
+    groups = [(cluster["first"], cluster["last"]) for cluster in clusters]
+    worst, found = _worst(
+        np.array([cluster["angle"] for cluster in clusters]),
+        angles_allowed(evidence, groups),
+        limit,
+    )
+    first, last = groups[worst]
+    return Worst(*found, f"mode {first}" if first == last else f"modes {first}–{last}")
+
+
+def angles_allowed(evidence: Evidence, groups: list[tuple[int, int]]) -> Array:
+    """Angles (g,) [rad] of clusters that the tolerance of the run allows."""
+    errors = _errors(evidence, SOLVED)
+    return angle_limits(evidence.shown[TRUTH].eigenvalues, errors, groups)
+
+
+def response(evidence: Evidence) -> Worst:
+    """Difference of the motion after a strike by the solver's modes from that by the truth's."""
+    struck, truth = evidence.response, evidence.shown[TRUTH]
+    damping = Damping(struck.attributes["mass_damping"], struck.attributes["stiffness_damping"])
+    last = RIGID_MODES + len(struck.seen.eigenvalues)
+    errors = _errors(evidence, SOLVED)[RIGID_MODES:last]
+    unknowns = truth.model.n_dofs
+    allowed = motion_limit(struck.seen, errors, damping, struck.seconds, unknowns)
+    limit = evidence.tolerances["response"]
+    found = struck.responses[SOLVED].difference
+    return Worst(found, allowed if limit is None else limit, allowed)
+
+
+def _errors(evidence: Evidence, variant: str) -> Array:
+    """Errors that the eigenvalues of a variant may have for all that its other criteria ask.
+
+    Those of the solver's that err more than its tolerance may do so up to what is accepted.
+    """
+    values = evidence.shown[variant].eigenvalues
+    rounding = np.array(evidence.audit["spectra"][variant]["rounding"])
+    errors = accepted_errors(values, rounding, evidence.config["solver"]["tolerance"])
+    if variant == SOLVED:
+        exact = evidence.shown[TRUTH].eigenvalues
+        elastic = slice(RIGID_MODES, min(len(exact), len(values)))
+        found = np.abs(values[elastic] - exact[elastic])
+        errors[elastic] = np.clip(found, errors[elastic], ACCEPTED * errors[elastic])
+    return errors
+
+
+def _worst(
+    values: Array, allowed: Array, limit: float | None
+) -> tuple[int, tuple[float, float, float]]:
+    """Number of the largest share of a limit; the value, its limit, and what is allowed."""
+    limits = allowed if limit is None else np.full(len(values), limit)
+    share = np.where(np.isnan(values), np.inf, values / limits)
+    worst = int(np.argmax(share))
+    return worst, (float(values[worst]), float(limits[worst]), float(allowed[worst]))
