@@ -19,7 +19,7 @@ PYTEST_PROCESSES ?= 4
 # change: what every change needs; part: that and a part of the rest (tests/tiers.py); all: everything.
 TIER ?= change
 PACKAGES = $(patsubst %/__init__.py,%,$(wildcard */__init__.py))
-RULES = $(wildcard Snakefile workflow/rules/*.smk)
+RULES = $(wildcard Snakefile workflow/rules/*.smk studies/*/*.smk)
 
 # Rules and tests call the tools of the environment by name.
 export PATH := $(abspath $(VENV))/bin:$(PATH)

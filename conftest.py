@@ -26,7 +26,7 @@ from tests.patience import HANG_SECONDS
 from tests.workflow_runs import planned
 from tests.zygote import Job, Limits, Zygote
 
-CHECKOUT = Path(__file__).resolve().parent.parent
+CHECKOUT = Path(__file__).resolve().parent
 MESH_FILES = ("stanford-bunny.obj", "teapot.obj")
 
 RANKS = {
@@ -93,7 +93,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     def spared(item: pytest.Item) -> bool:
         mark = item.get_closest_marker("nightly")
         return mark is not None and tiers.is_spared(
-            item.path.name, config.stash[DUE], mark.kwargs.get("unless", ()), config.stash[CHANGED]
+            tiers.name_of(item.path),
+            config.stash[DUE],
+            mark.kwargs.get("unless", ()),
+            config.stash[CHANGED],
         )
 
     if config.getoption("--tier") != "all":

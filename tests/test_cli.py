@@ -216,7 +216,8 @@ def test_files_do_not_take_the_place_of_closed_streams(tmp_path):
 
 
 def test_complaints_that_nobody_takes_change_no_status(tmp_path):
-    command = '"$0" -c "from carillon import cli; from carillon.errors import UserError\n'
+    command = '"$0" -c "from carillon.command_line import exit_status\n'
+    command += "from carillon.errors import UserError\n"
     command += (
         'def main(): raise UserError(1)\nraise SystemExit(exit_status.run(1, main))" 2> /dev/full'
     )

@@ -11,7 +11,7 @@ import command_help
 import pytest
 
 from carillon import ROOMS
-from carillon.__main__ import commands
+from carillon.__main__ import STUDY, commands, studies
 from tests.documentation import CHECKOUT, DOCS, PAGES, PROSE, RUN, blocks, page_before, prose
 
 EACH = pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(CHECKOUT)))
@@ -109,9 +109,10 @@ def test_every_command_has_its_help_on_a_page():
     )
     rooms = re.findall(r"^<!-- made here: commands (\w+) -->$", text, re.MULTILINE)
     headings = re.findall(
-        r"^## `carillon (\S+)`$", "\n".join(map(command_help.of_room, rooms)), re.M
+        r"^## `carillon ([^`]+)`$", "\n".join(map(command_help.of_room, rooms)), re.M
     )
-    assert sorted(headings) == sorted(commands())
+    every = {*commands(), *(f"{STUDY} {name}" for name in studies())} - {STUDY}
+    assert sorted(headings) == sorted(every)
 
 
 def inline(page: Path) -> list[str]:
@@ -119,7 +120,7 @@ def inline(page: Path) -> list[str]:
     return re.findall(r"`([^`\n]+)`", prose(page))
 
 
-OTHERS = {"--mpi", "--unlock", "--oversubscribe", "--report", "--tier", "--durations", "--measured"}
+OTHERS = {"--mpi", "--unlock", "--oversubscribe", "--tier", "--durations", "--measured"}
 """Options of other programs that pages name."""
 
 
@@ -134,7 +135,7 @@ def test_options_that_pages_name_exist():
 
 
 def test_commands_that_pages_name_exist():
-    known = set(commands())
+    known = {*commands(), *studies()}
     for page in PAGES:
         for code in inline(page):
             for name in re.findall(r"(?:^|/)carillon ([a-z][a-z-]*)", code):
@@ -142,7 +143,7 @@ def test_commands_that_pages_name_exist():
 
 
 def test_targets_that_pages_name_exist():
-    rules = (CHECKOUT / "workflow" / "rules").glob("*.smk")
+    rules = [*CHECKOUT.glob("workflow/rules/*.smk"), *CHECKOUT.glob("studies/*/*.smk")]
     known = {name for file in rules for name in re.findall(r"^rule (\w+):", file.read_text(), re.M)}
     for page in PAGES:
         for code in inline(page):

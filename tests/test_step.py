@@ -75,7 +75,7 @@ def test_what_a_lone_process_starts_looks_for_networks():
     look = "import os; print(os.environ.get('OMPI_MCA_pml'))"
     lone = (
         "import os, subprocess, sys\n"
-        "from carillon import step\n"
+        "from carillon.processes import mpi_environment\n"
         "with mpi_environment.without_networks(os.environ):\n"
         "    from mpi4py import MPI\n"
         "print(MPI.COMM_SELF.sendrecv('itself', 0), flush=True)\n"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import re
 import subprocess
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -14,12 +12,12 @@ import yaml
 from markupsafe import escape
 
 from solver.files.modes_file import FINE_TAKEN, read_modes
-from studies.base.catalogue import REPORT
 from studies.base.conditions import LABELS
 from studies.base.numbers import MISSING
 from studies.base.table import read_table
 from tests.pages import Page, assert_same_numbers, assert_self_contained
 from tests.workflow_runs import PROFILE, TINY, planned, snakemake
+from workflow.report.study import REPORT
 from workflow.settings import config_hash
 from workflow.variants import candidates_of, shown_of, variants_of
 
@@ -80,26 +78,6 @@ def test_a_second_run_does_nothing_but_compare_with_the_baseline(finished):
     assert (finished / NAME / "comparison" / "comparison.html").is_file()
 
 
-def test_snakemakes_own_report_holds_the_results_and_needs_nothing_from_elsewhere(finished):
-    done = run_tiny(finished, "--report", "report.html")
-    assert done.returncode == 0, done.stdout + done.stderr
-    source = (finished / "report.html").read_text(encoding="utf-8")
-    assert not re.search(r"""<\w[^<>]*\s(src|href)\s*=\s*["']?https?:""", source)
-    categories = value_of("categories", source)
-    assert set(categories) == {"Report", "Validation", "Figures", "Tables"}
-    assert set(categories["Figures"]) == {*MODELS, "all models"}
-    results = value_of("results", source)
-    assert {f"{NAME}/tables/{name}.csv" for name in REPORT.entries} <= set(results)
-    assert all(result["caption"] and result["labels"] for result in results.values())
-
-
-def value_of(name: str, source: str) -> dict[str, Any]:
-    """What the script of that name sets its variable to."""
-    assignment = re.search(rf'<script id="{name}">\s*var {name} = ', source)
-    value: dict[str, Any] = json.JSONDecoder().raw_decode(source, assignment.end())[0]
-    return value
-
-
 def test_resolved_configuration_lies_beside_the_results(results):
     config = yaml.safe_load((results / "config.yaml").read_text())
     assert list(config["models"]) == MODELS
@@ -114,7 +92,7 @@ def test_nothing_unfinished_is_left(results):
 
 def test_names_are_neither_run_nor_taken_for_markup(finished, results):
     made = {path.name for path in finished.iterdir()}
-    assert made - {"report.html"} == {".snakemake", "names.yaml", NAME}
+    assert made == {".snakemake", "names.yaml", NAME}
     pages = list(results.rglob("*.html"))
     assert len(pages) >= 1 + len(MODELS)
     for path in pages:

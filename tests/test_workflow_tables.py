@@ -10,11 +10,11 @@ import pytest
 
 from carillon.processes.cores import memory_bytes
 from carillon.records.measurement import measured
-from studies.base.catalogue import REPORT
 from studies.base.conditions import LABELS, ONE_COLD_RUN, Conditions, conditions
 from studies.base.numbers import MISSING
 from studies.base.table import Column, Table, read_csv_table, read_table, write_table
 from workflow import settings
+from workflow.report.study import REPORT
 
 CONFIG = {
     "title": "A run",

@@ -23,7 +23,6 @@ from carillon.command_line import exit_status
 from solver.response.response_file import StrikeOptions, read_response, respond, write_response
 from solver.verification.audit import audit_files
 from solver.verification.comparison import compare_each
-from studies.base.catalogue import VALIDATION
 from studies.base.table import read_table
 from tests.edited_files import edited
 from tests.pages import Page, assert_self_contained
@@ -33,6 +32,7 @@ from workflow.validation.criteria import Criterion
 from workflow.validation.distance import distance_in_words
 from workflow.validation.evidence import COARSENED, Evidence
 from workflow.validation.page import page as rendered
+from workflow.validation.study import VALIDATION
 from workflow.variants import SHOWN
 
 SIDES = (80.0, 40.0, 20.0)

@@ -62,7 +62,7 @@ class Part:
 
     @property
     def files(self) -> frozenset[str]:
-        """All of them, as names in `tests/`."""
+        """All of them, see `name_of`."""
         return frozenset((*self.related, *self.in_turn))
 
     def __str__(self) -> str:
@@ -72,9 +72,23 @@ class Part:
 
 def measured() -> dict[str, float]:
     """Seconds of nightly tests by file, those too that are in no table yet."""
-    marked = [path for path in sorted((CHECKOUT / TESTS).glob("test_*.py")) if _is_nightly(path)]
+    marked = [name_of(path) for path in files_of_tests() if _is_nightly(path)]
     found: dict[str, float] = json.loads(MEASURED.read_text())
-    return {**{path.name: UNKNOWN_SECONDS for path in marked}, **found}
+    return {**dict.fromkeys(marked, UNKNOWN_SECONDS), **found}
+
+
+def files_of_tests() -> list[Path]:
+    """Those in `tests/` and those of the studies."""
+    return sorted([*CHECKOUT.glob(f"{TESTS}/test_*.py"), *CHECKOUT.glob("studies/*/test_*.py")])
+
+
+def name_of(path: Path) -> str:
+    """Name of a file of tests: in `tests/` its own, elsewhere its path."""
+    return path.name if path.parent.name == TESTS else path.relative_to(CHECKOUT).as_posix()
+
+
+def _path_of(name: str) -> str:
+    return name if "/" in name else f"{TESTS}/{name}"
 
 
 def _is_nightly(path: Path) -> bool:
@@ -131,7 +145,7 @@ def is_spared(
     """
     if name in files:
         return False
-    return not unless or not touched([*unless, f"{TESTS}/{name}"], changed)
+    return not unless or not touched([*unless, _path_of(name)], changed)
 
 
 # What has changed ---------------------------------------------------------------------------------
@@ -175,15 +189,14 @@ def nearest(changed: Iterable[str]) -> list[str]:
     """Files of tests that try what has changed: themselves, then by imports, then by rooms."""
     changed = set(changed)
     found: dict[str, int] = {}
-    for path in sorted((CHECKOUT / TESTS).glob("test_*.py")):
-        name = f"{TESTS}/{path.name}"
-        for distance, modules in enumerate(_imported(name)):
+    for name in map(name_of, files_of_tests()):
+        for distance, modules in enumerate(_imported(_path_of(name))):
             if changed & modules:
-                found[path.name] = distance
+                found[name] = distance
                 break
         else:
-            if _of_rooms(path.name, changed):
-                found[path.name] = NEAR + 1
+            if _of_rooms(name, changed):
+                found[name] = NEAR + 1
     if _of_rooms(CLEAN_ROOT, changed):
         found[CLEAN_ROOT] = NEAR + 1
     return sorted(found, key=lambda name: (found[name], name))
@@ -205,6 +218,8 @@ def touched(places: Iterable[str], changed: Iterable[str]) -> bool:
 def _of_rooms(name: str, changed: Iterable[str]) -> bool:
     """Whether tests of this name are those of a folder in which something has changed."""
     changed = list(changed)
+    if name.startswith("studies/"):
+        return touched([name.rpartition("/")[0]], changed)
     return any(
         name.startswith(begin)
         for room, begins in ROOMS.items()
@@ -254,9 +269,10 @@ def seconds_by_file(durations: Iterable[str]) -> dict[str, float]:
     """Sum of the lines that `pytest --durations=0 -vv` prints, by file."""
     found: dict[str, float] = {}
     for line in durations:
-        match = re.match(r"([\d.]+)s (?:setup|call|teardown) +tests/(test_\w+\.py)::", line)
+        match = re.match(r"([\d.]+)s (?:setup|call|teardown) +([\w/]*test_\w+\.py)::", line)
         if match:
-            found[match[2]] = found.get(match[2], 0.0) + float(match[1])
+            name = match[2].removeprefix(f"{TESTS}/")
+            found[name] = found.get(name, 0.0) + float(match[1])
     return found
 
 

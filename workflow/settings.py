@@ -10,8 +10,8 @@ from typing import Any
 from jsonschema.exceptions import ValidationError
 from snakemake.utils import update_config, validate
 
+from carillon.builtin_names import BUILTIN_NAMES, BUILTIN_PREFIX
 from carillon.errors import UserError
-from carillon.fem.geometry.builtin_names import BUILTIN_NAMES, BUILTIN_PREFIX
 from carillon.fem.materials import NAMES as MATERIALS
 from carillon.files.yaml_input import read_own_yaml, read_yaml
 from carillon.records import provenance

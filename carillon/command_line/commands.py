@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from types import MappingProxyType
+from typing import Any
 
 from carillon import __version__
 from carillon.command_line import exit_status
@@ -122,12 +123,13 @@ def _parser(
     parts = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for each, command in {**commands, **unlisted}.items():
         module = import_module(command.module) if words and words[0] == each else None
+        listed: dict[str, Any] = {"help": command.summary} if each in commands else {}
         part = parts.add_parser(
             each,
+            **listed,
             description=None if module is None else module.__doc__,
             epilog=getattr(module, "EXAMPLES", None),
             formatter_class=argparse.RawDescriptionHelpFormatter,
-            **({"help": command.summary} if each in commands else {}),
         )
         if module is not None:
             module.add_arguments(part)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from importlib import import_module
 
 from carillon import ROOMS
-from carillon.__main__ import LONGER, commands
+from carillon.__main__ import LONGER, STUDY, commands, studies
 from carillon.command_line.arguments import Parser
 from carillon.command_line.commands import Command
 
@@ -23,13 +23,19 @@ def of_room(room: str) -> str:
 
 def _listed(room: str) -> Iterator[tuple[str, str | None, Command]]:
     """Commands of a room: name, name in the room, and what it is."""
+    if room == "studies":
+        yield from (
+            (f"{STUDY} {name}", each.in_room or name, each) for name, each in studies().items()
+        )
+        return
     everything = commands()
+    del everything[STUDY]
     if room in ROOMS[1:]:
         for own in import_module(f"{room}.commands").COMMANDS:
             name = LONGER.get(room, {}).get(own, own)
             yield name, own, everything.pop(name)
         return
-    in_rooms = {name for each in ROOMS[1:] for name, _, _ in _listed(each)}
+    in_rooms = {name for each in ROOMS[1:-1] for name, _, _ in _listed(each)}
     yield from ((name, None, everything[name]) for name in everything if name not in in_rooms)
 
 
@@ -54,7 +60,8 @@ def help_of(name: str, command: Command) -> str:
 
 
 def _section(room: str, name: str, own: str | None, command: Command) -> str:
-    also = f" Also `python -m {room} {own}`." if own is not None else ""
+    room = command.room if room == "studies" else room
+    also = f" Also `python -m {room} {own}`." if own is not None and room else ""
     ranks = " It may be started on several MPI ranks." if command.ranks else ""
     summary = command.summary[0].upper() + command.summary[1:]
     return (

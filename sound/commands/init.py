@@ -82,7 +82,7 @@ def _file_of(path: str) -> str:
 
 def _values(options: InitOptions, folder: Path) -> dict[str, Any]:
     """Keys and values that are not left to their defaults."""
-    from carillon.fem.geometry.builtin_names import BUILTIN_PREFIX
+    from carillon.builtin_names import BUILTIN_PREFIX
 
     builtin = options.mesh.startswith(BUILTIN_PREFIX)
     mesh = options.mesh if builtin else _seen_from(folder, options.mesh)

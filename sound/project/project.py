@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
-from carillon.fem.geometry.builtin_names import BUILTIN_PREFIX
 from carillon.files.yaml_input import read_yaml
 from solver.analysis.problem import ProblemOptions
 from sound.project.schema import check, project_schema, with_defaults

@@ -9,8 +9,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
-from carillon.fem.geometry.builtin_names import BUILTIN_PREFIX
 from carillon.files.yaml_input import read_own_yaml, read_yaml
 from sound.project.schema import check, with_defaults
 from sound.scenes.materials import NamedMaterial, named_material

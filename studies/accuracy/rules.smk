@@ -4,17 +4,6 @@ from studies.accuracy import study as accuracy_study
 from importlib.util import find_spec
 
 
-def accuracy_arguments():
-    """What is measured, and how often."""
-    part = config["accuracy"]
-    how = {
-        "solids": ",".join(part["solids"]),
-        "levels": part["levels"],
-        "runs": part["runs"],
-    }
-    return options(how)
-
-
 rule accuracy:
     input:
         f"{place(accuracy_study.ACCURACY)}/report.html",
@@ -33,7 +22,7 @@ rule measure_accuracy:
         **limits("measure_accuracy"),
     params:
         source=source("studies.accuracy.command"),
-        how=accuracy_arguments(),
+        how=accuracy_study.arguments(config),
         others=[name for name in ("gmsh", "skfem") if find_spec(name)],
     shell:
         "python -m solver accuracy {params.how:q} --out {output:q} > {log:q} 2>&1"

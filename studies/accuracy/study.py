@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from studies.base.study import Figure, Study
+from studies.base.study import Config, Figure, Study
+from workflow.arguments import options
 
 ACCURACY = Study(
     name="accuracy",
@@ -17,3 +18,14 @@ ACCURACY = Study(
         Figure("seconds", "plots:seconds_figure", "accuracy.json"),
     ),
 )
+
+
+def arguments(config: Config) -> list[str]:
+    """What is measured, and how often."""
+    part = config["accuracy"]
+    how = {
+        "solids": ",".join(part["solids"]),
+        "levels": part["levels"],
+        "runs": part["runs"],
+    }
+    return options(how)

@@ -11,8 +11,8 @@ from studies.accuracy.measure import AccuracyOptions, summarised
 from studies.accuracy.page import FIGURES, page
 from studies.accuracy.results import AccuracyStudy
 from studies.accuracy.solids import SOLIDS
+from studies.accuracy.study import ACCURACY
 from studies.accuracy.tables import LABELS
-from studies.base.catalogue import ACCURACY
 from studies.base.study import named
 from studies.base.style import save
 from studies.base.table import write_table
@@ -68,7 +68,7 @@ def study(request, tmp_path) -> AccuracyStudy:
 def test_the_page_holds_tables_and_figures(study):
     tables = {name: make(study) for name, make in ACCURACY.entries.items()}
     for figure in ACCURACY.figures:
-        drawn = named(figure.draw)(study)
+        drawn = named("studies.accuracy", figure.draw)(study)
         save(drawn, [_made(study.figure(f"{figure.file}.svg"))])
     for table in tables.values():
         write_table(table, _made(study.folder / "tables" / table.name).parent)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-from studies.base.catalogue import FORESTS, REPORT
+from studies.forests.study import FORESTS
 from workflow.report.blocks_tables import LOWER_BOUND
+from workflow.report.study import REPORT
 
 
 def rated(method: str, high: float = 10.0, **changes) -> dict:

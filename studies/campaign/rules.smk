@@ -1,5 +1,6 @@
 # Validations of solids x materials x seeds x ranks: `snakemake campaign`, no part of the default run.
 from studies.campaign import study as campaign_study
+from studies.campaign.cells import Cell, validation_arguments
 
 CAMPAIGN = place(campaign_study.CAMPAIGN)
 

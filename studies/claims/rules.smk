@@ -26,7 +26,7 @@ rule build_claims:
         validation=expand(f"{VALIDATION}/tables/{{model}}-criteria.json", model=MODELS),
         others=[file for file in READ_IF_THERE if Path(file).is_file()],
         texts=[
-            settings.FOLDER / "studies/claims" / name
+            studies.FOLDER / "claims" / name
             for name in ("claims.yaml", "paper.yaml", "measured.json", "tables.yaml")
         ],
         templates=templates(claims_study.CLAIMS),

@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 import yaml
 
-from studies.base.catalogue import CLAIMS
 from studies.base.table import Column, Table, read_csv_table, write_table
 from studies.claims.findings import IN_PART, LESS, NOT, REPRODUCED, UNMEASURED, Finding
 from studies.claims.measures import MEASURES
 from studies.claims.page import page
 from studies.claims.results import REFERENCE, Claims
+from studies.claims.study import CLAIMS
 from studies.claims.tables import TEXTS
 from tests.workflow_runs import CHECKOUT
 

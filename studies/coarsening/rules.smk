@@ -2,17 +2,6 @@
 from studies.coarsening import study as coarsening_study
 
 
-def coarsening_arguments():
-    """How every case is coarsened and refined."""
-    part = config["coarsening"]
-    how = {
-        "forest": part["forest"] and path_word(part["forest"]),
-        "modes": part["modes"],
-        "refine_to": part["refine_to"],
-    }
-    return options(how)
-
-
 rule coarsening:
     input:
         f"{place(coarsening_study.COARSENING)}/report.html",
@@ -34,7 +23,7 @@ rule rate_coarsening:
     params:
         source=source("studies.coarsening.command"),
         case=case_arguments("coarsening"),
-        how=coarsening_arguments(),
+        how=coarsening_study.arguments(config),
     shell:
         "python -m solver coarsening {params.case:q} {params.how:q}"
         " --out {output.case:q} --pictures {output.pictures:q} > {log:q} 2>&1"

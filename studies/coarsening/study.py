@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from studies.base.cases import case_files
-from studies.base.study import Figure, Study
+from studies.base.study import Config, Figure, Study
+from workflow.arguments import options, path_word
 
 COARSENING = Study(
     name="coarsening",
@@ -19,3 +20,14 @@ COARSENING = Study(
         Figure("errors", "plots:errors_figure", "tables/cases.json"),
     ),
 )
+
+
+def arguments(config: Config) -> list[str]:
+    """How every case is coarsened and refined."""
+    part = config["coarsening"]
+    how = {
+        "forest": part["forest"] and path_word(part["forest"]),
+        "modes": part["modes"],
+        "refine_to": part["refine_to"],
+    }
+    return options(how)

@@ -9,19 +9,18 @@ import pytest
 import yaml
 
 from carillon.fem.geometry.picture import looks_at
-from studies.base import catalogue
 from studies.base.cases import Case, cases_of
 from studies.base.table import read_table
 from studies.coarsening.pictures import best_view
 from studies.coarsening.results import CoarseningStudy
+from studies.coarsening.study import COARSENING
 from studies.coarsening.tables import filled_cells, rank_correlation, speeds
 from tests import solids
 from tests.pages import Page, assert_same_numbers, assert_self_contained
 from tests.workflow_runs import CHECKOUT, PROFILE, TINY, snakemake
 
 summary, cases, modes, elements, costs = (
-    catalogue.COARSENING.entries[name]
-    for name in ("summary", "cases", "modes", "elements", "costs")
+    COARSENING.entries[name] for name in ("summary", "cases", "modes", "elements", "costs")
 )
 STUDY = {
     "models": {

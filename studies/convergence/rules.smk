@@ -1,11 +1,5 @@
 # How fast the error correction converges on the models of a run.
-
-
-def convergence_arguments(wildcards, input):
-    """How the convergence of a model is followed; of no more modes than it has."""
-    part = config["convergence"]
-    modes = min(part["modes"], model_modes(wildcards))
-    return options({"modes": modes, "steps": part["steps"], "truth": input.truth})
+from studies.convergence import arguments as convergence
 
 
 rule follow_convergence:
@@ -24,7 +18,9 @@ rule follow_convergence:
     params:
         source=source("studies.convergence.command"),
         model=model_arguments,
-        how=convergence_arguments,
+        how=lambda wildcards, input: convergence.arguments(
+            config["convergence"], model_modes(wildcards), input.truth
+        ),
     shell:
         "python -m solver convergence {params.model:q} {params.how:q}"
         " --out {output:q} > {log:q} 2>&1"

@@ -2,17 +2,6 @@
 from studies.discretisation import study as discretisation_study
 
 
-def discretisation_arguments():
-    """What is compared in every case, and how often it is timed."""
-    part = config["discretisation"]
-    how = {
-        "forest": part["forest"] and path_word(part["forest"]),
-        "modes": part["modes"],
-        "runs": part["runs"],
-    }
-    return options(how)
-
-
 rule discretisation:
     input:
         f"{place(discretisation_study.DISCRETISATION)}/report.html",
@@ -34,7 +23,7 @@ rule rate_discretisation:
     params:
         source=source("studies.discretisation.command"),
         case=case_arguments("discretisation"),
-        how=discretisation_arguments(),
+        how=discretisation_study.arguments(config),
     shell:
         "python -m solver discretisation {params.case:q} {params.how:q}"
         " --out {output:q} > {log:q} 2>&1"

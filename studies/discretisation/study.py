@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from studies.base.cases import case_files
-from studies.base.study import Figure, Study
+from studies.base.study import Config, Figure, Study
+from workflow.arguments import options, path_word
 
 DISCRETISATION = Study(
     name="discretisation",
@@ -18,3 +19,14 @@ DISCRETISATION = Study(
         Figure("seconds", "plots:seconds_figure", "tables/cases.json"),
     ),
 )
+
+
+def arguments(config: Config) -> list[str]:
+    """What is compared in every case, and how often it is timed."""
+    part = config["discretisation"]
+    how = {
+        "forest": part["forest"] and path_word(part["forest"]),
+        "modes": part["modes"],
+        "runs": part["runs"],
+    }
+    return options(how)

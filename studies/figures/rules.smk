@@ -7,19 +7,6 @@ wildcard_constraints:
     shape="|".join(config["figures"]["models"]),
 
 
-def shape_mesh(wildcards):
-    """Mesh file of a solid of the figures; none for a built-in object."""
-    return solids.mesh_files(config, "figures", wildcards.shape)
-
-
-def shape_arguments(wildcards):
-    """What the solid of a figure is: mesh, resolution, material."""
-    model = config["figures"]["models"][wildcards.shape]
-    how = {key: model[key] for key in ("resolution", "material", "components")}
-    mesh = settings.mesh_of(config, wildcards.shape, "figures")
-    return [mesh, *options(how | {"poisson": config["poisson"]})]
-
-
 rule figures:
     input:
         f"{place(figures_study.FIGURES)}/report.html",
@@ -29,7 +16,7 @@ rule figures:
 # package.
 use rule time_methods as time_methods_in_full with:
     input:
-        model=shape_mesh,
+        model=lambda wildcards: solids.mesh_files(config, "figures", wildcards.shape),
         forests=settings.forest_files(),
     output:
         f"{place(figures_study.FIGURES)}/models/{{shape}}/methods.json",
@@ -39,14 +26,14 @@ use rule time_methods as time_methods_in_full with:
         f"{BENCHMARKS}/{figures_study.FIGURES.folder}/{{shape}}/methods.tsv"
     params:
         source=source("studies.benchmark.command"),
-        model=shape_arguments,
-        how=times_arguments(config["figures"]),
+        model=lambda wildcards: figures_study.arguments(config, wildcards.shape),
+        how=timing.arguments(config["figures"]),
         forest=forest_argument,
 
 
 use rule follow_convergence as follow_convergence_in_full with:
     input:
-        shape_mesh,
+        lambda wildcards: solids.mesh_files(config, "figures", wildcards.shape),
     output:
         f"{place(figures_study.FIGURES)}/models/{{shape}}/convergence.json",
     log:
@@ -57,13 +44,13 @@ use rule follow_convergence as follow_convergence_in_full with:
         **limits("follow_convergence_in_full"),
     params:
         source=source("studies.convergence.command"),
-        model=shape_arguments,
+        model=lambda wildcards: figures_study.arguments(config, wildcards.shape),
         how=options({key: config["figures"][key] for key in ("modes", "steps")}),
 
 
 use rule measure_scaling_of_run as measure_scaling with:
     input:
-        shape_mesh,
+        lambda wildcards: solids.mesh_files(config, "figures", wildcards.shape),
     output:
         f"{place(figures_study.FIGURES)}/models/{{shape}}/scaling.json",
     log:
@@ -72,5 +59,5 @@ use rule measure_scaling_of_run as measure_scaling with:
         f"{BENCHMARKS}/{figures_study.FIGURES.folder}/{{shape}}/scaling.tsv"
     params:
         source=source("studies.scaling.command"),
-        model=shape_arguments,
-        how=scaling_arguments(config["figures"]),
+        model=lambda wildcards: figures_study.arguments(config, wildcards.shape),
+        how=scaling.arguments(config["figures"]),

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from studies.base.study import Figure, Study
-from workflow import solids
+from studies.base.study import Config, Figure, Study
+from workflow import settings, solids
+from workflow.arguments import options
 
 FIGURES = Study(
     name="figures",
@@ -29,3 +30,11 @@ FIGURES = Study(
         ),
     ),
 )
+
+
+def arguments(config: Config, shape: str) -> list[str]:
+    """What the solid of a figure is: mesh, resolution, material."""
+    model = config["figures"]["models"][shape]
+    how = {key: model[key] for key in ("resolution", "material", "components")}
+    mesh = settings.mesh_of(config, shape, "figures")
+    return [mesh, *options(how | {"poisson": config["poisson"]})]

@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import pytest
 import yaml
 
-from studies.base.catalogue import FIGURES
 from studies.base.table import read_table
 from studies.benchmark.methods import Methods, named
 from studies.benchmark.rivals import SlepcConfiguration
+from studies.figures.study import FIGURES
 from studies.scaling.model import MISFIT_LIMIT
 from tests.pages import Page, assert_same_numbers, assert_self_contained
 from tests.workflow_runs import CHECKOUT, PROFILE, TINY, snakemake

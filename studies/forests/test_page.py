@@ -9,8 +9,8 @@ import yaml
 
 from carillon.errors import UserError
 from forests import default as default_forests
-from studies.base.catalogue import FORESTS
 from studies.base.table import read_table
+from studies.forests.study import FORESTS
 from tests.pages import Page, assert_same_numbers, assert_self_contained
 from tests.workflow_runs import CHECKOUT, PROFILE, TINY, snakemake
 from workflow import settings

@@ -2,17 +2,6 @@
 from studies.objectives import study as objectives_study
 
 
-def objectives_arguments():
-    """What is compared in every case."""
-    part = config["objectives"]
-    how = {
-        "forest": part["forest"] and path_word(part["forest"]),
-        "modes": part["modes"],
-        "objectives": ",".join(settings.studied_objectives(config)),
-    }
-    return options(how)
-
-
 rule objectives:
     input:
         f"{place(objectives_study.OBJECTIVES)}/report.html",
@@ -33,6 +22,6 @@ rule rate_objectives:
     params:
         source=source("studies.objectives.command"),
         case=case_arguments("objectives"),
-        how=objectives_arguments(),
+        how=objectives_study.arguments(config),
     shell:
         "python -m solver objectives {params.case:q} {params.how:q} --out {output:q} > {log:q} 2>&1"

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from studies.base.cases import case_files
-from studies.base.study import Figure, Study
+from studies.base.study import Config, Figure, Study
+from workflow import settings
+from workflow.arguments import options, path_word
 
 OBJECTIVES = Study(
     name="objectives",
@@ -17,3 +19,14 @@ OBJECTIVES = Study(
         Figure("{solid}", "plots:errors_figure", "tables/errors.json", of="objectives.models"),
     ),
 )
+
+
+def arguments(config: Config) -> list[str]:
+    """What is compared in every case."""
+    part = config["objectives"]
+    how = {
+        "forest": part["forest"] and path_word(part["forest"]),
+        "modes": part["modes"],
+        "objectives": ",".join(settings.studied_objectives(config)),
+    }
+    return options(how)

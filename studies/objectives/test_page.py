@@ -9,12 +9,12 @@ import yaml
 
 from carillon.errors import UserError
 from dataset_gen.objectives import OBJECTIVES
-from studies.base import catalogue
 from studies.base.cases import cases_of
 from studies.base.table import read_table
 from studies.objectives.goals import goals_of, judge
 from studies.objectives.page import shortened
 from studies.objectives.results import Objectives
+from studies.objectives.study import OBJECTIVES as STUDY
 from studies.objectives.tables import description
 from tests.pages import Page, assert_same_numbers, assert_self_contained
 from tests.small_forests import train_small_forests
@@ -22,8 +22,7 @@ from tests.workflow_runs import CHECKOUT, PROFILE, TINY, snakemake
 from workflow import settings, solids
 
 summary, errors, forest, goals, goal_cases = (
-    catalogue.OBJECTIVES.entries[name]
-    for name in ("summary", "errors", "forest", "goals", "goal-cases")
+    STUDY.entries[name] for name in ("summary", "errors", "forest", "goals", "goal-cases")
 )
 STUDY = {
     "models": {
@@ -208,7 +207,7 @@ def test_the_page_of_a_miniature_study_holds_its_tables(finished):
     assert_self_contained(page)
     assert {"model-box", "plot-box"} <= set(page.ids)
     sizes = ("title", "unknowns", "coarse_unknowns")
-    for name in catalogue.OBJECTIVES.entries:
+    for name in STUDY.entries:
         hidden = sizes if name == "errors" else ("title",) if name == "goal-cases" else ()
         assert_same_numbers(page, finished / "tables", name, hidden)
     assert (finished / "figures" / "box.png").stat().st_size > 5000

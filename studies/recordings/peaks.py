@@ -72,7 +72,7 @@ def strong_peaks(samples: Array, rate: int) -> Peaks:
     Examples
     --------
     >>> t = np.arange(8000) / 8000
-    >>> strong_peaks(np.exp(-5 * t) * np.sin(2 * np.pi * 440 * t), 8000).hertz.round(1).tolist()
+    >>> strong_peaks(np.exp(-5 * t) * np.sin(2 * np.pi * 440 * t), 8000).hertz.round().tolist()
     [440.0]
     """
     hertz, levels = spectrum(samples, rate)

@@ -17,7 +17,6 @@ import yaml
 from carillon.errors import UserError
 from sound.clips.damped import damped_sinusoids
 from sound.clips.wav import write_wav
-from studies.base.catalogue import RECORDING, RECORDINGS
 from studies.base.table import Table, write_table
 from studies.recordings import index, page
 from studies.recordings.formats import FORMATS, Format, differences, formats, write_as
@@ -33,6 +32,7 @@ from studies.recordings.recordings import (
     recordings,
 )
 from studies.recordings.results import START, RecordingResults
+from studies.recordings.study import RECORDING, RECORDINGS
 from tests.pages import Page, assert_same_numbers, assert_self_contained
 from workflow.__main__ import main
 from workflow.commands.estimate import CONFIGURATIONS, load

@@ -1,11 +1,6 @@
 # Wall time over MPI ranks, in the report of the run: a small solid on few ranks. More of both are
 # part of target figures.
-
-
-def scaling_arguments(part):
-    """How the scaling is measured, from a part of the configuration."""
-    ranks = ",".join(map(str, part["ranks"]))
-    return options({"modes": part["modes"], "ranks": ranks, "weak": part.get("weak")})
+from studies.scaling import arguments as scaling
 
 
 # It starts the ranks itself, one thread each.
@@ -24,6 +19,6 @@ rule measure_scaling_of_run:
     params:
         source=source("studies.scaling.command"),
         model=lambda wildcards: model_arguments(wildcards, config["scaling"]["resolution"]),
-        how=scaling_arguments(config["scaling"]),
+        how=scaling.arguments(config["scaling"]),
     shell:
         "python -m solver scaling {params.model:q} {params.how:q} --out {output:q} > {log:q} 2>&1"

@@ -11,11 +11,11 @@ import soundfile
 import yaml
 
 from sound.scenes.scene import scene_of
-from studies.base.catalogue import SCENE_SPECTRA
 from studies.base.style import save
 from studies.base.table import write_table
 from studies.scene_spectra import page, plots, scene
 from studies.scene_spectra.results import FOLDER, SceneSpectra
+from studies.scene_spectra.study import SCENE_SPECTRA
 from tests.pages import Page, assert_same_numbers
 from tests.scenes import require_engine
 from tests.workflow_runs import TINY, planned, snakemake

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 Entry = dict[str, Any]
 
 EXAMPLES = Path(__file__).with_name("examples.yaml")
-_STUDIO = Path(__file__).parents[3] / "studio"
+_STUDIO = Path(__file__).parents[2] / "studio"
 PAGE_SOURCES = sorted(
     path
     for folder in ("page", "scene", "standalone")

@@ -15,7 +15,6 @@ from sound.clips.wav import read_wav
 from sound.scenes.materials import MATERIALS, named_material
 from sound.scenes.playing.impact_list import COLUMNS
 from sound.scenes.scene import Scene, load_scene
-from studies.base.catalogue import SCENES
 from studies.base.table import write_table
 from studies.scenes import page, tables
 from studies.scenes.examples import (
@@ -33,6 +32,7 @@ from studies.scenes.examples import (
     triangle,
 )
 from studies.scenes.results import Scenes
+from studies.scenes.study import SCENES
 from studies.sounds import examples as sounds
 from tests.pages import Page, assert_same_numbers
 from tests.scenes import moved, require_engine

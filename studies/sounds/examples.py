@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.geometry.builtin_names import BUILTIN_PREFIX
+from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.files.yaml_input import read_own_yaml
 from workflow.arguments import options
 from workflow.settings import located

@@ -22,7 +22,6 @@ from sound.project.project import load_project
 from sound.rendering.listening import Listening
 from sound.rendering.render import Hit, rendered_parts
 from sound.rendering.solid import SoundingSolid
-from studies.base.catalogue import COMPARED_SOUNDS, SOUND, SOUNDS
 from studies.base.table import write_table
 from studies.recordings.recordings import recordings
 from studies.sounds import comparison, index, page, tables
@@ -45,6 +44,7 @@ from studies.sounds.examples import (
 from studies.sounds.pictures import fine_mesh
 from studies.sounds.plots import _ticks
 from studies.sounds.results import MODES, SoundResults
+from studies.sounds.study import COMPARED_SOUNDS, SOUND, SOUNDS
 from tests.pages import Page, assert_same_numbers, assert_self_contained
 from tests.small_design import N_MODES, SIDES, small_design
 from tests.workflow_runs import TINY, snakemake

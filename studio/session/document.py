@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
-from carillon.fem.geometry.builtin_names import BUILTIN_PREFIX
 from sound.project.project import Project, project_of
 
 NO_CLIP = "none"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from carillon.fem.geometry.builtin_names import BUILTIN_PREFIX
+from carillon.builtin_names import BUILTIN_PREFIX
 from sound.clips.instruments import synthesised
 from sound.clips.wav import PEAK, as_wav
 from studio.session.document import Document, Target

@@ -7,9 +7,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.command_line.progress import say
 from carillon.errors import UserError, one_line
-from carillon.fem.geometry.builtin_names import BUILTIN_PREFIX
 from carillon.fem.geometry.surface import surface_name
 from carillon.files.hdf5 import kind_of
 from carillon.limits import MESH_BYTES

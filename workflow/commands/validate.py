@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.command_line.arguments import (
     non_negative_number,
     number_between,
@@ -26,7 +27,6 @@ from carillon.command_line.options import REQUIRED, add_options, collect, option
 from carillon.command_line.progress import say, track
 from carillon.errors import UserError
 from carillon.fem.geometry import surface_name
-from carillon.fem.geometry.builtin_names import BUILTIN_PREFIX
 from carillon.fem.geometry.size import sizes_in_words
 from carillon.fem.materials import NAMES as MATERIALS
 from carillon.files.atomic import atomic_path

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
 from carillon.fem.finite_cells.build import finite_cells
 from carillon.fem.geometry import (
@@ -18,7 +19,6 @@ from carillon.fem.geometry import (
     load_surface,
     voxelize,
 )
-from carillon.fem.geometry.builtin_names import BUILTIN_PREFIX
 from carillon.fem.materials import young_modulus
 from solver.refinement import work
 

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import trimesh
 
+from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
 from carillon.fem.geometry.beside import Beside, NoFiles
 from carillon.fem.geometry.builtin import builtin_surface
-from carillon.fem.geometry.builtin_names import BUILTIN_PREFIX
 from carillon.fem.geometry.gltf import plain_gltf
 from carillon.fem.geometry.headers import require_plain_ply, whole_stl
 from carillon.fem.geometry.obj import plain_obj

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 import trimesh
 
-from carillon.fem.geometry import builtin_names
+from carillon import builtin_names
 from carillon.fem.geometry.sweep import joined, turned
 
 

@@ -14,7 +14,7 @@ import trimesh
 from trimesh.creation import box, cylinder, icosphere
 from trimesh.transformations import rotation_matrix
 
-from carillon.fem.geometry import builtin_names
+from carillon import builtin_names
 from carillon.fem.geometry.sweep import joined, sweep, tube, turned
 
 SIDE = 0.24
