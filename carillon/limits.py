@@ -24,6 +24,8 @@ LARGEST_CONTRAST = 1e12
 """Ratio of the moduli of one solid; beyond, rounding of the stiff cells hides the soft ones."""
 DENSITIES = (1e-3, 1e6)
 """Mass density [kg/m^3]."""
+RESOLUTIONS = (2, 100_000)
+"""Voxels, or lattice spacings, along the longest side of a solid."""
 POISSON = (-1.0, 0.5)
 """Poisson's ratio, both ends excluded."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -65,7 +66,12 @@ def _refused(place: Any, problem: str) -> yaml.MarkedYAMLError:
 
 
 def read_yaml(path: str | Path, what: str) -> dict[str, Any]:
-    """The keys and values of a YAML file.
+    """The keys and values of a YAML file, see `read_marked`."""
+    return read_marked(path, what)[0]
+
+
+def read_marked(path: str | Path, what: str) -> tuple[dict[str, Any], yaml.Node]:
+    """The keys and values of a YAML file, and its nodes, of which `line_of` tells lines.
 
     Parameters
     ----------
@@ -92,13 +98,33 @@ def read_yaml(path: str | Path, what: str) -> dict[str, Any]:
     if len(content) > MOST_BYTES:
         raise UserError(f"{path}: longer than {MOST_BYTES:,} bytes, expected {what} (YAML)")
     try:
-        document = parse_yaml(content.decode("utf-8-sig"))
+        document, node = _parsed(content.decode("utf-8-sig"))
     except (UnicodeDecodeError, UserError) as error:
         said = error.reason if isinstance(error, UnicodeDecodeError) else str(error)
         raise UserError(f"{path}: is not readable as YAML ({said}), expected {what}") from None
     if not isinstance(document, dict):
         raise UserError(f"{path}: expected {what}, keys and values (name: value), one in a line")
-    return document
+    return document, node
+
+
+def line_of(node: yaml.Node, place: Iterable[str | int]) -> int:
+    """Number of the line where a value begins, or what is nearest around it if it is missing."""
+    line = node.start_mark.line
+    for part in place:
+        entries = _entries(node)
+        if part not in entries:
+            break
+        line, node = entries[part]
+    return int(line) + 1
+
+
+def _entries(node: yaml.Node) -> dict[str | int, tuple[int, yaml.Node]]:
+    """Line and node of each value in a node."""
+    if isinstance(node, yaml.MappingNode):
+        return {key.value: (key.start_mark.line, value) for key, value in node.value}
+    if isinstance(node, yaml.SequenceNode):
+        return {number: (each.start_mark.line, each) for number, each in enumerate(node.value)}
+    return {}
 
 
 def read_own_yaml(path: Path) -> Any:
@@ -126,8 +152,15 @@ def parse_yaml(text: str) -> Any:
     Traceback (most recent call last):
     carillon.errors.UserError: line 1: found the reference *a; write its content out
     """
+    return _parsed(text)[0]
+
+
+def _parsed(text: str) -> tuple[Any, Any]:
+    """What a text says, and its node."""
     try:
-        return yaml.load(text, _Loader)
+        loader = _Loader(text)
+        node = loader.get_single_node()
+        return (None if node is None else loader.construct_document(node)), node
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f"line {mark.line + 1}: " if mark is not None else ""

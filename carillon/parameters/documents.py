@@ -1,0 +1,83 @@
+"""Dataclasses of parameters from the keys and values of YAML files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from carillon.errors import UserError
+from carillon.files.yaml_input import line_of, read_marked
+from carillon.parameters.fields import Domain
+from carillon.parameters.model import adapter
+from carillon.parameters.sentences import ParameterError, Place, mistake_of
+
+T = TypeVar("T")
+
+MOST_BITS = 4096
+"""Length of a whole number; Python does not write out those of thousands of digits."""
+_EXACT = 2.0**53
+"""Largest number below which all whole numbers are exact in double precision."""
+
+
+def read_parameters(path: str | Path, model: type[T], what: str) -> T:
+    """Read a YAML file.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    model
+        Dataclass of parameters that it describes.
+    what
+        What the file should be, for messages: "a project".
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read (see `carillon.files.yaml_input.read_marked`), or with the line
+        and one sentence about the first thing that is wrong with it.
+    """
+    document, node = read_marked(path, what)
+    try:
+        return parameters_from(document, model)
+    except ParameterError as error:
+        raise UserError(f"{path}, line {line_of(node, error.place)}: {error}") from None
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
+
+
+def parameters_from(document: Mapping[str, Any], model: type[T]) -> T:
+    """Parameters from plain keys and values, as YAML and JSON have them.
+
+    Nothing is converted but numbers such as 30.0, which are whole ones, and whole ones where others
+    are expected.
+
+    Raises
+    ------
+    ParameterError
+        With one sentence about the first thing that is wrong.
+    """
+    from pydantic import ValidationError
+
+    text = json.dumps(_plain(document, ()))
+    try:
+        made: T = adapter(model).validate_json(text, strict=True)  # type: ignore[arg-type]
+    except ValidationError as error:
+        raise mistake_of(error, Domain(model)) from None
+    return made
+
+
+def _plain(value: Any, place: Place) -> Any:
+    """The value with whole numbers for floats that are such, fit to be written as JSON."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(each, (*place, str(key))) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each, (*place, number)) for number, each in enumerate(value)]
+    if isinstance(value, int) and value.bit_length() > MOST_BITS:
+        reason = f"found a whole number of {value.bit_length():,} bits, expected {MOST_BITS:,}"
+        raise ParameterError(place, f"{reason} at most")
+    if isinstance(value, float) and value.is_integer() and abs(value) < _EXACT:
+        return int(value)
+    return value

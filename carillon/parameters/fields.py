@@ -1,0 +1,165 @@
+"""What the fields of a dataclass of parameters are, read from their annotations."""
+
+from __future__ import annotations
+
+import dataclasses
+import types
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+
+from annotated_types import Ge, GroupedMetadata, Gt, Le, Lt, MaxLen, MinLen
+
+from carillon.parameters.model import REQUIRED, OneOf
+
+_LIMITS = {Ge: "ge", Gt: "gt", Le: "le", Lt: "lt", MinLen: "min_length", MaxLen: "max_length"}
+
+
+@dataclass(frozen=True)
+class Domain:
+    """The values that an annotation admits.
+
+    Attributes
+    ----------
+    kind
+        int, float, str, bool, tuple, dict, or a dataclass.
+    meaning
+        What they are, with the unit in brackets; empty if the annotation does not say.
+    limits
+        By the names of `annotated_types`: ge, gt, le, lt, min_length, max_length.
+    choices
+        Texts that are admitted, if not all are.
+    words
+        Texts that are admitted in place of a value of this kind, such as auto.
+    nullable
+        Whether None is admitted.
+    items
+        Domains of the items of a tuple, or of the values of a dict.
+    endless
+        Whether a tuple has any number of the one item.
+    is_union
+        Whether pydantic names the kind that it tried in the places of mistakes.
+    annotation
+        What was read; without None.
+    """
+
+    kind: Any
+    meaning: str = ""
+    limits: Mapping[str, float] = field(default_factory=dict)
+    choices: tuple[str, ...] = ()
+    words: tuple[str, ...] = ()
+    nullable: bool = False
+    items: tuple[Domain, ...] = ()
+    endless: bool = False
+    is_union: bool = False
+    annotation: Any = None
+
+    @property
+    def is_section(self) -> bool:
+        """Whether values have keys of their own."""
+        return dataclasses.is_dataclass(self.kind)
+
+    @property
+    def unit(self) -> str:
+        """Unit of the values; empty for numbers without one."""
+        return unit_of(self.meaning)
+
+
+def unit_of(meaning: str) -> str:
+    """The unit at the end of a meaning.
+
+    Examples
+    --------
+    >>> unit_of("mass density [kg/m^3]"), unit_of("number of modes [1]"), unit_of("a name")
+    ('kg/m^3', '', '')
+    """
+    _, _, unit = meaning.rpartition("[")
+    return unit[:-1] if meaning.endswith("]") and unit != "1]" else ""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A field: its name, its default (`REQUIRED` for none), the values it takes, what it means."""
+
+    name: str
+    default: Any
+    domain: Domain
+    meaning: str
+    metavar: str | tuple[str, ...] | None = None
+    read: Any = None
+
+
+@cache
+def parameters_of(model: type) -> dict[str, Parameter]:
+    """The fields of a dataclass of parameters by name, in their order."""
+    hints = get_type_hints(model, include_extras=True)
+    return {each.name: _parameter(each, hints[each.name]) for each in dataclasses.fields(model)}
+
+
+def _parameter(each: dataclasses.Field[Any], annotation: Any) -> Parameter:
+    default = each.default
+    if each.default_factory is not dataclasses.MISSING:
+        default = each.default_factory()
+    metadata = each.metadata
+    domain = domain_of(annotation)
+    meaning = metadata.get("help") or domain.meaning
+    domain = replace(domain, meaning=meaning)
+    return Parameter(
+        each.name,
+        REQUIRED if default is dataclasses.MISSING else default,
+        domain,
+        meaning,
+        metadata.get("metavar"),
+        metadata.get("read"),
+    )
+
+
+def domain_of(annotation: Any) -> Domain:
+    """The values that an annotation admits."""
+    domain = _domain(annotation)
+    return domain if domain.nullable else replace(domain, annotation=annotation)
+
+
+def _domain(annotation: Any) -> Domain:
+    origin, parts = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        return _marked(domain_of(parts[0]), parts[1:])
+    if origin in (Union, types.UnionType):
+        return _united([part for part in parts if part is not type(None)], type(None) in parts)
+    if origin is Literal:
+        return Domain(str, choices=parts)
+    if origin is tuple:
+        endless = parts[-1] is Ellipsis
+        items = tuple(map(domain_of, parts[:1] if endless else parts))
+        return Domain(tuple, items=items, endless=endless)
+    if origin in (dict, Mapping):
+        return Domain(dict, items=(domain_of(parts[1]),))
+    return Domain(origin or annotation)
+
+
+def _united(members: list[Any], nullable: bool) -> Domain:
+    domains = list(map(domain_of, members))
+    main = next((domain for domain in domains if not domain.choices), domains[0])
+    words = [word for domain in domains if domain is not main for word in domain.choices]
+    return replace(
+        main,
+        words=tuple(words),
+        nullable=nullable,
+        is_union=len(domains) > 1,
+        annotation=Union[tuple(members)],  # noqa: UP007
+    )
+
+
+def _marked(domain: Domain, marks: tuple[Any, ...]) -> Domain:
+    limits = dict(domain.limits)
+    for mark in marks:
+        for each in mark if isinstance(mark, GroupedMetadata) else [mark]:
+            if isinstance(each, str):
+                domain = replace(domain, meaning=each)
+            elif isinstance(each, OneOf):
+                domain = replace(domain, choices=each.names)
+            elif type(each) in _LIMITS:
+                name = _LIMITS[type(each)]
+                limits[name] = getattr(each, name)
+    return replace(domain, limits=limits)

@@ -1,0 +1,130 @@
+"""Dataclasses whose values pydantic checks.
+
+pydantic is imported when the first value is checked, so that `--help` does not wait for it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar, dataclass_transform
+
+if TYPE_CHECKING:
+    from pydantic import ConfigDict, GetCoreSchemaHandler, TypeAdapter
+    from pydantic_core import CoreSchema
+
+T = TypeVar("T")
+
+REQUIRED: Any = dataclasses.MISSING
+"""Default of an option that has none."""
+CONFIG: ConfigDict = {"extra": "forbid", "allow_inf_nan": False}
+"""pydantic's settings for all parameters: no unknown keys, finite numbers."""
+
+
+@dataclass(frozen=True)
+class OneOf:
+    """Marker in `Annotated[str, OneOf(names)]` of a text that is one of several."""
+
+    names: tuple[str, ...]
+
+    def __get_pydantic_core_schema__(self, _: Any, __: GetCoreSchemaHandler) -> CoreSchema:
+        from pydantic_core import core_schema
+
+        return core_schema.literal_schema(list(self.names))
+
+
+@dataclass(frozen=True)
+class Check:
+    """Marker in `Annotated[..., Check(function)]` of values that a function checks or converts.
+
+    The function returns the value to take, and raises ValueError with the reason why there is none.
+    It is given what `Annotated` admits; with `before`, what was given.
+    """
+
+    function: Callable[[Any], Any]
+    before: bool = False
+
+    def __get_pydantic_core_schema__(self, source: Any, admit: GetCoreSchemaHandler) -> CoreSchema:
+        from pydantic_core import core_schema
+
+        if self.before:
+            return core_schema.no_info_before_validator_function(self.function, admit(source))
+        return core_schema.no_info_after_validator_function(self.function, admit(source))
+
+
+def option(
+    default: Any,
+    help: str | None = None,
+    *,
+    metavar: str | tuple[str, ...] | None = None,
+    read: Callable[[str], Any] | None = None,
+) -> Any:
+    """A field of a dataclass of parameters.
+
+    Parameters
+    ----------
+    default
+        Its default; with `REQUIRED` it has to be given. A dataclass stands for one made without
+        arguments.
+    help
+        What it is, with its unit in brackets; by default what its annotation says.
+    metavar
+        Name of its value in the help of commands.
+    read
+        Makes a value from the word of a command line, where the annotation does not say how; raises
+        ValueError with a reason.
+    """
+    metadata = {"help": help, "metavar": metavar, "read": read}
+    if default is REQUIRED:
+        return dataclasses.field(metadata=metadata)
+    if isinstance(default, type):
+        return dataclasses.field(default_factory=default, metadata=metadata)
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(option,))
+def parameters(cls: type[T]) -> type[T]:
+    """Make a frozen dataclass whose values are checked against their annotations.
+
+    Numbers of NumPy become Python's, and lists become tuples, where these are annotated. A check of
+    several values belongs in `__post_init__`, which raises ValueError with what is wrong; then the
+    sentence begins with the place of the dataclass.
+
+    Raises
+    ------
+    UserError
+        On construction, with one sentence about the first value that is not admitted.
+    """
+    made: Any = dataclass(frozen=True)(cls)
+    names = [field.name for field in dataclasses.fields(made)]
+
+    @functools.wraps(made.__init__)
+    def construct(self: Any, *values: Any, **named: Any) -> None:
+        from pydantic import ValidationError
+        from pydantic_core import ArgsKwargs
+
+        from carillon.parameters.fields import Domain
+        from carillon.parameters.sentences import mistake_of
+
+        if len(values) > len(names):
+            raise TypeError(f"{made.__name__} takes {len(names)} values, {len(values)} are given")
+        given = ArgsKwargs((), dict(zip(names, values)) | named)
+        try:
+            adapter(made).validator.validate_python(given, self_instance=self)
+        except ValidationError as error:
+            raise mistake_of(error, Domain(made)) from None
+
+    made.__init__ = construct
+    made.__pydantic_config__ = CONFIG
+    return made
+
+
+@functools.cache
+def adapter(annotation: Any) -> TypeAdapter[Any]:
+    """pydantic's validator of a dataclass of parameters or of one annotation."""
+    from pydantic import TypeAdapter
+
+    is_model = hasattr(annotation, "__pydantic_config__")
+    return TypeAdapter(annotation, config=None if is_model else CONFIG)

@@ -1,0 +1,157 @@
+"""Mistakes in parameters, each told in one sentence: its place, what was found and expected."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
+from typing import TYPE_CHECKING, Any
+
+from carillon.errors import UserError
+from carillon.parameters.fields import Domain, parameters_of
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
+
+ALIKE = 0.7
+"""Share of letters in common (difflib) from which a word is taken for a mistyped one."""
+
+_KINDS = {
+    int: "a whole number",
+    float: "a number",
+    str: "a text",
+    bool: "true or false",
+    tuple: "a list",
+}
+_RULES = {
+    "greater_than_equal": "at least {ge}",
+    "greater_than": "above {gt}",
+    "less_than_equal": "at most {le}",
+    "less_than": "below {lt}",
+    "too_short": "at least {min_length} of them",
+    "too_long": "at most {max_length} of them",
+    "string_too_short": "a text",
+    "string_too_long": "at most {max_length} characters",
+    "finite_number": "a finite number",
+}
+_UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
+
+Place = tuple[str | int, ...]
+
+
+class ParameterError(UserError):
+    """A value that a parameter does not take.
+
+    Attributes
+    ----------
+    place
+        Keys and numbers that lead to it in its document.
+    reason
+        What is wrong with it, without its place and meaning.
+    """
+
+    def __init__(self, place: Place, reason: str, meaning: str = "") -> None:
+        super().__init__(": ".join(part for part in (in_words(place), reason, meaning) if part))
+        self.place = place
+        self.reason = reason
+
+
+def mistake_of(error: ValidationError, domain: Domain) -> ParameterError:
+    """The first mistake that pydantic found in values that should have a domain.
+
+    A mistyped key often is also one that is missed: the former says more and goes first.
+    """
+    mistakes = error.errors(include_url=False)
+    mistakes.sort(key=lambda mistake: mistake["type"] not in _UNKNOWN)
+    mistake = mistakes[0]
+    kind, found = mistake["type"], mistake.get("input")
+    place, domain, parent = _followed(mistake["loc"], domain)
+    if kind in _UNKNOWN:
+        return ParameterError(place[:-1], _no_key(str(place[-1]), list(parameters_of(parent.kind))))
+    if kind == "missing" and parent.kind is tuple:
+        reason = f"found {_shown(found)}, expected {len(parent.items)} of them"
+        return ParameterError(place[:-1], reason, parent.meaning)
+    if kind == "missing":
+        reason = f"the key {place[-1]} is missing, expected {domain.meaning}"
+        return ParameterError(place[:-1], reason)
+    if kind in ("value_error", "assertion_error"):
+        return ParameterError(place, str(mistake["ctx"]["error"]))
+    reason = f"found {_shown(found)}, expected {_expected(kind, mistake.get('ctx', {}), domain)}"
+    suggestion = alike(found, [*domain.choices, *domain.words]) if isinstance(found, str) else None
+    if suggestion:
+        reason += f" (did you mean {suggestion}?)"
+    return ParameterError(place, reason, domain.meaning)
+
+
+def in_words(place: Iterable[str | int]) -> str:
+    """Name of a value.
+
+    Examples
+    --------
+    >>> in_words(("targets", 0, "clip"))
+    'targets[0].clip'
+    """
+    parts = [f"[{part}]" if isinstance(part, int) else f".{part}" for part in place]
+    return "".join(parts).removeprefix(".")
+
+
+def alike(word: str, words: Iterable[str]) -> str | None:
+    """The one of `words` that a mistyped word is most like, if it is like any.
+
+    Examples
+    --------
+    >>> alike("Validte", ["modes", "validate"]), alike("ring", ["modes", "validate"])
+    ('validate', None)
+    """
+    lower = {each.lower(): each for each in words}
+    found = get_close_matches(word.lower(), list(lower), 1, ALIKE)
+    return lower[found[0]] if found else None
+
+
+def _followed(location: Sequence[str | int], domain: Domain) -> tuple[Place, Domain, Domain]:
+    """Place of a mistake, the domain that is expected there, and the one around it."""
+    place: list[str | int] = []
+    parent = domain
+    tried = False
+    for part in location:
+        if domain.is_union and not tried:
+            tried = True  # Names the member of the union that pydantic tried.
+            continue
+        tried = False
+        place.append(part)
+        parent = domain
+        if domain.is_section:
+            known = parameters_of(domain.kind)
+            domain = known[str(part)].domain if part in known else Domain(Any)
+        elif domain.items:
+            number = part if isinstance(part, int) and not domain.endless else 0
+            domain = domain.items[min(number, len(domain.items) - 1)]
+        else:
+            domain = Domain(Any)
+    return tuple(place), domain, parent
+
+
+def _no_key(name: str, known: list[str]) -> str:
+    suggestion = alike(name, known)
+    hint = f"; did you mean {suggestion}?" if suggestion else ""
+    return f"there is no key {name!r}, only {', '.join(known)}{hint}"
+
+
+def _expected(kind: str, context: dict[str, Any], domain: Domain) -> str:
+    """What would fit the rule that was broken."""
+    if kind in _RULES:
+        bound = _RULES[kind].format(**{key: _limit(value) for key, value in context.items()})
+        if "than" in kind and domain.unit:
+            bound += f" {domain.unit}"
+        return f"{bound}, or {' or '.join(domain.words)}" if domain.words else bound
+    if domain.choices:
+        return f"one of {', '.join(domain.choices)}"
+    named = [_KINDS.get(domain.kind, "keys and values"), *domain.words, *["null"] * domain.nullable]
+    return " or ".join(named)
+
+
+def _limit(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else f"{value:,}"
+
+
+def _shown(value: Any) -> str:
+    return repr(list(value) if isinstance(value, tuple) else value)
