@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
-from carillon.parameters.fields import Domain, Parameter, domain_of, parameters_of
+from carillon.parameters.fields import ValueDomain, Parameter, domain_of, parameters_of
 from carillon.parameters.model import REQUIRED, adapter
 
 T = TypeVar("T")
@@ -80,7 +80,7 @@ def _add(parser: argparse._ActionsContainer, each: Parameter, positional: bool) 
         parser.add_argument(flag, action=action, default=default, help=arguments["help"])
 
 
-def _reader(domain: Domain) -> Callable[[str], Any]:
+def _reader(domain: ValueDomain) -> Callable[[str], Any]:
     domain = replace(domain, nullable=False)
 
     def read(text: str) -> Any:

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from carillon.errors import UserError
 from carillon.files.yaml_input import line_of, read_marked
-from carillon.parameters.fields import Domain
+from carillon.parameters.fields import ValueDomain
 from carillon.parameters.model import adapter
 from carillon.parameters.sentences import ParameterError, Place, mistake_of
 
@@ -65,7 +65,7 @@ def parameters_from(document: Mapping[str, Any], model: type[T]) -> T:
     try:
         made: T = adapter(model).validate_json(text, strict=True)  # type: ignore[arg-type]
     except ValidationError as error:
-        raise mistake_of(error, Domain(model)) from None
+        raise mistake_of(error, ValueDomain(model)) from None
     return made
 
 

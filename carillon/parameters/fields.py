@@ -17,7 +17,7 @@ _LIMITS = {Ge: "ge", Gt: "gt", Le: "le", Lt: "lt", MinLen: "min_length", MaxLen:
 
 
 @dataclass(frozen=True)
-class Domain:
+class ValueDomain:
     """The values that an annotation admits.
 
     Attributes
@@ -50,7 +50,7 @@ class Domain:
     choices: tuple[str, ...] = ()
     words: tuple[str, ...] = ()
     nullable: bool = False
-    items: tuple[Domain, ...] = ()
+    items: tuple[ValueDomain, ...] = ()
     endless: bool = False
     is_union: bool = False
     annotation: Any = None
@@ -84,7 +84,7 @@ class Parameter:
 
     name: str
     default: Any
-    domain: Domain
+    domain: ValueDomain
     meaning: str
     metavar: str | tuple[str, ...] | None = None
     read: Any = None
@@ -115,30 +115,30 @@ def _parameter(each: dataclasses.Field[Any], annotation: Any) -> Parameter:
     )
 
 
-def domain_of(annotation: Any) -> Domain:
+def domain_of(annotation: Any) -> ValueDomain:
     """The values that an annotation admits."""
     domain = _domain(annotation)
     return domain if domain.nullable else replace(domain, annotation=annotation)
 
 
-def _domain(annotation: Any) -> Domain:
+def _domain(annotation: Any) -> ValueDomain:
     origin, parts = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         return _marked(domain_of(parts[0]), parts[1:])
     if origin in (Union, types.UnionType):
         return _united([part for part in parts if part is not type(None)], type(None) in parts)
     if origin is Literal:
-        return Domain(str, choices=parts)
+        return ValueDomain(str, choices=parts)
     if origin is tuple:
         endless = parts[-1] is Ellipsis
         items = tuple(map(domain_of, parts[:1] if endless else parts))
-        return Domain(tuple, items=items, endless=endless)
+        return ValueDomain(tuple, items=items, endless=endless)
     if origin in (dict, Mapping):
-        return Domain(dict, items=(domain_of(parts[1]),))
-    return Domain(origin or annotation)
+        return ValueDomain(dict, items=(domain_of(parts[1]),))
+    return ValueDomain(origin or annotation)
 
 
-def _united(members: list[Any], nullable: bool) -> Domain:
+def _united(members: list[Any], nullable: bool) -> ValueDomain:
     domains = list(map(domain_of, members))
     main = next((domain for domain in domains if not domain.choices), domains[0])
     words = [word for domain in domains if domain is not main for word in domain.choices]
@@ -151,7 +151,7 @@ def _united(members: list[Any], nullable: bool) -> Domain:
     )
 
 
-def _marked(domain: Domain, marks: tuple[Any, ...]) -> Domain:
+def _marked(domain: ValueDomain, marks: tuple[Any, ...]) -> ValueDomain:
     limits = dict(domain.limits)
     for mark in marks:
         for each in mark if isinstance(mark, GroupedMetadata) else [mark]:

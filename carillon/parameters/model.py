@@ -105,7 +105,7 @@ def parameters(cls: type[T]) -> type[T]:
         from pydantic import ValidationError
         from pydantic_core import ArgsKwargs
 
-        from carillon.parameters.fields import Domain
+        from carillon.parameters.fields import ValueDomain
         from carillon.parameters.sentences import mistake_of
 
         if len(values) > len(names):
@@ -114,7 +114,7 @@ def parameters(cls: type[T]) -> type[T]:
         try:
             adapter(made).validator.validate_python(given, self_instance=self)
         except ValidationError as error:
-            raise mistake_of(error, Domain(made)) from None
+            raise mistake_of(error, ValueDomain(made)) from None
 
     made.__init__ = construct
     made.__pydantic_config__ = CONFIG

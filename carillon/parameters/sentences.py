@@ -7,7 +7,7 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 from carillon.errors import UserError
-from carillon.parameters.fields import Domain, parameters_of
+from carillon.parameters.fields import ValueDomain, parameters_of
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -55,7 +55,7 @@ class ParameterError(UserError):
         self.reason = reason
 
 
-def mistake_of(error: ValidationError, domain: Domain) -> ParameterError:
+def mistake_of(error: ValidationError, domain: ValueDomain) -> ParameterError:
     """The first mistake that pydantic found in values that should have a domain.
 
     A mistyped key often is also one that is missed: the former says more and goes first.
@@ -107,7 +107,9 @@ def alike(word: str, words: Iterable[str]) -> str | None:
     return lower[found[0]] if found else None
 
 
-def _followed(location: Sequence[str | int], domain: Domain) -> tuple[Place, Domain, Domain]:
+def _followed(
+    location: Sequence[str | int], domain: ValueDomain
+) -> tuple[Place, ValueDomain, ValueDomain]:
     """Place of a mistake, the domain that is expected there, and the one around it."""
     place: list[str | int] = []
     parent = domain
@@ -121,12 +123,12 @@ def _followed(location: Sequence[str | int], domain: Domain) -> tuple[Place, Dom
         parent = domain
         if domain.is_section:
             known = parameters_of(domain.kind)
-            domain = known[str(part)].domain if part in known else Domain(Any)
+            domain = known[str(part)].domain if part in known else ValueDomain(Any)
         elif domain.items:
             number = part if isinstance(part, int) and not domain.endless else 0
             domain = domain.items[min(number, len(domain.items) - 1)]
         else:
-            domain = Domain(Any)
+            domain = ValueDomain(Any)
     return tuple(place), domain, parent
 
 
@@ -136,7 +138,7 @@ def _no_key(name: str, known: list[str]) -> str:
     return f"there is no key {name!r}, only {', '.join(known)}{hint}"
 
 
-def _expected(kind: str, context: dict[str, Any], domain: Domain) -> str:
+def _expected(kind: str, context: dict[str, Any], domain: ValueDomain) -> str:
     """What would fit the rule that was broken."""
     if kind in _RULES:
         bound = _RULES[kind].format(**{key: _limit(value) for key, value in context.items()})
