@@ -34,7 +34,7 @@ def accepted_errors(values: Array, rounding: Array, tolerance: float) -> Array:
     values
         (k,) ascending eigenvalues [rad^2/s^2], rigid ones first.
     rounding
-        (k,) relative change of each by one rounding of every product, see `Audit.rounding`.
+        (k,) relative change of each by one rounding of every product, see `ModesEvidence.rounding`.
     tolerance
         Relative error of an eigenvalue that is accepted but for rounding.
     """
@@ -49,7 +49,7 @@ def orthogonality_limit(unknowns: int) -> float:
 
 
 def residual_limits(values: Array, errors: Array) -> Array:
-    """Largest residuals in energy (k,) that accepted `errors` allow, see `Audit.energy_residuals`.
+    """Largest `ModesEvidence.energy_residuals` (k,) that accepted `errors` allow.
 
     |r|_(K + s M)^-1 <= sqrt(2 E_i), here over sqrt(lambda_i).
 

@@ -1,94 +1,30 @@
-"""Evidence that a modes file holds, found anew from the file alone.
-
-K and M are assembled again from the mesh and the moduli in the file, by other code than that of the
-run that wrote it; nothing that the run said about itself is used.
-"""
+"""Audits of modes files: the evidence that a file holds, and what is wrong with it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import scipy.sparse as sp
-from mpi4py import MPI
-from numpy.typing import NDArray
-
 from carillon.errors import UserError
-from carillon.fem.model import RIGID_MODES
 from carillon.files.atomic import by_stem
-from carillon.processes.petsc import PETSc
-from solver.assembly.petsc_matrix import distributed_matrix
-from solver.assembly.sparse import assembled
-from solver.assembly.system import assemble
 from solver.correction.correction import EIGENVALUE_TOLERANCE
-from solver.distribution.local_mesh import distribute
 from solver.files.modes_file import ModesFile, read_modes
-from solver.linear.factorisation import factorised
-from solver.reference.truth import can_count, count_negative
-from solver.subspace.rayleigh_ritz import first_elastic_estimate
-from solver.verification.comparison import recomputed_residuals
+from solver.verification.evidence import ModesEvidence, measure_evidence
 from solver.verification.faults import faults
-from solver.verification.residuals import COLUMNS_AT_ONCE, count_rigid, residual_scale
-
-Array = NDArray[np.float64]
-
-GAP, GAP_OF_TOLERANCE = 1e-4, 40.0
-"""Relative width of a gap in which inaccurate eigenvalues cannot be mistaken for others, and the
-same as a multiple of the tolerance that they were computed to."""
-NEGLIGIBLE, FEWEST_SOLVED = 1e-8, 8
-"""Residual ratio below which a residual is not looked at in energy, but for the largest few."""
 
 
 @dataclass(frozen=True)
-class Audit:
-    """What is found.
+class Audit(ModesEvidence):
+    """Evidence, and the faults that follow from it.
 
     Attributes
     ----------
-    modes, unknowns
-        Number of modes and of unknowns.
-    residual_max, residual_median
-        Of the residual ratios, see `solver.verification.residuals.residual_ratios`.
-    energy_residuals
-        (k,) residuals r = K x - lambda M x in energy: the root of r^T (K + s M)^-1 r / lambda,
-        where s is the last eigenvalue; lambda of rigid modes is the first elastic one.  Its square
-        is of the order of the eigenvalue's relative error.  Where the residual ratio is below
-        `NEGLIGIBLE`, that ratio.
-    rounding
-        (k,) by how much each eigenvalue changes, relatively, if every product with an entry of K is
-        rounded once: the unit roundoff times |x|^T |K| |x| / lambda.
-    quotient_errors
-        (k,) relative difference of each eigenvalue from the Rayleigh quotient of its mode; 0 of
-        rigid ones.
-    orthogonality
-        Largest entry of |X^T M X - I|.
-    rigid_modes
-        Number of eigenvalues that are zero to rounding.
-    counted_below, counted, expected
-        A value [rad^2/s^2], the number of eigenvalues below it by the inertia of K - value M, and
-        the number that the file holds; None where PETSc cannot count.
-    mass
-        Of the solid [kg].
     faults
         What is wrong, a sentence each, see `solver.verification.faults`.
     """
 
-    modes: int
-    unknowns: int
-    residual_max: float
-    residual_median: float
-    energy_residuals: list[float]
-    rounding: list[float]
-    quotient_errors: list[float]
-    orthogonality: float
-    rigid_modes: int
-    counted_below: float
-    counted: int | None
-    expected: int
-    mass: float
     faults: list[str]
 
     def as_dict(self) -> dict[str, Any]:
@@ -101,7 +37,7 @@ def audit_files(
 ) -> dict[str, Audit]:
     """Audits of modes files, see `carillon.files.atomic.by_stem` for their names.
 
-    The `tolerance` is that to which the eigenvalues were asked for.
+    The eigenvalues were computed to the `tolerance`.
 
     Raises
     ------
@@ -119,123 +55,6 @@ def _audited(path: str, tolerance: float) -> Audit:
 
 
 def audit(file: ModesFile, tolerance: float = EIGENVALUE_TOLERANCE) -> Audit:
-    """Audit the contents of a modes file, whose eigenvalues were asked for to a `tolerance`.
-
-    Raises
-    ------
-    ArithmeticError
-        If what is found is no number, so that nothing can be said about the modes.
-    """
-    assert file.modes is not None
-    K, M = assembled(file.model)
-    with np.errstate(all="ignore"):  # judged below
-        residuals = recomputed_residuals(file, K, M)
-        gram = file.modes.T @ (M @ file.modes)
-    if not (np.isfinite(residuals).all() and np.isfinite(gram).all()):
-        raise ArithmeticError("residuals or products of the modes are not finite numbers")
-    gap = max(GAP, GAP_OF_TOLERANCE * tolerance)
-    value, expected = gap_below_last(file.eigenvalues, gap)
-    found = Audit(
-        len(file.eigenvalues),
-        file.mesh.n_dofs,
-        float(residuals.max()),
-        float(np.median(residuals)),
-        _energy_residuals(file, K, M, residuals).tolist(),
-        _rounding(file, K).tolist(),
-        _quotient_errors(file, K, gram).tolist(),
-        float(np.abs(gram - np.eye(len(gram))).max()),
-        _count_rigid(file, K),
-        value,
-        _count(K, M, value) if can_count() else None,
-        expected,
-        file.model.mass,
-        [],
-    )
-    return replace(found, faults=faults(file, found, tolerance))
-
-
-def _energy_residuals(file: ModesFile, K: sp.csr_matrix, M: sp.csr_matrix, ratios: Array) -> Array:
-    assert file.modes is not None
-    values, modes = file.eigenvalues, file.modes
-    found = ratios.copy()
-    largest = np.argsort(ratios)[-FEWEST_SOLVED:]
-    columns = np.union1d(np.flatnonzero(ratios > NEGLIGIBLE), largest)
-    scale = residual_scale(values)
-    matrix = distributed_matrix((K + values[-1] * M).tocsr(), MPI.COMM_SELF)
-    matrix.setOption(PETSc.Mat.Option.SPD, True)
-    factorisation = factorised(matrix, {})
-    for start in range(0, len(columns), COLUMNS_AT_ONCE):
-        few = columns[start : start + COLUMNS_AT_ONCE]
-        chosen = modes[:, few]
-        residual = np.asfortranarray(K @ chosen - (M @ chosen) * values[few])
-        right = PETSc.Mat().createDense(residual.shape, array=residual, comm=MPI.COMM_SELF)
-        solution = right.duplicate()
-        factorisation.getFactorMatrix().matSolve(right, solution)
-        square = np.einsum("ij,ij->j", residual, solution.getDenseArray(readonly=True))
-        found[few] = np.sqrt(np.maximum(square, 0.0) / scale[few])
-        right.destroy()
-        solution.destroy()
-    factorisation.destroy()
-    matrix.destroy()
-    return found
-
-
-def _quotient_errors(file: ModesFile, K: sp.csr_matrix, gram: Array) -> Array:
-    assert file.modes is not None
-    elastic = slice(RIGID_MODES, None)
-    modes = file.modes[:, elastic]
-    errors = np.zeros(len(file.eigenvalues))
-    quotients = np.einsum("ik,ik->k", modes, K @ modes) / np.diag(gram)[elastic]
-    errors[elastic] = np.abs(file.eigenvalues[elastic] / quotients - 1.0)
-    return errors
-
-
-def _rounding(file: ModesFile, K: sp.csr_matrix) -> Array:
-    assert file.modes is not None
-    size, weight = abs(K), np.empty(len(file.eigenvalues))
-    for start in range(0, len(weight), COLUMNS_AT_ONCE):
-        few = slice(start, start + COLUMNS_AT_ONCE)
-        part = np.abs(file.modes[:, few])
-        weight[few] = np.einsum("ij,ij->j", part, size @ part)
-    return np.asarray(np.finfo(float).eps * weight / residual_scale(file.eigenvalues))
-
-
-def _count_rigid(file: ModesFile, K: sp.csr_matrix) -> int:
-    assert file.modes is not None
-    scales = np.einsum("ij,i,ij->j", file.modes, K.diagonal(), file.modes)
-
-    def estimate() -> float:
-        alone = MPI.COMM_SELF
-        return first_elastic_estimate(assemble(distribute(file.model, 1, comm=alone), alone))
-
-    return count_rigid(file.eigenvalues, scales, estimate)
-
-
-def gap_below_last(values: Array, gap: float = GAP) -> tuple[float, int]:
-    """Middle of the last gap between ascending values that is wide, or else of the widest one.
-
-    Returns
-    -------
-    tuple[float, int]
-        The value in the gap, and how many of the `values` are below it.
-
-    Examples
-    --------
-    >>> gap_below_last(np.array([0.0] * 6 + [1.0, 2.0, 5.0, 5.00001]))
-    (3.5, 8)
-    """
-    if len(values) <= RIGID_MODES + 1:
-        return float(values[-1] * (1.0 + 1e-6)), len(values)
-    gaps = np.diff(values[RIGID_MODES:]) / values[RIGID_MODES + 1 :]
-    wide = np.flatnonzero(gaps > gap)
-    below = RIGID_MODES + 1 + int(wide[-1] if len(wide) else np.argmax(gaps))
-    return float(0.5 * (values[below - 1] + values[below])), below
-
-
-def _count(K: sp.csr_matrix, M: sp.csr_matrix, value: float) -> int:
-    stiffness, mass = (distributed_matrix(part, MPI.COMM_SELF) for part in (K, M))
-    try:
-        return count_negative(stiffness, mass, value)
-    finally:
-        stiffness.destroy()
-        mass.destroy()
+    """Audit the contents of a modes file, see `measure_evidence` for parameters and errors."""
+    evidence = measure_evidence(file, tolerance)
+    return Audit(**vars(evidence), faults=faults(file, evidence, tolerance))

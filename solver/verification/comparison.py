@@ -18,16 +18,18 @@ from solver.assembly.sparse import assembled
 from solver.files.modes_file import ModesFile, read_elastic, require_same_solid
 from solver.response.contact import interpolation
 from solver.subspace.spectrum import clusters
-from solver.verification.matching import SAME, match_clusters, mode_overlaps, recognised
+from solver.verification.errors import AUDIBLE_LAST, eigenvalue_errors, frequency_errors
+from solver.verification.matching import (
+    SAME,
+    match_clusters,
+    mode_overlaps,
+    recognised,
+    subspace_angles,
+)
 from solver.verification.materials import material_difference, on_one_mesh
-from solver.verification.residuals import residual_scale
+from solver.verification.residuals import recomputed_residuals
 
 Array = NDArray[np.float64]
-
-DEPENDENT = 1e-10
-"""Share of the largest eigenvalue of products of vectors below which these are dependent."""
-AUDIBLE_FIRST, AUDIBLE_LAST = 7, 60
-"""Mode numbers, from 1, of the frequency errors that are reported for coarsened models."""
 
 
 @dataclass
@@ -78,63 +80,6 @@ class SpectrumComparison:
         return {name: value for name, value in asdict(self).items() if value is not None}
 
 
-@dataclass(frozen=True)
-class FrequencyErrors:
-    """Relative errors of the frequencies of modes `first`..`last`, matched by index.
-
-    Attributes
-    ----------
-    rms, mean
-        Root mean square and signed mean.
-    worst, worst_mode
-        The error of largest magnitude, with its sign, and the mode that has it.
-    """
-
-    first: int
-    last: int
-    rms: float
-    mean: float
-    worst: float
-    worst_mode: int
-
-
-def frequency_errors(errors: Array, last: int) -> FrequencyErrors:
-    """Summary of the relative `errors` (k,) of modes 7, 8, ... up to `last`, if there are so many.
-
-    Examples
-    --------
-    >>> frequency_errors(np.array([0.25, -0.5, 1.0]), last=8)
-    FrequencyErrors(first=7, last=8, rms=0.395..., mean=-0.125, worst=-0.5, worst_mode=8)
-    """
-    part = errors[: last - RIGID_MODES]
-    worst = int(np.argmax(np.abs(part)))
-    first = RIGID_MODES + 1
-    return FrequencyErrors(
-        first,
-        RIGID_MODES + len(part),
-        float(np.sqrt(np.mean(part**2))),
-        float(np.mean(part)),
-        float(part[worst]),
-        first + worst,
-    )
-
-
-def eigenvalue_errors(values: Array, exact: Array) -> dict[str, float]:
-    """Median, 90th percentile and maximum of |values - exact| / exact, matched by index.
-
-    Examples
-    --------
-    >>> eigenvalue_errors(np.array([1.0, 2.5, 4.0]), np.array([1.0, 2.0, 4.0]))["max"]
-    0.25
-    """
-    error = np.abs(values / exact - 1.0)
-    return {
-        "median": float(np.median(error)),
-        "p90": float(np.quantile(error, 0.9)),
-        "max": float(error.max()),
-    }
-
-
 def compare_files(candidate: str | Path, truth: str | Path) -> SpectrumComparison:
     """Compare two modes files of one solid, of any meshes and discretisations.
 
@@ -143,8 +88,8 @@ def compare_files(candidate: str | Path, truth: str | Path) -> SpectrumCompariso
     UserError
         If a file is unusable or holds no elastic mode to compare, or they are of other solids.
     """
-    (found,) = compare_each([candidate], truth).values()
-    return found
+    (comparison,) = compare_each([candidate], truth).values()
+    return comparison
 
 
 def compare_each(
@@ -161,18 +106,19 @@ def compare_each(
     """
     exact = read_elastic(truth)
     matrix = assembled(exact.model)[1]
-    found = {}
+    comparisons = {}
     for label, name in by_stem(candidates).items():
         candidate = read_elastic(name)
         require_same_solid([truth, name], [exact, candidate])
-        found[label] = _compared(name, candidate, str(truth), exact, matrix)
-    return found
+        comparisons[label] = _compared(name, candidate, str(truth), exact, matrix)
+    return comparisons
 
 
 def _compared(
     candidate: str, a: ModesFile, truth: str, b: ModesFile, M: sp.csr_matrix
 ) -> SpectrumComparison:
     """Errors of a candidate, the mass matrix of the truth being at hand."""
+    assert a.modes is not None
     count = min(len(a.eigenvalues), len(b.eigenvalues))
     elastic = slice(RIGID_MODES, count)
     values, exact = a.eigenvalues[elastic], b.eigenvalues[elastic]
@@ -188,50 +134,12 @@ def _compared(
         audible.rms,
         abs(audible.worst),
         max((cluster["angle"] for cluster in angles), default=float("nan")),
-        float(recomputed_residuals(a, *assembled(a.model)).max()),
+        float(recomputed_residuals(*assembled(a.model), a.eigenvalues, a.modes).max()),
         count - RIGID_MODES,
         angles,
         None if modes is a.modes else _matched(modes, a, b, M),
         material_difference(a.model, b.model),
     )
-
-
-def recomputed_residuals(file: ModesFile, K: sp.csr_matrix, M: sp.csr_matrix) -> Array:
-    """Residual ratios (k,) by these matrices, see `solver.verification.residuals`."""
-    assert file.modes is not None
-    mass_modes = M @ file.modes
-    residual = K @ file.modes - mass_modes * file.eigenvalues
-    scale = residual_scale(file.eigenvalues) * np.linalg.norm(mass_modes, axis=0)
-    return np.asarray(np.linalg.norm(residual, axis=0) / scale)
-
-
-def is_independent(gram: Array) -> bool:
-    """Whether vectors with these products are independent, far beyond rounding."""
-    squares = np.linalg.eigvalsh(gram)
-    return bool(squares[0] > DEPENDENT * squares[-1])
-
-
-def subspace_angles(modes: Array, truth: Array, M: sp.csr_matrix, groups: list[slice]) -> Array:
-    """Largest M-weighted principal angle [rad] of each group of columns.
-
-    The truth's block (n, k) is M-orthonormal; the candidate's, which may come from another mesh, is
-    made so group by group; one whose modes are not independent is at a right angle.  The sine is
-    taken from the part of the truth outside the candidate's span, which is accurate for small
-    angles too.
-    """
-    angles = np.empty(len(groups))
-    for index, group in enumerate(groups):
-        inside, exact = modes[:, group], truth[:, group]
-        gram = inside.T @ (M @ inside)
-        if not is_independent(gram):
-            angles[index] = 0.5 * np.pi
-            continue
-        factor = np.linalg.cholesky(gram)
-        inside = np.linalg.solve(factor, inside.T).T
-        outside = exact - inside @ (inside.T @ (M @ exact))
-        square = np.linalg.eigvalsh(outside.T @ (M @ outside))[-1]
-        angles[index] = np.arcsin(min(1.0, np.sqrt(max(square, 0.0))))
-    return angles
 
 
 def _matched(modes: Array, a: ModesFile, b: ModesFile, M: sp.csr_matrix) -> dict[str, Any]:

@@ -5,8 +5,6 @@ The limits are derived in docs/explanation/trust.md.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from carillon.fem.model import RIGID_MODES
@@ -17,49 +15,49 @@ from solver.verification.allowance import (
     orthogonality_limit,
     residual_limits,
 )
-
-if TYPE_CHECKING:  # It imports this module.
-    from solver.verification.audit import Audit
+from solver.verification.evidence import ModesEvidence
 
 ROUNDING = 1e-9
-"""Relative difference of a frequency from that of its eigenvalue that rounding may make."""
+"""Largest relative difference by rounding between a frequency and that of its eigenvalue."""
 
 
-def faults(file: ModesFile, audit: Audit, tolerance: float) -> list[str]:
+def faults(file: ModesFile, evidence: ModesEvidence, tolerance: float) -> list[str]:
     """A sentence for each fault of a modes file, whose eigenvalues were asked for to a `tolerance`.
 
     Solids that hang on hinges have more than six rigid motions, which is no fault of the modes.
     """
-    found = []
-    if audit.counted is not None and audit.counted != audit.expected:
-        number = abs(audit.counted - audit.expected)
-        things = "1 eigenvalue is" if number == 1 else f"{number:,} eigenvalues are"
-        found.append(f"{things} {'missing' if audit.counted > audit.expected else 'too many'}")
-    if audit.rigid_modes < RIGID_MODES:
-        found.append(f"{audit.rigid_modes} of {RIGID_MODES} rigid motions are there")
-    limit = orthogonality_limit(audit.unknowns)
-    if audit.orthogonality > limit:
-        found.append(f"modes are orthonormal to {audit.orthogonality:.1e}, {limit:.1e} is required")
-    values, residuals = file.eigenvalues, np.array(audit.energy_residuals)
-    errors = accepted_errors(values, np.array(audit.rounding), ACCEPTED * tolerance)
+    sentences = []
+    if evidence.counted is not None and evidence.counted != evidence.expected:
+        missing = evidence.counted - evidence.expected
+        things = "1 eigenvalue is" if abs(missing) == 1 else f"{abs(missing):,} eigenvalues are"
+        sentences.append(f"{things} {'missing' if missing > 0 else 'too many'}")
+    if evidence.rigid_modes < RIGID_MODES:
+        sentences.append(f"{evidence.rigid_modes} of {RIGID_MODES} rigid motions are there")
+    limit = orthogonality_limit(evidence.unknowns)
+    if evidence.orthogonality > limit:
+        sentences.append(
+            f"modes are orthonormal to {evidence.orthogonality:.1e}, {limit:.1e} is required"
+        )
+    values, residuals = file.eigenvalues, np.array(evidence.energy_residuals)
+    errors = accepted_errors(values, np.array(evidence.rounding), ACCEPTED * tolerance)
     allowed = residual_limits(values, errors)
     over = np.flatnonzero(residuals[RIGID_MODES:] > allowed[RIGID_MODES:]) + RIGID_MODES
     if len(over):
         worst = over[np.argmax(residuals[over] / allowed[over])]
         modes = "1 mode has" if len(over) == 1 else f"{len(over):,} modes have"
-        found.append(
+        sentences.append(
             f"{modes} too large a residual, mode {worst + 1} {residuals[worst]:.1e} in energy, "
             f"where a tolerance of {tolerance:g} allows {allowed[worst]:.1e}"
         )
-    off = np.array(audit.quotient_errors)
+    off = np.array(evidence.quotient_errors)
     far = np.flatnonzero(off * values > errors)
     if len(far):
-        found.append(
+        sentences.append(
             f"the eigenvalue of mode {far[0] + 1} is {off[far[0]]:.1e} off its shape's Rayleigh "
             "quotient"
         )
     right = frequencies(values)
     differ = np.flatnonzero(np.abs(file.frequencies - right) > ROUNDING * right.max())
     if len(differ):
-        found.append(f"the frequency of mode {differ[0] + 1} is not that of its eigenvalue")
-    return found
+        sentences.append(f"the frequency of mode {differ[0] + 1} is not that of its eigenvalue")
+    return sentences

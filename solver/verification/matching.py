@@ -1,4 +1,4 @@
-"""Which mode of one solution is which mode of another, whatever their numbers."""
+"""Which mode of one solution is which of another by shape, and the angles between both."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
@@ -15,6 +16,8 @@ Array = NDArray[np.float64]
 
 SAME = 0.5
 """Overlap from which two modes count as the same."""
+DEPENDENT = 1e-10
+"""Share of the largest eigenvalue of a Gram matrix below which vectors are dependent."""
 
 
 @dataclass(frozen=True)
@@ -136,3 +139,27 @@ def recognised(errors: Array, overlaps: Array) -> dict[str, Any]:
         "worst": float(errors[worst]),
         "worst_mode": RIGID_MODES + 1 + int(modes[worst]),
     }
+
+
+def subspace_angles(modes: Array, truth: Array, M: sp.csr_matrix, groups: list[slice]) -> Array:
+    """Largest M-weighted principal angle [rad] of each group of columns.
+
+    The truth's block (n, k) is M-orthonormal; the candidate's, which may come from another mesh, is
+    made so group by group; one whose modes are not independent is at a right angle.  The sine is
+    taken from the part of the truth outside the candidate's span, which is accurate for small
+    angles too.
+    """
+    angles = np.empty(len(groups))
+    for index, group in enumerate(groups):
+        inside, exact = modes[:, group], truth[:, group]
+        gram = inside.T @ (M @ inside)
+        squares = np.linalg.eigvalsh(gram)
+        if not squares[0] > DEPENDENT * squares[-1]:  # nor if it is no number
+            angles[index] = 0.5 * np.pi
+            continue
+        factor = np.linalg.cholesky(gram)
+        inside = np.linalg.solve(factor, inside.T).T
+        outside = exact - inside @ (inside.T @ (M @ exact))
+        square = np.linalg.eigvalsh(outside.T @ (M @ outside))[-1]
+        angles[index] = np.arcsin(min(1.0, np.sqrt(max(square, 0.0))))
+    return angles

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
@@ -58,6 +59,14 @@ def residual_ratios(
     norms = np.sqrt(system.column_products(residual, residual))
     mass_norms = np.sqrt(system.column_products(mass_vectors, mass_vectors))
     return np.asarray(norms / np.maximum(scale * mass_norms, np.finfo(float).tiny))
+
+
+def recomputed_residuals(K: sp.csr_matrix, M: sp.csr_matrix, values: Array, modes: Array) -> Array:
+    """Residual ratios (k,) of modes (n_dofs, k) by matrices that were assembled anew."""
+    mass_modes = M @ modes
+    residual = K @ modes - mass_modes * values
+    scale = residual_scale(values) * np.linalg.norm(mass_modes, axis=0)
+    return np.asarray(np.linalg.norm(residual, axis=0) / scale)
 
 
 def residual_scale(values: Array) -> Array:

@@ -10,9 +10,9 @@ import h5py
 from carillon.fem.model import ElasticModel
 from solver.assembly.sparse import assembled
 from solver.files.model_group import FINITE_CELLS, put
-from solver.files.modes_file import ModesFile, frequencies, write_modes
+from solver.files.modes_file import write_modes
 from solver.response.contact import embedding
-from solver.verification.comparison import recomputed_residuals
+from solver.verification.residuals import recomputed_residuals
 from sound.project.design import Design
 from sound.project.design_file import put_object
 from sound.rendering.listening import Listening
@@ -35,10 +35,7 @@ def write_embedded(path: str | Path, design: Design, parameters: dict[str, Any])
     UserError
         If the file cannot be written.
     """
-    hertz = frequencies(design.eigenvalues)
-    none = design.eigenvalues[:0]
-    file = ModesFile(design.eigenvalues, hertz, design.modes, none, design.model, {}, {})
-    residuals = recomputed_residuals(file, *assembled(design.model))
+    residuals = recomputed_residuals(*assembled(design.model), design.eigenvalues, design.modes)
     attributes = {
         "method": "sound design",
         "normalisation": NORMALISATION,

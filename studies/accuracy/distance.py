@@ -30,7 +30,7 @@ from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
 from solver.refinement.coarse_or_fine import FineStart
 from solver.refinement.errors import FROM_SOLID
-from solver.verification.comparison import frequency_errors
+from solver.verification.errors import frequency_errors
 from studies.accuracy.solids import ANGLES
 
 Array = NDArray[np.float64]

@@ -18,7 +18,7 @@ from carillon.command_line.progress import track
 from carillon.errors import ConvergenceError, UserError
 from carillon.fem.model import RIGID_MODES
 from solver.analysis.problem import DISCRETISATIONS
-from solver.verification.comparison import frequency_errors
+from solver.verification.errors import frequency_errors
 from studies.accuracy.solids import ANGLES, POISSON, SOLIDS, ReferenceSolid
 from studies.accuracy.spectra import Spectrum, cells
 from studies.accuracy.tetrahedra import ORDERS, missing, tetrahedra, versions

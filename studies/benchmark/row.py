@@ -15,7 +15,7 @@ from carillon.fem.geometry import surface_name
 from carillon.processes.cores import blas_name, loaded_blas
 from solver.analysis.problem import ProblemOptions
 from solver.distribution.collective import bcast_from_root, compute_on_root
-from solver.verification.comparison import AUDIBLE_LAST
+from solver.verification.errors import AUDIBLE_LAST
 from studies.benchmark.further import RIVALS
 from studies.benchmark.methods import MethodRun, Methods, named
 from studies.benchmark.options import COARSE, ROUGH, BenchmarkOptions

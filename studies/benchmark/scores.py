@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import frequencies
-from solver.verification.comparison import AUDIBLE_LAST, eigenvalue_errors, frequency_errors
+from solver.verification.errors import AUDIBLE_LAST, eigenvalue_errors, frequency_errors
 
 Array = NDArray[np.float64]
 

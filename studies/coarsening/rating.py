@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from carillon.fem.geometry import Blocks
 from carillon.fem.model import RIGID_MODES, ElasticModel
 from solver.files.modes_file import frequencies
-from solver.verification.comparison import frequency_errors
+from solver.verification.errors import frequency_errors
 from solver.verification.matching import match_modes, recognised
 from studies.coarsening.blame import Blame
 from studies.coarsening.matching import FAR_OFF, SWAP, coarse_overlaps, verdict

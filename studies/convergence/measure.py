@@ -24,7 +24,7 @@ from solver.files.modes_file import read_modes
 from solver.hcms.condense import INTERFACES
 from solver.hcms.synthesis import synthesize
 from solver.linear import LinearSolver
-from solver.verification.comparison import eigenvalue_errors
+from solver.verification.errors import eigenvalue_errors
 
 Array = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ from solver.accuracy.material import INTERPOLATED, NOISY, PlacedMaterial
 from solver.analysis.problem import ProblemOptions
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.forest import FOREST
-from solver.verification.comparison import frequency_errors
+from solver.verification.errors import frequency_errors
 from studies.discretisation.methods import TOLERANCE, Given, TimedSpectrum, Ways
 from studies.discretisation.truth import FINER, LEFT, LEFT_OF_NOISE, SolidTruth
 

@@ -30,7 +30,7 @@ from solver.coarsening.linear import LinearCoarsening
 from solver.coarsening.model import block_moduli, coarse_model
 from solver.distribution.collective import bcast_from_root, compute_on_root
 from solver.files.modes_file import CHECKS, frequencies
-from solver.verification.comparison import AUDIBLE_LAST, frequency_errors
+from solver.verification.errors import AUDIBLE_LAST, frequency_errors
 
 logger = logging.getLogger(__name__)
 

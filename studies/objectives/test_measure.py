@@ -17,7 +17,7 @@ from solver.coarsening.choice import make_coarsening
 from solver.coarsening.fit import FitCoarsening
 from solver.coarsening.model import build_model
 from solver.files.modes_file import frequencies, read_modes
-from solver.verification.comparison import frequency_errors
+from solver.verification.errors import frequency_errors
 from studies.objectives.measure import BASELINES, FOREST, rate_objectives
 from tests import solids
 
