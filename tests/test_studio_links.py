@@ -17,7 +17,7 @@ from carillon.files.atomic import atomic_path
 from sound.project.design_file import write_design
 from studio.server import browser
 from studio.session import open_studio
-from studio.session.files import save
+from studio.session.designs import save
 from studio.session.workspace import OWN_FOLDER
 from tests.edited_files import edited
 from tests.small_design import small_design
@@ -174,14 +174,14 @@ def test_designs_that_are_links_are_neither_written_to_nor_removed(folder):
         (own / name).write_text("")
 
     async def look(studio):
-        assert studio.workspace.new_design() == own / "8.h5"
+        assert studio.session.workspace.new_design() == own / "8.h5"
 
     begin_and_end(folder, do=look)
     names = {path.name for path in own.iterdir()}
     assert names == {"1.h5", "notes.h5", "²" + ".h5", "9" * 190 + ".h5"}
 
 
-def test_exports_are_made_where_nothing_was_planted(folder):
+def test_exports_are_made_where_nothing_was_planted(folder, monkeypatch):
     for name in ("export.npy", "export-1"):
         plant(folder, f"{OWN_FOLDER}/{name}", "diary")
     left = folder / OWN_FOLDER / "export-2"
@@ -189,14 +189,15 @@ def test_exports_are_made_where_nothing_was_planted(folder):
     (left / "export.npy").write_text("of a killed studio")
 
     async def export(studio):
-        async def designed():
+        async def designed(state):
             return "design.h5"
 
         async def make(name, design, kind, target, out, seconds):
             with atomic_path(out) as temporary:
                 temporary.write_bytes(b"moduli")
 
-        studio.designed, studio._exports.call = designed, make
+        monkeypatch.setattr("studio.session.studio.designed", designed)
+        studio._exports.call = make
         assert (await studio.export("npy", None)).content == b"moduli"
 
     begin_and_end(folder, do=export)
@@ -209,7 +210,7 @@ def test_exports_are_made_where_nothing_was_planted(folder):
 
 async def written(studio, name: str) -> None:
     """Save a project whose design was never sought."""
-    await save(studio, name)
+    await save(studio.session, name)
 
 
 @pytest.mark.parametrize("name", ["pan.yaml~", "pan.h5", "new.yaml", "new.yaml~", "new.h5"])
@@ -261,12 +262,12 @@ def test_uploads_take_names_that_nothing_has(folder):
     os.mkfifo(folder / "a-3.stl")
 
     async def put(studio):
-        assert studio.workspace.put("a.stl", b"solid") == "a-4.stl"
-        assert studio.workspace.put("a.stl", DIARY.encode()) == "a-5.stl"
-        assert studio.workspace.put("a.stl", b"solid") == "a-4.stl"
+        assert studio.session.workspace.put("a.stl", b"solid") == "a-4.stl"
+        assert studio.session.workspace.put("a.stl", DIARY.encode()) == "a-5.stl"
+        assert studio.session.workspace.put("a.stl", b"solid") == "a-4.stl"
         for name in ("../a.stl", "/a.stl", "..", "a\0.stl", "a\n.stl", "a" * 250 + ".stl"):
             with pytest.raises(UserError):
-                studio.workspace.put(name, b"solid")
+                studio.session.workspace.put(name, b"solid")
 
     begin_and_end(folder, do=put)
     assert (folder / "a-4.stl").read_bytes() == b"solid"
@@ -334,7 +335,7 @@ def test_a_session_that_is_none_is_not_gone_on_with(folder, what, capsys):
         (folder / OWN_FOLDER / "session.json").write_text(given)
 
     async def look(studio):
-        assert studio.document.mesh is None and studio.name == "untitled"
+        assert studio.session.document.mesh is None and studio.session.name == "untitled"
         assert studio.state()["saved"]
 
     begin_and_end(folder, do=look)
@@ -353,7 +354,7 @@ def test_a_session_goes_on_after_its_folder_was_moved(folder):
     moved = folder.rename(folder.with_name("moved"))
 
     async def look(studio):
-        assert studio.document.material.design == str(moved / name)
+        assert studio.session.document.material.design == str(moved / name)
 
     begin_and_end(moved, do=look)
 
@@ -373,7 +374,9 @@ def test_a_mesh_that_is_a_link_to_elsewhere_is_one_outside(folder):
         open_studio(str(folder / "pan.yaml"), folder)
 
     async def look(studio):
-        assert studio.document.mesh == "mesh-2.obj"  # a copy, since the person named the link
+        assert (
+            studio.session.document.mesh == "mesh-2.obj"
+        )  # a copy, since the person named the link
         assert not (folder / "mesh-2.obj").is_symlink()
 
     begin_and_end(folder, str(folder / "mesh.obj"), look)
@@ -390,7 +393,7 @@ def test_a_project_is_opened_where_it_is_and_nowhere_else(folder):
 def test_names_that_lead_out_are_one_sentence(folder, name):
     async def look(studio):
         with pytest.raises(UserError) as caught:
-            studio.workspace.path(name)
+            studio.session.workspace.path(name)
         assert "expected" in str(caught.value)
 
     begin_and_end(folder, do=look)

@@ -116,8 +116,8 @@ def aimed(page: Page, names: list[str]) -> bool:
 
 def settled(studio, page: Page) -> bool:
     """Whether no search is wanted any more, and the page has what the design sounds like."""
-    told = studio.upkeep.is_settled and page.feed.is_empty
-    return told and page.is_idle and not studio.is_searching
+    told = studio.reconciler.is_settled and page.feed.is_empty
+    return told and page.is_idle and not studio.session.is_searching
 
 
 def cost(page: Page) -> float:
@@ -184,27 +184,27 @@ def test_an_edit_while_a_search_goes_on_is_taken_up_and_can_be_undone(folder):
             await until(lambda: aimed(page, ["end", "side"]), page)
             await studio.call("change_settings", {"settings": {"optimiser": {"evaluations": None}}})
             await studio.call("optimise", {})
-            await until(lambda: "z" and studio.document.material is not None, page)
+            await until(lambda: "z" and studio.session.document.material is not None, page)
             await studio.call("remove_target", {"target": "side"})
-            kept = studio.document.material
+            kept = studio.session.document.material
             assert kept is not None
             await until(lambda: page.bank[0]["targets"] == ["end"], page)
             await until(lambda: page.state["search"]["phase"] == "running", page)
-            await until(lambda: studio.document.material != kept, page)
+            await until(lambda: studio.session.document.material != kept, page)
             await studio.call("stop", {})
-            await until(lambda: studio.document.material.design is not None, page)
+            await until(lambda: studio.session.document.material.design is not None, page)
             await until(lambda: settled(studio, page), page)
             assert page.state["undo"] == "remove target side"
-            assert studio.document.material.design is not None
+            assert studio.session.document.material.design is not None
             for names in (["end", "side"], ["end", "side"]):
                 await studio.call("undo", {})
                 assert [each["name"] for each in studio.state()["targets"]] == names
-            assert studio.document.material is None
+            assert studio.session.document.material is None
             await until(lambda: aimed(page, ["end", "side"]), page)
             for _ in range(2):
                 await studio.call("redo", {})
             await until(lambda: aimed(page, ["end"]), page)
-            assert studio.document.material.design is not None
+            assert studio.session.document.material.design is not None
             assert not page.said
 
     run(play())
@@ -295,14 +295,14 @@ def test_settings_of_other_voxels_begin_anew_and_those_of_a_search_do_not(folder
         async with opened(folder, str(folder / "bar.yaml")) as (studio, page):
             await until(lambda: aimed(page, ["end", "side"]), page)
             await studio.call("optimise", {})
-            await until(lambda: studio.document.material is not None, page)
+            await until(lambda: studio.session.document.material is not None, page)
             await until(lambda: settled(studio, page), page)
             await studio.call("change_settings", {"settings": {"weights": {"amplitude": 5.0}}})
-            assert studio.document.material is not None
+            assert studio.session.document.material is not None
             await studio.call("change_settings", {"settings": {"resolution": 12}})
-            assert studio.document.material is None
+            assert studio.session.document.material is None
             await studio.call("undo", {})
-            assert studio.document.material is not None
+            assert studio.session.document.material is not None
 
     run(play())
 
@@ -313,14 +313,17 @@ def test_materials_are_kept_and_swapped(folder):
         async with opened(folder, str(folder / "bar.yaml")) as (studio, page):
             await until(lambda: aimed(page, ["end", "side"]), page)
             await studio.call("optimise", {})
-            await until(lambda: studio.document.material is not None, page)
+            await until(lambda: studio.session.document.material is not None, page)
             await until(lambda: settled(studio, page), page)
-            found = studio.document.material
+            found = studio.session.document.material
             await studio.call("keep", {})
             await studio.call("forget_material", {})
             for heard, now, other in (("B", None, found), ("A", found, None), ("B", None, found)):
                 assert studio.state()["heard"] == heard
-                assert (studio.document.material, studio.document.kept) == (now, other)
+                assert (studio.session.document.material, studio.session.document.kept) == (
+                    now,
+                    other,
+                )
                 await studio.call("swap", {})
             await studio.call("change_settings", {"settings": {"resolution": 12}})
             with pytest.raises(UserError, match="no material is kept"):
@@ -341,7 +344,7 @@ def test_a_studio_ends_while_a_search_is_about_to_begin(folder, monkeypatch):
             await until(lambda: aimed(page, ["end", "side"]), page)
             budget = {"optimiser": {"evaluations": None, "seconds": None}}
             await studio.call("change_settings", {"settings": budget})
-            ask, asked = studio.bench.ask, asyncio.Event()
+            ask, asked = studio.session.solid.ask, asyncio.Event()
 
             async def slowly(name, *arguments):
                 if name == "problem":
@@ -349,7 +352,7 @@ def test_a_studio_ends_while_a_search_is_about_to_begin(folder, monkeypatch):
                     await asyncio.sleep(0.5)
                 return await ask(name, *arguments)
 
-            monkeypatch.setattr(studio.bench, "ask", slowly)
+            monkeypatch.setattr(studio.session.solid, "ask", slowly)
             await studio.call("optimise", {})
             await asked.wait()
 
@@ -388,12 +391,12 @@ def test_nothing_is_lost_when_all_is_killed_in_a_search(folder):
 
     async def go_on():
         async with opened(folder) as (studio, page):
-            assert list(studio.document.material.z) == saved
+            assert list(studio.session.document.material.z) == saved
             await until(lambda: page.state["search"]["phase"] == "running", page)
             await studio.call("stop", {})
-            await until(lambda: studio.document.material.design is not None, page)
+            await until(lambda: studio.session.document.material.design is not None, page)
             await until(lambda: settled(studio, page), page)
-            assert studio.document.material.design is not None
+            assert studio.session.document.material.design is not None
 
     run(go_on())
 
@@ -412,7 +415,7 @@ def test_an_example_opens_and_leaves_its_clips_in_the_workspace(folder):
             await studio.call("open_project", {"project": "e1"})
             await until(lambda: page.is_idle and page.bank[0]["targets"], page)
             assert page.state["targets"][0]["clip"] is not None
-            document = studio.document
+            document = studio.session.document
             assert document.project(folder).targets[0].clip.endswith(".wav")
             assert replace(document, targets=()).mesh == document.mesh
 

@@ -25,7 +25,7 @@ TOLD_SECONDS = 0.25
 """Time between two pieces of news."""
 
 
-class SearchBench:
+class SearchProcess:
     """What the process for the search does."""
 
     def run(

@@ -58,7 +58,7 @@ class SurfaceNews:
     longest_side_m: float
 
 
-class SolidBench:
+class SolidProcess:
     """What the process for the solid does, step by step: `read`, `prepare`, `aim`, then banks."""
 
     def __init__(self) -> None:

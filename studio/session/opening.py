@@ -15,9 +15,10 @@ from carillon.files.hdf5 import kind_of
 from carillon.limits import MESH_BYTES
 from sound.project.design_file import read_design
 from sound.project.schema import check, project_schema
-from studio.session.calls import fit_name, opened, with_design
 from studio.session.document import Document, document_of, files_of
+from studio.session.projects import fit_name, opened, with_design
 from studio.session.restoring import NONSENSE
+from studio.session.snapshot import restore
 from studio.session.studio import DesignStudio
 from studio.session.workspace import OWN_FOLDER, PROJECT_ENDINGS, SESSION, OutsideError, Workspace
 
@@ -65,9 +66,9 @@ def _goes_on(session: Mapping[str, Any], what: str | None, name: str) -> bool:
 
 def _go_on(studio: DesignStudio, session: Mapping[str, Any]) -> None:
     """Go on with a session, unless nothing can be made of it."""
-    file = studio.workspace.folder / OWN_FOLDER / SESSION
+    file = studio.session.workspace.folder / OWN_FOLDER / SESSION
     try:
-        studio.restore(session)
+        restore(studio.session, session)
     except OutsideError as error:
         raise UserError(
             f"{file}: what the studio was left with names files that are not its own ({error}); "

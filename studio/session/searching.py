@@ -50,7 +50,7 @@ class Searching:
         self, told: Callable[[dict[str, Any]], None], found: Callable[[Live], None]
     ) -> None:
         self._told, self._found = told, found
-        self._worker = Worker("studio.processes.search:SearchBench")
+        self._worker = Worker("studio.processes.search:SearchProcess")
         self._is_broken_off = False
         self.phase = "idle"
         self.rows: list[dict[str, float]] = []

@@ -37,8 +37,8 @@ class SolidNews:
     longest_side_m: float | None = None
 
 
-class Bench:
-    """What is known of the solid, and its process.
+class SolidClient:
+    """The solid that a process computes with, and what is known of it.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class Bench:
 
     def __init__(self, folder: Path, changed: Callable[[], None]) -> None:
         self._folder, self._changed = folder, changed
-        self._worker = Worker("studio.processes.solid:SolidBench")
+        self._worker = Worker("studio.processes.solid:SolidProcess")
         self._numbers = 0
         self._forget()
 
@@ -128,7 +128,7 @@ class Bench:
         await self._bring_aim(document, heard)
 
     async def ask(self, name: str, *arguments: Any) -> Any:
-        """Call the process, see `studio.processes.solid.SolidBench`."""
+        """Call the process, see `studio.processes.solid.SolidProcess`."""
         return await self._worker.call(name, *arguments)
 
     async def _bring_surface(self, mesh: str, path: str, unit: float) -> None:

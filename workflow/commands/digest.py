@@ -17,7 +17,7 @@ from carillon.files.paths import cause
 
 CIRCUMSTANCES = {
     *("provenance", "timings", "hcms", "peak_memory_bytes", "ranks", "threads"),
-    *("forest_sha256", "settings"),
+    *("forest_sha256", "settings", "code"),
 }
 """Groups, datasets and attributes that tell where, how fast, from which files and after which wish,
 not what was found."""

@@ -1,0 +1,191 @@
+"""What pages may ask the studio to do: a function a call, which checks what it is given."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from carillon.builtin_names import BUILTIN_PREFIX
+from carillon.errors import UserError
+from carillon.fem.geometry.surface import surface_name
+from sound.project.schema import check, project_schema
+from studio.interface import NotFoundError
+from studio.session import designs
+from studio.session.document import Document, Target, merged
+from studio.session.examples import EXAMPLES
+from studio.session.projects import fit_name, opened
+from studio.session.state import StudioState
+
+
+def open_mesh(state: StudioState, mesh: str, unit: float = 1.0) -> None:
+    """Begin with a mesh: `builtin:NAME`, or one that was uploaded."""
+    file = mesh if mesh.startswith(BUILTIN_PREFIX) else state.meshes.get(mesh)
+    if file is None:
+        raise NotFoundError(f"there is no mesh {mesh!r}; add it again")
+    settings: dict[str, Any] = {"mesh": file}
+    if unit != 1.0:
+        settings["unit"] = unit
+    state.open(fit_name(surface_name(file)), Document(settings))
+
+
+def open_project(state: StudioState, project: str) -> None:
+    """Begin with an example (`e1`) or a project of the workspace (`p1`)."""
+    kind, number = project[:1], project[1:]
+    workspace = state.workspace
+    listed = {"e": EXAMPLES, "p": workspace.projects()}.get(kind, ())
+    if not (number.isascii() and number.isdigit() and 1 <= int(number) <= len(listed)):
+        raise NotFoundError(f"there is no project {project!r}; see which ones are listed")
+    if kind == "e":
+        example = EXAMPLES[int(number) - 1]
+        state.open(example.name, example.open(workspace))
+        return
+    name = workspace.projects()[int(number) - 1]
+    document = opened(workspace, name)
+    state.open(name, document)
+    state.saved = state.document
+
+
+def add_target(
+    state: StudioState, vertex: int, name: str | None = None, clip: str | None = None
+) -> None:
+    """Place a target on a vertex of the surface."""
+    document = state.document
+    _require_free(state, vertex)
+    named = name if name is not None else _free_name(document)
+    target = Target(named, vertex=vertex, clip=_file(state, clip))
+    changed = replace(document, targets=(*document.targets, target))
+    state.do(f"add target {named}", changed)
+
+
+def change_target(state: StudioState, target: str, **changes: Any) -> None:
+    """Change keys of a target."""
+    document = state.document
+    before = document.target(target)
+    if "clip" in changes:
+        changes["clip"] = _file(state, changes["clip"])
+        if changes["clip"] != before.clip:
+            changes.setdefault("without", ())
+    if changes.get("vertex") is not None:
+        _require_free(state, changes["vertex"], target)
+        changes["at"] = None
+    if "without" in changes:
+        changes["without"] = tuple(changes["without"])
+    changed = document.with_target(target, replace(before, **changes))
+    state.do(f"change target {target}", changed)
+
+
+def remove_target(state: StudioState, target: str) -> None:
+    """Remove a target."""
+    changed = state.document.with_target(target, None)
+    state.do(f"remove target {target}", changed)
+
+
+def change_settings(state: StudioState, settings: Mapping[str, Any]) -> None:
+    """Change keys of the project but its targets."""
+    schema = project_schema()
+    parts = {k: v for k, v in schema["properties"].items() if k not in ("mesh", "targets")}
+    check(settings, {**schema, "properties": parts, "required": []})
+    if settings.get("forest") is not None:
+        state.workspace.path(settings["forest"])
+    document = state.document
+    changed = replace(document, settings=merged(document.settings, settings))
+    state.do("change settings", changed)
+
+
+def undo(state: StudioState) -> None:
+    """Undo the last step."""
+    state.move(forwards=False)
+
+
+def redo(state: StudioState) -> None:
+    """Do again what was undone."""
+    state.move(forwards=True)
+
+
+def forget_material(state: StudioState) -> None:
+    """Go back to the uniform material."""
+    state.do("forget material", replace(state.document, material=None))
+
+
+def fine(state: StudioState, on: bool) -> None:
+    """Show the fine solid, or the one of the search."""
+    state.shows_fine = bool(on)
+    state.changed_and_woken()
+
+
+def keep(state: StudioState) -> None:
+    """Keep the present material as A, and go on with B."""
+    document = state.document
+    if document.mesh is None:
+        raise UserError("there is no solid yet whose material could be kept; open one first")
+    kept = replace(document, kept=document.material, heard="B")
+    state.do("keep material", kept)
+
+
+def swap(state: StudioState) -> None:
+    """Exchange the materials A and B."""
+    document = state.document
+    if document.heard is None:
+        raise UserError("no material is kept yet; keep one first")
+    other = "B" if document.heard == "A" else "A"
+    swapped = replace(document, material=document.kept, kept=document.material, heard=other)
+    state.is_searching = False
+    state.do("swap materials", swapped)
+
+
+HANDLERS: Mapping[str, Callable[..., Awaitable[None] | None]] = {
+    "open_mesh": open_mesh,
+    "open_project": open_project,
+    "save": designs.save,
+    "add_target": add_target,
+    "change_target": change_target,
+    "remove_target": remove_target,
+    "change_settings": change_settings,
+    "optimise": StudioState.begin_search,
+    "stop": StudioState.stop_search,
+    "undo": undo,
+    "redo": redo,
+    "forget_material": forget_material,
+    "fine": fine,
+    "keep": keep,
+    "swap": swap,
+}
+"""Functions of a state and the call's keys, by the name of the call in `studio.server.calls`."""
+
+
+async def handle(state: StudioState, name: str, arguments: Mapping[str, Any]) -> None:
+    """Do what a page asks for.
+
+    Raises
+    ------
+    UserError
+        If that cannot be done, with one sentence.
+    """
+    under_way = HANDLERS[name](state, **arguments)
+    if under_way is not None:
+        await under_way
+
+
+def _file(state: StudioState, clip: str | None) -> str | None:
+    return None if clip is None else state.clips.named(clip).file
+
+
+def _require_free(state: StudioState, vertex: int, target: str | None = None) -> None:
+    """Refuse a vertex that the surface has not, or that another target is at."""
+    bench = state.solid
+    count = None if bench.news is None else bench.news.vertices
+    if count is None:
+        raise UserError("there is no solid yet to place a target on; open one first")
+    if not isinstance(vertex, int) or not 0 <= vertex < count:
+        raise UserError(f"there is no vertex {vertex!r}, the surface has {count:,} of them")
+    for other in state.document.targets:
+        strike = bench.strikes.get(other.name)
+        taken = other.vertex if strike is None else strike.vertex
+        if taken == vertex and other.name != target:
+            raise UserError(f"the target {other.name!r} is at this point; choose another")
+
+
+def _free_name(document: Document) -> str:
+    names = {target.name for target in document.targets}
+    return next(name for k in range(1, 1000) if (name := f"target {k}") not in names)

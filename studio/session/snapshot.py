@@ -1,0 +1,93 @@
+"""The state of a studio as pages are told it, and as it is kept between two runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+from carillon.fem.geometry.builtin import BUILTINS
+from sound.project.schema import project_schema, with_defaults
+from studio.session.examples import EXAMPLES
+from studio.session.restoring import kept, restored, restored_name
+from studio.session.state import StudioState
+
+
+def state_event(state: StudioState) -> dict[str, Any]:
+    """The event `state`, as docs/contributing/studio.md describes it."""
+    document, news = state.document, state.solid.news
+    settings = with_defaults({**document.settings, "targets": []}, project_schema())
+    return {
+        "event": "state",
+        "revision": state.revision,
+        "name": state.name,
+        "saved": state.saved == document,
+        "workspace": state.workspace.folder.name,
+        "undo": state.history.undo_name,
+        "redo": state.history.redo_name,
+        "solid": None if news is None else asdict(news),
+        "targets": [_target(state, each.name) for each in document.targets],
+        "clips": state.clips.state(),
+        "wanted": state.solid.wanted,
+        "settings": {k: v for k, v in settings.items() if k not in ("mesh", "targets")},
+        "search": {"phase": _search_phase(state), "message": state.message},
+        "fine": {"on": state.shows_fine, "phase": state.fine_phase, "message": None},
+        "heard": document.heard,
+        "builtins": sorted(BUILTINS),
+        "examples": [
+            {"project": f"e{number}", "name": each.name, "says": each.says}
+            for number, each in enumerate(EXAMPLES, start=1)
+        ],
+        "projects": [
+            {"project": f"p{number}", "name": name}
+            for number, name in enumerate(state.workspace.projects(), start=1)
+        ],
+    }
+
+
+def _search_phase(state: StudioState) -> str:
+    """That of the search; one that waits for the solid or for clips is starting, too."""
+    is_waiting = state.is_searching and state.search.phase == "idle"
+    return "starting" if is_waiting else state.search.phase
+
+
+def _target(state: StudioState, name: str) -> dict[str, Any]:
+    target, strike = state.document.target(name), state.solid.strikes.get(name)
+    clip = None if target.clip is None else state.clips.add(target.clip).identifier
+    return {
+        "name": name,
+        "vertex": target.vertex if strike is None else strike.vertex,
+        "position_m": None if strike is None else strike.position.tolist(),
+        "clip": clip,
+        "modes": target.modes,
+        "allow_clipped": target.allow_clipped,
+        "without": list(target.without),
+    }
+
+
+def session_of(state: StudioState) -> dict[str, Any]:
+    """What a studio goes on with when it is started again."""
+    return {
+        "name": state.name,
+        "saved": state.saved == state.document,
+        "searching": state.is_searching,
+        "fine": state.shows_fine,
+        "history": kept(state.history, state.workspace),
+    }
+
+
+def restore(state: StudioState, session: Mapping[str, Any]) -> None:
+    """Let a studio go on with what `session_of` returned.
+
+    Raises
+    ------
+    OutsideError
+        If it names files outside of the workspace.
+    LookupError, TypeError, ValueError, AttributeError, ArithmeticError, UserError
+        If it is none.
+    """
+    name, history = restored_name(session["name"]), restored(session["history"], state.workspace)
+    saved, fine = bool(session["saved"]), bool(session["fine"])
+    state.is_searching = bool(session["searching"])
+    state.name, state.shows_fine = name, fine
+    state.history, state.saved = history, history.document if saved else None

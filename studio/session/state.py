@@ -1,0 +1,202 @@
+"""What a studio is about: the document, what computes, and who is told of it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from carillon.errors import UserError
+from studio.session.autosave import Autosave
+from studio.session.document import Document
+from studio.session.history import History
+from studio.session.listening import Clips
+from studio.session.pages import Pages
+from studio.session.searching import Live, Searching
+from studio.session.solid_client import SolidClient
+from studio.session.workspace import Workspace
+
+SAVED_SECONDS = 2.0
+"""Time within which a material that a search has found is saved."""
+Told = Callable[["StudioState"], dict[str, Any]]
+"""What is told of a state: to pages, or to the file of the session."""
+_OF_VOXELS = ("mesh", "unit", "resolution", "fill", "components", "discretisation")
+"""Keys of a project whose change makes other voxels, for which no former material is one."""
+_OF_COORDINATES = ("dimensions", "law", "poisson_bounds")
+"""Keys of its material whose change makes coordinates mean something else."""
+
+
+class StudioState:
+    """State that the calls of the page change and that `Reconciler` brings solid and sound to.
+
+    Parameters
+    ----------
+    event, session
+        What pages are told of the state, and what is kept of it; see `studio.session.snapshot`.
+
+    Attributes
+    ----------
+    workspace, name
+        The studio's folder, and the name of the project.
+    history
+        The document, with undo and redo.
+    meshes
+        Files of uploaded meshes by identifier.
+    saved
+        The document as it was saved last.
+    solid, clips, search
+        What computes.
+    shows_fine, is_searching
+        Whether the fine solid is to be shown, and whether a search is to go on.
+    fine_phase
+        Of the fine solid: `none`, `working` or `ready`.
+    message
+        Why there is no search, if there was to be one.
+    live
+        The newest material of a search that goes on.
+    is_finishing
+        Whether a design is being made of what a stopped search has found.
+    revision
+        Number of changes that pages were told.
+    woken, improved
+        Set when the document has changed, and when `live` has.
+    """
+
+    def __init__(
+        self, workspace: Workspace, name: str, document: Document, event: Told, session: Told
+    ) -> None:
+        self.workspace, self.name = workspace, name
+        self.history = History(document)
+        self.meshes: dict[str, str] = {}
+        self.saved: Document | None = document
+        self.shows_fine = self.is_searching = self.is_finishing = False
+        self.fine_phase = "none"
+        self.message: str | None = None
+        self.live: Live | None = None
+        self.revision = 0
+        self.woken, self.improved = asyncio.Event(), asyncio.Event()
+        self.pages = Pages(lambda: event(self), self._history_event)
+        self.autosave = Autosave(lambda: session(self), workspace.write_session)
+        self.solid = SolidClient(workspace.folder, self.changed)
+        self.clips = Clips(workspace.path, self.changed_and_woken)
+        self.search = Searching(self._progressed, self._found)
+        self._phase = self.search.phase
+
+    @property
+    def document(self) -> Document:
+        """What is designed."""
+        return self.history.document
+
+    # Telling.
+
+    def changed(self) -> None:
+        """Tell all pages the state, and save it soon."""
+        self.revision += 1
+        self._phase = self.search.phase
+        self.pages.tell_state()
+        self.autosave.soon()
+
+    def changed_and_woken(self) -> None:
+        """Tell all pages the state, and bring solid, clips and search to the document."""
+        self.changed()
+        self.woken.set()
+
+    def _history_event(self) -> dict[str, Any]:
+        return {"event": "history", "rows": self.search.rows}
+
+    def _progressed(self, news: dict[str, Any]) -> None:
+        if self._phase != self.search.phase:
+            self.changed()
+        self.pages.tell({"event": "progress", **news})
+
+    def _found(self, live: Live) -> None:
+        """Take up a better material of a search."""
+        self.live = live
+        self.history.replace(replace(self.document, material=live.material))
+        self.autosave.soon(SAVED_SECONDS)
+        self.improved.set()
+
+    # Editing.
+
+    def do(self, name: str, document: Document) -> None:
+        """Go on to another document; a search that goes on begins anew with it."""
+        document.require_sound(self.workspace.folder)
+        self.break_off()
+        self.history.do(name, self._with_materials_of_its_own(document))
+        self._edited()
+
+    def move(self, forwards: bool) -> None:
+        """Redo or undo."""
+        self.is_searching = False
+        self.break_off()
+        if not (self.history.redo() if forwards else self.history.undo()):
+            raise UserError(f"there is nothing to {'redo' if forwards else 'undo'}")
+        self._edited()
+
+    def open(self, name: str, document: Document) -> None:
+        """Begin with another project."""
+        document.require_sound(self.workspace.folder)
+        self.is_searching = False
+        self.break_off()
+        self.name, self.shows_fine = name, False
+        self.search.forget()
+        self.pages.tell_history()
+        self.history.do(f"open {name}", document)
+        self._edited()
+
+    def _edited(self) -> None:
+        news = self.solid.news
+        if news is not None and news.phase in ("reading", "preparing"):
+            if news.mesh != self.document.mesh:
+                self.solid.end()
+        self.changed_and_woken()
+
+    def _with_materials_of_its_own(self, document: Document) -> Document:
+        """An edited document without materials of another solid, which mean nothing on it."""
+        before = self.document
+        solid, former = (
+            {key: each.settings.get(key) for key in _OF_VOXELS} for each in (document, before)
+        )
+        if solid != former:
+            return replace(document, material=None, kept=None, heard=None)
+        law, known = ({**each.settings.get("material", {})} for each in (document, before))
+        if any(law.get(key) != known.get(key) for key in _OF_COORDINATES):
+            if document.material is not None and document.material.design is None:
+                document = replace(document, material=None)
+            if document.kept is not None and document.kept.design is None:
+                document = replace(document, kept=None, heard=None)
+        return document
+
+    # Searching.
+
+    def begin_search(self) -> None:
+        """Search from now on, as soon as the solid and the clips are ready."""
+        if self.is_searching:
+            return
+        if not any(target.clip for target in self.document.targets):
+            raise UserError("no target has a clip yet; place one and drop a clip on it")
+        self.is_searching = True
+        self.history.do("optimise", self.document)
+        self.changed_and_woken()
+
+    def stop_search(self) -> None:
+        """End the search at once; what it has found stays, and is made a design."""
+        self.is_searching = False
+        self.is_finishing = self.search.phase != "idle"
+        self.search.break_off()
+        self.changed()
+
+    def break_off(self) -> None:
+        """End a search that goes on; its best material is that of the document by now."""
+        self.message = self.live = None
+        self.is_finishing = False
+        if self.search.phase != "idle":
+            self.search.break_off()
+
+    def give_up_search(self, sentence: str) -> None:
+        """Tell why there is no search, and want none any more."""
+        if self.is_searching:
+            self.is_searching, self.message = False, sentence
+        self.changed()
+        self.pages.say(sentence, "error")
