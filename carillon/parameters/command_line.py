@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
-from carillon.parameters.fields import ValueDomain, Parameter, domain_of, parameters_of
+from carillon.parameters.fields import Parameter, ValueDomain, domain_of, parameters_of
 from carillon.parameters.model import REQUIRED, adapter
 
 T = TypeVar("T")
