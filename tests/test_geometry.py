@@ -7,6 +7,7 @@ import pytest
 import trimesh
 from scipy import ndimage
 
+from carillon.drawing.solid import draw, guess_up
 from carillon.errors import UserError
 from carillon.fem.geometry import (
     BUILTINS,
@@ -21,7 +22,6 @@ from carillon.fem.geometry import (
 )
 from carillon.fem.geometry.blocks import parts_of_patterns
 from carillon.fem.geometry.faces import face_neighbours, surface_quads
-from carillon.fem.geometry.picture import draw, guess_up
 from carillon.fem.geometry.topology import is_simple, thin_to
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 {z}\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"

@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.io import wavfile
 
+from carillon.drawing.solid import draw, mark
 from carillon.fem.geometry import HexMesh
-from carillon.fem.geometry.picture import draw, mark
 from carillon.files.atomic import atomic_path
 from solver.response.response import FLOOR_DECIBELS, SAMPLE_RATE_HERTZ, decibels, spectrogram
 from studies.base.colours import MUTED, themed

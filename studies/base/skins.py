@@ -6,8 +6,8 @@ import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
 
+from carillon.drawing.solid import Skin
 from carillon.fem.finite_cells.model import FiniteCellModel
-from carillon.fem.geometry.picture import Skin
 from carillon.fem.model import Solid
 from solver.response.contact import interpolation
 

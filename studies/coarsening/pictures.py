@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.drawing.solid import VIEW, draw, guess_up, looks_at
 from carillon.fem.geometry import HexMesh
-from carillon.fem.geometry.picture import VIEW, draw, guess_up, looks_at
 from studies.base.cases import Case
 from studies.base.media import COLOUR_MAP, cropped, embedded, solid_picture
 from studies.coarsening.picture_file import ModePicture, read_pictures

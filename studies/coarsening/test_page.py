@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from carillon.fem.geometry.picture import looks_at
+from carillon.drawing.solid import looks_at
 from studies.base.cases import Case, cases_of
 from studies.base.table import read_table
 from studies.coarsening.pictures import best_view

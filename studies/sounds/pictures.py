@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.drawing.solid import guess_up, looks_at, view_of
 from carillon.fem.geometry import HexMesh, hexmesh_from_grid
-from carillon.fem.geometry.picture import guess_up, looks_at, view_of
 from sound.project.design import Design
 from studies.base.colours import COLOURS
 from studies.base.media import COLOUR_MAP, Pixels, cropped, marked_picture

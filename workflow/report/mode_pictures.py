@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from carillon.drawing.solid import DRAWN_AMPLITUDE, Skin, draw, guess_up
 from carillon.fem.geometry import HexMesh
 from carillon.fem.geometry.faces import surface_quads
-from carillon.fem.geometry.picture import DRAWN_AMPLITUDE, Skin, draw, guess_up
 from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import ModesFile, read_modes
 from studies.base.media import cropped, save_pixels, solid_picture
@@ -98,7 +98,7 @@ def aligned(
 def view_of(mesh: HexMesh, motion: Array, skin: Skin | None = None) -> dict[str, Any]:
     """How all pictures of one mode are drawn, decided by the truth's `mesh` and `motion` (n, 3).
 
-    Arguments of `carillon.fem.geometry.picture.draw`. Colours end at the largest motion that can be
+    Arguments of `carillon.drawing.solid.draw`. Colours end at the largest motion that can be
     seen: inside, a body may move more than its surface does.
     """
     seen = motion[np.unique(surface_quads(mesh))] if skin is None else skin.seen(motion)

@@ -7,7 +7,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
-from carillon.fem.geometry.picture import draw
+from carillon.drawing.solid import draw
 from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import read_modes
 from studies.base.colours import COLOURS, MUTED

@@ -7,8 +7,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from carillon.drawing.solid import Skin
 from carillon.fem.geometry import load_surface
-from carillon.fem.geometry.picture import Skin
 from carillon.fem.model import Solid
 from solver.files.modes_file import CHECKS, FINE_TAKEN, ModesFile, read_modes
 from studies.base.conditions import Record

@@ -10,8 +10,8 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from carillon.drawing.solid import Skin, draw, guess_up, view_of
 from carillon.fem.geometry import HexMesh
-from carillon.fem.geometry.picture import Skin, draw, guess_up, view_of
 from solver.response.contact import Contact
 from studies.base.colours import COLOURS
 from studies.base.media import COLOUR_MAP, Pixels, cropped, marked_picture, solid_picture

@@ -1,0 +1,1 @@
+"""Pictures by matplotlib: the formats of their files, solids and their modes."""
