@@ -1,15 +1,39 @@
-"""Carillon's common ground: what every room needs and no room owns.
+"""`import carillon as ca`: modes of solids and sounds from them, by the names of `carillon.api`.
 
-Errors meant for the user, commands and options, atomic HDF5 files, provenance, progress, the check
-of the numerical runtime (BLAS, threads), and the finite element (`fem`), on which all else rests.
+Beside these, the packages in here are the common ground of all rooms: commands and options, files,
+provenance, processes with their threads and ranks, and the finite element (`fem`).
 """
 
 import os as _os
+from typing import TYPE_CHECKING
 
+from carillon import lazy_exports as _lazy_exports
 from carillon.processes import kernel_cache as _kernel_cache
 from carillon.processes import mpi_environment as _mpi_environment
 from carillon.processes import openblas as _openblas
 from carillon.processes import present_folder as _present_folder
+
+if TYPE_CHECKING:
+    from carillon.api import (
+        Design,
+        Forests,
+        Material,
+        Mesh,
+        Solution,
+        audit,
+        coarsen,
+        compare,
+        design,
+        extract,
+        generate,
+        load_mesh,
+        read,
+        render,
+        solve,
+        train,
+        write_wav,
+    )
+    from carillon.errors import ConvergenceError, UserError
 
 # Before anything loads numpy, and with it OpenBLAS, or numba, or MPI.
 _openblas.configure(_os.environ)
@@ -20,7 +44,38 @@ _mpi_environment.leave_lonely_step(_os.environ)
 _mpi_environment.start_without_daemon(_os.environ)
 _mpi_environment.stay_apart(_os.environ, _os.getpid())
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "studio", "workflow", "studies")
 """Packages of the project; each imports those before it."""
+
+_ERRORS = ("ConvergenceError", "UserError")
+__all__ = [
+    "ConvergenceError",
+    "Design",
+    "Forests",
+    "Material",
+    "Mesh",
+    "Solution",
+    "UserError",
+    "audit",
+    "coarsen",
+    "compare",
+    "design",
+    "extract",
+    "generate",
+    "load_mesh",
+    "read",
+    "render",
+    "solve",
+    "train",
+    "write_wav",
+]
+
+__getattr__ = _lazy_exports.exports(
+    __name__, {name: "errors" if name in _ERRORS else "api" for name in __all__}
+)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

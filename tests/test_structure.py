@@ -18,6 +18,9 @@ import studies
 CHECKOUT = Path(__file__).resolve().parent.parent
 ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "studio", "workflow", "studies")
 
+SURFACE = "carillon.api"
+"""What users import; it names things as they do."""
+
 EVERYBODY = (
     "carillon",
     "carillon.command_line",
@@ -77,11 +80,13 @@ def study_of(module: str) -> str | None:
 def arrows() -> dict[str, set[str]]:
     """Packages that each package imports; studies are told apart by `study_of`.
 
-    `carillon` itself prepares the process before anything is loaded, so it is left out.
+    `carillon` itself prepares the process before anything is loaded, so it is left out, and the
+    public surface is where all comes together.
     """
     found: dict[str, set[str]] = {}
     for module in modules():
-        if module != "carillon" and not module.endswith(".__main__") and not study_of(module):
+        apart = module in ("carillon", SURFACE) or module.endswith(".__main__")
+        if not apart and not study_of(module):
             others = {package_of(name) for name in imported(module)}
             found.setdefault(package_of(module), set()).update(others)
     return {package: others - {package} for package, others in found.items()}
@@ -148,9 +153,15 @@ def test_nothing_of_the_product_imports_a_study():
     assert found == set()
 
 
+def test_nothing_imports_the_public_surface():
+    assert [name for name in modules() if SURFACE in imported(name)] == ["carillon"]
+
+
 def test_public_class_names_are_told_apart():
     named: dict[str, list[str]] = {}
     for name, path in modules().items():
+        if name == SURFACE:
+            continue
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 named.setdefault(node.name, []).append(name)

@@ -191,15 +191,25 @@ def read_elastic(path: str | Path) -> ModesFile:
     UserError
         See `read_modes`; or if there is none, or one at zero frequency.
     """
-    file = read_modes(path)
+    return require_elastic(read_modes(path), path)
+
+
+def require_elastic(file: ModesFile, name: str | Path) -> ModesFile:
+    """The contents of a file, `name` in messages, if they hold elastic modes.
+
+    Raises
+    ------
+    UserError
+        If there is none, or one at zero frequency.
+    """
     if len(file.eigenvalues) <= RIGID_MODES:
         raise UserError(
-            f"{path}: holds {len(file.eigenvalues)} modes, of which {RIGID_MODES} are rigid; "
+            f"{name}: holds {len(file.eigenvalues)} modes, of which {RIGID_MODES} are rigid; "
             "compute more"
         )
     if file.eigenvalues[RIGID_MODES] <= 0.0:
         raise UserError(
-            f"{path}: more than {RIGID_MODES} of its modes have frequency zero, as of a solid that "
+            f"{name}: more than {RIGID_MODES} of its modes have frequency zero, as of a solid that "
             "hangs on a hinge; repair the mesh and compute them again"
         )
     return file

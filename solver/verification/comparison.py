@@ -15,7 +15,7 @@ from carillon.fem.geometry import blocks_with_coarse, prolongation
 from carillon.fem.model import RIGID_MODES, ElasticModel
 from carillon.files.atomic import by_stem
 from solver.assembly.sparse import assembled
-from solver.files.modes_file import ModesFile, read_elastic, require_same_solid
+from solver.files.modes_file import ModesFile, read_elastic, require_elastic, require_same_solid
 from solver.response.contact import interpolation
 from solver.subspace.spectrum import clusters
 from solver.verification.errors import AUDIBLE_LAST, eigenvalue_errors, frequency_errors
@@ -39,7 +39,7 @@ class SpectrumComparison:
     Attributes
     ----------
     eigenvalue_relative_error
-        Median, 90th percentile and maximum of |lambda - truth| / truth.
+        Median, 90th percentile and maximum of `|lambda - truth| / truth`.
     frequency_rms_relative_error
         Root mean square over all compared modes.
     frequency_rms_relative_error_7_60, frequency_max_relative_error_7_60
@@ -112,6 +112,14 @@ def compare_each(
         require_same_solid([truth, name], [exact, candidate])
         comparisons[label] = _compared(name, candidate, str(truth), exact, matrix)
     return comparisons
+
+
+def compare_modes(candidate: ModesFile, truth: ModesFile) -> SpectrumComparison:
+    """Compare the contents of two modes files; errors are those of `compare_files`."""
+    names = ("candidate", "truth")
+    files = [require_elastic(file, name) for file, name in zip((candidate, truth), names)]
+    require_same_solid(names[::-1], files[::-1])
+    return _compared(names[0], candidate, names[1], truth, assembled(truth.model)[1])
 
 
 def _compared(

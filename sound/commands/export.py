@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING
 
 from carillon.command_line.arguments import whole_number
 from carillon.command_line.options import REQUIRED, add_options, collect, option
-from carillon.errors import UserError
 from sound.commands.damping_options import DampingOptions
+from sound.export.formats import FORMATS, format_of
 
 if TYPE_CHECKING:  # Its import takes long, and `--help` needs none.
     from sound.project.design import Design
 
-FORMATS = ("h5", "gltf", "glb", "dsp", "npy")
 MOST_POINTS = 10_000
 """To strike in a Faust program, each of which is an entry of its menu."""
 
@@ -46,29 +45,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the file and say what it holds."""
+    from sound.export.formats import export_design
     from sound.outputs import require_output
     from sound.project.design_file import read_design
 
     options = collect(ExportOptions, arguments)
-    kind = _format(options.out, options.format)
+    kind = format_of(options.out, options.format)
     require_output(options.out, [Path(options.out).suffix.lower()], [options.design])
     design = read_design(options.design).damped_by(collect(DampingOptions, arguments).damping_from)
-    if kind == "h5":
-        from sound.export.embedded import write_embedded  # Loaded if needed: some take long.
-
-        write_embedded(options.out, design, {"design": options.design})
-    elif kind == "dsp":
-        from sound.export.faust import write_faust
-
-        write_faust(options.out, design, options.points)
-    elif kind == "npy":
-        from sound.export.moduli import write_moduli
-
-        write_moduli(options.out, design)
-    else:
-        from sound.export.gltf import write_gltf
-
-        write_gltf(options.out, design, binary=kind == "glb")
+    export_design(options.out, design, kind, options.points, options.design)
     print(f"{options.out}: {_content(kind, design)}, {Path(options.out).stat().st_size:,} bytes")
     return 0
 
@@ -82,18 +67,3 @@ def _content(kind: str, design: Design) -> str:
         )
     hertz = design.frequencies
     return f"{len(hertz)} modes, {hertz[0]:.4g} to {hertz[-1]:.4g} Hz"
-
-
-def _format(out: str, named: str | None) -> str:
-    """What is written: as named, or as the ending tells; the two must not contradict each other."""
-    ending = Path(out).suffix.lstrip(".").lower()
-    if named is not None and ending in FORMATS and ending != named:
-        raise UserError(
-            f"--out {out}: ends in .{ending}, but --format is {named}; leave one of them"
-        )
-    if named is None and ending not in FORMATS:
-        raise UserError(
-            f"--out {out}: the ending tells no format, expected one of .{', .'.join(FORMATS)}; or "
-            "name it by --format"
-        )
-    return named or ending

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from carillon.errors import UserError
 from carillon.fem.model import Solid
 from carillon.files.hdf5 import kind_of
-from solver.files.modes_file import read_modes
+from solver.files.modes_file import ModesFile, read_modes
 from solver.response.response import Damping
 from sound.project.design import Design
 from sound.project.design_file import read_design
@@ -98,14 +98,22 @@ def open_heard_solid(
     if has_modes and not like:
         if damping_from:
             raise UserError("--damping-from goes with a design; modes.h5 takes --damping")
-        modes = read_modes(file)
-        solid = SoundingSolid.of_modes(modes, Damping(*damping) if damping else Damping())
-        return HeardSolid(solid, None, _places_of_model(modes.model))
+        return heard_modes(read_modes(file), Damping(*damping) if damping else Damping())
     design = read_design(like or file).damped_by(damping_from)
-    if has_modes:
-        solid = SoundingSolid.of_truth(read_modes(file), design)
-    else:
+    return heard_design(design, read_modes(file) if has_modes else None)
+
+
+def heard_modes(file: ModesFile, damping: Damping) -> HeardSolid:
+    """The solid of any modes file, with Rayleigh damping."""
+    return HeardSolid(SoundingSolid.of_modes(file, damping), None, _places_of_model(file.model))
+
+
+def heard_design(design: Design, truth: ModesFile | None = None) -> HeardSolid:
+    """A design as its clips are heard, by its own modes or by those of another mesh."""
+    if truth is None:
         solid = SoundingSolid.of_design(design)
+    else:
+        solid = SoundingSolid.of_truth(truth, design)
     return HeardSolid(solid, Listening.of_design(design, solid), _places_of_design(design))
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import trimesh
+from numpy.typing import ArrayLike
 
 from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
@@ -82,6 +83,26 @@ def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
     if unit != 1.0:
         surface.apply_scale(unit)
     return surface
+
+
+def surface_of_triangles(vertices: ArrayLike, faces: ArrayLike, name: str) -> trimesh.Trimesh:
+    """A surface [m] of vertices (v, 3) and triangles (f, 3), checked as those of files are.
+
+    Raises
+    ------
+    UserError
+        If arrays have other shapes or faces name vertices that are not there, and for what
+        `load_surface` refuses of coordinates and faces.
+    """
+    surface = trimesh.Trimesh(np.asarray(vertices), np.asarray(faces), process=False)
+    try:
+        _require_vertices(surface)
+    except ValueError as error:
+        raise UserError(f"{name}: {error}") from None
+    if not len(surface.faces):
+        raise UserError(f"{name}: has no faces, expected the triangles of a surface")
+    _require_solid(name, surface, 1.0)
+    return _turned_alike(name, surface)
 
 
 def surface_name(mesh: str) -> str:

@@ -1,0 +1,842 @@
+"""The public surface: what `import carillon as ca` offers, in one file.
+
+Arrays are float64 and SI.  Everything runs in a plain script, and on the ranks of
+`mpiexec -n RANKS python -m mpi4py SCRIPT`, all of which then call `solve` together: frequencies and
+residuals are on every rank, meshes and shapes on rank 0, which writes the files.
+
+Rooms are loaded by the functions that need them, and nothing below imports this module.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from carillon.errors import UserError
+from carillon.fem import materials
+from carillon.fem.element import DEFAULT_POISSON
+from carillon.fem.geometry import HexMesh, hexmesh_from_voxels, load_surface, surface_name, voxelize
+from carillon.fem.geometry.surface import surface_of_triangles
+from carillon.fem.model import DEFAULT_DENSITY, Constants, Solid, fine_model
+from carillon.limits import require_constants
+
+if TYPE_CHECKING:
+    import trimesh
+    from matplotlib.figure import Figure
+    from mpi4py import MPI
+
+    from forests.model import Model
+    from solver.files.modes_file import ModesFile
+    from solver.verification.audit import Audit
+    from solver.verification.comparison import SpectrumComparison
+    from sound.clips.extraction import ModalSound
+    from sound.project.design import Design as FoundDesign
+    from sound.rendering.heard_solid import HeardSolid
+
+Array = NDArray[np.float64]
+Young = float | str | Array | Callable[[Array], ArrayLike]
+
+DAMPING = (30.0, 1e-6)
+"""Rayleigh damping of a solid that is struck: coefficients of mass [1/s] and of stiffness [s]."""
+SAMPLE_RATE = 44_100
+"""Samples of a sound per second [Hz]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """The surface of a solid, in metres.
+
+    Attributes
+    ----------
+    surface : trimesh.Trimesh
+        Its triangles, turned alike.
+    name
+        For messages and files.
+
+    Examples
+    --------
+    >>> import carillon as ca
+    >>> bar = ca.load_mesh("builtin:bar")
+    >>> bar.name, bar.hexahedra(12).n_cells
+    ('bar', 18)
+    """
+
+    surface: trimesh.Trimesh
+    name: str = "mesh"
+
+    @classmethod
+    def of_triangles(cls, vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> Self:
+        """The surface of vertices (v, 3) [m] and triangles (f, 3).
+
+        Raises
+        ------
+        UserError
+            If it is no surface around a solid.
+        """
+        return cls(surface_of_triangles(vertices, faces, name), name)
+
+    @property
+    def vertices(self) -> Array:
+        """Positions (v, 3) [m]."""
+        return np.asarray(self.surface.vertices)
+
+    @property
+    def faces(self) -> NDArray[np.int64]:
+        """Vertices (f, 3) of the triangles."""
+        return np.asarray(self.surface.faces)
+
+    @property
+    def extents(self) -> Array:
+        """Sides (3,) of the box around it [m]."""
+        return np.asarray(self.surface.extents)
+
+    def hexahedra(self, resolution: int) -> HexMesh:
+        """The voxels inside, `resolution` of them along the longest side.
+
+        Raises
+        ------
+        UserError
+            If they do not hold together.
+        """
+        return hexmesh_from_voxels(voxelize(self.surface, resolution, name=self.name))
+
+
+def load_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
+    """The surface in a mesh file (OBJ, STL, PLY, OFF, glTF), or `builtin:NAME`.
+
+    Parameters
+    ----------
+    unit
+        Metres per unit of the file.
+
+    Raises
+    ------
+    UserError
+        If there is no such mesh, or it is no surface around a solid.
+    """
+    return Mesh(load_surface(str(path), unit), surface_name(str(path)))
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """What a solid is made of.
+
+    Attributes
+    ----------
+    young : float, str, (m,) or (m, 8) array, or function
+        Young's modulus [Pa]: one; the name of a field (`uniform`, `smooth`, `two-region`, `random`,
+        `noise`) or a file of moduli; one for each voxel, or for each of their quadrature points; or
+        a function of the voxels' centres (m, 3) [m] that returns (m,).
+    poisson, density
+        Poisson's ratio and mass density [kg/m^3].
+    damping
+        Rayleigh's coefficients of mass [1/s] and of stiffness [s], for `render`.
+    seed
+        Of the fields that are drawn.
+
+    Examples
+    --------
+    >>> import carillon as ca
+    >>> stiffer_above = ca.Material(lambda centres: 1e9 * (1.0 + centres[:, 2]))
+    >>> ca.Material.named("steel").density
+    7850.0
+    """
+
+    young: Young = 1e9
+    poisson: float = DEFAULT_POISSON
+    density: float = DEFAULT_DENSITY
+    damping: tuple[float, float] = DAMPING
+    seed: int = 0
+
+    @classmethod
+    def named(cls, name: str) -> Self:
+        """A material such as `steel` or `glass`, with its constants and its damping.
+
+        Raises
+        ------
+        UserError
+            If there is none of that name.
+        """
+        from sound.scenes.materials import named_material
+
+        found = named_material(name)
+        return cls(found.young, found.poisson, found.density, (found.alpha, found.beta))
+
+    def moduli(self, mesh: HexMesh) -> Array:
+        """Young's modulus (m,), or (m, 8) if given so, of the voxels of a mesh [Pa].
+
+        Raises
+        ------
+        UserError
+            If a name or a file is unknown; what is wrong with numbers is said when they are used.
+        """
+        if isinstance(self.young, str):
+            return materials.young_modulus(self.young, mesh, self.seed)
+        if callable(self.young):
+            return np.asarray(self.young(mesh.origin + mesh.edge * (mesh.grid + 0.5)), dtype=float)
+        young = np.asarray(self.young, dtype=float)
+        return np.full(mesh.n_cells, young) if young.ndim == 0 else young
+
+
+Given = Material | Young | None
+"""A material as it may be given: what is none is its modulus; of a solid that has one, nothing else
+is then changed."""
+Body = Mesh | HexMesh | Solid | str | Path
+"""A solid as it may be given: a surface or its file, hexahedra, or those with material."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Modes of a solid.
+
+    Attributes
+    ----------
+    eigenvalues, frequencies : (k,)
+        [rad^2/s^2] and [Hz], ascending; the first six are those of rigid motions.
+    residuals : (k,)
+        `|K x - lambda M x| / (lambda |M x|)`.
+    shapes : (k, n, 3)
+        Displacements of the nodes, mass-normalised [kg^-1/2]; None on other ranks than 0.
+    solid
+        The solid, with the material that was solved; None on other ranks than 0.
+    evidence
+        What the solver did and achieved.
+    """
+
+    eigenvalues: Array
+    frequencies: Array
+    residuals: Array
+    shapes: Array | None
+    solid: Solid | None
+    evidence: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def mesh(self) -> HexMesh:
+        """Hexahedra and nodes of the solid."""
+        return self._file().mesh
+
+    def plot(self, mode: int) -> Figure:
+        """A figure of the solid in a mode, counted from 1, rigid ones included.
+
+        Raises
+        ------
+        UserError
+            If there is no such mode.
+        """
+        from matplotlib.figure import Figure
+
+        from carillon.fem.geometry.picture import draw
+
+        if not 1 <= mode <= len(self.frequencies):
+            raise UserError(f"mode {mode}: expected 1 to {len(self.frequencies)}")
+        file = self._file()
+        assert file.modes is not None
+        figure = Figure(figsize=(6.0, 4.5), layout="constrained")
+        axes = figure.add_subplot(projection="3d")
+        draw(axes, file.model.hexmesh, file.modes[:, mode - 1])
+        axes.set_title(f"mode {mode}, {self.frequencies[mode - 1]:.4g} Hz")
+        return figure
+
+    def save(self, path: str | Path) -> None:
+        """Write a modes file, which all commands read.
+
+        Raises
+        ------
+        UserError
+            If it cannot be written.
+        """
+        from solver.files.modes_file import write_modes
+
+        if self.solid is not None:
+            file = self._file()
+            assert file.modes is not None
+            blocks = [file.modes]
+            write_modes(
+                path, file.model, file.eigenvalues, blocks, file.residuals, self.evidence, {}
+            )
+
+    def to_vtu(self, path: str | Path) -> None:
+        """Write mesh, moduli and modes for ParaView; finite cells as cubes with eight nodes.
+
+        Raises
+        ------
+        UserError
+            If it cannot be written.
+        """
+        import meshio
+
+        from carillon.files.atomic import atomic_path
+
+        if self.solid is None or self.shapes is None:
+            return
+        mesh = self.solid.hexmesh
+        corners = mesh.cells[:, [0, 1, 3, 2, 4, 5, 7, 6]]
+        fields = {
+            f"mode {number}, {hertz:.4g} Hz": np.ascontiguousarray(shape)
+            for number, (hertz, shape) in enumerate(zip(self.frequencies, self.shapes), 1)
+        }
+        young = self.solid.young.reshape(len(self.solid.young), -1).mean(axis=1)
+        cells = {"Young's modulus [Pa]": [young]} if len(young) == len(corners) else {}
+        grid = meshio.Mesh(mesh.nodes, [("hexahedron", corners)], fields, cells)
+        with atomic_path(path) as temporary:
+            grid.write(temporary, file_format="vtu")
+
+    def _file(self) -> ModesFile:
+        """What its modes file holds."""
+        from solver.files.modes_file import ModesFile
+
+        if self.solid is None or self.shapes is None:
+            raise UserError("meshes and shapes are on rank 0 alone")
+        modes = self.shapes.transpose(1, 2, 0).reshape(-1, len(self.shapes))
+        values = (self.eigenvalues, self.frequencies, modes, self.residuals)
+        return ModesFile(*values, self.solid, self.evidence, {})
+
+
+def solve(
+    body: Body,
+    material: Given = None,
+    resolution: int = 32,
+    modes: int = 60,
+    method: str = "auto",
+    discretisation: str = "voxel",
+    initial: Solution | None = None,
+    comm: MPI.Comm | None = None,
+    **options: Any,
+) -> Solution:
+    """Lowest modes of a solid; collective.
+
+    Parameters
+    ----------
+    body
+        A surface, or the name of its file; hexahedra; or a solid of `coarsen` or of another
+        solution, which keeps its material unless another is given.
+    material
+        1 GPa everywhere unless given; what is no `Material` is taken as its `young`.
+    resolution
+        Voxels along the longest side, of a surface.
+    modes
+        Number of modes, the six rigid ones included.
+    method
+        `auto`, `lanczos`, `lobpcg` or `hcms`; ground truth by `slepc` or `arpack`.
+    discretisation
+        `voxel`, or `finite-cell`: the solid as it is, by quadratic cells that its surface cuts.
+    initial
+        Modes of a similar material on the same mesh, which are corrected.
+    comm
+        Ranks that share the work; all that were started unless given.
+    options
+        `tolerance`, `linear_solver` and the other options of `carillon modes`, with underscores.
+
+    Raises
+    ------
+    UserError
+        For anything wrong with the solid or the options.
+    ConvergenceError
+        If a tolerance was missed.
+
+    Examples
+    --------
+    >>> import carillon as ca
+    >>> solution = ca.solve("builtin:bar", ca.Material.named("aluminium"), resolution=12, modes=10)
+    >>> solution.frequencies[6:].round(-1).tolist()
+    [1790.0, 2020.0, 3330.0, 5250.0]
+    >>> softer = ca.solve(solution.solid, 0.9 * solution.solid.young, modes=10, initial=solution)
+    >>> bool(abs(softer.frequencies[9] / solution.frequencies[9] - 0.9**0.5) < 1e-6)
+    True
+    """
+    from mpi4py import MPI
+
+    from solver.analysis import library
+    from solver.distribution.collective import compute_on_root
+
+    ranks = MPI.COMM_WORLD if comm is None else comm
+    solid = compute_on_root(ranks, lambda: _solid(body, material, resolution, discretisation))
+    start = None if initial is None or initial.shapes is None else initial._file().modes
+    found = library.solve(
+        solid, modes=modes, initial_modes=start, comm=ranks, method=method, **options
+    )
+    evidence = {"method": method, **found.evidence, "timings": found.seconds}
+    values = (found.eigenvalues, found.frequencies, found.residuals)
+    return Solution(*values, _shapes(found.modes), solid, evidence)
+
+
+def coarsen(
+    body: Body,
+    material: Given = None,
+    resolution: int = 32,
+    method: str = "ddfem",
+    forests: Forests | str | Path | None = None,
+) -> Solid:
+    """A solid of up to eight times fewer elements, one for each 2x2x2 block of voxels.
+
+    Parameters
+    ----------
+    body, material, resolution
+        See `solve`; a solid with material must be one of voxels.
+    method
+        `ddfem`, by regression forests; `average` or `galerkin`; `fit`, what the forests learned.
+    forests
+        For `ddfem`: those that come along unless given.
+
+    Raises
+    ------
+    UserError
+        For anything wrong with the solid, or forests for another Poisson's ratio.
+
+    Examples
+    --------
+    >>> import carillon as ca
+    >>> fine = ca.solve("builtin:bar", "two-region", resolution=16, modes=10)
+    >>> coarse = ca.solve(ca.coarsen("builtin:bar", "two-region", resolution=16), modes=10)
+    >>> coarse.mesh.n_cells, fine.mesh.n_cells
+    (16, 72)
+    >>> bool(ca.compare(coarse, fine).frequency_rms_relative_error < 0.2)
+    True
+    """
+    from solver.coarsening.choice import make_coarsening
+    from solver.coarsening.model import build_model
+
+    fine = _solid(body, material, resolution, "voxel")
+    file = forests.path if isinstance(forests, Forests) else forests
+    coarsening = make_coarsening(method, fine.poisson, file)
+    young = fine.young[:, 0] if fine.young.ndim > 1 else fine.young
+    constants: Constants = {"poisson": fine.poisson, "density": fine.density}
+    return build_model(fine.mesh, young, coarsening, **constants)
+
+
+def read(path: str | Path) -> Solution | Design:
+    """The modes in a modes file, or the design in a design file.
+
+    Raises
+    ------
+    UserError
+        If the file is missing, damaged or of another kind.
+    """
+    from carillon.files.hdf5 import kind_of
+    from solver.files.modes_file import read_modes
+    from sound.project.design_file import read_design
+
+    if kind_of(path, "a Carillon modes or design file (HDF5)")[0] == "design":
+        return Design(read_design(path))
+    file = read_modes(path)
+    values = (file.eigenvalues, file.frequencies, file.residuals)
+    return Solution(*values, _shapes(file.modes), file.model, file.attributes)
+
+
+def compare(solution: Solution, truth: Solution) -> SpectrumComparison:
+    """How far a spectrum is from another that is taken for the truth, on any two meshes.
+
+    Raises
+    ------
+    UserError
+        If they are of other solids, or one has no elastic modes.
+    """
+    from solver.verification.comparison import compare_modes
+
+    return compare_modes(solution._file(), truth._file())
+
+
+def audit(solution: Solution | str | Path, tolerance: float = 1e-6) -> Audit:
+    """Check a spectrum by itself: residuals, orthogonality, and a count by inertia.
+
+    K and M are assembled anew; `faults` of what is returned says what is wrong, a sentence each.
+
+    Parameters
+    ----------
+    solution
+        Or a modes file.
+    tolerance
+        Relative error that the eigenvalues were asked for to.
+
+    Raises
+    ------
+    UserError
+        If the file is unusable.
+
+    Examples
+    --------
+    >>> import carillon as ca
+    >>> found = ca.audit(ca.solve("builtin:box", resolution=8, modes=12))
+    >>> found.faults, found.counted == found.expected
+    ([], True)
+    """
+    from solver.files.modes_file import read_modes
+    from solver.verification import audit as audits
+
+    file = solution._file() if isinstance(solution, Solution) else read_modes(solution)
+    return audits.audit(file, tolerance)
+
+
+def render(
+    source: Solution | Design | str | Path,
+    at: ArrayLike | None = None,
+    *,
+    target: str | None = None,
+    strength: ArrayLike = 1.0,
+    times: ArrayLike = 0.0,
+    seconds: float | None = None,
+    rate: int = SAMPLE_RATE,
+    contact_seconds: float = 0.0,
+    damping: tuple[float, float] = DAMPING,
+) -> Array:
+    """Samples (s,) of the sound of one strike or of many.
+
+    Those of a design are of full scale as its clips; those of a solution are scaled to 1 dB below.
+
+    Parameters
+    ----------
+    source
+        Modes, a design, or the file of either.
+    at : (3,) or (p, 3)
+        Points of the surface that are struck [m]; of a design in the unit of its mesh.
+    target
+        Of a design: the target whose point is struck, in place of `at`.
+    strength : float or (p,)
+        Impulse along the inward normal [N s].
+    times : float or (p,)
+        When [s].
+    seconds
+        Length; until all has decayed unless given.
+    rate
+        Samples per second [Hz].
+    contact_seconds
+        Duration of the force, half a sine; 0 is an impulse.
+    damping
+        Of a solution: Rayleigh's coefficients of mass [1/s] and of stiffness [s].
+
+    Raises
+    ------
+    UserError
+        If a point is far from the surface, a target unknown, or nothing sounds.
+
+    Examples
+    --------
+    >>> import carillon as ca
+    >>> bar = ca.solve("builtin:bar", resolution=12, modes=12)
+    >>> samples = ca.render(bar, bar.mesh.nodes[0], seconds=0.5)
+    >>> samples.shape, float(abs(samples).max().round(2))
+    ((22050,), 0.89)
+    """
+    from sound.clips.wav import PEAK
+    from sound.rendering.render import Hit, ringing_seconds
+    from sound.rendering.render import render as rendered
+    from sound.rendering.strike_list import Point
+
+    heard = _heard(source, damping)
+    if (at is None) == (target is None):
+        raise UserError("expected at, the points that are struck, or target, the name of one")
+    points = [Point(target=target)]
+    if at is not None:
+        places = np.asarray(at, dtype=float).reshape(-1, 3).tolist()
+        points = [Point(at=(x, y, z)) for x, y, z in places]
+    found = heard.places([("at", point) for point in points])
+    count = len(points)
+    hits = [
+        Hit(float(begin), position, float(impulse) * inward, distance)
+        for begin, impulse, (position, inward, distance) in zip(
+            np.broadcast_to(np.asarray(times, dtype=float), count),
+            np.broadcast_to(np.asarray(strength, dtype=float), count),
+            found,
+        )
+    ]
+    length = seconds or max(hit.seconds for hit in hits) + ringing_seconds(heard.solid)
+    samples = rendered(heard.solid, hits, length, rate, contact_seconds, heard.listening)
+    peak = float(np.abs(samples).max(initial=0.0))
+    return samples * (PEAK / peak) if heard.listening is None and peak > 0.0 else samples
+
+
+def write_wav(path: str | Path, samples: ArrayLike, rate: int = SAMPLE_RATE) -> None:
+    """Write samples (s,), full scale being 1, as a sound file.
+
+    Raises
+    ------
+    UserError
+        If it cannot be written, or its name does not end in .wav.
+    """
+    from sound.clips.wav import write_wav as write
+
+    write(path, np.asarray(samples, dtype=float), rate)
+
+
+def extract(
+    clip: str | Path | ArrayLike, rate: int = SAMPLE_RATE, modes: int | None = None
+) -> ModalSound:
+    """Frequencies, dampings and amplitudes of the modes that the recording of a strike holds.
+
+    Parameters
+    ----------
+    clip
+        A sound file, or samples (s,) at `rate` [Hz].
+    modes
+        Number of modes to keep, those with most energy; all that are found unless given.
+
+    Raises
+    ------
+    UserError
+        If the clip is unusable or has no modes.
+
+    Examples
+    --------
+    >>> import carillon as ca
+    >>> seconds = np.arange(8000) / 8000
+    >>> clip = np.exp(-8.0 * seconds) * np.sin(2.0 * np.pi * 440.0 * seconds)
+    >>> ca.extract(clip, 8000).frequencies.round(2).tolist()
+    [440.0]
+    """
+    from sound.clips import extraction
+    from sound.clips.files import extract_file
+
+    if isinstance(clip, str | Path):
+        return extract_file(clip, modes)
+    return extraction.extract(np.asarray(clip, dtype=float), rate, modes)
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """A material that lets struck points of a solid sound as clips do.
+
+    Attributes
+    ----------
+    found
+        All that its file holds.
+    """
+
+    found: FoundDesign
+
+    @property
+    def frequencies(self) -> Array:
+        """Of the elastic modes (n,) [Hz], ascending."""
+        return self.found.frequencies
+
+    @property
+    def target_frequencies(self) -> Array:
+        """Of the clips (n,) [Hz]."""
+        return self.found.targets.frequencies
+
+    @property
+    def young(self) -> Array:
+        """Young's modulus (m,) of the voxels [Pa]."""
+        return self.found.young
+
+    def render(self, at: ArrayLike | None = None, **how: Any) -> Array:
+        """Samples (s,) of strikes, see `carillon.render`."""
+        return render(self, at, **how)
+
+    def export(self, path: str | Path, points: int = 0) -> None:
+        """Write it for other tools: .h5, .gltf, .glb, .dsp (Faust) or .npy (moduli).
+
+        Parameters
+        ----------
+        points
+            Struck points of a Faust program, besides the targets'.
+
+        Raises
+        ------
+        UserError
+            If the ending tells no format, or the file cannot be written.
+        """
+        from sound.export.formats import export_design, format_of
+
+        export_design(path, self.found, format_of(str(path)), points)
+
+    def save(self, path: str | Path) -> None:
+        """Write a design file, which all commands read.
+
+        Raises
+        ------
+        UserError
+            If it cannot be written.
+        """
+        from sound.project.design_file import write_design
+
+        write_design(path, self.found)
+
+
+def design(project: str | Path | None = None, initial: Design | None = None, **keys: Any) -> Design:
+    """Search for a material that lets struck points of a solid sound as clips do.
+
+    Parameters
+    ----------
+    project
+        Project file (YAML), of which `keys` replace what they name.
+    initial
+        Design of the same mesh to go on from.
+    keys
+        Keys of a project: `mesh`, `resolution`, `targets`, `optimiser` and so on, sections as
+        dictionaries; paths are from the folder of the project, or the present one.
+
+    Raises
+    ------
+    UserError
+        For anything wrong with the mesh, the points, the clips or the numbers.
+
+    Notes
+    -----
+    Processes share the work, so that a script begins by `if __name__ == "__main__":`.
+    """
+    from carillon.files.yaml_input import read_yaml
+    from sound.design.optimise import optimise
+    from sound.design.preparation import prepare
+    from sound.project.project import project_of
+
+    described = {} if project is None else dict(read_yaml(Path(project), "a project"))
+    for key, value in keys.items():
+        own = described.get(key)
+        if isinstance(own, Mapping) and isinstance(value, Mapping):
+            value = {**own, **value}
+        described[key] = value
+    folder = Path() if project is None else Path(project).parent
+    problem = prepare(project_of(described, folder))
+    return Design(optimise(problem, None if initial is None else initial.found))
+
+
+@dataclass(frozen=True, eq=False)
+class Forests:
+    """Regression forests that coarsen 2x2x2 blocks of voxels.
+
+    Attributes
+    ----------
+    path
+        Their file.
+    model
+        All that it holds.
+
+    Examples
+    --------
+    >>> import carillon as ca
+    >>> forests = ca.Forests.load()
+    >>> soft, stiff = forests.coarsen([[1, 1, 1, 1, 2, 2, 2, 2], [3, 3, 3, 3, 6, 6, 6, 6]])
+    >>> bool(np.allclose(stiff, 3.0 * soft))
+    True
+    """
+
+    path: Path
+    model: Model
+
+    @classmethod
+    def load(cls, path: str | Path | None = None) -> Self:
+        """The forests of a file, or those that come along.
+
+        Raises
+        ------
+        UserError
+            If they are missing or damaged.
+        """
+        from forests.default import default_path
+        from forests.model import load_model
+
+        file = default_path() if path is None else Path(path)
+        return cls(file, load_model(file))
+
+    @property
+    def scores(self) -> dict[str, float]:
+        """On samples that were held out in training, by name."""
+        return self.model.scores
+
+    def coarsen(self, young: ArrayLike) -> Array:
+        """Moduli (b, 8) at the quadrature points of elements from those (b, 8) of blocks' voxels.
+
+        Raises
+        ------
+        UserError
+            For a bad shape, or a modulus that is negative or not finite.
+        """
+        from forests.evaluate import coarsen
+
+        return coarsen(self.model, young)
+
+
+def generate(path: str | Path, samples: int, workers: int = 1, **options: Any) -> None:
+    """Draw random blocks, fit a coarse element to each, and write them to a shard for `train`.
+
+    Parameters
+    ----------
+    options
+        `seed`, `objective` and the other options of `carillon generate`, with underscores.
+
+    Raises
+    ------
+    UserError
+        For impossible options, or if the file cannot be written.
+    """
+    from dataset_gen.generate import engine_of, generate_file
+    from dataset_gen.settings import ShardOptions, settings_of
+    from dataset_gen.shards import origin_of
+    from dataset_gen.tasks import ShardPlan
+
+    asked = ShardOptions(samples=samples, **options)
+    settings = settings_of(asked)
+    plan, origin = ShardPlan(settings), origin_of(settings, asked)
+    generate_file(path, plan, origin, engine_of(workers))
+
+
+def train(
+    shards: Sequence[str | Path], out: str | Path, workers: int = 1, **options: Any
+) -> Forests:
+    """Train forests on shards of `generate` and write them to a file.
+
+    Parameters
+    ----------
+    options
+        `trees`, `depth` and the other options of `carillon train`, with underscores.
+
+    Raises
+    ------
+    UserError
+        For impossible options, unusable shards or too few samples.
+    """
+    from forests.model import save_model
+    from forests.training.dataset import open_dataset
+    from forests.training.ranks import Ranks
+    from forests.training.train import TrainingOptions, model_of, train_trees
+
+    training, dataset = TrainingOptions(**options), open_dataset([str(path) for path in shards])
+    trained = train_trees(dataset, training, Ranks(None), workers)
+    assert trained is not None
+    save_model(out, model_of(dataset, training, trained))
+    return Forests.load(out)
+
+
+def _shapes(modes: Array | None) -> Array | None:
+    """Displacements (k, n, 3) from columns (3 n, k), of which they are a view."""
+    return None if modes is None else modes.reshape(-1, 3, modes.shape[1]).transpose(2, 0, 1)
+
+
+def _solid(body: Body, given: Given, resolution: int, discretisation: str) -> Solid:
+    """The solid with material, in the discretisation that is asked for."""
+    made = given if isinstance(given, Material) else Material(1e9 if given is None else given)
+    require_constants(made.poisson, made.density)
+    if isinstance(body, Solid):
+        solid = body if given is None else body.with_young(made.moduli(body.mesh))
+        if isinstance(given, Material):
+            solid = solid.with_constants(made.poisson, made.density)
+        return solid
+    constants: Constants = {"poisson": made.poisson, "density": made.density}
+    if isinstance(body, HexMesh):
+        return fine_model(body, made.moduli(body), **constants)
+    mesh = body if isinstance(body, Mesh) else load_mesh(body)
+    if discretisation == "voxel":
+        hexahedra = mesh.hexahedra(resolution)
+        return fine_model(hexahedra, made.moduli(hexahedra), **constants)
+    if discretisation != "finite-cell":
+        raise UserError(f"discretisation {discretisation!r}: expected voxel or finite-cell")
+    from carillon.fem.finite_cells.build import finite_cells
+    from carillon.fem.finite_cells.model import finite_cell_model
+
+    cells = finite_cells(mesh.surface, resolution, name=mesh.name)
+    return finite_cell_model(cells, made.moduli(cells.mesh), made.poisson, made.density)
+
+
+def _heard(source: Solution | Design | str | Path, damping: tuple[float, float]) -> HeardSolid:
+    from solver.response.response import Damping
+    from sound.rendering.heard_solid import heard_design, heard_modes
+
+    opened = read(source) if isinstance(source, str | Path) else source
+    if isinstance(opened, Design):
+        return heard_design(opened.found)
+    return heard_modes(opened._file(), Damping(*damping))

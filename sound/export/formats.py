@@ -1,0 +1,70 @@
+"""The formats that a design is exported in, each loaded when it is asked for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from carillon.errors import UserError
+
+if TYPE_CHECKING:
+    from sound.project.design import Design
+
+FORMATS = ("h5", "gltf", "glb", "dsp", "npy")
+
+
+def format_of(out: str, named: str | None = None) -> str:
+    """The format of a file, as named or as its ending says.
+
+    Raises
+    ------
+    UserError
+        If the two contradict each other, or neither tells one.
+    """
+    ending = Path(out).suffix.lstrip(".").lower()
+    if named is not None and ending in FORMATS and ending != named:
+        raise UserError(
+            f"--out {out}: ends in .{ending}, but --format is {named}; leave one of them"
+        )
+    if named is None and ending not in FORMATS:
+        raise UserError(
+            f"--out {out}: the ending tells no format, expected one of .{', .'.join(FORMATS)}; or "
+            "name it by --format"
+        )
+    return named or ending
+
+
+def export_design(
+    path: str | Path, design: Design, kind: str, points: int = 0, source: str | None = None
+) -> None:
+    """Write a design in one of `FORMATS`.
+
+    Parameters
+    ----------
+    points
+        Struck points of a Faust program, besides the targets'.
+    source
+        File that the design was read from, for the provenance.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be written.
+    """
+    match kind:
+        case "h5":
+            from sound.export.embedded import write_embedded
+
+            write_embedded(path, design, {} if source is None else {"design": source})
+        case "dsp":
+            from sound.export.faust import write_faust
+
+            write_faust(path, design, points)
+        case "npy":
+            from sound.export.moduli import write_moduli
+
+            write_moduli(path, design)
+        case _:
+            from sound.export.gltf import write_gltf
+
+            write_gltf(path, design, binary=kind == "glb")
