@@ -36,7 +36,93 @@ EVERYBODY = (
 )
 """Packages that all others may import."""
 
-ARROWS: dict[str, str] = {}
+ARROWS = {
+    "carillon": "",
+    "carillon.numerics": "",
+    "carillon.files": "carillon",
+    "carillon.parameters": "carillon carillon.files",
+    "carillon.processes": "carillon carillon.files",
+    "carillon.records": "carillon carillon.numerics carillon.processes",
+    "carillon.command_line": "carillon carillon.files carillon.processes carillon.records",
+    "carillon.fem.geometry": "carillon carillon.command_line carillon.files",
+    "carillon.fem": "carillon carillon.fem.geometry carillon.files carillon.processes",
+    "carillon.drawing": "carillon.fem.geometry",
+    "carillon.fem.finite_cells": "carillon carillon.fem carillon.fem.geometry",
+    #
+    "dataset_gen.objectives": "",
+    "dataset_gen": "dataset_gen.objectives",
+    "dataset_gen.commands": "dataset_gen",
+    #
+    "forests": "",
+    "forests.training": "dataset_gen dataset_gen.objectives forests",
+    "forests.commands": "forests forests.training",
+    #
+    "solver.distribution": "",
+    "solver.coarsening": "dataset_gen.objectives forests",
+    "solver.assembly": "solver.distribution",
+    "solver.files": "solver.distribution",
+    "solver.subspace": "solver.assembly solver.distribution",
+    "solver.linear": "solver.assembly solver.distribution",
+    "solver.response": "solver.files solver.subspace",
+    "solver.reference": "solver.assembly solver.linear solver.subspace",
+    "solver.correction": "solver.assembly solver.distribution solver.linear solver.subspace",
+    "solver.hcms": "solver.assembly solver.distribution solver.linear solver.subspace",
+    "solver.verification": """solver.assembly solver.correction solver.distribution solver.files
+        solver.linear solver.reference solver.response solver.subspace""",
+    "solver.analysis": """dataset_gen.objectives solver.assembly solver.coarsening
+        solver.correction solver.distribution solver.files solver.hcms solver.linear
+        solver.reference solver.subspace solver.verification""",
+    "solver": "solver.analysis",
+    "solver.refinement": """solver.analysis solver.assembly solver.coarsening solver.correction
+        solver.distribution solver.files solver.linear solver.subspace""",
+    "solver.accuracy": "solver.analysis solver.distribution solver.files solver.refinement",
+    "solver.commands": """solver.accuracy solver.analysis solver.coarsening solver.correction
+        solver.distribution solver.files solver.linear solver.refinement solver.response
+        solver.verification""",
+    #
+    "sound": "",
+    "sound.clips": "sound",
+    "sound.project": "solver.analysis solver.files sound sound.clips",
+    "sound.design": """solver.analysis solver.coarsening solver.distribution solver.files
+        solver.linear solver.response solver.subspace sound sound.clips sound.project""",
+    "sound.rendering": """solver.files solver.response solver.subspace sound sound.clips
+        sound.project""",
+    "sound.scenes": """solver.accuracy solver.analysis solver.files solver.refinement
+        solver.response sound sound.project sound.rendering""",
+    "sound.scenes.film": "sound sound.scenes",
+    "sound.scenes.contact": "sound.scenes",
+    "sound.export": """solver.assembly solver.files solver.response solver.verification sound
+        sound.project sound.rendering sound.scenes""",
+    "sound.scenes.audible": "solver.response sound.rendering sound.scenes sound.scenes.contact",
+    "sound.commands": """solver.response sound sound.clips sound.design sound.export
+        sound.project sound.rendering""",
+    "sound.scenes.playing": "sound.clips sound.scenes sound.scenes.audible sound.scenes.contact",
+    #
+    "studio": "",
+    "studio.server": "sound.project studio",
+    "studio.standalone": "sound sound.design sound.project sound.rendering studio",
+    "studio.scene": "solver.refinement sound.scenes studio studio.standalone",
+    "studio.processes": """solver.analysis solver.files solver.response sound sound.clips
+        sound.design sound.export sound.project sound.rendering studio studio.standalone""",
+    "studio.session": "sound sound.clips sound.project studio studio.processes",
+    "studio.commands": """solver.refinement sound sound.clips sound.export sound.project
+        sound.scenes sound.scenes.film sound.scenes.playing studio.scene studio.server
+        studio.session studio.standalone""",
+    #
+    "workflow": "dataset_gen dataset_gen.objectives forests forests.training",
+    "workflow.report": "solver.files solver.hcms solver.refinement workflow studies.base",
+    "workflow.estimate": "dataset_gen.objectives solver.coarsening solver.refinement workflow",
+    "workflow.scripts": "workflow.report studies.base",
+    "workflow.validation": """solver.files solver.refinement solver.response solver.verification
+        workflow workflow.report studies.base""",
+    "workflow.commands": """dataset_gen.objectives solver.analysis solver.coarsening
+        solver.correction solver.response workflow workflow.estimate workflow.report
+        studies.base""",
+    #
+    "studies": "",
+    "studies.base": "solver.response workflow studies",
+    "studies.base.scripts": "studies.base",
+}
 """Packages, from the bottom to the top, with those that they import beside `EVERYBODY`."""
 
 

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from carillon.drawing.formats import require_plottable
+from carillon.command_line.picture_formats import require_plottable
 from carillon.files.paths import require_writable
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from carillon.drawing.formats import require_plottable
+from carillon.command_line.picture_formats import require_plottable
 from carillon.files.atomic import atomic_path
 
 MARKERS = "osD^vP*X<>h8"
