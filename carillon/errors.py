@@ -1,7 +1,7 @@
 """Errors that are addressed to the person at the terminal."""
 
 LONGEST_MESSAGE = 1200
-"""Characters of a message; what is longer loses its middle, so that it fits on a screen."""
+"""Longest message in characters; a longer one loses its middle, so that it fits on a screen."""
 
 
 def one_line(text: str) -> str:

@@ -16,9 +16,9 @@ TYPES: dict[str, np.dtype[Any]] = {
     "u4": np.dtype("<u4"),
     "u2": np.dtype("<u2"),
 }
-"""Of arrays, by the names that headers have for them."""
+"""Types of arrays by their names in headers."""
 _ALIGNED = 8
-"""Bytes at whose multiples arrays begin; views of 8-byte numbers need that."""
+"""Alignment of arrays in a message in bytes; views of 8-byte numbers need it."""
 _LENGTH = struct.Struct("<I")
 
 

@@ -10,7 +10,7 @@ from carillon.errors import UserError
 from studio.feed import Feed
 
 CLIP_PARTS = ("sound", "modes", "rest", "noise")
-"""What of a clip can be heard."""
+"""Parts of a clip that can be heard."""
 EXPORTS = ("h5", "gltf", "glb", "dsp", "npy", "wav", "html")
 """Kinds of files that a design can be taken home as."""
 

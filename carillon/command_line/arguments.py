@@ -12,12 +12,12 @@ from carillon.errors import UserError
 from carillon.processes.cores import allowed_cores
 
 LARGEST = 2**63 - 1
-"""Of whole numbers: what files and compiled code can hold."""
+"""Largest whole number on a command line: what files and compiled code can hold."""
 
 MOST_WORKERS = 64
 """Processes or threads that one command may start on a machine of few cores."""
 WORKERS_OF_CORE = 4
-"""The same for each core of a machine with more."""
+"""Processes or threads for each core that one command may start on a machine of many cores."""
 
 ALIKE = 0.7
 """Share of letters in common (difflib) from which a word is taken for a mistyped one."""

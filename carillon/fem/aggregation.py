@@ -19,7 +19,7 @@ from carillon.errors import LocalConvergenceError
 Array = NDArray[np.float64]
 
 DAMPING = 0.7
-"""Of a Jacobi step: it reduces most what differs from vertex to vertex."""
+"""Damping factor of a Jacobi step; it reduces most what differs from vertex to vertex."""
 STEPS = 2
 """Jacobi steps before and after each coarse correction."""
 OVERCORRECTION = 1.6
@@ -29,7 +29,7 @@ MOST_KEPT = 0.7
 COARSEST = 100
 """Fewest vertices of the graph whose matrix a V-cycle inverts; it has up to eight times as many."""
 MOST_ITERATIONS = 200
-"""Of conjugate gradients; some twenty are usual."""
+"""Most iterations of conjugate gradients; some twenty are usual."""
 CYCLE = np.float32
 """Numbers of the cycle: precise enough for a preconditioner, and half the traffic of memory."""
 

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 FEW_CELLS = 12_000
 """Cells up to which the Laplacian is factorised; the factors of more fill up."""
 SHIFT = 1e-3
-"""Below the spectrum, that the Laplacian is inverted at."""
+"""Shift at which the Laplacian is inverted; it lies below the spectrum."""
 TOLERANCE = 1e-6
 """Relative error of eigenvalues from an iterative inverse."""
 

@@ -19,7 +19,7 @@ _HEADERS = {
 }
 _REAL = "fiu"
 _MOST_COMMENTS, _MOST_OF_VALUE = 1 << 20, 64
-"""Bytes of a text file, in all and for each value."""
+"""Most bytes of comments in a text file of moduli, and of one value."""
 
 
 def read_moduli(path: Path, count: int, label: str) -> Array:

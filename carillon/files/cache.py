@@ -23,7 +23,7 @@ Found = TypeVar("Found")
 PLACE = "CARILLON_CACHE"
 """Environment variable that names the folder in place of the user's own cache."""
 MOST_BYTES = 1 << 28
-"""Of all entries of a kind; those that were used least recently make room."""
+"""Most bytes of all entries of a kind; the least recently used ones make room."""
 
 
 def remembered(

@@ -23,12 +23,12 @@ MOST_OBJECTS, DEEPEST = 100_000, 16
 MOST_ATTRIBUTES = 1024
 """Attributes that a group or dataset may have."""
 LIST_BYTES = 1 << 28
-"""Bytes that a list of texts in an attribute may take, as far as can be told before it is read."""
+"""Most bytes of a list of texts in an attribute, as far as can be told before it is read."""
 
 _SAME_LENGTH = {h5z.FILTER_FLETCHER32, h5z.FILTER_SHUFFLE}
 """Filters whose output is as long as what is stored, but for a checksum."""
 _TEXT = np.dtype([("length", "<u4"), ("address", "<u8"), ("index", "<u4")])
-"""How a text of any length stands in a dataset: what is said of it, itself is in a heap."""
+"""Reference to a text of any length in a dataset; the text itself is in a heap."""
 _HEAP, _HEAP_HEAD = b"GCOL\1\0\0\0", 16
 """First bytes of a heap of texts, and how many tell its length, the last eight of them."""
 _PIECE = 1 << 20

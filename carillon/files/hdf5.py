@@ -19,7 +19,7 @@ from carillon.files.content import require_whole
 from carillon.files.paths import cause, first_line, require_file
 
 LONGEST_KIND = 40
-"""Characters of what a file says it is, in messages."""
+"""Longest kind of a file in characters, in messages."""
 
 SEAL_BYTES = 512
 """Length of the seal, which stands before the HDF5 file proper (its user block)."""
@@ -38,7 +38,7 @@ _NONSENSE = (
     ArithmeticError,
     RuntimeError,
 )
-"""What HDF5, numpy and JSON raise where a file holds something else than is read from it."""
+"""Exceptions of HDF5, numpy and JSON on a file that holds something else than is read from it."""
 _SEAL = b"Carillon: the bytes behind the first 512 have the SHA-256 "
 _UNSEALED = "is damaged (its checksum is gone); remove it and generate the file again"
 _HDF5 = b"\x89HDF\r\n\x1a\n"

@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import PurePath
 
 LONGEST_ENDING = 10
-"""Characters of a format's ending, which temporary names keep."""
+"""Longest ending of a file's name in characters that a temporary name keeps."""
 
 
 def temporary_name(name: str) -> tuple[str, str]:

@@ -14,7 +14,7 @@ from pathlib import Path
 from carillon.errors import UserError
 
 LONGEST_NAME = 200
-"""Bytes of a file's name; file systems take 255, of which temporary names need some."""
+"""Longest name of a file in bytes; file systems take 255, of which temporary names need some."""
 
 _OTHER_KINDS = (
     (stat.S_ISDIR, "folder"),

@@ -13,7 +13,7 @@ from carillon.errors import UserError
 from carillon.files.paths import cause
 
 MOST_BYTES = 1 << 20
-"""Of a file: descriptions of runs are a few kilobytes."""
+"""Most bytes of a YAML file; descriptions of runs are a few kilobytes."""
 DEEPEST = 32
 """Levels of lists and mappings inside each other."""
 

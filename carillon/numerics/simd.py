@@ -75,7 +75,7 @@ class TileType(types.Type):
 LANES_TYPE = LanesType()
 intrinsic: Any = numba_intrinsic
 Vector = Any
-"""What compiled functions call a `LanesType` value."""
+"""Name of a `LanesType` value in compiled functions."""
 
 
 @register_model(LanesType)

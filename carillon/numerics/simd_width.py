@@ -25,7 +25,7 @@ X86 = {"zmm": Registers(8, 32), "ymm": Registers(4, 16), "xmm": Registers(2, 16)
 """AVX-512, AVX and SSE2, by the names of the registers."""
 
 OTHERS = Registers(2, 32)
-"""Of processors without these names, such as those with NEON."""
+"""Vector registers of processors without these names, such as those with NEON."""
 
 
 def registers_in(assembly: str) -> Registers:

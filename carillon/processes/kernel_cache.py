@@ -25,7 +25,7 @@ logger = logging.getLogger(__name__)
 FOLDER = "carillon-cache"
 """Name of the private folder, before the number of its user."""
 PLACES = ("/tmp", "/var/tmp", "/dev/shm")
-"""Where it may be, besides TMPDIR."""
+"""Folders besides TMPDIR that may hold compiled kernels."""
 
 _CLASSES = "NUMBA_CACHE_LOCATOR_CLASSES"
 _DIRECTORY = "NUMBA_CACHE_DIR"

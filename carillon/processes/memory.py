@@ -9,9 +9,9 @@ from pathlib import Path
 from carillon.processes.cores import memory_bytes
 
 FIRST_TO_GO = 500
-"""How likely the kernel is to end the process when memory runs out, of 1000 at most."""
+"""Kernel score of the process, at most 1000: the highest is ended first without memory."""
 LEAST_ROOM = 8 << 30
-"""Bytes that a process may ask for at least: threads of large machines reserve some each."""
+"""Least limit of a process's data in bytes: threads of large machines reserve some each."""
 
 
 def spare_the_machine() -> None:

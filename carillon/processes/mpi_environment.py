@@ -28,7 +28,7 @@ from carillon.processes.loading import while_loading
 _STEP = ("SLURM_STEP_ID", "SLURM_STEPID")
 _LAUNCHERS = ("PMIX_", "PMI_", "OMPI_COMM_WORLD_")
 _SETTINGS = "PMIX_MCA_"
-"""Of PMIx, which it leaves to processes that a lone one starts."""
+"""Variables of PMIx that it leaves to processes which a lone one starts."""
 _MPIEXEC = "rank {} of {}", "the mpiexec of the MPI that mpi4py was built with"
 _SEVERAL = (
     ("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK", *_MPIEXEC),

@@ -16,11 +16,11 @@ from typing import Any
 from carillon.processes.ranks import Comm
 
 NAP_MICROSECONDS = 20
-"""Between two looks for messages; the system adds some fifty."""
+"""Sleep between two looks for messages in microseconds; the system adds some fifty."""
 _LIBRARY = "libopen-pal.so"
 _ASKED = "OMPI_MCA_mpi_yield_when_idle"
 _napping: list[Any] = []
-"""What Open MPI calls while it waits, once it does."""
+"""Function that Open MPI calls while it waits; kept here so that it is not freed."""
 
 
 def leave_cores(comm: Comm) -> bool:

@@ -30,7 +30,7 @@ EXAMPLES = """examples:
   carillon studio --export page.html design.h5
 """
 PACKAGES = ("starlette", "uvicorn", "websockets")
-"""What the server stands on, and nothing else of the project does."""
+"""Packages that the studio's server alone needs."""
 REQUIREMENTS = "workflow/envs/requirements-studio.txt"
 WORKSPACE = "carillon-studio"
 """Folder of projects where no file is opened whose own folder it is."""

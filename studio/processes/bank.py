@@ -18,7 +18,7 @@ from studio.binary import pack
 Array = NDArray[np.float64]
 
 LOUDEST = 0.5
-"""What the loudest strike of a solid without clips reaches, full scale being 1."""
+"""Peak of the loudest strike of a solid without clips, as a share of full scale."""
 
 
 @dataclass(frozen=True)

@@ -16,11 +16,11 @@ from sound.clips.wav import as_wav, read_wav
 Array = NDArray[np.float64]
 
 LEAST_SHARE = 1e-12
-"""Of energy that is left, so that what is explained stays a number of decibels."""
+"""Smallest share of energy left unexplained that is shown, so that decibels stay finite."""
 SPECTRUM_POINTS = 2000
-"""Of a spectrum that is drawn: each tells the loudest of its part."""
+"""Points of a drawn spectrum; each shows the loudest of its part."""
 LOWEST_HERTZ, FLOOR_DECIBELS = 20.0, -100.0
-"""Where spectra begin, and how far they go down."""
+"""Lowest frequency [Hz] and lowest level [dB] of drawn spectra."""
 
 
 @dataclass(frozen=True)

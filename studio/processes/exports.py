@@ -19,7 +19,7 @@ from sound.rendering.render import Hit, render, ringing_seconds
 from sound.rendering.solid import SoundingSolid
 
 FAUST_POINTS = 0
-"""To strike in a Faust program, besides the targets'."""
+"""Points to strike in a Faust program besides those of the targets."""
 
 
 class Exports:

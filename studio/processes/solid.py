@@ -45,7 +45,7 @@ from studio.processes.history import history_of
 Array = NDArray[np.float64]
 
 MODES = 30
-"""Of a solid that has no targets yet."""
+"""Elastic modes of a solid that has no targets yet."""
 
 
 @dataclass(frozen=True)

@@ -21,10 +21,11 @@ Arrays = dict[str, tuple[str, Any]]
 GROUND_ON_PAGE = 65_535
 """Number of the ground on the page, where numbers of objects have 16 bits and no sign."""
 LOUDEST_STRIKE = 0.7
-"""Of full scale, if all modes were at their peak together, of a strike by hand where an object is
-loudest."""
+"""Level of a strike by hand where an object is loudest, as a share of full scale, with all modes at
+their peak together."""
 QUIETEST_STRIKE = 0.1
-"""The same of one that is as strong as an object's hardest impact, and would hardly be heard."""
+"""Least level of a strike as strong as an object's hardest impact, which would else hardly be
+heard; a share of full scale."""
 
 
 def content(performance: Performance) -> bytes:

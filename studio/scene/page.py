@@ -15,7 +15,7 @@ HERE = Path(__file__).resolve().parent
 STYLES = (PAGE / "studio.css", PAGE / "solid.css", HERE / "scene.css")
 PROCESSOR = HERE / "processor.js"
 LARGE_BYTES = 25_000_000
-"""From which on it is told how large a page is."""
+"""Size of a page in bytes above which it is named."""
 
 
 def write_scene_page(path: str | Path, performance: Performance) -> None:

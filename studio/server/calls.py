@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 from carillon.errors import UserError
 
 Kinds = Mapping[str, str]
-"""What values of keys have to be, by words of `_KINDS`."""
+"""Kinds of the values of a call's keys, by words of `_KINDS`."""
 
 CALLS: Mapping[str, tuple[Kinds, Kinds]] = {
     "open_mesh": ({"mesh": "a text"}, {"unit": "a number"}),
@@ -44,10 +44,10 @@ CALLS: Mapping[str, tuple[Kinds, Kinds]] = {
 }
 """Calls by name: keys that have to be there, and keys that may be."""
 LARGEST = 2**53
-"""Of whole numbers, which browsers do not tell apart beyond."""
+"""Largest whole number in a call; browsers do not tell larger ones apart."""
 LONGEST_LIST = 1000
 LONGEST_TEXT = 1000
-"""Characters of a key or a text in a call."""
+"""Longest key or text of a call in characters."""
 
 
 def read_message(text: str) -> dict[str, Any]:

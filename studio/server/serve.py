@@ -23,7 +23,7 @@ from studio.server.uploads import Limits
 FIRST_PORT = 8620
 """Port that is tried first, and the next ones after it."""
 PORTS = 20
-"""How many are tried before the system chooses one."""
+"""Number of ports that are tried before the system chooses one."""
 QUEUE = 128
 """Connections that wait in the system until they are accepted."""
 ENDING_SECONDS = 3

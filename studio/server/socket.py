@@ -15,9 +15,9 @@ from studio.interface import Studio
 from studio.server.calls import LARGEST, read_call, read_message
 
 MOST_CALLS = 32
-"""Of a page, that are under way; more wait."""
+"""Most calls of a page that are under way at a time; more wait."""
 OWN_FAULT = "the studio itself failed at this; what it printed says why"
-"""Where a fault is neither the person's nor the machine's."""
+"""Answer to a call that fails by a fault of the program."""
 TOO_SLOW = 1013
 """Why a feed is cut off, as WebSockets number it: try again later."""
 

@@ -12,11 +12,11 @@ from pathlib import PurePosixPath
 from starlette.requests import ClientDisconnect, Request
 
 MESH_ENDINGS = (".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
-"""Of meshes that are taken: other files would come to lie among the person's own."""
+"""Endings of meshes that may be uploaded; other files would come to lie among the person's own."""
 CLIP_ENDINGS = (".wav", ".wave", ".flac", ".ogg", ".oga", ".aif", ".aiff", ".mp3")
-"""The same of clips."""
+"""Endings of clips that may be uploaded."""
 LONGEST_NAME = 100
-"""Characters of a file's name; the ending is kept."""
+"""Longest name of an uploaded file in characters; the ending is kept."""
 
 
 @dataclass(frozen=True)

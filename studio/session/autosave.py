@@ -10,7 +10,7 @@ from carillon.command_line.progress import say
 from carillon.errors import UserError
 
 SOON_SECONDS = 0.3
-"""After a change; more of them may come together."""
+"""Time between a change and its saving; more changes may come together."""
 
 
 class Autosave:

@@ -15,7 +15,7 @@ from studio.processes.worker import Worker
 from studio.session.document import Target
 
 LISTENING_SECONDS = 180.0
-"""That the modes of a clip may take to be found."""
+"""Longest time to find the modes of a clip."""
 
 
 _NOTHING: dict[str, Any] = {
@@ -25,7 +25,7 @@ _NOTHING: dict[str, Any] = {
     "says": [],
     "modes": [],
 }
-"""Of a clip that was not listened to yet."""
+"""State of a clip that was not listened to yet."""
 
 
 @dataclass

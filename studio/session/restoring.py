@@ -14,9 +14,9 @@ from studio.session.history import History
 from studio.session.workspace import OWN_FOLDER, OutsideError, Workspace
 
 NONSENSE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, UserError)
-"""What is raised where a session is none, or one of another version."""
+"""Exceptions on reading a session that is none, or one of another version."""
 LONGEST_NAME = 255
-"""Characters of a project's name, as long as that of a file."""
+"""Longest name of a project in characters, as long as that of a file."""
 
 
 def kept(history: History, workspace: Workspace) -> dict[str, Any]:

@@ -12,11 +12,11 @@ from studio.processes.worker import Worker
 from studio.session.document import Material
 
 MOST_ROWS = 4000
-"""Of a history that is shown; of more every second one is left out."""
+"""Most rows of a search's history that is shown; of more, every second one is left out."""
 
 
 _COUNTED = ("cost", "evaluations")
-"""What of a row is news; time alone is not."""
+"""Keys of a row that make it news; time alone is not."""
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,9 @@ from studio.processes.worker import Worker
 from studio.session.document import Document, Target
 
 READ_SECONDS = 60.0
-"""That a mesh may take to be read."""
+"""Longest time to read a mesh."""
 PREPARED_SECONDS = 1800.0
-"""That a solid may take to be prepared: that of the finest resolution takes minutes."""
+"""Longest time to prepare a solid; the finest resolution takes minutes."""
 
 
 @dataclass(frozen=True)

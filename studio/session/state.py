@@ -20,7 +20,7 @@ from studio.session.workspace import Workspace
 SAVED_SECONDS = 2.0
 """Time within which a material that a search has found is saved."""
 Told = Callable[["StudioState"], dict[str, Any]]
-"""What is told of a state: to pages, or to the file of the session."""
+"""Function that describes a state: to pages, or for the file of the session."""
 _OF_VOXELS = ("mesh", "unit", "resolution", "fill", "components", "discretisation")
 """Keys of a project whose change makes other voxels, for which no former material is one."""
 _OF_COORDINATES = ("dimensions", "law", "poisson_bounds")

@@ -20,14 +20,14 @@ from carillon.files.yaml_input import MOST_BYTES, parse_yaml, read_yaml
 from sound.project.template import project_text
 
 OWN_FOLDER = ".studio"
-"""For the session, and designs that undo may go back to."""
+"""Folder of the session and of designs that undo may go back to."""
 PROJECT_ENDINGS = (".yaml", ".yml")
 MOST_PROJECTS = 200
-"""That are listed."""
+"""Most projects that are listed."""
 LONGEST_NAME = 64
 SESSION = "session.json"
 MOST_SESSION_BYTES = 1 << 28
-"""Of a session that is gone on with: one of thousands of unknowns and all its steps has less."""
+"""Longest session in bytes that is read; thousands of unknowns and all steps take less."""
 _DESIGNS, _LOCK, _EXPORT = "designs", "lock", "export-"
 _NAME = re.compile(r"[A-Za-z0-9_-]+")
 _NUMBERED = re.compile(r"[0-9]{1,20}\.h5")

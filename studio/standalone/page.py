@@ -21,7 +21,7 @@ STYLES = (PAGE / "studio.css", PAGE / "solid.css", HERE / "standalone.css")
 PROCESSOR = PAGE / "sound/bank-processor.js"
 LICENCES = (PAGE / "vendor/three/LICENSE", PAGE / "vendor/three-mesh-bvh/LICENSE")
 MANY_TRIANGLES = 20_000
-"""From which on it is told what they cost."""
+"""Number of triangles above which their cost is named."""
 
 
 def write_page(path: str | Path, design: Design) -> None:

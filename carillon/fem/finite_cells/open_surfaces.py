@@ -21,7 +21,8 @@ Index = NDArray[np.int64]
 ENDS = 0.02
 """Share of a piece of a line by which its ends are moved inwards to see whether they are inside."""
 RIM_POINTS = 9
-"""Of a piece with one end inside, which the rim of a hole cuts, where winding numbers are found."""
+"""Points at which winding numbers are found on a piece with one end inside that the rim of a hole
+cuts."""
 VAGUENESS = 0.25
 """Distance of a winding number from a whole one beyond which holes are near."""
 SHEET = 0.55

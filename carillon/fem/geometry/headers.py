@@ -8,9 +8,10 @@ import re
 from carillon.errors import UserError
 
 STL_HEADER, STL_TRIANGLE = 84, 50
-"""Bytes of a binary STL file before its triangles, and of each."""
+"""Bytes of a binary STL file before its triangles, and bytes of one triangle."""
 TEXT_START = 4000
-"""Bytes at the start of a text file, of which none is zero and the first triangle is among them."""
+"""Bytes at the start of a text file that are checked: none is zero, and the first triangle is among
+them."""
 _FACET = re.compile(rb"^\s*facet\b", re.MULTILINE)
 _STRIPS = re.compile(rb"^element\s+(tristrips?)\s+(\d+)", re.MULTILINE)
 _ELEMENT = re.compile(rb"^element\s+(\S+)\s+(\d+)", re.MULTILINE)

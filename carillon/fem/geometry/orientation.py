@@ -23,7 +23,7 @@ INSIDE = 0.5
 POKING = 0.02
 """Share of a closed part's area outside the others from which on it is no cavity."""
 MOSTLY = 0.5
-"""The same of an open one."""
+"""Share of an open part's area outside the others from which on it is no cavity."""
 CERTAIN = 0.15
 """Mean winding number of an open part on itself, half of one if closed, that tells its inside."""
 BESIDE = 1e-4
