@@ -118,6 +118,12 @@ def load_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
     ------
     UserError
         If there is no such mesh, or it is no surface around a solid.
+
+    Examples
+    --------
+    >>> import carillon as ca
+    >>> ca.load_mesh("builtin:plate", unit=0.5).extents.round(3).tolist()
+    [0.12, 0.12, 0.019]
     """
     return Mesh(load_surface(str(path), unit), surface_name(str(path)))
 
@@ -416,6 +422,15 @@ def read(path: str | Path) -> Solution | Design:
     ------
     UserError
         If the file is missing, damaged or of another kind.
+
+    Examples
+    --------
+    >>> import carillon as ca
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     ca.solve("builtin:box", resolution=4, modes=8).save(f"{folder}/box.h5")
+    ...     len(ca.read(f"{folder}/box.h5").frequencies)
+    8
     """
     from carillon.files.hdf5 import kind_of
     from solver.files.modes_file import read_modes
@@ -435,6 +450,13 @@ def compare(solution: Solution, truth: Solution) -> SpectrumComparison:
     ------
     UserError
         If they are of other solids, or one has no elastic modes.
+
+    Examples
+    --------
+    >>> import carillon as ca
+    >>> fine, coarse = (ca.solve("builtin:box", resolution=n, modes=12) for n in (12, 6))
+    >>> bool(0.0 < ca.compare(coarse, fine).frequency_rms_relative_error < 0.05)
+    True
     """
     from solver.verification.comparison import compare_modes
 
@@ -557,6 +579,13 @@ def write_wav(path: str | Path, samples: ArrayLike, rate: int = SAMPLE_RATE) -> 
     ------
     UserError
         If it cannot be written, or its name does not end in .wav.
+
+    Examples
+    --------
+    >>> import carillon as ca
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     ca.write_wav(f"{folder}/tone.wav", np.sin(0.1 * np.arange(2000)))
     """
     from sound.clips.wav import write_wav as write
 
@@ -678,6 +707,13 @@ def design(project: str | Path | None = None, initial: Design | None = None, **k
     Notes
     -----
     Processes share the work, so that a script begins by `if __name__ == "__main__":`.
+
+    Examples
+    --------
+    >>> import carillon as ca
+    >>> ca.design(mesh="builtin:bar", targets=[])
+    Traceback (most recent call last):
+    carillon.errors.UserError: ...
     """
     from carillon.files.yaml_input import read_yaml
     from sound.design.optimise import optimise
@@ -763,6 +799,13 @@ def generate(path: str | Path, samples: int, workers: int = 1, **options: Any) -
     ------
     UserError
         For impossible options, or if the file cannot be written.
+
+    Examples
+    --------
+    >>> import carillon as ca
+    >>> ca.generate("shard.h5", samples=0)
+    Traceback (most recent call last):
+    carillon.errors.UserError: ...
     """
     from dataset_gen.generate import engine_of, generate_file
     from dataset_gen.settings import ShardOptions, settings_of
@@ -789,6 +832,16 @@ def train(
     ------
     UserError
         For impossible options, unusable shards or too few samples.
+
+    Examples
+    --------
+    >>> import carillon as ca
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     ca.generate(f"{folder}/shard.h5", samples=200)
+    ...     trained = ca.train([f"{folder}/shard.h5"], f"{folder}/forests.h5", trees=1, min_leaf=10)
+    >>> trained.model.forests.trees
+    1
     """
     from forests.model import save_model
     from forests.training.dataset import open_dataset
