@@ -236,7 +236,7 @@ class Solution:
         """
         from matplotlib.figure import Figure
 
-        from carillon.drawing.solid.py ..docs.extensions.rule_graph import draw
+        from carillon.drawing.solid import draw
 
         if not 1 <= mode <= len(self.frequencies):
             raise UserError(f"mode {mode}: expected 1 to {len(self.frequencies)}")
