@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import resource
 import time
-from dataclasses import astuple, fields, replace
+from contextlib import AbstractContextManager
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -19,16 +20,14 @@ from solver.analysis.components import elastic_part
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import Layout, System, assemble
 from solver.correction.correct import correct
-from solver.correction.correction import Correction, default_guard
+from solver.correction.correction import default_guard
 from solver.distribution.collective import bcast_from_root
-from solver.distribution.local_mesh import LocalMesh, distribute
-from solver.hcms.counts import Counts, Tally
+from solver.distribution.local_mesh import distribute
+from solver.hcms.counts import Tally
 from solver.hcms.synthesis import make_subdomains, synthesize
-from solver.linear import LinearSolver
-from studies.scaling.counting import CountingComm, TimedLinearSolver
-from studies.scaling.work import assembly_flops, dense_flops, elimination
+from solver.linear import Inverse, LinearSolver
 
-Phases = dict[str, dict[str, list[float]]]
+Array = NDArray[np.float64]
 
 REPEATS = 3
 """Runs of which the fastest is reported: what else runs on the machine only slows them."""
@@ -48,9 +47,10 @@ def measure(
     Returns
     -------
     dict[str, Any]
-        Plain values: `phases` with seconds, waiting [s], flops, bytes and messages of each rank,
-        `seconds` of all but the partition, `peak_memory_bytes` of each rank, `link` (latency [s],
-        bandwidth [B/s] between two ranks; None on one), sizes, ranks and cores.
+        Plain values: `phases` with the seconds of each rank, and of the synthesis also waiting [s],
+        flops, bytes and messages; `seconds` of all but the partition, `peak_memory_bytes` of each
+        rank, `link` (latency [s], bandwidth [B/s] between two ranks; None on one), sizes, ranks and
+        cores.
 
     Raises
     ------
@@ -82,43 +82,40 @@ def measure(
         "blocks": run.result.blocks,
         "right_hand_sides": run.result.solves,
         "linear_solver": run.linear.method,
-        "phases": run.phases(model),
-        "peak_memory_bytes": _everyones(comm, [_peak_memory()])[:, 0].tolist(),
+        "phases": run.phases(),
+        "peak_memory_bytes": comm.allgather(_peak_memory()),
         "link": _measure_link(comm),
     }
 
 
 class _Run:
-    """HCMS and error correction with a tally for every phase."""
+    """HCMS and error correction, each phase timed."""
 
     def __init__(self, model: Solid | None, options: SolverOptions, comm: MPI.Comm) -> None:
-        self.comm = CountingComm.of(comm)
+        self.comm = comm
         requested = options.modes - RIGID_MODES
         self.width = requested + default_guard(requested)
-        with self._phase() as self.partition:
-            self.local_mesh: LocalMesh = distribute(model, None, options.seed, self.comm)
+        self.own = {name: Tally() for name in ("partition", "assembly", "dense")}
+        with self._phase("partition"):
+            self.local_mesh = distribute(model, None, options.seed, comm)
             parts = self.local_mesh.decomposition.tree.parts
             self.keep = default_keep(options.modes, parts, together=True)
-            layout = Layout.of_local_mesh(self.local_mesh, self.comm)
-            subdomains = make_subdomains(self.local_mesh, options.interface, self.comm)
-            self.linear = TimedLinearSolver.of(LinearSolver(options.linear_solver, layout))
-        begin = self._together()
-        with self._phase() as self.assembly:
-            system: System = assemble(self.local_mesh, self.comm, layout)
-        self.comm.barrier()
+            layout = Layout.of_local_mesh(self.local_mesh, comm)
+            subdomains = make_subdomains(self.local_mesh, options.interface, comm)
+            self.linear = _TimedLinearSolver(options.linear_solver, layout)
+        comm.barrier()
+        begin = time.perf_counter()
+        with self._phase("assembly"):
+            system = assemble(self.local_mesh, comm, layout)
+        comm.barrier()
+        threads = system.rows.threads
         synthesis = synthesize(
-            self.local_mesh,
-            self.keep,
-            options.interface,
-            self.comm,
-            subdomains,
-            system.rows.threads,
+            self.local_mesh, self.keep, options.interface, comm, subdomains, threads
         )
-        self.counts: Counts = synthesis.counts
-        self.comm.barrier()
-        with self._phase() as self.correction:
+        self.counts = synthesis.counts
+        with self._phase("dense"):
             values, start = elastic_part(system, synthesis)
-            self.result: Correction = correct(
+            self.result = correct(
                 system,
                 start,
                 requested,
@@ -127,57 +124,55 @@ class _Run:
                 tolerance=cast(float, options.tolerance),
                 max_steps=options.corrections,
             )
-        self.seconds = self._together() - begin
+        comm.barrier()
+        self.seconds = time.perf_counter() - begin
         system.destroy()
 
-    def _together(self) -> float:
-        """Time at which all ranks are here."""
+    def _phase(self, name: str) -> AbstractContextManager[None]:
+        """Time the body of a phase that all ranks begin together."""
         self.comm.barrier()
-        return time.perf_counter()
+        return self.own[name].running()
 
-    def _phase(self) -> Any:
-        self.comm.barrier()
-        return self.comm.phase()
-
-    def phases(self, model: Solid | None) -> Phases:
+    def phases(self) -> dict[str, dict[str, list[float]]]:
         """Every phase's quantities, one a rank; collective."""
-        factor, solving = self.linear.factor, self.linear.solving
-        dense = self.correction
-        dense.seconds -= factor.seconds + solving.seconds
-        self._count_flops(model)
-        tallies = {
-            "partition": self.partition,
-            "assembly": self.assembly,
-            **self.counts.phases(),
-            "factor": factor,
-            "solve": solving,
-            "dense": dense,
+        factor, solving = self.linear.factor.seconds, self.linear.solving.seconds
+        own = {name: tally.seconds for name, tally in self.own.items()}
+        own = {**own, "dense": own["dense"] - factor - solving, "factor": factor, "solve": solving}
+        everyone = self.comm.allgather(own)
+        seconds = {name: {"seconds": [each[name] for each in everyone]} for name in own}
+        synthesis = {
+            phase: {name: values.tolist() for name, values in quantities.items()}
+            for phase, quantities in self.counts.per_rank(self.comm).items()
         }
-        everyone = _everyones(self.comm, [list(astuple(tally)) for tally in tallies.values()])
-        return {
-            phase: {
-                field.name: everyone[:, row, column].tolist()
-                for column, field in enumerate(fields(Tally))
-            }
-            for row, phase in enumerate(tallies)
-        }
-
-    def _count_flops(self, model: Solid | None) -> None:
-        ranks = self.comm.size
-        work = bcast_from_root(self.comm, lambda: elimination(cast(Solid, model)))
-        shared, alone = dense_flops(
-            self.local_mesh.n_dofs, self.result.blocks, self.result.solves, self.width
-        )
-        self.assembly.flops = assembly_flops(self.local_mesh.cells.elements)
-        self.linear.factor.flops = work.flops / ranks
-        self.linear.solving.flops = work.solve_flops(self.result.solves) / ranks
-        own = 3 * (self.local_mesh.stop - self.local_mesh.start) / self.local_mesh.n_dofs
-        self.correction.flops = own * shared + (alone if self.comm.rank == 0 else 0.0)
+        first = {name: seconds.pop(name) for name in ("partition", "assembly")}
+        return {**first, **synthesis, **seconds}
 
 
-def _everyones(comm: MPI.Comm, mine: list[Any]) -> NDArray[np.float64]:
-    """Arrays of all ranks, stacked; the same on every rank."""
-    return np.array(comm.allgather(mine), dtype=float)
+class _TimedLinearSolver(LinearSolver):
+    """A linear solver whose factorisations and solves on this rank are timed."""
+
+    def __init__(self, method: str, layout: Layout) -> None:
+        super().__init__(method, layout)
+        self.factor, self.solving = Tally(), Tally()
+
+    def inverse(self, system: System, shift: float) -> Inverse:
+        """Inverse whose making is timed, and whose solves will be."""
+        with self.factor.running():
+            inverse = super().inverse(system, shift)
+        return _TimedInverse(inverse, self.solving)
+
+
+class _TimedInverse:
+    def __init__(self, inverse: Inverse, tally: Tally) -> None:
+        self.shift, self.exact, self.negative = inverse.shift, inverse.exact, inverse.negative
+        self._inverse, self._tally = inverse, tally
+
+    def solve(self, block: Array) -> Array:
+        with self._tally.running():
+            return self._inverse.solve(block)
+
+    def destroy(self) -> None:
+        self._inverse.destroy()
 
 
 def _this_machine() -> tuple[str, int]:

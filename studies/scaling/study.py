@@ -4,32 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from math import log2
 from typing import Any
-
-import numpy as np
 
 from carillon.command_line.arguments import number_between, whole_number
 from carillon.command_line.options import option
-from carillon.fem.elements import Elements
 from carillon.fem.model import Solid
 from solver import linear
 from solver.analysis.options import number_of_modes, positive_tolerance
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.correction.correction import INTERACTIVE_TOLERANCE
 from solver.distribution.decomposition import decompose
+from solver.distribution.tree import MergeTree
 from studies.scaling.launch import MOST_RANKS, measure_each, require_ranks
 from studies.scaling.model import (
     ASSUMPTIONS,
     WEAK_ASSUMPTIONS,
-    CorrectionWork,
     MachineRates,
     as_far_as_it_fits,
     fit_machine,
-    predict,
-    work_of_busiest,
 )
-from studies.scaling.sizes import TreeSizes, sizes_of_box, sizes_of_solid
-from studies.scaling.work import Factorisation, elimination
+from studies.scaling.work import Request, balanced_tree, busiest
 
 PREDICTED = tuple(1 << power for power in range(11))
 """Numbers of ranks that the model is asked for: 1 to 1024."""
@@ -38,6 +33,8 @@ FEWEST_CELLS = 4
 NOTE = "A model, not a measurement; see its assumptions and how far it is from the measurements."
 
 Result = dict[str, Any]
+Tree = tuple[MergeTree, list[float]]
+"""A merge tree and the nodes of its groups."""
 
 
 def rank_counts(text: str) -> tuple[int, ...]:
@@ -109,8 +106,16 @@ def scaling_study(
         )
 
     strong, failed = runs(dict.fromkeys(scaling.ranks, options.resolution))
-    machine = fit_machine(strong, scaling.latency, scaling.bandwidth)
-    work = elimination(problem.model)
+    model, most = problem.model, len(problem.model.connectivity) // FEWEST_CELLS
+    asked = {*PREDICTED, *(run["ranks"] for run in strong)}
+    trees = trees_of_solid(model, sorted(n for n in asked if n <= most), options.seed)
+    request = Request.of_run(strong[0])
+    work = {ranks: busiest(*tree, request, ranks) for ranks, tree in trees.items()}
+    machine = fit_machine(
+        [(run, work[run["ranks"]]) for run in strong if run["ranks"] in work],
+        scaling.latency,
+        scaling.bandwidth,
+    )
     result: Result = {
         "mesh": options.mesh,
         "resolution": options.resolution,
@@ -119,11 +124,7 @@ def scaling_study(
         "strong": {
             "runs": strong,
             "failed": failed,
-            "model": _modelled(
-                strong,
-                _strong(problem.model, options.seed, machine, work, strong, scaling),
-                ASSUMPTIONS,
-            ),
+            "model": _modelled(machine, strong, trees, request, ASSUMPTIONS),
         },
         "weak": None,
     }
@@ -134,12 +135,38 @@ def scaling_study(
             "runs": weak,
             "failed": failed,
             "model": _modelled(
+                machine,
                 weak,
-                _weak(problem.model.elements, machine, work, strong[0], weak),
+                growing_trees(weak[0]),
+                Request.of_run(weak[0]),
                 ASSUMPTIONS + WEAK_ASSUMPTIONS,
             ),
         }
     return result
+
+
+def trees_of_solid(model: Solid, ranks: Sequence[int], seed: int) -> dict[int, Tree]:
+    """Merge tree of a solid and the nodes of its groups, for each of ascending numbers of ranks."""
+    trees: dict[int, Tree] = {}
+    last: Tree | None = None
+    for count in ranks:
+        if last is None or count > last[0].parts:
+            decomposition, _ = decompose(model, None, seed, count)
+            nodes = [float(stop - start) for start, stop in decomposition.row_ranges()]
+            last = decomposition.tree, nodes
+        trees[count] = last
+    return trees
+
+
+def growing_trees(run: Result) -> dict[int, Tree]:
+    """The same of solids that grow with the ranks, with the unknowns of a rank of this run."""
+    nodes = run["n_dofs"] / run["ranks"] / 3.0
+    levels = max(0, round(log2(run["subdomains"] / run["ranks"])))
+    trees = {}
+    for ranks in PREDICTED:
+        tree = balanced_tree(levels + round(log2(ranks)))
+        trees[ranks] = tree, [nodes / (1 << levels) * (1 << level) for level in tree.levels()]
+    return trees
 
 
 def study_lines(result: Result) -> list[str]:
@@ -170,56 +197,23 @@ def study_lines(result: Result) -> list[str]:
     return lines
 
 
-def _strong(
-    model: Solid,
-    seed: int,
+def _modelled(
     machine: MachineRates,
-    work: Factorisation,
     runs: list[Result],
-    scaling: ScalingOptions,
-) -> list[Result]:
-    correction = CorrectionWork.measured(runs[0])
+    trees: dict[int, Tree],
+    request: Request,
+    assumptions: Sequence[str],
+) -> Result:
     rows = []
-    sizes: TreeSizes | None = None
-    most = len(model.connectivity) // FEWEST_CELLS
-    for ranks in sorted({*PREDICTED, *scaling.ranks}):
-        if ranks > most:
-            break
-        if sizes is None or ranks > sizes.tree.parts:
-            sizes = sizes_of_solid(model, *decompose(model, None, seed, ranks))
-        busiest = work_of_busiest(sizes, work, runs[0]["keep"], correction, ranks)
-        rows.append(_row(ranks, model.n_dofs, sizes, predict(machine, busiest)))
-    return rows
-
-
-def _weak(
-    elements: Elements,
-    machine: MachineRates,
-    work: Factorisation,
-    alone: Result,
-    runs: list[Result],
-) -> list[Result]:
-    correction = CorrectionWork.measured(runs[0])
-    unknowns = runs[0]["n_dofs"] / runs[0]["ranks"]
-    parts = 1 << max(0, round(np.log2(runs[0]["subdomains"] / runs[0]["ranks"])))
-    rows = []
-    for ranks in PREDICTED:
-        sizes = sizes_of_box(parts * ranks, unknowns / 3.0 / parts, elements)
-        grown = work.grown(ranks * unknowns / alone["n_dofs"])
-        busiest = work_of_busiest(sizes, grown, runs[0]["keep"], correction, ranks)
-        rows.append(_row(ranks, ranks * unknowns, sizes, predict(machine, busiest)))
-    return rows
-
-
-def _row(ranks: int, n_dofs: float, sizes: TreeSizes, seconds: dict[str, float]) -> Result:
-    return {
-        "ranks": ranks,
-        "n_dofs": round(n_dofs),
-        "subdomains": sizes.tree.parts,
-        "seconds": seconds,
-        "total": sum(seconds.values()),
-    }
-
-
-def _modelled(runs: list[Result], rows: list[Result], assumptions: Sequence[str]) -> Result:
+    for ranks, (tree, nodes) in trees.items():
+        seconds = machine.predict(busiest(tree, nodes, request, ranks))
+        rows.append(
+            {
+                "ranks": ranks,
+                "n_dofs": round(3.0 * nodes[-1]),
+                "subdomains": tree.parts,
+                "seconds": seconds,
+                "total": sum(seconds.values()),
+            }
+        )
     return {"note": NOTE, "assumptions": list(assumptions), **as_far_as_it_fits(runs, rows)}

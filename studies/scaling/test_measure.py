@@ -11,30 +11,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from carillon.errors import UserError
-from carillon.fem.finite_cells.build import finite_cells
-from carillon.fem.geometry import builtin_surface, hexmesh_from_voxels, load_surface, voxelize
+from carillon.fem.geometry import hexmesh_from_voxels, load_surface, voxelize
 from carillon.fem.model import fine_model
-from solver.distribution.decomposition import decompose
 from solver.hcms.counts import Tally
 from studies.scaling import launch
 from studies.scaling.model import (
     ASSUMED_BANDWIDTH,
     MISFIT_LIMIT,
-    CorrectionWork,
     MachineRates,
     as_far_as_it_fits,
     fit_machine,
     kind,
-    predict,
-    work_of_busiest,
 )
-from studies.scaling.plan import planned_counts
 from studies.scaling.plot import save_plot
-from studies.scaling.sizes import sizes_of_box, sizes_of_solid
-from studies.scaling.study import PREDICTED, study_lines
-from studies.scaling.work import elimination
-from tests.cut_solids import uniform
-from tests.solids import random_box
+from studies.scaling.study import PREDICTED, growing_trees, study_lines, trees_of_solid
+from studies.scaling.work import Request, balanced_tree, busiest
 
 BAR = ("builtin:bar", "--resolution", 24, "--material", "smooth")
 COUNT = """
@@ -45,27 +36,22 @@ from solver.distribution.local_mesh import distribute
 from solver.hcms import schedule
 from solver.hcms.synthesis import synthesize
 from solver.analysis.problem import ProblemOptions, build_problem
-from studies.scaling.plan import planned_counts
-from studies.scaling.sizes import sizes_of_solid
-from solver.distribution.decomposition import decompose
+from studies.scaling.work import Request, busiest
 
 comm, keep = MPI.COMM_WORLD, 60
 if len(sys.argv) > 1:
     schedule.SHARED_SIZE, schedule.SHARED_PRODUCTS = 20, 1e3
 for discretisation in ("voxel", "finite-cell"):
     options = ProblemOptions("builtin:bar", 24, "smooth", discretisation=discretisation)
-    model = build_problem(options).model
-    local_mesh = distribute(model, 6, 0, comm)
-    found = synthesize(local_mesh, keep, "free", comm).counts.per_rank(comm)
+    local_mesh = distribute(build_problem(options).model, 6, 0, comm)
+    counted = synthesize(local_mesh, keep, "free", comm).counts.per_rank(comm)
     if comm.rank == 0:
-        decomposition, order = decompose(model, 6, 0, comm.size)
-        sizes = sizes_of_solid(model, decomposition, order)
-        planned = [each.phases() for each in planned_counts(sizes, decomposition.owner, keep)]
-        assert list(planned[0]) == list(found)
-        for phase in found:
-            for name in ("messages", "bytes", "flops"):
-                values = [float(getattr(each[phase], name)) for each in planned]
-                print(json.dumps([phase, name, values, found[phase][name].tolist()]))
+        decomposition = local_mesh.decomposition
+        nodes = [float(stop - start) for start, stop in decomposition.row_ranges()]
+        work = busiest(decomposition.tree, nodes, Request(keep, 1, 10, 60), comm.size)
+        for phase, quantities in counted.items():
+            flops, messages = (float(quantities[name].max()) for name in ("flops", "messages"))
+            print(json.dumps([phase, work[phase].flops, flops, work[phase].messages, messages]))
 """
 
 
@@ -84,51 +70,43 @@ def bar():
         (3, ""),
     ],
 )
-def test_planned_counts_are_those_of_a_run(ranks, options, tmp_path, mpiexec):
+def test_work_of_the_busiest_rank_is_what_a_run_counts(ranks, options, tmp_path, mpiexec):
     program = tmp_path / "count.py"
     program.write_text(COUNT)
     done = mpiexec(ranks, program, *options.split(), check=True)
     rows = [json.loads(line) for line in done.stdout.splitlines()]
     assert {phase for phase, *_ in rows} >= {"local", "merge 1", "down", "basis"}
-    for phase, name, planned, found in rows:
-        # Operations of sparse products are counted by entries, some of which may cancel to zero.
-        assert planned == pytest.approx(found, rel=0.01), (phase, name)
+    for phase, flops, counted, messages, sent in rows:
+        # Merges are counted for compact groups, which the parts of a bar are not.
+        factor = 2.5 if kind(phase) == "merge" else 1.01
+        assert counted / factor <= flops <= factor * counted, phase
+        assert (messages > 0.0) == (sent > 0.0), phase
 
 
-def test_a_box_of_cubes_is_as_large_as_it_should_be():
-    elements = random_box(1, 1, 1).elements
-    sizes = sizes_of_box(8, 1000.0, elements)
-    assert sizes.nodes[:8] == pytest.approx(1000.0) and sizes.nodes[-1] == pytest.approx(8000.0)
-    assert sizes.boundary[0] == pytest.approx(10**3 - 8**3) and sizes.boundary[-1] == 0.0
-    # Cubes meet in a face, pairs of them in two, fours of them in four.
-    assert sizes.rows_left == pytest.approx([100.0] * 4 + [200.0] * 2 + [400.0])
-    # Where quadratic cells meet, one or two of their layers belong to a group.
-    quadratic = sizes_of_box(8, 1000.0, uniform(finite_cells(builtin_surface("box"), 4)).elements)
-    assert quadratic.rows_left == pytest.approx(1.5 * sizes.rows_left)
-    assert quadratic.pairs_across == pytest.approx(2.0 * 16.0 / 9.0 * sizes.pairs_across)
-    with pytest.raises(ValueError, match="power of two"):
-        sizes_of_box(6, 1000.0, elements)
+def test_equal_subdomains_are_joined_in_pairs():
+    tree = balanced_tree(3)
+    assert tree.parts == 8 and tree.levels() == [0] * 8 + [1] * 4 + [2] * 2 + [3]
+    assert tree.ranges()[8:] == [(0, 2), (2, 4), (4, 6), (6, 8), (0, 4), (4, 8), (0, 8)]
+    trees = growing_trees({"n_dofs": 6000, "ranks": 2, "subdomains": 8})
+    tree, nodes = trees[4]
+    assert tree.parts == 16 and nodes[0] == pytest.approx(250.0) and nodes[-1] == 4000.0
 
 
 def test_more_ranks_have_less_to_do_each_and_more_to_say():
     mesh = bar()
-    model = fine_model(mesh, np.ones(mesh.n_cells))
-    sizes = sizes_of_solid(model, *decompose(model, 8, 0, 1))
-    work = elimination(model)
-    correction = CorrectionWork(blocks=2, solves=100, width=70)
-    alone, many = (work_of_busiest(sizes, work, 60, correction, ranks) for ranks in (1, 8))
-    for phase in ("local", "basis", "factor", "solve"):
+    trees = trees_of_solid(fine_model(mesh, np.ones(mesh.n_cells)), (1, 8, 64), 0)
+    assert trees[64][0].parts >= 64
+    request = Request(keep=60, blocks=2, solves=100, width=70)
+    alone, many = (busiest(*trees[8], request, ranks) for ranks in (1, 8))
+    for phase in ("assembly", "local", "basis", "factor", "solve", "dense"):
         assert many[phase].flops < alone[phase].flops
     assert sum(tally.messages for tally in alone.values()) == 0.0
     assert all(many[phase].messages > 0.0 for phase in ("merge 1", "down", "factor", "dense"))
-    (counts,) = planned_counts(sizes, np.zeros(8, dtype=int), 60)
-    assert alone["local"].flops == counts.local.flops
 
 
 def run(ranks: int, seconds: float, oversubscribed: bool = False) -> dict:
-    """A measured run in which every rank does a gigaflop in every phase."""
-    quantities = {"seconds": seconds, "waiting": 0.0, "flops": 1e9, "bytes": 0.0, "messages": 0.0}
-    phase = {name: [value] * ranks for name, value in quantities.items()}
+    """A measured run in which every phase takes all ranks so long."""
+    phase = {"seconds": [seconds] * ranks}
     return {
         "ranks": ranks,
         "oversubscribed": oversubscribed,
@@ -138,16 +116,28 @@ def run(ranks: int, seconds: float, oversubscribed: bool = False) -> dict:
 
 
 def test_rates_are_fitted_to_runs_that_have_their_cores():
-    machine = fit_machine([run(1, 0.5), run(2, 0.5), run(8, 50.0, oversubscribed=True)])
+    work = {phase: Tally(flops=1e9) for phase in ("local", "merge 1", "merge 2")}
+    runs = [run(1, 0.5), run(2, 0.5), run(8, 50.0, oversubscribed=True)]
+    machine = fit_machine([(each, work) for each in runs])
     assert machine.rates["local"] == machine.rates["merge"] == pytest.approx(2e9)
     assert (machine.latency, machine.bandwidth) == (1e-6, 1e9)
-    assert fit_machine([run(1, 0.5)]).bandwidth == ASSUMED_BANDWIDTH
-    assert fit_machine([run(1, 0.5)], latency=5e-6, bandwidth=1e10).latency == 5e-6
+    alone = [(run(1, 0.5), work)]
+    assert fit_machine(alone).bandwidth == ASSUMED_BANDWIDTH
+    assert fit_machine(alone, latency=5e-6, bandwidth=1e10).latency == 5e-6
+
+
+def test_waiting_is_no_work():
+    busy = run(2, 0.5)
+    busy["phases"]["local"] = {"seconds": [0.5, 0.5], "waiting": [0.0, 0.4]}
+    busy["phases"]["merge 1"] = {"seconds": [0.5, 0.5], "waiting": [0.4, 0.3]}
+    work = {"local": Tally(flops=1e9), "merge 1": Tally(flops=1e9)}
+    rates = fit_machine([(busy, work)]).rates
+    assert rates["local"] == pytest.approx(2e9) and rates["merge"] == pytest.approx(5e9)
 
 
 def test_time_is_that_of_operations_bytes_and_messages():
     machine = MachineRates({"merge": 1e9}, latency=1e-3, bandwidth=1e6)
-    seconds = predict(machine, {"merge 3": Tally(messages=10, bytes=2e6, flops=3e9)})
+    seconds = machine.predict({"merge 3": Tally(messages=10, bytes=2e6, flops=3e9)})
     assert seconds == {"merge 3": pytest.approx(3.0 + 2.0 + 0.01)}
     assert kind("merge 3") == "merge"
 

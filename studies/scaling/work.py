@@ -1,103 +1,190 @@
-"""Operations of the error correction, counted from sizes alone."""
+"""Operations, bytes and messages of the busiest rank in every phase, counted without doing them.
+
+They follow from the nodes of the groups of a merge tree, from the solver's own schedule of merges,
+and from closed forms for compact solids: a group of n nodes has 6 n^(2/3) on its boundary, and
+nested dissection starts with a separator of s = 3 n^(2/3) unknowns, so that a factorisation takes
+about 4 s^3 operations and its factor has 2 s^2 entries.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from carillon.fem.elements import Elements
-from carillon.fem.model import Solid
-from solver.assembly.node_rows import Pattern
-from solver.hcms.counts import eigen_flops, product_flops
-from solver.linear.dissection import dissect
+from solver.distribution.decomposition import COST_EXPONENT
+from solver.distribution.tree import Merge, MergeTree, assign_ranks
+from solver.hcms.counts import (
+    Tally,
+    count_shared_eigenproblem,
+    eigen_flops,
+    krylov_flops,
+    product_flops,
+)
+from solver.hcms.schedule import planned_modes, schedule
+from solver.hcms.synthesis import local_steps
 
-LOOKS = 3
-"""Dense eigenproblems of the Krylov space that a correction solves."""
+REAL_BYTES = 8
+MERGE_MESSAGES = 10
+"""Messages that a rank sends for a merge with the group of another."""
+DENSE_PROBLEMS = 3
+"""Dense eigenproblems of the Krylov space that a correction solves on one rank."""
+
+Work = dict[str, Tally]
 
 
 @dataclass(frozen=True)
-class Factorisation:
-    """A sparse Cholesky factorisation by nested dissection.
+class Request:
+    """What is computed, on any number of ranks.
 
     Attributes
     ----------
-    flops
-        Operations of the factorisation.
-    entries
-        Entries of the factor.
-    boundary
-        Unknowns on the boundary of the largest front, level by level from the root.
+    keep
+        Modes kept at the root of the merge tree.
+    blocks, solves
+        Blocks of right-hand sides of the correction, and their columns in all.
+    width
+        Modes that it forms.
     """
 
-    flops: float
-    entries: float
-    boundary: tuple[float, ...]
+    keep: int
+    blocks: int
+    solves: int
+    width: int
 
-    def grown(self, factor: float) -> Factorisation:
-        """That of a compact solid `factor` times as large."""
-        return Factorisation(
-            self.flops * factor**2,
-            self.entries * factor ** (4.0 / 3.0),
-            tuple(size * factor ** (2.0 / 3.0) for size in self.boundary),
-        )
-
-    def solve_flops(self, columns: float) -> float:
-        """Operations of a solve with so many right-hand sides."""
-        return 4.0 * self.entries * columns
-
-    def update_bytes(self, levels: int) -> float:
-        """Bytes of the updates that the fronts of the uppermost `levels` send to their parents."""
-        return sum(4.0 * size * (size + 1.0) for size in self.boundary[1 : levels + 1])
-
-    def solve_bytes(self, levels: int, columns: float) -> float:
-        """Bytes of right-hand sides that pass these fronts, up and down."""
-        return sum(16.0 * size * columns for size in self.boundary[1 : levels + 1])
+    @classmethod
+    def of_run(cls, run: dict[str, Any]) -> Request:
+        """That of a measured run."""
+        return cls(run["keep"], run["blocks"], run["right_hand_sides"], run["width"])
 
 
-def assembly_flops(elements: Elements) -> float:
-    """Operations of the stiffness of elements: a matrix for each point, scaled and added."""
-    points, nodes = elements.young.shape[1], elements.node_places.shape[1]
-    return 2.0 * len(elements) * points * (3 * nodes) ** 2
-
-
-def elimination(model: Solid) -> Factorisation:
-    """Symbolic factorisation of the stiffness of a solid."""
-    mesh, steps = model.mesh, model.elements.steps
-    pattern = Pattern.of_cells(model.connectivity.astype(np.int64), 0, mesh.n_nodes)
-    fronts = dissect(mesh.node_grid.astype(np.int64), pattern.indptr, pattern.columns, steps)
-    own = 3.0 * np.diff(fronts.first)
-    outside = 3.0 * np.array([len(boundary) for boundary in fronts.boundary])
-    flops = own**3 / 3.0 + own**2 * outside + own * outside**2
-    depth = np.zeros(len(fronts), dtype=int)
-    for front in reversed(range(len(fronts))):
-        if fronts.parent[front] >= 0:
-            depth[front] = depth[fronts.parent[front]] + 1
-    boundary = tuple(float(outside[depth == level].max()) for level in range(int(depth.max()) + 1))
-    return Factorisation(
-        float(flops.sum()), float((0.5 * own * (own + 1.0) + own * outside).sum()), boundary
-    )
-
-
-def dense_flops(unknowns: float, blocks: int, solves: int, width: int) -> tuple[float, float]:
-    """Operations of the block Lanczos iteration: those shared by the ranks, and those of rank 0.
-
-    Every block is projected on the basis and freed of it, then made orthonormal; twice the
-    operator's Ritz values are looked at, and in the end the modes are formed.
+def busiest(tree: MergeTree, nodes: Sequence[float], request: Request, ranks: int) -> Work:
+    """Work of the busiest rank in every phase, as tallies without times.
 
     Parameters
     ----------
-    unknowns
-        Of the whole solid.
-    blocks, solves
-        Blocks of right-hand sides and their columns in all.
-    width
-        Vectors formed.
+    nodes
+        (groups,) nodes of every group of `tree`.
     """
-    if blocks == 0:
-        return 0.0, 0.0
-    columns = solves / blocks
-    basis = 2.0 * unknowns * solves**2
-    orthonormal = 6.0 * unknowns * columns * solves
-    vectors = product_flops(round(unknowns), solves, width)
-    return basis + orthonormal + vectors, LOOKS * eigen_flops(solves, False)
+    unknowns = 3.0 * np.asarray(nodes)
+    owner = assign_ranks(np.asarray(nodes[: tree.parts]) ** COST_EXPONENT, ranks)
+    modes = planned_modes(tree, nodes, request.keep)
+    steps = local_steps(tree.parts)
+    local, basis, own = np.zeros((3, ranks))
+    for part, rank in enumerate(owner):
+        own[rank] += unknowns[part]
+        local[rank] += krylov_flops(int(unknowns[part]), modes[part], steps)
+        basis[rank] += product_flops(int(unknowns[part]), modes[part], modes[-1])
+    largest = float(own.max())
+    return {
+        "assembly": Tally(flops=largest),
+        "local": Tally(flops=float(local.max())),
+        **_synthesis(tree, nodes, modes, owner, request.keep, ranks),
+        "basis": Tally(flops=float(basis.max()) if tree.merges else 0.0),
+        **_correction(float(unknowns[-1]), largest, request, ranks),
+    }
+
+
+def balanced_tree(levels: int) -> MergeTree:
+    """Merge tree of 2^levels subdomains, joined in pairs."""
+    parts = 1 << levels
+    merges = [Merge(parts + i, 2 * i, 2 * i + 1) for i in range(parts - 1)]
+    return MergeTree(parts, tuple(merges))
+
+
+def _synthesis(
+    tree: MergeTree, nodes: Sequence[float], modes: list[int], owner: Any, keep: int, ranks: int
+) -> Work:
+    """Work of the merges, level by level, and of the coefficients on their way back."""
+    plan, levels = schedule(tree, owner, nodes, keep), tree.levels()
+    phases = {f"merge {level}": _tallies(ranks) for level in range(1, levels[-1] + 1)}
+    down = _tallies(ranks)
+    for step, team, crews in zip(tree.merges, plan.teams, plan.crews, strict=True):
+        merge = phases[f"merge {levels[step.group]}"]
+        here, size = plan.holder[step.group], modes[step.left] + modes[step.right]
+        products = _product_flops(nodes, modes, step, root=step.group == len(nodes) - 1)
+        merge[here].flops += products / (1 + len(crews[0]) + len(crews[1]))
+        for rank in team:
+            if len(team) == 1:
+                merge[rank].flops += eigen_flops(size, True)
+            else:
+                count_shared_eigenproblem(merge[rank], size, True, len(team))
+        for child in (step.left, step.right):
+            there = plan.holder[child]
+            if step.group < len(nodes) - 1:
+                down[here].flops += product_flops(modes[child], modes[step.group], modes[-1])
+            if there != here:
+                rows = min(3.0 * nodes[child], 3.0 * _boundary(nodes[child]))
+                merge[there].messages += MERGE_MESSAGES
+                merge[there].bytes += REAL_BYTES * modes[child] * (rows + size)
+                down[here].messages += 2
+                down[here].bytes += REAL_BYTES * modes[child] * modes[-1]
+    down[plan.holder[-1]].messages += 2 * (ranks - 1)
+    down[plan.holder[-1]].bytes += REAL_BYTES * (ranks - 1) * (1 + modes[-1])
+    return {name: _largest(tallies) for name, tallies in {**phases, "down": down}.items()}
+
+
+def _product_flops(nodes: Sequence[float], modes: list[int], step: Merge, root: bool) -> float:
+    """Products of a merge: at the face where two compact groups meet, and for the joined boundary.
+
+    The stiffness at the face is projected on the modes of either group and on both; but for the
+    root, the joined modes are formed on the boundary.
+    """
+    left, right, joined = (modes[group] for group in (step.left, step.right, step.group))
+    face = 3.0 * nodes[step.group] ** (2.0 / 3.0)
+    boundary = 0.0 if root else 3.0 * _boundary(nodes[step.group])
+    projected = 2.0 * face * (left**2 + right**2 + left * right)
+    return projected + boundary * (left + right) * joined
+
+
+def _correction(unknowns: float, largest: float, request: Request, ranks: int) -> Work:
+    """Work of the block Lanczos iteration, where the busiest rank has `largest` of the unknowns.
+
+    The ranks share factorisation, solves, the projection of every block on all before it and the
+    modes; the dense problems of the Krylov space are the first rank's.
+    """
+    blocks, solves = request.blocks, request.solves
+    columns = solves / max(blocks, 1)
+    rounds = (ranks - 1).bit_length()
+    separator = 3.0 * (unknowns / 3.0) ** (2.0 / 3.0)
+    fronts = [separator * 0.5 ** (2.0 * level / 3.0) for level in range(rounds)]
+    shared = 2.0 * solves**2 + 6.0 * columns * solves + 2.0 * solves * request.width
+    alone = DENSE_PROBLEMS * eigen_flops(solves, False)
+    outside = 3.0 * _boundary(largest / 3.0) if ranks > 1 else 0.0
+    reduced = rounds * solves * (0.5 * solves + 2.0 * columns)
+    return {
+        "factor": Tally(
+            rounds,
+            REAL_BYTES * sum(0.5 * front**2 for front in fronts),
+            4.0 * separator**3 / ranks,
+        ),
+        "solve": Tally(
+            2 * rounds * max(blocks, 1),
+            REAL_BYTES * sum(2.0 * front * solves for front in fronts),
+            8.0 * separator**2 * solves / ranks,
+        ),
+        "dense": Tally(
+            6 * rounds * blocks,
+            REAL_BYTES * (4.0 * outside * solves + reduced),
+            largest * shared + alone,
+        ),
+    }
+
+
+def _boundary(nodes: float) -> float:
+    """Nodes on the boundary of a compact group."""
+    return 6.0 * nodes ** (2.0 / 3.0)
+
+
+def _tallies(ranks: int) -> list[Tally]:
+    return [Tally() for _ in range(ranks)]
+
+
+def _largest(tallies: list[Tally]) -> Tally:
+    return Tally(
+        max(each.messages for each in tallies),
+        max(each.bytes for each in tallies),
+        max(each.flops for each in tallies),
+    )
