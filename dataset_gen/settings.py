@@ -7,19 +7,14 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Annotated, Any, get_type_hints
 
 from carillon import __version__
-from carillon.command_line.arguments import (
-    non_negative_number,
-    poisson_ratio,
-    positive_number,
-    whole_number,
-)
-from carillon.command_line.options import REQUIRED, option
 from carillon.errors import UserError
 from carillon.fem import block, element
 from carillon.fem.element import DEFAULT_POISSON
+from carillon.parameters import REQUIRED, OneOf, option, parameters
+from carillon.parameters.quantities import Count, NonNegative, Number, PoissonRatio, Positive
 from dataset_gen import objectives, sampling
 from dataset_gen.objectives import (
     DATASET_OBJECTIVES,
@@ -56,19 +51,19 @@ def code_of_rows() -> str:
     return digest.hexdigest()[:12]
 
 
-@dataclass(frozen=True)
+@parameters
 class ShardOptions:
     """One of several nearly equal shards of the first samples of a seed, and how to fit them."""
 
-    samples: int = option(REQUIRED, "of all shards", type=whole_number(1))
-    seed: int = option(0, "of the samples", type=whole_number(0))
-    shard: int = option(0, "number of this shard", type=whole_number(0))
-    shards: int = option(1, "number of all shards", type=whole_number(1))
-    objective: str = option(DEFAULT_OBJECTIVE, "of the fits", choices=DATASET_OBJECTIVES)
-    poisson: float = option(DEFAULT_POISSON, "Poisson's ratio", type=poisson_ratio)
-    distribution: str = option("uniform", "of the fine moduli", choices=DISTRIBUTIONS)
-    low: float | None = option(None, "least modulus [GPa] (0 or 0.01)", type=non_negative_number)
-    high: float | None = option(None, "largest modulus [GPa] (10 or 1000)", type=positive_number)
+    samples: Count = option(REQUIRED, "of all shards")
+    seed: Number = option(0, "of the samples")
+    shard: Number = option(0, "number of this shard")
+    shards: Count = option(1, "number of all shards")
+    objective: Annotated[str, OneOf(*DATASET_OBJECTIVES)] = option(DEFAULT_OBJECTIVE, "of the fits")
+    poisson: PoissonRatio = option(DEFAULT_POISSON, "Poisson's ratio")
+    distribution: Annotated[str, OneOf(*DISTRIBUTIONS)] = option("uniform", "of the fine moduli")
+    low: NonNegative | None = option(None, "least modulus [GPa] (0 or 0.01)")
+    high: Positive | None = option(None, "largest modulus [GPa] (10 or 1000)")
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from carillon.command_line.arguments import whole_number
+from typing import Annotated
+
 from carillon.errors import UserError
+from carillon.parameters.quantities import between
 
 LOWEST_RATE, HIGHEST_RATE = 1_000, 768_000
 """Samples per second [Hz] of clips and of what is rendered."""
@@ -20,8 +22,8 @@ LEAST_IMPULSE, LARGEST_IMPULSE = 1e-6, 1e6
 QUIETEST, LOUDEST = 1e-9, 1e6
 """Magnitude of the loudest sample of a clip, full scale being 1."""
 
-sample_rate = whole_number(LOWEST_RATE, HIGHEST_RATE)
-"""Argument type: samples per second."""
+SampleRate = Annotated[int, between(LOWEST_RATE, HIGHEST_RATE)]
+"""Samples per second [Hz]."""
 
 
 def require_level(peak: float) -> None:

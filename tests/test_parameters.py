@@ -57,7 +57,7 @@ class Solid:
     density: Density = option(1000.0)
     poisson: PoissonRatio = option(0.25)
     modes: Annotated[int, Ge(2), Le(9)] | Literal["auto"] = option("auto", "number of modes [1]")
-    method: Annotated[str, OneOf(("fast", "slow"))] = option("fast", "how it is solved")
+    method: Annotated[str, OneOf("fast", "slow")] = option("fast", "how it is solved")
     lumped: bool = option(False, "lump the mass")
     points: tuple[Point, ...] = option((), "points of the solid")
     weights: Weights = option(Weights, "weights of the cost")

@@ -7,6 +7,7 @@ import copy
 import json
 import math
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import pytest
@@ -14,9 +15,10 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from carillon.command_line import arguments
 from carillon.errors import LONGEST_MESSAGE, one_line
 from carillon.files.yaml_input import parse_yaml
+from carillon.parameters.command_line import reader
+from carillon.parameters.quantities import Count, NonNegative, PoissonRatio, Positive, between
 from sound.clips.instruments import note_hertz
 from sound.project.project import project_of
 from studies.forests.training import require_counts
@@ -33,12 +35,17 @@ NUMBERS = st.one_of(
     st.floats().map(repr),
     st.sampled_from(["１２", "1_000", "0x10", "1e999", "-0", "+5", "", " 5", "5\n", "٣", "1e-400"]),
 )
+BETWEEN = Annotated[float, between(-2.0, 3.0)]
 TYPES = {
-    "whole": (arguments.whole_number(1), int, lambda value: 1 <= value < 2**63),
-    "not negative": (arguments.non_negative_number, float, lambda value: 0.0 <= value < math.inf),
-    "positive": (arguments.positive_number, float, lambda value: 0.0 < value < math.inf),
-    "ratio": (arguments.poisson_ratio, float, lambda value: -1.0 < value < 0.5),
-    "between": (arguments.number_between(-2.0, 3.0), float, lambda value: -2.0 <= value <= 3.0),
+    "whole": (reader(Count), int, lambda value: 1 <= value < 2**63),
+    "not negative": (reader(NonNegative), float, lambda value: 0.0 <= value < math.inf),
+    "positive": (reader(Positive), float, lambda value: 0.0 < value < math.inf),
+    "ratio": (reader(PoissonRatio), float, lambda value: -1.0 < value < 0.5),
+    "between": (
+        reader(Annotated[float, between(-2.0, 3.0)]),
+        float,
+        lambda value: -2.0 <= value <= 3.0,
+    ),
 }
 
 

@@ -4,26 +4,13 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Iterable, Sequence
-from difflib import get_close_matches
+from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from carillon.errors import UserError
-from carillon.processes.cores import allowed_cores
-
-LARGEST = 2**63 - 1
-"""Largest whole number on a command line: what files and compiled code can hold."""
-
-MOST_WORKERS = 64
-"""Processes or threads that one command may start on a machine of few cores."""
-WORKERS_OF_CORE = 4
-"""Processes or threads for each core that one command may start on a machine of many cores."""
-
-ALIKE = 0.7
-"""Share of letters in common (difflib) from which a word is taken for a mistyped one."""
+from carillon.parameters.sentences import alike
 
 _NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$", re.ASCII)
-_WHOLE = re.compile(r"[-+]?[0-9]{1,30}", re.ASCII)
 
 
 class Parser(argparse.ArgumentParser):
@@ -67,82 +54,3 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Raise the mistake as a UserError; `exit_status.run` prints it and exits with 2."""
         raise UserError(f"{message} (see {self.prog} --help)")
-
-
-def alike(word: str, words: Iterable[str]) -> str | None:
-    """The one of `words` that a mistyped word is most like, if it is like any.
-
-    Examples
-    --------
-    >>> alike("Validte", ["modes", "validate"]), alike("ring", ["modes", "validate"])
-    ('validate', None)
-    """
-    lower = {each.lower(): each for each in words}
-    found = get_close_matches(word.lower(), list(lower), 1, ALIKE)
-    return lower[found[0]] if found else None
-
-
-def whole_number(minimum: int, maximum: int = LARGEST) -> Callable[[str], int]:
-    """Argument type: an integer in `minimum`..`maximum`, in digits."""
-
-    def convert(text: str) -> int:
-        if not _WHOLE.fullmatch(text):
-            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
-        value = int(text)
-        if value < minimum:
-            raise argparse.ArgumentTypeError(f"{value} is too small, expected at least {minimum}")
-        if value > maximum:
-            raise argparse.ArgumentTypeError(f"{value} is too large, expected at most {maximum}")
-        return value
-
-    return convert
-
-
-def number_of_workers(text: str) -> int:
-    """Argument type: processes or threads, no more than this machine could bear."""
-    return whole_number(1, max(MOST_WORKERS, WORKERS_OF_CORE * allowed_cores()))(text)
-
-
-def number_between(low: float, high: float, unit: str = "") -> Callable[[str], float]:
-    """Argument type: a number in `low`..`high`, both of them included."""
-
-    def convert(text: str) -> float:
-        value = _number(text)
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(
-                f"{text} is out of range, expected {low:g} to {high:g} {unit}".rstrip()
-            )
-        return value
-
-    return convert
-
-
-def positive_number(text: str) -> float:
-    """Argument type: a finite number above zero."""
-    value = _number(text)
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text} is out of range, expected a number above 0")
-    return value
-
-
-def poisson_ratio(text: str) -> float:
-    """Argument type: Poisson's ratio in (-1, 0.5)."""
-    value = _number(text)
-    if not -1.0 < value < 0.5:
-        raise argparse.ArgumentTypeError(f"Poisson's ratio {text} is outside (-1, 0.5)")
-    return value
-
-
-def non_negative_number(text: str) -> float:
-    """Argument type: a finite number, zero or above."""
-    value = _number(text)
-    if not 0.0 <= value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text} is out of range, expected 0 or above")
-    return value
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None

@@ -64,6 +64,8 @@ def _add(parser: argparse._ActionsContainer, each: Parameter, positional: bool) 
         arguments["choices"] = item.choices
     elif each.read or item.kind is not str or item.limits:
         arguments["type"] = _checked(each.read) if each.read else _reader(item)
+    if positional and default is not REQUIRED:
+        arguments.setdefault("nargs", "?")
     if positional:
         parser.add_argument(each.name, **{"metavar": each.name.upper(), **arguments})
         return

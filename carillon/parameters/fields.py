@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import types
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -67,15 +68,15 @@ class ValueDomain:
 
 
 def unit_of(meaning: str) -> str:
-    """The unit at the end of a meaning.
+    """The unit in a meaning, if there is one.
 
     Examples
     --------
     >>> unit_of("mass density [kg/m^3]"), unit_of("number of modes [1]"), unit_of("a name")
     ('kg/m^3', '', '')
     """
-    _, _, unit = meaning.rpartition("[")
-    return unit[:-1] if meaning.endswith("]") and unit != "1]" else ""
+    units = re.findall(r"\[([^]]+)\]", meaning)
+    return units[0] if len(units) == 1 and units != ["1"] else ""
 
 
 @dataclass(frozen=True)

@@ -23,11 +23,11 @@ CONFIG: ConfigDict = {"extra": "forbid", "allow_inf_nan": False}
 """pydantic's settings for all parameters: no unknown keys, finite numbers."""
 
 
-@dataclass(frozen=True)
 class OneOf:
-    """Marker in `Annotated[str, OneOf(names)]` of a text that is one of several."""
+    """Marker in `Annotated[str, OneOf(*names)]` of a text that is one of several."""
 
-    names: tuple[str, ...]
+    def __init__(self, *names: str) -> None:
+        self.names = names
 
     def __get_pydantic_core_schema__(self, _: Any, __: GetCoreSchemaHandler) -> CoreSchema:
         from pydantic_core import core_schema
@@ -84,7 +84,7 @@ def option(
     return dataclasses.field(default=default, metadata=metadata)
 
 
-@dataclass_transform(frozen_default=True, field_specifiers=(option,))
+@dataclass_transform(frozen_default=True)
 def parameters(cls: type[T]) -> type[T]:
     """Make a frozen dataclass whose values are checked against their annotations.
 

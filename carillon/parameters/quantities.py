@@ -8,46 +8,55 @@ from annotated_types import Ge, Gt, Interval, Le, Lt
 
 from carillon.limits import DENSITIES, MODULI, POISSON, RESOLUTIONS, UNITS
 from carillon.parameters.model import OneOf
+from carillon.processes.cores import allowed_cores
 
 LARGEST = 2**63 - 1
 """Largest whole number that files and compiled code can hold."""
 MOST_UNKNOWNS = 2**31 - 1
 """Largest number of unknowns of a model, and so of its modes."""
 
+MOST_WORKERS = 64
+"""Processes or threads that one command may start on a machine of few cores."""
+WORKERS_OF_CORE = 4
+"""Processes or threads that one command may start for each core of a machine with more."""
 
-def between(limits: tuple[float, float]) -> Interval:
+
+def between(low: float, high: float) -> Interval:
     """Mark of numbers within limits, both of them included."""
-    return Interval(ge=limits[0], le=limits[1])
+    return Interval(ge=low, le=high)
 
 
+Coordinate = Annotated[float, between(-1e18, 1e18)]
+Point = Annotated[tuple[Coordinate, Coordinate, Coordinate], "a position [m]"]
 Count = Annotated[int, Ge(1), Le(LARGEST)]
 """A number of things, one at least."""
 Number = Annotated[int, Ge(0), Le(LARGEST)]
 """A number of things or of one of them, counted from 0."""
+Workers = Annotated[int, between(1, max(MOST_WORKERS, WORKERS_OF_CORE * allowed_cores()))]
+"""A number of processes or threads, no more than this machine could bear."""
 Positive = Annotated[float, Gt(0.0)]
 NonNegative = Annotated[float, Ge(0.0)]
 Seed = Annotated[int, Ge(0), Le(LARGEST), "seed of random numbers"]
 
 Mesh = Annotated[str, "either builtin:NAME or a mesh file"]
 Resolution = Annotated[
-    int, between(RESOLUTIONS), "voxels, or lattice spacings, along the longest side [1]"
+    int, between(*RESOLUTIONS), "voxels, or lattice spacings, along the longest side [1]"
 ]
 Discretisation = Annotated[
     str,
-    OneOf(("voxel", "finite-cell")),
+    OneOf("voxel", "finite-cell"),
     "cubes that are full or empty (voxel), or quadratic cells of twice their edge of which only "
     "what is inside counts (finite-cell)",
 ]
-MetresPerUnit = Annotated[float, between(UNITS), "metres per unit of the mesh's coordinates [m]"]
-Fill = Annotated[
-    str, OneOf(("winding", "centre", "orthographic")), "which voxels the surface fills"
-]
+MetresPerUnit = Annotated[float, between(*UNITS), "metres per unit of the mesh's coordinates [m]"]
+Fill = Annotated[str, OneOf("winding", "centre", "orthographic"), "which voxels the surface fills"]
 Components = Annotated[
     str,
-    OneOf(("error", "largest")),
+    OneOf("error", "largest"),
     "either error, which rejects voxels in several pieces, or largest, which keeps one",
 ]
-Density = Annotated[float, between(DENSITIES), "mass density [kg/m^3]"]
+Density = Annotated[float, between(*DENSITIES), "mass density [kg/m^3]"]
 PoissonRatio = Annotated[float, Gt(POISSON[0]), Lt(POISSON[1]), "Poisson's ratio [1]"]
-YoungsModulus = Annotated[float, between(MODULI), "Young's modulus [Pa]"]
+YoungsModulus = Annotated[float, between(*MODULI), "Young's modulus [Pa]"]
+Tolerance = Annotated[float, between(1e-15, 1.0), "relative error that double precision can reach"]
 NumberOfModes = Annotated[int, Ge(1), Le(MOST_UNKNOWNS), "number of modes, rigid ones included [1]"]

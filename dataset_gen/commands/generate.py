@@ -9,10 +9,10 @@ from __future__ import annotations
 import argparse
 
 from carillon.command_line import exit_status
-from carillon.command_line.arguments import number_of_workers
-from carillon.command_line.options import add_options, collect
 from carillon.command_line.progress import say
 from carillon.errors import UserError
+from carillon.parameters.command_line import add_options, collect, reader
+from carillon.parameters.quantities import Workers
 from carillon.processes.ranks import world
 from dataset_gen.generate import Engine, engine_of, generate_file
 from dataset_gen.ranks import run_on_ranks
@@ -30,7 +30,7 @@ EXAMPLES = """examples:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     add_options(parser, ShardOptions)
-    parser.add_argument("--workers", type=number_of_workers, default=1, help="processes")
+    parser.add_argument("--workers", type=reader(Workers), default=1, help="processes")
     parser.add_argument("--out", required=True, help="HDF5 file to write")
 
 

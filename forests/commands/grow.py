@@ -8,10 +8,11 @@ from __future__ import annotations
 import argparse
 import time
 
-from carillon.command_line.arguments import whole_number
 from carillon.command_line.progress import say
 from carillon.errors import UserError
 from carillon.files.paths import require_writable
+from carillon.parameters.command_line import reader
+from carillon.parameters.quantities import Number
 from forests.commands.training import add_training, training_of
 from forests.training.dataset import open_dataset
 from forests.training.train import grow_trees, parameters_of
@@ -22,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     add_training(parser)
     parser.add_argument("--out", required=True, help="HDF5 file to write")
-    parser.add_argument("--tree", type=whole_number(0), required=True, help="its number, from 0")
+    parser.add_argument("--tree", type=reader(Number), required=True, help="its number, from 0")
 
 
 def run(arguments: argparse.Namespace) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from carillon.command_line.arguments import number_of_workers
-from carillon.command_line.options import add_options, collect
+from carillon.parameters.command_line import add_options, collect, reader
+from carillon.parameters.quantities import Workers
 from forests.training.train import TrainingOptions
 
 
@@ -17,11 +17,9 @@ def add_training(parser: argparse.ArgumentParser) -> None:
 
 def add_workers(parser: argparse.ArgumentParser, meaning: str = "threads") -> None:
     """Add the number of threads of a training to a command."""
-    parser.add_argument("--workers", type=number_of_workers, default=1, help=meaning)
+    parser.add_argument("--workers", type=reader(Workers), default=1, help=meaning)
 
 
 def training_of(arguments: argparse.Namespace) -> TrainingOptions:
     """The parameters that `add_training` has read."""
-    training = collect(TrainingOptions, arguments)
-    training.validate()
-    return training
+    return collect(TrainingOptions, arguments)

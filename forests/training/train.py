@@ -6,16 +6,16 @@ import logging
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, replace
-from typing import Any, NamedTuple, TypeVar
+from dataclasses import asdict, replace
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
 from joblib import Parallel, delayed
 
-from carillon.command_line.arguments import number_between, whole_number
-from carillon.command_line.options import option
 from carillon.command_line.progress import track
 from carillon.errors import UserError
+from carillon.parameters import OneOf, option, parameters
+from carillon.parameters.quantities import Count, Number, between
 from carillon.records import provenance
 from forests.layout import MOST_LEAVES
 from forests.model import FILLED, VOID, Model
@@ -24,7 +24,7 @@ from forests.training.dataset import Dataset, Samples, joined
 from forests.training.join import join
 from forests.training.leaves import Leaves, Sums, add_rows, solve_leaves
 from forests.training.ranks import Ranks
-from forests.training.rows import STUDIED, rows_of
+from forests.training.rows import rows_of
 from forests.training.scores import held_out_scores, uniform_scores
 from forests.training.structure import GROWERS, Rows, Tree, TreeLimits
 
@@ -35,32 +35,28 @@ T = TypeVar("T")
 KINDS = {VOID: "void", FILLED: "filled"}
 
 
-@dataclass(frozen=True)
+@parameters
 class TrainingOptions:
     """Parameters of the training."""
 
-    trees: int = option(3, "of each of the two forests", type=whole_number(1, 1000))
-    depth: int = option(20, "of a tree, at most", type=whole_number(1, 1000))
-    max_leaves: int = option(
-        30_000, "of a tree, at most; 56 bytes each", type=whole_number(1, MOST_LEAVES)
+    trees: Annotated[int, between(1, 1000)] = option(3, "of each of the two forests")
+    depth: Annotated[int, between(1, 1000)] = option(20, "of a tree, at most")
+    max_leaves: Annotated[int, between(1, MOST_LEAVES)] = option(
+        30_000, "of a tree, at most; 56 bytes each"
     )
-    min_leaf: int = option(30, "rows of the subset that a leaf needs", type=whole_number(1))
-    structure_rows: int = option(
-        5_000_000, "rows of the subset that splits are chosen from", type=whole_number(1)
-    )
-    prior: float = option(
+    min_leaf: Count = option(30, "rows of the subset that a leaf needs")
+    structure_rows: Count = option(5_000_000, "rows of the subset that splits are chosen from")
+    prior: Annotated[float, between(1e-9, 1e9)] = option(
         0.5,
         "rows that the surroundings of a leaf count for in it",
-        type=number_between(1e-9, 1e9),
     )
-    uniform_weight: float = option(
+    uniform_weight: Annotated[float, between(1e-9, 1e9)] = option(
         400.0,
         "weight of blocks of one material; they are few but fill most real objects",
-        type=number_between(1e-9, 1e9),
     )
-    transform: str = option("log", "of the features and the target", choices=TRANSFORMS)
-    grower: str = option("linear", "how splits are chosen", choices=GROWERS)
-    seed: int = option(0, "of the splits", type=whole_number(0))
+    transform: Annotated[str, OneOf(*TRANSFORMS)] = option("log", "of the features and the target")
+    grower: Annotated[str, OneOf(*GROWERS)] = option("linear", "how splits are chosen")
+    seed: Number = option(0, "of the splits")
 
     @property
     def limits(self) -> TreeLimits:
@@ -75,21 +71,6 @@ class TrainingOptions:
     def kind(self, job: int) -> int:
         """Forest that a tree belongs to."""
         return job // self.trees
-
-    def validate(self) -> None:
-        """Raise UserError when a parameter makes no sense."""
-        for name in ("trees", "depth", "max_leaves", "min_leaf", "structure_rows"):
-            if getattr(self, name) < 1:
-                raise UserError(f"{name} is {getattr(self, name)}, expected at least 1")
-        if self.prior <= 0.0 or self.uniform_weight <= 0.0:
-            raise UserError("prior and uniform weight must be positive")
-        if self.seed < 0:
-            raise UserError(f"seed is {self.seed}, expected 0 or more")
-        for name, known in (("transform", (*TRANSFORMS, *STUDIED)), ("grower", tuple(GROWERS))):
-            if getattr(self, name) not in known:
-                raise UserError(
-                    f"{name} {getattr(self, name)!r} is unknown, choose {' or '.join(known)}"
-                )
 
 
 def grow_trees(
@@ -252,7 +233,6 @@ def train_trees(
         The trees on the first rank, None on the others. They depend on the number of ranks to
         rounding.
     """
-    training.validate()
     begin = time.perf_counter()
     if grown is None:
         shown = progress and ranks.first

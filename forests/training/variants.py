@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
+
+from carillon.parameters import OneOf, option, parameters
+from forests.scaling import TRANSFORMS
+from forests.training.rows import STUDIED
+from forests.training.train import TrainingOptions
 
 VARIANTS: dict[str, dict[str, Any]] = {
     "ratios, variance splits (paper)": {"transform": "ratio", "grower": "best"},
@@ -17,3 +22,10 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "the same, 6 trees": {"trees": 6},
 }
 """Trainings that are compared, as what they change of the default one."""
+
+
+@parameters
+class VariantOptions(TrainingOptions):
+    """Parameters of a training that is compared, which may have transforms of no evaluator."""
+
+    transform: Annotated[str, OneOf(*TRANSFORMS, *STUDIED)] = option("log")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Annotated
 
-from carillon.command_line.arguments import number_between
-from carillon.command_line.options import option
 from carillon.errors import UserError
+from carillon.parameters import option, parameters
+from carillon.parameters.quantities import between
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
 
@@ -14,16 +14,15 @@ FIRST_RESOLUTION = 16
 """Resolution to begin with in search of one that is accurate enough."""
 
 
-@dataclass(frozen=True)
+@parameters
 class DistanceOptions:
     """Which distance from the solid's frequencies is asked for, and whether it is estimated."""
 
-    accuracy: float | None = option(
+    accuracy: Annotated[float, between(1e-05, 1.0)] | None = option(
         None,
         "raise the resolution until frequencies are expected to be so near to the solid's: the "
         "root mean square of the relative errors, and a third of the worst "
         f"(from --resolution, or {FIRST_RESOLUTION})",
-        type=number_between(1e-5, 1.0),
         metavar="ERROR",
     )
     estimate: bool | None = option(

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import Annotated
 
-from carillon.command_line.arguments import number_between, whole_number
-from carillon.command_line.options import option
 from carillon.errors import UserError
+from carillon.parameters import Check, OneOf, option, parameters
+from carillon.parameters.quantities import Number, NumberOfModes, between
 from solver import linear
 from solver.correction.correction import ACCELERATIONS, EIGENVALUE_TOLERANCE
 from solver.hcms.condense import DEFAULT_INTERFACE, INTERFACES
@@ -22,21 +23,25 @@ MISSED = ("fail", "keep")
 LEAST_UNKNOWNS = 4
 """Unknowns to each mode from which on the modes are few of all there are."""
 
-number_of_modes = whole_number(1, 2**31 - 1)
-"""Argument type: a number of modes, or of whatever else is at most as many as unknowns."""
-number_of_steps = whole_number(0, 10_000)
-"""Argument type: a number of steps."""
-positive_tolerance = number_between(1e-15, 1.0)
-"""Argument type: a relative tolerance that double precision can reach."""
+LEAST_TOLERANCE = 1e-15
+"""Smallest relative tolerance that double precision can reach."""
 
 
-def tolerance(text: str) -> float:
-    """Argument type: a relative tolerance that double precision can reach, or 0 for none."""
-    value = number_between(0.0, 1.0)(text)
-    return value if value == 0.0 else positive_tolerance(text)
+def _reachable(tolerance: float) -> float:
+    if 0.0 < tolerance < LEAST_TOLERANCE:
+        raise ValueError(
+            f"found {tolerance:g}, expected {LEAST_TOLERANCE:g} to 1, or 0 for no tolerance"
+        )
+    return tolerance
 
 
-@dataclass(frozen=True)
+Steps = Annotated[int, between(0, 10_000)]
+"""A number of steps."""
+ToleranceOrNone = Annotated[float, between(0.0, 1.0), Check(_reachable)]
+"""A relative tolerance that double precision can reach, or 0 for none."""
+
+
+@parameters
 class SolverOptions:
     """What to compute and how; the defaults suit a model of some ten thousand unknowns.
 
@@ -44,67 +49,59 @@ class SolverOptions:
     `solver.linear.LinearSolver`, the accelerations in `solver.correction.correct`.
     """
 
-    method: str = option(
+    method: Annotated[str, OneOf(*METHODS)] = option(
         "auto",
         "hcms with error correction; from random vectors lanczos, or lobpcg with multigrid for "
         "what is too large to factorise; auto, the fastest of these; or ground truth by slepc or "
         "arpack",
-        choices=METHODS,
     )
-    modes: int = option(256, "number of modes, rigid ones included", type=number_of_modes)
-    tolerance: float | None = option(
+    modes: NumberOfModes = option(256, "number of modes, rigid ones included")
+    tolerance: ToleranceOrNone | None = option(
         None,
         "hcms, lanczos: relative eigenvalue error to correct to "
         f"(default {EIGENVALUE_TOLERANCE:g}; 0 makes exactly --corrections steps); "
         f"slepc, arpack: residual tolerance (default {RESIDUAL_TOLERANCE:g})",
-        type=tolerance,
     )
-    corrections: int = option(
+    corrections: Steps = option(
         MAX_CORRECTIONS,
         "largest number of correction steps; 0 is plain HCMS",
-        type=number_of_steps,
     )
-    retained_modes: int | None = option(
+    retained_modes: NumberOfModes | None = option(
         None,
         "modes kept at the root of the merge tree (default: some more than --modes)",
-        type=number_of_modes,
     )
-    cutoff: float | None = option(
+    cutoff: Annotated[float, between(1e-9, 1000000000000000.0)] | None = option(
         None,
         "frequency [Hz] up to which HCMS keeps modes below the root (default: numbers of modes "
         "that grow with the subdomains)",
-        type=number_between(1e-9, 1e15, "Hz"),
         metavar="HZ",
     )
-    subdomains: int | None = option(
-        None, "number of subdomains (default: from the unknowns)", type=number_of_modes
+    subdomains: NumberOfModes | None = option(
+        None, "number of subdomains (default: from the unknowns)"
     )
-    interface: str = option(
-        DEFAULT_INTERFACE, "treatment of interfaces by HCMS", choices=INTERFACES
+    interface: Annotated[str, OneOf(*INTERFACES)] = option(
+        DEFAULT_INTERFACE, "treatment of interfaces by HCMS"
     )
-    seed: int = option(
+    seed: Number = option(
         0,
         "of random materials, the partition, and the vectors that slepc and arpack start from",
-        type=whole_number(0),
     )
     check_inertia: bool | None = option(
         None,
         "count the eigenvalues by inertia, and find those that are missing (default: for slepc "
         "and arpack)",
     )
-    linear_solver: str = option(
+    linear_solver: Annotated[str, OneOf(*linear.METHODS)] = option(
         "auto",
         "linear solver of the corrections; auto is the fastest direct one",
-        choices=linear.METHODS,
     )
-    acceleration: str = option(
-        "lanczos", "of the corrections; relaxation is the paper's", choices=ACCELERATIONS
+    acceleration: Annotated[str, OneOf(*ACCELERATIONS)] = option(
+        "lanczos", "of the corrections; relaxation is the paper's"
     )
-    missed_tolerance: str = option(
+    missed_tolerance: Annotated[str, OneOf(*MISSED)] = option(
         "fail",
         "what comes of a correction that misses its tolerance: fail, with status 3 and no file, or "
         "keep, a file that tells what was reached",
-        choices=MISSED,
     )
 
     @property

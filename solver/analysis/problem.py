@@ -4,23 +4,32 @@ from __future__ import annotations
 
 import time
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.command_line.arguments import whole_number
-from carillon.command_line.options import REQUIRED, option
 from carillon.errors import UserError
 from carillon.fem import geometry, materials
 from carillon.fem.element import DEFAULT_POISSON
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
-from carillon.fem.geometry import COMPONENTS, FILLS, HexMesh, hexmesh_from_voxels, voxelize
+from carillon.fem.geometry import HexMesh, hexmesh_from_voxels, voxelize
 from carillon.fem.geometry.bridges import say_bridged
 from carillon.fem.geometry.size import doubt_unit
 from carillon.fem.materials import young_modulus
 from carillon.fem.model import DEFAULT_DENSITY, ElasticModel, Solid
 from carillon.limits import require_constants
+from carillon.parameters import REQUIRED, OneOf, option, parameters
+from carillon.parameters.quantities import (
+    Components,
+    Density,
+    Discretisation,
+    Fill,
+    MetresPerUnit,
+    Number,
+    PoissonRatio,
+    Resolution,
+)
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, OBJECTIVES
 from solver.coarsening.choice import METHODS as COARSENINGS
 from solver.coarsening.choice import make_coarsening
@@ -40,46 +49,37 @@ AUTO = "auto"
 """Coarsening that suits the discretisation."""
 
 
-@dataclass(frozen=True)
+@parameters
 class ProblemOptions:
     """The solid to analyse."""
 
     mesh: str = option(REQUIRED, "surface mesh file, or builtin:NAME")
-    resolution: int = option(
-        REQUIRED, "voxels, or lattice spacings, along the longest side", type=whole_number(2)
-    )
+    resolution: Resolution = option(REQUIRED)
     material: str = option(
         "uniform",
         f"{', '.join(materials.NAMES)}, or a file with one Young's modulus [Pa] per voxel",
         metavar="NAME|FILE",
     )
-    coarsen: str = option(
+    coarsen: Annotated[str, OneOf(AUTO, *COARSENINGS)] = option(
         "none",
         f"coarsening of the blocks; {AUTO} is {FOREST} of voxels and none of finite cells",
-        choices=(AUTO, *COARSENINGS),
     )
     forest: str | None = option(
         None, "forests for --coarsen ddfem (HDF5; default: those of the package)", metavar="FILE"
     )
-    objective: str = option(
-        DEFAULT_OBJECTIVE, "fit objective for --coarsen fit", choices=tuple(OBJECTIVES)
+    objective: Annotated[str, OneOf(*OBJECTIVES)] = option(
+        DEFAULT_OBJECTIVE, "fit objective for --coarsen fit"
     )
-    discretisation: str = option(
-        "voxel",
-        "voxel: cubes that are full or empty; finite-cell: quadratic cells of twice their edge, "
-        "of which only what is inside counts",
-        choices=DISCRETISATIONS,
-    )
-    unit: float = option(1.0, "metres per unit of the mesh", type=float)
-    fill: str = option("winding", "which voxels are inside", choices=sorted(FILLS))
-    components: str = option("error", "if the voxels fall apart", choices=COMPONENTS)
-    poisson: float = option(DEFAULT_POISSON, "Poisson's ratio", type=float)
-    density: float = option(DEFAULT_DENSITY, "mass density [kg/m^3]", type=float)
+    discretisation: Discretisation = option("voxel")
+    unit: MetresPerUnit = option(1.0)
+    fill: Fill = option("winding")
+    components: Components = option("error")
+    poisson: PoissonRatio = option(DEFAULT_POISSON)
+    density: Density = option(DEFAULT_DENSITY)
     lumped: bool = option(False, "lump the mass")
-    seed: int = option(
+    seed: Number = option(
         0,
         "of random materials, the partition, and the vectors that slepc and arpack start from",
-        type=whole_number(0),
     )
 
     def __post_init__(self) -> None:

@@ -9,7 +9,8 @@ from __future__ import annotations
 import argparse
 import json
 
-from carillon.command_line.arguments import number_between
+from carillon.parameters.command_line import reader
+from carillon.parameters.quantities import Tolerance
 from carillon.records.provenance import record
 from solver.commands.running import on_ranks, parameters, require_outputs, write_json
 from solver.correction.correction import EIGENVALUE_TOLERANCE
@@ -28,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("files", nargs="+", metavar="FILE", help="modes files")
     parser.add_argument(
         "--tolerance",
-        type=number_between(1e-15, 1.0),
+        type=reader(Tolerance),
         default=EIGENVALUE_TOLERANCE,
         help="relative error that the eigenvalues were asked for to, which decides how wide the "
         "gap has to be below which they are counted (default: %(default)g)",

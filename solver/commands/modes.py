@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.command_line.arguments import whole_number
-from carillon.command_line.options import add_options, collect
 from carillon.command_line.progress import say
 from carillon.errors import UserError
 from carillon.fem.geometry.size import sizes_in_words
 from carillon.fem.model import Solid
+from carillon.parameters.command_line import add_options, collect, reader
+from carillon.parameters.quantities import Resolution
 from solver.accuracy.options import FIRST_RESOLUTION, DistanceOptions
 from solver.accuracy.solving import Wishes, solve_accurately, solve_solid
 from solver.analysis.coarse_start import coarse_start
@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_solid(parser, "resolution")
     parser.add_argument(
         "--resolution",
-        type=whole_number(2),
+        type=reader(Resolution),
         help="voxels, or lattice spacings, along the longest side; needed without --accuracy",
     )
     add_options(parser, DistanceOptions)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from carillon.command_line.options import add_options, collect
 from carillon.errors import UserError
+from carillon.parameters.command_line import add_options, collect
 from solver.commands.running import on_ranks, parameters, require_outputs
 from solver.response.response_file import TRUTH, StrikeOptions, respond, write_response
 

@@ -11,8 +11,8 @@ from typing import Any
 from mpi4py import MPI
 
 from carillon.command_line import outputs
-from carillon.command_line.options import add_options
 from carillon.files.atomic import atomic_path
+from carillon.parameters.command_line import add_options
 from carillon.processes.cores import limit_threads, warn_about_reference_blas
 from carillon.processes.petsc import PETSc
 from solver.analysis.problem import ProblemOptions

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Annotated
 
-from carillon.command_line.arguments import number_between
-from carillon.command_line.options import option
 from carillon.errors import UserError
+from carillon.parameters import option, parameters
+from carillon.parameters.quantities import between
 from solver.coarsening.forest import FOREST
 
 ALLOWED_ERROR = 0.05
@@ -15,17 +15,16 @@ ALLOWED_DISTANCE = 0.01
 """Expected distance from the solid's that finite cells are divided for if nothing is said."""
 
 
-@dataclass(frozen=True)
+@parameters
 class RefinementOptions:
     """Which error a coarse model, or one of finite cells, may have."""
 
-    refine_to: float | None = option(
+    refine_to: Annotated[float, between(0.0, 10.0)] | None = option(
         None,
         "keep blocks fine, or divide finite cells, until the expected error of the frequencies of "
         "modes 7 to 60 is at most so large: its root mean square, and a third of the worst "
         f"(default {ALLOWED_ERROR:g} with --coarsen {FOREST}, {ALLOWED_DISTANCE:g} with "
         "--discretisation finite-cell; 0 refines nothing)",
-        type=number_between(0.0, 10.0),
         metavar="ERROR",
     )
 

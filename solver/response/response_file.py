@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.command_line.arguments import number_between
-from carillon.command_line.options import option
 from carillon.errors import UserError
 from carillon.files.hdf5 import create_h5, open_h5
-from carillon.limits import EXTENTS, FARTHEST
+from carillon.parameters import option, parameters
+from carillon.parameters.quantities import Point, between
 from carillon.records import provenance
 from solver.files.modes_file import read_elastic, require_same_solid
 from solver.response.contact import Contact, choose_contacts
@@ -42,37 +40,33 @@ SEEN = {"eigenvalues": "rad^2/s^2", "motion": "kg^-1/2", "push": "kg^-1/2"}
 INSTANTS = 1500
 
 
-_coordinate = number_between(-EXTENTS[1] * FARTHEST, EXTENTS[1] * FARTHEST, "m")
-_POINT: dict[str, Any] = {"type": _coordinate, "nargs": 3, "metavar": ("X", "Y", "Z")}
-
-
-@dataclass(frozen=True)
+@parameters
 class StrikeOptions:
     """How a solid is struck and watched; for the points see `choose_contacts`."""
 
-    strike: Sequence[float] | None = option(
-        None, "point of the surface that is struck [m] (default: chosen by the truth)", **_POINT
+    strike: Point | None = option(
+        None,
+        "point of the surface that is struck [m] (default: chosen by the truth)",
+        metavar=("X", "Y", "Z"),
     )
-    observed: Sequence[float] | None = option(
+    observed: Point | None = option(
         None,
         "point of the surface whose motion is watched [m] (default: chosen by the truth)",
-        **_POINT,
+        metavar=("X", "Y", "Z"),
     )
-    mass_damping: float = option(
+    mass_damping: Annotated[float, between(0.0, 1e12)] = option(
         Damping.mass_per_second,
         "coefficient of the mass in Rayleigh damping [1/s]",
-        type=number_between(0.0, 1e12, "1/s"),
     )
-    stiffness_damping: float = option(
+    stiffness_damping: Annotated[float, between(0.0, 1e6)] = option(
         Damping.stiffness_seconds,
         "coefficient of the stiffness in Rayleigh damping [s]",
-        type=number_between(0.0, 1e6, "s"),
     )
-    contact_seconds: float = option(
-        2e-4, "duration of the force in the sound [s]", type=number_between(1e-9, 10.0, "s")
+    contact_seconds: Annotated[float, between(1e-9, 10.0)] = option(
+        2e-4, "duration of the force in the sound [s]"
     )
-    periods: float = option(
-        6.0, "time watched, in periods of the first elastic mode", type=number_between(1e-6, 1e6)
+    periods: Annotated[float, between(1e-6, 1e6)] = option(
+        6.0, "time watched, in periods of the first elastic mode"
     )
 
     @property

@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from carillon.command_line.options import REQUIRED, add_options, collect, option
+from carillon.parameters import REQUIRED, option, parameters
+from carillon.parameters.command_line import add_options, collect
 
 if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     from sound.project.design import Design, FineFrequencies
 
 
-@dataclass(frozen=True)
+@parameters
 class CheckOptions:
     """What is checked."""
 

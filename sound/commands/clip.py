@@ -4,37 +4,38 @@ from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import dataclass
+from typing import Annotated
 
-from carillon.command_line.arguments import positive_number, whole_number
-from carillon.command_line.options import REQUIRED, add_options, collect, option
 from carillon.errors import UserError
-from sound.bounds import sample_rate
+from carillon.parameters import REQUIRED, OneOf, option, parameters
+from carillon.parameters.command_line import add_options, collect
+from carillon.parameters.quantities import Number, Positive
+from sound.bounds import SampleRate
 
 NAMES = ("metal", "wood", "piano")
 LONGEST_SECONDS = 60.0
 """Length of a clip that is long enough for every strike to die away."""
 
 
-@dataclass(frozen=True)
+@parameters
 class PitchOptions:
     """How high a clip sounds, by one of the two; the instrument's own pitch if by none."""
 
     note: str | None = option(None, "lowest partial as a note, such as C4 or F#3")
-    pitch: float | None = option(None, "lowest partial [Hz]", type=positive_number)
+    pitch: Positive | None = option(None, "lowest partial [Hz]")
 
 
-@dataclass(frozen=True)
+@parameters
 class ClipOptions:
     """A clip to synthesise."""
 
-    instrument: str = option(
-        REQUIRED, "what is struck", choices=NAMES, metavar=f"{{{','.join(NAMES)}}}"
+    instrument: Annotated[str, OneOf(*NAMES)] = option(
+        REQUIRED, "what is struck", metavar=f"{{{','.join(NAMES)}}}"
     )
     out: str = option(REQUIRED, "sound file to write", metavar="FILE.wav")
-    seconds: float = option(2.0, "length", type=positive_number)
-    rate: int = option(44_100, "samples per second", type=sample_rate)
-    seed: int = option(0, "of imperfections and noise", type=whole_number(0))
+    seconds: Positive = option(2.0, "length")
+    rate: SampleRate = option(44_100, "samples per second")
+    seed: Number = option(0, "of imperfections and noise")
     json: bool = option(False, "print the partials as JSON")
 
 

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Annotated
 
-from carillon.command_line.options import option
+from carillon.parameters import OneOf, option, parameters
 
 
-@dataclass(frozen=True)
+@parameters
 class DampingOptions:
     """Whose dampings sound."""
 
-    damping_from: str | None = option(
+    damping_from: Annotated[str, OneOf("clips", "material")] | None = option(
         None,
         "dampings of the clips, or those that loss factors of the material make, not as the "
         "project says",
-        choices=("clips", "material"),
     )

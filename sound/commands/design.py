@@ -6,17 +6,18 @@ import argparse
 import json
 import sys
 import time
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from carillon.command_line.options import REQUIRED, add_options, collect, option
 from carillon.command_line.progress import LINE_SECONDS, say
 from carillon.errors import UserError
 from carillon.files.locks import locked
+from carillon.parameters import REQUIRED, option, parameters
+from carillon.parameters.command_line import add_options, collect
 from sound.commands.search_options import SearchOptions
 from sound.design.interrupts import ended_by_interrupts
 from sound.design.objective import fall
@@ -34,7 +35,7 @@ SHOWN_EVERY = 1.0
 """Seconds between two progress lines on a terminal."""
 
 
-@dataclass(frozen=True)
+@parameters
 class DesignOptions:
     """What is designed, and where it is written."""
 

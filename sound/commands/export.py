@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from carillon.command_line.arguments import whole_number
-from carillon.command_line.options import REQUIRED, add_options, collect, option
+from carillon.parameters import REQUIRED, OneOf, option, parameters
+from carillon.parameters.command_line import add_options, collect
+from carillon.parameters.quantities import between
 from sound.commands.damping_options import DampingOptions
 from sound.export.formats import FORMATS, format_of
 
@@ -19,7 +19,7 @@ MOST_POINTS = 10_000
 """To strike in a Faust program, each of which is an entry of its menu."""
 
 
-@dataclass(frozen=True)
+@parameters
 class ExportOptions:
     """What is exported, and how."""
 
@@ -29,11 +29,10 @@ class ExportOptions:
         "file to write: .h5 (embedded mesh with eigenpairs), .gltf, .glb, .dsp (Faust), or .npy "
         "(Young's moduli [Pa] of the fine cells, for solver modes --material)",
     )
-    format: str | None = option(None, "where --out has another ending", choices=FORMATS)
-    points: int = option(
+    format: Annotated[str, OneOf(*FORMATS)] | None = option(None, "where --out has another ending")
+    points: Annotated[int, between(0, MOST_POINTS)] = option(
         0,
         "for Faust: points to strike all over the surface, besides the targets'",
-        type=whole_number(0, MOST_POINTS),
     )
 
 

@@ -5,27 +5,27 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from carillon.command_line.arguments import whole_number
-from carillon.command_line.options import REQUIRED, add_options, collect, option
 from carillon.errors import UserError
+from carillon.parameters import REQUIRED, option, parameters
+from carillon.parameters.command_line import add_options, collect
+from carillon.parameters.quantities import Count
 
 if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     from sound.clips.extraction import ModalSound
     from sound.clips.targets import Targets
 
 
-@dataclass(frozen=True)
+@parameters
 class ExtractOptions:
     """Clips whose modes are extracted, and what is written of them."""
 
-    clips: list[str] = option(REQUIRED, "a strike each", nargs="+", metavar="CLIP.wav")
-    modes: int | None = option(
+    clips: tuple[str, ...] = option(REQUIRED, "a strike each", metavar="CLIP.wav")
+    modes: Count | None = option(
         None,
         "modes to keep, shared by all clips, those that carry most (default: all)",
-        type=whole_number(1),
     )
     allow_clipped: bool = option(False, "leave out samples at full scale, rather than refuse")
     json: bool = option(False, "print JSON instead of tables")
@@ -72,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _content(clips: list[str], sounds: list[ModalSound], targets: Targets) -> dict[str, Any]:
+def _content(clips: Sequence[str], sounds: list[ModalSound], targets: Targets) -> dict[str, Any]:
     """What is printed and written."""
     return {
         "clips": [

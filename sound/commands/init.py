@@ -6,12 +6,12 @@ import argparse
 import os
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from carillon.command_line.options import REQUIRED, add_options, collect, option
 from carillon.errors import UserError
+from carillon.parameters import REQUIRED, option, parameters
+from carillon.parameters.command_line import add_options, collect
 
 ENDINGS = (".yaml", ".yml")
 """Of projects."""
@@ -27,7 +27,7 @@ EXAMPLES = """examples:
 """
 
 
-@dataclass(frozen=True)
+@parameters
 class InitOptions:
     """The project to begin with."""
 
@@ -35,11 +35,10 @@ class InitOptions:
     path: str | None = option(
         None,
         f"folder or file (.yaml) to write (default: {DEFAULT_NAME} in this folder)",
-        nargs="?",
         metavar="FOLDER|FILE",
     )
-    clips: list[str] | None = option(
-        None, "a strike each, at points spread over the surface", nargs="+", metavar="CLIP.wav"
+    clips: tuple[str, ...] | None = option(
+        None, "a strike each, at points spread over the surface", metavar="CLIP.wav"
     )
     allow_clipped: bool = option(False, "leave out samples of clips at full scale")
 

@@ -9,17 +9,13 @@ from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated, Any
 
-from carillon.command_line.arguments import (
-    number_between,
-    number_of_workers,
-    positive_number,
-    whole_number,
-)
-from carillon.command_line.options import REQUIRED, add_options, collect, option
 from carillon.errors import UserError
+from carillon.parameters import REQUIRED, option, parameters
+from carillon.parameters.command_line import add_options, collect
+from carillon.parameters.quantities import Positive, Workers, between
 from carillon.records.measurement import measured
 
 if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
@@ -27,19 +23,18 @@ if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     from sound.project.design import Design
 
 
-@dataclass(frozen=True)
+@parameters
 class ReachOptions:
     """What is asked, and how long an answer may take."""
 
     project: str = option(REQUIRED, "project file (YAML)")
     design: str = option(REQUIRED, "its design.h5")
-    seconds: float = option(120.0, "wall time in which descents begin", type=positive_number)
-    descents: int = option(3, "descents for each question at most", type=whole_number(1, 1000))
-    workers: int | None = option(None, "processes, not the project's", type=number_of_workers)
-    unless_fall: float | None = option(
+    seconds: Positive = option(120.0, "wall time in which descents begin")
+    descents: Annotated[int, between(1, 1000)] = option(3, "descents for each question at most")
+    workers: Workers | None = option(None, "processes, not the project's")
+    unless_fall: Annotated[float, between(0.0, 1.0)] | None = option(
         None,
         "ask nothing of a design whose cost fell by this share or more",
-        type=number_between(0.0, 1.0),
         metavar="SHARE",
     )
     json: bool = option(False, "print as JSON")

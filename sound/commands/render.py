@@ -5,19 +5,19 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from carillon.command_line.arguments import number_between, positive_number, whole_number
-from carillon.command_line.options import REQUIRED, add_options, collect, option
 from carillon.errors import UserError
+from carillon.parameters import REQUIRED, option, parameters
+from carillon.parameters.command_line import add_options, collect
+from carillon.parameters.quantities import Number, Point, Positive, between
 from sound.bounds import (
     LARGEST_IMPULSE,
     LEAST_IMPULSE,
     LONGEST_SOUND,
+    SampleRate,
     require_length,
-    sample_rate,
 )
 from sound.commands.damping_options import DampingOptions
 
@@ -37,19 +37,20 @@ FULL = 0.99
 TOLD = 1e-3
 """Share of the clips' energy in missed tones from which on it is told."""
 
+_Impulse = Annotated[float, between(-LARGEST_IMPULSE, LARGEST_IMPULSE)]
+_Coefficient = Annotated[float, between(0.0, 1e9)]
 
-@dataclass(frozen=True)
+
+@parameters
 class PointOptions:
     """Where a solid is struck, by one of the four."""
 
     target: str | None = option(None, "strike where a target was assigned", metavar="NAME")
-    vertex: int | None = option(None, "strike a vertex of the surface", type=whole_number(0))
-    at: list[float] | None = option(
+    vertex: Number | None = option(None, "strike a vertex of the surface")
+    at: Point | None = option(
         None,
         "strike the surface near a point, in the coordinates of the mesh that was designed, as in "
         "a project; of modes.h5 alone [m]",
-        type=number_between(-1e18, 1e18),
-        nargs=3,
         metavar=("X", "Y", "Z"),
     )
     strikes: str | None = option(
@@ -57,37 +58,33 @@ class PointOptions:
     )
 
 
-@dataclass(frozen=True)
+@parameters
 class ImpulseOptions:
     """How a solid is struck, by one of the two."""
 
-    impulse: list[float] | None = option(
+    impulse: tuple[_Impulse, _Impulse, _Impulse] | None = option(
         None,
         "impulse [N s]",
-        type=number_between(-LARGEST_IMPULSE, LARGEST_IMPULSE, "N s"),
-        nargs=3,
         metavar=("FX", "FY", "FZ"),
     )
-    strength: float = option(
+    strength: Annotated[float, between(LEAST_IMPULSE, LARGEST_IMPULSE)] = option(
         1.0,
         "impulse along the inward normal [N s] (default 1, which sounds as loud as the clip); with "
         "--strikes that of lines without one",
-        type=number_between(LEAST_IMPULSE, LARGEST_IMPULSE, "N s"),
     )
 
 
-@dataclass(frozen=True)
+@parameters
 class RenderOptions:
     """What sounds, and the sound that is written."""
 
     file: str = option(REQUIRED, "design.h5, or modes.h5 of the solver")
     out: str = option(REQUIRED, "file to write (WAV)")
-    seconds: float | None = option(None, "length (default: until it decays)", type=positive_number)
-    rate: int = option(44_100, "samples per second", type=sample_rate)
-    contact_seconds: float = option(
+    seconds: Positive | None = option(None, "length (default: until it decays)")
+    rate: SampleRate = option(44_100, "samples per second")
+    contact_seconds: Annotated[float, between(0.0, LONGEST_CONTACT)] = option(
         0.0,
         "duration of the force, half a sine (default 0: an impulse)",
-        type=number_between(0.0, LONGEST_CONTACT, "s"),
     )
     no_residual: bool = option(False, "modes only, without the noise of the clips")
     modes_out: str | None = option(
@@ -99,12 +96,10 @@ class RenderOptions:
         "for modes.h5 of a designed object: dampings, points, loudness, noise of a design",
         metavar="DESIGN",
     )
-    damping: list[float] | None = option(
+    damping: tuple[_Coefficient, _Coefficient] | None = option(
         None,
         "for modes.h5: Rayleigh damping, coefficients of mass [1/s] and stiffness [s] "
         "(default 30 1e-6)",
-        type=number_between(0.0, 1e9),
-        nargs=2,
         metavar=("ALPHA", "BETA"),
     )
     json: bool = option(False, "print what sounds as JSON")

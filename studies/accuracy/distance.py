@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from annotated_types import Ge
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.command_line.arguments import whole_number
-from carillon.command_line.options import option
 from carillon.command_line.progress import track
 from carillon.errors import ConvergenceError, UserError
 from carillon.fem.finite_cells.model import FiniteCellModel
@@ -22,6 +21,7 @@ from carillon.fem.geometry.builtin import BUILTINS
 from carillon.fem.geometry.thin import THIN
 from carillon.fem.geometry.trials import TRIALS
 from carillon.fem.model import RIGID_MODES, Solid
+from carillon.parameters import option, parameters
 from solver.accuracy.estimate import estimate_cell_errors
 from solver.accuracy.solving import Solved, Wishes, solve_solid
 from solver.analysis.modal_solver import modal_analysis
@@ -52,12 +52,12 @@ FACTOR = 3.0
 """An expected error that is wrong by no more counts as right."""
 
 
-@dataclass(frozen=True)
+@parameters
 class DistanceStudyOptions:
     """What is measured."""
 
-    resolution: int = option(32, "lattice spacings along the longest side", type=whole_number(4))
-    reference: int = option(48, "those of the spectra that count as true", type=whole_number(6))
+    resolution: Annotated[int, Ge(4)] = option(32, "lattice spacings along the longest side")
+    reference: Annotated[int, Ge(6)] = option(48, "those of the spectra that count as true")
     turned: bool = option(False, "each solid also turned by 25, 35 and 15 degrees")
 
 

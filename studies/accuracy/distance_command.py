@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
-from carillon.command_line.options import add_options, collect
+from carillon.parameters.command_line import add_options, collect
 from carillon.records.measurement import measured
 from solver.commands.running import on_ranks, parameters, require_outputs, write_json
 from studies.accuracy.distance import OBJECTS, DistanceStudyOptions, as_text, measure_distances

@@ -5,18 +5,17 @@ from __future__ import annotations
 import statistics
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.command_line.arguments import whole_number
-from carillon.command_line.options import option
 from carillon.command_line.progress import track
 from carillon.errors import ConvergenceError, UserError
 from carillon.fem.model import RIGID_MODES
+from carillon.parameters import option, parameters
+from carillon.parameters.quantities import between
 from solver.analysis.problem import DISCRETISATIONS
 from solver.verification.errors import frequency_errors
 from studies.accuracy.solids import ANGLES, POISSON, SOLIDS, ReferenceSolid
@@ -50,20 +49,20 @@ def solid_names(text: str) -> tuple[str, ...]:
     return names
 
 
-@dataclass(frozen=True)
+@parameters
 class AccuracyOptions:
     """What is measured."""
 
     solids: tuple[str, ...] = option(
         tuple(SOLIDS),
         f"solids, joined by commas (default {','.join(SOLIDS)})",
-        type=solid_names,
+        read=solid_names,
         metavar="NAMES",
     )
-    levels: int = option(
-        LEVELS, "sizes of each discretisation, coarsest first", type=whole_number(2, LEVELS)
+    levels: Annotated[int, between(2, LEVELS)] = option(
+        LEVELS, "sizes of each discretisation, coarsest first"
     )
-    runs: int = option(3, "timed runs, of which medians are told", type=whole_number(1, 100))
+    runs: Annotated[int, between(1, 100)] = option(3, "timed runs, of which medians are told")
 
 
 def measure_accuracy(options: AccuracyOptions) -> dict[str, Any]:

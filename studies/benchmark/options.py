@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Annotated
 
-from carillon.command_line.arguments import positive_number, whole_number
-from carillon.command_line.options import option
-from solver.analysis.options import number_of_modes
+from carillon.parameters import OneOf, option, parameters
+from carillon.parameters.quantities import NumberOfModes, Positive, between
 from studies.benchmark.further import ALL, RIVALS
 from studies.benchmark.methods import RIVAL_SECONDS
 
@@ -17,25 +16,23 @@ COARSE = ("ddfem", "ddfem_rough", "ddfem_ec_accurate", "ddfem_ec", "ddfem_ec_war
 BESIDE_DESIGN = ("arpack", "hcms", "hcms_ec")
 """What `design` leaves out."""
 
-number_of_rounds = whole_number(1, 10_000)
-"""Argument type: a number of rounds."""
+Rounds = Annotated[int, between(1, 10_000)]
+"""A number of rounds."""
 
 
-@dataclass(frozen=True)
+@parameters
 class BenchmarkOptions:
     """How a row is measured."""
 
-    modes: int = option(256, "number of modes, rigid ones included", type=number_of_modes)
-    runs: int = option(5, "rounds; in each, every method runs once", type=number_of_rounds)
-    slow_runs: int | None = option(
+    modes: NumberOfModes = option(256, "number of modes, rigid ones included")
+    runs: Rounds = option(5, "rounds; in each, every method runs once")
+    slow_runs: Rounds | None = option(
         None,
         "rounds that ARPACK and --rivals take part in (default: all)",
-        type=number_of_rounds,
     )
-    fine_runs: int | None = option(
+    fine_runs: Rounds | None = option(
         None,
         "rounds that methods on the fine mesh take part in (default: all)",
-        type=number_of_rounds,
     )
     design: bool = option(
         False, "only what a design does on the coarse mesh, and --method auto and SLEPc beside it"
@@ -43,11 +40,11 @@ class BenchmarkOptions:
     arpack: bool = option(True, "run ARPACK, the slowest method, too")
     arpack_regular: bool = option(False, "also ARPACK without a factorisation, on a lumped mass")
     rough: bool = option(False, "also the fine mesh to 1e-3, from random vectors and coarse modes")
-    rivals: list[str] | None = option(
-        None, "further general eigensolvers, on one rank", nargs="+", choices=(*RIVALS, ALL)
+    rivals: tuple[Annotated[str, OneOf(*RIVALS, ALL)], ...] | None = option(
+        None, "further general eigensolvers, on one rank"
     )
-    rival_seconds: float = option(
-        RIVAL_SECONDS, "wall time after which one of these is given up [s]", type=positive_number
+    rival_seconds: Positive = option(
+        RIVAL_SECONDS, "wall time after which one of these is given up [s]"
     )
     tune: bool = option(
         False, "SLEPc in its fastest configuration of several, each tried once before"
@@ -66,7 +63,7 @@ class BenchmarkOptions:
     @property
     def further(self) -> tuple[str, ...]:
         """Further rivals that the options ask for."""
-        asked = self.rivals or []
+        asked = self.rivals or ()
         return tuple(name for name in RIVALS if name in asked or ALL in asked)
 
     def rounds(self, method: str) -> int:

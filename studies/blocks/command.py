@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from carillon.command_line.options import add_options, collect
 from carillon.command_line.outputs import require_outputs
+from carillon.parameters.command_line import add_options, collect
 from studies.base.command_results import add_outputs, publish
 from studies.blocks import table
 from studies.blocks.cases import CASES

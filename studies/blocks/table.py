@@ -12,15 +12,14 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from carillon.command_line.arguments import whole_number
-from carillon.command_line.options import option
 from carillon.command_line.progress import track
 from carillon.fem.element import Array
+from carillon.parameters import option, parameters
+from carillon.parameters.quantities import Number, between
 from carillon.processes.serial import serial_blas
 from forests.evaluate import MOST_BLOCKS
 from forests.model import Model
@@ -55,14 +54,14 @@ and no coarsening reaches their displacements; the relative errors weigh all blo
 Row = dict[str, Any]
 
 
-@dataclass(frozen=True)
+@parameters
 class TableOptions:
     """Blocks that the coarsenings are compared on."""
 
-    blocks: int = option(10_000, "of each range", type=whole_number(1, MOST_BLOCKS))
-    seed: int = option(0, "of the blocks", type=whole_number(0))
-    materials: int = option(
-        MATERIALS, "base materials of a database", type=whole_number(2, MOST_MATERIALS)
+    blocks: Annotated[int, between(1, MOST_BLOCKS)] = option(10_000, "of each range")
+    seed: Number = option(0, "of the blocks")
+    materials: Annotated[int, between(2, MOST_MATERIALS)] = option(
+        MATERIALS, "base materials of a database"
     )
 
 
@@ -128,7 +127,7 @@ def _joined(pieces: Sequence[Errors]) -> Errors:
 @serial_blas
 def table(
     models: dict[str, Model],
-    options: TableOptions = TableOptions(),
+    options: TableOptions,
     databases: dict[BlockCase, Database] | None = None,
 ) -> list[Row]:
     """Rows of Fig. 9 on random blocks of each case, on one core.

@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from carillon.command_line.arguments import positive_number, whole_number
-from carillon.command_line.options import collect
+from annotated_types import Ge
+
 from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES
+from carillon.parameters.command_line import collect, reader
+from carillon.parameters.quantities import NumberOfModes, Positive, between
 from carillon.records.measurement import measured
 from solver.analysis.problem import ProblemOptions
 from solver.coarsening.choice import METHODS
@@ -41,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--refine-to",
-        type=positive_number,
+        type=reader(Positive),
         default=ALLOWED_ERROR,
         metavar="ERROR",
         help="expected error of the frequencies down to which blocks stay fine in the second "
@@ -49,13 +51,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--modes",
-        type=whole_number(RIGID_MODES + 1, LAST),
+        type=reader(Annotated[int, between(RIGID_MODES + 1, LAST)]),
         default=LAST,
         help=f"rigid included (default {LAST}, the most)",
     )
     parser.add_argument(
         "--timed-modes",
-        type=whole_number(RIGID_MODES + 1),
+        type=reader(Annotated[NumberOfModes, Ge(RIGID_MODES + 1)]),
         help="modes computed where the coarse model is weighed against the fine one and both are "
         "timed (default: --modes)",
     )

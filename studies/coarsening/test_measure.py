@@ -194,11 +194,11 @@ def test_modes_of_the_neck_and_of_specks_are_told_apart(dumbbell):
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["--modes", "61"], "61 is too large"),
-        (["--modes", "6"], "6 is too small"),
+        (["--modes", "61"], "found 61, expected at most"),
+        (["--modes", "6"], "found 6, expected at least 7"),
         (["--coarsen", "none"], "invalid choice: 'none'"),
-        (["--refine-to", "0"], "expected a number above 0"),
-        (["--refine-to", "nan"], "expected a number above 0"),
+        (["--refine-to", "0"], "expected above 0"),
+        (["--refine-to", "nan"], "expected a finite number"),
         (["--out", "absent/case.json"], "the folder absent does not exist"),
         (["--pictures", "absent/case.h5"], "the folder absent does not exist"),
         (["--out", "one", "--pictures", "./one"], "name two files"),

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 
-from carillon.command_line.options import collect
+from carillon.parameters.command_line import collect, reader
+from carillon.parameters.quantities import NumberOfModes
 from carillon.records.measurement import measured
-from solver.analysis.options import number_of_modes, number_of_steps
+from solver.analysis.options import Steps
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.commands.running import add_solid, on_ranks, parameters, require_outputs, write_json
 from solver.distribution.collective import compute_on_root
@@ -21,9 +22,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     add_solid(parser)
     parser.add_argument(
-        "--modes", type=number_of_modes, default=256, help="rigid included (default 256)"
+        "--modes", type=reader(NumberOfModes), default=256, help="rigid included (default 256)"
     )
-    parser.add_argument("--steps", type=number_of_steps, default=3, help="corrections (default 3)")
+    parser.add_argument("--steps", type=reader(Steps), default=3, help="corrections (default 3)")
     parser.add_argument(
         "--truth", help="modes file with the exact eigenvalues (default: SLEPc finds them)"
     )

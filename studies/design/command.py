@@ -4,34 +4,32 @@ from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import asdict
+from typing import Annotated, Any
 
-from carillon.command_line.arguments import whole_number
-from carillon.command_line.options import REQUIRED, add_options, collect, option
 from carillon.command_line.progress import say
+from carillon.parameters import REQUIRED, option, parameters
+from carillon.parameters.command_line import add_options, collect
+from carillon.parameters.quantities import Count, between
 from carillon.records.measurement import measured
 from sound.commands.search_options import SearchOptions
 
 
-@dataclass(frozen=True)
+@parameters
 class DesignBenchmarkOptions:
     """What is measured."""
 
     project: str = option(REQUIRED, "project file (YAML)")
-    runs: int = option(7, "timed evaluations", type=whole_number(1, 1000))
-    resolutions: list[int] | None = option(
+    runs: Annotated[int, between(1, 1000)] = option(7, "timed evaluations")
+    resolutions: tuple[Count, ...] | None = option(
         None,
         "time evaluations alone, of the solid in these numbers of voxels along its longest side",
-        type=whole_number(1),
-        nargs="+",
         metavar="N",
     )
-    seeds: int = option(
+    seeds: Annotated[int, between(1, 1000)] = option(
         1,
         "searches by each optimiser, their seeds from the project's on, of which medians and "
         "spreads are told",
-        type=whole_number(1, 1000),
     )
     fine_check: bool = option(
         False, "compare searches with checks on the fine solid, by their costs there"

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
-from typing import Any
+from typing import Annotated, Any
 
-from carillon.command_line.arguments import whole_number
-from carillon.command_line.options import collect
 from carillon.fem.model import RIGID_MODES
+from carillon.parameters.command_line import collect, reader
+from carillon.parameters.quantities import between
 from carillon.records.measurement import measured
 from solver.analysis.problem import ProblemOptions
 from solver.commands.running import add_solid, on_ranks, parameters, require_outputs, write_json
@@ -24,13 +24,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_solid(parser, "coarsen", "objective", "discretisation", "fill", "lumped")
     parser.add_argument(
         "--modes",
-        type=whole_number(RIGID_MODES + 1, 1000),
+        type=reader(Annotated[int, between(RIGID_MODES + 1, 1000)]),
         default=36,
         help="rigid included (default 36)",
     )
     parser.add_argument(
         "--runs",
-        type=whole_number(1, 1000),
+        type=reader(Annotated[int, between(1, 1000)]),
         default=3,
         help="rounds, in each of which every way runs once (default 3)",
     )

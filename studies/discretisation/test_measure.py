@@ -134,8 +134,8 @@ def test_every_way_is_rated_against_both_truths(plate):
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["--modes", "6"], "6 is too small"),
-        (["--runs", "0"], "0 is too small"),
+        (["--modes", "6"], "found 6, expected at least 7"),
+        (["--runs", "0"], "found 0, expected at least 1"),
         (["--lumped"], "unrecognized arguments: --lumped"),
         (["--poisson", "0.3"], "the default forests are for Poisson's ratio 0.25"),
         (["--out", "absent/case.json"], "the folder absent does not exist"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
-from carillon.command_line.options import add_options, collect
+from carillon.parameters.command_line import add_options, collect
 from studies.fits import measure
 
 

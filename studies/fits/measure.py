@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from carillon.command_line.arguments import poisson_ratio, whole_number
-from carillon.command_line.options import option
 from carillon.command_line.progress import track
 from carillon.fem.element import DEFAULT_POISSON, Array
 from carillon.numerics.simd import LANES, add_product, empty, load_tile, store_tile
+from carillon.parameters import OneOf, option, parameters
+from carillon.parameters.quantities import PoissonRatio, between
 from carillon.processes.serial import serial_blas
 from carillon.records.provenance import compiled_for, processor
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, OBJECTIVES, fit, flops, sampled_energy
@@ -127,13 +126,13 @@ def _flops_per_fit(objective: str, young: Array, poisson: float) -> float | None
     return sum(counts) / len(young) if counts else None
 
 
-@dataclass(frozen=True)
+@parameters
 class FitBenchmarkOptions:
     """Which fits are timed."""
 
-    samples: int = option(4000, "of seed 0", type=whole_number(1, MOST_TIMED))
-    objective: str | None = option(None, "this one only", choices=OBJECTIVES)
-    poisson: float = option(DEFAULT_POISSON, "Poisson's ratio", type=poisson_ratio)
+    samples: Annotated[int, between(1, MOST_TIMED)] = option(4000, "of seed 0")
+    objective: Annotated[str, OneOf(*OBJECTIVES)] | None = option(None, "this one only")
+    poisson: PoissonRatio = option(DEFAULT_POISSON, "Poisson's ratio")
 
 
 def benchmark(options: FitBenchmarkOptions) -> dict[str, Any]:

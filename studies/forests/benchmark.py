@@ -9,14 +9,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from carillon.command_line.arguments import number_between, whole_number
-from carillon.command_line.options import option
 from carillon.command_line.progress import track
 from carillon.fem.element import Array
+from carillon.parameters import option, parameters
+from carillon.parameters.quantities import between
 from carillon.records import provenance
 from forests.default import default_path
 from forests.evaluate import MOST_BLOCKS, coarsen, coarsen_with_derivatives
@@ -46,16 +46,16 @@ BLOCKS_PER_LEAF = 5
 """Random blocks to grow scikit-learn's trees on: ten rows a leaf where the origin is void."""
 
 
-@dataclass(frozen=True)
+@parameters
 class ForestBenchmarkOptions:
     """What is measured."""
 
     forest: str | None = option(
         None, "forests to measure (HDF5; default: those of the package)", metavar="FILE"
     )
-    blocks: int = option(100_000, "evaluated in one run", type=whole_number(1, MOST_BLOCKS))
-    largest: float = option(
-        600.0, "of the largest forest [MB]", type=number_between(1e-3, 1e6), metavar="MB"
+    blocks: Annotated[int, between(1, MOST_BLOCKS)] = option(100_000, "evaluated in one run")
+    largest: Annotated[float, between(0.001, 1e6)] = option(
+        600.0, "of the largest forest [MB]", metavar="MB"
     )
 
 

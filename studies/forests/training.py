@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 
-from carillon.command_line.arguments import LARGEST
 from carillon.errors import UserError
 from carillon.fem.element import Array
 from carillon.files.atomic import atomic_path
+from carillon.parameters.quantities import LARGEST
 from dataset_gen.generate import generate
 from dataset_gen.settings import ShardOptions
 from forests.layout import NODE
@@ -24,7 +24,7 @@ from forests.training.rows import modulus_over_scale, rows_of
 from forests.training.scores import scores_of
 from forests.training.structure import Tree
 from forests.training.train import Trained, TrainingOptions, train_trees
-from forests.training.variants import VARIANTS
+from forests.training.variants import VARIANTS, VariantOptions
 
 logger = logging.getLogger(__name__)
 
@@ -116,7 +116,7 @@ def variants(
     leaves = training.max_leaves * training.trees
     rows = []
     for name in names:
-        changed = replace(training, **VARIANTS[name])
+        changed = VariantOptions(**{**asdict(training), **VARIANTS[name]})
         changed = replace(changed, max_leaves=max(1, leaves // changed.trees))
         logger.info(name)
         rows.append({"variant": name, **_row(dataset, changed, workers, test)})

@@ -6,11 +6,11 @@ import argparse
 import json
 from typing import Any
 
-from carillon.command_line.options import collect
 from carillon.errors import UserError
+from carillon.parameters.command_line import collect, reader
+from carillon.parameters.quantities import NumberOfModes
 from carillon.records.provenance import record
 from dataset_gen.objectives import OBJECTIVES, require_objective
-from solver.analysis.options import number_of_modes
 from solver.analysis.problem import ProblemOptions
 from solver.commands.running import add_voxels, on_ranks, parameters, require_outputs, write_json
 from studies.objectives.measure import rate_objectives
@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     add_voxels(parser, "objective")
     parser.add_argument(
-        "--modes", type=number_of_modes, default=256, help="rigid included (default 256)"
+        "--modes", type=reader(NumberOfModes), default=256, help="rigid included (default 256)"
     )
     parser.add_argument(
         "--objectives",

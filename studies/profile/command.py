@@ -6,7 +6,7 @@ import argparse
 import json
 from dataclasses import asdict
 
-from carillon.command_line.options import add_options, collect
+from carillon.parameters.command_line import add_options, collect
 from carillon.records.measurement import measured
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.commands.running import add_solid, on_ranks, parameters, require_outputs, write_json

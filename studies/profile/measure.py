@@ -12,19 +12,19 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.command_line.arguments import whole_number
-from carillon.command_line.options import option
 from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES, Solid
+from carillon.parameters import option, parameters
+from carillon.parameters.quantities import NumberOfModes, between
 from carillon.processes.threads import in_parallel, split
 from solver.analysis.modal_solver import ModalSolver
-from solver.analysis.options import SolverOptions, number_of_modes
+from solver.analysis.options import SolverOptions
 from solver.assembly.system import Layout, System
 from solver.correction.correction import EIGENVALUE_TOLERANCE, carried, resolved
 from solver.correction.krylov import KrylovBasis
@@ -46,12 +46,12 @@ MASS_OPERATIONS, STIFFNESS_OPERATIONS = 6, 18
 """Operations of a pair of nodes in a product with one vector."""
 
 
-@dataclass(frozen=True)
+@parameters
 class ProfileOptions:
     """How a profile is measured."""
 
-    modes: int = option(256, "number of modes, rigid ones included", type=number_of_modes)
-    runs: int = option(5, "runs of which medians are taken", type=whole_number(1, 1000))
+    modes: NumberOfModes = option(256, "number of modes, rigid ones included")
+    runs: Annotated[int, between(1, 1000)] = option(5, "runs of which medians are taken")
 
 
 @dataclass
@@ -161,7 +161,7 @@ class _MeteredInverse:
             return self._inverse.solve(block)
 
 
-def profile(model: Solid, options: ProfileOptions = ProfileOptions(), seed: int = 0) -> Profile:
+def profile(model: Solid, options: ProfileOptions, seed: int = 0) -> Profile:
     """Measure the phases of `--method auto` on one rank; `seed` is that of the random vectors.
 
     Raises

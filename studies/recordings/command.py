@@ -7,10 +7,10 @@ installed. What is there already stays.
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
 from pathlib import Path
 
-from carillon.command_line.options import REQUIRED, add_options, collect, option
+from carillon.parameters import REQUIRED, option, parameters
+from carillon.parameters.command_line import add_options, collect
 from studies.recordings.packages import bring
 from workflow.disk_space import make_folder
 
@@ -19,7 +19,7 @@ EXAMPLES = """example:
 """
 
 
-@dataclass(frozen=True)
+@parameters
 class RecordingsOptions:
     """Where recordings are put."""
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from carillon.command_line.options import add_options, collect
+from carillon.parameters.command_line import add_options, collect
 from carillon.records.measurement import measured
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem

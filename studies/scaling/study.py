@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from math import log2
-from typing import Any
+from typing import Annotated, Any
 
-from carillon.command_line.arguments import number_between, whole_number
-from carillon.command_line.options import option
 from carillon.fem.model import Solid
+from carillon.parameters import OneOf, option, parameters
+from carillon.parameters.command_line import reader
+from carillon.parameters.quantities import NumberOfModes, Tolerance, between
 from solver import linear
-from solver.analysis.options import number_of_modes, positive_tolerance
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.correction.correction import INTERACTIVE_TOLERANCE
 from solver.distribution.decomposition import decompose
@@ -37,37 +37,36 @@ Tree = tuple[MergeTree, list[float]]
 """A merge tree and the nodes of its groups."""
 
 
+RankCount = Annotated[int, between(1, MOST_RANKS)]
+"""A number of ranks."""
+
+
 def rank_counts(text: str) -> tuple[int, ...]:
     """Argument type: numbers of ranks, separated by commas, each once and ascending."""
-    return tuple(sorted({whole_number(1, MOST_RANKS)(part) for part in text.split(",")}))
+    return tuple(sorted(set(map(reader(RankCount), text.split(",")))))
 
 
-@dataclass(frozen=True)
+@parameters
 class ScalingOptions:
     """What is run and modelled."""
 
-    modes: int = option(256, "number of modes, rigid ones included", type=number_of_modes)
-    ranks: tuple[int, ...] = option(
-        (1, 2), "numbers of ranks to run on, separated by commas (default 1,2)", type=rank_counts
+    modes: NumberOfModes = option(256, "number of modes, rigid ones included")
+    ranks: tuple[RankCount, ...] = option(
+        (1, 2), "numbers of ranks to run on, separated by commas (default 1,2)", read=rank_counts
     )
     weak: bool = option(False, "also a solid that grows with the ranks, as many unknowns a rank")
-    tolerance: float = option(
-        INTERACTIVE_TOLERANCE, "relative eigenvalue error to correct to", type=positive_tolerance
-    )
-    linear_solver: str = option(
+    tolerance: Tolerance = option(INTERACTIVE_TOLERANCE, "relative eigenvalue error to correct to")
+    linear_solver: Annotated[str, OneOf(*linear.METHODS)] = option(
         "mumps",
         "linear solver of the correction, the same on any number of ranks",
-        choices=linear.METHODS,
     )
-    latency: float | None = option(
+    latency: Annotated[float, between(1e-12, 1e3)] | None = option(
         None,
         "of the modelled network [s] (default: measured)",
-        type=number_between(1e-12, 1e3, "s"),
     )
-    bandwidth: float | None = option(
+    bandwidth: Annotated[float, between(1.0, 1e18)] | None = option(
         None,
         "of the modelled network [B/s] (default: measured)",
-        type=number_between(1.0, 1e18, "B/s"),
     )
 
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from carillon.command_line.options import REQUIRED, add_options, collect, option
 from carillon.errors import UserError
+from carillon.parameters import REQUIRED, option, parameters
+from carillon.parameters.command_line import add_options, collect
 
 if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     from sound.scenes.performance import Performance
@@ -36,7 +36,7 @@ OUTPUTS = {
 """Options that name files to write, and endings that these may have."""
 
 
-@dataclass(frozen=True)
+@parameters
 class SceneOptions:
     """What is played, and what is written of it."""
 

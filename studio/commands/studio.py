@@ -8,15 +8,15 @@ was designed is kept in the workspace.
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from carillon.command_line.arguments import whole_number
-from carillon.command_line.options import add_options, collect, option
 from carillon.command_line.progress import say
 from carillon.errors import UserError, one_line
+from carillon.parameters import option, parameters
+from carillon.parameters.command_line import add_options, collect
+from carillon.parameters.quantities import between
 
 if TYPE_CHECKING:
     import socket
@@ -38,14 +38,13 @@ BUILTIN = "builtin:"
 LOOPBACK_HOST = "127.0.0.1"
 
 
-@dataclass(frozen=True)
+@parameters
 class StudioOptions:
     """What is opened, and where it is served."""
 
     what: str | None = option(
         None,
         "project (YAML), mesh, design (.h5) or builtin:NAME to begin with (default: choose there)",
-        nargs="?",
         metavar="FILE",
     )
     workspace: str | None = option(
@@ -54,10 +53,9 @@ class StudioOptions:
         f"{WORKSPACE}); no other is read or written",
         metavar="FOLDER",
     )
-    port: int | None = option(
+    port: Annotated[int, between(1, 65535)] | None = option(
         None,
         "port to listen on (default: the first free one from 8620 on)",
-        type=whole_number(1, 65535),
     )
     host: str = option(
         LOOPBACK_HOST,

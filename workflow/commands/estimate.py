@@ -5,14 +5,15 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import pandas as pd
 
-from carillon.command_line.arguments import whole_number
 from carillon.fem.geometry import surface_name
 from carillon.files.atomic import atomic_path
 from carillon.files.paths import require_writable
+from carillon.parameters.command_line import reader
+from carillon.parameters.quantities import between
 from carillon.processes.cores import allowed_cores
 from dataset_gen.objectives import DATASET_OBJECTIVES
 from workflow import settings, training
@@ -45,10 +46,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--objective", choices=DATASET_OBJECTIVES, help="instead of dataset.objective"
     )
-    parser.add_argument("--nodes", type=whole_number(1, MOST_NODES), default=1, help="(default 1)")
+    parser.add_argument(
+        "--nodes",
+        type=reader(Annotated[int, between(1, MOST_NODES)]),
+        default=1,
+        help="(default 1)",
+    )
     parser.add_argument(
         "--cores-per-node",
-        type=whole_number(1, MOST_CORES),
+        type=reader(Annotated[int, between(1, MOST_CORES)]),
         default=allowed_cores(),
         metavar="CORES",
         help="(default: those of this machine)",

@@ -8,28 +8,23 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import yaml
+from annotated_types import Ge
 
 from carillon.builtin_names import BUILTIN_PREFIX
-from carillon.command_line.arguments import (
-    non_negative_number,
-    number_between,
-    number_of_workers,
-    positive_number,
-    whole_number,
-)
-from carillon.command_line.options import REQUIRED, add_options, collect, option
 from carillon.command_line.progress import say, track
 from carillon.errors import UserError
 from carillon.fem.geometry import surface_name
 from carillon.fem.geometry.size import sizes_in_words
 from carillon.fem.materials import NAMES as MATERIALS
 from carillon.files.atomic import atomic_path
+from carillon.parameters import REQUIRED, option, parameters
+from carillon.parameters.command_line import add_options, collect, reader
+from carillon.parameters.quantities import NonNegative, Point, Positive, Workers, between
 from carillon.processes.cores import allowed_cores
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.coarsening.forest import load_forest
@@ -65,44 +60,42 @@ def _tolerance(text: str) -> tuple[str, float]:
         raise argparse.ArgumentTypeError(
             f"{text!r} names no tolerance, expected NAME=VALUE with one of {', '.join(TOLERANCES)}"
         )
-    return name, positive_number(value)
+    return name, reader(Positive)(value)
 
 
 def _point(what: str) -> Any:
     words = f"point of the surface that is {what}, in mesh units (default: chosen)"
-    return option(None, words, type=float, metavar=("X", "Y", "Z"), nargs=3)
+    return option(None, words, metavar=("X", "Y", "Z"))
 
 
-@dataclass(frozen=True)
+@parameters
 class ValidateOptions:
     """What a validation needs beside the solid."""
 
     out: str = option(REQUIRED, "folder of all results", metavar="FOLDER")
     name: str | None = option(None, "name of the solid's page (default: that of the mesh)")
-    modes: int = option(256, "rigid included", type=whole_number(12))
-    mass_damping: float | None = option(
-        None, "Rayleigh damping [1/s] (default: of a plastic)", type=non_negative_number
+    modes: Annotated[int, Ge(12)] = option(256, "rigid included")
+    mass_damping: NonNegative | None = option(
+        None, "Rayleigh damping [1/s] (default: of a plastic)"
     )
-    stiffness_damping: float | None = option(
-        None, "Rayleigh damping [s] (default: of a plastic)", type=non_negative_number
+    stiffness_damping: NonNegative | None = option(
+        None, "Rayleigh damping [s] (default: of a plastic)"
     )
-    tolerance: float = option(
+    tolerance: Annotated[float, between(1e-15, 0.1)] = option(
         EIGENVALUE_TOLERANCE,
         "relative error of an eigenvalue that HCMS + EC is corrected to, and from which the limits "
         "of the criteria follow",
-        type=number_between(1e-15, 0.1),
     )
-    ranks: int = option(1, "MPI ranks of every solver run", type=whole_number(1, 4096))
+    ranks: Annotated[int, between(1, 4096)] = option(1, "MPI ranks of every solver run")
     forest: str | None = option(None, "forests to coarsen by (default: those of the package)")
-    cores: int = option(allowed_cores(), "cores to use (default: all)", type=number_of_workers)
-    strike: list[float] | None = _point("struck")
-    observed: list[float] | None = _point("watched")
-    tolerances: list[tuple[str, float]] | None = option(
+    cores: Workers = option(allowed_cores(), "cores to use (default: all)")
+    strike: Point | None = _point("struck")
+    observed: Point | None = _point("watched")
+    tolerances: tuple[tuple[str, float], ...] | None = option(
         None,
         f"limits of the criteria: {', '.join(TOLERANCES)}",
-        type=_tolerance,
+        read=_tolerance,
         metavar="NAME=VALUE",
-        nargs="+",
     )
 
 

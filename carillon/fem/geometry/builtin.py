@@ -12,11 +12,11 @@ import numpy as np
 import trimesh
 
 from carillon import builtin_names
-from carillon.command_line.arguments import alike
 from carillon.errors import UserError
 from carillon.fem.geometry.sweep import SECTIONS, joined, spline, sweep, tube, turned
 from carillon.fem.geometry.thin import THIN
 from carillon.fem.geometry.trials import TRIALS
+from carillon.parameters.sentences import alike
 
 
 def bar() -> trimesh.Trimesh:
