@@ -186,9 +186,15 @@ def test_what_is_no_file_is_not_waited_for(tmp_path):
         (["clip", "wood", "--out", "hit.mp3"], "hit.mp3: ends in .mp3, expected .* .wav"),
         (["clip", "wood", "--out", "hit"], "hit: ends in nothing, expected .* .wav"),
         (["clip", "wood", "--note", "", "--out", "hit.wav"], "'' is not a note"),
-        (["clip", "wood", "--rate", "1e11", "--out", "hit.wav"], "found '1e11', expected a whole number"),
-        (["clip", "wood", "--rate", "768001", "--out", "hit.wav"], "expected at most 768000"),
-        (["clip", "wood", "--seed", str(2**64), "--out", "hit.wav"], "expected at most 9,223,372,036,854,775,807"),
+        (
+            ["clip", "wood", "--rate", "1e11", "--out", "hit.wav"],
+            "expected a whole number",
+        ),
+        (["clip", "wood", "--rate", "768001", "--out", "hit.wav"], "expected at most 768,000"),
+        (
+            ["clip", "wood", "--seed", str(2**64), "--out", "hit.wav"],
+            "expected at most 9,223",
+        ),
         (["extract", "end.wav", "--residual", "x.mp3"], "x.mp3: ends in .mp3"),
         (["extract", "end.wav", "--residual", "end.wav"], "is an input and would be replaced"),
         (["extract", "end.wav", "--residual", "./end.wav"], "is an input and would be replaced"),

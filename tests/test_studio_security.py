@@ -11,8 +11,8 @@ import socket
 import pytest
 from websockets.exceptions import InvalidStatus
 
-from carillon.command_line.options import collect
 from carillon.errors import UserError
+from carillon.parameters.command_line import collect
 from studio.commands.studio import StudioOptions
 from studio.server.guard import Keys, host_names
 from studio.server.page_files import PAGE, page_policy

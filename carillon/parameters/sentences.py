@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 from carillon.errors import UserError
 from carillon.parameters.fields import ValueDomain, parameters_of
+from carillon.parameters.mistyped import alike
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
-
-ALIKE = 0.7
-"""Share of letters in common (difflib) from which a word is taken for a mistyped one."""
 
 _KINDS = {
     int: "a whole number",
@@ -92,19 +89,6 @@ def in_words(place: Iterable[str | int]) -> str:
     """
     parts = [f"[{part}]" if isinstance(part, int) else f".{part}" for part in place]
     return "".join(parts).removeprefix(".")
-
-
-def alike(word: str, words: Iterable[str]) -> str | None:
-    """The one of `words` that a mistyped word is most like, if it is like any.
-
-    Examples
-    --------
-    >>> alike("Validte", ["modes", "validate"]), alike("ring", ["modes", "validate"])
-    ('validate', None)
-    """
-    lower = {each.lower(): each for each in words}
-    found = get_close_matches(word.lower(), list(lower), 1, ALIKE)
-    return lower[found[0]] if found else None
 
 
 def _followed(

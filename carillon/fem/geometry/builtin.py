@@ -16,7 +16,7 @@ from carillon.errors import UserError
 from carillon.fem.geometry.sweep import SECTIONS, joined, spline, sweep, tube, turned
 from carillon.fem.geometry.thin import THIN
 from carillon.fem.geometry.trials import TRIALS
-from carillon.parameters.sentences import alike
+from carillon.parameters.mistyped import alike
 
 
 def bar() -> trimesh.Trimesh:
