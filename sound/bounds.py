@@ -1,4 +1,4 @@
-"""Bounds of sounds, read or made: what is beyond them is a mistake, or more than memory holds."""
+"""Bounds of sounds that are read or made; beyond them is a mistake, or too much for memory."""
 
 from __future__ import annotations
 
@@ -8,26 +8,27 @@ from carillon.errors import UserError
 from carillon.parameters.quantities import between
 
 LOWEST_RATE, HIGHEST_RATE = 1_000, 768_000
-"""Samples per second [Hz] of clips and of what is rendered."""
+"""Least and greatest sampling rate [Hz] of clips and of rendered sounds."""
 MOST_CHANNELS = 16
-"""Of a clip; their mean is taken, which of many microphones says nothing."""
+"""Greatest number of channels of a clip."""
 MOST_CLIP_SAMPLES = 1 << 23
-"""Of a clip, in all channels: three minutes at 44.1 kHz, of which a strike needs seconds."""
+"""Greatest number of samples of a clip, in all channels: three minutes at 44.1 kHz."""
 MOST_SAMPLES = 1 << 26
-"""Of a sound that is made: 10 minutes at 96 kHz, half a gigabyte while it is worked out."""
+"""Greatest number of samples of a rendered sound: 10 minutes at 96 kHz, half a gigabyte of
+memory."""
 LONGEST_SOUND = 600.0
-"""Length [s] of a sound that somebody may want to hear."""
+"""Greatest length [s] of a rendered sound."""
 LEAST_IMPULSE, LARGEST_IMPULSE = 1e-6, 1e6
-"""What somebody may strike with [N s]."""
+"""Least and greatest impulse of a strike [N s]."""
 QUIETEST, LOUDEST = 1e-9, 1e6
-"""Magnitude of the loudest sample of a clip, full scale being 1."""
+"""Least and greatest magnitude of the loudest sample of a clip, full scale being 1."""
 
 SampleRate = Annotated[int, between(LOWEST_RATE, HIGHEST_RATE)]
 """Samples per second [Hz]."""
 
 
 def require_level(peak: float) -> None:
-    """Refuse a clip whose loudest sample has a magnitude that no recording has.
+    """Refuse a clip whose loudest sample has an impossible magnitude.
 
     Raises
     ------
@@ -46,12 +47,12 @@ def require_level(peak: float) -> None:
 
 
 def require_length(seconds: float, rate: int) -> None:
-    """Refuse to make a sound without a sample, or of more than `MOST_SAMPLES`.
+    """Refuse a length without a sample, or of more than `MOST_SAMPLES`.
 
     Raises
     ------
     UserError
-        If it would have so few or so many.
+        If it is such a length.
     """
     count = seconds * rate
     if not 0.5 < count <= MOST_SAMPLES:

@@ -1,4 +1,4 @@
-"""Names of files that commands write: their endings say what is in them."""
+"""Names of files that commands write; the endings name the formats."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from carillon.files.paths import require_writable
 def require_output(
     path: str | Path, endings: Iterable[str], inputs: Iterable[str | Path] = ()
 ) -> Path:
-    """Check, before the work, that a result can be written to `path` and that its name suits it.
+    """Check, before the work, that `path` can be written and has one of the endings.
 
     Parameters
     ----------
     endings
-        With their dots, in lower case; capitals are taken for the same.
+        Endings with their dots, in lower case; capitals count as the same.
     inputs
-        Files that the command reads, which it must not replace.
+        Files that the command reads and must not replace.
 
     Raises
     ------

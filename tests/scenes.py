@@ -7,11 +7,12 @@ from typing import Any
 
 import pytest
 
-from sound.scenes.bodies import Body
+from sound.scenes.bodies import bodies_of
+from sound.scenes.body import Body
 from sound.scenes.contact.engine import Course, simulate
-from sound.scenes.contact.impacts import Blow, Pressing, told_apart
+from sound.scenes.contact.impacts import HertzImpact, SustainedContact, split_impacts
 from sound.scenes.contact.touch import Touch
-from sound.scenes.playing.play import bodies_of
+from sound.scenes.ground_plane import GroundPlane
 from sound.scenes.scene import Scene, scene_of
 
 QUIET = {"radiation": False, "space": False, "contact_damping": False, "noise": False}
@@ -34,13 +35,17 @@ def scene(*objects: dict[str, Any], **given: Any) -> Scene:
 
 
 def moved(described: Scene) -> tuple[list[Body], Course]:
-    """Its bodies, and how they move."""
-    bodies = bodies_of(described)
-    return bodies, simulate(described, bodies, visible=False)
+    """Its bodies, and their motion."""
+    bodies = bodies_of(described.objects)
+    ground = GroundPlane(described.ground, described.ground_material)
+    return bodies, simulate(
+        bodies, described.seconds, described.engine, described.gravity, ground, visible=False
+    )
 
 
-def struck(described: Scene) -> tuple[list[Body], list[Blow], list[Pressing]]:
-    """Its bodies, impacts, and what lasts."""
+def struck(described: Scene) -> tuple[list[Body], list[HertzImpact], list[SustainedContact]]:
+    """Its bodies, impacts, and sustained contacts."""
     bodies, course = moved(described)
     touch = Touch(bodies, described.ground_material)
-    return bodies, *told_apart(course.contacts, described, touch)
+    split = split_impacts(course.contacts, touch, described.engine, described.gravity)
+    return bodies, *split

@@ -63,9 +63,11 @@ def test_the_same_scene_makes_the_same_files(folder, monkeypatch):
 def test_a_tune_strikes_its_bars_in_turn_in_time_and_in_tune():
     require_engine()
     described = tune_of("C7 E7 G7")
-    bodies, blows, _ = struck(described)
+    bodies, impacts, _ = struck(described)
     on_bars = [
-        blow.impact for blow in blows if min(blow.impact.pair) == 0 and max(blow.impact.pair)
+        contact.impact
+        for contact in impacts
+        if min(contact.impact.pair) == 0 and max(contact.impact.pair)
     ]
     assert [max(impact.pair) for impact in on_bars] == [1, 2, 3]
     beats = np.diff([impact.seconds for impact in on_bars])

@@ -32,16 +32,16 @@ def test_a_ball_bounces_when_and_as_fast_as_theory_says(restitution):
         engine={"steps": 64},
     )
     described = _with_ground(described, restitution)
-    (body,), blows, _ = struck(described)
+    (body,), impacts, _ = struck(described)
     speed, time = np.sqrt(2 * G * height), np.sqrt(2 * height / G)
-    for number, blow in enumerate(blows[:4]):
+    for number, contact in enumerate(impacts[:4]):
         # Theory's bounces take no time, the engine's some.
         late = number * described.engine.contact_seconds + 1e-3 * time
-        assert blow.impact.seconds == pytest.approx(time, abs=late)
+        assert contact.impact.seconds == pytest.approx(time, abs=late)
         # What is held to the ground is slowed by its weight.
         slowed = number * G * described.engine.contact_seconds
-        assert blow.impact.speed == pytest.approx(speed, abs=0.01 * speed + slowed)
-        gained = np.linalg.norm(blow.impact.impulse) / body.mass
+        assert contact.impact.speed == pytest.approx(speed, abs=0.01 * speed + slowed)
+        gained = np.linalg.norm(contact.impact.impulse) / body.mass
         lifted = G * described.engine.contact_seconds
         assert gained == pytest.approx(
             (1 + restitution) * speed + lifted, abs=0.01 * speed + 2 * slowed
@@ -83,25 +83,25 @@ def test_impacts_are_told_with_their_pair_place_and_direction():
         ground=None,
         seconds=0.2,
     )
-    _, blows, _ = struck(described)
-    (blow,) = blows
-    assert blow.impact.pair == (1, 0)
-    assert blow.impact.position == pytest.approx([-0.01, 0, 0], abs=5e-4)
-    assert blow.impact.impulse[0] > 0.0 and abs(blow.impact.impulse[1:]).max() < 1e-9
-    assert blow.impulses[:, 0] == pytest.approx(-blow.impulses[:, 1])
+    _, impacts, _ = struck(described)
+    (contact,) = impacts
+    assert contact.impact.pair == (1, 0)
+    assert contact.impact.position == pytest.approx([-0.01, 0, 0], abs=5e-4)
+    assert contact.impact.impulse[0] > 0.0 and abs(contact.impact.impulse[1:]).max() < 1e-9
+    assert contact.impulses[:, 0] == pytest.approx(-contact.impulses[:, 1])
 
 
 def test_what_lands_presses_with_its_weight_and_then_sleeps():
     block = {"name": "block", "mesh": "builtin:box", "material": "wood", "count": 0}
     described = scene({**block, "resolution": 12, "position": [0, 0, 0.2]}, seconds=2.0)
-    (body,), blows, (pressing,) = struck(described)
-    assert pressing.pair == (0, GROUND)
-    steps = pressing.contacts.steps
+    (body,), impacts, (sustained,) = struck(described)
+    assert sustained.pair == (0, GROUND)
+    steps = sustained.contacts.steps
     late = steps > steps[-1] - 200
-    weight = pressing.contacts.pressures[late].sum() / 200
+    weight = sustained.contacts.pressures[late].sum() / 200
     # It falls asleep before it has quite settled.
     assert weight == pytest.approx(body.mass * G, rel=0.3)
-    assert blows[-1].impact.seconds <= steps[-1] * described.engine.step_seconds < 1.0
+    assert impacts[-1].impact.seconds <= steps[-1] * described.engine.step_seconds < 1.0
 
 
 def test_sliding_is_slowed_by_friction():
@@ -146,11 +146,11 @@ def test_hertz_contact_lasts_as_long_as_its_equation_of_motion_says():
 
 def test_impacts_last_as_hertz_says_of_both_materials():
     described = scene(ball(position=[0, 0, 0.06]), ground_material="glass", seconds=0.3)
-    (body,), blows, _ = struck(described)
+    (body,), impacts, _ = struck(described)
     glass, steel = described.ground_material, body.entry.material
     giving = (1 - glass.poisson**2) / glass.young + (1 - steel.poisson**2) / steel.young
     expected = bounce_seconds(body.mass, 0.01, 1 / giving, np.sqrt(2 * G * 0.05))
-    assert blows[0].impact.duration == pytest.approx(expected, rel=0.01)
+    assert impacts[0].impact.duration == pytest.approx(expected, rel=0.01)
 
 
 def test_a_contact_is_as_stiff_as_its_force_grows():

@@ -10,15 +10,16 @@ from scipy.signal import hilbert
 
 from carillon.errors import UserError
 from sound.project.design_file import write_design
-from sound.rendering.bank import Bank
-from sound.rendering.bank import ring as ring_bank
 from sound.rendering.render import Hit, render
 from sound.scenes.audible.hearing import HEAD_RADIUS, Head, heard
 from sound.scenes.audible.radiation import SOUND_SPEED
-from sound.scenes.audible.ringing import BLOCK, Excitation, ring
 from sound.scenes.audible.roughness import octave_heights, profile
+from sound.scenes.bodies import bodies_of
 from sound.scenes.picture import Motion
-from sound.scenes.playing.play import bodies_of, perform
+from sound.scenes.playing.play import perform
+from sound.synthesis.bank import Bank
+from sound.synthesis.bank import ring as ring_bank
+from sound.synthesis.driven import BLOCK, Excitation, ring
 from tests.scenes import QUIET, ball, require_engine, scene, struck
 from tests.small_design import small_design
 
@@ -54,9 +55,9 @@ def thrown_at(target: dict, **sound) -> object:
 
 def test_a_strike_sounds_as_render_has_it(design):
     described = thrown_at({"name": "box", "design": design}, noise=True)
-    bodies, (blow,), _ = struck(described)
-    body, impact = bodies[0], blow.impact
-    place = blow.places[0, 1] + body.centre
+    bodies, (contact,), _ = struck(described)
+    body, impact = bodies[0], contact.impact
+    place = contact.places[0, 1] + body.centre
     hit = Hit(impact.seconds, place, -impact.impulse)
     expected = render(body.solid, [hit], 0.5, RATE, impact.duration, body.listening)
     performance = perform(described, visible=False)
@@ -66,9 +67,9 @@ def test_a_strike_sounds_as_render_has_it(design):
 
 def test_a_strike_of_modes_of_no_design_sounds_as_render_has_it():
     described = thrown_at(BAR)
-    bodies, (blow,), _ = struck(described)
-    body, impact = bodies[0], blow.impact
-    place = blow.places[0, 1] + body.centre
+    bodies, (contact,), _ = struck(described)
+    body, impact = bodies[0], contact.impact
+    place = contact.places[0, 1] + body.centre
     hit = Hit(impact.seconds, place, -impact.impulse)
     expected = render(body.solid, [hit], 0.5, RATE, impact.duration)
     performance = perform(described, visible=False)
@@ -229,7 +230,7 @@ def test_a_profile_is_as_rough_as_told_and_the_same_for_the_same_seed():
 
 def test_what_slides_is_heard_and_what_lies_still_is_not():
     slid = {**BAR, "name": "slid", "friction": 0.1, "velocity": [2.0, 0, 0]}
-    bodies = bodies_of(scene(slid, ground=None))
+    bodies = bodies_of(scene(slid, ground=None).objects)
     low = -float(bodies[0].shape.vertices[:, 2].min())
     described = scene({**slid, "position": [0, 0, low + 1e-5]}, seconds=0.5, gravity=[0, 0, -9.81])
     sound = perform(described, visible=False).sound

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sound.scenes.bodies import bodies_of
 from sound.scenes.film.rays import View
 from sound.scenes.picture import Camera, Motion
-from sound.scenes.playing.play import bodies_of
 from sound.scenes.playing.viewpoint import ASPECT, camera_of, head_of
 from tests.scenes import ball, scene
 
@@ -41,7 +41,7 @@ def window(camera: Camera, places: np.ndarray, radii: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("along", ALONG)
 def test_all_is_seen_and_nearly_fills_the_picture(along: str) -> None:
     places = np.linspace(-0.6, 0.6, COUNT)[:, None] * ALONG[along] + [3.0, 1.0, 2.0]
-    camera = camera_of(SCENE, bodies_of(SCENE), motion(np.stack([places, places])))
+    camera = camera_of(SCENE.camera, bodies_of(SCENE.objects), motion(np.stack([places, places])))
     left, right, top, bottom = window(camera, places, RADII)
     assert 0.0 < left < right < 1.0 and 0.0 < top < bottom < 1.0
     assert max(right - left, bottom - top) > 0.85
@@ -54,13 +54,13 @@ def test_what_rolls_far_away_makes_the_others_no_smaller() -> None:
     staying = np.stack([places] * 20)
     leaving = staying.copy()
     leaving[:, 0, 0] -= np.linspace(0.0, 100.0, 20)
-    bodies = bodies_of(SCENE)
-    near, far = (camera_of(SCENE, bodies, motion(each)) for each in (staying, leaving))
+    bodies = bodies_of(SCENE.objects)
+    near, far = (camera_of(SCENE.camera, bodies, motion(each)) for each in (staying, leaving))
     assert far == near
 
 
 def test_who_hears_is_where_the_camera_is() -> None:
     places = np.linspace(-0.6, 0.6, COUNT)[:, None] * ALONG["wide"]
-    camera = camera_of(SCENE, bodies_of(SCENE), motion(np.stack([places, places])))
-    head = head_of(SCENE, camera)
+    camera = camera_of(SCENE.camera, bodies_of(SCENE.objects), motion(np.stack([places, places])))
+    head = head_of(SCENE.listener, camera)
     np.testing.assert_array_equal(head.at(np.zeros(1))[0], [camera.position])

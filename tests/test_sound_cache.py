@@ -13,10 +13,10 @@ from carillon.errors import UserError
 from carillon.files import cache
 from sound.clips import cache as clips
 from sound.clips import files
-from sound.clips.damped import damped_sinusoids
 from sound.clips.extraction import ModalSound, extract
 from sound.clips.files import extract_file
 from sound.clips.wav import write_wav
+from sound.synthesis.sinusoids import damped_sinusoids
 from tests.edited_files import edited
 
 RATE = 8000

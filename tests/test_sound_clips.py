@@ -15,11 +15,11 @@ import soundfile
 from carillon.errors import UserError
 from sound.__main__ import main
 from sound.bounds import MOST_CHANNELS, MOST_CLIP_SAMPLES, MOST_SAMPLES, require_length
-from sound.clips.damped import damped_sinusoids
 from sound.clips.extraction import extract
 from sound.clips.instruments import INSTRUMENTS, note_hertz, synthesised
 from sound.clips.wav import PEAK, read_wav, write_wav
 from sound.commands.clip import NAMES
+from sound.synthesis.sinusoids import damped_sinusoids
 
 RATE = 8000
 

@@ -27,9 +27,9 @@ from solver.verification.comparison import compare_files
 from sound.__main__ import main
 from sound.export.gltf import EXTENSION, UNSIGNED_INT
 from sound.project.design_file import write_design
-from sound.rendering.bank import Bank, ring
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
+from sound.synthesis.bank import Bank, ring
 from tests.small_design import N_MODES, SIDES, small_design
 from tests.solids import box_mesh
 

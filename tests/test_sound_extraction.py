@@ -8,23 +8,17 @@ import soundfile
 
 from carillon.errors import UserError
 from sound.clips.clipping import is_clipped
-from sound.clips.damped import (
-    correlations,
-    damped_sinusoids,
-    exponents_of,
-    fitted_coefficients,
-    normal_matrix,
-    refined,
-)
 from sound.clips.ending import ending
 from sound.clips.esprit import esprit
 from sound.clips.extraction import ModalSound, extract
+from sound.clips.free_vibration import LONGEST_BLOW
 from sound.clips.glide import glide
 from sound.clips.instruments import synthesised
+from sound.clips.least_squares import fitted_coefficients, normal_matrix, refined
 from sound.clips.onset import second_strike, strike_sample
 from sound.clips.pursuit import further
-from sound.clips.ringing import LONGEST_BLOW
 from sound.clips.wav import read_wav
+from sound.synthesis.sinusoids import correlations, damped_sinusoids, exponents_of
 
 RATE = 8000
 FREQUENCY_TOLERANCE, DAMPING_TOLERANCE = 1e-3, 0.05

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sound.clips.damped import damped_sinusoids
 from sound.clips.files import extract_file
+from sound.synthesis.sinusoids import damped_sinusoids
 from studies.recordings.formats import RATES, SUBTYPES, Format, write_as
 
 HIGHEST_RATE = 192_000

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from sound.clips.damped import damped_sinusoids
 from sound.clips.extraction import extract
 from sound.clips.noise import noise_part
+from sound.synthesis.sinusoids import damped_sinusoids
 
 RATE = 44_100
 COUNT = 2 * RATE

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from carillon.errors import UserError
-from sound.rendering.bank import Bank, ring
 from sound.rendering.listening import Listening
 from sound.rendering.render import Hit, render
 from sound.rendering.solid import SoundingSolid
+from sound.synthesis.bank import Bank, ring
 from studio.binary import unpack
 from studio.standalone import write_page
 from studio.standalone.content import GAIN_ERROR, STEPS, content

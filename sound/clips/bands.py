@@ -1,4 +1,4 @@
-"""Narrow bands of a clip, brought down to frequency 0 and a low sampling rate."""
+"""Narrow bands of a clip, shifted to frequency 0 at a low sampling rate."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _STOP_DECIBELS = 80.0
+"""Attenuation of the filter outside of a band [dB]."""
 
 
 @dataclass(frozen=True)
@@ -21,11 +22,11 @@ class Band:
     Attributes
     ----------
     centre, width : float [Hz]
-        Sinusoids within half a width of the centre are what it is for.
+        Centre and width of the band; its sinusoids lie within half a width of the centre.
     rate : float [Hz]
         Sampling rate, at least twice the width.
     signal : (n,) complex
-        Shifted by the centre.
+        Samples, shifted by the centre to frequency 0.
     """
 
     centre: float
@@ -37,9 +38,9 @@ class Band:
 def bands(clip: Array, rate: int, width: float, samples: int) -> Iterator[Band]:
     """Bands of `width` [Hz] side by side from 0 to half the rate, `samples` long at most.
 
-    The filter looks ahead, not back: sample n of a band is a weighted sum of later samples of the
-    clip, so that a damped sinusoid stays one from the strike on, in that only its coefficient
-    changes.  The end of the band, where the filter would look beyond the clip, is left out.
+    The filter looks ahead: sample n of a band is a weighted sum of later samples of the clip, so a
+    damped sinusoid stays one from the strike on, with another coefficient.  The end of the band,
+    where the filter would look beyond the clip, is left out.
     """
     from scipy.fft import next_fast_len  # Slow to load.
 

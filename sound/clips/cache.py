@@ -1,4 +1,4 @@
-"""Modes found in clips are kept: what was searched once is not searched again."""
+"""Cache of the modes of clips, so that a clip is searched only once."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ _ARRAYS = (*_MODES, "residual")
 def remembered_modes(
     samples: Array, rate: int, modes: int | None, search: Callable[[], ModalSound]
 ) -> ModalSound:
-    """What `search` finds in a clip, or found in it before.
+    """The modes of a clip, by `search` or from the cache.
 
     Parameters
     ----------
     samples : (s,)
-        Of the clip.
+        Samples of the clip.
     rate : int [Hz]
         Samples per second.
     modes
-        How many the search keeps.
+        Number of modes that the search keeps.
     search
-        Called unless its result is in the cache.  What it raises is not kept.
+        Called unless its result is in the cache.  Its exceptions are not cached.
     """
     return remembered("clips", _key(samples, rate, modes), search, _read, _write)
 
@@ -52,9 +52,10 @@ def _key(samples: Array, rate: int, modes: int | None) -> str:
 
 @cache
 def _origin() -> bytes:
-    """Other code finds other modes; other libraries and processors, other last digits."""
+    """Hash of code, libraries and processor; with others, modes differ or their last digits do."""
     digest = hashlib.sha256()
-    for source in sorted(Path(__file__).parent.glob("*.py")):
+    room = Path(__file__).parent.parent
+    for source in sorted([*room.glob("clips/*.py"), *room.glob("synthesis/*.py")]):
         digest.update(source.read_bytes())
     digest.update(json.dumps([provenance.versions(), provenance.processor()]).encode())
     return digest.digest()

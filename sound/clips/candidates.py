@@ -1,4 +1,4 @@
-"""Where in a clip there may be modes: damped sinusoids that ESPRIT finds in its bands."""
+"""Candidates for the modes of a clip: damped sinusoids that ESPRIT finds in its bands."""
 
 from __future__ import annotations
 
@@ -13,30 +13,31 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 BAND_SAMPLES = 512
-"""Length of a band's signal, from the strike on; narrow bands last longer."""
+"""Greatest number of samples of a band, from the strike on; those of a narrow band last longer."""
 BAND_DECAY = 5.0
-"""Nepers of decay within a band's length from which on a mode is sought again in wider bands."""
+"""Decay within a band's length [nepers] above which a mode is sought again in wider bands."""
 LOWEST_HERTZ, HIGHEST_FRACTION = 20.0, 0.97
-"""Lowest frequency of a mode, and the highest in half sampling rates."""
+"""Lowest frequency of a mode [Hz], and the highest over half the sampling rate."""
 LEAST_QUALITY = 2.0
-"""pi f / d of a mode; what dies away faster is a knock rather than a mode."""
+"""Least quality factor pi f / d of a mode; a quicker decay makes a knock."""
 LEAST_DECAY = 0.1
-"""Nepers (0.87 dB) by which a mode must decay within the clip; what does not is a steady tone."""
+"""Least decay of a mode within the clip [nepers] (0.87 dB); a slower decay makes a steady tone."""
 _MOST_GROWTH = 5.0
-"""Nepers by which a sinusoid may grow within the clip, for one that does not decay to be told."""
+"""Greatest growth of a sinusoid within the clip [nepers]; growing ones show that a clip does not
+decay."""
 _LATER = 16
-"""Samples of a band by which a second search begins later."""
+"""Delay of the second search in a band [samples]."""
 MOST = 200
-"""Candidates of one pass over the bands."""
+"""Greatest number of candidates of one pass over the bands."""
 _PEAK = 20.0
-"""Largest over median power in a band's spectrum below which it is taken for noise."""
+"""Largest over median power of a band's spectrum below which the band counts as noise."""
 
 
 def candidates(rest: Array, rate: int, width: float, label: str, visible: bool) -> Complex:
-    """Exponents (k,) per sample of the clip from its bands of `width` [Hz], or of what is left.
+    """Exponents (k,) per sample of the sinusoids in all bands of `width` [Hz] of a rest.
 
-    Of more than `MOST` those with most energy: a clip that ends in mid-tone, and has no noise that
-    would hide what its end leaves in all bands, would take minutes otherwise.
+    The `MOST` of greatest energy are kept.  Otherwise a clip that ends in mid-tone, without noise,
+    would take minutes, as its end leaves traces in all bands.
     """
     count = int(0.5 * rate / width) + 1
     parts = track(bands(rest, rate, width, BAND_SAMPLES), label, count, visible=visible)
@@ -77,15 +78,15 @@ def _energies(exponents: Complex, signal: Complex) -> Array:
 
 
 def rings(exponents: Complex) -> NDArray[np.bool_]:
-    """Which sinusoids vibrate long enough, compared to their period, to be modes."""
+    """Which sinusoids have at least the quality factor `LEAST_QUALITY`."""
     return exponents.imag > -2.0 * LEAST_QUALITY * exponents.real
 
 
 def _stable(signal: Complex) -> Complex:
     """Exponents per sample that ESPRIT finds from the strike on and also from a little later on.
 
-    What it makes of the noise of a blow changes altogether, while a mode moves by less than it
-    decays, or than what decays slowly can be told from in so short a signal.
+    The exponents of a blow's noise change altogether, while that of a mode moves by less than its
+    decay, or by less than the resolution of so short a signal.
     """
     exponents, later = esprit(signal), esprit(signal[_LATER:])
     moved = np.abs(exponents[:, None] - later).min(axis=1)

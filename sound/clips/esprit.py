@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 Complex = NDArray[np.complex128]
 
 MOST = 40
-"""Most exponents that are looked for in one signal."""
+"""Greatest number of exponents of one signal."""
 _ESTER_FRACTION = 0.02
+"""Least criterion of the number of sinusoids, over its maximum."""
 
 
 def esprit(signal: Complex) -> Complex:
@@ -27,7 +28,7 @@ def esprit(signal: Complex) -> Complex:
 
 
 def exponents_of_orders(signal: Complex, orders: Iterable[int]) -> list[Complex]:
-    """The same for each of some numbers of sinusoids."""
+    """Exponents (p,) of damped sinusoids in `signal` for each of some numbers p."""
     vectors = _subspace(signal)
     return [_exponents(vectors[:, :order]) for order in orders]
 

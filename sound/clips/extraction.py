@@ -1,12 +1,12 @@
 """Modes of a contact sound: frequencies, dampings and amplitudes from a clip of one strike.
 
 Ren, Yeh and Lin (2013), whom the paper follows, fit peaks of spectrograms.  Here all damped
-sinusoids that stand out of the noise are fitted to the whole clip, see `sound.clips.search`, from
-where on they ring freely, see `sound.clips.ringing`.
+sinusoids that stand out of the noise are fitted to the whole clip, see `sound.clips.mode_search`,
+from the beginning of the free vibration on, see `sound.clips.free_vibration`.
 
-Two modes come apart if their frequencies differ by the half-power bandwidth d / pi or more where
-the signal is 20 dB above the noise, by two thirds of it at 40 dB.  Errors of modes that stand apart
-are what the noise makes inevitable.
+Two modes are resolved if their frequencies differ by the half-power bandwidth d / pi where the
+signal is 20 dB above the noise, by two thirds of it at 40 dB.  Errors of resolved modes are those
+that the noise makes inevitable.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from carillon.processes.threads import blas_threads
 from sound.bounds import require_level
 from sound.clips.candidates import LEAST_DECAY
 from sound.clips.clipping import is_clipped, restored
-from sound.clips.damped import damped_sinusoids, superposed
 from sound.clips.ending import ending
+from sound.clips.free_vibration import SHORTEST_SAMPLES, free_modes
 from sound.clips.glide import glide
+from sound.clips.mode_search import FEWEST_PERIODS, has_periods, is_mode
 from sound.clips.onset import second_strike, strike_sample
-from sound.clips.ringing import SHORTEST_SAMPLES, ringing
-from sound.clips.search import FEWEST_PERIODS, has_periods, is_mode
 from sound.clips.significance import Fit
+from sound.synthesis.sinusoids import damped_sinusoids, superposed
 
 Array = NDArray[np.float64]
 
 LONGEST_SECONDS = 6.0
-"""Time after the strike that is searched for modes."""
+"""Length of the part after the strike that is searched for modes [s]."""
 
 
 @dataclass(frozen=True)
@@ -49,16 +49,16 @@ class ModalSound:
     dampings : (n,) [1/s]
         d.
     amplitudes : (n,)
-        At the strike, in units of the samples.
+        Amplitudes at the strike, in units of the samples.
     phases : (n,) [rad]
         theta.
     residual : (s,)
-        The clip from where its modes ring on, up to a second strike or to where it is
-        faded out, minus all modes found, those not asked for included.
+        The clip from the beginning of free vibration to a second strike or a fade-out, minus all
+        modes, including those that are not kept.
     rate : int [Hz]
         Samples per second.
     evidence : dict
-        How the modes were found and how sure they are; plain values.
+        Details of the search and of its accuracy; plain values.
     """
 
     frequencies: Array
@@ -88,7 +88,7 @@ def extract(
     Parameters
     ----------
     samples : (s,)
-        Of one channel.
+        Samples of one channel.
     rate : int [Hz]
         Samples per second.
     modes : int or None
@@ -104,7 +104,7 @@ def extract(
 
     Examples
     --------
-    >>> from sound.clips.damped import damped_sinusoids
+    >>> from sound.synthesis.sinusoids import damped_sinusoids
     >>> clip = damped_sinusoids(
     ...     np.array([440.0]), np.array([8.0]), np.array([0.5]), np.zeros(1), rate=8000, count=8000
     ... )
@@ -130,13 +130,13 @@ def extract(
     clipped = is_clipped(clip)[: len(searched)]
     with blas_threads(1):  # many small matrices
         if clipped.any():
-            found, searched = restored(searched, clipped, rate, visible)
+            free, searched = restored(searched, clipped, rate, visible)
             clip[: len(searched)] = searched * scale
         else:
-            found = ringing(searched, rate, visible)
-    start = found.start
-    _require_modes(found.whole, len(searched) - start, rate)
-    sound = _as_sound(found.modes, clip[start:], rate, scale, modes)
+            free = free_modes(searched, rate, visible)
+    start = free.start
+    _require_modes(free.whole, len(searched) - start, rate)
+    sound = _as_sound(free.modes, clip[start:], rate, scale, modes)
     sound.evidence.update(
         strike_seconds=(strike + start) / rate,
         blow_seconds=start / rate,
@@ -164,9 +164,9 @@ def _require_sound(clip: Array) -> None:
 
 
 def _require_no_steady_tone(clip: Array, rate: int) -> None:
-    """Refuse a tone that is as loud at the end as at the beginning, before it is searched.
+    """Refuse a tone that is as loud at the end as at the beginning, before the search.
 
-    Where it breaks off, it would fill all bands with candidates.
+    Its end would fill all bands with candidates.
     """
     quarter = len(clip) // 4
     first, last = clip[:quarter], clip[-quarter:]

@@ -1,4 +1,4 @@
-"""Clips by the name of their files."""
+"""Modes of clips in files, and names of clips."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ def extract_file(
 ) -> ModalSound:
     """Modes of the clip in a WAV file, see `extract`, whose errors then name the file.
 
-    They come from the user's cache if the clip was searched before.  A clip that is clipped is
-    refused unless that is allowed.
+    They come from the user's cache if the clip was searched before.  Clipped clips are refused
+    unless `allow_clipped`.
     """
     samples, rate = read_wav(path, allow_clipped)
     try:
@@ -29,7 +29,7 @@ def extract_file(
 
 
 def clip_names(clips: Sequence[str | Path]) -> list[str]:
-    """Names of the clips without folder and ending, or numbers where those are not unique."""
+    """File names of clips without folder and ending, or numbers if those are not unique."""
     names = [Path(clip).stem for clip in clips]
     unique = len(set(names)) == len(names)
     return names if unique else [f"clip {number + 1}" for number in range(len(names))]

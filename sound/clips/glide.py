@@ -1,6 +1,7 @@
-"""Whether the loudest tone of a clip glides: a drum's falls in pitch while its head slackens.
+"""Glide of a clip's loudest tone: that of a drum falls in pitch while its head slackens.
 
-No material does so.  A row of neighbouring modes imitates it, so that a fit does not tell.
+No material glides.  A fit of modes does not show a glide, as a row of neighbouring modes imitates
+it.
 """
 
 from __future__ import annotations
@@ -18,22 +19,25 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _HALF_WIDTH = 0.15
-"""Of the band that is looked at, over its tone's frequency."""
+"""Half-width of the analysed band, over its tone's frequency."""
 _BAND_SAMPLES = 400
-"""Most samples of the band."""
+"""Greatest number of samples of the band."""
 _FEWEST_SAMPLES = 24
+"""Least number of samples of the band."""
 _BETTER, _GOOD = 0.85, 0.15
-"""Energy that a gliding tone leaves of the band, over what two modes leave, and over all of it."""
+"""Greatest energy that a gliding tone leaves unexplained, over the energy that two modes leave, and
+over that of the whole band."""
 LEAST_CENTS = 30.0
-"""Change of pitch that is told."""
+"""Least change of pitch that counts as a glide [cents]."""
 _ENERGY = 0.9
-"""Share of the band's energy within the time in which the change is measured."""
+"""Share of the band's energy within the time that the change of pitch is measured in."""
 _STEPS = 40
+"""Greatest number of evaluations of a least-squares fit."""
 
 
 @dataclass(frozen=True)
 class Glide:
-    """A tone that comes to `hertz` within `seconds` of the strike, from `cents` above that."""
+    """A tone that glides from `cents` above `hertz` to `hertz`, within `seconds` of the strike."""
 
     hertz: float
     seconds: float
@@ -41,9 +45,11 @@ class Glide:
 
 
 def glide(clip: Array, rate: int) -> Glide | None:
-    """The glide of the loudest tone of a clip (s,) that begins with its strike, if it has one.
+    """The glide of the loudest tone of a clip (s,) that begins with its strike; None if it is
+    steady.
 
-    Its frequency w + u exp(-t / tau) explains more of a band around it than two steady modes do.
+    A glide is a frequency w + u exp(-t / tau) that explains more of the band around the tone than
+    two steady modes do.
     """
     power = np.abs(np.fft.rfft(clip, 2 * len(clip))) ** 2
     power[: int(2.0 * len(clip) * LOWEST_HERTZ / rate)] = 0.0
@@ -66,9 +72,10 @@ def glide(clip: Array, rate: int) -> Glide | None:
 
 
 def _band(clip: Array, rate: int, centre: float) -> tuple[Complex, float, float]:
-    """What is near a frequency, brought down to 0 and a low rate, and that rate [Hz].
+    """The band around a frequency [Hz], shifted to 0, its rate [Hz], and the filter's look-ahead
+    [s].
 
-    The filter looks ahead, as those of `bands`, by a time [s] that is returned, too.
+    The filter looks ahead as those of `bands` do.
     """
     from scipy.signal import oaconvolve  # Slow to load.
 
@@ -84,7 +91,7 @@ def _band(clip: Array, rate: int, centre: float) -> tuple[Complex, float, float]
 
 
 def _left_by_two(band: Complex) -> float:
-    """Energy that the best of one or two damped sinusoids leave."""
+    """Energy that one or two damped sinusoids leave unexplained, the lesser of the two."""
     from sound.clips.esprit import exponents_of_orders
 
     time = np.arange(len(band))
@@ -101,7 +108,7 @@ def _left_by_two(band: Complex) -> float:
 def _left_by_glide(
     band: Complex, rate: float, lasts: float
 ) -> tuple[float, tuple[float, float, float]]:
-    """Energy that a gliding tone leaves, and its w [rad/s], u [rad/s] and tau [s]."""
+    """Energy that a gliding tone leaves unexplained, and its w [rad/s], u [rad/s] and tau [s]."""
     time = np.arange(len(band)) / rate
     turns = np.angle(band[1:] * band[:-1].conj()) * rate
     weights = np.abs(band[1:])[:, None]
@@ -135,7 +142,7 @@ def _fitted(
     start: Array,
     bounds: tuple[list[float], list[float]] | tuple[float, float] = (-np.inf, np.inf),
 ) -> tuple[float, Array]:
-    """Least energy that some waves leave, of which amplitudes are eliminated, and their values."""
+    """Least energy that waves of eliminated amplitudes leave unexplained, and their parameters."""
     from scipy.optimize import least_squares  # Slow to load.
 
     def rest(values: Array) -> Array:

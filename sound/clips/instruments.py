@@ -1,8 +1,8 @@
-"""Clips to design after: struck metal, struck wood and a piano's strings, synthesised.
+"""Synthesised clips to design after: struck metal, struck wood and a piano's strings.
 
-Only what such sounds have in common is modelled, after Fletcher and Rossing, The Physics of Musical
-Instruments (1998): where the partials lie, how much each is excited by where it is struck, how fast
-it dies away, and how noisy the blow is.
+Only the common features of such sounds are modelled, after Fletcher and Rossing, The Physics of
+Musical Instruments (1998): frequencies of the partials, their excitation by the place of the
+strike, their decay, and the noise of the blow.
 
 - Metal: bending modes (m, n) of a simply supported rectangular plate, whose frequencies grow as
   (m/a)^2 + (n/b)^2 (ch. 3), with the small loss of metals.
@@ -27,11 +27,11 @@ from sound.clips.extraction import ModalSound
 Array = NDArray[np.float64]
 
 CONCERT_HERTZ = 440.0
-"""A4."""
+"""Frequency of A4."""
 HIGHEST_FRACTION = 0.4
-"""Partials above this share of the sampling rate are left out."""
+"""Highest frequency of a partial, over the sampling rate."""
 LEAST_AMPLITUDE = 0.02
-"""Amplitude relative to the largest (-34 dB) below which a partial is left out."""
+"""Least amplitude of a partial, over the largest (-34 dB)."""
 
 _SEMITONES = {"C": 0, "D": 2, "E": 4, "F": 5, "G": 7, "A": 9, "B": 11}
 _PLATE_ASPECT = 1.27
@@ -44,19 +44,19 @@ _IMPERFECTION = 0.005
 
 @dataclass(frozen=True)
 class Instrument:
-    """What is struck.
+    """An instrument.
 
     Attributes
     ----------
     pitch : float [Hz]
-        Frequency of the lowest partial unless another is asked for.
+        Frequency of the lowest partial by default.
     partials
         Function of (pitch, highest frequency, random numbers) that gives frequencies (n,) [Hz] and
         relative amplitudes (n,).
     damping : float [1/s]
-        At frequency 0.
+        Damping at frequency 0.
     loss : float
-        Loss factor of the material, which adds pi f `loss` to the damping of frequency f.
+        Loss factor of the material; pi f `loss` is added to the damping at frequency f.
     knock : float
         Peak of the noise of the blow, relative to the sum of the partials' amplitudes.
     knock_damping : float [1/s]
@@ -105,11 +105,11 @@ def synthesised(
     pitch : float or None [Hz]
         Frequency of the lowest partial; the instrument's own if None.
     seconds : float [s]
-        Length.
+        Duration.
     rate : int [Hz]
         Samples per second.
     seed : int
-        Of imperfections, of where it is struck, and of the noise.
+        Seed of the imperfections, the place of the strike, and the noise.
 
     Raises
     ------
@@ -176,4 +176,4 @@ INSTRUMENTS = {
     "wood": Instrument(520.0, _bar, 12.0, 1.5e-2, 0.15, 250.0),
     "piano": Instrument(note_hertz("C4"), _string, 0.8, 1e-3, 0.02, 150.0),
 }
-"""What can be struck, by name."""
+"""Instruments by name."""

@@ -1,7 +1,7 @@
-"""What of a clip's rest is noise: tones that still stand in it are brought down to it.
+"""Noise of a clip's rest: tones in the rest are lowered to the level of the noise around them.
 
-A rest that is played along would otherwise replay the partials that were not found as modes, with
-any material and at any point.
+Otherwise a played rest would contain partials that were not found as modes, with any material and
+at any point.
 """
 
 from __future__ import annotations
@@ -12,32 +12,31 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 FRAME_SECONDS = (0.08, 0.02)
-"""Lengths of short-time spectra, one after the other: long ones tell tones 50 Hz apart, short ones
-show tones that die away at once."""
+"""Lengths of the short-time spectra, one after the other: long ones resolve tones 50 Hz apart,
+short ones show tones that decay quickly."""
 OVERLAP = 4
-"""Spectra of one length that a sample is in."""
+"""Number of spectra of one length that contain a sample."""
 AROUND_HERTZ = 400.0
-"""Distance up to which frequencies are the surroundings of one."""
+"""Half-width [Hz] of the neighbourhood that a frequency is compared with."""
 STANDS_OUT = 10.0
-"""Power over that of the surroundings, the median, from which on a frequency is one of a tone; a
-thousandth of noise reaches it."""
+"""Least power of a tone over the median of its neighbourhood; a thousandth of noise reaches it."""
 LOBE = 2
-"""Frequencies of a spectrum below and above a tone's that it reaches through the window."""
+"""Half-width of a tone in the spectrum, by the window [frequencies of the spectrum]."""
 FADE_SECONDS = 0.002
-"""Time over which loudness is compared, so that nothing is taken out before it sounds."""
+"""Time over which powers are compared, so that no tone is removed before it begins."""
 
 
 def noise_part(rest: Array, rate: int) -> tuple[Array, float]:
-    """Noise (s,) of a clip's rest, and the share of the rest's energy that it lacks, 0 to 1.
+    """Noise (s,) of a clip's rest, and the share of the rest's energy that is not noise, 0 to 1.
 
-    What is broad in frequency stays, be it as short as a click or as long as a hiss.  Where power
-    stands out of that at the frequencies around it, at the same time, it gets theirs.  A tone that
-    dies away within some milliseconds passes for a click.
+    Broadband sound stays, as short as a click or as long as a hiss.  Where the power at a frequency
+    stands out of that at frequencies around it at the same time, it is lowered to theirs.  A tone
+    that decays within some milliseconds counts as a click.
 
     Parameters
     ----------
     rest : (s,)
-        A clip less its modes.
+        A clip without its modes.
     rate : int [Hz]
         Samples per second.
 
@@ -59,22 +58,22 @@ def noise_part(rest: Array, rate: int) -> tuple[Array, float]:
 
 
 def _tones(rest: Array, rate: int, seconds: float) -> Array:
-    """What stands out of spectra that are some `seconds` long."""
+    """Tones (s,) of a rest, by spectra of `seconds`."""
     from scipy.signal import ShortTimeFFT, get_window  # Slow to load.
 
     length = OVERLAP * max(2 * LOBE, round(seconds * rate / OVERLAP))
     transform = ShortTimeFFT(get_window("hann", length), length // OVERLAP, rate)
-    padded = np.pad(rest, length)  # Spectra of the ends need something beyond them.
+    padded = np.pad(rest, length)  # spectra of the ends reach beyond them
     spectra = transform.stft(padded)
     out = 1.0 - _gains(np.abs(spectra), round(AROUND_HERTZ * length / rate))
     return np.asarray(transform.istft(out * spectra, k1=len(padded))[length:-length])
 
 
 def _gains(magnitudes: Array, reach: int) -> Array:
-    """Factors (f, t) that bring magnitudes of tones down to the median around them; 1 elsewhere."""
+    """Factors (f, t) that lower magnitudes of tones to the median around them; 1 elsewhere."""
     from scipy.ndimage import binary_dilation, median_filter
 
-    # As one long row: scipy's filter of one dimension takes a tenth of the time of that of two.
+    # As one long row: scipy's one-dimensional filter takes a tenth of the time of the other.
     rows = np.pad(magnitudes.T, ((0, 0), (reach, reach)), mode="symmetric")
     medians = median_filter(rows.ravel(), 2 * reach + 1).reshape(rows.shape)
     around = medians[:, reach:-reach].T
@@ -85,11 +84,11 @@ def _gains(magnitudes: Array, reach: int) -> Array:
 
 
 def _begun(tones: Array, rest: Array, rate: int) -> Array:
-    """Tones no louder than the rest they are of: spectra smear them ahead of where they begin."""
+    """Tones limited to the power of the rest: spectra smear them to before they begin."""
     from scipy.ndimage import uniform_filter1d
 
     size = max(1, round(FADE_SECONDS * rate))
-    # Running sums of squares may round to less than nothing.
+    # Running sums of squares may round to below 0.
     power, most = (np.maximum(uniform_filter1d(each**2, size), 0.0) for each in (tones, rest))
     share = np.divide(most, power, out=np.ones_like(power), where=power > most)
     return np.asarray(np.sqrt(share) * tones)

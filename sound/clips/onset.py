@@ -1,4 +1,4 @@
-"""Where in a clip the strike is, and where a second one."""
+"""Onset of the strike in a clip, and of a second one."""
 
 from __future__ import annotations
 
@@ -8,24 +8,25 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _QUIETER = 10.0
-"""Mean power after the strike over that before it, from which on there is a strike to be found."""
+"""Least mean power after a strike, over that before it."""
 
 _FRAME_SECONDS, _HOPS = 0.01, 4
-"""Length of a short-time spectrum, and how many begin within it."""
+"""Length of a short-time spectrum [s], and number of spectra that begin within it."""
 _LOWEST_BAND, _HIGHEST_FRACTION = 200.0, 0.9
-"""Where bands of a third of an octave begin [Hz], and where they end, in half sampling rates."""
+"""Lowest frequency of the third-octave bands [Hz], and the highest over half the sampling rate."""
 _AFTER, _GAP, _BEFORE = 4, 4, 8
-"""Spectra after a strike, at it, and before it."""
+"""Numbers of spectra after a strike, at it, and before it."""
 _LATER_SECONDS = 0.05
-"""Time after the strike up to which what rises belongs to its blow."""
+"""Time after the strike [s] in which rises belong to the same blow."""
 _RISE, _AUDIBLE = 4.0, 1e-3
-"""Power of a band after a strike over that before it, and over that of its loudest spectrum."""
+"""Least power of a band after a strike, over that before it, and over that of its loudest
+spectrum."""
 _SHARE = 0.5
-"""Share of the bands that a strike makes rise at once; beats and swells raise fewer."""
+"""Least share of bands that rise together at a strike; beats and swells raise fewer."""
 
 
 def strike_sample(clip: Array) -> int:
-    """Number of the sample where the strike begins; 0 if nothing before it is quieter.
+    """Number of the first sample of the strike; 0 if the clip is not quieter before it.
 
     The sample, at or before the loudest one, that splits the clip up to there best into two
     stretches of white noise of different power (the change point of Maeda 1985).

@@ -1,4 +1,4 @@
-"""What still stands out of a rest: peaks of its spectra under windows that die away."""
+"""Sinusoids that stand out of a rest: peaks of its spectra under decaying windows."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 APART = 4.0
-"""Distance of two new sinusoids, over the decay of the quicker one."""
+"""Least distance of two new sinusoids, over the decay of the quicker one."""
 MOST = 40
-"""Sinusoids that are added at a time."""
+"""Greatest number of sinusoids that are added at a time."""
 
 
 def further(rest: Array, rate: int) -> Complex:
     """Exponents (k,) per sample of damped sinusoids that stand out of a rest, strongest first.
 
-    Under a window exp(-d n) the power of a sinusoid that decays as fast is largest compared to that
-    of the noise, which is the median around.
+    Under a window exp(-d n), a sinusoid of the decay d has the greatest power over that of the
+    noise, which is the median around it.
     """
     decay, found, scores = 1.0 / len(rest), [], []
     while decay < np.pi / (4.0 * LEAST_QUALITY):
@@ -43,7 +43,7 @@ def further(rest: Array, rate: int) -> Complex:
 
 
 def _medians(power: Array, reach: int) -> Array:
-    """Median of the power around each frequency, between medians of stretches."""
+    """Median of the power around each frequency, interpolated between medians of intervals."""
     count = max(1, len(power) // reach)
     length = len(power) // count
     middles = length * (np.arange(count) + 0.5)
@@ -52,7 +52,7 @@ def _medians(power: Array, reach: int) -> Array:
 
 
 def _apart(exponents: Complex, scores: Array) -> Complex:
-    """The strongest, none close to a stronger one."""
+    """The strongest exponents, none close to a stronger one."""
     chosen: list[complex] = []
     for number in np.argsort(-scores):
         each = exponents[number]

@@ -1,4 +1,4 @@
-"""What is worth telling of how a clip was searched."""
+"""Remarks on the search of a clip."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from typing import Any
 
 MOSTLY_MODES = 0.8
-"""Share of a clip's energy in its modes below which somebody should know of it."""
+"""Least share of a clip's energy in its modes without a remark."""
 
 
 def remarks(evidence: Mapping[str, Any]) -> list[str]:
-    """Sentences without an end on the evidence of a `ModalSound` that are out of the ordinary."""
+    """Remarks, without full stops, on what is unusual in the evidence of a `ModalSound`."""
     found = []
     if evidence["explained"] < MOSTLY_MODES:
         found.append("the rest is noise, or tones that do not fade evenly, and no material has it")

@@ -1,4 +1,4 @@
-"""How WAV files are laid out: chunks with their lengths, of which one holds the samples."""
+"""WAV files cut short: their header announces more samples than there are."""
 
 from __future__ import annotations
 
@@ -6,17 +6,18 @@ import os
 from pathlib import Path
 
 UNKNOWN = 0x7FFF_F000
-"""Length from which on it stands for one that was not known when the file was begun: programs that
-write to a pipe cannot come back to it."""
+"""Least length of a chunk that stands for an unknown one: programs that write to a pipe cannot fill
+in the length later."""
 MOST_CHUNKS = 1000
-"""Looked at; a recording has a few."""
+"""Greatest number of chunks that are read; a recording has a few."""
 _HEAD = 12
+"""Length of the file's head [bytes]."""
 
 
 def missing_bytes(path: str | Path) -> int:
-    """Bytes of samples that a WAV file announces and does not have; 0 for any other file.
+    """Number of bytes of samples that a WAV file announces but lacks; 0 for any other file.
 
-    Libraries take what there is, so that half a recording would pass for a whole one.
+    Libraries read what there is, so half a recording would pass for a whole one.
 
     Raises
     ------

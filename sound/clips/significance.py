@@ -1,4 +1,4 @@
-"""Which damped sinusoids stand out of a clip's noise, and how sure their parameters are."""
+"""Significance of damped sinusoids in a clip's noise, and deviations of their parameters."""
 
 from __future__ import annotations
 
@@ -8,37 +8,38 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sound.clips.damped import fitted_coefficients, inverse, normal_matrix, refined, superposed
+from sound.clips.least_squares import fitted_coefficients, inverse, normal_matrix, refined
+from sound.synthesis.sinusoids import superposed
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 FALSE_MODES = 5e-4
-"""Modes that noise alone makes a clip seem to hold."""
+"""Expected number of sinusoids in a clip of nothing but noise."""
 FALSE_STRONG_MODES, STRONG = 1e-2, 1e-2
-"""The same of those whose peaks are within 40 dB of the highest, in a clip that has modes at all:
-to miss one of these is worse."""
+"""The same expected number for sinusoids whose spectral peaks are within 40 dB of the highest, in a
+clip that has modes, as missing one of these is worse; and that ratio of peaks."""
 _LENIENCE = 2.0 * np.log(FALSE_STRONG_MODES / FALSE_MODES)
 NEIGHBOURHOOD = 150.0
-"""Angular frequency on either side of a mode, in dampings, from which its noise is taken."""
+"""Half-width of the band around a mode whose noise it is compared with, over the mode's damping."""
 _SILENCED = 10.0
-"""Nepers by which a window dies away until what it still lets through is left out."""
+"""Decay [nepers] at which a window ends."""
 _LEAST_LEVEL = 1e-15
-"""Variance of noise that is always assumed, relative to the peak: that of 24-bit samples."""
+"""Least variance of the noise, relative to the peak: that of 24-bit samples."""
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Damped sinusoids (k,) fitted to a clip of peak 1, see `sound.clips.damped`.
+    """Damped sinusoids (k,) fitted to a clip of peak 1, see `sound.synthesis.sinusoids`.
 
     Attributes
     ----------
     exponents, coefficients : (k,) complex
-        In order of frequency.
+        Exponents and coefficients in the order of frequency.
     prominence : (k,)
-        Energy that the fit would lose without each, over the level.
+        Energy that the fit would lose without each sinusoid, over the level.
     level : (k,)
-        Variance of white noise as strong as the noise under each.
+        Variance of white noise as strong as the noise at each sinusoid.
     """
 
     exponents: Complex
@@ -47,12 +48,12 @@ class Fit:
     level: Array
 
     def chosen(self, which: NDArray[Any]) -> Fit:
-        """Some of them, by mask or numbers."""
+        """Some of the sinusoids, by mask or numbers."""
         fields = (self.exponents, self.coefficients, self.prominence, self.level)
         return Fit(*(values[which] for values in fields))
 
     def deviations(self, samples: int) -> Complex:
-        """Standard deviations (k,) of exponents that the noise allows, for both their parts."""
+        """Standard deviations (k,) of the exponents by the noise; real and imaginary part each."""
         matrix = normal_matrix(self.exponents, self.coefficients, samples)
         variances = np.diag(inverse(matrix)).reshape(2, 2, -1)[:, 1]
         real, imaginary = np.sqrt(np.maximum(variances, 0.0) * self.level)
@@ -60,16 +61,16 @@ class Fit:
 
 
 def settled(exponents: Complex, clip: Array, steps: int) -> Fit:
-    """Fit to the whole clip, refined, of those that stand out of its noise."""
+    """Refined fit of those exponents to the whole clip that stand out of its noise."""
     fit = _pruned(exponents, clip)
     return _pruned(refined(fit.exponents, fit.coefficients, clip, steps)[0], clip)
 
 
 def _pruned(exponents: Complex, clip: Array) -> Fit:
-    """Fit of the exponents less those that do not stand out.
+    """Fit of the exponents without those that do not stand out of the noise.
 
-    Of neighbours that do not, the one that the fit needs least goes first: of two estimates of one
-    mode neither is needed while the other is there.
+    Of neighbours the least prominent one is dropped first: of two estimates of one mode, neither is
+    prominent as long as the other is there.
     """
     exponents = exponents[np.argsort(exponents.imag)]
     while True:
@@ -89,16 +90,16 @@ def _pruned(exponents: Complex, clip: Array) -> Fit:
 
 
 def _is_strong(exponents: Complex, coefficients: Complex, samples: int) -> NDArray[np.bool_]:
-    """Which sinusoids have peaks in the spectrum that are not far below the highest."""
+    """Which sinusoids have spectral peaks within `STRONG` of the highest."""
     peaks = np.abs(coefficients) / np.maximum(-exponents.real, 1.0 / samples)
     return np.asarray(peaks >= STRONG * peaks.max(initial=0.0))
 
 
 def threshold(exponents: Complex, samples: int) -> Array:
-    """Prominence (k,) that noise alone makes fewer than `FALSE_MODES` sinusoids exceed.
+    """Prominence (k,) that `FALSE_MODES` sinusoids of noise alone exceed, on average.
 
-    That of noise has an exponential distribution of mean 2, and sinusoids that decay as fast as one
-    of them tell so many frequencies apart as their bandwidths fit into the spectrum.
+    The prominence of noise has an exponential distribution of mean 2, and the number of distinct
+    frequencies is that of bandwidths, by the decay of the sinusoid, in the spectrum.
     """
     decay = np.maximum(-exponents.real, 1.0 / samples)
     frequencies = np.maximum(1.0, 0.5 * np.pi / decay)
@@ -106,7 +107,7 @@ def threshold(exponents: Complex, samples: int) -> Array:
 
 
 def _gain(exponents: Complex, coefficients: Complex, samples: int) -> Array:
-    """Energy (k,) that each damped sinusoid explains and the others cannot."""
+    """Energy (k,) that each damped sinusoid explains and the others do not."""
     count = len(exponents)
     matrix = normal_matrix(exponents, np.ones(count, complex), samples, order=1)
     blocks = inverse(matrix).reshape(2, count, 2, count)
@@ -116,10 +117,10 @@ def _gain(exponents: Complex, coefficients: Complex, samples: int) -> Array:
 
 
 def _level(exponents: Complex, rest: Array) -> Array:
-    """Variance (k,) of white noise as strong as the rest where and when each sinusoid sounds.
+    """Variance (k,) of white noise as strong as the rest around each sinusoid.
 
     It is the median, over frequencies around the sinusoid's, of the rest's correlation with
-    sinusoids that die away as fast to the nearest power of 2.
+    sinusoids of its decay, rounded to a power of 2.
     """
     slowest = 1.0 / len(rest)
     octaves = np.round(np.log2(np.maximum(-exponents.real, slowest) / slowest))
@@ -138,8 +139,8 @@ def _level(exponents: Complex, rest: Array) -> Array:
 def power_under(rest: Array, decay: float, padding: float = 1.0) -> tuple[Array, int]:
     """Power spectrum of a rest under a window exp(-decay n), and the length that it belongs to.
 
-    That of white noise is its variance.  What the window silences is left out, and zeros are added
-    up to `padding` times the length.
+    The power of white noise is its variance.  The end that the window silences is left out, and
+    zeros are added up to `padding` times the length.
     """
     from scipy.fft import next_fast_len, rfft
 

@@ -15,34 +15,35 @@ from sound.clips.extraction import ModalSound
 Array = NDArray[np.float64]
 
 SAME_HERTZ, SAME_FRACTION = 1.0, 0.002
-"""Modes of different clips closer than 1 Hz or 0.2 %, whichever is more, are one: about what
-listeners can tell apart in pure tones (Moore, An Introduction to the Psychology of Hearing, ch. 6).
+"""Greatest distance of modes of different clips that count as one, in Hz or as a share, whichever
+is more: about the least difference of pure tones that listeners hear (Moore, An Introduction to the
+Psychology of Hearing, ch. 6).
 """
 APART = 3e-3
-"""Relative difference of frequencies up to which a design counts two modes as one; it averages the
-amplitudes of such modes, see `sound.design.objective.RESOLVED`."""
+"""Greatest relative difference of two frequencies that count as one mode of a design, as it
+averages their amplitudes, see `sound.design.objective.RESOLVED`."""
 HEARD = 1e-3
-"""Amplitude over that of a clip's loudest mode, 60 dB below which nobody hears a mode."""
+"""Least amplitude of an audible mode, over that of the clip's loudest (-60 dB)."""
 FEWEST_MODES, MOST_MODES = 2, 30
-"""Modes of a design whose number is left to the clips."""
+"""Least and greatest number of modes of a design whose project leaves the number to the clips."""
 
 
 @dataclass(frozen=True)
 class Targets:
-    """What a design should sound like when struck at T points.
+    """Modes that a design should have at T struck points.
 
     Attributes
     ----------
     names : T texts
         Names of the points.
     frequencies : (N,) [Hz]
-        Ascending, shared by all points.
+        Frequencies, ascending, shared by all points.
     dampings : (N,) [1/s]
-        Shared by all points, too.
+        Dampings, shared by all points.
     amplitudes : (T, N)
-        At the strike, 0 where the clip of that point has no such mode.
+        Amplitudes at the strike; 0 where the clip of a point lacks a mode.
     residuals : T arrays (s,)
-        Samples, what is left of each clip without its modes.
+        Samples of each clip without its modes.
     rates : T integers [Hz]
         Sampling rates of the residuals.
     """
@@ -60,16 +61,15 @@ def share_frequencies(
     sounds: Sequence[ModalSound],
     modes: int | Literal["auto"] | None = None,
 ) -> Targets:
-    """The `modes` modes that carry most of all clips' sound, with amplitudes per clip; all if None.
+    """The `modes` modes of greatest energy in all clips, with amplitudes per clip; all if None.
 
-    `auto` takes those that a design can use: of modes closer than `APART` the stronger one counts
-    for both, and what is below `HEARD` in every clip does not count; `MOST_MODES` at most, or one
-    for each clip where there are more clips.
+    `auto` takes the modes that a design can use: of modes closer than `APART` the stronger one
+    stands for both, and modes below `HEARD` in every clip are left out; at most `MOST_MODES`, or
+    one for each clip if there are more clips.
 
-    Modes of different clips that cannot be told apart become one, whose frequency and damping are
-    means weighted by amplitude. They are chosen one by one: the clip of whose energy the least is
-    covered yet names its strongest mode. Loud and quiet clips count alike, as each one's energy is
-    its own measure.
+    Modes of different clips that sound the same become one, whose frequency and damping are means
+    weighted by amplitude.  Modes are chosen one by one, each time the strongest of the clip whose
+    energy is covered least.  Shares of energy count, so loud and quiet clips count alike.
 
     Raises
     ------
@@ -120,9 +120,9 @@ def share_frequencies(
 
 
 def without_modes(sound: ModalSound, hertz: Sequence[float]) -> ModalSound:
-    """A clip without its modes at some frequencies [Hz]: for each the nearest, if it is the same.
+    """A clip without the modes nearest to some frequencies [Hz], if they sound the same.
 
-    The residual, which has no modes of the clip anyway, stays as it is.
+    The residual, which contains no modes anyway, stays as it is.
 
     Raises
     ------
@@ -151,9 +151,9 @@ def without_modes(sound: ModalSound, hertz: Sequence[float]) -> ModalSound:
 
 
 def _groups(frequencies: Array, owners: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Group number (k,) of each mode, the closest pairs joined first.
+    """Group number (k,) of each mode; modes of one group sound the same, the closest join first.
 
-    A group spans no more than what counts as the same, and has one mode of a clip at most.
+    A group has at most one mode of each clip.
     """
     groups = np.arange(len(frequencies))
     order = np.argsort(frequencies, kind="stable")
@@ -174,9 +174,10 @@ def _same(frequencies: Array) -> bool:
 
 
 def _usable(frequencies: Array, amplitudes: Array, shares: Array) -> tuple[Array, Array]:
-    """Amplitudes (T, k) and shares (T, k) of modes, 0 in the columns of those that do not count.
+    """Amplitudes (T, k) and shares (T, k) of modes, 0 for modes that a design cannot use.
 
-    A mode beside a stronger one counts with that one, which is as loud as the louder of the two.
+    The share of a mode close to a stronger one is added to that one's, which takes the greater
+    amplitude.
     """
     amplitudes, shares = amplitudes.copy(), shares.copy()
     loudest = amplitudes.max(axis=1, keepdims=True)

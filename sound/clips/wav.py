@@ -1,4 +1,4 @@
-"""Sound files: a clip of a strike in, a sound out."""
+"""Sound files: clips are read, sounds are written."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ from sound.outputs import require_output
 Array = NDArray[np.float64]
 
 ENDINGS = (".wav",)
-"""Of sound files that are written."""
+"""Endings of the names of sound files that are written."""
 PEAK = 0.89
-"""Largest magnitude of a normalised sound: 1 dB below full scale."""
+"""Peak magnitude of a normalised sound: 1 dB below full scale."""
 
 
 def read_wav(path: str | Path, allow_clipped: bool = False) -> tuple[Array, int]:
     """Samples (s,) of a sound file, full scale being 1, and their rate [Hz].
 
-    Of several channels the loudest that is clipped least: microphones at several places hear each
-    mode at another time, and some cancel in the mean.
+    Of several channels, the loudest of those clipped least is read: microphones at several places
+    receive each mode at another phase, and some modes cancel in the mean.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def write_wav(path: str | Path, samples: Array, rate: int, peak: bool = False) -
         raise UserError(
             f"{path}: not written, the sound reaches {largest:.3g}, more than its samples hold"
         )
-    # By way of memory, since the library does not say why it could not write to a disk.
+    # Through memory, since the library does not say why it could not write to a disk.
     content = as_wav(samples, rate)
     with atomic_path(path) as temporary:
         temporary.write_bytes(content)
@@ -99,7 +99,7 @@ def as_wav(samples: Array, rate: int) -> bytes:
 
 
 def _channels(path: Path) -> tuple[Array, int]:
-    """Samples (s, c) and their rate [Hz], within bounds that are looked at before anything is read.
+    """Samples (s, c) and their rate [Hz]; bounds are checked before samples are read.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def _channels(path: Path) -> tuple[Array, int]:
             channels = file.read(dtype="float64", always_2d=True)
             missing = missing or file.frames - len(channels)
             rate = int(file.samplerate)
-    except TypeError:  # how the library asks for what a header tells
+    except TypeError:  # the library asks for the header's values
         raise UserError(
             "has samples alone by its name, without a header that tells their rate and kind; "
             "expected a sound clip (WAV), convert it to one"

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.response.response import SAMPLE_RATE_HERTZ, half_sine
-from sound.rendering.bank import Bank, ring
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
+from sound.synthesis.bank import Bank, ring
 
 Array = NDArray[np.float64]
 

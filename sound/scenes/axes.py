@@ -1,4 +1,4 @@
-"""Which way is up: z in a scene, y in glTF (glTF 2.0, section 3.4)."""
+"""Upward axis of mesh files: z in a scene, y in glTF (glTF 2.0, section 3.4)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 Y_UP = (".gltf", ".glb")
-"""Endings of mesh files whose y points up.  Of others nothing is known, and z is taken to."""
+"""Endings of mesh files whose y points up.  In all other files z is taken to point up."""
 _Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 

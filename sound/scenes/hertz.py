@@ -1,8 +1,8 @@
-"""Contact of two elastic solids by Hertz: how long a bounce lasts, how stiff a contact is.
+"""Hertz's theory of the contact of two elastic solids: duration of a bounce, stiffness, patch.
 
-K. L. Johnson, Contact Mechanics (1985), sections 4.2 and 11.4.  The solids are as if round where
-they touch, of one effective radius 1 / R = 1 / R1 + 1 / R2, and give way by one effective modulus
-1 / E = (1 - nu1^2) / E1 + (1 - nu2^2) / E2.
+K. L. Johnson, Contact Mechanics (1985), sections 4.2 and 11.4.  The effective radius is
+1 / R = 1 / R1 + 1 / R2, the effective modulus 1 / E = (1 - nu1^2) / E1 + (1 - nu2^2) / E2, the
+effective mass 1 / m = 1 / m1 + 1 / m2.
 """
 
 from __future__ import annotations
@@ -13,25 +13,24 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 BOUNCE = 2.8683
-"""2 (15 / 16)^(2/5) times the integral of (1 - x^(5/2))^(-1/2) from 0 to 1."""
+"""Factor of the duration of a bounce: 2 (15 / 16)^(2/5) times the integral of (1 - x^(5/2))^(-1/2)
+from 0 to 1."""
 
 
 def compliance(young: Array | float, poisson: float) -> Array:
-    """What a solid contributes to 1 / E [1/Pa], of its modulus [Pa] and Poisson's ratio."""
+    """Part of a solid in 1 / E [1/Pa], from its Young's modulus [Pa] and Poisson's ratio."""
     return np.asarray((1.0 - poisson**2) / young)
 
 
 def bounce_seconds(mass: float, radius: float, modulus: float, speed: float) -> float:
-    """How long two solids touch that strike each other [s].
+    """Duration [s] of the contact in an impact.
 
     Parameters
     ----------
-    mass : float [kg]
-        Effective: 1 / m = 1 / m1 + 1 / m2.
-    radius, modulus : float [m], [Pa]
-        Effective.
+    mass, radius, modulus : float [kg], [m], [Pa]
+        Effective mass, radius and modulus.
     speed : float [m/s]
-        At which they approach each other.
+        Speed of approach.
 
     Examples
     --------
@@ -45,15 +44,15 @@ def bounce_seconds(mass: float, radius: float, modulus: float, speed: float) -> 
 
 
 def approach(force: Array, radius: float, modulus: float) -> Array:
-    """How far two solids give way [m] that are pressed together by a force [N]."""
+    """Approach [m] of two solids that are pressed together by a force [N]."""
     return np.asarray((0.75 * force / (modulus * np.sqrt(radius))) ** (2.0 / 3.0))
 
 
 def stiffness(force: Array, radius: float, modulus: float) -> Array:
-    """Force per way [N/m] about a contact that is pressed by a force [N]."""
+    """Stiffness [N/m] of a contact under a force [N]."""
     return np.asarray(np.cbrt(6.0 * modulus**2 * radius * force))
 
 
 def patch_radius(force: Array, radius: float, modulus: float) -> Array:
-    """Radius of the circle in which the solids touch [m]."""
+    """Radius [m] of the circle of contact under a force [N]."""
     return np.asarray(np.cbrt(0.75 * force * radius / modulus))

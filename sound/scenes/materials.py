@@ -27,32 +27,32 @@ _NUMBERS = (
 
 @dataclass(frozen=True)
 class NamedMaterial:
-    """What a solid is made of, the same everywhere and in all directions.
+    """A homogeneous, isotropic material.
 
     Attributes
     ----------
     name
-        By which scenes call it.
+        Name in scenes.
     about
-        What it is, and what is simplified.
+        Description, with what is simplified.
     young : float [Pa]
         Young's modulus.
     poisson : float [1]
         Poisson's ratio.
     density : float [kg/m^3]
-        Of mass.
+        Mass density.
     alpha, beta : float [1/s], [s]
         Rayleigh damping: the damping matrix is alpha M + beta K.
     restitution : float [1]
         Speed after over speed before an impact at about 1 m/s on a hard, heavy body.
     friction : float [1]
-        Coulomb's coefficient of sliding.
+        Coulomb's coefficient of sliding friction.
     roughness : float [m]
-        Root mean square height of its surface.
+        Root mean square height of the surface.
     colour : (3,)
         Red, green and blue from 0 to 1 (sRGB).
     source
-        Where the numbers are from.
+        Source of the numbers.
     """
 
     name: str
@@ -111,7 +111,7 @@ def _read(path: Path) -> dict[str, NamedMaterial]:
 
 
 def _material(name: str, values: Mapping[str, Any]) -> NamedMaterial:
-    """A material from its entry; numbers may be whole ones there."""
+    """A material from its entry, whose numbers may be integers."""
     red, green, blue = map(float, values["colour"])
     numbers: dict[str, Any] = {key: float(values[key]) for key in _NUMBERS}
     return NamedMaterial(
@@ -125,4 +125,4 @@ def _material(name: str, values: Mapping[str, Any]) -> NamedMaterial:
 
 _TABLE = _read(Path(__file__).parent / "materials.yaml")
 MATERIALS = tuple(_TABLE)
-"""Names of all there are."""
+"""Names of all materials."""

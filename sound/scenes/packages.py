@@ -1,4 +1,4 @@
-"""Packages that scenes stand on, and nothing else of the project does."""
+"""Packages that only scenes need."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ REQUIREMENTS = "workflow/envs/requirements-scenes.txt"
 
 
 def scene_package(name: str) -> Any:
-    """A package that scenes need, loaded when it is: that takes long.
+    """Import a package that scenes need; only when it is needed, as that takes long.
 
     Raises
     ------
     UserError
-        If it cannot be loaded.
+        If it cannot be imported.
     """
     try:
         return import_module(name)

@@ -1,4 +1,4 @@
-"""A scene that was played: what is seen, what is heard, and what struck what."""
+"""The result of playing a scene: motion, sound and impacts."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from sound.scenes.picture import Picture
 Array = NDArray[np.float64]
 
 GROUND = -1
-"""Number of the ground among the objects."""
+"""Number that stands for the ground in pairs of bodies."""
 
 
 class Impact(NamedTuple):
-    """Two solids that strike each other.
+    """An impact of two bodies.
 
     Attributes
     ----------
     seconds : float [s]
-        When it begins.
+        Time at which it begins.
     pair : (2,)
-        Numbers of the objects, `GROUND` for the ground, which is the second one then.
+        Numbers of the bodies; the ground, `GROUND`, is always the second one.
     position : (3,) [m]
-        Where, in the scene.
+        Position in the scene.
     impulse : (3,) [N s]
-        On the first object; the second one receives its negative.
+        Impulse on the first body; the second one receives its negative.
     speed : float [m/s]
-        At which they approach each other.
+        Speed of approach.
     duration : float [s]
-        Of the contact, by Hertz.
+        Duration of the contact, by Hertz.
     """
 
     seconds: float
@@ -45,17 +45,17 @@ class Impact(NamedTuple):
 
 @dataclass(frozen=True)
 class Voice:
-    """What an object sounds like when it is struck by hand.
+    """The sound of an object that is struck by hand.
 
     Attributes
     ----------
     frequencies : (N,) [Hz]
-        Of its modes.
+        Frequencies of the modes.
     dampings : (N,) [1/s]
-        Amplitudes fall as exp(-d t).
+        Dampings d: amplitudes fall as exp(-d t).
     gains : (V, N) [full scale]
-        What 1 N s inwards at each vertex of its surface lets the modes sound with, one metre away
-        and as loud as in the scene's sound.
+        Amplitudes of the modes one metre away after 1 N s inwards at each vertex of the surface,
+        as loud as in the scene's sound.
     """
 
     frequencies: Array
@@ -65,32 +65,32 @@ class Voice:
 
 @dataclass(frozen=True)
 class Performance:
-    """A scene from its beginning to its end.
+    """A scene that was played.
 
     Attributes
     ----------
     title
-        Of the scene.
+        Title of the scene.
     picture
-        What is seen.
+        Surfaces, motion and camera.
     sound : (s, 2) [full scale]
-        What the two ears hear.
+        Sound at the left and the right ear.
     rate : int [Hz]
-        Its samples per second.
+        Samples per second.
     impacts
-        In the order of time; rolling and sliding are none.
+        Impacts in the order of time, without rolling and sliding.
     voices : B voices
-        None for an object that does not sound.
+        Sounds of the objects; None for a silent one.
     scale : float [1/Pa]
         Full scale per pascal.
     timings : dict [s]
-        Wall time by what was done.
+        Wall time of each step of the work.
     accuracies : B dicts
-        How far each object's frequencies are expected to be from the solid's, see
-        `sound.scenes.uniform.UniformSolid`; None for one that does not sound, or if nothing is
-        known of it.
+        Expected errors of each object's frequencies, see `sound.scenes.uniform.UniformSolid`; None
+        for a silent object, or if they are unknown.
     moved : dict
-        How far (3,) [m] objects that overlapped were moved before the start, by their names.
+        Displacements (3,) [m] by which overlapping objects were separated before the start, by
+        name.
     """
 
     title: str

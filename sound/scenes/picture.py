@@ -1,4 +1,4 @@
-"""What is seen of a scene: surfaces, how they move, and from where they are looked at."""
+"""The visible part of a scene: surfaces, motion and camera."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Appearance:
     Attributes
     ----------
     name
-        What the scene calls the object.
+        Name of the object in the scene.
     vertices : (V, 3) [m]
         In the object's own axes, from its centre of mass.
     faces : (F, 3)
@@ -35,14 +35,14 @@ class Appearance:
 
 @dataclass(frozen=True)
 class Motion:
-    """Where B objects are at T times.
+    """Positions and rotations of B objects at T times.
 
     Attributes
     ----------
     times : (T,) [s]
-        At equal steps, from 0.
+        Times at equal steps from 0.
     positions : (T, B, 3) [m]
-        Of the centres of mass; z points up.
+        Positions of the centres of mass; z points up.
     rotations : (T, B, 4)
         Unit quaternions (w, x, y, z) that turn an object's own axes to those of the scene.
     """
@@ -52,7 +52,7 @@ class Motion:
     rotations: Array
 
     def at(self, seconds: float) -> tuple[Array, Array]:
-        """Positions (B, 3) [m] and rotations (B, 4) at a time, between steps interpolated."""
+        """Positions (B, 3) [m] and rotations (B, 4) at a time, interpolated between steps."""
         place = float(np.clip(np.interp(seconds, self.times, np.arange(len(self.times))), 0, None))
         before = min(int(place), len(self.times) - 1)
         after = min(before + 1, len(self.times) - 1)
@@ -68,12 +68,12 @@ class Motion:
 
 @dataclass(frozen=True)
 class Camera:
-    """From where a scene is seen.
+    """The camera.
 
     Attributes
     ----------
     position, target : (3,) [m]
-        Where it is, and what it looks at.
+        Position of the camera, and point in the middle of the picture.
     degrees : float
         Vertical field of view.
     """
@@ -85,18 +85,18 @@ class Camera:
 
 @dataclass(frozen=True)
 class Picture:
-    """All that is seen.
+    """The visible part of a scene.
 
     Attributes
     ----------
     objects : B surfaces
-        In the order of the motion's objects.
+        Surfaces of the objects, in the order of the motion.
     motion
-        How they move.
+        Motion of the objects.
     ground : float [m] or None
         Height of the ground, if there is one.
     camera
-        From where they are seen.
+        The camera.
     """
 
     objects: list[Appearance]

@@ -11,9 +11,9 @@ Array = NDArray[np.float64]
 Faces = NDArray[np.integer]
 
 SHARPEST = 5e-4
-"""Radius of what is sharp [m]: edges of things are rounded by use."""
+"""Least radius of curvature [m]: edges of things are rounded by use."""
 SMOOTHINGS = 2
-"""Rings of neighbours that a curvature is averaged over."""
+"""Number of times that the curvature at each vertex is averaged with its neighbours'."""
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,9 @@ class Shape:
     vertices, faces : (V, 3) [m], (F, 3)
         Triangles.
     inward : (V, 3)
-        Unit vectors into the solid.
+        Unit vectors into the solid at the vertices.
     radii : (V,) [m]
-        Of the sphere that is as round as the surface is there.
+        Radii of curvature at the vertices.
     """
 
     vertices: Array
@@ -36,21 +36,27 @@ class Shape:
     radii: Array
 
     @classmethod
-    def of_surface(cls, vertices: Array, faces: Faces, centre: Array) -> Shape:
-        """The shape of a surface in the axes of its mesh, about a centre (3,) [m]."""
+    def of_surface(
+        cls, vertices: Array, faces: Faces, centre: Array, radius: float | None = None
+    ) -> Shape:
+        """The shape of a surface about a centre (3,) [m]; `radius` [m] is that of a ball."""
         import trimesh
 
         from sound.strikes import inward_normals
 
         surface = trimesh.Trimesh(vertices, faces, process=False)
         inward = inward_normals(surface, vertices)
-        return cls(vertices - centre, faces, inward, vertex_radii(vertices, faces, inward))
+        if radius is not None:
+            radii = np.full(len(vertices), radius)
+        else:
+            radii = vertex_radii(vertices, faces, inward)
+        return cls(vertices - centre, faces, inward, radii)
 
 
 def vertex_radii(vertices: Array, faces: Faces, normals: Array) -> Array:
-    """Radii of curvature (V,) [m], by how much normals turn from vertex to vertex.
+    """Radii of curvature (V,) [m], from the angles between the normals of neighbouring vertices.
 
-    Between `SHARPEST` and half of the longest side, of which what is flat has the latter.
+    They lie between `SHARPEST` and half of the longest side, which stands for flat.
     """
     edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
     first, second = edges.T
@@ -71,7 +77,7 @@ def _mean_at(
     to_second: Array,
     n: int,
 ) -> Array:
-    """Means (n,) at the ends of edges of what each edge gives to its first and second end."""
+    """Mean (n,) at each vertex of the values that its edges have for their first or second end."""
     ends = np.concatenate([first, second])
     sums = np.bincount(ends, np.concatenate([to_first, to_second]), n)
     return np.asarray(sums / np.maximum(np.bincount(ends, minlength=n), 1))

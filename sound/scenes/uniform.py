@@ -1,8 +1,8 @@
-"""Modes of a solid of one material, found once for all its sizes, moduli and densities.
+"""Modes of a solid of one material, computed once for all its sizes, moduli and densities.
 
 A solid of the size s, Young's modulus E and density rho has the eigenvalues of that of size 1, E_0
 and rho_0 times (E / E_0) (rho_0 / rho) / s^2, if Poisson's ratios agree; mass-normalised modes go
-as 1 / sqrt(rho s^3).  What was found is in the user's cache.
+as 1 / sqrt(rho s^3).  The modes are kept in the user's cache.
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ from solver.accuracy.lattices import covering_on, voxel_lattice
 from solver.accuracy.voxels import Reference
 from solver.files.modes_file import read_modes, write_modes
 from solver.refinement.errors import FROM_SOLID, LAST, ExpectedErrors
+from solver.response.response import Damping
+from sound.rendering.solid import SoundingSolid
 
 if TYPE_CHECKING:  # Its import takes long.
     import trimesh
@@ -36,27 +38,27 @@ if TYPE_CHECKING:  # Its import takes long.
 Array = NDArray[np.float64]
 
 YOUNG, DENSITY = 1e9, 1000.0
-"""Of the solid that is solved [Pa], [kg/m^3]."""
+"""Young's modulus [Pa] and density [kg/m^3] of the solid whose modes are computed."""
 VOXEL, FINITE_CELL, AUTO = "voxel", "finite-cell", "auto"
 DISCRETISATIONS = (AUTO, FINITE_CELL, VOXEL)
-"""Ways to discretise; `auto` are finite cells, or voxels where these have no use for a surface."""
+"""Methods of discretisation; `auto` takes finite cells, or voxels if these refuse a surface."""
 _KIND, _VERSION = "modes of scenes", 1  # counted up, too, when other modes are found than before
 
 
 @dataclass(frozen=True)
 class Discretised:
-    """What is solved.
+    """Discretisation of a solid.
 
     Attributes
     ----------
     discretisation, resolution
-        One of `DISCRETISATIONS`; lattice spacings along the longest side.
+        One of `DISCRETISATIONS`; number of lattice spacings along the longest side.
     components
-        See `carillon.fem.geometry.voxelize`.
+        Pieces that are kept, see `carillon.fem.geometry.voxelize`.
     poisson
         Poisson's ratio.
     count
-        Elastic modes; 0 for the solid alone.
+        Number of elastic modes; 0 for the solid alone.
     """
 
     discretisation: str
@@ -73,12 +75,12 @@ class UniformSolid:
     Attributes
     ----------
     model
-        Its mesh, of modulus and density.
+        Mesh, modulus and density.
     eigenvalues, modes : (k,) [rad^2/s^2], (n_dofs, k) [kg^-1/2]
-        Ascending, the six rigid ones first; None if none were asked for.
+        Ascending, the six rigid ones first; None if none were requested.
     accuracy : dict
-        Discretisation, resolution, and how far frequencies are expected to be from the solid's, as
-        `solver.refinement.errors.ExpectedErrors.attributes` has it, where that could be told.
+        Discretisation, resolution, and expected errors of the frequencies as in
+        `solver.refinement.errors.ExpectedErrors.attributes`, if they could be estimated.
     """
 
     model: Solid
@@ -100,6 +102,27 @@ class UniformSolid:
             self.modes / np.sqrt(denser * size**3),
             self.accuracy,
         )
+
+    def sized(
+        self, size: float, young: float, density: float, pitch: float | None
+    ) -> tuple[UniformSolid, float]:
+        """The same solid at another size, and the factor that a pitch enlarges it further by.
+
+        The factor gives the first elastic mode the frequency `pitch` [Hz], as frequencies go as
+        1 / size; it is 1 without a pitch.
+        """
+        solid = self.scaled(size, young, density)
+        if pitch is None:
+            return solid, 1.0
+        assert solid.eigenvalues is not None
+        factor = float(np.sqrt(solid.eigenvalues[RIGID_MODES])) / (2.0 * np.pi * pitch)
+        return self.scaled(factor * size, young, density), factor
+
+    def sounding(self, damping: Damping) -> SoundingSolid | None:
+        """The solid with its modes, damped; None without modes."""
+        if self.eigenvalues is None or self.modes is None:
+            return None
+        return SoundingSolid.damped(self.model, self.eigenvalues, self.modes, damping)
 
 
 def uniform_solid(surface: trimesh.Trimesh, name: str, how: Discretised) -> UniformSolid:
@@ -125,15 +148,15 @@ def _solved(surface: trimesh.Trimesh, name: str, how: Discretised) -> UniformSol
 
     solid = _without_modes(surface, name, how)
     with one_thread():
-        found = solve(solid.model, modes=RIGID_MODES + how.count)
-        assert found.modes is not None
+        result = solve(solid.model, modes=RIGID_MODES + how.count)
+        assert result.modes is not None
         accuracy = {**solid.accuracy}
         try:
-            errors = _expected(surface, name, how, solid.model, found.eigenvalues, found.modes)
+            errors = _expected(surface, name, how, solid.model, result.eigenvalues, result.modes)
             accuracy |= errors.attributes(FROM_SOLID)
         except Exception as error:  # the modes are right without it
             say(f"how far the frequencies of {name!r} are from the solid's cannot be told: {error}")
-    return UniformSolid(solid.model, found.eigenvalues, found.modes, accuracy)
+    return UniformSolid(solid.model, result.eigenvalues, result.modes, accuracy)
 
 
 def _without_modes(surface: trimesh.Trimesh, name: str, how: Discretised) -> UniformSolid:
@@ -177,7 +200,7 @@ def _expected(
     values: Array,
     modes: Array,
 ) -> ExpectedErrors:
-    """Expected errors of frequencies; voxels are compared with finite cells on their lattice."""
+    """Expected errors of frequencies; those of voxels by finite cells on their lattice."""
     if isinstance(model, FiniteCellModel):
         return estimate_cell_errors(model, values, modes).errors
     from solver.analysis.library import solve
@@ -186,9 +209,9 @@ def _expected(
     cells = covering_on(surface, lattice, "largest", name).cells
     young = np.full(cells.mesh.n_cells, YOUNG)
     reference = Reference(finite_cell_model(cells, young, how.poisson, DENSITY))
-    found = solve(reference.model, modes=min(RIGID_MODES + how.count, LAST))
-    assert found.modes is not None
-    return reference.errors(values, found.eigenvalues, found.modes)
+    result = solve(reference.model, modes=min(RIGID_MODES + how.count, LAST))
+    assert result.modes is not None
+    return reference.errors(values, result.eigenvalues, result.modes)
 
 
 def _resized(model: Solid, size: float) -> Solid:
@@ -211,6 +234,6 @@ def _read(path: Path) -> UniformSolid:
 
 def _write(path: Path, solid: UniformSolid) -> None:
     assert solid.eigenvalues is not None and solid.modes is not None
-    told = {"accuracy": solid.accuracy}
+    attributes = {"accuracy": solid.accuracy}
     none = np.zeros(len(solid.eigenvalues))
-    write_modes(path, solid.model, solid.eigenvalues, [solid.modes], none, told, {})
+    write_modes(path, solid.model, solid.eigenvalues, [solid.modes], none, attributes, {})

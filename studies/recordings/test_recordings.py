@@ -15,8 +15,8 @@ import soundfile
 import yaml
 
 from carillon.errors import UserError
-from sound.clips.damped import damped_sinusoids
 from sound.clips.wav import write_wav
+from sound.synthesis.sinusoids import damped_sinusoids
 from studies.base.table import Table, write_table
 from studies.recordings import index, page
 from studies.recordings.formats import FORMATS, Format, differences, formats, write_as

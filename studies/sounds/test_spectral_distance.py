@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sound.clips.damped import damped_sinusoids
+from sound.synthesis.sinusoids import damped_sinusoids
 from studies.sounds.spectral_distance import FLOOR_DECIBELS, log_spectral_distance
 
 RATES = (16_000, 44_100, 48_000)

@@ -1,1 +1,1 @@
-"""What contacts do to the modes of bodies, and what two ears hear of it."""
+"""From contacts to the sound at two ears."""

@@ -1,4 +1,4 @@
-"""The click of a solid that is accelerated as a whole: the air makes way for it.
+"""Acceleration noise: the click of a solid that is accelerated as a whole.
 
 Its field is that of a rigid sphere of the same volume.  A sphere of radius a with the acceleration
 A radiates far away, at the angle theta to A and a distance r, after the time (r - a) / c,
@@ -21,7 +21,8 @@ from sound.scenes.audible.radiation import AIR_DENSITY, SOUND_SPEED
 Array = NDArray[np.float64]
 
 MATCHED_HERTZ = 10_000.0
-"""Where the filter is as loud as the sphere; a quarter of the sample rate if that is less."""
+"""Frequency [Hz] at which the filter has the magnitude of the sphere's response; a quarter of the
+sampling rate if that is less."""
 
 
 def equivalent_radius(volume: float) -> float:
@@ -38,8 +39,8 @@ def equivalent_radius(volume: float) -> float:
 def acceleration_filter(radius: float, rate: int) -> tuple[Array, Array]:
     """Digital filter b, a (3,) [Pa m / (m/s^2)] from acceleration to the dipole of the click.
 
-    What comes out of it for an acceleration (s, 3), times the direction to a listener (unit vector)
-    and over the distance [m], is the pressure there, without the time that sound takes.
+    The output for an acceleration (s, 3), times the unit vector to a listener and over the distance
+    [m], is the pressure there, without the delay of the way.
 
     Its poles are those of the sphere, -(1 +- i) / tau, at exp(pole / rate).  Of its two zeros one
     is at 0 Hz.  The other one and the gain make it exact towards 0 Hz and as loud as the sphere at
@@ -51,7 +52,7 @@ def acceleration_filter(radius: float, rate: int) -> tuple[Array, Array]:
     Parameters
     ----------
     radius : float [m]
-        Of the sphere.
+        Radius of the sphere.
     rate : int [Hz]
         Samples per second.
     """

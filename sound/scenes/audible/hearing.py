@@ -1,9 +1,9 @@
-"""A head that hears: distance, delay and direction of what sounds.
+"""Sound of a moving body at the two ears of a head.
 
-Each ear hears a body over the way to it: later by the speed of sound, fainter as 1 / distance, and
-through the shadow of a spherical head (Brown and Duda, IEEE Transactions on Speech and Audio
-Processing 6, 1998): a filter of one pole and one zero, and the longer way around the head.  As ways
-change, so do delays, which is Doppler's shift.
+Each ear hears the body with the delay of the way, as 1 / distance, and through the shadow of a
+spherical head (Brown and Duda, IEEE Transactions on Speech and Audio Processing 6, 1998): a filter
+of one pole and one zero, and a longer way around the head.  Delays that change make Doppler's
+shift.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from sound.scenes.picture import Motion
 Array = NDArray[np.float64]
 
 HEAD_RADIUS = 0.0875
-"""Of a mean head [m]."""
+"""Radius [m] of an average head."""
 NEAREST = 0.1
-"""Distance [m] within which nothing gets louder."""
+"""Distance [m] below which loudness stays constant."""
 ROUNDS = 4
-"""In which the moment is found at which a body sounded: each gains a factor of v / c."""
+"""Number of fixed-point iterations for the time of emission; each reduces the error by v / c."""
 SIXTH = 1.0 / 6.0
 UP = np.array([0.0, 0.0, 1.0])
 SHADOW_LEAST, SHADOW_DEGREES = 0.1, 150.0
-"""Gain of high frequencies at the darkest angle from an ear, and that angle."""
+"""Least gain of high frequencies over all angles of incidence, and the angle that it is at."""
 
 
 @dataclass(frozen=True)
@@ -38,11 +38,11 @@ class Head:
     Attributes
     ----------
     times : (t,) [s]
-        At which its places are known, ascending.
+        Times of its positions, ascending.
     positions : (t, 3) [m]
-        Of its middle.
+        Positions of its centre.
     facing : (3,) [m]
-        Point that its nose is turned to.
+        Point that the nose points to.
     """
 
     times: Array
@@ -67,16 +67,16 @@ def towards(motion: Motion, body: int, head: Head) -> Array:
 
 
 def heard(source: Array, motion: Motion, body: int, head: Head, rate: int) -> Array:
-    """What two ears (s, 2), left and right, hear of a body.
+    """Sound (s, 2) [Pa] of a body at the left and the right ear.
 
     Parameters
     ----------
     source : (s,) [Pa m]
         Pressure times distance, in the direction of the head.
     motion, body
-        Where it is.
+        Motion of all bodies, and number of this one.
     head
-        Who hears it.
+        The head.
     rate : int [Hz]
         Samples per second.
     """
@@ -95,7 +95,7 @@ def heard(source: Array, motion: Motion, body: int, head: Head, rate: int) -> Ar
 
 @numba.njit(cache=True, nogil=True)
 def along(parts, frames, directions):  # type: ignore[no-untyped-def]
-    """Parts (s, 3) along directions (t, 3) that change evenly between frames (t,) [samples]."""
+    """Components of vectors (s, 3) along directions (t, 3) that are linear between frames (t,)."""
     total = np.zeros(len(parts))
     last = len(frames) - 1
     begin = 0
@@ -113,7 +113,7 @@ def along(parts, frames, directions):  # type: ignore[no-untyped-def]
 
 
 def _seen_away(motion: Motion, body: int, places: Array) -> Array:
-    """Ways (t, 3) [m] from a head to where a body was when it sounded what arrives now."""
+    """Vectors (t, 3) [m] from a head to where a body emitted the sound that arrives then."""
     track = motion.positions[:, body]
     away = track - places
     for _ in range(ROUNDS):
@@ -124,9 +124,9 @@ def _seen_away(motion: Motion, body: int, places: Array) -> Array:
 
 
 def _around(angle: Array) -> Array:
-    """Way [m] to an ear beyond that to the head's middle, by the angle between ear and source.
+    """Way [m] to an ear less that to the head's centre, by the angle between ear and source.
 
-    Woodworth's: straight to the ear that is seen, around the head to one that is not.
+    Woodworth's formula: straight to a visible ear, around the head to a hidden one.
     """
     bent = angle - np.pi / 2.0
     return np.asarray(HEAD_RADIUS * np.where(bent < 0.0, -np.cos(angle), bent))
@@ -141,7 +141,7 @@ def _shadow(angle: Array) -> Array:
 
 @numba.njit(cache=True, nogil=True)
 def _through(source, frames, delays, gains, shadows, rate):  # type: ignore[no-untyped-def]
-    """A source delayed, made fainter and filtered by what changes evenly from frame to frame."""
+    """A source with delays, gains and head shadows that are linear from frame to frame."""
     count = len(source)
     heard = np.zeros(count)
     # (1 + shadow s / (2 w)) / (1 + s / (2 w)), w = c / a, by the bilinear transformation.
@@ -152,7 +152,7 @@ def _through(source, frames, delays, gains, shadows, rate):  # type: ignore[no-u
     last = len(frames) - 1
     begin = 0
     for frame in range(len(frames)):
-        # The last values hold on.
+        # After the last frame its values hold.
         end = min(count, int(np.ceil(frames[frame + 1]))) if frame < last else count
         length = frames[frame + 1] - frames[frame] if frame < last else 1.0
         then = min(frame + 1, last)
@@ -173,7 +173,7 @@ def _through(source, frames, delays, gains, shadows, rate):  # type: ignore[no-u
 
 @numba.njit(cache=True, nogil=True)
 def _between(source, place):  # type: ignore[no-untyped-def]
-    """The source between samples, by a cubic through four of them (Lagrange); silent around."""
+    """The source between samples, by Lagrange's cubic through four; 0 beyond its ends."""
     whole = int(np.floor(place))
     d = place - whole
     before, after, beyond = d + 1.0, d - 1.0, d - 2.0

@@ -1,19 +1,19 @@
-"""How loud the modes of a solid are heard, the pressure on its surface being that on a sphere.
+"""Sound radiated by the modes of a solid, with the scattering of a sphere.
 
 A surface that moves at the normal velocity v radiates, to a direction d far away and at a distance
 r, the pressure (Kirchhoff and Helmholtz, with reciprocity; factors of modulus 1 left out)
 
     r p(d) = omega rho / (4 pi)  integral of v (J + S) over the surface,
 
-where J = exp(-i k d.x) is a plane wave and S what the solid, at rest, scatters of it to its own
-surface.  S would take the solution of a boundary value problem.  Here it is that of a sphere with
-as large a surface, radius a: every order l of spherical harmonics of J is scattered there to
+where J = exp(-i k d.x) is a plane wave and S the field on the surface that the solid at rest
+scatters of it.  S is the solution of a boundary value problem; here that of a sphere with an equal
+surface, of radius a, stands for it: every order l of spherical harmonics of J is scattered to
 
     S_l = z_l dJ_l/dn,  z_l = -h_l(ka) / (k h_l'(ka)),
 
 with spherical Hankel functions h_l.  Orders above 2 take z_2, which makes them one integral over
-the plane wave itself.  So spheres whose velocity has orders up to 2 are heard exactly, and so is
-the volume that any solid displaces at low frequencies.
+the plane wave itself.  This is exact for spheres whose velocity has orders up to 2, and for the
+volume that any solid displaces at low frequencies.
 """
 
 from __future__ import annotations
@@ -30,24 +30,24 @@ Array = NDArray[np.float64]
 Waves = NDArray[np.complex128]
 
 AIR_DENSITY = 1.204
-"""Of air at 20 C [kg/m^3]."""
+"""Density [kg/m^3] of air at 20 C."""
 SOUND_SPEED = 343.2
-"""In air at 20 C [m/s]."""
+"""Speed of sound [m/s] in air at 20 C."""
 STEPS = 1 << 12
-"""Entries of a table of a turn's cosines."""
+"""Number of steps of a full turn in the table of cosines."""
 SHIFT = float(STEPS * 1024)
-"""Whole turns that leave no phase negative."""
+"""Whole turns, in steps, that are added to phases so that none is negative."""
 COSINES = np.cos(2.0 * np.pi * np.arange(STEPS + 1) / STEPS)
 DIRECTION_PAIRS = 96
-"""Pairs of opposite directions over which the power of orders above 1 is averaged.
+"""Number of pairs of opposite directions over which the power of orders above 1 is averaged.
 
 Below 16 kHz its level is then 0.2 dB (rms) off that of all directions for a marimba bar, 0.6 dB for
 a box of 20 cm.
 """
 AT_CENTRE = 1e-9
-"""Distance from the centre of mass, over the radius, below which a point is moved away from it."""
+"""Least distance of a point from the centre of mass, over the radius; nearer points are moved."""
 ROUNDING = 1e-9
-"""Share of the monopole that order 0 has without meaning to; it gives no sign."""
+"""Rounding error of order 0, over the monopole: a smaller value has no sign."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class _Panels:
 
 
 def radiated(solid_motion: Array, shape: Shape, frequencies: Array) -> Radiation:
-    """How loud the modes of a solid are heard, approximately; see this module.
+    """Sound radiated by the modes of a solid, approximately; see this module.
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ def _waves(ways, facings, numbers, flows):  # type: ignore[no-untyped-def]
 
 
 def _main_axis(turned: Waves, towards: Waves) -> tuple[Array, Array]:
-    """Dipoles (N, 3) along one axis each, and what of them moves a quarter of a period later.
+    """Dipoles (N, 3) along one axis each, and their parts a quarter of a period later.
 
     The ellipse that a complex dipole runs through is cut into its two half axes.  The first one is
     the longer and sets out as a dipole of the phase `towards` (N,) does.

@@ -1,4 +1,8 @@
-"""How what a body lies on damps it while it lies still, of which the engine tells nothing."""
+"""Damping of a body at rest by the bodies that it lies on.
+
+The engine records no contacts of a sleeping body, so the contacts of the last moment before are
+taken for it.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +12,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sound.scenes.audible.damping import dashpot, moved_along
-from sound.scenes.contact.impacts import LASTING, Pressing
-from sound.scenes.scene import Scene
+from sound.scenes.audible.contact_damping import dashpot, motion_along
+from sound.scenes.contact.impacts import LASTING, SustainedContact
+from sound.scenes.scene import EngineEntry
 
 Array = NDArray[np.float64]
 
 
 class Rest(NamedTuple):
-    """A time in which a body lies still, from `begin` to `end` [s], and dampings (K,) [1/s]."""
+    """An interval of rest from `begin` to `end` [s], with added dampings (K,) [1/s]."""
 
     begin: float
     end: float
@@ -26,34 +30,34 @@ class Rest(NamedTuple):
 def rests_of(
     number: int,
     motion: Array,
-    pressings: Sequence[Pressing],
+    contacts: Sequence[SustainedContact],
     times: Array,
     resting: NDArray[np.bool_],
-    scene: Scene,
+    engine: EngineEntry,
 ) -> list[Rest]:
-    """Times in which a body that sounds lies still, in their order.
-
-    It then is pressed by the mean of the forces of the last moment before.
+    """The intervals of rest of a body that sounds, in the order of time.
 
     Parameters
     ----------
     number
-        Of the body.
+        Number of the body.
     motion : (V, 3, K) [kg^-1/2]
-        Of its surface's vertices in each mode.
-    pressings
+        Displacements of its surface's vertices in each mode.
+    contacts
         All contacts of the scene, by pairs.
     times, resting : (T,) [s], (T,)
-        Whether it lies still at each time.
+        Whether the body is at rest at each time.
+    engine
+        Steps of the simulation.
     """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], resting, [False]]).astype(int)))
-    own = [each for each in pressings if number in each.pair]
+    own = [each for each in contacts if number in each.pair]
     rests = []
     for first, after in edges.reshape(-1, 2):
         begin = float(times[first])
         end = float(times[after]) if after < len(times) else float("inf")
         before = float(times[max(0, first - 1)])
-        parts = [_damping(number, motion, each, before, begin, scene) for each in own]
+        parts = [_damping(number, motion, each, before, begin, engine) for each in own]
         rests.append(Rest(begin, end, np.sum(parts, axis=0)))
     return rests
 
@@ -61,26 +65,24 @@ def rests_of(
 def _damping(
     number: int,
     motion: Array,
-    pressing: Pressing,
+    contact: SustainedContact,
     before: float,
     begin: float,
-    scene: Scene,
+    engine: EngineEntry,
 ) -> Array:
-    """Dampings (K,) [1/s] by one solid that the body touched in the last moment before a time."""
-    step_seconds = scene.engine.step_seconds
-    width = round(LASTING * scene.engine.steps)
-    steps = pressing.contacts.steps
-    high = int(np.searchsorted(steps, begin / step_seconds, side="right"))
-    if not high or steps[high - 1] < before / step_seconds - width:
+    """Dampings (K,) [1/s] by one other body, touched in the last moment before `begin` [s]."""
+    width = round(LASTING * engine.steps)
+    steps, spots = contact.contacts.steps, contact.spots
+    high = int(np.searchsorted(steps, begin / engine.step_seconds, side="right"))
+    if not high or steps[high - 1] < before / engine.step_seconds - width:
         return np.zeros(motion.shape[2])
-    low = int(np.searchsorted(steps, steps[high - 1] - width))
-    contacts = pressing.contacts[slice(low, high)]
-    forces = contacts.pressures / (width + 1)
-    radius = 1.0 / float(pressing.spots.curvatures[low:high].mean())
-    modulus = 1.0 / float(pressing.spots.giving[low:high].mean())
-    mass = float(np.median(contacts.masses))
+    last = slice(int(np.searchsorted(steps, steps[high - 1] - width)), high)
+    points = contact.contacts[last]
+    forces = points.pressures / (width + 1)
+    radius = 1.0 / float(spots.curvatures[last].mean())
+    modulus = 1.0 / float(spots.compliances[last].mean())
+    mass = float(np.median(points.masses))
     damper = dashpot(np.array([forces.sum()]), radius, modulus, mass)
-    side = pressing.pair.index(number)
-    moved = motion[pressing.spots.vertices[low:high, side]]
-    along = moved_along(moved, contacts.own_forces[:, side])
+    side = contact.pair.index(number)
+    along = motion_along(motion[spots.vertices[last, side]], points.own_forces[:, side])
     return np.asarray(0.5 * damper[0] * (forces @ along**2) / forces.sum())

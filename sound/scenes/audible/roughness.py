@@ -1,8 +1,8 @@
-"""Roughness of surfaces, and how it lets a force tremble that rolls or slides over them.
+"""Random profiles of rough surfaces along the way of a rolling or sliding contact.
 
-A profile is a sum of octaves of smooth random waves, of heights that fall with the wavelength as
-those of a self-affine surface (B. Persson, Surface Science Reports 61, 2006).  What is shorter than
-the patch in which two solids touch is not felt.
+A profile is a sum of octaves of smooth random waves, whose heights fall with the wavelength as
+those of a self-affine surface (B. Persson, Surface Science Reports 61, 2006).  Waves shorter than
+the patch of contact are left out.
 """
 
 from __future__ import annotations
@@ -14,35 +14,36 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 LONGEST_WAVE = 5e-3
-"""Wavelength [m] beyond which a surface is its shape."""
+"""Greatest wavelength [m] of roughness; longer ones belong to the shape of the surface."""
 OCTAVES = 10
+"""Number of octaves of wavelengths."""
 HURST = 0.8
-"""Heights of waves go as wavelength to this power."""
+"""Hurst exponent: heights of waves go as the wavelength to this power."""
 _LATTICE_RMS = 0.49
-"""Root mean square of the waves of one octave of unit height; a test measures it."""
+"""Root mean square height of the waves of one octave of unit height; a test measures it."""
 
 
 def octave_heights(rms: float) -> Array:
-    """Heights (rms) (o,) [m] of octaves from the longest on, of a surface's roughness [m]."""
+    """Root mean square heights (o,) [m] of the octaves, longest first, of a roughness [m]."""
     heights = 2.0 ** (-HURST * np.arange(OCTAVES))
     return np.asarray(rms * heights / np.linalg.norm(heights))
 
 
 def profile(way: Array, speeds: Array, patches: Array, rms: float, seed: int, rate: int) -> Array:
-    """Heights (s,) [m] that are felt along a way.
+    """Heights (s,) [m] of a surface under a moving contact.
 
     Parameters
     ----------
     way : (s,) [m]
-        Over the surface, at each sample.
+        Distance covered at each sample.
     speeds : (s,) [m/s]
-        At which it goes on; waves that would be faster than half the sampling rate are left out.
+        Speed at each sample; waves passed faster than half the sampling rate are left out.
     patches : (s,) [m]
         Diameters of the patch of contact.
     rms : float [m]
-        Roughness.
+        Root mean square roughness.
     seed : int
-        Of the surface.
+        Seed of the surface.
     rate : int [Hz]
         Samples per second.
     """
@@ -72,7 +73,7 @@ def _profile(way, speeds, patches, heights, seed, rate):  # type: ignore[no-unty
 
 @numba.njit(cache=True, nogil=True)
 def _hashed(cell, octave, seed):  # type: ignore[no-untyped-def]
-    """A number within -1 and 1 that depends on all of three (splitmix64)."""
+    """A pseudorandom number from -1 to 1 by cell, octave and seed (splitmix64)."""
     x = np.uint64(cell) * np.uint64(0x9E3779B97F4A7C15) + seed
     x += np.uint64(octave) * np.uint64(0xD1B54A32D192ED03)
     x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)

@@ -1,4 +1,4 @@
-"""Forces that last, block by block: how they tremble as surfaces are rough, how they damp."""
+"""Sustained forces between bodies: their fluctuation by rough surfaces, and their dashpots."""
 
 from __future__ import annotations
 
@@ -8,44 +8,41 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter
 
-from sound.scenes.audible.damping import dashpot
-from sound.scenes.audible.ringing import BLOCK
+from sound.scenes.audible.contact_damping import dashpot
 from sound.scenes.audible.roughness import profile
-from sound.scenes.bodies import Body
 from sound.scenes.contact.contacts import ContactPoints
-from sound.scenes.contact.impacts import Pressing
+from sound.scenes.contact.impacts import SustainedContact
 from sound.scenes.hertz import patch_radius, stiffness
-from sound.scenes.performance import GROUND
-from sound.scenes.scene import Scene
+from sound.synthesis.driven import BLOCK
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 LOWEST_HERTZ = 20.0
-"""Below which a force that trembles is not heard."""
+"""Frequency [Hz] below which fluctuations of a force are filtered out, as they are not heard."""
 
 
 @dataclass(frozen=True)
-class Pressed:
-    """Forces between two objects that last, in blocks of samples.
+class SustainedForce:
+    """The sustained force between two bodies, in blocks of samples.
 
     Attributes
     ----------
     pair
-        Numbers of the objects.
+        Numbers of the bodies.
     contacts, vertices, shares
-        Points of contact in the order of time, vertices nearest to them, and what of their forces
-        lasts.
+        Points of contact in the order of time, nearest vertices of both bodies, and sustained
+        shares of the forces.
     blocks : (b,)
-        Numbers of the blocks in which there are any, ascending.
+        Numbers of the blocks with a force, ascending.
     firsts : (b,)
-        Number of the first point in each.
+        Number of the first point in each block.
     steps : (b,)
-        Steps of the engine in each that have any.
+        Number of the engine's steps with a force in each block.
     courses : (b, BLOCK)
-        How the force comes and goes, over itself.
+        Fluctuation of the force over its mean.
     dashpots : (b,) [N s/m]
-        Force over the speed at which the objects approach.
+        Dashpot of the contact in each block.
     """
 
     pair: tuple[int, int]
@@ -59,30 +56,49 @@ class Pressed:
     dashpots: Array
 
     def mean(self, values: Array) -> Array:
-        """Sums over points of contact (c, ...) in each block, mean over its steps (b, ...)."""
+        """Sums of values (c, ...) over the points of each block, mean over its steps (b, ...)."""
         steps = self.steps.reshape(-1, *(1,) * (values.ndim - 1))
         return np.asarray(np.add.reduceat(values, self.firsts, axis=0) / steps)
 
 
-def pressed(pressing: Pressing, bodies: list[Body], scene: Scene) -> Pressed | None:
-    """The forces of a pair that last; None if there are none.
+def sustained_force(
+    contact: SustainedContact,
+    roughness: float,
+    seconds: float,
+    step_seconds: float,
+    rate: int,
+    seed: int,
+) -> SustainedForce | None:
+    """The sustained force of a pair of bodies; None if there is none.
 
-    A bump of the height h presses two solids by h more together, which changes their force by h
+    A bump of the height h presses the bodies together by another h, which changes their force by h
     times the stiffness of the contact, at most by all of it.
+
+    Parameters
+    ----------
+    contact
+        Contacts of the pair.
+    roughness : float [m]
+        Root mean square height of both surfaces together.
+    seconds, step_seconds : float [s]
+        Duration of the scene, and of a step of the simulation.
+    rate : int [Hz]
+        Samples per second.
+    seed : int
+        Seed of the scene's random surfaces.
     """
-    rate, step_seconds = scene.sound.rate, scene.engine.step_seconds
-    times = pressing.contacts.steps * step_seconds
-    chosen = np.flatnonzero((pressing.shares > 0.0) & (times < scene.seconds))
+    times = contact.contacts.steps * step_seconds
+    chosen = np.flatnonzero((contact.shares > 0.0) & (times < seconds))
     if not len(chosen):
         return None
-    contacts, shares = pressing.contacts[chosen], pressing.shares[chosen]
+    contacts, shares = contact.contacts[chosen], contact.shares[chosen]
     blocks, firsts = np.unique((times[chosen] * rate).astype(np.int64) // BLOCK, return_index=True)
     new_step = np.diff(contacts.steps, prepend=-1) > 0
     steps = np.add.reduceat(new_step.astype(np.int64), firsts)
     forces = np.add.reduceat(shares * contacts.pressures, firsts) / steps
     points = np.add.reduceat(np.ones(len(contacts)), firsts)
-    radius = 1.0 / float(pressing.spots.curvatures[chosen].mean())
-    modulus = 1.0 / float(pressing.spots.giving[chosen].mean())
+    radius = 1.0 / float(contact.spots.curvatures[chosen].mean())
+    modulus = 1.0 / float(contact.spots.compliances[chosen].mean())
     sliding = contacts.velocities - (
         np.einsum("ci,ci->c", contacts.velocities, contacts.normals)[:, None] * contacts.normals
     )
@@ -90,36 +106,27 @@ def pressed(pressing: Pressing, bodies: list[Body], scene: Scene) -> Pressed | N
     speeds = np.add.reduceat(pace, firsts) / points
     springs = stiffness(forces, radius, modulus)
     heights = profile(
-        _within(np.cumsum(speeds) * BLOCK / rate, speeds * BLOCK / rate),
+        _way(np.cumsum(speeds) * BLOCK / rate, speeds * BLOCK / rate),
         np.repeat(speeds, BLOCK),
         np.repeat(2.0 * patch_radius(forces, radius, modulus), BLOCK),
-        _roughness(pressing.pair, bodies, scene),
-        _seed(scene.seed, pressing.pair),
+        roughness,
+        _seed(seed, contact.pair),
         rate,
     )
-    trembling = np.clip(heights * np.repeat(springs / forces, BLOCK), -1.0, 1.0)
+    fluctuation = np.clip(heights * np.repeat(springs / forces, BLOCK), -1.0, 1.0)
     b, a = butter(1, LOWEST_HERTZ, "highpass", fs=rate)
-    courses = lfilter(b, a, trembling - trembling[0]).reshape(-1, BLOCK)
+    courses = lfilter(b, a, fluctuation - fluctuation[0]).reshape(-1, BLOCK)
     dashpots = dashpot(forces, radius, modulus, float(np.median(contacts.masses)))
-    vertices = pressing.spots.vertices[chosen]
-    return Pressed(
-        pressing.pair, contacts, vertices, shares, blocks, firsts, steps, courses, dashpots
+    vertices = contact.spots.vertices[chosen]
+    return SustainedForce(
+        contact.pair, contacts, vertices, shares, blocks, firsts, steps, courses, dashpots
     )
 
 
-def _within(ends: Array, steps: Array) -> Array:
-    """Ways (b * BLOCK,) that grow evenly in every block to its end, by its step."""
+def _way(ends: Array, steps: Array) -> Array:
+    """Distances (b * BLOCK,) covered at each sample, by those at the end and within each block."""
     shares = (np.arange(BLOCK) + 1.0) / BLOCK - 1.0
     return np.asarray((ends[:, None] + steps[:, None] * shares).ravel())
-
-
-def _roughness(pair: tuple[int, int], bodies: list[Body], scene: Scene) -> float:
-    """Of both surfaces together (rms) [m]."""
-    own = [
-        scene.ground_material.roughness if each == GROUND else bodies[each].entry.roughness
-        for each in pair
-    ]
-    return float(np.hypot(own[0], own[1]))
 
 
 def _seed(seed: int, pair: tuple[int, int]) -> int:

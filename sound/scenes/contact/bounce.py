@@ -1,4 +1,4 @@
-"""How much a contact of the engine is damped so that a bounce leaves a share of the speed."""
+"""Damping of the engine's contacts by the coefficient of restitution."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from scipy.optimize import brentq
 Array = NDArray[np.float64]
 
 PHASES = 16
-"""Places within a step at which a body may arrive, over which bounces are averaged."""
+"""Number of moments within a step at which a bounce may begin; their bounces are averaged."""
 MOST_DAMPED = 1.5
-"""Damping ratio beyond which steps are too long to follow it."""
+"""Greatest damping ratio that the engine's steps resolve."""
 
 
 @cache
 def damping_ratio(restitution: float, steps: int) -> float:
-    """Damping ratio of a spring and damper that only push.
+    """Damping ratio of a spring and damper that push but never pull.
 
     Parameters
     ----------
     restitution : float
-        Share of the speed that a bounce leaves.
+        Speed after a bounce over the speed before it.
     steps : int
-        Of the engine in half a period of the spring.
+        Number of the engine's steps in half a period of the spring.
 
     Examples
     --------
@@ -42,7 +42,7 @@ def damping_ratio(restitution: float, steps: int) -> float:
 
 
 def restitution_of(ratio: float, steps: int) -> float:
-    """Share of the speed that a bounce leaves, as the engine steps through it."""
+    """Speed after a bounce over the speed before it, by the engine's own steps."""
     omega = np.pi / steps
     away = -(np.arange(PHASES) + 0.5) / PHASES
     speed = np.full(PHASES, -1.0)

@@ -1,4 +1,4 @@
-"""Keeps points of contact as the engine finds them, tens of thousands of times a second."""
+"""Log of the points of contact, tens of thousands in a second of simulated time."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from sound.scenes.contact.contacts import ContactPoints
 Array = NDArray[np.float64]
 
 CHUNK = 1 << 16
-"""Points that room is made for at a time."""
+"""Number of points that memory is allocated for at a time."""
 _NUMBERS, _VALUES = 3, 26
 _LEAST_INVERSE = 1e-12
 
 
 class ContactLog:
-    """Points of contact in the order of time; see `ContactPoints` for what is kept of each."""
+    """Points of contact in the order of time; `ContactPoints` describes the values of each."""
 
     def __init__(self) -> None:
         self._full: list[tuple[NDArray[np.int64], Array]] = []
@@ -32,28 +32,28 @@ class ContactLog:
 
     @property
     def count(self) -> int:
-        """Points so far."""
+        """Number of points so far."""
         return sum(len(numbers) for numbers, _ in self._full) + self._used
 
-    def take(self, step: int, addresses: NDArray[np.int32], *told: Any) -> None:
-        """Keep the points of a step.
+    def take(self, step: int, addresses: NDArray[np.int32], *values: Any) -> None:
+        """Add the points of a step.
 
         Parameters
         ----------
         step
-            Its number.
+            Number of the step.
         addresses : (n,)
-            Of the points' forces.
-        told
+            Addresses of the points' forces in MuJoCo's data.
+        values
             The other arguments of `_keep`, from `geoms` on.
         """
         if self._used + len(addresses) > CHUNK:
             self._full.append((self._numbers[: self._used], self._values[: self._used]))
             self._new()
-        self._used = _keep(self._numbers, self._values, self._used, step, addresses, *told)
+        self._used = _keep(self._numbers, self._values, self._used, step, addresses, *values)
 
     def contacts(self) -> ContactPoints:
-        """All of them."""
+        """All points."""
         parts = [*self._full, (self._numbers[: self._used], self._values[: self._used])]
         numbers = np.concatenate([part[0] for part in parts])
         values = np.concatenate([part[1] for part in parts])
@@ -92,10 +92,10 @@ def _keep(  # type: ignore[no-untyped-def]
     inverse_mass,
     inverse_inertia,
 ):
-    """Write points that push from row `used` on; returns the next free row.
+    """Write the points that carry a force from row `used` on; returns the next free row.
 
-    The engine's normals point from the first to the second solid; here they point into the first,
-    which the ground, whose number is the lowest, never is.
+    MuJoCo's normals point from the first to the second body; here they point into the first, which
+    the ground, whose number is the lowest, never is.
     """
     for c in range(len(addresses)):
         address = addresses[c]
@@ -105,7 +105,7 @@ def _keep(  # type: ignore[no-untyped-def]
         sign = 1.0
         if one > other:
             one, other, sign = other, one, -1.0
-        # Now `other` is the first solid, into which the engine's normal points for sign 1.
+        # Now `other` is the first body, into which MuJoCo's normal points for sign 1.
         normal = sign * frames[c, 0:3]
         force = sign * (
             constraint_forces[address] * frames[c, 0:3]
@@ -150,7 +150,7 @@ def _keep(  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _turned_back(turn, vector):  # type: ignore[no-untyped-def]
-    """A vector of the scene in a body's own axes."""
+    """Components in a body's own axes of a vector of the scene."""
     own = np.zeros(3)
     for i in range(3):
         for j in range(3):
@@ -160,7 +160,7 @@ def _turned_back(turn, vector):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _turned(turn, vector):  # type: ignore[no-untyped-def]
-    """A vector in a body's own axes in those of the scene."""
+    """Components in the scene's axes of a vector in a body's own axes."""
     seen = np.zeros(3)
     for i in range(3):
         for j in range(3):

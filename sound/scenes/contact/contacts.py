@@ -1,4 +1,4 @@
-"""What touched what, step by step, as the engine of rigid bodies tells it."""
+"""Points of contact between bodies, recorded in every step of the simulation."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ Integers = NDArray[np.integer]
 
 @dataclass(frozen=True)
 class ContactPoints:
-    """Points of contact, one after the other; c of them.
+    """c points of contact.
 
     Attributes
     ----------
     steps : (c,)
-        Number of the step in which each was.
+        Number of the step.
     pairs : (c, 2)
-        Numbers of the objects; the second one may be `sound.scenes.performance.GROUND`.
+        Numbers of the two bodies; the second one may be `sound.scenes.performance.GROUND`.
     positions : (c, 3) [m]
-        In the scene.
+        Positions in the scene.
     places : (c, 2, 3) [m]
-        In each object's own axes, from its centre of mass.
+        Positions in the own axes of each of the two bodies.
     normals : (c, 3)
-        Unit vectors from the second into the first object.
+        Unit vectors from the second into the first body.
     forces : (c, 3) [N]
-        On the first object, in the axes of the scene.
+        Forces on the first body, in the axes of the scene.
     own_forces : (c, 2, 3) [N]
-        On each object, in its own axes.
+        Forces on each body, in its own axes.
     velocities : (c, 3) [m/s]
-        Of the first object's point in the second one's eyes.
+        Velocities of the first body's point relative to the second one's.
     turning : (c,) [rad/s]
-        How fast one rolls on the other.
+        Angular speeds of rolling.
     masses : (c,) [kg]
-        Effective, for a push along the normal.
+        Effective masses for an impulse along the normal.
     """
 
     steps: Integers

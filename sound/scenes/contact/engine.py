@@ -1,4 +1,4 @@
-"""Rigid bodies under gravity, by MuJoCo: how they move, and the forces where they touch."""
+"""Motion of rigid bodies under gravity by MuJoCo, and the forces at their contacts."""
 
 from __future__ import annotations
 
@@ -13,48 +13,50 @@ from numpy.typing import NDArray
 from carillon.command_line.logs import warn_once
 from carillon.command_line.progress import track
 from carillon.errors import UserError, one_line
-from sound.scenes.bodies import Body
+from sound.scenes.body import Body
 from sound.scenes.contact.bounce import damping_ratio
 from sound.scenes.contact.contact_log import ContactLog
 from sound.scenes.contact.contacts import ContactPoints
 from sound.scenes.contact.start import start
-from sound.scenes.materials import NamedMaterial
+from sound.scenes.ground_plane import GroundPlane
 from sound.scenes.packages import scene_package
 from sound.scenes.picture import Motion
-from sound.scenes.scene import Scene
+from sound.scenes.scene import EngineEntry, Vector
 
 Array = NDArray[np.float64]
 
 PICTURES_PER_SECOND = 120
-"""Poses that are kept."""
+"""Number of poses of each body that are kept for every second."""
 FASTEST = 1e4
-"""Speed [m/s] beyond which a scene has burst."""
+"""Greatest speed [m/s] of any body; a greater one means that the simulation is unstable."""
 STEPS_TO_SLEEP = 10
-"""The engine's own number (mjMINAWAKE)."""
+"""Number of steps that a body must be slow for before MuJoCo lets it sleep (mjMINAWAKE)."""
 SLOWEST_BODY = 1e-7
-"""Speed [m/s] at which a body lies still where nothing falls."""
+"""Speed [m/s] below which a body sleeps in a scene without gravity."""
 MOST_CONTACTS, MOST_CONTACTS_EACH = 1_000_000, 20_000
-"""Points of contact, each counted in every step, that a scene may have for every second; and for
-every object and second, where that is more."""
+"""Greatest number of contact points in a second, for the whole scene and for each object; the
+larger limit holds.  A point that lasts counts in every step."""
 MOST_KEPT = 12_000_000
-"""Points of contact that a scene may have in all, which take 3 GB."""
+"""Greatest number of contact points in a whole scene; they take 3 GB."""
 _IMPEDANCE = [0.999, 0.999, 0.001, 0.5, 2.0]
+"""MuJoCo's `solimp` of every contact: a constraint that hardly yields beyond its spring."""
 
 
 @dataclass(frozen=True)
 class Course:
-    """How a scene goes.
+    """The motion of all bodies, and their contacts.
 
     Attributes
     ----------
     motion
-        Poses of all objects.
+        Poses of all bodies.
     contacts
-        What touched what, in the order of time.
+        Points of contact in the order of time.
     resting : (T, B)
-        Whether each object lay still, at the times of the motion.
+        Whether each body slept, at the times of the motion.
     moved : dict
-        How far (3,) [m] objects were moved before the start to be apart, by their numbers.
+        Displacements (3,) [m] by which overlapping bodies were separated before the start, by the
+        numbers of the bodies.
     """
 
     motion: Motion
@@ -63,26 +65,48 @@ class Course:
     moved: dict[int, Array]
 
 
-def simulate(scene: Scene, bodies: list[Body], visible: bool = True) -> Course:
-    """Let bodies move as a scene says.
+def simulate(
+    bodies: list[Body],
+    seconds: float,
+    engine: EngineEntry,
+    gravity: Vector,
+    ground: GroundPlane,
+    visible: bool = True,
+) -> Course:
+    """Simulate the motion of bodies.
 
-    Bodies that overlap a little at the start are moved apart, see `sound.scenes.contact.start`.
-    Contacts are springs with dampers: a bounce takes `engine.contact_seconds` whatever the mass,
+    Bodies that overlap a little at the start are separated, see `sound.scenes.contact.start`.
+    Contacts are springs with dampers: a bounce takes `engine.contact_seconds` whatever the masses,
     and leaves the share of speed that the restitution says.  Bodies that lie still sleep.
+
+    Parameters
+    ----------
+    bodies
+        All bodies of the scene.
+    seconds : float [s]
+        Duration.
+    engine
+        Stiffness of the contacts, and steps.
+    gravity : (3,) [m/s^2]
+        Acceleration of a free body.
+    ground
+        The ground, if there is one.
+    visible : bool
+        Whether progress is shown on a terminal.
 
     Raises
     ------
     UserError
-        If two bodies overlap much at the start, if anything flies apart, or touches too often.
+        If two bodies overlap much at the start, the simulation is unstable, or there are too many
+        contacts.
     """
     mujoco = loaded()
-    model = _model(mujoco, scene, bodies)
+    model = _model(mujoco, bodies, engine, gravity, ground)
     data = mujoco.MjData(model)
-    moved = start(mujoco, model, data, scene, bodies)
+    moved = start(mujoco, model, data, bodies, gravity, engine.contact_seconds)
     recorder = _Recorder(model, data, bodies)
-    every = max(1, round(1.0 / (PICTURES_PER_SECOND * scene.engine.step_seconds)))
-    poses = int(np.ceil(scene.seconds / (every * scene.engine.step_seconds)))
-    steps = every * poses
+    every = max(1, round(1.0 / (PICTURES_PER_SECOND * engine.step_seconds)))
+    steps = every * int(np.ceil(seconds / (every * engine.step_seconds)))
     for step in track(
         range(steps), "moving", unit="steps", visible=visible and sys.stderr.isatty()
     ):
@@ -92,10 +116,10 @@ def simulate(scene: Scene, bodies: list[Body], visible: bool = True) -> Course:
         mujoco.mj_step(model, data)
         if data.ncon:
             recorder.take_contacts(step, before)
-            recorder.require_few((step + 1) * scene.engine.step_seconds)
+            recorder.require_few((step + 1) * engine.step_seconds)
         if step % every == 0:
-            recorder.require_calm(step * scene.engine.step_seconds)
-    return recorder.course(every * scene.engine.step_seconds, moved)
+            recorder.require_calm(step * engine.step_seconds)
+    return recorder.course(every * engine.step_seconds, moved)
 
 
 def loaded() -> Any:
@@ -105,42 +129,37 @@ def loaded() -> Any:
     return mujoco
 
 
-def _model(mujoco: ModuleType, scene: Scene, bodies: list[Body]) -> Any:
-    """The engine's description of a scene."""
+def _model(
+    mujoco: ModuleType,
+    bodies: list[Body],
+    engine: EngineEntry,
+    gravity: Vector,
+    ground: GroundPlane,
+) -> Any:
+    """MuJoCo's model of bodies and ground."""
     spec = mujoco.MjSpec()
-    spec.option.timestep = scene.engine.step_seconds
-    spec.option.gravity = scene.gravity
+    spec.option.timestep = engine.step_seconds
+    spec.option.gravity = gravity
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
-    spec.option.sleep_tolerance = _stillness(scene)
-    if scene.ground is not None:
-        _add_ground(mujoco, spec, scene)
+    # A quarter of the speed that a falling body gains meanwhile: none sleeps at the top of its
+    # flight.
+    gained = float(np.linalg.norm(gravity)) * STEPS_TO_SLEEP * engine.step_seconds
+    spec.option.sleep_tolerance = max(0.25 * gained, SLOWEST_BODY)
+    if ground.height is not None:
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_PLANE,
+            size=[0.0, 0.0, 1.0],
+            pos=[0.0, 0.0, ground.height],
+            **_contact_options(engine, ground.material.friction, ground.material.restitution),
+        )
     for number, body in enumerate(bodies):
-        _add_body(mujoco, spec, scene, number, body)
+        _add_body(mujoco, spec, engine, number, body)
     return spec.compile()
 
 
-def _stillness(scene: Scene) -> float:
-    """Speed [m/s] below which a body that keeps it for `STEPS_TO_SLEEP` lies still.
-
-    A quarter of what a body gains in them that falls: none is still at the top of its flight.
-    """
-    gained = float(np.linalg.norm(scene.gravity)) * STEPS_TO_SLEEP * scene.engine.step_seconds
-    return max(0.25 * gained, SLOWEST_BODY)
-
-
-def _add_ground(mujoco: ModuleType, spec: Any, scene: Scene) -> None:
-    material: NamedMaterial = scene.ground_material
-    spec.worldbody.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=[0.0, 0.0, 1.0],
-        pos=[0.0, 0.0, scene.ground],
-        **_touch(scene, material.friction, material.restitution),
-    )
-
-
-def _add_body(mujoco: ModuleType, spec: Any, scene: Scene, number: int, body: Body) -> None:
+def _add_body(mujoco: ModuleType, spec: Any, engine: EngineEntry, number: int, body: Body) -> None:
     from scipy.spatial.transform import Rotation
 
     entry = body.entry
@@ -157,20 +176,20 @@ def _add_body(mujoco: ModuleType, spec: Any, scene: Scene, number: int, body: Bo
     )
     if not entry.fixed:
         added.add_freejoint()
-    touch = _touch(scene, entry.friction, entry.restitution)
-    if entry.radius is not None:
-        size = [entry.radius, 0.0, 0.0]
-        added.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=size, **touch)
+    contact = _contact_options(engine, entry.friction, entry.restitution)
+    if body.radius is not None:
+        size = [body.radius, 0.0, 0.0]
+        added.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=size, **contact)
     for part, corners in enumerate(body.parts):
         name = f"{number} {part}"
         spec.add_mesh(name=name, uservert=corners.ravel().tolist())
-        added.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **touch)
+        added.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **contact)
 
 
-def _touch(scene: Scene, friction: float, restitution: float) -> dict[str, Any]:
-    """What the engine knows of a surface."""
-    stiff = (np.pi / scene.engine.contact_seconds) ** 2
-    ratio = damping_ratio(restitution, scene.engine.steps)
+def _contact_options(engine: EngineEntry, friction: float, restitution: float) -> dict[str, Any]:
+    """MuJoCo's options of the contacts of a surface."""
+    stiff = (np.pi / engine.contact_seconds) ** 2
+    ratio = damping_ratio(restitution, engine.steps)
     return {
         "friction": [friction, 0.0, 0.0],
         "solref": [-stiff, -2.0 * ratio * np.sqrt(stiff)],
@@ -180,7 +199,7 @@ def _touch(scene: Scene, friction: float, restitution: float) -> dict[str, Any]:
 
 
 class _Recorder:
-    """Keeps what the engine tells."""
+    """Records poses and contacts."""
 
     def __init__(self, model: Any, data: Any, bodies: list[Body]) -> None:
         self.model, self.data, self.bodies = model, data, bodies
@@ -202,7 +221,7 @@ class _Recorder:
         self.resting.append(np.asarray(self.data.body_awake[1:] != 1) & self.free)
 
     def take_contacts(self, step: int, velocities: Array) -> None:
-        """Keep what touches in a step, at whose beginning there were these velocities."""
+        """Record the contacts of a step; `velocities` are those at its beginning."""
         contact, data = self.data.contact, self.data
         self.log.take(
             step,
@@ -221,7 +240,7 @@ class _Recorder:
         )
 
     def require_few(self, seconds: float) -> None:
-        """Refuse more contacts than can be kept."""
+        """Refuse more contacts than can be recorded."""
         rate = max(MOST_CONTACTS, MOST_CONTACTS_EACH * len(self.bodies))
         if self.log.count > min(rate * max(1.0, seconds), MOST_KEPT):
             raise UserError(
@@ -231,7 +250,7 @@ class _Recorder:
             )
 
     def require_calm(self, seconds: float) -> None:
-        """Refuse a scene that has burst."""
+        """Refuse a simulation that is unstable."""
         speed = float(np.abs(self.data.qvel).max(initial=0.0))
         if not speed < FASTEST:
             raise UserError(

@@ -1,9 +1,9 @@
-"""Forces of contacts, told apart: short ones are impacts, what lasts presses, rolls and slides.
+"""Contact forces split into impacts and sustained contact.
 
 A contact of the engine is softer than a real one, so the course of its force says little, but its
-impulse is right.  Of the force between two solids what is gone within a few bounces' time (a
-morphological opening tells) is one impact for each of its peaks, which is then heard as long as
-Hertz says; the rest goes on as it is.
+impulse is right.  The part of the force between two bodies that lasts only a few bounces' time, by
+a morphological opening, makes one impact for each of its peaks; Hertz's theory says how long that
+impact sounds.  The rest of the force is sustained contact: resting, rolling and sliding.
 """
 
 from __future__ import annotations
@@ -20,39 +20,41 @@ from sound.scenes.contact.contacts import ContactPoints
 from sound.scenes.contact.touch import Spots, Touch
 from sound.scenes.hertz import bounce_seconds
 from sound.scenes.performance import Impact
-from sound.scenes.scene import Scene
+from sound.scenes.scene import EngineEntry, Vector
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.integer]
 
 LASTING = 2.5
-"""Bounces' times that a force must last to be no impact."""
+"""Least duration of a sustained force, in durations of a bounce of the engine."""
 GAP_STEPS = 3
-"""Steps without a force that do not end it: what lies still loses touch at times."""
+"""Greatest number of steps without a force within one contact: resting bodies lose touch at
+times."""
 PROMINENT = 0.5
-"""Of the height of a peak: what it must stand out by to be an impact of its own."""
+"""Least prominence of a peak of the force that is an impact of its own, over the peak's height."""
 SLOWEST = 1e-3
-"""Speed of approach [m/s] below which an impact is not heard; its force goes on as if it lasted."""
+"""Least speed of approach [m/s] of an audible impact; the force of a slower one counts as
+sustained."""
 HOVERING = 0.5
-"""Of the speed that gravity makes in a bounce's time: the engine cannot tell slower bounces from a
-force that lasts."""
+"""Least speed of approach of an impact, over the speed that a body gains by gravity in the duration
+of a bounce: the engine cannot tell slower bounces from resting."""
 LONGEST = 0.02
-"""Duration of an impact [s]; what is softer presses rather than strikes."""
+"""Greatest duration of an impact [s]; a softer one would be a push rather than a strike."""
 _TINY = 1e-30
 
 
 @dataclass(frozen=True)
-class Blow:
-    """An impact, and where on both solids it pushes.
+class HertzImpact:
+    """An impact, with the impulses at all points where both bodies touch.
 
     Attributes
     ----------
     impact
-        What is told of it.
+        The whole impact.
     places : (p, 2, 3) [m]
-        Points at which it pushes, in each object's own axes, from its centre of mass.
+        Points of contact, in the own axes of each of the two bodies.
     impulses : (p, 2, 3) [N s]
-        By which it does, likewise.
+        Impulses on the two bodies there, in the same axes.
     """
 
     impact: Impact
@@ -61,19 +63,19 @@ class Blow:
 
 
 @dataclass(frozen=True)
-class Pressing:
-    """Contacts between two solids, of whose forces a part lasts.
+class SustainedContact:
+    """All contacts of two bodies, and the sustained part of their forces.
 
     Attributes
     ----------
     pair : (2,)
-        Numbers of the objects.
+        Numbers of the bodies.
     contacts
         Points of contact in the order of time.
     spots
-        What the surfaces are like there.
+        The two surfaces at these points.
     shares : (c,)
-        Of the force of each point, what lasts.
+        Sustained share of the force at each point.
     """
 
     pair: tuple[int, int]
@@ -82,33 +84,39 @@ class Pressing:
     shares: Array
 
 
-def told_apart(
-    contacts: ContactPoints, scene: Scene, touch: Touch
-) -> tuple[list[Blow], list[Pressing]]:
-    """Impacts in the order of time, and what lasts, pair by pair."""
-    blows: list[Blow] = []
-    pressings: list[Pressing] = []
+def split_impacts(
+    contacts: ContactPoints, touch: Touch, engine: EngineEntry, gravity: Vector
+) -> tuple[list[HertzImpact], list[SustainedContact]]:
+    """Impacts in the order of time, and the sustained contact of each pair of bodies."""
+    impacts: list[HertzImpact] = []
+    sustained: list[SustainedContact] = []
+    weight = float(np.linalg.norm(gravity)) * engine.contact_seconds
+    slowest = max(SLOWEST, HOVERING * weight)
     order = np.lexsort(contacts.pairs.T[::-1])  # stable: each pair's are in the order of time
     firsts = np.flatnonzero(np.diff(contacts.pairs[order], axis=0, prepend=-2).any(axis=1))
     for chosen in np.split(order, firsts[1:]):
         own = contacts[chosen]
         pair = (int(own.pairs[0, 0]), int(own.pairs[0, 1]))
         spots = touch.spots(pair, own)
-        found, shares = _of_pair(pair, own, spots, scene)
-        blows += found
-        pressings.append(Pressing(pair, own, spots, shares))
-    blows.sort(key=lambda blow: (blow.impact.seconds, blow.impact.pair))
-    return blows, pressings
+        of_pair, shares = _of_pair(pair, own, spots, engine, slowest)
+        impacts += of_pair
+        sustained.append(SustainedContact(pair, own, spots, shares))
+    impacts.sort(key=lambda each: (each.impact.seconds, each.impact.pair))
+    return impacts, sustained
 
 
 def _of_pair(
-    pair: tuple[int, int], contacts: ContactPoints, spots: Spots, scene: Scene
-) -> tuple[list[Blow], Array]:
-    """Impacts of a pair, and shares (c,) of the forces that last."""
+    pair: tuple[int, int],
+    contacts: ContactPoints,
+    spots: Spots,
+    engine: EngineEntry,
+    slowest: float,
+) -> tuple[list[HertzImpact], Array]:
+    """Impacts of a pair, and sustained shares (c,) of the forces."""
     first = int(contacts.steps[0])
     force = np.bincount(contacts.steps - first, contacts.pressures)
-    width = round(LASTING * scene.engine.steps)
-    # Zeros around: a force that begins or ends at the edge would last else.
+    width = round(LASTING * engine.steps)
+    # Zeros around: otherwise a force that begins or ends at the edge would count as sustained.
     padded = grey_closing(np.pad(force, width), GAP_STEPS + 1)
     lasting = np.minimum(grey_opening(padded, width)[width:-width], force)
     share = np.divide(lasting, force, out=np.ones_like(force), where=force > 0.0)
@@ -117,19 +125,16 @@ def _of_pair(
         return [], share[contacts.steps - first]
     lows, highs = np.searchsorted(contacts.steps, ranges.T + first)
     owners = np.repeat(np.arange(len(ranges)), highs - lows)
-    chosen = np.arange(len(owners)) + np.repeat(lows - _starts(highs - lows), highs - lows)
+    starts = np.cumsum(highs - lows) - (highs - lows)
+    chosen = np.arange(len(owners)) + np.repeat(lows - starts, highs - lows)
     parts = contacts[chosen]
-    weights = scene.engine.step_seconds * (1.0 - share[parts.steps - first])
-    told = _impacts(pair, parts, Spots(*(each[chosen] for each in spots)), owners, weights, scene)
-    for number in np.flatnonzero([each is None for each in told]):
+    weights = engine.step_seconds * (1.0 - share[parts.steps - first])
+    struck = Spots(*(each[chosen] for each in spots))
+    impacts = _impacts(pair, parts, struck, owners, weights, engine.step_seconds, slowest)
+    for number in np.flatnonzero([each is None for each in impacts]):
         share[slice(*ranges[number])] = 1.0
-    blows = _blows(told, parts, spots.vertices[chosen], owners, weights)
-    return blows, share[contacts.steps - first]
-
-
-def _starts(counts: Integers) -> Integers:
-    """Where each of several groups begins, by how many each has."""
-    return np.cumsum(counts) - counts
+    with_points = _with_points(impacts, parts, struck.vertices, owners, weights)
+    return with_points, share[contacts.steps - first]
 
 
 def _impacts(
@@ -138,14 +143,17 @@ def _impacts(
     spots: Spots,
     owners: Integers,
     weights: Array,
-    scene: Scene,
+    step_seconds: float,
+    slowest: float,
 ) -> list[Impact | None]:
-    """The impacts of groups of contacts, by their `owners` (c,); None for what is too faint.
+    """The impacts of groups of contacts; None for a group slower than `slowest` [m/s].
 
     Parameters
     ----------
+    owners : (c,)
+        Number of each contact's group, ascending.
     weights : (c,) [s]
-        Impulse of each point over its force.
+        Impulse of each contact over its force.
     """
     firsts = np.flatnonzero(np.diff(owners, prepend=-1))
 
@@ -159,32 +167,30 @@ def _impacts(
     closing = -np.einsum("ci,ci->c", contacts.velocities, contacts.normals)
     speeds = np.maximum.reduceat(closing, firsts)
     radii = safe / np.maximum(summed(pushes * spots.curvatures), _TINY)
-    moduli = safe / np.maximum(summed(pushes * spots.giving), np.finfo(float).tiny)
+    moduli = safe / np.maximum(summed(pushes * spots.compliances), np.finfo(float).tiny)
     places = summed(pushes[:, None] * contacts.positions) / safe[:, None]
     impulses = summed(weights[:, None] * contacts.forces)
-    seconds = contacts.steps[firsts] * scene.engine.step_seconds
-    weight = float(np.linalg.norm(scene.gravity)) * scene.engine.contact_seconds
-    slowest = max(SLOWEST, HOVERING * weight)
-    found: list[Impact | None] = []
+    seconds = contacts.steps[firsts] * step_seconds
+    impacts: list[Impact | None] = []
     for i in range(len(firsts)):
         if totals[i] <= 0.0 or speeds[i] < slowest:
-            found.append(None)
+            impacts.append(None)
             continue
         speed = float(speeds[i])
         duration = min(bounce_seconds(masses[i], radii[i], moduli[i], speed), LONGEST)
         time = float(seconds[i])
-        found.append(Impact(time, pair, places[i], impulses[i], speed, duration))
-    return found
+        impacts.append(Impact(time, pair, places[i], impulses[i], speed, duration))
+    return impacts
 
 
-def _blows(
-    told: list[Impact | None],
+def _with_points(
+    impacts: list[Impact | None],
     contacts: ContactPoints,
     vertices: Integers,
     owners: Integers,
     weights: Array,
-) -> list[Blow]:
-    """Blows of impacts; points that are nearest to the same vertices become one."""
+) -> list[HertzImpact]:
+    """Impacts with their points; contacts nearest to the same two vertices become one point."""
     order = np.lexsort((vertices[:, 1], vertices[:, 0], owners))
     keys = np.column_stack([owners, vertices])[order]
     firsts = np.flatnonzero(np.any(np.diff(keys, axis=0, prepend=-2), axis=1))
@@ -193,22 +199,22 @@ def _blows(
     places = np.add.reduceat(pushes * contacts.places[order], firsts, axis=0) / totals
     forces = weights[order, None, None] * contacts.own_forces[order]
     impulses = np.add.reduceat(forces, firsts, axis=0)
-    ends = np.searchsorted(keys[firsts, 0], np.arange(len(told) + 1))
+    ends = np.searchsorted(keys[firsts, 0], np.arange(len(impacts) + 1))
     return [
-        Blow(impact, places[low:high], impulses[low:high])
-        for impact, low, high in zip(told, ends[:-1], ends[1:])
+        HertzImpact(impact, places[low:high], impulses[low:high])
+        for impact, low, high in zip(impacts, ends[:-1], ends[1:])
         if impact is not None
     ]
 
 
 def _peaks(force: Array) -> Integers:
-    """Half-open ranges of steps (n, 2), one for every peak of a force (s,) that stands out."""
+    """Half-open ranges of steps (n, 2), one for every prominent peak of a force (s,)."""
     padded = np.pad(force, 1)
     peaks = find_peaks(padded, height=0.0, plateau_size=1)[0]
     if not len(peaks):
         return np.zeros((0, 2), dtype=np.int64)
-    stands_out = peak_prominences(padded, peaks)[0]
-    return _cut(force, peaks[stands_out >= PROMINENT * padded[peaks]] - 1)
+    prominences = peak_prominences(padded, peaks)[0]
+    return _cut(force, peaks[prominences >= PROMINENT * padded[peaks]] - 1)
 
 
 @numba.njit(cache=True)

@@ -1,8 +1,8 @@
-"""How bodies begin: as fast as their scene says, and none in another one.
+"""Start of a simulation: initial velocities, and separation of bodies that overlap.
 
-The engine pushes what overlaps apart within half a bounce, so a depth d of overlap becomes a speed
-of pi d / T, T being the time of a bounce: a millimetre lets a bowl leap as high as itself.  Depths
-are those of the convex parts that touch, which may stand out of the surface that is seen.
+The engine separates overlapping bodies within half a bounce, so a depth d of overlap becomes a
+speed of pi d / T, where T is the duration of a bounce: a millimetre makes a bowl leap as high as
+itself.  Depths are those of the convex parts, which may stand out of the visible surface.
 """
 
 from __future__ import annotations
@@ -16,38 +16,38 @@ from numpy.typing import NDArray
 
 from carillon.command_line.progress import say
 from carillon.errors import UserError
-from sound.scenes.bodies import Body
+from sound.scenes.body import Body
 from sound.scenes.contact.impacts import SLOWEST
 from sound.scenes.performance import GROUND
-from sound.scenes.scene import Scene
+from sound.scenes.scene import Vector
 
 Array = NDArray[np.float64]
 
 OVERLAP = 0.01
-"""Of the longest side of the smaller one: depth up to which two are moved apart before the start;
-what is deeper is refused."""
+"""Greatest depth of an overlap that is separated, over the longest side of the smaller body; a
+deeper one is refused."""
 STEEP = 0.3
-"""Sine of the slope from which on a surface carries: of two bodies the upper one is moved then,
-else each by half."""
+"""Vertical component of the contact normal above which the upper of two bodies alone is moved;
+below it each is moved by half of the depth."""
 CLEAR = 0.01
-"""Of the depth from which bodies are moved apart: what is left once they are."""
+"""Depth at which a separation ends, over the depth at which it begins."""
 ROUNDS = 300
-"""Times that everything is moved apart at most: what is moved may get into another one."""
+"""Greatest number of separations of all bodies: one that is moved may overlap another one."""
 NAMED = 3
-"""Bodies that a sentence names."""
+"""Greatest number of bodies that a message names."""
 
 
 class Overlap(NamedTuple):
-    """Two solids that are in each other.
+    """Two overlapping bodies.
 
     Attributes
     ----------
     pair : (2,)
-        Numbers of the objects; `GROUND` for the ground, which is the second one then.
+        Numbers of the bodies; the ground, `GROUND`, is always the second one.
     depth : float [m]
-        How far the first one has to move to be clear.
+        Distance by which the first body has to move to be clear.
     normal : (3,)
-        In which direction, a unit vector.
+        Unit vector in which it has to move.
     """
 
     pair: tuple[int, int]
@@ -56,24 +56,29 @@ class Overlap(NamedTuple):
 
 
 def start(
-    mujoco: ModuleType, model: Any, data: Any, scene: Scene, bodies: Sequence[Body]
+    mujoco: ModuleType,
+    model: Any,
+    data: Any,
+    bodies: Sequence[Body],
+    gravity: Vector,
+    contact_seconds: float,
 ) -> dict[int, Array]:
-    """Set velocities, and move bodies apart that overlap a little.
+    """Set velocities, and separate bodies that overlap a little.
 
     Returns
     -------
     dict
-        How far (3,) [m] bodies were moved, by their numbers.
+        Displacements (3,) [m] of the bodies that were moved, by their numbers.
 
     Raises
     ------
     UserError
-        If two overlap by more than `OVERLAP`, with a position at which they would not, or have no
-        room to be moved apart.
+        If two bodies overlap by more than `OVERLAP`; the message names a position at which they
+        would not.  Or if there is no room to separate bodies.
     """
     mujoco.mj_forward(model, data)
     _set_velocities(model, data, bodies)
-    moved = _move_apart(mujoco, model, data, scene, bodies)
+    moved = _separated(mujoco, model, data, bodies, gravity, contact_seconds)
     mujoco.mj_forward(model, data)
     if moved:
         say(_in_words(moved, data, bodies))
@@ -81,7 +86,7 @@ def start(
 
 
 def _set_velocities(model: Any, data: Any, bodies: Sequence[Body]) -> None:
-    """Those of rotation are given about the axes of the scene."""
+    """Set the velocities of all free bodies; spins are about the axes of the scene."""
     for number, body in enumerate(bodies):
         first = model.body_dofadr[number + 1]
         if first >= 0:
@@ -90,35 +95,37 @@ def _set_velocities(model: Any, data: Any, bodies: Sequence[Body]) -> None:
             data.qvel[first + 3 : first + 6] = np.array(body.entry.spin) @ turned
 
 
-def _move_apart(
-    mujoco: ModuleType, model: Any, data: Any, scene: Scene, bodies: Sequence[Body]
+def _separated(
+    mujoco: ModuleType,
+    model: Any,
+    data: Any,
+    bodies: Sequence[Body],
+    gravity: Vector,
+    contact_seconds: float,
 ) -> dict[int, Array]:
+    """Displacements (3,) [m] of the bodies that had to be moved, by their numbers."""
     moved: dict[int, Array] = {}
-    least = _unheard_depth(scene)
+    # Depth that is left: that of a body at rest under gravity, or of an impact that is not heard.
+    bounce = contact_seconds / np.pi
+    least = max(float(np.linalg.norm(gravity)) * bounce, SLOWEST) * bounce
     for _ in range(ROUNDS):
-        found = [each for each in _overlaps(model, data) if each.depth > least]
-        if not found:
+        overlaps = [each for each in _overlaps(model, data) if each.depth > least]
+        if not overlaps:
             return moved
         if not moved:
             least *= CLEAR
-            _require_shallow(mujoco, model, data, found, bodies, least)
-        for each in found:
-            for number, way in zip(each.pair, _ways(each, scene, bodies)):
+            _require_shallow(mujoco, model, data, overlaps, bodies, least)
+        for each in overlaps:
+            for number, way in zip(each.pair, _ways(each, gravity, bodies)):
                 if way.any():
                     moved[number] = moved.get(number, np.zeros(3)) + way
                     _move(model, data, number, way)
         mujoco.mj_forward(model, data)
-    names = " and ".join(_name(number, bodies) for number in found[0].pair)
+    names = " and ".join(_name(number, bodies) for number in overlaps[0].pair)
     raise UserError(
-        f"{names} overlap by {1e3 * found[0].depth:.3g} mm at the start and are too closely packed "
-        "to be moved apart; give them more room"
+        f"{names} overlap by {1e3 * overlaps[0].depth:.3g} mm at the start and are too closely "
+        "packed to be moved apart; give them more room"
     )
-
-
-def _unheard_depth(scene: Scene) -> float:
-    """Depth [m] that is left: what gravity presses a body in by, or too little to be heard."""
-    bounce = scene.engine.contact_seconds / np.pi
-    return max(float(np.linalg.norm(scene.gravity)) * bounce, SLOWEST) * bounce
 
 
 def _overlaps(model: Any, data: Any) -> list[Overlap]:
@@ -141,15 +148,17 @@ def _require_shallow(
     mujoco: ModuleType,
     model: Any,
     data: Any,
-    found: Sequence[Overlap],
+    overlaps: Sequence[Overlap],
     bodies: Sequence[Body],
     least: float,
 ) -> None:
+    """Refuse overlaps deeper than `OVERLAP`."""
+
     def excess(each: Overlap) -> float:
         sides = [_longest_side(bodies[number]) for number in each.pair if number != GROUND]
         return each.depth / (OVERLAP * min(sides))
 
-    worst = max(found, key=excess)
+    worst = max(overlaps, key=excess)
     if excess(worst) <= 1.0:
         return
     names = " and ".join(_name(number, bodies) for number in worst.pair)
@@ -160,7 +169,7 @@ def _require_shallow(
     place = _clear_place(mujoco, model, data, worst.pair, free, least)
     if place is None:
         raise UserError(f"{start}; move them apart")
-    # Rounded away from the other one, so that the place can be written as it is told.
+    # Rounded away from the other body, so that the rounded position is clear, too.
     rounded = [_rounded(x, way) for x, way in zip(place, place - begin)]
     if second == GROUND:
         raise UserError(f"{start}; it rests on it at a height (z) of {rounded[2]} m")
@@ -172,13 +181,13 @@ def _require_shallow(
 def _clear_place(
     mujoco: ModuleType, model: Any, data: Any, pair: tuple[int, int], free: int, least: float
 ) -> Array | None:
-    """Where (3,) [m] one of a pair, moved alone, is clear of the other one."""
+    """Position (3,) [m] at which body `free` of a pair, moved alone, is clear of the other one."""
     side = 1.0 if free == pair[0] else -1.0
     for _ in range(ROUNDS):
-        found = [each for each in _overlaps(model, data) if each.pair == pair]
-        if not found or found[0].depth <= least:
+        overlap = next((each for each in _overlaps(model, data) if each.pair == pair), None)
+        if overlap is None or overlap.depth <= least:
             return np.array(data.xpos[free + 1])
-        _move(model, data, free, side * found[0].depth * found[0].normal)
+        _move(model, data, free, side * overlap.depth * overlap.normal)
         mujoco.mj_forward(model, data)
     return None
 
@@ -188,11 +197,11 @@ def _move(model: Any, data: Any, number: int, way: Array) -> None:
     data.qpos[first : first + 3] += way
 
 
-def _ways(each: Overlap, scene: Scene, bodies: Sequence[Body]) -> tuple[Array, Array]:
-    """How far (3,) [m] either is moved."""
+def _ways(each: Overlap, gravity: Vector, bodies: Sequence[Body]) -> tuple[Array, Array]:
+    """Displacements (3,) [m] of both bodies."""
     apart = each.depth * each.normal
     fixed = [number == GROUND or bodies[number].entry.fixed for number in each.pair]
-    down = np.array(scene.gravity)
+    down = np.array(gravity)
     steepness = -float(each.normal @ down) / max(float(np.linalg.norm(down)), 1e-12)
     if fixed[1] or (steepness > STEEP and not fixed[0]):
         return apart, np.zeros(3)
@@ -210,7 +219,7 @@ def _name(number: int, bodies: Sequence[Body]) -> str:
 
 
 def _rounded(value: float, direction: float) -> str:
-    """A coordinate [m] to a hundredth of a millimetre, rounded in a direction if there is one."""
+    """A coordinate [m] rounded to a hundredth of a millimetre, up or down by the direction."""
     if abs(direction) < 1e-9:
         return f"{value:.5g}"
     hundredths = np.ceil(1e5 * value) if direction > 0.0 else np.floor(1e5 * value)
@@ -218,11 +227,11 @@ def _rounded(value: float, direction: float) -> str:
 
 
 def _in_words(moved: dict[int, Array], data: Any, bodies: Sequence[Body]) -> str:
-    told = []
+    parts = []
     for number, way in sorted(moved.items())[:NAMED]:
         place = ", ".join(f"{x:.5g}" for x in data.xpos[number + 1])
-        told.append(
+        parts.append(
             f"{_name(number, bodies)} by {1e3 * float(np.linalg.norm(way)):.3g} mm to [{place}]"
         )
     rest = f" and {len(moved) - NAMED} more" if len(moved) > NAMED else ""
-    return f"what overlaps at the start is moved apart: {', '.join(told)}{rest}"
+    return f"what overlaps at the start is moved apart: {', '.join(parts)}{rest}"

@@ -1,4 +1,4 @@
-"""Where on their surfaces two solids touch, and how stiff they are there."""
+"""The two surfaces at points of contact: nearest vertices, curvature and compliance."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from sound.scenes.bodies import Body
+from sound.scenes.body import Body
 from sound.scenes.contact.contacts import ContactPoints
 from sound.scenes.hertz import compliance
 from sound.scenes.materials import NamedMaterial
@@ -18,32 +18,32 @@ Array = NDArray[np.float64]
 
 
 class Spots(NamedTuple):
-    """What two surfaces are like at c points of contact.
+    """Two surfaces at c points of contact.
 
     Attributes
     ----------
     vertices : (c, 2)
-        The nearest of each surface; `GROUND` for the ground.
+        Nearest vertex of each surface; `GROUND` for the ground.
     curvatures : (c,) [1/m]
-        1 / R, of the effective radius.
-    giving : (c,) [1/Pa]
-        1 / E, of the effective modulus; see `sound.scenes.hertz`.
+        1 / R of the effective radius R.
+    compliances : (c,) [1/Pa]
+        1 / E of the effective modulus E; see `sound.scenes.hertz`.
     """
 
     vertices: NDArray[np.integer]
     curvatures: Array
-    giving: Array
+    compliances: Array
 
 
 class Touch:
-    """Surfaces of a scene, as contacts find them.
+    """The surfaces of all bodies and of the ground, searched by position.
 
     Parameters
     ----------
     bodies
-        Of the scene.
+        All bodies of the scene.
     ground
-        What the ground is made of, which is flat.
+        Material of the ground, which is flat.
     """
 
     def __init__(self, bodies: list[Body], ground: NamedMaterial) -> None:
@@ -54,16 +54,16 @@ class Touch:
         self._trees = [trees[id(body.shape)] for body in bodies]
 
     def spots(self, pair: tuple[int, int], contacts: ContactPoints) -> Spots:
-        """What the surfaces of a pair of objects are like where they touch."""
+        """The surfaces of a pair of bodies at their points of contact."""
         vertices = np.full((len(contacts), 2), GROUND)
-        curvatures, giving = np.zeros(len(contacts)), np.zeros(len(contacts))
+        curvatures, compliances = np.zeros(len(contacts)), np.zeros(len(contacts))
         for side, number in enumerate(pair):
             if number == GROUND:
-                giving += self._ground
+                compliances += self._ground
                 continue
             body = self._bodies[number]
             near = self._trees[number].query(contacts.places[:, side])[1]
             vertices[:, side] = near
             curvatures += 1.0 / body.shape.radii[near]
-            giving += body.compliance[near]
-        return Spots(vertices, curvatures, giving)
+            compliances += body.compliance[near]
+        return Spots(vertices, curvatures, compliances)

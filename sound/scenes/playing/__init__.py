@@ -1,1 +1,1 @@
-"""From a scene to what is seen and heard of it."""
+"""Scenes played: from a description to motion and sound."""

@@ -1,9 +1,8 @@
-"""Plays a scene: bodies move, contacts excite modes, a head hears them."""
+"""Plays a scene: bodies move, contacts excite their modes, two ears hear them."""
 
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,40 +11,38 @@ from carillon.command_line.progress import say
 from carillon.errors import UserError
 from carillon.processes.cores import allowed_threads
 from carillon.processes.serial import serial_blas
-from carillon.processes.threads import in_parallel
-from sound.scenes.audible.excitation import excitation
-from sound.scenes.audible.hearing import Head, along, heard, towards
-from sound.scenes.audible.loudness import CHANNELS, click, clip_noise, mode_gains, voice
-from sound.scenes.audible.resting_contact import rests_of
-from sound.scenes.audible.ringing import ring
-from sound.scenes.audible.sustained_contact import pressed
-from sound.scenes.bodies import Body, body_of
-from sound.scenes.contact.engine import Course, simulate
-from sound.scenes.contact.impacts import Blow, Pressing, told_apart
+from sound.scenes.audible.loudness import voice
+from sound.scenes.bodies import bodies_of
+from sound.scenes.contact.engine import simulate
+from sound.scenes.contact.impacts import split_impacts
 from sound.scenes.contact.touch import Touch
-from sound.scenes.performance import GROUND, Performance
+from sound.scenes.ground_plane import GroundPlane
+from sound.scenes.performance import Performance
 from sound.scenes.picture import Appearance, Picture
+from sound.scenes.playing.scene_sound import SceneSound, gains_of, sustained_forces
 from sound.scenes.playing.viewpoint import camera_of, head_of
-from sound.scenes.scene import ObjectEntry, Scene
+from sound.scenes.scene import Scene
 
 Array = NDArray[np.float64]
 
-AT_ONCE = 16
-"""Bodies whose sounds are kept before they are added up."""
 FULL = 0.99
-"""Largest magnitude of a sound that is scaled to full scale: what rounds it does not reach 1."""
+"""Largest magnitude of a sound that is scaled to full scale; rounding does not take it to 1."""
 
 
 @serial_blas
 def perform(scene: Scene, threads: int | None = None, visible: bool = True) -> Performance:
-    """A scene from its beginning to its end; the same, bit for bit, on any number of threads.
+    """Play a scene from its beginning to its end.
+
+    The result is the same, bit for bit, on any number of threads.
 
     Parameters
     ----------
+    scene
+        The scene.
     threads
-        That bodies are shared among; as many as there are cores unless told.
+        Number of threads that share the bodies; that of the cores if None.
     visible
-        Whether progress is told.
+        Whether progress is shown.
 
     Raises
     ------
@@ -53,43 +50,54 @@ def perform(scene: Scene, threads: int | None = None, visible: bool = True) -> P
         If an object is unusable, two overlap at the start, or nothing touches anything.
     """
     threads = threads or allowed_threads()
+    seconds, engine, settings = scene.seconds, scene.engine, scene.sound
     clock = Clock()
-    bodies = bodies_of(scene)
+    bodies = bodies_of(scene.objects)
     clock.lap("bodies")
-    course = simulate(scene, bodies, visible)
+    ground = GroundPlane(scene.ground, scene.ground_material)
+    course = simulate(bodies, seconds, engine, scene.gravity, ground, visible)
     clock.lap("motion")
     if not len(course.contacts):
         raise UserError(
-            f"nothing touches anything within {scene.seconds:g} s, so nothing sounds; let the "
+            f"nothing touches anything within {seconds:g} s, so nothing sounds; let the "
             "scene last longer, or let objects meet"
         )
-    blows, lasting = told_apart(course.contacts, scene, Touch(bodies, scene.ground_material))
+    touch = Touch(bodies, ground.material)
+    impacts, contacts = split_impacts(course.contacts, touch, engine, scene.gravity)
     clock.lap("contacts")
-    player = _Player(scene, bodies, course, blows, lasting, threads)
-    sound = player.heard_together(threads)
+    camera = camera_of(scene.camera, bodies, course.motion)
+    player = SceneSound(
+        bodies,
+        course,
+        impacts,
+        contacts,
+        sustained_forces(
+            contacts, bodies, ground.material, seconds, engine, settings.rate, scene.seed, threads
+        ),
+        gains_of(bodies, settings.radiation, threads),
+        head_of(scene.listener, camera),
+        settings,
+        engine,
+        round(seconds * settings.rate),
+    )
+    sound = player.together(threads)
     clock.lap("sound")
-    scale = _scale(scene, float(np.abs(sound).max(initial=0.0)))
+    scale = _scale(settings.full_scale, float(np.abs(sound).max(initial=0.0)))
     voices = [
-        None if body.solid is None else voice(body, scale * player.gains[number])
-        for number, body in enumerate(bodies)
+        None if body.solid is None else voice(body, scale * gains)
+        for body, gains in zip(bodies, player.gains)
     ]
     clock.lap("voices")
+    surfaces = [
+        Appearance(each.entry.name, each.shape.vertices, each.shape.faces, each.entry.colour)
+        for each in bodies
+    ]
     return Performance(
         scene.title,
-        Picture(
-            [
-                Appearance(
-                    each.entry.name, each.shape.vertices, each.shape.faces, each.entry.colour
-                )
-                for each in bodies
-            ],
-            course.motion,
-            scene.ground,
-            player.camera,
-        ),
+        Picture(surfaces, course.motion, scene.ground, camera),
         scale * sound,
-        scene.sound.rate,
-        [blow.impact for blow in blows],
+        settings.rate,
+        [each.impact for each in impacts],
         voices,
         scale,
         clock.seconds,
@@ -99,148 +107,30 @@ def perform(scene: Scene, threads: int | None = None, visible: bool = True) -> P
 
 
 class Clock:
-    """Wall time of one thing after the other."""
+    """Wall time of steps, one after the other."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
         self._last = time.perf_counter()
 
-    def lap(self, what: str) -> None:
-        """What took the time since the last lap."""
+    def lap(self, step: str) -> None:
+        """Note the time since the last lap as that of a step."""
         now = time.perf_counter()
-        self.seconds[what] = now - self._last
+        self.seconds[step] = now - self._last
         self._last = now
 
 
-def bodies_of(scene: Scene) -> list[Body]:
-    """Bodies of all objects; those that are alike but for their places share their modes.
-
-    Raises
-    ------
-    UserError
-        See `sound.scenes.bodies.body_of`.
-    """
-    made: dict[ObjectEntry, Body] = {}
-    bodies = []
-    for entry in scene.objects:
-        nowhere = (0.0, 0.0, 0.0)
-        alike = replace(
-            entry, name="", position=nowhere, rotation=nowhere, velocity=nowhere, spin=nowhere
-        )
-        if alike not in made:
-            made[alike] = body_of(entry)
-        body = made[alike]
-        bodies.append(replace(body, entry=replace(entry, radius=body.entry.radius)))
-    return bodies
-
-
-class _Player:
-    """Lets bodies sound, one at a time."""
-
-    def __init__(
-        self,
-        scene: Scene,
-        bodies: list[Body],
-        course: Course,
-        blows: list[Blow],
-        lasting: list[Pressing],
-        threads: int,
-    ) -> None:
-        self.scene, self.bodies, self.course = scene, bodies, course
-        self.lasting = lasting
-        self.blows: list[list[Blow]] = [[] for _ in bodies]
-        for blow in blows:
-            for number in blow.impact.pair:
-                if number != GROUND:
-                    self.blows[number].append(blow)
-        found = in_parallel(pressed, [(each, bodies, scene) for each in lasting], threads)
-        self.pressings = [each for each in found if each is not None]
-        self.count = round(scene.seconds * scene.sound.rate)
-        self.camera = camera_of(scene, bodies, course.motion)
-        self.head: Head = head_of(scene, self.camera)
-        self.gains = _gains(bodies, scene.sound.radiation, threads)
-
-    def heard_together(self, threads: int) -> Array:
-        """What two ears (count, 2) hear of all bodies, added up in their order."""
-        sound = np.zeros((self.count, 2))
-        for first in range(0, len(self.bodies), AT_ONCE):
-            last = min(first + AT_ONCE, len(self.bodies))
-            for part in in_parallel(self.heard, [(each,) for each in range(first, last)], threads):
-                sound += part
-        return sound
-
-    def heard(self, number: int) -> Array:
-        """What two ears (count, 2) hear of a body."""
-        source = self.source(number)
-        if not self.scene.sound.space:
-            return np.repeat(source[:, None], 2, axis=1)
-        return heard(source, self.course.motion, number, self.head, self.scene.sound.rate)
-
-    def source(self, number: int) -> Array:
-        """Pressure times distance (count,) [Pa m] of a body, in the direction of the head."""
-        scene, body, motion = self.scene, self.bodies[number], self.course.motion
-        rate = scene.sound.rate
-        times, directions = motion.times, towards(motion, number, self.head)
-        total = np.zeros(self.count)
-        if scene.sound.radiation:
-            jerked = click(number, body, self.blows[number], self.count, rate)
-            total += along(jerked, rate * times, directions)
-        if body.solid is None:
-            return total
-        moved = body.motion(body.shape.vertices)
-        resting = self.course.resting[:, number]
-        rests = rests_of(number, moved, self.lasting, times, resting, scene)
-        act = excitation(
-            number,
-            body,
-            moved,
-            self.blows[number],
-            self.pressings,
-            rests,
-            self.count,
-            rate,
-            signed=scene.sound.radiation and body.listening is None,
-            damped=scene.sound.contact_damping,
-        )
-        gains = self.gains[number]
-        modes = ring(body.solid.frequencies, body.solid.dampings, gains, act, self.count, rate)
-        total += modes[:, 0]
-        if gains[:, 1:].any():
-            turned = np.einsum("tij,ti->tj", _matrices(motion.rotations[:, number]), directions)
-            total += along(modes[:, 1:], rate * times, turned)
-        if body.listening is not None and scene.sound.noise:
-            own = self.blows[number]
-            total += clip_noise(number, body, own, float(gains[0, 0]), self.count, rate)
-        return total
-
-
-def _gains(bodies: list[Body], radiation: bool, threads: int) -> list[Array]:
-    """Gains of the modes of all bodies; those of bodies that are alike are found once."""
-    sounding = {id(body.solid): body for body in bodies if body.solid is not None}
-    arguments = [(body, radiation) for body in sounding.values()]
-    found = dict(zip(sounding, in_parallel(mode_gains, arguments, threads)))
-    levels = [10.0 ** (body.entry.level / 20.0) for body in bodies]
-    silent = np.zeros((0, CHANNELS))
-    return [found.get(id(body.solid), silent) * level for body, level in zip(bodies, levels)]
-
-
-def _matrices(quaternions: Array) -> Array:
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_quat(quaternions[:, [1, 2, 3, 0]]).as_matrix())
-
-
-def _scale(scene: Scene, peak: float) -> float:
-    """Full scale per pascal."""
-    wanted = scene.sound.full_scale
+def _scale(full_scale: float | None, peak: float) -> float:
+    """Full scale per pascal, from the pressure [Pa] of full scale and of the loudest sample."""
     if peak == 0.0:
         return 1.0
-    if wanted is None:
+    if full_scale is None:
         return FULL / peak
-    if peak > FULL * wanted:
+    if peak > FULL * full_scale:
         say(
-            f"the loudest sample has {peak:.3g} Pa, more than full_scale ({wanted:g} Pa): all is "
-            f"{20.0 * np.log10(peak / (FULL * wanted)):.1f} dB fainter, so that nothing clips"
+            f"the loudest sample has {peak:.3g} Pa, more than full_scale ({full_scale:g} Pa): all "
+            f"is {20.0 * np.log10(peak / (FULL * full_scale)):.1f} dB fainter, so that "
+            "nothing clips"
         )
         return FULL / peak
-    return 1.0 / wanted
+    return 1.0 / full_scale

@@ -1,4 +1,4 @@
-"""A row of bars, each a step lower than the one before, that a ball strikes in turn."""
+"""A tune: a ball bounces down a row of bars, one for each note."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from sound.scenes.scene import Scene, scene_of
 MOST_NOTES = 64
 GRAVITY = 9.81
 BEAT_SECONDS = 0.36
-"""Time from one bar to the next."""
+"""Time from one bar to the next [s]."""
 RESTITUTION = 0.8
 GAP = 0.02
-"""Between bars [m]."""
+"""Gap between neighbouring bars [m]."""
 BALL_RADIUS = 0.012
 AFTERWARDS_SECONDS = 2.5
-"""Time that the last bar rings."""
+"""Time after the last note, in which its bar rings [s]."""
 BAR = {
     "mesh": "builtin:bar",
     "material": "aluminium",
@@ -38,8 +38,8 @@ def tune_of(notes: str) -> Scene:
     """The scene of a tune, a bar for every note.
 
     A ball that lands on a bar with the speed w leaves it with e w, and is back at the bar's height
-    after 2 e w / g.  Each bar is lower than the one before by as much as makes up for what a bounce
-    takes, w^2 (1 - e^2) / (2 g), so all bounces are alike and take (1 + e) w / g.
+    after 2 e w / g.  Each bar is lower than the one before by w^2 (1 - e^2) / (2 g), which makes up
+    for the loss of a bounce, so all bounces are alike and take (1 + e) w / g.
 
     Parameters
     ----------

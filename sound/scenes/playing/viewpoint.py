@@ -1,4 +1,4 @@
-"""From where a scene is seen and heard, where it does not say."""
+"""Camera and head of a scene, where its description leaves them out."""
 
 from __future__ import annotations
 
@@ -6,41 +6,41 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sound.scenes.audible.hearing import Head
-from sound.scenes.bodies import Body
+from sound.scenes.body import Body
 from sound.scenes.picture import Camera, Motion
-from sound.scenes.scene import Scene
+from sound.scenes.scene import CameraEntry, ListenerEntry
 
 Array = NDArray[np.float64]
 
 FROM = np.array([0.25, -1.0, 0.42]) / np.linalg.norm([0.25, -1.0, 0.42])
-"""Direction to the camera: in front, a little to the right and above."""
+"""Unit vector to the camera: in front, a little to the right and above."""
 _RIGHT = np.cross([0.0, 0.0, 1.0], FROM) / np.hypot(FROM[0], FROM[1])
 AXES = np.stack([_RIGHT, np.cross(FROM, _RIGHT)])
-"""To the right and up in the picture."""
+"""Unit vectors to the right and up in the picture."""
 ASPECT = 16.0 / 9.0
-"""Width over height of what a camera sees at least."""
+"""Width over height of the part of the picture that shows the scene."""
 ROOM = 1.15
-"""Around what is seen."""
+"""Size of the picture over that of the scene in it."""
 MOST = 0.8
-"""Share of all places, the nearest to their median, that must be seen; what rolls away need not."""
+"""Share of all positions that the picture shows, those nearest to the median; bodies that roll away
+are left out."""
 
 
-def camera_of(scene: Scene, bodies: list[Body], motion: Motion) -> Camera:
-    """The camera of a scene, at a place that sees nearly all unless told.
+def camera_of(entry: CameraEntry, bodies: list[Body], motion: Motion) -> Camera:
+    """The camera of a scene; it shows nearly all of the motion unless its entry says otherwise.
 
-    In a picture with the axes a, a ball of radius r at the place x is seen from the distance d of
-    the point u that is looked at if |a.(x - u)| + r <= s (d - b.(x - u)), where b points to the
+    From the distance d to the target u, a ball of radius r at x is inside the picture if
+    |a.(x - u)| + r <= s (d - b.(x - u)) for both axes a of the picture, where b points to the
     camera and s is the slope of the picture's edge.  Along one axis, d is least where the balls on
-    either side need the same.
+    either side need the same distance.
     """
-    entry = scene.camera
     if entry.position is not None and entry.target is not None:
         return Camera(entry.position, entry.target, entry.degrees)
     sizes = np.array([np.linalg.norm(body.shape.vertices, axis=1).max() for body in bodies])
     places = motion.positions.reshape(-1, 3)
     away = np.linalg.norm(places - np.median(places, axis=0), axis=1)
     near = away <= np.quantile(away, MOST)
-    near[: len(bodies)] = True  # where all begin
+    near[: len(bodies)] = True  # all initial positions
     seen, reach = places[near], np.resize(sizes, len(places))[near]
     middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
     if entry.position is not None:
@@ -57,9 +57,8 @@ def camera_of(scene: Scene, bodies: list[Body], motion: Motion) -> Camera:
     return Camera(_three(target + distance * FROM), _three(target), entry.degrees)
 
 
-def head_of(scene: Scene, camera: Camera) -> Head:
-    """Who hears a scene: at the camera, facing what it looks at, unless told."""
-    entry = scene.listener
+def head_of(entry: ListenerEntry, camera: Camera) -> Head:
+    """The listener's head: at the camera and facing its target unless the entry says otherwise."""
     facing = np.array(camera.target if entry.facing is None else entry.facing)
     if entry.path is not None:
         path = np.array(entry.path)

@@ -7,12 +7,14 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from sound.synthesis.sinusoids import sampled_exponents
+
 Array = NDArray[np.float64]
 
 BLOCK = 512
-"""Samples that one matrix product computes for all modes."""
+"""Number of samples that one matrix product computes for all modes."""
 SILENT = -80.0
-"""Natural logarithm of an amplitude that counts as zero; 1e-35, of which nothing is heard."""
+"""Natural logarithm of the largest amplitude that counts as zero; 1e-35 cannot be heard."""
 
 
 class Bank:
@@ -35,9 +37,7 @@ class Bank:
 
     def __init__(self, frequencies: Array, dampings: Array, rate: int) -> None:
         self.rate = rate
-        self._heard = frequencies < rate / 2.0
-        heard = np.where(self._heard, frequencies, 0.0)
-        self._exponents = (-dampings + 2j * np.pi * heard) / rate
+        self._exponents, self._heard = sampled_exponents(frequencies, dampings, rate)
         self._state = np.zeros(len(frequencies), dtype=complex)
         turns = np.exp(np.arange(BLOCK)[:, None] * self._exponents)
         self._kernel = np.concatenate([turns.imag, turns.real], axis=1)
@@ -49,7 +49,7 @@ class Bank:
     def advance(self, count: int) -> Array:
         """The next `count` samples."""
         begins = np.arange(0, count, BLOCK)[:, None] * self._exponents
-        # Numbers too small for the processor's normal format would slow the product down.
+        # Denormal numbers would slow the product down.
         states = self._state * np.where(begins.real > SILENT, np.exp(begins), 0.0)
         samples = np.concatenate([states.real, states.imag], axis=1) @ self._kernel.T
         last = count * self._exponents
@@ -63,7 +63,7 @@ def ring(bank: Bank, strikes: Iterable[tuple[float, Array]], count: int) -> Arra
     Parameters
     ----------
     strikes
-        Time [s] and amplitudes (k,) of each; a time between samples is kept exactly.
+        Time [s] and amplitudes (k,) of each strike; times between samples are kept exactly.
 
     Examples
     --------

@@ -1,9 +1,8 @@
-"""Modes that are struck, pressed and damped, sample by sample: what a body sounds like.
+"""Modes driven by strikes and lasting forces, with damping that changes over time.
 
-Each mode is a complex number that turns and decays with every sample, as in
-`sound.rendering.bank`, whose samples these are when it is struck: s = Im x.  Forces are added to
-it before a sample is taken.  Samples are worked out in blocks, within which damping does not
-change, all modes side by side.
+As in `sound.synthesis.bank`, each mode is a complex number x that turns and decays from sample to
+sample, and its sound is Im x.  Forces are added to x before a sample is taken.  Samples are
+computed in blocks, within which the damping is constant, for all modes side by side.
 """
 
 from __future__ import annotations
@@ -16,40 +15,41 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.response.response import half_sine
+from sound.synthesis.sinusoids import sampled_exponents
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 BLOCK = 64
-"""Samples that a force's place and a damping hold for."""
+"""Number of samples in a block, in which places of forces and dampings are constant."""
 SILENT = 1e-30
-"""Squared magnitude, over that of the loudest force on any mode, below which a mode is silent."""
+"""Squared magnitude, over that of the greatest force on any mode, below which a mode is silent."""
 
 
 @dataclass(frozen=True)
 class Excitation:
-    """All that acts on the K modes of a body.
+    """Strikes, lasting forces and added damping of the K modes of a body.
 
     Attributes
     ----------
     firsts : (S,)
-        Sample at or after which each of S strikes begins, ascending.
+        Numbers of the first samples of S strikes, ascending.
     since : (S,)
-        Samples between its beginning and that one, from 0 to 1.
+        Time from the beginning of each strike to its first sample, in samples from 0 to 1.
     durations : (S,) [s]
-        Of its force, half a sine.
+        Durations of the strikes' forces, half a sine each.
     amplitudes : (S, K)
-        What it lets the modes sound with.
+        Amplitudes of the modes after each strike.
     blocks : (P,)
-        Number of the block of samples in which each of P presses acts, ascending.
+        Numbers of the blocks in which P lasting forces act, ascending.
     courses : (P, BLOCK)
-        How its force goes.
+        Each lasting force, sample by sample.
     pushes : (P, K) [1/s]
-        What a second of its force would let the modes sound with.
+        Amplitudes of the modes after a second of each lasting force at magnitude 1.
     damped : (D,)
-        Numbers of the blocks in which modes are damped by what a body lies on, ascending.
+        Numbers of the blocks with added damping, ascending.
     dampings : (D, K) [1/s]
-        By how much.
+        Added dampings of the modes.
     """
 
     firsts: Integers
@@ -66,23 +66,22 @@ class Excitation:
 def ring(
     frequencies: Array, dampings: Array, gains: Array, act: Excitation, count: int, rate: int
 ) -> Array:
-    """Samples (count, C) of a body.
+    """Samples (count, C) of driven modes.
 
     Parameters
     ----------
     frequencies, dampings : (K,) [Hz], [1/s]
-        Of its modes; those from half the rate on stay silent.
+        Frequencies and dampings; modes from half the rate on stay silent.
     gains : (K, C)
-        How loud each is in each of C channels.
+        Gain of each mode in each of C channels.
     act
-        What acts on them.
+        Forces on the modes, and added damping.
     count : int
-        Samples.
+        Number of samples.
     rate : int [Hz]
         Samples per second.
     """
-    heard = frequencies < rate / 2.0
-    exponents = (-dampings + 2j * np.pi * np.where(heard, frequencies, 0.0)) / rate
+    exponents, heard = sampled_exponents(frequencies, dampings, rate)
     begun = act.amplitudes * heard * np.exp(act.since[:, None] * exponents)
     pulses = [pulse(seconds, rate) for seconds in act.durations]
     lengths = np.array([len(pulse) for pulse in pulses], dtype=np.int64)

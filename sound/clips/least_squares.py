@@ -1,8 +1,7 @@
-"""Damped sinusoids: their samples, and least-squares fits of them to a signal.
+"""Least-squares fits of damped sinusoids to a signal; `sound.synthesis.sinusoids` has the symbols.
 
-A signal is Re sum_k c_k exp(lambda_k n) at sample n = 0, 1, ..., with complex `coefficients` c and
-`exponents` lambda = (-d + 2 pi i f) / rate.  As sums of products of two such terms have closed
-forms, the normal equations of a fit cost nothing beside its right-hand side.
+Sums of products of two damped sinusoids have closed forms, so the normal equations of a fit cost
+nothing beside its right-hand side.
 """
 
 from __future__ import annotations
@@ -11,102 +10,21 @@ import numpy as np
 import scipy.linalg as la
 from numpy.typing import NDArray
 
+from sound.synthesis.sinusoids import correlations, superposed
+
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_BLOCK = 512
-_SILENT = -300.0
-"""Natural logarithm of what counts as zero."""
 _MOST_GROWTH = 40.0
-"""Nepers by which a sinusoid may grow within the signal, beyond which sums overflow."""
+"""Greatest growth of a sinusoid within the signal [nepers]; sums would overflow beyond."""
 _CLOSEST = 1e-3
+"""Least magnitude of an exponent, times the number of samples, in the closed forms."""
 _FIRST_DAMPING, _LEAST_DAMPING = 1e-3, 1e-6
+"""Levenberg-Marquardt damping of the first step, and the least after a step that failed."""
 _CONVERGED = 1e-9
+"""Relative decrease of the squared rest at which steps end."""
 _WELL_CONDITIONED = 1e-5
-"""Least diagonal entry of a Cholesky factor with which a matrix is inverted."""
-
-
-def exponents_of(frequencies: Array, dampings: Array, rate: int) -> Complex:
-    """Exponents (k,) per sample of frequencies [Hz] and dampings [1/s]."""
-    return np.asarray((-dampings + 2j * np.pi * frequencies) / rate)
-
-
-def damped_sinusoids(
-    frequencies: Array, dampings: Array, amplitudes: Array, phases: Array, rate: int, count: int
-) -> Array:
-    """Samples (count,) of sum_k a_k exp(-d_k t) sin(2 pi f_k t + theta_k), t = n / rate.
-
-    Parameters
-    ----------
-    frequencies : (k,) [Hz]
-        f.
-    dampings : (k,) [1/s]
-        d.
-    amplitudes : (k,)
-        a, in any unit.
-    phases : (k,) [rad]
-        theta.
-    rate : int [Hz]
-        Samples per second.
-    count : int
-        Number of samples.
-
-    Examples
-    --------
-    >>> one = np.ones(1)
-    >>> damped_sinusoids(one, 0.0 * one, one, 0.0 * one, rate=4, count=5).round(6) + 0.0
-    array([ 0.,  1.,  0., -1.,  0.])
-    """
-    coefficients = -1j * np.asarray(amplitudes) * np.exp(1j * np.asarray(phases))
-    return superposed(exponents_of(frequencies, dampings, rate), coefficients, count)
-
-
-def superposed(exponents: Complex, coefficients: Complex, count: int) -> Array:
-    """Samples (count,) of Re sum_k c_k exp(lambda_k n)."""
-    cosines, sines, starts = _turns(exponents, count)
-    weights = starts * coefficients
-    blocks = _real(weights) @ cosines.T - _real(-1j * weights) @ sines.T
-    return np.asarray(blocks.ravel()[:count])
-
-
-def correlations(exponents: Complex, signal: Array) -> Complex:
-    """Sums (2, k) over the samples of signal[n] exp(lambda_k n) and of the same times n."""
-    cosines, sines, starts = _turns(exponents, len(signal))
-    blocks = np.zeros((len(starts), len(cosines)))
-    blocks.ravel()[: len(signal)] = signal
-    later = blocks * np.arange(len(cosines))
-    first = np.arange(len(starts)) * len(cosines)
-    plain = starts * (blocks @ cosines + 1j * (blocks @ sines))
-    slope = starts * (later @ cosines + 1j * (later @ sines)) + first[:, None] * plain
-    return np.stack([plain.sum(axis=0), slope.sum(axis=0)])
-
-
-def _turns(exponents: Complex, count: int) -> tuple[Array, Array, Complex]:
-    """Both parts (b, k) of exp(lambda_k n) in the first block of samples n, and its value (m, k) at
-    the first of each block.
-
-    The value at any sample is a product of the two.
-    """
-    size = min(_BLOCK, max(count, 1))
-    within = _powers(exponents, size)
-    starts = _powers(size * exponents, -(-count // size))
-    return _real(within), _real(-1j * within), starts
-
-
-def _powers(exponents: Complex, count: int) -> Complex:
-    """exp(lambda_k n) (count, k) for n = 0 .. count - 1, each from one half as far."""
-    powers = np.ones((1, len(exponents)), complex)
-    while len(powers) < count:
-        turn = len(powers) * exponents
-        # Numbers too small for the processor's normal format would slow the products down.
-        turn = np.where(turn.real > _SILENT, np.exp(turn), 0.0)
-        powers = np.concatenate([powers, turn * powers[: count - len(powers)]])
-    return powers
-
-
-def _real(values: Complex) -> Array:
-    """Real parts side by side, as BLAS wants them."""
-    return np.ascontiguousarray(values.real)
+"""Least diagonal entry of a Cholesky factor by which a matrix is inverted."""
 
 
 def normal_matrix(exponents: Complex, directions: Complex, count: int, order: int = 2) -> Array:
@@ -153,16 +71,16 @@ def _power_sums(exponents: Complex, count: int) -> tuple[Complex, Complex, Compl
 
 
 def solved(matrix: Array, right: Complex, damping: float = 1e-13) -> Complex:
-    """Complex unknowns w of real normal equations, Levenberg-Marquardt damped.
+    """Complex unknowns w of real normal equations with Levenberg-Marquardt damping.
 
     Parameters
     ----------
     matrix : (2 n, 2 n)
         See `normal_matrix`.
     right : (n,) complex
-        A^T r for a signal r.
+        A^T r of a signal r.
     damping : float
-        Share of the diagonal that is added to it.
+        Share of the diagonal that is added to the matrix.
     """
     values = inverse(matrix, damping) @ np.concatenate([right.real, -right.imag])
     half = len(right)

@@ -1,11 +1,11 @@
-"""All damped sinusoids that stand out of a clip, and which of them are modes.
+"""Search for the damped sinusoids of a clip, and for the modes among them.
 
-The clip is cut into bands, ESPRIT (Roy and Kailath 1989) finds the damped sinusoids of every band,
-ESTER (Badeau, David and Richard 2006) their number, and a least-squares fit to the whole clip
-refines them.  This is done for narrow bands, which tell slow and close modes apart, and then, on
-what those leave, for wide ones, in which modes that die away at once stand out.  What still stands
-out of the rest is added, see `sound.clips.pursuit`, and what does not stand out of the noise is
-dropped, which is why ESTER may be generous.
+The clip is split into bands.  ESPRIT (Roy and Kailath 1989) finds the damped sinusoids of every
+band, ESTER (Badeau, David and Richard 2006) their number, and a least-squares fit to the whole clip
+refines them.  Narrow bands come first: they separate slow and close modes.  Wide bands then find
+quickly decaying modes in the rest.  Sinusoids that still stand out of the rest are added, see
+`sound.clips.pursuit`; those that do not stand out of the noise are dropped, so that ESTER may find
+too many.
 """
 
 from __future__ import annotations
@@ -14,26 +14,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sound.clips.candidates import BAND_DECAY, BAND_SAMPLES, LEAST_DECAY, candidates, rings
-from sound.clips.damped import superposed
 from sound.clips.pursuit import further
 from sound.clips.significance import Fit, settled
+from sound.synthesis.sinusoids import superposed
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 FEWEST_PERIODS = 3.0
-"""Periods of a mode that a clip must hold; what has fewer is drift rather than a mode."""
+"""Least number of periods of a mode within the clip; a slower oscillation counts as drift."""
 PURSUITS = 6
-"""Rounds in which what stands out of the rest is added."""
+"""Greatest number of rounds in which sinusoids that stand out of the rest are added."""
 WIDTH_FACTORS = (1.0, 4.0, 16.0)
-"""Widths of bands, one search after the other."""
+"""Widths of the bands, one search after the other, over the width of the narrowest."""
 SETTLING_STEPS, _FINAL_STEPS = 4, 20
-"""Steps of least squares after each change of the set, and at the end."""
+"""Numbers of least-squares steps after each change of the set of sinusoids, and at the end."""
 SAME = 0.25
-"""Distance of two exponents, over the decay of one, below which they are one mode."""
+"""Distance of two exponents, over the decay of one, below which they count as one mode."""
 UNDER_PEAK, DROWNED = 2.0, 0.01
-"""Distance, over the decay of the louder one, and share of its amplitude, below which a sinusoid
-mends the fit of another and is no mode of its own."""
+"""Distance from a louder sinusoid, over that one's decay, and share of its amplitude, below which a
+sinusoid only corrects the fit of the louder one and is dropped."""
 
 
 def sinusoids(clip: Array, rate: int, visible: bool = False) -> Fit:
@@ -46,7 +46,7 @@ def sinusoids(clip: Array, rate: int, visible: bool = False) -> Fit:
         slow, quick = fit.chosen(is_slow), fit.exponents[~is_slow]
         rest = clip - superposed(slow.exponents, slow.coefficients, len(clip))
         new = candidates(rest, rate, width, f"bands of {width:.0f} Hz", visible)
-        # Two sinusoids for one mode would fit a clean clip even better.
+        # Otherwise two sinusoids would be fitted to one mode, which fits a clean clip even better.
         new = new[~_is_beside(new, slow.exponents)]
         quick = quick[~_is_beside(quick, new)]
         fit = settled(np.concatenate([slow.exponents, quick, new]), clip, SETTLING_STEPS)
@@ -54,7 +54,7 @@ def sinusoids(clip: Array, rate: int, visible: bool = False) -> Fit:
 
 
 def pursued(fit: Fit, clip: Array, rate: int) -> Fit:
-    """A fit with what still stands out of its rest, refined to the end, each mode once."""
+    """A fit completed by the sinusoids that stand out of its rest, and refined to the end."""
     for _ in range(PURSUITS):
         rest = clip - superposed(fit.exponents, fit.coefficients, len(clip))
         new = further(rest, rate)
@@ -70,7 +70,7 @@ def pursued(fit: Fit, clip: Array, rate: int) -> Fit:
 
 
 def _is_beside(exponents: Complex, others: Complex) -> NDArray[np.bool_]:
-    """Which exponents nobody can tell from one of the others."""
+    """Which exponents coincide with one of the others."""
     if not len(others):
         return np.zeros(len(exponents), bool)
     distance = np.abs(exponents[:, None] - others).min(axis=1)
@@ -78,7 +78,7 @@ def _is_beside(exponents: Complex, others: Complex) -> NDArray[np.bool_]:
 
 
 def _is_drowned(fit: Fit) -> NDArray[np.bool_]:
-    """Which sinusoids lie under the peak of another mode, far below it in amplitude."""
+    """Which sinusoids lie under the peak of a far louder one."""
     distance = np.abs(fit.exponents[:, None] - fit.exponents)
     under = distance < UNDER_PEAK * np.abs(fit.exponents.real)
     amplitudes = np.abs(fit.coefficients)
@@ -93,7 +93,7 @@ def is_mode(fit: Fit, samples: int) -> NDArray[np.bool_]:
 
 
 def modes_of(fit: Fit, clip: Array) -> Fit:
-    """The modes of a fit, without what is none but may have held up one beside it."""
+    """The modes of a fit, fitted again without the sinusoids that are no modes."""
     kept = is_mode(fit, len(clip))
     if kept.all():
         return fit
