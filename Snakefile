@@ -2,7 +2,7 @@
 import shutil
 from pathlib import Path
 
-from snakemake.utils import min_version, validate
+from snakemake.utils import min_version
 
 from carillon.errors import UserError
 from carillon.command_line.progress import say
@@ -23,10 +23,8 @@ if not workflow.overwrite_configfiles:
 
 
 try:
-    config = settings.read(workflow.configfiles, workflow.config_settings.config)
-    settings.check(config)
-    validate(config, schema=str(settings.SCHEMA))
-    settings.check_links(config)
+    config = settings.complete(workflow.configfiles, workflow.config_settings.config)
+    settings.check_files(config)
 except UserError as error:
     raise WorkflowError(str(error)) from None
 

@@ -2,13 +2,16 @@
 
 A folder is a study: its command or commands (`COMMANDS` in `__init__.py`), what it measures, its
 tables, plots and page (`study.py` says where they are), its rules (`rules.smk`) and tests. Whoever
-adds or removes the folder adds or removes the study. `base` is what all of them stand on.
+adds or removes the folder adds or removes the study. `config.py` holds its part of the
+configuration: `SECTIONS`, dataclasses of parameters by key, and `LIMITS`, memory and time of its
+rules. `base` is what all of them stand on.
 """
 
 from __future__ import annotations
 
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 from carillon.command_line.commands import Command
 
@@ -47,3 +50,8 @@ def commands() -> dict[str, Command]:
     for name in names():
         found |= getattr(import_module(f"studies.{name}"), "COMMANDS", {})
     return found
+
+
+def configurations() -> list[ModuleType]:
+    """Modules of all studies' parts of the configuration."""
+    return [import_module(f"studies.{name}.config") for name in names_with("config.py")]

@@ -25,8 +25,8 @@ from studies.forests.training import require_counts
 from studies.scaling.study import rank_counts
 from tests.hostile.fuzzing import damaged, examples, or_refused, values, yaml_texts
 from tests.hostile.zoo import CONFIGURATION, PROJECT
-from workflow import settings as configuration
 from workflow.commands.validate import _tolerance
+from workflow.configuration.whole import completed
 from workflow.estimate.rates import PACKAGED, checked
 
 NUMBERS = st.one_of(
@@ -195,7 +195,7 @@ def clips(tmp_path_factory):
 )
 def test_any_value_in_a_configuration_fits_or_is_refused(place, value):
     config = replaced(yaml.safe_load(CONFIGURATION), place, value)
-    or_refused(lambda: configuration.check(config))
+    or_refused(lambda: completed(config))
 
 
 @examples(60)
@@ -216,7 +216,7 @@ def test_the_memory_of_a_reader_is_bounded():
 
 def test_the_values_tried_are_real(tmp_path):
     assert project_of(yaml.safe_load(PROJECT), clips_in(tmp_path)).modes == 6
-    configuration.check(yaml.safe_load(CONFIGURATION))
+    completed(yaml.safe_load(CONFIGURATION))
 
 
 def clips_in(folder: Path) -> Path:

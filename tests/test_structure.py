@@ -112,15 +112,16 @@ ARROWS = {
         sound.scenes sound.scenes.film sound.scenes.playing studio.scene studio.server
         studio.session studio.standalone""",
     #
-    "workflow": "dataset_gen dataset_gen.objectives forests forests.training",
+    "workflow.configuration": "dataset_gen dataset_gen.objectives",
+    "workflow": "forests workflow.configuration",
     "workflow.report": "solver.files solver.hcms solver.refinement workflow studies.base",
     "workflow.estimate": "dataset_gen.objectives solver.coarsening solver.refinement workflow",
     "workflow.scripts": "workflow.report studies.base",
     "workflow.validation": """solver.files solver.refinement solver.response solver.verification
         workflow workflow.report studies.base""",
     "workflow.commands": """dataset_gen.objectives solver.analysis solver.coarsening
-        solver.correction solver.response workflow workflow.estimate workflow.report
-        studies.base""",
+        solver.correction solver.response workflow workflow.configuration workflow.estimate
+        workflow.report studies.base""",
     #
     "studies": "",
     "studies.base": "solver.response workflow studies",

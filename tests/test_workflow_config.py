@@ -1,19 +1,21 @@
-"""Configuration: schema, defaults, and what is said about mistakes."""
+"""Configuration: keys, defaults, and what is said about mistakes."""
 
 from __future__ import annotations
 
 import copy
+import re
 import subprocess
 import sys
-from dataclasses import fields
 from importlib import import_module
 from pathlib import Path
 
 import pytest
 import yaml
-from jsonschema import Draft202012Validator
 
+from carillon.builtin_names import BUILTIN_NAMES
 from carillon.errors import UserError
+from carillon.parameters import REQUIRED
+from carillon.parameters.fields import parameters_of
 from dataset_gen.settings import ShardOptions
 from forests.training.train import TrainingOptions
 from solver.analysis.options import SolverOptions
@@ -21,63 +23,52 @@ from solver.analysis.problem import ProblemOptions
 from solver.response.response_file import StrikeOptions
 from studies.benchmark.options import BenchmarkOptions
 from studies.scaling.study import ScalingOptions
+from tests.configuration_keys import every_key, every_value
 from workflow import settings, solids
+from workflow.configuration.whole import completed, limits
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 CONFIGS = CHECKOUT / "workflow" / "config"
 
 
+NAMES = sorted(path.stem for path in CONFIGS.glob("*.yaml"))
+
+
 def load(name: str) -> dict:
-    return yaml.safe_load((CONFIGS / f"{name}.yaml").read_text())
+    return settings.complete([CONFIGS / f"{name}.yaml"])
 
 
-def defaults_of(schema: dict) -> dict:
-    """Every default of a schema, nested as in the configuration."""
-    found = {}
-    for key, part in schema.get("properties", {}).items():
-        if part.get("type") == "object" and "properties" in part:
-            found[key] = defaults_of(part)
-        elif "default" in part:
-            found[key] = part["default"]
-    return found
+def test_every_key_has_a_description():
+    for place, each in every_key():
+        assert each.meaning or each.domain.kind.__doc__, f"{place} has no description"
 
 
-def every_key(schema: dict, path: str = "") -> list[tuple[str, dict]]:
-    found = []
-    parts = dict(schema.get("properties", {}))
-    if isinstance(schema.get("additionalProperties"), dict):
-        parts["*"] = schema["additionalProperties"]
-    for key, part in parts.items():
-        found += [(f"{path}{key}", part), *every_key(part, f"{path}{key}.")]
-    return found
+@pytest.mark.parametrize("name", NAMES)
+def test_equal_configurations_have_equal_hashes(name):
+    """Whether defaults are written out or not."""
+    config = load(name)
+    again = completed(config)
+    assert again == config
+    assert settings.config_hash(again) == settings.config_hash(config)
 
 
-def test_schema_is_a_schema():
-    Draft202012Validator.check_schema(settings.schema())
+def test_a_configuration_file_does_not_copy_what_jobs_may_take():
+    for name in NAMES:
+        assert "resources" not in yaml.safe_load((CONFIGS / f"{name}.yaml").read_text())
+    given = {"find_modes": {"minutes": 7}, "grow_tree": {"memory_mb": 5}}
+    resources = completed({**load("tiny"), "resources": given})["resources"]
+    own = limits()
+    assert resources["find_modes"] == {"memory_mb": own["find_modes"].memory_mb, "minutes": 7}
+    assert resources["grow_tree"] == {"memory_mb": 5, "minutes": own["grow_tree"].minutes}
+    with pytest.raises(UserError, match="resources: no rule 'find_mods' takes any; did you mean"):
+        completed({**load("tiny"), "resources": {"find_mods": {"minutes": 7}}})
 
 
-def test_every_key_has_a_description_and_objects_admit_no_unknown_key():
-    for path, part in every_key(settings.schema()):
-        assert part.get("description"), f"{path} has no description"
-        if part.get("type") == "object":
-            assert "additionalProperties" in part, f"{path} admits unknown keys"
-
-
-def test_default_configuration_states_the_defaults_of_the_schema():
-    config = load("laptop")
-    del config["models"]
-    expected = defaults_of(settings.schema())
-    # Which model is shown depends on the models, which have no default.
-    for part in ("convergence", "times", "scaling"):
-        assert config[part].pop("models")
-        expected[part].pop("models")
-    assert config["times"].pop("all_methods") and expected["times"].pop("all_methods") is None
-    assert config == expected
-
-
-@pytest.mark.parametrize("name", sorted(path.stem for path in CONFIGS.glob("*.yaml")))
-def test_every_configuration_fits_the_schema(name):
-    settings.check(load(name))
+def test_limits_are_those_of_the_rules():
+    """Every rule takes its own from the table, and none stands there for nothing."""
+    rules = [*CHECKOUT.glob("workflow/rules/*.smk"), *CHECKOUT.glob("studies/*/*.smk")]
+    taken = {name for file in rules for name in re.findall(r'limits\("(\w+)"', file.read_text())}
+    assert taken == set(limits())
 
 
 def test_default_run_needs_no_file_and_four_models_or_more():
@@ -106,7 +97,7 @@ def test_a_bad_value_is_answered_in_one_sentence(keys, value, says):
         target = target[key]
     target[keys[-1]] = value
     with pytest.raises(UserError) as caught:
-        settings.check(config)
+        completed(config)
     message = str(caught.value)
     assert "\n" not in message
     for word in says:
@@ -117,10 +108,10 @@ def test_a_missing_mesh_file_and_an_unknown_model_are_named(tmp_path):
     config = load("meshes")
     config["mesh_folder"] = str(tmp_path)
     with pytest.raises(UserError, match=r"models\.bunny: there is no file .*stanford-bunny\.obj"):
-        settings.check_links(config)
+        settings.check_files(config)
     config["models"] = {"bell": config["models"]["bell"]}
     with pytest.raises(UserError, match="'bunny' is not among the models bell"):
-        settings.check_links(config)
+        completed(config)
 
 
 @pytest.mark.parametrize(
@@ -138,7 +129,7 @@ def test_lists_of_models_name_models(part, key):
     config = load("laptop")
     config[part][key] = ["gong"]
     with pytest.raises(UserError, match=rf"{part}\.{key}: 'gong' is not among the models"):
-        settings.check_links(config)
+        completed(config)
 
 
 OPTIONS = {
@@ -168,39 +159,28 @@ OTHER_DEFAULTS = {
 
 @pytest.mark.parametrize("section", OPTIONS)
 def test_keys_that_are_options_have_their_choices_and_defaults(section):
+    prefix = "models.NAME" if section == "models" else section
     keys = {
-        path.split(".")[-1]: (path, part)
-        for path, part in every_key(
-            {"properties": {section: settings.schema()["properties"][section]}}
-        )
+        place.rpartition(".")[2]: each
+        for place, each in every_key()
+        if place.rpartition(".")[0] == prefix
     }
-    options = {each.name: each for kind in OPTIONS[section] for each in fields(kind)}
+    options = {
+        name: each for kind in OPTIONS[section] for name, each in parameters_of(kind).items()
+    }
     assert keys.keys() & options.keys()
     for name in keys.keys() & options.keys():
-        path, part = keys[name]
-        choices = options[name].metadata.get("choices")
-        chosen = part["items"] if part.get("type") == "array" else part
-        assert choices is None or set(chosen["enum"]) == set(choices), path
-        default, own = options[name].default, f"{section}.{name}"
-        if "default" in part and own not in OTHER_DEFAULTS:
-            assert part["default"] == default, path
-
-
-def test_materials_are_told_where_a_file_may_be_named():
-    schema = settings.schema()["properties"]
-    material = schema["models"]["additionalProperties"]["properties"]["material"]["description"]
-    assert all(name in material for name in settings.MATERIALS)
+        domain, own = keys[name].domain, options[name].domain
+        chosen = domain.items[0] if domain.kind is tuple else domain
+        assert not own.choices or set(chosen.choices) == set(own.choices), name
+        if keys[name].default is not REQUIRED and f"{section}.{name}" not in OTHER_DEFAULTS:
+            assert keys[name].default == options[name].default, name
 
 
 LISTS = {
     "discretisation": "solver.analysis.problem:DISCRETISATIONS",
     "fill": "carillon.fem.geometry:FILLS",
     "components": "carillon.fem.geometry:COMPONENTS",
-    "material": "carillon.fem.materials:NAMES",
-    "materials": "carillon.fem.materials:NAMES",
-    "distributions": "dataset_gen.sampling:DISTRIBUTIONS",
-    "ranges": "dataset_gen.sampling:DISTRIBUTIONS",
-    "objective": "dataset_gen.objectives:DATASET_OBJECTIVES",
     "grower": "forests.training.structure:GROWERS",
     "transform": "forests.scaling:TRANSFORMS",
     "interface": "solver.hcms.condense:INTERFACES",
@@ -211,60 +191,39 @@ LISTS = {
     "quantity": "studies.objectives.goals:LABELS",
     "solids": "studies.accuracy.solids:SOLIDS",
 }
-"""Where the code holds what a key of the schema enumerates, by the name of the key."""
-EXAMPLES = {
-    "sound.examples": "studies/sounds/examples.yaml",
-    "sound.recordings": "studies/sounds/examples.yaml",
-    "scenes.examples": "studies/scenes/examples.yaml",
-}
-"""The same of those that are entries of a file."""
+"""Where the code holds the choices of a key, by the name of the key."""
+CHOICES = [
+    (place, domain.choices)
+    for place, domain in every_value()
+    if domain.choices and place.rpartition(".")[2].rstrip("[]") in LISTS
+]
 
 
-def enumerations(part: object, path: tuple[str, ...] = ()) -> list[tuple[str, list[str]]]:
-    """Every list of choices in the schema, after the keys that it is of."""
-    if isinstance(part, list):
-        return [found for each in part for found in enumerations(each, path)]
-    if not isinstance(part, dict):
-        return []
-    here = [(".".join(path), part["enum"])] if "enum" in part else []
-    for key, each in part.items():
-        inner = part.get("properties") is not None and key == "properties"
-        keys = each.items() if inner else [(None, each)]
-        for name, below in keys:
-            here += enumerations(below, path if name is None else (*path, name))
-    return here
-
-
-@pytest.mark.parametrize(("path", "choices"), enumerations(settings.schema()), ids=str)
-def test_every_list_of_the_schema_is_that_of_the_code(path, choices):
-    """Snakemake reads the schema by itself, so that it has to hold them, too."""
-    name = path.split(".")[-1]
-    if path in EXAMPLES:
-        entries = yaml.safe_load((CHECKOUT / EXAMPLES[path]).read_text())
-        assert set(choices) <= set(entries.get("scenes", entries)), path
-        return
-    module, _, attribute = LISTS[name].partition(":")
+@pytest.mark.parametrize(("place", "choices"), CHOICES, ids=str)
+def test_every_list_of_choices_is_that_of_the_code(place, choices):
+    """They are written out where the code that has them takes long to load."""
+    module, _, attribute = LISTS[place.rpartition(".")[2].rstrip("[]")].partition(":")
     held = getattr(import_module(module), attribute)
-    assert sorted(set(choices) - {"all"}) == sorted(held), path
+    assert sorted(set(choices) - {"all"}) == sorted(held), place
 
 
 def test_built_in_solids_are_known_without_loading_what_makes_them():
     from carillon.fem.geometry.builtin import builtin_surface
 
-    for name in settings.BUILTIN_NAMES:
+    for name in BUILTIN_NAMES:
         assert builtin_surface(name).is_volume, name
     with pytest.raises(UserError) as error:
         builtin_surface("gong")
-    assert str(error.value).endswith(f"expected one of {', '.join(settings.BUILTIN_NAMES)}")
+    assert str(error.value).endswith(f"expected one of {', '.join(BUILTIN_NAMES)}")
     program = "import sys, workflow.settings; assert not {'trimesh', 'numba'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", program], check=True)
 
 
-@pytest.mark.parametrize("section", ["models", *solids.STUDIED])
+@pytest.mark.parametrize("section", ["", *solids.studied(load("laptop"))])
 def test_a_built_in_solid_that_there_is_not_is_named_with_its_key(section):
     config = load("laptop")
-    models = config["models"] if section == "models" else config[section]["models"]
+    models = (config[section] if section else config)["models"]
     models["gong"] = {**next(iter(models.values())), "mesh": "builtin:gong"}
-    where = "models" if section == "models" else f"{section}.models"
+    where = f"{section}.models" if section else "models"
     with pytest.raises(UserError, match=rf"{where}\.gong\.mesh: there is no builtin:gong"):
-        settings.check_links(config)
+        completed(config)

@@ -6,10 +6,8 @@ import hashlib
 
 import pytest
 
-from tests.workflow_runs import CHECKOUT
+from tests.workflow_runs import LAPTOP
 from workflow import pinned_meshes, settings
-
-LAPTOP = CHECKOUT / "workflow" / "config" / "laptop.yaml"
 
 
 @pytest.fixture

@@ -14,16 +14,18 @@ from typing import Any
 import pytest
 import yaml
 
-from carillon import limits
 from carillon.errors import UserError
 from carillon.fem.geometry import builtin_surface
+from carillon.parameters import Check
 from forests.evaluate import MOST_BLOCKS
 from forests.layout import MOST_LEAVES
 from studies.blocks.database import MOST_MATERIALS
 from studies.scaling import launch
-from tests.workflow_runs import CHECKOUT, snakemake
+from tests.configuration_keys import every_key, every_value
+from tests.workflow_runs import CHECKOUT, LAPTOP, snakemake
 from workflow import settings
 from workflow.arguments import options, path_word, quoted
+from workflow.configuration.whole import completed
 from workflow.submission import require_plain
 
 LINT = runpy.run_path(str(CHECKOUT / ".ci" / "lint_rules.py"))
@@ -35,12 +37,12 @@ HOSTILE = (
 """Names that a shell, argparse or Snakemake might take for more than names."""
 
 
-LAPTOP = yaml.safe_load((CHECKOUT / "workflow" / "config" / "laptop.yaml").read_text())
+CONFIG = settings.complete([LAPTOP])
 
 
 def changed(place: str, value: Any) -> dict[str, Any]:
     """The default configuration with another value at a place such as models.bell.mesh."""
-    config = copy.deepcopy(LAPTOP)
+    config = copy.deepcopy(CONFIG)
     *sections, key = place.split(".")
     part = config
     for section in sections:
@@ -51,7 +53,7 @@ def changed(place: str, value: Any) -> dict[str, Any]:
 
 def refusal(config: dict[str, Any]) -> str:
     with pytest.raises(UserError) as caught:
-        settings.check(config)
+        completed(config)
     message = str(caught.value)
     assert len(message.splitlines()) == 1 and len(message) <= 1200
     return message
@@ -63,7 +65,7 @@ def refusal(config: dict[str, Any]) -> str:
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_names_are_single_words_for_a_shell(name):
     for place in ("models.bell.mesh", "models.bell.material", "results_dir", "mesh_folder"):
-        settings.check(changed(place, name))
+        completed(changed(place, name))
     config = changed("models.bell.mesh", name)
     assert settings.mesh_of(config, "bell") == f"meshes/{name}"
     assert shlex.split(quoted(shlex.join(["mpiexec", name]))) == ["mpiexec", name]
@@ -147,7 +149,7 @@ def test_a_run_with_hostile_names_runs_nothing_but_its_rules(tmp_path):
         ("x" * 201, "a name of more than 200 bytes"),
         ("ü" * 101, "a name of more than 200 bytes"),
         ("ab/" * 400, "longer than 1,000 bytes"),
-        ("", "non-empty"),
+        ("", "expected a text"),
     ],
 )
 def test_names_that_nothing_can_be_called_are_refused(name, says):
@@ -187,65 +189,44 @@ def test_numbers_are_finite_and_within_bounds(value):
 
 def numbers() -> Iterator[str]:
     """Places of plain numbers in the default configuration."""
-    for place, part in every_part(settings.schema()):
-        named = place.replace("figures.models.*", "figures.models.bell").replace("*", "bell")
-        if {"integer", "number"} & set(kinds(part)) and "[]" not in named:
+    for place, each in every_key():
+        named = place.replace("resources.NAME", "resources.find_modes").replace("NAME", "bell")
+        solid = named.split(".models.bell")[0]
+        there = ".models.bell" not in named or "bell" in CONFIG[solid]["models"]
+        if each.domain.kind in (int, float) and "[]" not in named and there:
             yield named
 
 
-def kinds(part: dict[str, Any]) -> list[str]:
-    kind = part.get("type", [])
-    return [kind] if isinstance(kind, str) else kind
-
-
-def every_part(schema: dict[str, Any], path: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
-    """All parts of a schema with their places; entries of lists end in []."""
-    parts = dict(schema.get("properties", {}))
-    if isinstance(schema.get("additionalProperties"), dict):
-        parts["*"] = schema["additionalProperties"]
-    if isinstance(schema.get("items"), dict):
-        parts["[]"] = schema["items"]
-    for key, part in parts.items():
-        place = f"{path}.{key}" if path else key
-        yield place, part
-        yield from every_part(part, place)
-
-
 def test_every_number_has_bounds_and_every_text_a_form():
-    for place, part in every_part(settings.schema()):
-        if {"integer", "number"} & set(kinds(part)):
-            assert {"maximum", "exclusiveMaximum"} & set(part), f"{place} has no upper bound"
-            assert {"minimum", "exclusiveMinimum"} & set(part), f"{place} has no lower bound"
-        if "string" in kinds(part):
-            assert {"format", "enum"} & set(part), f"{place} may hold any text"
+    for place, domain in every_value():
+        if domain.kind in (int, float):
+            assert {"le", "lt"} & set(domain.limits), f"{place} has no upper bound"
+            assert {"ge", "gt"} & set(domain.limits), f"{place} has no lower bound"
+        if domain.kind is str and not domain.choices:
+            marks = getattr(domain.annotation, "__metadata__", ())
+            assert any(isinstance(mark, Check) for mark in marks), f"{place} may hold any text"
 
 
 def test_bounds_are_those_of_the_commands():
-    bounds = {
-        place: (part.get("minimum"), part["maximum"])
-        for place, part in every_part(settings.schema())
-        if "maximum" in part
-    }
-    assert bounds["models.*.unit"] == limits.UNITS
-    assert bounds["models.*.density"] == limits.DENSITIES
+    bounds = {place: domain.limits.get("le") for place, domain in every_value()}
     for place, most in {
-        "scaling.ranks.[]": launch.MOST_RANKS,
-        "figures.ranks.[]": launch.MOST_RANKS,
+        "scaling.ranks[]": launch.MOST_RANKS,
+        "figures.ranks[]": launch.MOST_RANKS,
         "forests.blocks": MOST_BLOCKS,
         "forests_study.blocks": MOST_BLOCKS,
         "forests_study.timed_blocks": MOST_BLOCKS,
         "forests.materials": MOST_MATERIALS,
     }.items():
-        assert bounds[place][1] == most, place
+        assert bounds[place] == most, place
     for place in ("forests.max_leaves", "default_forest.forests.max_leaves"):
-        assert bounds[place][1] <= MOST_LEAVES
+        assert bounds[place] <= MOST_LEAVES
 
 
 @pytest.mark.parametrize(
     ("place", "value"),
     [
         ("models.bell.resolution", 10**9),
-        ("models.bell.resolution", 16.0),
+        ("models.bell.resolution", 16.5),
         ("solver.modes", 10**30),
         ("solver.ranks", 1_000_000),
         ("solver.cores", 1_000_000),
@@ -299,7 +280,7 @@ def test_files_that_are_no_configurations_are_refused(tmp_path, text, says):
     path = tmp_path / "config.yaml"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(UserError) as caught:
-        settings.read([path], {})
+        settings.complete([path])
     assert says in str(caught.value)
     assert len(str(caught.value)) <= 1200 and len(str(caught.value).splitlines()) == 1
 
@@ -310,19 +291,50 @@ def test_files_that_are_no_configurations_are_refused(tmp_path, text, says):
 def test_names_that_hold_no_configuration_are_refused(tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(UserError, match="expected a configuration"):
-        settings.read([name], {})
+        settings.complete([name])
 
 
 def test_files_and_values_of_the_command_line_take_precedence_in_their_order(tmp_path):
     first, second = tmp_path / "first.yaml", tmp_path / "second.yaml"
-    first.write_text("solver: {modes: 20, tolerance: 1e-5}\nmodels: {a: {resolution: 8}}\ntitle: t")
-    second.write_text("solver: {modes: 30}\nmodels: {b: {material: 2020-01-01}}")
-    config = settings.read([first, second], {"title": "u", "models": {"a": {"resolution": 9}}})
-    assert config == {
-        "solver": {"modes": 30, "tolerance": 1e-5},
-        "models": {"a": {"resolution": 9}, "b": {"material": "2020-01-01"}},
-        "title": "u",
-    }
+    first.write_text(
+        "solver: {modes: 20, tolerance: 1e-5}\nmodels: {a: {resolution: 8}}\ntitle: t\n"
+    )
+    second.write_text("solver: {modes: 30}\nmodels: {a: {mesh: 'builtin:bar', title: 2020-01-01}}")
+    config = settings.complete([first, second], {"title": "u", "models": {"a": {"resolution": 9}}})
+    assert config["solver"]["modes"] == 30 and config["solver"]["tolerance"] == 1e-5
+    assert config["models"]["a"]["title"] == "2020-01-01" and config["title"] == "u"
+    assert config["models"]["a"]["resolution"] == 9
+
+
+@pytest.mark.parametrize(
+    ("second", "given", "says"),
+    [
+        ("title: u", {}, "first.yaml, line 2: models.a.resolution: found 1, expected at least 2"),
+        (
+            "\nmodels:\n  a:\n    resolution: 0",
+            {},
+            "second.yaml, line 4: models.a.resolution: found 0, expected",
+        ),
+        (
+            "title: u",
+            {"models": {"a": {"resolution": 0}}},
+            "--config: models.a.resolution: found 0, expected",
+        ),
+        (
+            "solver:\n  modes: 20\n  mods: 30",
+            {},
+            "second.yaml, line 3: solver: there is no key 'mods', only .*; did you mean modes",
+        ),
+    ],
+)
+def test_a_mistake_is_told_with_the_file_and_line_that_count(
+    tmp_path, monkeypatch, second, given, says
+):
+    monkeypatch.chdir(tmp_path)
+    Path("first.yaml").write_text("title: t\nmodels: {a: {mesh: 'builtin:bar', resolution: 1}}\n")
+    Path("second.yaml").write_text(second)
+    with pytest.raises(UserError, match=says):
+        settings.complete(["first.yaml", "second.yaml"], given)
 
 
 def test_a_configuration_that_snakemake_has_loaded_is_refused_in_a_sentence(dry_run, tmp_path):

@@ -6,12 +6,13 @@ import pytest
 import yaml
 
 from carillon.errors import UserError
-from tests.workflow_runs import CHECKOUT, planned
+from tests.workflow_runs import LAPTOP, planned
 from workflow import settings, training
+from workflow.configuration.whole import completed
 
 
 def config(**dataset) -> dict:
-    loaded = yaml.safe_load((CHECKOUT / "workflow" / "config" / "laptop.yaml").read_text())
+    loaded = settings.complete([LAPTOP])
     loaded["dataset"] |= dataset
     return loaded
 
@@ -53,25 +54,23 @@ def test_every_parameter_of_the_training_is_passed_on():
     ],
 )
 def test_data_that_make_no_sense_are_answered_in_one_sentence(dataset, says):
-    wrong = config(**dataset)
-    settings.check(wrong)
     with pytest.raises(UserError) as caught:
-        settings.check_links(wrong)
+        completed(config(**dataset))
     assert says in str(caught.value) and "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
     ("key", "value", "says"),
     [
-        ("distributions", ["normal"], ["dataset.distributions.0", "normal"]),
+        ("distributions", ["normal"], ["dataset.distributions[0]", "normal"]),
         ("distributions", [], ["dataset.distributions"]),
         ("ranges", {"uniform": [1]}, ["dataset.ranges.uniform", "least and largest modulus"]),
         ("low", 1, ["dataset", "low"]),
     ],
 )
-def test_the_schema_knows_distributions_and_ranges(key, value, says):
+def test_distributions_and_ranges_are_checked(key, value, says):
     with pytest.raises(UserError) as caught:
-        settings.check(config(**{key: value}))
+        completed(config(**{key: value}))
     for words in says:
         assert words in str(caught.value)
 

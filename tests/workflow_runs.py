@@ -11,6 +11,7 @@ from tests.patience import HANG_SECONDS
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 TINY = CHECKOUT / "workflow" / "config" / "tiny.yaml"
+LAPTOP = CHECKOUT / "workflow" / "config" / "laptop.yaml"
 PROFILE = CHECKOUT / "workflow" / "profiles" / "default"
 
 

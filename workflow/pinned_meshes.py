@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from carillon.files.yaml_input import read_own_yaml
-from workflow import settings, solids
+from workflow import settings
 
 PINNED: dict[str, dict[str, str]] = read_own_yaml(Path(__file__).with_suffix(".yaml"))
 """SHA-256 and source by file name."""
@@ -17,15 +17,24 @@ SHOWN = 12
 
 
 def of_run(config: Mapping[str, Any]) -> list[str]:
-    """A sentence about every mesh of a configuration that is another file than the pinned one."""
-    meshes = [each["mesh"] for each in config["models"].values()]
-    meshes += [each["mesh"] for part in solids.STUDIED for each in config[part]["models"].values()]
-    return list(_others(config, [*meshes, config["sound"]["bunny"]]))
+    """A sentence about every mesh of a configuration that is another file than the pinned one.
+
+    Any text of a configuration may name one.
+    """
+    return list(_others(config, _texts(config)))
 
 
 def of_study(config: Mapping[str, Any], section: str) -> list[str]:
     """The same of the solids of a study."""
     return list(_others(config, [each["mesh"] for each in config[section]["models"].values()]))
+
+
+def _texts(part: Any) -> Iterator[str]:
+    if isinstance(part, str):
+        yield part
+    elif isinstance(part, Mapping | list):
+        for each in part.values() if isinstance(part, Mapping) else part:
+            yield from _texts(each)
 
 
 def _others(config: Mapping[str, Any], meshes: Iterable[str]) -> Iterator[str]:

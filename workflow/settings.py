@@ -1,26 +1,25 @@
-"""The configuration: one file describes a run, the schema fills in what it leaves out."""
+"""The configuration: one file describes a run, `workflow.configuration` what it leaves out."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from functools import cache
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
+from typing import Any, cast
 
-from jsonschema.exceptions import ValidationError
-from snakemake.utils import update_config, validate
+from snakemake.utils import update_config
 
-from carillon.builtin_names import BUILTIN_NAMES, BUILTIN_PREFIX
+from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
 from carillon.fem.materials import NAMES as MATERIALS
-from carillon.files.yaml_input import read_own_yaml, read_yaml
+from carillon.files.yaml_input import nearest, read_marked
+from carillon.parameters.sentences import ParameterError, Place
 from carillon.records import provenance
-from dataset_gen.objectives import OBJECTIVES, require_objective
 from forests import default as default_forests
 from workflow import training
 from workflow.arguments import path_word
+from workflow.configuration.whole import Values, completed
 from workflow.disk_space import require_place
-from workflow.strict_schema import first_mistake, reason
 
 PLACES = ("results_dir", "mesh_folder", "baseline")
 """Keys that say where something lies, on which no result depends."""
@@ -30,22 +29,15 @@ DEFAULT_FORESTS = "default"
 """Name of the forests that come with the package."""
 FOLDER = Path(__file__).resolve().parent
 """Of the rules and all that belongs to them."""
-SCHEMA = FOLDER / "schemas" / "config.schema.yaml"
 CONFIGURATION = "a configuration"
 
 
-@cache
-def schema() -> dict[str, Any]:
-    """The JSON schema of the configuration, which nobody changes."""
-    loaded: dict[str, Any] = read_own_yaml(SCHEMA)
-    return loaded
-
-
-def read(files: Iterable[str | Path], given: Mapping[str, Any]) -> dict[str, Any]:
+def complete(files: Iterable[str | Path], given: Values = MappingProxyType({})) -> dict[str, Any]:
     """A configuration from its files and from what the command line gives beside them.
 
-    Snakemake reads the same files, but takes 1e-3 for text, 2020-01-01 for a date, the last of
-    several equal keys, and what is there once for a million times.
+    It is checked and has its defaults; meshes may be absent. Snakemake reads the same files, but
+    takes 1e-3 for text, 2020-01-01 for a date, the last of several equal keys, and what is there
+    once for a million times.
 
     Parameters
     ----------
@@ -57,39 +49,32 @@ def read(files: Iterable[str | Path], given: Mapping[str, Any]) -> dict[str, Any
     Raises
     ------
     UserError
-        If a file cannot be read, see `carillon.files.yaml_input.read_yaml`.
+        If a file cannot be read, see `carillon.files.yaml_input.read_yaml`; or with one sentence
+        about the first value that does not fit, and the line that it is in.
     """
+    documents = [(str(file), *read_marked(file, CONFIGURATION)) for file in files]
     config: dict[str, Any] = {}
-    for values in (*(read_yaml(file, CONFIGURATION) for file in files), given):
+    for values in (*(values for _, values, _ in documents), given):
         update_config(config, values)
-    return config
+    try:
+        return completed(config)
+    except ParameterError as error:
+        nodes = {file: node for file, _, node in documents}
+        raise UserError(f"{_where(error.place, nodes, given)}{error}") from None
 
 
-def check(config: Mapping[str, Any]) -> None:
-    """Check a configuration before any rule is built from it.
-
-    Raises
-    ------
-    UserError
-        With one sentence about the first value that does not fit.
-    """
-    mistake = first_mistake(schema(), config)
-    if mistake is not None:
-        raise UserError(_sentence(mistake))
-
-
-def complete(files: Iterable[str | Path]) -> dict[str, Any]:
-    """A configuration from its files, checked and with its defaults; meshes may be absent.
-
-    Raises
-    ------
-    UserError
-        If it cannot be read, or holds anything that does not fit.
-    """
-    config = read(files, {})
-    check(config)
-    validate(config, str(SCHEMA))
-    return config
+def _where(place: Place, nodes: Mapping[str, Any], given: Values) -> str:
+    """Beginning of a sentence: where the value at a place was written last."""
+    found = [(0, "")]
+    for file, node in nodes.items():
+        steps, line = nearest(node, place)
+        found.append((steps, f"{file}, line {line}: "))
+    steps, part = 0, cast("Any", given)
+    while steps < len(place) and isinstance(part, Mapping) and place[steps] in part:
+        steps, part = steps + 1, part[place[steps]]
+    if steps:
+        found.append((steps, "--config: "))
+    return sorted(found, key=lambda each: each[0])[-1][1]
 
 
 def resolved(config: Mapping[str, Any]) -> dict[str, Any]:
@@ -104,19 +89,16 @@ def config_hash(config: Mapping[str, Any]) -> str:
     )
 
 
-def check_links(config: Mapping[str, Any]) -> None:
-    """Check what a schema cannot say: names and files that a complete configuration refers to.
+def check_files(config: Mapping[str, Any]) -> None:
+    """Check that a run can write, and read what its complete configuration names.
 
     Raises
     ------
     UserError
-        If a model's mesh or material or the forests do not exist, a list of models names none,
-        `objectives.objectives` names no objective, or training data make no sense.
+        If the folder of the results cannot be written, or a model's mesh or material or the forests
+        do not exist.
     """
     require_place(Path(config["results_dir"]), "results_dir")
-    for where, models in _solids(config):
-        for name, model in models.items():
-            require_known_mesh(f"{where}.{name}.mesh", model["mesh"])
     for name in config["models"]:
         for path in model_files(config, name):
             if not Path(path).is_file():
@@ -124,36 +106,11 @@ def check_links(config: Mapping[str, Any]) -> None:
                     f"models.{name}: there is no file {path}; put it there, or set mesh_folder to "
                     "the folder that holds it"
                 )
-    for part in ("convergence", "times", "scaling"):
-        _require_models(f"{part}.models", config[part]["models"], config["models"])
-    _require_models(
-        "times.all_methods", config["times"]["all_methods"] or (), config["times"]["models"]
-    )
-    for part in ("convergence", "scaling"):
-        figures = config["figures"]
-        _require_models(f"figures.{part}", figures[part], figures["models"])
     forests = forests_file(config)
     if forests is not None and not Path(forests).is_file():
         raise UserError(
             f"forests.model: there is no file {forests}; name one that python -m forests train "
             f"wrote, {DEFAULT_FORESTS} for those of the package, or null to train some"
-        )
-    for plan in (training.own(config), training.default(config)):
-        plan.check()
-    training.check_study(config)
-    for name in studied_objectives(config):
-        try:
-            require_objective(name)
-        except UserError as error:
-            raise UserError(f"objectives.objectives: {error}") from None
-
-
-def require_known_mesh(where: str, mesh: str) -> None:
-    """Raise UserError unless a mesh that is called built-in is one, as the key `where` says."""
-    if mesh.startswith(BUILTIN_PREFIX) and mesh.removeprefix(BUILTIN_PREFIX) not in BUILTIN_NAMES:
-        raise UserError(
-            f"{where}: there is no {mesh}, expected a file or {BUILTIN_PREFIX}NAME with "
-            f"{', '.join(BUILTIN_NAMES)}"
         )
 
 
@@ -198,11 +155,6 @@ def own_shards(config: Mapping[str, Any]) -> list[str]:
     return [] if config["forests"]["model"] else training.own(config).shards
 
 
-def studied_objectives(config: Mapping[str, Any]) -> list[str]:
-    """Names of the objectives that the study compares."""
-    return list(config["objectives"]["objectives"] or OBJECTIVES)
-
-
 def forest_files(named: str | None = None) -> list[str]:
     """File of the forests that are named, or else of those of the package; none without either."""
     try:
@@ -217,22 +169,6 @@ def _forests_of_package() -> str:
     return str(file.relative_to(here) if file.is_relative_to(here) else file)
 
 
-def _solids(config: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Solids by name, of the run and of every section that has some of its own, after its key."""
-    yield "models", config["models"]
-    for section, part in config.items():
-        models = part.get("models") if isinstance(part, Mapping) and section != "models" else None
-        if isinstance(models, Mapping):
-            yield f"{section}.models", models
-
-
-def _require_models(where: str, names: Iterable[str], models: Iterable[str]) -> None:
-    known = list(models)
-    for name in names:
-        if name not in known:
-            raise UserError(f"{where}: {name!r} is not among the models {', '.join(known)}")
-
-
 def located(config: Mapping[str, Any], mesh: str) -> str:
     """Mesh argument of the solver: `builtin:NAME`, or the path of a file below mesh_folder."""
     return mesh if mesh.startswith(BUILTIN_PREFIX) else _in_mesh_folder(config, mesh)
@@ -240,13 +176,3 @@ def located(config: Mapping[str, Any], mesh: str) -> str:
 
 def _in_mesh_folder(config: Mapping[str, Any], path: str) -> str:
     return path_word(Path(config["mesh_folder"]) / path)
-
-
-def _sentence(mistake: ValidationError) -> str:
-    where = ".".join(str(part) for part in mistake.absolute_path) or "configuration"
-    meant = mistake.schema.get("description") if isinstance(mistake.schema, dict) else None
-    return f"{where}: {reason(mistake)}" + (f"; expected: {_lower(meant)}" if meant else "")
-
-
-def _lower(text: str) -> str:
-    return text[0].lower() + text[1:].rstrip(".")

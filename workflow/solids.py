@@ -9,21 +9,18 @@ from typing import Any
 from workflow import settings
 
 Config = Mapping[str, Any]
-STUDIED = ("figures", "objectives", "coarsening", "discretisation", "campaign")
-"""Sections with solids of their own, which are left out if they have no mesh."""
-MEASURED = {
-    "report": {
-        "convergence": "convergence.models",
-        "methods": "times.models",
-        "scaling": "scaling.models",
-    },
-    "figures": {
-        "methods": "figures.models",
-        "convergence": "figures.convergence",
-        "scaling": "figures.scaling",
-    },
-}
-"""Where the configuration names the solids that a study measures, by the file of what is found."""
+
+
+def studied(config: Config) -> list[str]:
+    """Sections with solids of their own, which are left out if they have no mesh."""
+    return [
+        section
+        for section, part in config.items()
+        if isinstance(part, Mapping)
+        and isinstance(part.get("models"), Mapping)
+        # Those of the run itself have any names.
+        and section != "models"
+    ]
 
 
 def mesh_files(config: Config, section: str, solid: str) -> list[str]:
@@ -52,15 +49,21 @@ def named(config: Config, where: str) -> list[str]:
     """
     section, _, part = where.rpartition(".")
     names = list(config[section][part] if section else config[part])
-    absent = absent_meshes(config, section) if section in STUDIED else {}
+    absent = absent_meshes(config, section) if section in studied(config) else {}
     return [name for name in names if name not in absent]
 
 
-def measured_files(config: Config, study: str) -> list[str]:
-    """Files of what a study measures of its solids, below its folder."""
+def measured_files(config: Config, measured: Mapping[str, str]) -> list[str]:
+    """Files of what a study measures of its solids, below its folder.
+
+    Parameters
+    ----------
+    measured
+        Where the configuration names the solids, see `named`, by the file of what is found.
+    """
     return [
         f"models/{solid}/{file}.json"
-        for file, where in MEASURED[study].items()
+        for file, where in measured.items()
         for solid in named(config, where)
     ]
 

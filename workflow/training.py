@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
-from carillon.errors import UserError
-from dataset_gen.sampling import moduli
-from forests.training.variants import VARIANTS
 from workflow.arguments import options
 
 TRAINING = (
@@ -24,15 +21,12 @@ class Training:
 
     Attributes
     ----------
-    section
-        Where it stands in the configuration, for messages; empty for the run's own.
     dataset, forests
         Its sections of the configuration.
     poisson
         Poisson's ratio of the blocks.
     """
 
-    section: str
     dataset: Mapping[str, Any]
     forests: Mapping[str, Any]
     poisson: float
@@ -78,71 +72,13 @@ class Training:
         """Numbers of the trees of both forests."""
         return range(2 * self.forests["trees"])
 
-    def check(self) -> None:
-        """Check what a schema cannot say.
-
-        Raises
-        ------
-        UserError
-            If a range is of no distribution in use or is none, or shards would be empty.
-        """
-        where = f"{self.section}dataset"
-        for name, (low, high) in self.dataset["ranges"].items():
-            if name not in self.distributions:
-                raise UserError(
-                    f"{where}.ranges: {name!r} is not among the distributions "
-                    f"{', '.join(self.distributions)}"
-                )
-            try:
-                moduli(name, low, high)
-            except UserError as error:
-                raise UserError(f"{where}.ranges: {error}") from None
-        fewest = min(map(self.samples_of, self.distributions))
-        if fewest < self.dataset["shards"]:
-            raise UserError(
-                f"{where}.shards: {fewest} samples of a distribution cannot be split into "
-                f"{self.dataset['shards']} shards"
-            )
-
 
 def own(config: Mapping[str, Any]) -> Training:
     """The forests of the run."""
-    return Training("", config["dataset"], config["forests"], config["poisson"])
-
-
-def study(config: Mapping[str, Any]) -> Training:
-    """The trainings that the study of the forests compares: on data of the default forests."""
-    plan = default(config)
-    rows = config["forests_study"]["structure_rows"]
-    return replace(plan, forests={**plan.forests, "structure_rows": rows})
-
-
-def check_study(config: Mapping[str, Any]) -> None:
-    """Check that the default forests' data suffice for the study, and that its trainings exist.
-
-    Raises
-    ------
-    UserError
-        If they do not.
-    """
-    requested, data = config["forests_study"], config["default_forest"]["dataset"]
-    if requested["shards"] > data["shards"]:
-        raise UserError(
-            f"forests_study.shards: {requested['shards']} of {data['shards']} shards of a "
-            "distribution, see default_forest.dataset.shards"
-        )
-    if max(requested["curve_rows"]) > 8 * data["samples"]:
-        raise UserError(
-            f"forests_study.curve_rows: {max(requested['curve_rows']):,} rows, but "
-            f"default_forest.dataset.samples gives {8 * data['samples']:,}"
-        )
-    for name in requested["variants"] or ():
-        if name not in VARIANTS:
-            known = ", ".join(VARIANTS)
-            raise UserError(f"forests_study.variants: {name!r} is unknown, choose from {known}")
+    return Training(config["dataset"], config["forests"], config["poisson"])
 
 
 def default(config: Mapping[str, Any]) -> Training:
     """The forests that come with the package."""
     part = config["default_forest"]
-    return Training("default_forest.", part["dataset"], part["forests"], config["poisson"])
+    return Training(part["dataset"], part["forests"], config["poisson"])

@@ -109,13 +109,19 @@ def read_marked(path: str | Path, what: str) -> tuple[dict[str, Any], yaml.Node]
 
 def line_of(node: yaml.Node, place: Iterable[str | int]) -> int:
     """Number of the line where a value begins, or what is nearest around it if it is missing."""
-    line = node.start_mark.line
+    return nearest(node, place)[1]
+
+
+def nearest(node: yaml.Node, place: Iterable[str | int]) -> tuple[int, int]:
+    """How many steps of the way to a place a document has, and the line where the last one is."""
+    steps, line = 0, node.start_mark.line
     for part in place:
         entries = _entries(node)
         if part not in entries:
             break
+        steps += 1
         line, node = entries[part]
-    return int(line) + 1
+    return steps, int(line) + 1
 
 
 def _entries(node: yaml.Node) -> dict[str | int, tuple[int, yaml.Node]]:

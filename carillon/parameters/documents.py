@@ -72,7 +72,12 @@ def parameters_from(document: Mapping[str, Any], model: type[T]) -> T:
 def _plain(value: Any, place: Place) -> Any:
     """The value with whole numbers for floats that are such, fit to be written as JSON."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(each, (*place, str(key))) for key, each in value.items()}
+        for key in value:
+            if not isinstance(key, str):
+                raise ParameterError(place, f"found the key {key!r}, expected a text")
+        return {key: _plain(each, (*place, key)) for key, each in value.items()}
+    if isinstance(value, str) and any("\ud800" <= character <= "\udfff" for character in value):
+        raise ParameterError(place, f"found {value!r}, which has half a character")
     if isinstance(value, list | tuple):
         return [_plain(each, (*place, number)) for number, each in enumerate(value)]
     if isinstance(value, int) and value.bit_length() > MOST_BITS:

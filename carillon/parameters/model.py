@@ -66,8 +66,8 @@ def option(
     Parameters
     ----------
     default
-        Its default; with `REQUIRED` it has to be given. A dataclass stands for one made without
-        arguments.
+        Its default; with `REQUIRED` it has to be given. A dataclass or another function stands for
+        what it makes without arguments.
     help
         What it is, with its unit in brackets; by default what its annotation says.
     metavar
@@ -79,7 +79,7 @@ def option(
     metadata = {"help": help, "metavar": metavar, "read": read}
     if default is REQUIRED:
         return dataclasses.field(metadata=metadata)
-    if isinstance(default, type):
+    if callable(default):
         return dataclasses.field(default_factory=default, metadata=metadata)
     return dataclasses.field(default=default, metadata=metadata)
 

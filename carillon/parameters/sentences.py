@@ -63,7 +63,10 @@ def mistake_of(error: ValidationError, domain: ValueDomain) -> ParameterError:
     kind, found = mistake["type"], mistake.get("input")
     place, domain, parent = _followed(mistake["loc"], domain)
     if kind in _UNKNOWN:
-        return ParameterError(place[:-1], _no_key(str(place[-1]), list(parameters_of(parent.kind))))
+        unknown = _no_key(str(place[-1]), list(parameters_of(parent.kind)))
+        mistyped = ParameterError(place[:-1], unknown)
+        mistyped.place = place  # Of the line, which names the key.
+        return mistyped
     if kind == "missing" and parent.kind is tuple:
         reason = f"found {_shown(found)}, expected {len(parent.items)} of them"
         return ParameterError(place[:-1], reason, parent.meaning)
@@ -136,6 +139,8 @@ def _expected(kind: str, context: dict[str, Any], domain: ValueDomain) -> str:
 
 
 def _limit(value: Any) -> str:
+    if isinstance(value, str):
+        return value
     return f"{value:g}" if isinstance(value, float) else f"{value:,}"
 
 

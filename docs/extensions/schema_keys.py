@@ -7,12 +7,13 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import parameter_tables
 import yaml
 
 from sound.project.schema import SCHEMA as PROJECT_SCHEMA
 from sound.project.schema import word_of
 from sound.scenes.scene import SCHEMA as SCENE_SCHEMA
-from workflow import settings
+from workflow.configuration.whole import limits, whole
 
 _BOUNDS = {
     "minimum": "at least {}",
@@ -30,7 +31,17 @@ Schema = Mapping[str, Any]
 
 def of_configuration() -> str:
     """Sections with the keys of the configuration."""
-    return _sections(settings.schema(), "The run")
+    return parameter_tables.sections(whole(), "The run") + _limits_of_rules()
+
+
+def _limits_of_rules() -> str:
+    """The rules' own limits as a table."""
+    rows = [
+        f"| `{rule}` | {each.what} | {each.memory_mb or ''} | {each.minutes} |"
+        for rule, each in limits().items()
+    ]
+    head = ["", "| rule | a job makes | memory [MB] | time [min] |", "| --- | --- | --: | --: |"]
+    return "\n".join([*head, *rows, ""])
 
 
 def of_project() -> str:

@@ -7,6 +7,7 @@ import json
 import pytest
 import yaml
 
+from studies.accuracy.config import AccuracySection
 from studies.accuracy.measure import AccuracyOptions, summarised
 from studies.accuracy.page import FIGURES, page
 from studies.accuracy.results import AccuracyStudy
@@ -17,7 +18,6 @@ from studies.base.study import named
 from studies.base.style import save
 from studies.base.table import write_table
 from tests.pages import Page, assert_same_numbers, assert_self_contained
-from tests.workflow_runs import CHECKOUT
 
 KINDS = list(LABELS)
 
@@ -89,9 +89,6 @@ def _made(path):
 
 
 def test_the_configuration_names_what_the_command_does():
-    schema = yaml.safe_load((CHECKOUT / "workflow/schemas/config.schema.yaml").read_text())
-    part = schema["properties"]["accuracy"]["properties"]
-    defaults = AccuracyOptions()
-    assert part["solids"]["items"]["enum"] == part["solids"]["default"] == list(SOLIDS)
-    assert part["levels"]["default"] == part["levels"]["maximum"] == defaults.levels
-    assert part["runs"]["default"] == defaults.runs
+    part, defaults = AccuracySection(), AccuracyOptions()
+    assert part.solids == tuple(SOLIDS) and part.levels == defaults.levels
+    assert part.runs == defaults.runs

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -25,13 +26,14 @@ class Results:
         It, or the one above, holds the run's `config.yaml`.
     section
         Of the configuration that holds the study's `models`; all of it if empty.
-    study
-        What `workflow.solids.MEASURED` calls the study, if it measures any of these.
+    measures
+        Where the configuration names the solids that the study measures, by the file of the result:
+        methods, convergence, scaling.
     """
 
     folder: Path
     section: ClassVar[str] = ""
-    study: ClassVar[str] = ""
+    measures: ClassVar[Mapping[str, str]] = {}
 
     @cached_property
     def config(self) -> dict[str, Any]:
@@ -47,7 +49,7 @@ class Results:
     @property
     def without(self) -> str:
         """What is said of solids that are left out, and of meshes that are not the pinned ones."""
-        if self.section not in solids.STUDIED:
+        if self.section not in solids.studied(self.config):
             return ""
         others = pinned_meshes.of_study(self.config, self.section)
         return " ".join(filter(None, [solids.without(self.config, self.section), *others]))
@@ -78,7 +80,7 @@ class Results:
         return self._measured("scaling")
 
     def _measured(self, file: str) -> dict[str, Any]:
-        names = solids.named(self.config, solids.MEASURED[self.study][file])
+        names = solids.named(self.config, self.measures[file])
         return {name: self.read_json(f"models/{name}/{file}.json") for name in names}
 
     @property
@@ -86,7 +88,7 @@ class Results:
         """Provenance of the result files by name."""
         return {
             f"models/{name}/{file}.json": output["provenance"]
-            for file in solids.MEASURED[self.study]
+            for file in self.measures
             for name, output in getattr(self, file).items()
         }
 

@@ -21,6 +21,7 @@ from tests.pages import Page, assert_self_contained
 from tests.workflow_runs import PROFILE, TINY, planned, snakemake
 from workflow import settings
 from workflow.__main__ import main
+from workflow.configuration.whole import completed
 
 MODELS = {
     "box": {"mesh": "builtin:box", "resolution": 8, "title": "A <box> & more"},
@@ -101,7 +102,7 @@ def test_the_arguments_of_a_cell_are_those_of_validate(config):
     assert "frequency_rms=0.3 frequency_worst=1" in told
     config["campaign"]["models"]["box"]["mesh"] = "builtin:gong"
     with pytest.raises(settings.UserError, match=r"campaign\.models\.box\.mesh"):
-        settings.check_links(config)
+        completed(config)
 
 
 def test_the_worst_come_first(study):

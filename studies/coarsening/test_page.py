@@ -17,7 +17,8 @@ from studies.coarsening.study import COARSENING
 from studies.coarsening.tables import filled_cells, rank_correlation, speeds
 from tests import solids
 from tests.pages import Page, assert_same_numbers, assert_self_contained
-from tests.workflow_runs import CHECKOUT, PROFILE, TINY, snakemake
+from tests.workflow_runs import LAPTOP, PROFILE, TINY, snakemake
+from workflow import settings
 
 summary, cases, modes, elements, costs = (
     COARSENING.entries[name] for name in ("summary", "cases", "modes", "elements", "costs")
@@ -152,7 +153,7 @@ def test_the_study_is_no_part_of_the_default_run(plan):
 def test_the_trial_solids_are_all_studied():
     from carillon.fem.geometry.trials import TRIALS
 
-    config = yaml.safe_load((CHECKOUT / "workflow" / "config" / "laptop.yaml").read_text())
+    config = settings.complete([LAPTOP])
     meshes = [model["mesh"] for model in config["coarsening"]["models"].values()]
     assert {f"builtin:{name}" for name in TRIALS} <= set(meshes)
 

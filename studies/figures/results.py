@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from studies.base.results import Results
+from studies.figures.study import MEASURES
 
 
 class Figures(Results):
     """The folder of the figures; solids whose mesh does not exist are left out."""
 
-    section = study = "figures"
+    section = "figures"
+    measures = MEASURES

@@ -6,6 +6,13 @@ from studies.base.study import Config, Figure, Study
 from workflow import settings, solids
 from workflow.arguments import options
 
+MEASURES = {
+    "methods": "figures.models",
+    "convergence": "figures.convergence",
+    "scaling": "figures.scaling",
+}
+"""Where the configuration names the solids that are measured, by the file of the result."""
+
 FIGURES = Study(
     name="figures",
     package="studies.figures",
@@ -13,7 +20,7 @@ FIGURES = Study(
     title="Times, convergence and scaling in full",
     results="results:Figures",
     page="page:page",
-    measured=lambda config: solids.measured_files(config, "figures"),
+    measured=lambda config: solids.measured_files(config, MEASURES),
     figures=(
         Figure("times", "workflow.report.methods_plot:methods_figure", "tables/methods.json"),
         Figure(

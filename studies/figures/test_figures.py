@@ -5,7 +5,6 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import pytest
-import yaml
 
 from studies.base.table import read_table
 from studies.benchmark.methods import Methods, named
@@ -13,13 +12,13 @@ from studies.benchmark.rivals import SlepcConfiguration
 from studies.figures.study import FIGURES
 from studies.scaling.model import MISFIT_LIMIT
 from tests.pages import Page, assert_same_numbers, assert_self_contained
-from tests.workflow_runs import CHECKOUT, PROFILE, TINY, snakemake
-from workflow import solids
+from tests.workflow_runs import LAPTOP, PROFILE, TINY, snakemake
+from workflow import settings, solids
 from workflow.report.convergence_tables import convergence_sentences
 from workflow.report.methods_tables import METHODS
 
 convergence, methods, ratios = map(FIGURES.entries.get, ("convergence", "methods", "ratios"))
-CONFIG = yaml.safe_load((CHECKOUT / "workflow" / "config" / "laptop.yaml").read_text())
+CONFIG = settings.complete([LAPTOP])
 
 
 def test_figures_are_no_part_of_the_default_run(plan):

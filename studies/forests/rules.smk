@@ -6,7 +6,7 @@ FORESTS_STUDY = place(forests_study.FORESTS)
 STUDIED_FORESTS = (
     settings.forest_files(config["forests_study"]["model"]) or f"{DEFAULT_FOLDER}/forests.h5"
 )
-STUDY_TRAINING = training.study(config)
+STUDY_TRAINING = forests_study.trainings(config)
 
 
 rule forests_study:

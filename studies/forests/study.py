@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from studies.base.study import Figure, Study
+from dataclasses import replace
+
+from studies.base.study import Config, Figure, Study
+from workflow import training
 
 PARTS = ("model", "blocks", "benchmark", "variants", "curve")
 
@@ -21,3 +24,10 @@ FORESTS = Study(
         Figure("sizes", "plots:sizes_figure", "benchmark.json"),
     ),
 )
+
+
+def trainings(config: Config) -> training.Training:
+    """The trainings that the study compares: on data of the default forests."""
+    plan = training.default(config)
+    rows = config["forests_study"]["structure_rows"]
+    return replace(plan, forests={**plan.forests, "structure_rows": rows})

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from dataset_gen import objectives
 from studies.base.cases import case_files
 from studies.base.study import Config, Figure, Study
-from workflow import settings
 from workflow.arguments import options, path_word
 
 OBJECTIVES = Study(
@@ -27,6 +27,6 @@ def arguments(config: Config) -> list[str]:
     how = {
         "forest": part["forest"] and path_word(part["forest"]),
         "modes": part["modes"],
-        "objectives": ",".join(settings.studied_objectives(config)),
+        "objectives": ",".join(part["objectives"] or objectives.OBJECTIVES),
     }
     return options(how)

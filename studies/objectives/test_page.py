@@ -15,11 +15,13 @@ from studies.objectives.goals import goals_of, judge
 from studies.objectives.page import shortened
 from studies.objectives.results import Objectives
 from studies.objectives.study import OBJECTIVES as STUDY
+from studies.objectives.study import arguments
 from studies.objectives.tables import description
 from tests.pages import Page, assert_same_numbers, assert_self_contained
 from tests.small_forests import train_small_forests
-from tests.workflow_runs import CHECKOUT, PROFILE, TINY, snakemake
+from tests.workflow_runs import LAPTOP, PROFILE, TINY, snakemake
 from workflow import settings, solids
+from workflow.configuration.whole import completed
 
 summary, errors, forest, goals, goal_cases = (
     STUDY.entries[name] for name in ("summary", "errors", "forest", "goals", "goal-cases")
@@ -169,11 +171,11 @@ def test_every_objective_is_described_in_one_line(name):
 
 
 def test_an_unknown_objective_is_answered_in_one_sentence():
-    config = yaml.safe_load((CHECKOUT / "workflow" / "config" / "laptop.yaml").read_text())
-    assert settings.studied_objectives(config) == list(OBJECTIVES)
+    config = settings.complete([LAPTOP])
+    assert arguments(config)[-1] == ",".join(OBJECTIVES)
     config["objectives"]["objectives"] = ["guess"]
-    with pytest.raises(UserError, match=r"objectives\.objectives: objective 'guess' is unknown"):
-        settings.check_links(config)
+    with pytest.raises(UserError, match=r"objectives\.objectives\[0\]: found 'guess'"):
+        completed(config)
 
 
 def test_the_study_is_no_part_of_the_default_run(plan):

@@ -17,6 +17,7 @@ from sound.scenes.playing.impact_list import COLUMNS
 from sound.scenes.scene import Scene, load_scene
 from studies.base.table import write_table
 from studies.scenes import page, tables
+from studies.scenes.config import ScenesSection
 from studies.scenes.examples import (
     BARS,
     EXAMPLES,
@@ -37,7 +38,6 @@ from studies.sounds import examples as sounds
 from tests.pages import Page, assert_same_numbers
 from tests.scenes import moved, require_engine
 from tests.workflow_runs import TINY, snakemake
-from workflow import settings
 from workflow.commands.estimate import CONFIGURATIONS, load
 
 CONFIG = load(CONFIGURATIONS / "laptop.yaml")
@@ -61,9 +61,8 @@ def read(name: str, folder: Path) -> Scene:
 # What they are -----------------------------------------------------------------------------------
 
 
-def test_the_schema_names_the_scenes():
-    section = settings.schema()["properties"]["scenes"]["properties"]
-    assert section["examples"]["items"]["enum"] == list(DESCRIBED["scenes"])
+def test_the_configuration_names_the_scenes():
+    assert ScenesSection().examples == tuple(DESCRIBED["scenes"])
 
 
 def test_pages_are_made_anew_when_what_they_are_made_of_changes():

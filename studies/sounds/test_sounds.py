@@ -24,7 +24,7 @@ from sound.rendering.render import Hit, rendered_parts
 from sound.rendering.solid import SoundingSolid
 from studies.base.table import write_table
 from studies.recordings.recordings import recordings
-from studies.sounds import comparison, index, page, tables
+from studies.sounds import comparison, config, index, page, tables
 from studies.sounds.examples import (
     DESIGN,
     ELSEWHERE,
@@ -48,7 +48,6 @@ from studies.sounds.study import COMPARED_SOUNDS, SOUND, SOUNDS
 from tests.pages import Page, assert_same_numbers, assert_self_contained
 from tests.small_design import N_MODES, SIDES, small_design
 from tests.workflow_runs import TINY, snakemake
-from workflow import settings
 from workflow.commands.estimate import CONFIGURATIONS, load
 
 RATE = 22_050
@@ -330,10 +329,8 @@ def test_a_colour_bar_has_round_ticks_within_its_range(low, high):
     assert all(0.98 * low <= tick <= 1.02 * high for tick in ticks)
 
 
-def test_the_schema_names_the_examples():
-    section = settings.schema()["properties"]["sound"]["properties"]
-    listed = [name for key in LISTS for name in section[key]["items"]["enum"]]
-    assert listed == list(yaml.safe_load(EXAMPLES.read_text()))
+def test_the_configuration_names_the_examples():
+    assert [*config.EXAMPLES, *config.RECORDED] == list(yaml.safe_load(EXAMPLES.read_text()))
 
 
 def test_clips_are_recordings_in_the_examples_that_are_listed_so_and_in_no_other():

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 
 from snakemake.common.configfile import load_configfile
-from snakemake.utils import validate
 
 from carillon.command_line import exit_status
 from workflow import settings
@@ -13,10 +12,8 @@ from workflow import settings
 
 def main() -> None:
     """Load and check the configuration named."""
-    config = load_configfile(sys.argv[1])
-    settings.check(config)
-    validate(config, str(settings.SCHEMA))
-    settings.check_links(config)
+    load_configfile(sys.argv[1])
+    settings.check_files(settings.complete([sys.argv[1]]))
 
 
 if __name__ == "__main__":

@@ -24,6 +24,7 @@ from carillon.fem.materials import NAMES as MATERIALS
 from carillon.files.atomic import atomic_path
 from carillon.parameters import REQUIRED, option, parameters
 from carillon.parameters.command_line import add_options, collect, reader
+from carillon.parameters.fields import parameters_of
 from carillon.parameters.quantities import NonNegative, Point, Positive, Workers, between
 from carillon.processes.cores import allowed_cores
 from solver.analysis.problem import ProblemOptions, build_problem
@@ -32,6 +33,8 @@ from solver.correction.correction import EIGENVALUE_TOLERANCE
 from solver.response.surface import surface_of
 from studies.base.table import read_table
 from workflow import settings
+from workflow.configuration.run import TolerancesSection
+from workflow.configuration.whole import completed
 from workflow.disk_space import make_folder, require_own
 from workflow.failure import cause
 from workflow.report.findings import headline
@@ -48,8 +51,7 @@ LOOK_SECONDS = 0.5
 _PLANNED = re.compile(r"^total\s+(\d+)$", re.MULTILINE)
 _DONE = re.compile(r"^(\d+) of \d+ steps \(", re.MULTILINE)
 """Snakemake's words for how many steps there are, and are done."""
-_SECTION = settings.schema()["properties"]["validation"]["properties"]
-TOLERANCES = tuple(_SECTION["tolerances"]["properties"])
+TOLERANCES = tuple(parameters_of(TolerancesSection))
 """Names of the limits of the criteria."""
 
 
@@ -122,9 +124,9 @@ def run(arguments: argparse.Namespace) -> int:
         If the solid cannot be made, or the run fails.
     """
     config = configuration(arguments)
-    settings.check(config)
     say("reading the mesh, making its voxels", sys.stderr.isatty())
     size = _checked_size(arguments)
+    completed(config)
     name = next(iter(config["models"]))
     folder = Path(arguments.out).resolve()
     make_folder(folder)

@@ -61,7 +61,7 @@ def _placeless(config: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any],
     """The same configuration on files that are there, with the meshes by what stands for them."""
     values = copy.deepcopy(dict(config)) | {"results_dir": "results", "baseline": None}
     meshes: dict[str, str] = {}
-    for part in (values, *(values[section] for section in solids.STUDIED)):
+    for part in (values, *(values[section] for section in solids.studied(values))):
         for model in part["models"].values():
             # Of a material from a file is only known that it varies.
             if "material" in model and model["material"] not in MATERIALS:

@@ -15,6 +15,7 @@ from studies.base.conditions import Record
 from studies.base.results import Results
 from studies.base.skins import skin_of
 from workflow import settings
+from workflow.report.study import MEASURES
 from workflow.variants import candidates_of, further_of, shown_of, variants_of
 
 FAST = "ddfem_hcms_ec"
@@ -26,7 +27,7 @@ PRECOMPUTATION = ("mesh", "material")
 class Run(Results):
     """The folder of a run."""
 
-    study = "report"
+    measures = MEASURES
 
     @property
     def models(self) -> list[str]:

@@ -8,6 +8,13 @@ from typing import Any
 from studies.base.study import Config, Figure, Study
 from workflow import settings, solids, variants
 
+MEASURES = {
+    "convergence": "convergence.models",
+    "methods": "times.models",
+    "scaling": "scaling.models",
+}
+"""Where the configuration names the models that are measured, by the file of the result."""
+
 
 def _by_variant(
     config: Config, names: Callable[[Mapping[str, Any]], Iterable[str]], pattern: str
@@ -30,7 +37,7 @@ def _measured(config: Config) -> list[str]:
         *_by_variant(config, variants.variants_of, "models/{model}/{variant}.h5"),
         *(f"models/{name}/comparisons.json" for name in models),
         *(f"models/{name}/further_comparisons.json" for name in further),
-        *solids.measured_files(config, "report"),
+        *solids.measured_files(config, MEASURES),
     ]
 
 
