@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import command_help
+import gallery
 import materials_table
 import rooms_picture
 import schema_keys
@@ -19,6 +20,7 @@ PARTS: dict[str, Callable[..., str]] = {
     "configuration": schema_keys.of_configuration,
     "project": schema_keys.of_project,
     "scene": schema_keys.of_scene,
+    "examples": gallery.of_examples,
     "materials": materials_table.of_materials,
 }
 _PLACE = re.compile(r"^<!-- made here: (.+) -->$", re.MULTILINE)

@@ -1,0 +1,90 @@
+"""Every example says what it shows, stands in the gallery, and runs."""
+
+from __future__ import annotations
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import gallery
+import pytest
+
+from tests.patience import HANG_SECONDS
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+SLOW = {
+    "a_scene",
+    "a_study",
+    "coarsening",
+    "design_from_a_clip",
+    "export_a_design",
+    "melody",
+    "own_objective",
+    "pan_of_two_materials",
+    "strike_and_hear",
+    "train_forests",
+}
+"""Examples that take more than ten seconds, and are run each night."""
+LIGHT = 60_000
+"""Bytes of a picture in the checkout."""
+
+EACH = pytest.mark.parametrize("script", gallery.scripts(), ids=lambda script: script.stem)
+
+
+@EACH
+def test_an_example_is_short_and_says_what_it_shows(script):
+    lines = script.read_text().splitlines()
+    docstring = ast.get_docstring(ast.parse(script.read_text()))
+    assert 10 <= len(lines) <= 60
+    assert docstring is not None and ": " in docstring.splitlines()[0]
+
+
+@EACH
+def test_an_example_uses_the_public_surface_alone(script):
+    rooms = {"dataset_gen", "forests", "solver", "sound", "studio", "studies", "workflow"}
+    for node in ast.walk(ast.parse(script.read_text())):
+        if isinstance(node, ast.Import):
+            names = {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            names = {node.module}
+        else:
+            continue
+        assert names.isdisjoint(rooms) and not any(n.startswith("carillon.") for n in names)
+
+
+def test_pictures_are_light_and_of_examples_that_are_there():
+    pictures = {path.stem: path.stat().st_size for path in gallery.PICTURES.iterdir()}
+    assert set(pictures) == {script.stem for script in gallery.scripts()}
+    assert max(pictures.values()) < LIGHT
+
+
+@pytest.mark.parametrize(
+    "script",
+    [
+        pytest.param(path, id=path.stem, marks=[pytest.mark.nightly] * (path.stem in SLOW))
+        for path in gallery.scripts()
+    ],
+)
+def test_an_example_runs_and_draws_its_picture(script, tmp_path):
+    pytest.importorskip("mujoco") if script.stem == "a_scene" else None
+    done = subprocess.run(
+        [sys.executable, "-W", "error::DeprecationWarning", script],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(CHECKOUT), "MPLBACKEND": "Agg"},
+        capture_output=True,
+        text=True,
+        timeout=HANG_SECONDS,
+    )
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / gallery.picture_of(script).name).stat().st_size > 5_000
+
+
+@pytest.mark.mpi
+@pytest.mark.nightly
+def test_ranks_say_the_same(tmp_path, mpiexec, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = mpiexec(2, gallery.EXAMPLES / "on_ranks.py", check=True)
+    said = {line.partition(": ")[2] for line in done.stdout.splitlines() if "rank " in line}
+    assert len(said) == 1
