@@ -1,1 +1,1 @@
-"""Optimisation of the material until struck points sound as their clips (sections 5 and 6)."""
+"""Optimisation of a material by the clips of struck points (sections 5 and 6)."""

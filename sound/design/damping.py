@@ -1,8 +1,8 @@
-"""Loss factors of regions, by which a material damps its modes as the clips say.
+"""Loss factors of a material's regions, fitted to the dampings of the clips.
 
-The loss factor of a material is the share of its strain energy that a radian of vibration loses.
-A mode loses what its regions lose, each by its share s_r of the mode's strain energy (modal strain
-energy method; Johnson and Kienholz, AIAA Journal 20, 1982):
+The loss factor of a material is the share of its strain energy that a radian of vibration loses.  A
+mode loses the energy that its regions lose, each by its share s_r of the mode's strain energy
+(modal strain energy method; Johnson and Kienholz, AIAA Journal 20, 1982):
 
     d = alpha / 2 + omega / 2 sum_r eta_r s_r .
 """
@@ -21,8 +21,8 @@ from sound.project.material_damping import MaterialDamping
 Array = NDArray[np.float64]
 
 ALIKE = 1e-4
-"""Weight of the differences of loss factors: little, but where dampings do not tell regions apart,
-such as the two ends of a bar, it makes them alike."""
+"""Weight of the differences between loss factors.  It is small, and makes equal those that dampings
+do not distinguish, such as of the two ends of a bar."""
 
 
 def material_damping(
@@ -32,60 +32,59 @@ def material_damping(
     regions: int,
     hertz: Array,
     order: NDArray[np.integer],
-    wanted: Array,
+    targets: Array,
 ) -> MaterialDamping:
-    """Loss factors that bring the dampings of a material's modes near to those `wanted`.
+    """Loss factors that bring the dampings of a material's modes near to the targets.
 
     Parameters
     ----------
     simulation, evaluation
-        Of the material.
+        Simulation and modes of the material.
     mesh
-        Its voxels.
+        Voxels.
     regions : int
-        Regions that have a loss factor each; they depend on the solid alone.
+        Number of regions with a loss factor each; the regions depend on the solid alone.
     hertz : (N,) [Hz]
-        What the modes sound at.
+        Frequencies of the modes.
     order : (N,)
-        Number of each among the modes of the evaluation.
-    wanted : (N,) [1/s]
-        Dampings.
+        Number of each mode in the evaluation.
+    targets : (N,) [1/s]
+        Dampings of the clips.
     """
     labels = partition_cells(mesh, min(regions, mesh.n_cells))
     shares = simulation.energy_shares(evaluation, labels)[order]
-    factors, mass = fitted_loss_factors(shares, hertz, wanted)
+    factors, mass = fitted_loss_factors(shares, hertz, targets)
     dampings = 0.5 * mass + np.pi * hertz * (shares @ factors)
     return MaterialDamping(factors[labels], mass, np.maximum(dampings, 0.0))
 
 
-def fitted_loss_factors(shares: Array, hertz: Array, wanted: Array) -> tuple[Array, float]:
-    """Loss factors (R,) and alpha [1/s], neither negative, for dampings nearest to those `wanted`.
+def fitted_loss_factors(shares: Array, hertz: Array, targets: Array) -> tuple[Array, float]:
+    """Loss factors (R,) and alpha [1/s], none negative, for dampings nearest to the targets.
 
-    Least squares of relative differences: so no damping is made far too long for the sake of a
-    short one.
+    Least squares of relative differences, so that large dampings do not outweigh small ones.
 
     Parameters
     ----------
     shares : (N, R)
-        Of the modes' strain energies, that the regions hold.
+        Shares of the regions in the modes' strain energies.
     hertz : (N,) [Hz]
         Frequencies.
-    wanted : (N,) [1/s]
-        Dampings, above 0.
+    targets : (N,) [1/s]
+        Dampings above 0.
 
     Examples
     --------
     >>> shares, hertz = np.array([[0.9, 0.1], [0.2, 0.8], [0.5, 0.5]]), np.array([1e2, 2e2, 3e2])
-    >>> wanted = np.pi * hertz * (shares @ np.array([0.01, 0.03]))
-    >>> factors, mass = fitted_loss_factors(shares, hertz, wanted)
+    >>> targets = np.pi * hertz * (shares @ np.array([0.01, 0.03]))
+    >>> factors, mass = fitted_loss_factors(shares, hertz, targets)
     >>> factors.round(6).tolist(), round(mass, 6)
     ([0.01, 0.03], 0.0)
     """
-    lost = np.pi * hertz[:, None] * shares / wanted[:, None]
+    lost = np.pi * hertz[:, None] * shares / targets[:, None]
     regions = shares.shape[1]
     differences = ALIKE * np.linalg.norm(lost) * (np.eye(regions) - 1.0 / regions)
     columns = np.column_stack(
-        [np.concatenate([lost, differences]), np.append(0.5 / wanted, np.zeros(regions))]
+        [np.concatenate([lost, differences]), np.append(0.5 / targets, np.zeros(regions))]
     )
-    found = nnls(columns, np.append(np.ones(len(wanted)), np.zeros(regions)))[0]
-    return found[:-1], float(found[-1])
+    solution = nnls(columns, np.append(np.ones(len(targets)), np.zeros(regions)))[0]
+    return solution[:-1], float(solution[-1])

@@ -1,4 +1,4 @@
-"""The elements that are analysed, whose moduli follow from those of the voxels."""
+"""Elements of the analysed solid, as functions of the moduli of its voxels."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from solver.coarsening.model import block_moduli, coarse_model
 Array = NDArray[np.float64]
 
 STRAINS = 6
-"""Rank of the stiffness of a point."""
+"""Rank of the stiffness at a quadrature point."""
 
 
 class AnalysedElements(ABC):
@@ -31,7 +31,7 @@ class AnalysedElements(ABC):
     Attributes
     ----------
     model
-        The solid that is analysed, with moduli of 1 Pa.
+        Analysed solid with moduli of 1 Pa.
     """
 
     model: Solid
@@ -47,14 +47,14 @@ class AnalysedElements(ABC):
         start: Modes | Array | None,
         poisson: float | None = None,
     ) -> Modes:
-        """Its modes by a solver of `model`, see `ModalSolver.solve`."""
+        """Modes by a solver of `model`, see `ModalSolver.solve`."""
         return solver.solve(young, start, poisson)
 
     @abstractmethod
     def slopes(self, young: Array, directions: Array) -> Array:
-        """Derivatives (p c, m) of the moduli at the p points of each element.
+        """Derivatives (p c, m) of the moduli at the p points of c elements.
 
-        `directions` (M, m) are those of the voxels' moduli that they are taken along.
+        They are directional derivatives along m `directions` (M, m) of the voxels' moduli.
 
         Raises
         ------
@@ -64,22 +64,22 @@ class AnalysedElements(ABC):
 
     @abstractmethod
     def strains(self, poisson: float) -> Array:
-        """B (p, 6, 3 k): a unit of modulus at point p has the stiffness B_p^T B_p."""
+        """Matrices B (p, 6, 3 k); the stiffness of modulus 1 at point p is B_p^T B_p."""
 
 
 def analysed_elements(
     mesh: HexMesh, options: ProblemOptions, cells: FiniteCells | None = None
 ) -> AnalysedElements:
-    """What a solid is analysed by: finite cells, fine voxels, or the blocks of a coarsening.
+    """Elements of a solid: finite cells, voxels, or blocks of a coarsening.
 
     Parameters
     ----------
     mesh
-        Its voxels.
+        Voxels.
     options
-        The solid, of which constants, coarsening and forests are used.
+        Constants, coarsening and forests.
     cells
-        The finite cells that have these voxels, if it is one of them.
+        Finite cells with these voxels; None if there are none.
     """
     constants: Constants = {"poisson": options.poisson, "density": options.density}
     if cells is not None:
@@ -91,7 +91,7 @@ def analysed_elements(
 
 
 class _FineElements(AnalysedElements):
-    """The voxels themselves."""
+    """Voxels."""
 
     def __init__(self, mesh: HexMesh, constants: Constants) -> None:
         self.model = fine_model(mesh, np.ones(mesh.n_cells), **constants)
@@ -107,7 +107,7 @@ class _FineElements(AnalysedElements):
 
 
 class _CoarseElements(_FineElements):
-    """Blocks of voxels, by a coarsening."""
+    """Blocks of voxels with moduli by a coarsening."""
 
     def __init__(self, mesh: HexMesh, coarsening: Coarsening, constants: Constants) -> None:
         self._coarsening, self._constants = coarsening, constants

@@ -1,4 +1,4 @@
-"""The modes of the fine solid beside those of the coarse one that a search works with."""
+"""Modes of the fine solid, matched with those of the coarse solid of a search."""
 
 from __future__ import annotations
 
@@ -28,27 +28,27 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 CLEAR = 0.7
-"""Modal assurance criterion from which two shapes are taken for one."""
+"""Least modal assurance criterion of two modes that count as one shape."""
 FINE_TOLERANCE = 1e-5
 """Relative error of the fine eigenvalues: a hundredth of a cent."""
 
 
 @dataclass(frozen=True)
 class FineModes:
-    """Elastic modes of the fine solid, and which coarse ones they are.
+    """Elastic modes of the fine solid, matched with coarse ones.
 
     Attributes
     ----------
     frequencies : (N,) [Hz]
-        Ascending.
+        Frequencies, ascending.
     order : (N,)
-        Number of the coarse mode of the same shape.
+        Numbers of the coarse modes of the same shapes.
     coarse : (N,) [Hz]
-        Its frequency.
+        Frequencies of these coarse modes.
     excess : (T, N)
-        Its balance of amplitudes at the struck points less that of the fine mode.
+        Balances of amplitudes of these coarse modes minus those of the fine modes.
     cost
-        Eq. (4) of the fine solid.
+        Cost of the fine solid, Eq. (4).
     """
 
     frequencies: Array
@@ -64,16 +64,16 @@ class FineModes:
 
 
 class FineSolid:
-    """The solid that a coarse one stands for, its modes followed from one material to the next.
+    """The fine solid of a coarse one; modes of one material are the start of the next analysis.
 
-    One thread does it, as in the search: what is found does not depend on the machine's cores.
+    It uses one thread, as the search does, so results do not depend on the machine's cores.
 
     Parameters
     ----------
     setting
-        Of the search, which coarsens.
+        Setting of a search that coarsens.
     coarse
-        Its simulation.
+        Simulation of the coarse solid.
     """
 
     def __init__(self, setting: Setting, coarse: Simulation) -> None:
@@ -84,12 +84,12 @@ class FineSolid:
         self._last: Modes | None = None
 
     def modes(self, evaluation: Evaluation) -> FineModes:
-        """Modes of the material that an evaluation of the coarse simulation found modes of.
+        """Modes of the material of an evaluation of the coarse solid.
 
         Raises
         ------
         ConvergenceError
-            If there are none to be had.
+            If they were not found.
         """
         simulation, setting = self._simulation, self._setting
         with one_thread():
@@ -108,14 +108,12 @@ class FineSolid:
 
 
 def fine_frequencies(design: Design) -> FineFrequencies:
-    """Frequencies of a design on the solid that its coarse one stands for.
-
-    A design that was not coarsened is its own.
+    """Frequencies of a design on its fine solid; of one that was not coarsened, its own.
 
     Raises
     ------
     ConvergenceError
-        If there are no modes to be had.
+        If the modes were not found.
     """
     count = len(design.targets.frequencies)
     if not is_coarsened(design):
@@ -136,35 +134,35 @@ def fine_frequencies(design: Design) -> FineFrequencies:
 
 
 def is_coarsened(design: Design) -> bool:
-    """Whether the solid that a design was sought on stands for a finer one."""
+    """Whether the solid of a design is a coarsening of a finer one."""
     mesh = design.model.mesh
     return isinstance(design.model, ElasticModel) and mesh.n_cells != len(design.young)
 
 
 class ShapeMatch:
-    """Which mode of a coarse solid has the shape of which one of the fine solid.
+    """Matching of the modes of a coarse and a fine solid by their shapes.
 
     Parameters
     ----------
     coarse, fine
-        The two solids, of any moduli.
+        The two solids, with any moduli.
     """
 
     def __init__(self, coarse: Solid, fine: Solid) -> None:
-        # Of a lumped mass, a cell's share a node; factors do not matter.
+        # Lumped mass up to a factor: the number of elements at each node.
         self._mass = np.repeat(np.bincount(fine.connectivity.ravel()), 3)[:, None]
         self._interpolation = interpolation(coarse, fine.mesh.nodes)
 
     def order(self, coarse_modes: Array, fine_modes: Array) -> Index:
-        """Number (N,) of the coarse mode for each fine one.
+        """Numbers (N,) of the coarse modes that match the fine ones.
 
-        Modes of which one shape clearly is the other's are pairs; what is left, shapes that the
-        coarse solid does not have, are pairs in their order.
+        Modes of clearly the same shape are pairs.  The others, whose shapes the coarse solid does
+        not have, are paired in the order of frequency.
 
         Parameters
         ----------
         coarse_modes, fine_modes : (3 n, N)
-            On the nodes of the two solids, by ascending frequency.
+            Modes on the nodes of the two solids, by ascending frequency.
         """
         count = fine_modes.shape[1]
         nodal = self._interpolation @ coarse_modes.reshape(-1, 3 * count)

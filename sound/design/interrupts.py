@@ -1,4 +1,4 @@
-"""What Ctrl-C and SIGTERM do to a search: once, they end it; twice, the program."""
+"""Interrupts of a search: the first Ctrl-C or SIGTERM ends the search, the second the program."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _interrupted: ContextVar[Callable[[], bool] | None] = ContextVar("interrupted", 
 
 @contextmanager
 def ended_by_interrupts() -> Iterator[None]:
-    """Let Ctrl-C end the process there and then, while it has nothing to lose.
+    """Let Ctrl-C end the process at once, while there is nothing to lose.
 
     Python would raise an exception, which some libraries swallow while they are imported.
     """
@@ -29,9 +29,10 @@ def ended_by_interrupts() -> Iterator[None]:
 
 @contextmanager
 def interruptible() -> Iterator[Callable[[], bool]]:
-    """Whether somebody asked to stop (Ctrl-C or SIGTERM); asked a second time, it is as before.
+    """Yields a function that says whether Ctrl-C or SIGTERM came; the second one acts as before.
 
-    Within another one it tells what that does.  In another thread than the main one nobody can ask.
+    Nested contexts share the outermost one's function.  Signals reach the main thread only, so in
+    another thread the function is always false.
     """
     outer = _interrupted.get()
     if outer is not None:
@@ -55,7 +56,7 @@ def interruptible() -> Iterator[Callable[[], bool]]:
 
 
 def _handled(numbers: tuple[signal.Signals, ...], handler: Any) -> dict[signal.Signals, Any]:
-    """Former handlers of signals that are given another one; none but in the main thread."""
+    """Set the handler of signals, and return the former ones; none outside of the main thread."""
     try:
         return {number: signal.signal(number, handler) for number in numbers}
     except ValueError:

@@ -1,4 +1,4 @@
-"""Young's modulus from few coordinates: Y = Phi z over the modes of the volumetric Laplacian."""
+"""Reduced material: Young's modulus Y = Phi z over modes of the volumetric Laplacian."""
 
 from __future__ import annotations
 
@@ -16,24 +16,25 @@ from sound.design.poisson import FreePoisson
 Array = NDArray[np.float64]
 
 LAWS = ("linear", "exponential")
+"""Laws from the field Phi z to moduli, see `ReducedMaterial`."""
 KNEE = 0.1
-"""Share of the reference modulus below which the linear law bends, so that none becomes negative.
+"""Modulus below which the linear law bends to stay positive, over the reference modulus.
 
-Regression forests tell moduli in a block apart over four decades or so; a knee far lower would
-only make cells that carry nothing.
+Regression forests distinguish moduli in a block over about four decades; a far lower knee would
+only make cells without stiffness.
 """
 REACH = np.log(100.0)
-"""Logarithm of the largest modulus of the exponential law as a multiple of the reference."""
+"""Natural logarithm of the largest modulus of the exponential law over the reference modulus."""
 
 
 @dataclass(frozen=True)
 class ReducedMaterial:
     """Moduli of the cells as a function of reduced coordinates z (section 6, [XLCB15]).
 
-    `linear` is Y / Y0 = g(x) with x = Phi z, where g(x) = x as far as x is above the knee k, and
-    k exp(x / k - 1) below it: the paper's Y = Phi z, continued with its slope to where it would not
-    be positive.  `exponential` is Y / Y0 = exp(r tanh(x / r)), about
-    exp(Phi z) within a factor of `REACH` both ways, for moduli that differ by decades.
+    `linear` is Y / Y0 = g(x) with x = 1 + Phi z, where g(x) = x above the knee k and
+    k exp(x / k - 1) below it: the paper's Y = Phi z, continued smoothly to stay positive.
+    `exponential` is Y / Y0 = exp(r tanh(Phi z / r)) with r = `REACH`, about exp(Phi z), for moduli
+    that differ by decades.
 
     Neither frequencies relative to the first one nor balances of amplitudes depend on a factor
     common to all moduli, so the constant part is not among the coordinates: z = 0 is the uniform
@@ -42,16 +43,16 @@ class ReducedMaterial:
     Attributes
     ----------
     basis : (M, m)
-        Modes of the Laplacian without the constant, their rms value 1.
+        Modes of the Laplacian without the constant one, of root mean square 1.
     laplacian : (m,)
-        Eigenvalues of the Laplacian, the diagonal of Q in Eq. (4).
+        Eigenvalues of these modes, the diagonal of Q in Eq. (4).
     young : float [Pa]
         Modulus Y0.
     law : str
         One of `LAWS`.
     free_poisson
-        Poisson's ratio as a function of the last coordinate, which moduli do not depend on: its
-        column of the basis is zero, as its eigenvalue.  None if there is no such coordinate.
+        Poisson's ratio as a function of the last coordinate; None if it is fixed.  Moduli do not
+        depend on that coordinate: its column of the basis and its eigenvalue are 0.
     """
 
     basis: Array
@@ -106,13 +107,13 @@ class ReducedMaterial:
         return np.asarray(self.young * np.where(x > KNEE, x, bent))
 
     def poisson(self, z: Array) -> float | None:
-        """Poisson's ratio, if it is free."""
+        """Poisson's ratio; None if it is fixed."""
         return None if self.free_poisson is None else self.free_poisson.at(z[-1])
 
     def coordinates(self, moduli: Array, poisson: float | None = None) -> Array:
-        """Coordinates (m,) whose moduli come nearest to a multiple of given ones (M,) [Pa].
+        """Coordinates (m,) whose moduli are nearest to a multiple of `moduli` (M,) [Pa].
 
-        `poisson` is used if it is free.
+        `poisson` is used if Poisson's ratio is free.
         """
         if self.law == "exponential":
             level = np.log(moduli) - np.log(moduli).mean()
@@ -126,7 +127,7 @@ class ReducedMaterial:
         return np.asarray(z)
 
     def slopes(self, moduli: Array) -> Array:
-        """Derivatives (M,) [Pa] of the moduli with respect to Phi z, at given `moduli`."""
+        """Derivatives (M,) [Pa] of `moduli` (M,) with respect to Phi z."""
         if self.law == "exponential":
             level = np.log(moduli / self.young) / REACH
             return np.asarray(moduli * (1.0 - level**2))

@@ -1,6 +1,6 @@
-"""What modes beyond those computed add to the derivatives of mode shapes (appendix 2).
+"""Contribution of modes that were not computed to the derivatives of mode shapes (appendix 2).
 
-The appendix leaves it out; here it is found in a Krylov space.
+The appendix truncates it; here a Krylov space gives it.
 """
 
 from __future__ import annotations
@@ -16,42 +16,42 @@ from solver.subspace.orthonormal import is_cancelled
 Array = NDArray[np.float64]
 
 SHIFTS = (0.5, 0.75)
-"""Range of a shift, as shares of the last eigenvalue: with it among the computed ones a Krylov
-space is near to all of them, and an analysis of a similar material can use the inverse, too."""
+"""Least and greatest shift over the last computed eigenvalue.  A Krylov space about such a shift is
+near to all computed eigenvalues, and the analysis of a similar material can use the inverse."""
 MOST_BLOCKS = 16
-"""Blocks of a Krylov space at most."""
+"""Greatest number of blocks of a Krylov space."""
 MOST_PASSES = 3
-"""Times that a block is made orthogonal; twice is enough but for rounding."""
+"""Greatest number of orthogonalisations of a block; two are enough but for rounding."""
 CLEAR = 0.2
-"""Share of the largest distance to all eigenvalues from which another shift is as good."""
+"""Least distance of a usable shift from all eigenvalues, over that of the best shift."""
 DEPENDENT = 1e-10
-"""Share (squared) of a vector below which it lies in the space that it was made orthogonal to."""
+"""Squared norm of an orthogonalised vector, over that of the vector, below which it is dropped."""
 
 
 def outside_response(
     modes: Modes, inverse: Inverse, elastic: Array, values: Array, pushes: Array, accuracy: float
 ) -> Array:
-    """x (3 n, T, N) with x_pk = sum of u_j (u_j^T f_p) / (lambda_k - lambda_j) over other modes.
+    """x (3 n, T, N), the sums of u_j (u_j^T f_p) / (lambda_k - lambda_j) over other modes j.
 
-    These are all solutions of (K - lambda_k M) x = -f, without the part of f that the computed
-    modes hold, and all lie near one Krylov space of (K - mu M)^-1 M: of its blocks of T vectors,
-    made orthogonal to the computed modes, the Galerkin solutions are taken, with as many blocks as
-    it takes until one more changes no solution by more than `accuracy`.
+    They solve (K - lambda_k M) x = -f, without the part of f in the computed modes, and lie near
+    one Krylov space of (K - mu M)^-1 M.  The result is the Galerkin solution in that space, made
+    orthogonal to the computed modes and enlarged by blocks of T vectors until a block changes no
+    solution by more than `accuracy`.
 
     Parameters
     ----------
     modes
-        Of the analysis.
+        Modes of the analysis.
     inverse
-        (K - mu M)^-1 with mu between the eigenvalues, not close to one.
+        (K - mu M)^-1 with mu between the eigenvalues, close to none.
     elastic : (3 n, N)
-        The computed modes but for the rigid ones.
+        Computed elastic modes.
     values : (N,) [rad^2/s^2]
-        Their eigenvalues.
+        Eigenvalues of the elastic modes.
     pushes : (3 n, T)
         Forces f.
     accuracy : float
-        Largest relative change by the last block.
+        Greatest relative change by the last block.
     """
     struck = pushes.shape[1]
     space = _Space(modes, elastic, MOST_BLOCKS * struck)
@@ -75,11 +75,11 @@ class _Space:
     Parameters
     ----------
     modes
-        Of the analysis.
+        Modes of the analysis.
     elastic
-        Those but the rigid ones.
+        Elastic modes.
     room
-        Vectors that it may grow to.
+        Greatest number of vectors.
 
     Attributes
     ----------
@@ -102,12 +102,13 @@ class _Space:
         return self._vectors[:, self._known : self._size]
 
     def free_of(self, forces: Array) -> Array:
-        """Forces (3 n, T) less the part that the subspace, and what it is orthogonal to, hold."""
+        """Forces (3 n, T) without their parts in the subspace and in what it is orthogonal to."""
         vectors, mass_vectors = self._vectors[:, : self._size], self._mass_vectors[:, : self._size]
         return np.asarray(forces - mass_vectors @ (vectors.T @ forces))
 
     def add(self, block: Array) -> Array:
-        """Let the subspace grow by a block (3 n, b), which is lost; M times what it added."""
+        """Enlarge the subspace by a block (3 n, b), which is overwritten; M times the new
+        vectors."""
         mass_block, gram = self._made_orthogonal(block)
         weights = _orthonormal(gram)
         block, mass_block = block @ weights, mass_block @ weights
@@ -120,7 +121,7 @@ class _Space:
         return mass_block
 
     def _made_orthogonal(self, block: Array) -> tuple[Array, Array]:
-        """M times `block`, and its Gram matrix, once it is made orthogonal to all, in place."""
+        """Orthogonalise `block` in place; M times it, and its Gram matrix."""
         vectors, mass_vectors = self._vectors[:, : self._size], self._mass_vectors[:, : self._size]
         for _ in range(MOST_PASSES):
             overlap = mass_vectors.T @ block
@@ -148,7 +149,7 @@ def _galerkin(stiffness: Array, held: Array, values: Array) -> Array:
 
 
 def shift_between(values: Array) -> float:
-    """The shift in the range of `SHIFTS` that is farthest from all of the eigenvalues (N,)."""
+    """The shift in the range of `SHIFTS` that is farthest from all eigenvalues (N,)."""
     ends = values[-1] * np.array(SHIFTS)
     middles = 0.5 * (values[1:] + values[:-1])
     possible = np.concatenate([ends, middles[(middles > ends[0]) & (middles < ends[1])]])
@@ -157,7 +158,7 @@ def shift_between(values: Array) -> float:
 
 
 def lies_between(values: Array, shift: float) -> bool:
-    """Whether a shift is hardly closer to an eigenvalue of (N,) than that of `shift_between`."""
+    """Whether a shift is nearly as far from all eigenvalues (N,) as that of `shift_between`."""
     best = _distance(values, shift_between(values))
     return SHIFTS[0] * values[-1] <= shift and _distance(values, shift) >= CLEAR * best
 

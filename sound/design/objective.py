@@ -1,15 +1,15 @@
-"""How far a solid sounds from its targets: Eq. (1) to (4), as sums of squares.
+"""Objective of a design, Eq. (1) to (4), as sums of squares.
 
-Two decisions make the amplitudes of Eq. (2) functions that have derivatives.  A mode has no sign,
-so magnitudes are compared.  And modes of one frequency have no shapes of their own, only their span
-has: what a strike excites within the width that the ear resolves is averaged,
+Two decisions make the amplitudes of Eq. (2) differentiable.  A mode has no sign, so magnitudes are
+compared.  And modes of equal frequency have no shapes of their own, only a common span, so energies
+are averaged within the width that the ear resolves,
 
     b_k = sum_i w((f_i - f_k) / f_k) a_i^2 / sum_i w((f_i - f_k) / f_k),   w a Gaussian,
 
-which for a mode on its own is a_k^2.  The targets' amplitudes are averaged likewise.
+which is a_k^2 for a mode on its own.  The targets' amplitudes are averaged likewise.
 
-Eq. (2) leaves the first mode out, as Eq. (1) has to.  Here it counts as the others: it would
-otherwise be as loud as the loudest wherever that is of use to them.
+Eq. (2) leaves the first mode out, as Eq. (1) has to.  Here it counts like the others: otherwise it
+would become too loud wherever that helps the others.
 """
 
 from __future__ import annotations
@@ -31,27 +31,27 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 RESOLVED = 3e-3
-"""Standard deviation of the average over neighbouring modes, as a share of their frequency: about
-the difference of two tones that the ear just tells apart."""
+"""Standard deviation of the average over neighbouring modes, over their frequency: about the least
+difference of two tones that the ear resolves."""
 CLUSTER = 1e-6
-"""Relative difference of eigenvalues below which they are taken for equal."""
+"""Relative difference below which eigenvalues count as equal."""
 EQUAL = 1e-9
-"""The same, below which a divided difference is a derivative."""
+"""Relative difference of eigenvalues below which a derivative replaces a divided difference."""
 TINY = 1e-30
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Derivatives of eigenpairs with respect to m coordinates, projected where they are needed.
+    """Derivatives of eigenpairs by m coordinates, projected on pairs of modes and struck points.
 
     Attributes
     ----------
     pairs : (P, 2)
-        Numbers i <= j of elastic modes that are close to each other, first all with i = j.
+        Numbers i <= j of elastic modes of close eigenvalues, first all with i = j.
     stiffness : (m, P) [rad^2/s^2]
-        u_i^T (dK/dz) u_j of these.
+        u_i^T (dK/dz) u_j of these pairs.
     outside : (m, T, N)
-        Part of the derivative of each pushed mode that lies outside the modes close to it.
+        Part of the derivative of each pushed mode outside of the modes close to it.
     """
 
     pairs: Index
@@ -61,7 +61,7 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class DesignCost:
-    """Value of Eq. (4) and its parts, each without its weight."""
+    """Cost, Eq. (4), and its parts without their weights."""
 
     total: float
     frequency: float
@@ -75,11 +75,11 @@ class Objective:
     Parameters
     ----------
     targets
-        What the points shall sound like.
+        Modes that the points shall have.
     weights
         w_f, w_a and w_r.
-    shift : (T, N)
-        Added to the targets' balances of amplitudes, none if not given.
+    shift : (T, N) or None
+        Shift of the targets' balances of amplitudes.
     """
 
     def __init__(self, targets: Targets, weights: Weights, shift: Array | None = None) -> None:
@@ -105,7 +105,7 @@ class Objective:
         Parameters
         ----------
         eigenvalues : (N,) [rad^2/s^2]
-            Of the elastic modes, ascending.
+            Eigenvalues of the elastic modes, ascending.
         pushed : (T, N) [kg^-1/2 N s]
             u_k^T f of a unit impulse f along the inward normals.
         regulariser : float
@@ -142,7 +142,7 @@ class Objective:
         return np.asarray(self.targets.frequencies[0] * np.sqrt(eigenvalues / eigenvalues[0]))
 
     def balance(self, eigenvalues: Array, pushed: Array) -> Array:
-        """Amplitudes (T, N) of modes as shares of the loudest at each point, see `cost`."""
+        """Amplitudes (T, N) of modes over the loudest at each point; `cost` has the parameters."""
         energies = _average(np.sqrt(eigenvalues), pushed**2)
         return np.asarray(np.sqrt(energies / energies.max(axis=1, keepdims=True)))
 
@@ -160,10 +160,10 @@ def _average(frequencies: Array, energies: Array) -> Array:
 
 
 def _slopes(eigenvalues: Array, sensitivity: Sensitivity) -> Array:
-    """Derivatives (m, N) of the eigenvalues; those of equal ones share their mean.
+    """Derivatives (m, N) of the eigenvalues; equal eigenvalues have the mean of theirs.
 
-    Equal eigenvalues part in any direction and have no derivatives one by one.  The mean is that of
-    a change that keeps them together; of a pair, it is what central differences find.
+    Equal eigenvalues have no derivatives one by one, as any change separates them.  Their mean has
+    one; for a pair, central differences find it, too.
     """
     slopes = sensitivity.stiffness[:, : len(eigenvalues)].copy()
     for group in clusters(eigenvalues, CLUSTER):
@@ -201,7 +201,7 @@ def _average_slopes(
     for point, a in enumerate(pushed):
         slopes[point] = (divided * (a[i] * a[j])) @ sensitivity.stiffness.T
         slopes[point] += (2.0 * kernel * a) @ sensitivity.outside[:, point].T
-        # The centre of the average moves, and so does the sum that divides it.
+        # The centre of the average depends on z, too, and so does its sum of weights.
         moved = (by_centre @ a**2)[:, None] * values.T
         lost = energies[point][:, None] * (by_own @ values.T + by_centre.sum(1)[:, None] * values.T)
         slopes[point] = (slopes[point] + moved - lost) / total[:, None]
@@ -209,5 +209,5 @@ def _average_slopes(
 
 
 def fall(start: float, end: float) -> float:
-    """Share of the cost at the start that was taken off; none where there was nothing."""
+    """Decrease of a cost over that at the start; 0 if that is 0."""
     return 1.0 - end / start if start > 0.0 else 0.0

@@ -1,4 +1,4 @@
-"""A design: the search for a material, and the analysis of what was found."""
+"""The search for a design."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from sound.project.design import HISTORY_TYPE, Design
 Array = NDArray[np.float64]
 
 KEEP_SECONDS = 30.0
-"""Time between two designs that are kept while a search goes on [s]."""
+"""Time between two intermediate designs of a search [s]."""
 
 
 def optimise(
@@ -35,30 +35,30 @@ def optimise(
     coordinates: Array | None = None,
     history: NDArray[np.void] | None = None,
 ) -> Design:
-    """Search for a material until the project's budget is spent, or somebody interrupts.
+    """Search for a material until the project's budget is spent or an interrupt comes.
 
-    What is found is never worse than what the search starts from, by analyses to `FINAL_TOLERANCE`;
-    where a coarse solid is searched on and the project wants checks, by its cost on the fine one.
+    The cost of the design is not greater than that of the start, by analyses to `FINAL_TOLERANCE`;
+    of a coarse solid with `fine_check`, that is the cost on the fine solid.
 
     Parameters
     ----------
     problem
-        Of the project.
+        Problem of the project.
     initial
-        Design to go on from, of the same mesh; its targets may be others.
+        Design to go on from, of the same mesh; its targets may differ.
     keep
-        Called with the design so far every `KEEP_SECONDS` of the search, if there is a better one.
+        Called with the best design so far every `keep_seconds`, if it is a new one.
     watch
         Called after every round of evaluations; ends the search by returning True.
     keep_seconds : float or None [s]
-        Takes the place of `KEEP_SECONDS`.
+        `KEEP_SECONDS` if None.
     follow
-        Called from another thread with every step of a descent and the frequencies (N,) [Hz] that
-        the design then has, in the order of the modes that are searched with.
+        Called from another thread with every step of a descent and the frequencies (N,) [Hz] of the
+        design then, in the order of the modes of the search.
     coordinates : (m,) or None
-        Of the material to start from, in place of the initial design's.
+        Coordinates of the start, instead of the initial design's.
     history : structured array of HISTORY_TYPE or None
-        Of how that was found, in place of the initial design's.
+        History of the start, instead of the initial design's.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Optimisers of the material: a hybrid after appendix 3, and its two parts by themselves."""
+"""Optimisers of the material: a hybrid after appendix 3, and its two parts on their own."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from sound.design.tasks import Task, Trial
 Array = NDArray[np.float64]
 
 ALTERNATING = ((True, False), (False, True), (True, True))
-"""E_f, then E_a (section 6), then both: by themselves they undo some of what the other gained."""
+"""Terms that successive steps reduce: E_f, then E_a (section 6), then both, as each of the two
+undoes some of the other's gain."""
 TOGETHER = ((True, True),)
 DESCENTS = (
     StepOptions(ALTERNATING, damping=1e-2, longest=0.5),
@@ -24,25 +25,27 @@ DESCENTS = (
     StepOptions(ALTERNATING, damping=10.0, longest=0.1),
     LimitedMemory(evaluations=2),
 )
-"""How the descents go that run side by side: none is the best for all solids."""
+"""Descents that run side by side, as none is the best for all solids."""
 FINE_DESCENTS = (TrustRegion(radius=0.3), TrustRegion(radius=0.03))
+"""Descents that run side by side on the fine solid."""
 FINE_STEPS = 3
-"""The same on the fine solid, and fewer steps, as each takes longer."""
+"""Number of steps of a descent on the fine solid before all are compared."""
 STEPS = 6
-"""Steps that a descent takes before all are compared."""
+"""Number of steps of a descent on the coarse solid before all are compared."""
 WORTHWHILE = 0.01
-"""Share of its cost that a descent has to take off in these, to be worth going on with."""
+"""Least relative decrease of the cost in these steps of a descent that goes on."""
 SPREAD = 0.03
 """Standard deviation of the first offspring along each coordinate."""
 _LARGE = 1e12
+"""Cost that stands for infinity."""
 
 
 def hybrid(search: Search, z: Array, seed: int, population: int | None) -> None:
-    """Descents to local optima, and offspring to leave them, as in appendix 3 but not in turn.
+    """Descents to local optima, and evolution to leave them, as in appendix 3 but side by side.
 
-    Descents run side by side.  One that stalls gives its place to one of the best offspring that
-    the evolution strategy bears around the best material known; what descends from them goes back
-    to the strategy, whose covariance learns where better optima lie.
+    A descent that stalls is replaced by one from the best offspring of the evolution strategy
+    around the best known material.  The ends of descents are injected into the strategy, whose
+    covariance learns where better optima lie.
     """
     lanes = [Task(z, options=options, steps=STEPS) for options in DESCENTS]
     strategy: Any = None
@@ -66,7 +69,7 @@ def hybrid(search: Search, z: Array, seed: int, population: int | None) -> None:
 
 
 def evolution(search: Search, z: Array, seed: int, population: int | None) -> None:
-    """CMA-ES by itself."""
+    """CMA-ES alone."""
     (first,) = search.run([Task(z, gradient=True)])
     strategy = _strategy(z, seed, population)
     while True:
@@ -80,7 +83,7 @@ def evolution(search: Search, z: Array, seed: int, population: int | None) -> No
 
 
 def quasi_newton(search: Search, z: Array, seed: int, population: int | None) -> None:
-    """L-BFGS by itself (scipy), again from where it stopped for as long as there is time."""
+    """L-BFGS (scipy) alone, restarted where it stopped as long as there is time."""
     from scipy.optimize import minimize
 
     start: Array | None = None

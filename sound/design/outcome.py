@@ -1,4 +1,4 @@
-"""What a search came to: the better one of its best and its first material, analysed to the end."""
+"""Outcome of a search: the better of its best and its first material, analysed precisely."""
 
 from __future__ import annotations
 
@@ -27,8 +27,7 @@ from sound.design.tasks import Trial
 from sound.project.design import HISTORY_TYPE, Design, FineFrequencies
 
 FINAL_TOLERANCE = 1e-12
-"""Relative error of the eigenvalues that a design is written with; its root is that of the modes,
-and so of the terms of the cost."""
+"""Relative error of a design's eigenvalues; its square root is that of the modes and the cost."""
 
 
 @dataclass(frozen=True)
@@ -41,9 +40,10 @@ class _Analysed:
 
 
 class Outcome:
-    """What searches come to: the better one of their best and their first material.
+    """Outcome of a search.
 
-    Analyses of a search are coarse: what is a little better by them may be a little worse.
+    Analyses in a search are imprecise, so a slightly better material may really be worse than the
+    first one.
     """
 
     def __init__(self, problem: DesignProblem, former_rows: NDArray[np.void]) -> None:
@@ -60,7 +60,7 @@ class Outcome:
         return FineSolid(self._problem.setting, self._simulation)
 
     def of(self, search: Search) -> Design:
-        """The design that a search has found so far, by analyses of the solid that it works with.
+        """The best design of a search so far, by analyses of the solid of the search.
 
         Raises
         ------
@@ -73,12 +73,12 @@ class Outcome:
         if best is not None and best is not first:
             try:
                 chosen = min(self._analysed(best), start, key=lambda each: each.cost.total)
-            except ConvergenceError:  # modes to be had coarsely alone
+            except ConvergenceError:  # it has modes at the tolerance of the search only
                 pass
         return self._design(search, chosen, start.cost.total)
 
     def checked(self, trial: Trial) -> Checked:
-        """A trial's material, analysed on the solid of the search and on the fine one.
+        """A trial's material, analysed on the solid of the search and on the fine solid.
 
         Raises
         ------
@@ -95,7 +95,7 @@ class Outcome:
 
     def _analysed(self, trial: Trial) -> _Analysed:
         setting = self._problem.setting
-        # As in the search: sums shared among threads round differently.
+        # One thread as in the search: sums over several threads round differently.
         with one_thread():
             evaluation = self._simulation.evaluate(trial.z, trial.start)
             return _Analysed(evaluation, cost_of(setting.objective, setting.material, evaluation))
@@ -110,7 +110,7 @@ class Outcome:
         density = problem.project.solid.density
         heavier = weight(moduli, density, problem.project.material.young_bounds)
         young = heavier * moduli
-        # As in the search: sums shared among threads round differently.
+        # One thread as in the search: sums over several threads round differently.
         with one_thread():
             damping = material_damping(
                 simulation,
@@ -163,7 +163,7 @@ class Outcome:
 
 
 def history_rows(history: Sequence[HistoryEntry]) -> NDArray[np.void]:
-    """Entries as rows of a design's history."""
+    """Rows of a design's history."""
     return np.array(
         [
             (

@@ -1,7 +1,7 @@
-"""A density of the whole with which the moduli of a design are those of materials that exist.
+"""Density at which the moduli of a design are those of real materials.
 
-Frequencies depend on moduli over density alone, so a factor common to both is free.  The loudness
-of a design is its clips', whatever it weighs.
+Frequencies depend on moduli over density, so a factor common to both is free.  The loudness of a
+design is that of its clips, whatever the density.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ Array = NDArray[np.float64]
 
 
 def weight(moduli: Array, density: float, bounds: Sequence[float] | None) -> float:
-    """Factor of moduli and density that brings the moduli within bounds, as near to 1 as may be.
+    """Factor of moduli and density, nearest to 1, that brings the moduli within bounds.
 
-    Where they differ by more than the bounds do, the geometric mean of their extremes becomes that
-    of the bounds.  The density stays within what a solid may have.
+    If the moduli span more than the bounds do, the geometric mean of their extremes becomes that of
+    the bounds.  The density stays within `carillon.limits.DENSITIES`.
 
     Parameters
     ----------
     moduli : (M,) [Pa]
-        Of the cells.
+        Moduli of the cells.
     density : float [kg/m^3]
-        Of the solid.
+        Density of the solid.
     bounds : (2,) [Pa] or None
-        Lowest and highest modulus; 1 if there are none.
+        Lowest and highest modulus; without bounds the factor is 1.
 
     Examples
     --------

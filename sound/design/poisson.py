@@ -1,4 +1,4 @@
-"""Poisson's ratio of the whole solid as a coordinate of the search."""
+"""Poisson's ratio of a solid as a coordinate of the search."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from carillon.fem.element import elasticity_matrix
 
 FIRST, SECOND = 0.0, 0.4
-"""Poisson's ratios of the two elasticity matrices that any other is made from."""
+"""Poisson's ratios of the two elasticity matrices whose combinations are all others."""
 
 
 @dataclass(frozen=True)
@@ -26,11 +26,11 @@ class FreePoisson:
         return float(self.low + (self.high - self.low) * share)
 
     def slope(self, poisson: float) -> float:
-        """Its derivative by the coordinate."""
+        """Derivative of Poisson's ratio by the coordinate."""
         return (poisson - self.low) * (self.high - poisson) / (self.high - self.low)
 
     def coordinate(self, poisson: float) -> float:
-        """The inverse of `at`; of what is not within the bounds, that of what is near."""
+        """Inverse of `at`; ratios out of the bounds are moved into them."""
         margin = 1e-3 * (self.high - self.low)
         inside = float(np.clip(poisson, self.low + margin, self.high - margin))
         odds = (inside - self.low) / (self.high - inside)

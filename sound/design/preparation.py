@@ -1,4 +1,4 @@
-"""What a search needs, from a project: targets, mesh, material and objective."""
+"""Preparation of a search from a project: targets, mesh, material and objective."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class DesignProblem:
-    """What a search needs: the surface, the setting and the project they follow from."""
+    """A search to be run: project, surface and setting."""
 
     project: Project
     vertices: Array
@@ -42,7 +42,7 @@ class DesignProblem:
 
     @property
     def workers(self) -> int:
-        """Processes that evaluate materials."""
+        """Number of processes that evaluate materials."""
         return self.project.optimiser.workers or allowed_cores()
 
 
@@ -66,18 +66,18 @@ def targets_of(project: Project) -> Targets:
 
 @dataclass(frozen=True)
 class PreparedSolid:
-    """What a search needs of the solid alone, whatever it shall sound like.
+    """The solid of a search, without targets.
 
     Attributes
     ----------
     surface
-        That is struck.
+        Struck surface.
     mesh
-        Its voxels.
+        Voxels.
     material
-        Their moduli as a function of coordinates.
+        Moduli of the voxels as a function of coordinates.
     cells
-        The finite cells that have these voxels, if it is one of them.
+        Finite cells with these voxels; None if there are none.
     """
 
     surface: trimesh.Trimesh
@@ -116,15 +116,15 @@ def prepare(
     Parameters
     ----------
     targets
-        What its points shall sound like; from its clips if not given.
+        Targets; those of the project's clips if None.
     solid
-        Of the project, if it is prepared already.
+        Solid of the project, if it is prepared already.
 
     Raises
     ------
     UserError
-        For anything wrong with the mesh, the points, the clips or the numbers.  What is wrong
-        with targets is told of all of them, before any clip is searched.
+        For anything wrong with the mesh, the points, the clips or the numbers.  The faults of all
+        targets are named, before any clip is searched.
     """
     surface = project.surface() if solid is None else solid.surface
     if targets is None:
@@ -156,7 +156,7 @@ def require_same_voxels(problem: DesignProblem, initial: Design) -> None:
 
 
 def coordinates_of(problem: DesignProblem, initial: Design) -> Array:
-    """Coordinates (m,) whose material is that of an initial design, as near as may be.
+    """Coordinates (m,) of the material nearest to that of an initial design.
 
     Raises
     ------
@@ -166,8 +166,8 @@ def coordinates_of(problem: DesignProblem, initial: Design) -> Array:
     require_same_voxels(problem, initial)
     material = problem.setting.material
     before = initial.settings.get("material", {})
-    wanted = problem.project.material
-    same = (before.get("law"), before.get("poisson_bounds")) == (wanted.law, wanted.poisson_bounds)
+    now = problem.project.material
+    same = (before.get("law"), before.get("poisson_bounds")) == (now.law, now.poisson_bounds)
     if same and len(initial.coordinates) == material.dimensions:
         return initial.coordinates
     return material.coordinates(initial.young, initial.model.poisson)

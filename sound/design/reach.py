@@ -1,10 +1,10 @@
-"""Which frequencies a solid can have, mode by mode: by itself, and beside its neighbours.
+"""Reach of a solid: which target frequencies it can have, mode by mode and with neighbours.
 
-Ordered eigenvalues are continuous functions of the moduli.  So where one material has a mode above
-its target, relative to the first mode, and another one below it, a material between the two has it
-right: no search is needed to know.  Else descents that look at nothing but this mode say how near
-it was brought.  Modes together, each with its two neighbours and as many as may be from the first
-one on, take descents in any case, and what these do not find may be there all the same.
+Ordered eigenvalues are continuous functions of the moduli.  So if one material has a mode above its
+target, relative to the first mode, and another one below, a material between them meets the target:
+no search is needed.  Otherwise descents that lower the distance of this mode alone show how near it
+gets.  Several modes together, each with its two neighbours or all from the first one on, always
+need descents, and a material that these do not find may still exist.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from sound.project.project import Weights
 Array = NDArray[np.float64]
 
 HAD_CENTS = 15.0
-"""Distance from its target up to which a mode is had [cents]."""
+"""Greatest distance of a mode from its target that counts as met [cents]."""
 HAD, NOT_ALONE, NOT_BESIDE, NOT_TOGETHER, NOT_SOUGHT = (
     "had",
     "not by itself",
@@ -39,36 +39,38 @@ HAD, NOT_ALONE, NOT_BESIDE, NOT_TOGETHER, NOT_SOUGHT = (
     "not with all others",
     "not sought, the time was over",
 )
+"""Verdicts on a mode."""
 SAMPLES = 24
-"""Materials that are looked at before any descent."""
+"""Number of materials that are analysed before the descents."""
 SPREADS = (0.5, 1.5, 3.0)
-"""Root mean square values of their Phi z, in turn."""
+"""Root mean square values of Phi z of these materials, in turn."""
 DESCENT = TrustRegion(radius=0.3)
 STEPS = 6
+"""Number of steps of a descent."""
 AT_ONCE = 8
-"""Materials after which the time is looked at."""
+"""Number of tasks between two checks of the time."""
 
 
 @dataclass(frozen=True)
 class ModeReach:
-    """How near to its target a mode can be brought.
+    """How near a mode gets to its target.
 
-    All distances are those of frequencies relative to the first mode.
+    All distances are of frequencies relative to the first mode.
 
     Attributes
     ----------
     mode : int
-        Counted from 1.
+        Number of the mode from 1 on.
     target_hz : float [Hz]
-        Its target.
+        Target.
     cents : float [cents]
-        How far above the target it is in the design.
+        Distance of the design above the target.
     alone_cents : float [cents]
-        The least distance that was found; none where it is known to be had.
+        Least distance found; 0 if the target can be met.
     beside_cents : float [cents]
-        The same of it and its two neighbours, the largest of the three.
+        Least distance found of the mode and its two neighbours together, the largest of the three.
     verdict : str
-        What of this it is.
+        Verdict.
     """
 
     mode: int
@@ -81,18 +83,18 @@ class ModeReach:
 
 @dataclass(frozen=True)
 class Reach:
-    """Which modes a solid can have.
+    """Reach of a solid.
 
     Attributes
     ----------
     modes
-        From the second one on.
+        Reach of each mode from the second one on.
     together : int
-        Modes, counted from the first one, that one of the materials looked at has all of.
+        Number of modes from the first one on whose targets one material meets together.
     seconds : float [s]
-        Time that it took.
+        Duration.
     had_cents : float [cents]
-        Distance up to which a mode is had.
+        Greatest distance that counts as met.
     """
 
     modes: list[ModeReach]
@@ -102,14 +104,14 @@ class Reach:
 
 
 class SomeModes(Objective):
-    """Frequencies of some modes relative to the first one, and nothing else.
+    """Objective of the frequencies of some modes relative to the first one.
 
     Parameters
     ----------
     targets
-        What all modes shall sound at.
+        Targets of all modes.
     modes
-        Numbers of those that count, from 1 on for the second mode.
+        Numbers of the modes that count, 1 for the second mode.
     """
 
     def __init__(self, targets: Targets, modes: Sequence[int]) -> None:
@@ -131,47 +133,47 @@ class _Known:
     Attributes
     ----------
     off : (k, N) [cents]
-        How far above their targets modes are, with the first one at its own.
+        Distances of modes above their targets, with the first mode at its target.
     """
 
-    def __init__(self, wanted: Array) -> None:
-        self._wanted = wanted
+    def __init__(self, targets: Array) -> None:
+        self._targets = targets
         self._materials: list[Array] = []
-        self.off = np.empty((0, len(wanted)))
+        self.off = np.empty((0, len(targets)))
 
     def add(self, trials: Sequence[Trial]) -> None:
         for trial in trials:
             if trial.eigenvalues is not None:
                 self._materials.append(trial.z)
                 own = np.sqrt(trial.eigenvalues / trial.eigenvalues[0])
-                self.off = np.vstack([self.off, cents(own, self._wanted / self._wanted[0])])
+                self.off = np.vstack([self.off, cents(own, self._targets / self._targets[0])])
 
     def least(self, modes: Sequence[int]) -> float:
-        """Least distance [cents] of some modes; none of one that is on both sides of its target."""
+        """Least distance [cents] of some modes; 0 of a single one with materials on both sides."""
         off = self.off[:, list(modes)]
         if len(modes) == 1 and off.min() <= 0.0 <= off.max():
             return 0.0
         return float(np.abs(off).max(axis=1).min())
 
     def best(self, modes: Sequence[int], rank: int) -> Array:
-        """The material (m,) that is the nearest but `rank` for some modes."""
+        """The material (m,) of rank `rank`, 0 being the nearest, for some modes."""
         order = np.argsort(np.linalg.norm(self.off[:, list(modes)], axis=1), kind="stable")
         return self._materials[order[min(rank, len(order) - 1)]]
 
 
 def reach(problem: DesignProblem, design: Design, seconds: float | None, descents: int) -> Reach:
-    """How near each mode from the second on can be brought to its target, on the fine solid.
+    """Reach of each mode from the second one on, on the fine solid.
 
     Parameters
     ----------
     problem
-        Of the design's project, with the design's targets.
+        Problem of the design's project, with the design's targets.
     design
-        Whose modes are told about.  Where it has all of them, nothing is sought.
+        Design.  If it meets all targets, there is no search.
     seconds : float or None [s]
         Time in which descents begin, half of it for modes from the first one on; no limit if None.
     descents : int
-        For each question at most, each from another one of the materials that suit it best so far.
+        Greatest number of descents for each question, each from another one of the best materials.
 
     Raises
     ------
@@ -198,14 +200,14 @@ def reach(problem: DesignProblem, design: Design, seconds: float | None, descent
 
 
 class _Descents:
-    """Descents on the fine solid that look at the frequencies of some modes only.
+    """Descents on the fine solid by the frequencies of some modes only.
 
     Attributes
     ----------
     known
-        Materials that were looked at.
+        Materials that were analysed.
     sought
-        Groups of modes that descents looked for without running out of time.
+        Groups of modes whose descents all ended in time.
     """
 
     def __init__(self, problem: DesignProblem, most: int) -> None:
@@ -223,7 +225,7 @@ class _Descents:
         self._pool.close()
 
     def look_at(self, materials: Sequence[Array]) -> None:
-        """Find the modes of some materials."""
+        """Analyse some materials."""
         self._run([Task(z) for z in materials], np.inf)
         if not len(self.known.off):
             raise UserError(
@@ -232,7 +234,7 @@ class _Descents:
             )
 
     def together(self, deadline: float) -> int:
-        """How many modes from the first one on one material has."""
+        """Number of modes from the first one on whose targets one material meets."""
         count = len(self._targets.frequencies)
         for last in range(1, count):
             group = tuple(range(1, last + 1))
@@ -244,7 +246,7 @@ class _Descents:
         return count
 
     def approach(self, groups: Sequence[tuple[int, ...]], deadline: float) -> None:
-        """Bring groups of modes to their targets, each from the materials that are nearest."""
+        """Descend for each group of modes from the materials nearest to its targets."""
         for rank in range(self._most):
             groups = [group for group in groups if self.known.least(group) > HAD_CENTS]
             tasks = [self._task(group, rank, deadline) for group in groups]
@@ -260,19 +262,19 @@ class _Descents:
         )
 
     def _run(self, tasks: Sequence[Task], deadline: float) -> int:
-        """Remember what becomes of tasks, a few at once; how many ended in time."""
-        found: list[Trial] = []
+        """Run tasks, a few at once, and keep their materials; the number that ended in time."""
+        trials: list[Trial] = []
         in_time = 0
-        while len(found) < len(tasks) and time.monotonic() < deadline:
-            found += self._pool.run(tasks[len(found) : len(found) + AT_ONCE])
+        while len(trials) < len(tasks) and time.monotonic() < deadline:
+            trials += self._pool.run(tasks[len(trials) : len(trials) + AT_ONCE])
             if time.monotonic() < deadline:
-                in_time = len(found)
-        self.known.add(found)
+                in_time = len(trials)
+        self.known.add(trials)
         return in_time
 
 
 def _samples(size: int) -> list[Array]:
-    """Coordinates of the uniform material, and of random ones, every other of them smooth."""
+    """Coordinates of the uniform material and of random ones, every other one smooth."""
     random = np.random.default_rng(0)
     samples = [np.zeros(size)]
     for number in range(1, SAMPLES):
@@ -284,7 +286,7 @@ def _samples(size: int) -> list[Array]:
 
 
 def _beside(mode: int, count: int) -> tuple[int, ...]:
-    """Numbers of a mode and its neighbours, but for the first mode, which is at its target."""
+    """Numbers of a mode and its neighbours, without the first mode, which meets its target."""
     return tuple(range(max(1, mode - 1), min(count, mode + 2)))
 
 

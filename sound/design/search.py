@@ -1,4 +1,4 @@
-"""What every optimiser works with: trials of materials, a budget, and a record of the way."""
+"""A search within a budget: trials of materials, and their history."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ Array = NDArray[np.float64]
 
 
 FEWEST = 2
-"""Evaluations that a descent needs: that of its start, and one to find something better."""
+"""Least number of evaluations of a descent: that of its start, and one of a step."""
 
 
 LEAST_LEG = 8
-"""Evaluations of a leg: those of four descents, which run side by side."""
+"""Least number of evaluations of a leg: two of each of four descents side by side."""
 LEAST_LEG_SECONDS = 2.0
-"""The same as a multiple of the time that is reserved for what follows a leg."""
+"""Least duration of a leg, over the time that is reserved for the check after it."""
 
 ENDLESS_SECONDS = 60.0
-"""What legs are shares of where nothing but somebody's word ends a search."""
+"""Duration [s] that legs are shares of in a search without a budget."""
 
 
 class BudgetSpentError(Exception):
-    """Time or evaluations are used up, or somebody asked to stop."""
+    """Time or evaluations are used up, or an interrupt came."""
 
 
 @dataclass(frozen=True)
 class HistoryEntry:
-    """The best cost known after some time [s] and evaluations."""
+    """The best cost after some time [s] and evaluations."""
 
     seconds: float
     evaluations: int
@@ -47,19 +47,19 @@ class HistoryEntry:
 
 @dataclass(frozen=True)
 class CheckEntry:
-    """What a check on the fine solid found of a material.
+    """Result of a check of a material on the fine solid.
 
     Attributes
     ----------
     seconds, evaluations
-        Of the search so far.
+        Time and evaluations of the search so far.
     coarse_rms_cents, fine_rms_cents : float [cents]
-        Root mean square distances of coarse and fine frequencies from the targets, each with the
-        moduli scaled so that it is least.
+        Root mean square distances of coarse and fine frequencies from the targets, each up to the
+        best common factor.
     foretold_rms_cents : float [cents]
-        That of the fine frequencies from those that the search expected.
+        Root mean square distance of the fine frequencies from those that the search expected.
     cost : float
-        Eq. (4) of the fine solid.
+        Cost of the fine solid, Eq. (4).
     """
 
     seconds: float
@@ -76,33 +76,33 @@ class Search:
     Parameters
     ----------
     make_pool
-        Makes the processes that run them, which tell of their steps; their start counts as time of
-        the search.
+        Makes the pool of processes, from a function that receives their steps; its start counts as
+        time of the search.
     seconds : float or None [s]
-        Budget; None sets no limit.
+        Budget of time; None sets no limit.
     evaluations : int or None
-        The same.  Descents that run side by side get equal shares of the evaluations that are left,
-        so that what they find does not depend on which one comes first.
+        Budget of evaluations.  Descents that run side by side get equal shares of the evaluations
+        that are left, so their results do not depend on which one is faster.
     watch
         Called after every round of tasks; ends the search by returning True.
     before : (float [s], int)
-        Seconds and evaluations of former searches that this one goes on from.
+        Time and evaluations of former searches that this one continues.
     interrupted
-        Asked while a round goes on.  One that is broken off leaves the best of its steps, and its
-        evaluations do not count.
+        Called during a round; ends the search by returning True.  The best step of the round is
+        kept, but its evaluations do not count.
 
     Attributes
     ----------
     best
-        The best trial so far, of the present leg.
+        Best trial of the present leg.
     start
-        The first one of all.
+        First trial of all.
     history
-        The cost of the best one over time; it may rise where a leg begins.
+        Best cost over time; it may rise where a leg begins.
     spent
-        Whether the whole budget is used up, or somebody asked to stop.
+        Whether the whole budget is used up, or an interrupt came.
     checks
-        What checks on the fine solid found, see `sound.design.space_mapping`.
+        Checks on the fine solid, see `sound.design.space_mapping`.
     """
 
     def __init__(
@@ -145,7 +145,7 @@ class Search:
 
     @property
     def endless(self) -> bool:
-        """Whether nothing but somebody's word ends the search."""
+        """Whether the search has no budget."""
         return self._most is None and not np.isfinite(self.deadline)
 
     @property
@@ -154,9 +154,10 @@ class Search:
         return self._done
 
     def begin_leg(self, objective: Objective | None, share: float, reserve: float) -> None:
-        """Give a share of what is left of the budget to a search, perhaps with another objective.
+        """Begin a leg with a share of the remaining budget, and with an objective of its own if
+        given.
 
-        From now on `best` is that of this leg.  `reserve` seconds are kept for what follows it; a
+        `best` is that of the leg from now on.  `reserve` seconds are kept for the check after it; a
         leg that would leave too little for another one is the last.
         """
         self.best, self._objective = None, objective
@@ -175,20 +176,20 @@ class Search:
             self._leg_most = self._most if self._is_last else self._done + evaluations
 
     def run(self, tasks: Sequence[Task]) -> list[Trial]:
-        """What becomes of the tasks.
+        """Run tasks.
 
         Raises
         ------
         BudgetSpentError
-            If the budget of the leg is spent, before or after: what was found is in `best` then.
-            Where it is enough for some of the tasks only, these are run.
+            If the budget of the leg is spent, before or after; the best trial is in `best`.  If it
+            suffices for the first tasks only, these are run.
         """
         affordable = self._affordable(tasks)
         if not affordable or time.monotonic() >= self._leg_deadline:
             self._end()
         self._step = None
         try:
-            # Without a first material there would be no design to be written.
+            # Without a first material there would be no design to write.
             trials = self._pool.run(affordable, self._interrupted if self.start else None)
         except InterruptedRoundError:
             self._break_off()
@@ -205,7 +206,7 @@ class Search:
             self._step = step
 
     def _break_off(self) -> NoReturn:
-        """End in the middle of a round, with the best of its steps."""
+        """End in the middle of a round with the best of its steps."""
         step = self._step
         if step is not None:
             self._record([Trial(step.z, step.cost, 0, eigenvalues=step.eigenvalues)])
@@ -217,7 +218,7 @@ class Search:
         raise BudgetSpentError
 
     def _affordable(self, tasks: Sequence[Task]) -> list[Task]:
-        """The first tasks that enough evaluations are left for, with their limits."""
+        """The first tasks that the budget suffices for, with their limits."""
         tasks = [replace(task, objective=self._objective) for task in tasks]
         deadline = self._leg_deadline
         if self._leg_most is None:
@@ -231,7 +232,7 @@ class Search:
         ]
 
     def _record(self, trials: Sequence[Trial]) -> None:
-        """Add what was found, in the order of the clock, to the history."""
+        """Add trials to the history in the order of time."""
         now = time.monotonic()
         costs = []
         lowest = np.inf if self.best is None else self.history[-1].cost.total
@@ -260,7 +261,7 @@ class Search:
 
 
 def require_modes(search: Search) -> Trial:
-    """The trial that a search began with."""
+    """The first trial of a search, refused if it has no modes."""
     if search.start is None or not np.isfinite(search.start.cost.total):
         raise UserError(
             "the material to start from has no modes that could be computed; expected a solid "

@@ -1,10 +1,10 @@
 """Derivatives of eigenpairs through the coarsening and the reduced material (appendix 2).
 
-With M-orthonormal modes, d lambda_k = u_k^T dK u_k and the derivative of u_k is the sum over all
-other modes j of u_j (u_j^T dK u_k) / (lambda_k - lambda_j).  Of a pushed mode f^T u_k that is one
-product u_k^T dK x_k, with x_k the sum of u_j (u_j^T f) / (lambda_k - lambda_j).  Modes close to k,
-which the differences in the denominators would magnify, are left out of x_k, and their products
-u_i^T dK u_j are found one by one; modes that were not computed are for `modal_truncation`.
+With M-orthonormal modes, d lambda_k = u_k^T dK u_k, and the derivative of u_k is the sum over all
+other modes j of u_j (u_j^T dK u_k) / (lambda_k - lambda_j).  For a pushed mode f^T u_k that is one
+product u_k^T dK x_k, with x_k the sum of u_j (u_j^T f) / (lambda_k - lambda_j).  Modes close to k
+would have tiny denominators; they are left out of x_k, and their products u_i^T dK u_j are computed
+one by one.  `modal_truncation` adds the modes that were not computed.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 POINTS_AT_ONCE = 1024
-"""Points of elements whose strain energies exist together."""
+"""Number of elements' points whose strain energies are held in memory together."""
 CELLS_AT_ONCE = 8
-"""Elements whose strains do."""
+"""Number of elements whose strains are held in memory together."""
 CLOSE = 1e-2
-"""Relative difference of eigenvalues up to which modes are close to each other."""
+"""Greatest relative difference of the eigenvalues of close modes."""
 
 
 def projected_stiffness(
@@ -32,12 +32,12 @@ def projected_stiffness(
     others: Array,
     slopes: Array,
 ) -> tuple[Array, Array]:
-    """u_i^T (dK/dz) u_j of some pairs, and u_i^T (dK/dz) x_i with vectors that belong to a mode.
+    """u_i^T (dK/dz) u_j of some pairs of modes, and u_i^T (dK/dz) x_i with further vectors x.
 
     Parameters
     ----------
     nodes : (c, k)
-        Of the elements.
+        Nodes of the elements.
     strains : (p, 6, 3 k)
         See `sound.design.elements.AnalysedElements.strains`.
     vectors : (3 n, N)
@@ -45,7 +45,7 @@ def projected_stiffness(
     pairs : (P, 2)
         Numbers i and j, see `close_pairs`.
     others : (3 n, T, N)
-        Vectors x, T of each mode.
+        Vectors x, T for each mode.
     slopes : (p c, m)
         Derivatives of the moduli at the elements' points.
 
@@ -82,7 +82,7 @@ def all_pairs(count: int) -> Index:
 
 
 def inside_response(elastic: Array, values: Array, pushed: Array) -> Array:
-    """x (3 n, T, N) with x_pk = sum of u_j (u_j^T f_p) / (lambda_k - lambda_j) over the computed.
+    """x (3 n, T, N), the sums of u_j (u_j^T f_p) / (lambda_k - lambda_j) over computed modes j.
 
     Modes close to k are left out.
 
@@ -91,7 +91,7 @@ def inside_response(elastic: Array, values: Array, pushed: Array) -> Array:
     elastic : (3 n, N)
         Modes u.
     values : (N,) [rad^2/s^2]
-        Their eigenvalues.
+        Eigenvalues.
     pushed : (T, N)
         u_j^T f_p.
     """
@@ -117,7 +117,7 @@ def _pair_energies(nodes, strains, columns, pairs, count, energies):  # type: ig
     """
     width, points = nodes.shape[1], len(strains) // 6
     each = columns.shape[1]
-    # Many columns at once, as few of them do not keep BLAS busy.
+    # Many columns at once, as BLAS is slow for few.
     local = np.empty((3 * width, CELLS_AT_ONCE * each))
     strain = np.empty((len(strains), CELLS_AT_ONCE * each))
     for first in range(0, len(nodes), CELLS_AT_ONCE):
@@ -145,7 +145,7 @@ def _pair_energies(nodes, strains, columns, pairs, count, energies):  # type: ig
 
 @numba.njit(cache=True, nogil=True, fastmath={"contract", "reassoc"}, error_model="numpy")
 def _products(strain, start, count, row, place):  # type: ignore[no-untyped-def]
-    """Of the first columns of strains (6, k), each with that as far from `start` on."""
+    """Products of the first columns of strains (6, k) with those from `start` on."""
     s0, s1, s2, s3, s4, s5 = strain[0], strain[1], strain[2], strain[3], strain[4], strain[5]
     for i in range(count):
         j = start + i

@@ -1,4 +1,4 @@
-"""From material coordinates to the modes that are heard, and their derivatives."""
+"""Modes of a solid as functions of its material's coordinates, with derivatives."""
 
 from __future__ import annotations
 
@@ -32,10 +32,9 @@ from sound.strikes import Strike
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-3
-"""Relative error of eigenvalues at which an analysis stops; a thousandth is a hundredth of a
-bark."""
+"""Relative error of eigenvalues at which an analysis stops; 1e-3 is about a hundredth of a bark."""
 RESPONSE = 0.1
-"""Accuracy of what lies outside the computed modes, as a share of theirs: the root of that of the
+"""Accuracy of the modal truncation's correction, over the square root of that of the
 eigenvalues."""
 
 
@@ -46,17 +45,17 @@ class Evaluation:
     Attributes
     ----------
     z : (m,)
-        Material coordinates.
+        Coordinates of the material.
     eigenvalues : (N,) [rad^2/s^2]
-        Of the elastic modes, ascending.
+        Eigenvalues of the elastic modes, ascending.
     pushed : (T, N) [kg^-1/2 N s]
         u_k^T f of a unit impulse f along the inward normal at each point.
     modes
-        All of the analysis, to start the next one from.
+        All modes of the analysis, as a start of the next one.
     sensitivity
-        Derivatives, if they were asked for.
+        Derivatives; None if they were not computed.
     inverse
-        (K - mu M)^-1 of this very material, if the analysis made one.
+        (K - mu M)^-1 of this material; None if the analysis made none.
     """
 
     z: Array
@@ -73,11 +72,11 @@ class Simulation:
     Parameters
     ----------
     mesh
-        Its voxels.
+        Voxels.
     options
-        The solid, of which constants, coarsening and forests are used.
+        Constants, coarsening and forests.
     material
-        Its moduli as a function of the coordinates.
+        Moduli as a function of the coordinates.
     strikes
         Struck points.
     modes
@@ -85,12 +84,12 @@ class Simulation:
     tolerance
         Relative error of the eigenvalues.
     cells
-        The finite cells that have these voxels, if it is one of them.
+        Finite cells with these voxels; None if there are none.
 
     Attributes
     ----------
     evaluations : int
-        Modal analyses made so far, those that found no modes included.
+        Number of modal analyses so far, including those that failed.
     """
 
     def __init__(
@@ -127,9 +126,9 @@ class Simulation:
         Parameters
         ----------
         start
-            Modes at coordinates not far from there, from which the analysis then begins.
+            Modes at near coordinates, as a start of the analysis.
         derivatives
-            Whether their derivatives are asked for.
+            Whether derivatives are computed.
         """
         self.evaluations += 1
         young = self.material.moduli(z)
@@ -142,16 +141,16 @@ class Simulation:
         return self.differentiate(evaluation) if derivatives else evaluation
 
     def evaluate_anyway(self, z: Array, start: Modes | None) -> Evaluation:
-        """Modes at the coordinates z, from nothing if those of another material lead nowhere."""
+        """Modes at the coordinates z; if the analysis from `start` fails, without a start."""
         if start is not None:
             with suppress(ConvergenceError):
                 return self.evaluate(z, start)
         return self.evaluate(z)
 
     def differentiate(self, evaluation: Evaluation, whole: bool = False) -> Evaluation:
-        """The same evaluation with derivatives, `whole` those of all pairs of modes one by one.
+        """The evaluation with derivatives; if `whole`, those of all pairs of modes one by one.
 
-        Its modes then have the inverse of their own material, for an analysis that starts there.
+        Its modes then hold the inverse of their own material, for analyses that start there.
         """
         modes, values = evaluation.modes, evaluation.eigenvalues
         inverse = evaluation.inverse
@@ -193,15 +192,15 @@ class Simulation:
     def _with_slope_of_poisson(
         self, z: Array, strains: Array, slopes: Array
     ) -> tuple[Array, Array]:
-        """Strains and slopes, to which those of Poisson's ratio are added.
+        """Strains and slopes with those of Poisson's ratio added.
 
-        Its derivative of the stiffness is a sum of the stiffnesses at two other ratios, whose
-        strains count as further points.
+        The derivative of the stiffness by Poisson's ratio is a combination of the stiffnesses at
+        two other ratios, whose strains are added as further points.
         """
         poisson, free = self.poisson(z), self.material.free_poisson
         assert free is not None
         young = self.material.moduli(z)
-        # The moduli at the points are linear in a factor of all.
+        # The moduli at the points are linear in a common factor.
         moduli = self.elements.slopes(young, young[:, None]).reshape(-1, len(strains))
         by_cell = np.zeros((len(moduli), 3, len(strains), slopes.shape[1]))
         by_cell[:, 0] = slopes.reshape(len(moduli), len(strains), -1)
@@ -211,11 +210,11 @@ class Simulation:
         return np.concatenate([strains, *further]), by_cell.reshape(-1, slopes.shape[1])
 
     def energy_shares(self, evaluation: Evaluation, regions: NDArray[np.integer]) -> Array:
-        """Shares (N, R) of the modes' strain energies that R regions of the solid hold.
+        """Shares (N, R) of R regions in the modes' strain energies.
 
-        That of a region is d log(lambda) by the logarithm of a factor of its moduli.  The stiffness
-        grows with a factor of all moduli, through any coarsening, so the shares of a mode add up
-        to 1; where elements reach over several regions, one may be a little below 0.
+        The share of a region is the derivative of log(lambda) by the logarithm of a factor of its
+        moduli.  The stiffness is linear in a factor of all moduli, through any coarsening, so the
+        shares of a mode add up to 1; for elements across regions, one may be slightly negative.
 
         Parameters
         ----------

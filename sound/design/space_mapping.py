@@ -1,10 +1,10 @@
-"""Search on a coarse solid for what shall sound right on the fine one: space mapping.
+"""Space mapping: a search on a coarse solid for a design that is right on the fine solid.
 
-The coarse model's errors change little from one material to a similar one.  So what a check finds
-of them at one material is taken off what the coarse search aims at next: with fine frequencies f
-and coarse ones c of a material, the target F of each mode becomes F c / f; balances of amplitudes
-are shifted by their difference [BCD+04].  The search then foretells what is right on the fine
-solid where the check was made.
+The errors of the coarse solid are nearly the same for similar materials.  So the errors that a
+check finds at one material correct the targets of the next coarse search: with fine frequencies f
+and coarse ones c of the material, the target F of each mode becomes F c / f, and balances of
+amplitudes are shifted by their difference [BCD+04].  The coarse search is then exact at the
+material that was checked.
 """
 
 from __future__ import annotations
@@ -29,40 +29,42 @@ from sound.design.tasks import SearchStep, Trial
 Array = NDArray[np.float64]
 
 FIRST_SHARE, LARGEST_SHARE = 0.2, 0.35
-"""Of what is left of the budget: of the first leg on the coarse solid, and of any."""
+"""Share of the remaining budget of the first leg on the coarse solid, and the greatest share of
+any."""
 LONGER = 1.5
-"""Factor of a leg's share to the next one's."""
+"""Ratio of the shares of successive legs."""
 
 WORTHWHILE = 0.5
-"""Share of the cost on the fine solid that a leg on the coarse one has to come down to, or the next
-leg is on the fine solid."""
+"""Greatest ratio of the fine costs after and before a coarse leg, for the next leg to be coarse,
+too; otherwise it is on the fine solid."""
 
 MET_CENTS = 5.0
-"""Distance of fine frequencies from their targets (rms) that hardly anybody hears."""
+"""Root mean square distance of fine frequencies from their targets that is hardly audible
+[cents]."""
 GAIN, FRUITLESS = 0.01, 2
-"""Share by which the cost has to fall for a leg not to be fruitless, and how many fruitless ones in
-a row, one on each solid, end a search whose frequencies are met."""
+"""Least relative decrease of the cost by a fruitful leg, and number of successive fruitless legs,
+one on each solid, that end a search whose frequencies are met."""
 
 Optimiser = Callable[..., None]
 
 
 @dataclass(frozen=True)
 class Checked:
-    """A material, its modes on the coarse solid, and those on the fine one."""
+    """A material with its modes on the coarse and on the fine solid."""
 
     evaluation: Evaluation
     fine: FineModes
 
     @property
     def total(self) -> float:
-        """Eq. (4) of the fine solid."""
+        """Cost of the fine solid, Eq. (4)."""
         return self.fine.cost.total
 
 
 def aimed(objective: Objective, fine: FineModes) -> Objective:
-    """What a coarse solid has to sound like for the fine one to sound like the targets.
+    """Objective of the coarse solid, corrected so that the fine solid meets its targets.
 
-    The clips' residuals are left out, which no search looks at.
+    The clips' residuals are left out, as a search does not use them.
     """
     targets = objective.targets
     shifted = targets.frequencies * fine.ratios
@@ -83,14 +85,14 @@ class SpaceMapping:
     Parameters
     ----------
     objective
-        What the fine solid shall sound like.
+        Objective of the fine solid.
     check
-        Modes of a trial's material on both solids.
+        Analyses a trial's material on both solids.
 
     Attributes
     ----------
     best
-        The best material by its cost on the fine solid.
+        Best material by its cost on the fine solid.
     """
 
     def __init__(self, objective: Objective, check: Callable[[Trial], Checked]) -> None:
@@ -99,11 +101,11 @@ class SpaceMapping:
         self.best: Checked | None = None
 
     def run(self, search: Search, optimiser: Optimiser, seed: int, population: int | None) -> None:
-        """Search from the first material of a search until its budget is spent.
+        """Run legs from the first material of a search until its budget is spent.
 
-        Every leg begins at the best material so far, and aims at the targets less the errors of the
-        coarse solid there.  Where these gain little, one descends on the fine solid itself.  A
-        search with a budget also ends where frequencies are met and legs have been fruitless.
+        Every leg begins at the best material so far, with targets corrected there.  After a leg
+        that gains little, the next one descends on the fine solid.  A search with a budget also
+        ends when its frequencies are met and `FRUITLESS` legs gained little.
         """
         share, finely, fruitless = FIRST_SHARE, False, 0
         reserve = self._checked(search, require_modes(search))
@@ -121,7 +123,7 @@ class SpaceMapping:
                 pass
             if search.best is None:
                 continue
-            # Modes to start from are rows of one of the two solids.
+            # Rows of modes to start from belong to one of the two solids.
             reserve = self._checked(search, replace(search.best, start=None))
             finely = not finely and self.best.total > WORTHWHILE * best.total
             fruitless = fruitless + 1 if self.best.total > (1.0 - GAIN) * best.total else 0
@@ -129,7 +131,7 @@ class SpaceMapping:
             seed += 1
 
     def foretold(self, step: SearchStep) -> Array:
-        """What the fine solid is likely to sound at (N,) [Hz], in the order of the coarse modes."""
+        """Expected frequencies (N,) [Hz] of the fine solid, in the order of the coarse modes."""
         hertz = frequencies(step.eigenvalues)
         if self.best is None:
             return hertz
@@ -145,11 +147,11 @@ class SpaceMapping:
         return off <= MET_CENTS
 
     def _checked(self, search: Search, trial: Trial) -> float:
-        """Check a material, and remember it if it is the best one; how long that took [s]."""
+        """Check a material, and keep it if it is the best one; the duration [s]."""
         begin = time.monotonic()
         try:
             checked = self._check(trial)
-        except ConvergenceError:  # modes to be had coarsely alone
+        except ConvergenceError:  # it has modes on the coarse solid only
             if self.best is None:
                 raise
             return time.monotonic() - begin
@@ -159,13 +161,13 @@ class SpaceMapping:
         return time.monotonic() - begin
 
     def _entry(self, search: Search, checked: Checked) -> CheckEntry:
-        fine, wanted = checked.fine, self._objective.targets.frequencies
+        fine, targets = checked.fine, self._objective.targets.frequencies
         ratios = fine.ratios if self.best is None else self.best.fine.ratios
         return CheckEntry(
             search.own_seconds,
             search.own_evaluations,
-            rms_cents(np.sort(fine.coarse), wanted),
-            rms_cents(fine.frequencies, wanted),
+            rms_cents(np.sort(fine.coarse), targets),
+            rms_cents(fine.frequencies, targets),
             rms_cents(fine.coarse / ratios, fine.frequencies),
             checked.total,
         )

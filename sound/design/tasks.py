@@ -1,4 +1,4 @@
-"""What a search asks to be evaluated, and what becomes of it; it travels between processes."""
+"""Tasks of a search and their results, which travel between processes."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from sound.strikes import Strike
 Array = NDArray[np.float64]
 
 FAILED = DesignCost(np.inf, np.inf, np.inf, np.inf)
-"""Cost of a material whose modes could not be found."""
+"""Cost of a material whose modes were not found."""
 
 
 @dataclass(frozen=True)
 class Setting:
-    """The solid, its struck points and what they shall sound like; travels to other processes."""
+    """The solid of a search, its struck points and its objective."""
 
     mesh: HexMesh
     options: ProblemOptions
@@ -37,15 +37,15 @@ class Setting:
 
     @property
     def is_coarsened(self) -> bool:
-        """Whether what is analysed stands for a finer solid."""
+        """Whether the analysed solid is a coarsening of a finer one."""
         return self.cells is None and self.options.coarsen != "none"
 
     def fine(self) -> Setting:
-        """The same without coarsening."""
+        """The setting without coarsening."""
         return replace(self, options=replace(self.options, coarsen="none"))
 
     def simulation(self, tolerance: float = TOLERANCE) -> Simulation:
-        """Its simulation, on as many threads as this process is allowed."""
+        """Simulation of the solid, on all threads of this process."""
         modes = len(self.objective.targets.frequencies)
         return Simulation(
             self.mesh, self.options, self.material, self.strikes, modes, tolerance, self.cells
@@ -61,15 +61,15 @@ class Task:
     z : (m,)
         Coordinates.
     start : (3 n, k) or None
-        Rows of modes to begin from.
+        Rows of modes that the analysis starts from.
     gradient : bool
-        Whether the gradient of the cost is asked for.
+        Whether the gradient of the cost is computed.
     options, steps, damping, limits
-        Of a descent, see `descend`; an evaluation alone if there are no options.
+        Parameters of a descent, see `descend`; without options the task is a single evaluation.
     objective
-        What is lowered in place of the setting's.
+        Objective instead of the setting's.
     fine : bool
-        Whether the fine solid is meant, not the one of the search.
+        Whether the fine solid is analysed instead of that of the search.
     """
 
     z: Array
@@ -85,24 +85,24 @@ class Task:
 
 @dataclass(frozen=True)
 class Trial:
-    """What became of a task.
+    """Result of a task.
 
     Attributes
     ----------
     z : (m,)
         Coordinates of the material.
     cost
-        Its cost, `FAILED` if there are no modes to be had.
+        Cost; `FAILED` if the modes were not found.
     evaluations : int
-        Materials looked at.
+        Number of evaluations.
     gradient : (m,) or None
-        Of the cost, if it was asked for.
+        Gradient of the cost, if it was computed.
     descent
-        How a descent went; its modes stay behind.
+        Record of a descent, without its modes.
     start : (3 n, k) or None
-        Modes for others to begin from, of a descent or with the gradient.
+        Rows of modes for other analyses to start from, of a descent or with the gradient.
     eigenvalues : (N,) [rad^2/s^2] or None
-        Of the elastic modes, if there are any to be had.
+        Eigenvalues of the elastic modes, if they were found.
     """
 
     z: Array
@@ -116,18 +116,18 @@ class Trial:
 
 @dataclass(frozen=True)
 class SearchStep:
-    """A material that a descent has come to, told while it goes on.
+    """A step of a descent, reported while the descent goes on.
 
     Attributes
     ----------
     z : (m,)
         Coordinates.
     cost
-        By what the descent lowers.
+        Cost by the objective of the descent.
     eigenvalues : (N,) [rad^2/s^2]
-        Of the elastic modes.
+        Eigenvalues of the elastic modes.
     fine : bool
-        Whether the fine solid was looked at.
+        Whether the fine solid was analysed.
     """
 
     z: Array
