@@ -1,4 +1,4 @@
-"""The surface that is struck and seen: that of the mesh file, with a vertex near every point."""
+"""Struck and visible surface: that of the mesh file, refined to have a vertex near every point."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 Faces = NDArray[np.int64]
 
 LONGEST_EDGE = 1.0 / 16.0
-"""Edge of a triangle, over the surface's longest side, from which it is cut."""
+"""Greatest length of an edge, over the surface's longest side; longer edges are halved."""
 
 
 def struck_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
@@ -48,7 +48,7 @@ def longest_side(surface: trimesh.Trimesh) -> float:
 
 
 def _cut(vertices: Array, faces: Faces, longest: float) -> tuple[Array, Faces]:
-    """Halve edges above `longest` in all triangles that share them, until there are none."""
+    """Halve edges longer than `longest` in all triangles that share them, until there are none."""
     while True:
         ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)
         sides = np.sort(ends.reshape(-1, 2), axis=1)

@@ -1,4 +1,4 @@
-"""Commands from example clips to a material to a sound."""
+"""Commands of sound design: from clips to a material to sounds."""
 
 from carillon.command_line.commands import Command
 

@@ -1,7 +1,7 @@
-"""`python -m sound check`: what a design sounds like on the fine solid, beside its targets.
+"""`python -m sound check`: frequencies of a design on the fine solid, beside its targets.
 
-The search of `design` works with a coarse solid. Here the material that it found is solved on all
-voxels, and the frequencies of both stand beside those of the targets.
+The search of `design` works on a coarse solid.  Here the modes of its material are computed on all
+voxels, and the frequencies of both solids are compared with the targets.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from sound.bounds import SampleRate
 
 NAMES = ("metal", "wood", "piano")
 LONGEST_SECONDS = 60.0
-"""Length of a clip that is long enough for every strike to die away."""
+"""Greatest length of a clip [s]; every strike has decayed by then."""
 
 
 @parameters

@@ -28,11 +28,11 @@ if TYPE_CHECKING:
     from sound.project.project import Project
 
 ENDINGS = (".h5", ".hdf5")
-"""Of designs."""
+"""Endings of the names of designs."""
 SLOW = ("trimesh", "sound.design.optimise")
-"""Modules that take seconds to load, which `--help` does without."""
+"""Modules that take seconds to load and that `--help` does not need."""
 SHOWN_EVERY = 1.0
-"""Seconds between two progress lines on a terminal."""
+"""Time between two progress lines on a terminal [s]."""
 
 
 @parameters
@@ -136,7 +136,7 @@ class _SearchProgress:
         self._due = time.monotonic() + (0.0 if self._terminal else LINE_SECONDS)
 
     def show(self, search: Search) -> None:
-        """Say how far the search is, if that is due."""
+        """Print progress, if it is due."""
         now = time.monotonic()
         if now < self._due:
             return
@@ -161,8 +161,8 @@ def summarise(design: Design) -> dict[str, Any]:
     from sound.design.cents import rms_cents
 
     evidence = design.evidence
-    wanted = design.targets.frequencies
-    off = np.abs(design.frequencies / wanted - 1.0)
+    targets = design.targets.frequencies
+    off = np.abs(design.frequencies / targets - 1.0)
     assert design.damping is not None
     ratios = design.damping.dampings / design.targets.dampings
     return {
@@ -181,8 +181,8 @@ def summarise(design: Design) -> dict[str, Any]:
         "target_distances_m": [strike.distance for strike in design.strikes],
         "frequency_error_median": float(np.median(off)),
         "frequency_error_max": float(off.max()),
-        "coarse_rms_cents": rms_cents(design.coarse_frequencies, wanted),
-        "fine_rms_cents": None if design.fine is None else rms_cents(design.frequencies, wanted),
+        "coarse_rms_cents": rms_cents(design.coarse_frequencies, targets),
+        "fine_rms_cents": None if design.fine is None else rms_cents(design.frequencies, targets),
         "checks": evidence["checks"],
         "young_min_pa": float(design.young.min()),
         "young_max_pa": float(design.young.max()),
@@ -213,7 +213,7 @@ def _sentences(out: Path, design: Design, summary: dict[str, Any]) -> str:
 
 
 def _rms_sentence(summary: dict[str, Any]) -> str:
-    """How far frequencies are from the targets, with the moduli scaled so that it is least."""
+    """Distance of the frequencies from the targets up to the best common factor."""
     coarse, fine = summary["coarse_rms_cents"], summary["fine_rms_cents"]
     if fine is None:
         return f"from their targets (rms): {coarse:.1f} cents"
@@ -224,7 +224,7 @@ def _rms_sentence(summary: dict[str, Any]) -> str:
 
 
 def _material_sentence(design: Design) -> str:
-    """Moduli and density; bounds of the former that could not be kept to."""
+    """Moduli and density, and the share of moduli beyond their bounds."""
     low, high = design.young.min(), design.young.max()
     text = (
         f"Young's modulus {low / 1e9:.3g} to {high / 1e9:.3g} GPa, density "
@@ -236,7 +236,7 @@ def _material_sentence(design: Design) -> str:
 
 
 def _damping_sentence(summary: dict[str, Any]) -> str:
-    """How near loss factors bring the dampings to the clips'."""
+    """Dampings by loss factors over those of the clips."""
     low, median, high = np.quantile(summary["damping_ratios"], (0.25, 0.5, 0.75))
     factors = summary["loss_factors"]
     return (

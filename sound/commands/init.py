@@ -17,9 +17,9 @@ ENDINGS = (".yaml", ".yml")
 """Of projects."""
 DEFAULT_NAME = "project.yaml"
 PLACEHOLDER = "clip.wav"
-"""Clip that a project names if none was given."""
+"""File name of the clip in a project without clips."""
 DIGITS = 5
-"""Of positions, which name vertices without being theirs to the last bit."""
+"""Significant digits of positions; the nearest vertices are struck."""
 
 EXAMPLES = """examples:
   init pan.yaml --mesh builtin:frying-pan --clips plate.wav handle.wav

@@ -1,8 +1,8 @@
-"""`python -m sound reach`: which frequencies a solid can have, where a design misses some.
+"""`python -m sound reach`: which of the targets that a design misses its solid can meet.
 
-For every mode that a design misses: whether a material has it by itself, whether one has it beside
-its neighbours, and how near it was brought where none was found. All on the fine solid, relative to
-the first mode.
+For every mode that misses its target: whether a material meets it, alone and together with its
+neighbours, or else how near one gets.  All frequencies are of the fine solid and relative to the
+first mode.
 """
 
 from __future__ import annotations

@@ -31,11 +31,11 @@ if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     Array = NDArray[np.float64]
 
 LONGEST_CONTACT = 1.0
-"""Duration of a force [s] that still strikes rather than pushes."""
+"""Greatest duration of a strike's force [s]."""
 FULL = 0.99
-"""Largest magnitude of a sound that is scaled to full scale: what rounds it does not reach 1."""
+"""Largest magnitude of a sound that is scaled to full scale; rounding does not take it to 1."""
 TOLD = 1e-3
-"""Share of the clips' energy in missed tones from which on it is told."""
+"""Least share of the clips' energy in missed tones that is reported."""
 
 _Impulse = Annotated[float, between(-LARGEST_IMPULSE, LARGEST_IMPULSE)]
 _Coefficient = Annotated[float, between(0.0, 1e9)]
@@ -154,7 +154,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _require_outputs(options: RenderOptions, points: PointOptions) -> None:
-    """Refuse names and a length that nothing can be written with, before the work."""
+    """Refuse unusable output names and lengths, before the work."""
     from sound.clips.wav import ENDINGS
     from sound.outputs import require_output
 

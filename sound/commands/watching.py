@@ -1,4 +1,4 @@
-"""Designing on while somebody edits the project and listens: what `design --watch` does."""
+"""`design --watch`: a search that takes up edits of its project and writes sounds."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from sound.rendering.render import Hit, render, ringing_seconds
 from sound.rendering.solid import SoundingSolid
 
 LOOK_SECONDS = 1.0
-"""Time between two looks at the project's file, after a round of evaluations each."""
+"""Least time between two readings of the project's file [s]."""
 WRITE_SECONDS = 2.0
-"""Time between two designs that are written and rendered, if there is a better one."""
+"""Least time between two designs that are written and rendered [s]."""
 AS_BEFORE = "going on with the project as it was"
 
 
@@ -38,14 +38,14 @@ class EditedProject:
     Parameters
     ----------
     path
-        Of the file.
+        Project file.
     load
-        Reads it, and raises a `UserError` if it is broken.
+        Reads the file, and raises a `UserError` if it is invalid.
 
     Attributes
     ----------
     project
-        As it was when it was whole last.
+        Last valid project.
     """
 
     def __init__(self, path: str | Path, load: Callable[[], Project]) -> None:
@@ -55,9 +55,9 @@ class EditedProject:
         self.project = load()
 
     def has_changed(self) -> bool:
-        """Whether there is another project than before, and a whole one; a broken one is told of.
+        """Whether there is another valid project than before; an invalid one is reported.
 
-        A file is taken up once two looks have found the same in it, so not while it is written.
+        A file is read when its content has been the same twice, so not while it is written.
         """
         now = time.monotonic()
         if now < self._due:
@@ -95,11 +95,11 @@ def design_on(
     out: Path,
     show: Callable[[Search], None],
 ) -> Design:
-    """Search until somebody interrupts, with the project as it is edited; `problem` is its first.
+    """Search until an interrupt, with the project as it is edited; `problem` is the first one.
 
-    Every better design is written to `out`, and its sounds beside it.  An edit of the solid begins
-    anew, any other goes on from the best material.  What cannot be designed after an edit is told,
-    and the search goes on with the project before.
+    Every better design is written to `out`, and its sounds beside it.  An edit of the solid starts
+    a new search; after any other edit the search goes on from the best material.  An edit that
+    cannot be designed is reported, and the search goes on with the project before.
 
     Raises
     ------
@@ -160,7 +160,7 @@ class _Writer:
         self._files = sound_files(out, [target.name for target in project.targets])
         clips = [target.clip for target in project.targets]
         for path in self._files.values():
-            if path.is_symlink():  # which nobody has named
+            if path.is_symlink():  # which the user has not named
                 raise UserError(f"{path}: is a link, expected a sound or nothing; remove it")
             require_output(path, ENDINGS, clips)
         self._cost = float("inf")

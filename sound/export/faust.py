@@ -1,4 +1,4 @@
-"""Faust: a modal model to be struck at several points, in the manner of mesh2faust.
+"""Faust: a modal model that is struck at several points, like those of mesh2faust.
 
 mesh2faust's models are banks of `pm.modeFilter`, or `pm.modalModel` in newer libraries, whose
 filters differ between versions in phase and level, and in single precision miss low frequencies.
@@ -26,7 +26,7 @@ from sound.rendering.solid import SoundingSolid
 Array = NDArray[np.float64]
 
 LEAST_DAMPING = 1e-3
-"""Damping [1/s] in place of none, since Faust's models know decay times."""
+"""Least damping [1/s], since Faust's models need finite decay times."""
 
 _TEMPLATE = Template("""\
 declare name "$name";
@@ -117,7 +117,7 @@ def faust_program(design: Design, points: int, name: str) -> str:
 
 
 def _struck_points(design: Design, points: int) -> tuple[list[str], Array, Array]:
-    """Names, positions (p, 3) and inward normals (p, 3): the targets', and others spread out."""
+    """Names, positions (p, 3) and inward normals (p, 3) of the targets and of other points."""
     import trimesh
 
     from sound.strikes import inward_normals, spread
@@ -138,7 +138,7 @@ def _struck_points(design: Design, points: int) -> tuple[list[str], Array, Array
 
 
 def _plain(name: str) -> str:
-    """A name without what means something in a Faust label."""
+    """A name without characters that have a meaning in a Faust label."""
     return re.sub(r"[^\w .+-]", "_", name)
 
 

@@ -91,7 +91,7 @@ def gltf_document(design: Design) -> tuple[dict[str, Any], bytes]:
             "units": UNITS,
         },
     }
-    # A player has one gain for the whole body; those of the struck points are with their nodes.
+    # A player has one gain for the whole body; nodes have the gains of the struck points.
     gain = float(listening.gains.mean()) / (2.0 * np.pi * lowest)
     strikes = _strike_nodes(design, listening)
     body = {
@@ -143,7 +143,7 @@ def _mass_properties(design: Design) -> dict[str, Any]:
 
 
 def _material(design: Design) -> dict[str, Any]:
-    """Constants of the solid; every mode has a damping, so there is neither alpha nor beta."""
+    """Constants of the solid, without alpha and beta, as every mode has its own damping."""
     return {
         "name": "designed",
         "density": design.model.density,

@@ -1,4 +1,4 @@
-"""The two kinds of glTF 2.0 files, and the buffer that holds their numbers."""
+"""glTF 2.0 files of both kinds, and their buffer of binary data."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Buffer:
         return len(self.views) - 1
 
     def entries(self) -> dict[str, Any]:
-        """What a document says of it."""
+        """Entries of a document that describe the buffer."""
         return {
             "accessors": self.accessors,
             "bufferViews": self.views,

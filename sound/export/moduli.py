@@ -1,4 +1,4 @@
-"""NumPy: a design's moduli alone, for analyses of the fine solid."""
+"""NumPy: the moduli of a design, for analyses of the fine solid."""
 
 from __future__ import annotations
 

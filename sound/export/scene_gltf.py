@@ -1,9 +1,9 @@
-"""glTF 2.0: a scene that was played, as objects that move, seen by a camera, with its sound.
+"""glTF 2.0 of a played scene: moving objects, camera and sound.
 
 The motion is an ordinary animation.  The sound is in the draft extension KHR_audio_emitter
 (repository omigroup/gltf-extensions, folder extensions/2.0/KHR_audio_emitter, commit b48a264;
-KhronosGroup/glTF, pull request 2137), as a global emitter: what two ears hear depends on no place
-any more.  Players that do not know the draft show the scene silently.
+KhronosGroup/glTF, pull request 2137), as a global emitter: the sound at two ears has no position.
+Players that do not know the draft show the scene silently.
 
 glTF's y points up and the scene's z: a root node turns all of it.
 """
@@ -36,15 +36,16 @@ DRAFT = (
     "draft, repository omigroup/gltf-extensions, extensions/2.0/KHR_audio_emitter, commit b48a264"
 )
 UPRIGHT = (-(0.5**0.5), 0.0, 0.0, 0.5**0.5)
-"""Turn (x, y, z, w) by which z becomes y."""
+"""Quaternion (x, y, z, w) that turns z to y."""
 ROUGHNESS = 0.5
-"""Of all surfaces, as renderers understand it: from 0, a mirror, to 1."""
+"""Roughness of all surfaces in glTF's sense, from 0, a mirror, to 1."""
 GROUND_COLOUR = (0.8, 0.8, 0.8)
 GROUND_REACH = 20.0
-"""Half the side of the ground, in distances of what the camera looks at."""
+"""Half the side of the ground, over the distance of the camera's target."""
 NEAREST = 0.01
-"""What is closer to the camera is not shown, in the same distances."""
+"""Distance of the camera's near plane, over that of its target."""
 _STRAIGHT = 1e-9
+"""Length of a cross product below which the camera looks straight up or down."""
 
 
 def write_scene_gltf(path: str | Path, performance: Performance, binary: bool) -> None:
@@ -92,7 +93,7 @@ def scene_document(performance: Performance) -> tuple[dict[str, Any], bytes]:
 
 
 def _object_nodes(picture: Picture) -> list[dict[str, Any]]:
-    """A node for each object, where it is at first; meshes have the numbers of objects."""
+    """A node for each object, at its first position; its mesh has the object's number."""
     turns = _turns(picture.motion)
     return [
         {
@@ -106,7 +107,7 @@ def _object_nodes(picture: Picture) -> list[dict[str, Any]]:
 
 
 def _animation(motion: Motion, buffer: Buffer) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """Channels and samplers: places and turns of each object, at times that all share."""
+    """Channels and samplers: positions and rotations of each object, at shared times."""
     channels: list[dict[str, Any]] = []
     samplers: list[dict[str, Any]] = []
     times = buffer.add(motion.times, FLOAT)
@@ -151,7 +152,7 @@ def _material(each: Appearance) -> dict[str, Any]:
 
 
 def _ground(picture: Picture) -> list[Appearance]:
-    """A square about what the camera looks at, if there is a ground."""
+    """A square around the camera's target, if there is a ground."""
     if picture.ground is None:
         return []
     reach = GROUND_REACH * _distance(picture.camera)
@@ -184,7 +185,7 @@ def _camera_node(camera: Camera) -> dict[str, Any]:
     back = np.subtract(camera.position, camera.target) / _distance(camera)
     across = np.cross([0.0, 0.0, 1.0], back)
     long = float(np.linalg.norm(across))
-    # Looking straight up or down, where it is not told what is up in the picture.
+    # Looking straight up or down, where no direction is up in the picture.
     right = across / long if long > _STRAIGHT else np.array([1.0, 0.0, 0.0])
     axes = np.column_stack([right, np.cross(back, right), back])
     return {
@@ -196,15 +197,15 @@ def _camera_node(camera: Camera) -> dict[str, Any]:
 
 
 def _distance(camera: Camera) -> float:
-    """From the camera to what it looks at [m]."""
+    """Distance [m] from the camera to its target."""
     return float(np.linalg.norm(np.subtract(camera.position, camera.target)))
 
 
 def _emitters(performance: Performance, buffer: Buffer) -> dict[str, Any]:
-    """The sound, played once, everywhere as loud.
+    """The sound, played once, equally loud everywhere.
 
-    Its samples have 16 bits, which all players know; they are used in full, and the gain makes up
-    for it.
+    Its samples have 16 bits, which all players support, scaled to full range; the gain undoes the
+    scale.
     """
     import soundfile
 

@@ -1,4 +1,4 @@
-"""A design: the material found for a set of targets, and the modes it gives."""
+"""A design: a material for a set of targets, with its modes."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ HISTORY_TYPE = np.dtype([(name, float) for name in HISTORY])
 
 @dataclass(frozen=True)
 class FineFrequencies:
-    """What the fine solid of a design sounds at.
+    """Frequencies of the fine solid of a design.
 
     Attributes
     ----------
     hertz : (N,) [Hz]
-        Of its elastic modes, ascending.
+        Frequencies of the elastic modes, ascending.
     order : (N,)
-        Number of the coarse elastic mode that has the shape of each.
+        Numbers of the coarse elastic modes of the same shapes.
     """
 
     hertz: Array
@@ -50,47 +50,47 @@ class FineFrequencies:
 
 @dataclass
 class Design:
-    """A material that lets struck points sound as their clips do.
+    """A material whose struck points sound as their clips.
 
     Attributes
     ----------
     strikes
-        The T struck points.
+        T struck points.
     targets
-        What they shall sound like.
+        Modes that the points shall have.
     coordinates : (m,)
-        z of the reduced material Y = Phi z (§6), dimensionless: of a reference modulus.
+        z of the reduced material Y = Phi z (§6), over a reference modulus.
     young : (M,) [Pa]
         Young's modulus of the fine cells, scaled so that the frequencies come nearest to the
         targets (least squares of cents).
     model
-        The coarse solid that was analysed, with its moduli.
+        Analysed solid with its moduli.
     eigenvalues : (6 + N,) [rad^2/s^2]
-        Ascending, those of the rigid motions first.
+        Eigenvalues, ascending, those of the rigid motions first.
     modes : (n_dofs, 6 + N) [kg^-1/2]
-        Of the coarse model, mass-normalised.
+        Mass-normalised modes of the model.
     surface_vertices : (V, 3) [m]
-        Of the surface that was voxelised.
+        Vertices of the surface.
     surface_faces : (F, 3)
-        Vertices of its triangles.
+        Triangles of the surface.
     fine_grid : (M, 3)
         Integer coordinates of the fine cells.
     fine_origin : (3,) [m]
-        Position of their origin.
+        Position of grid coordinates 0.
     fine_edge : float [m]
         Edge of a fine cell.
     history
         Rows of `HISTORY_TYPE`, see `HISTORY`.
     settings : dict
-        The project as resolved.
+        The project with all defaults.
     evidence : dict
-        How the result was come by and how good it is.
+        Method and quality of the result.
     provenance : dict
-        Origin of the numbers; filled in on reading.
+        Origin of the numbers; set on reading.
     fine
-        Frequencies of the fine solid; None if they were not looked for.
+        Frequencies of the fine solid; None if they were not computed.
     damping
-        Loss factors of the material, and what they make of the modes; None in designs of before.
+        Loss factors of the material, and dampings by them; None in old designs.
     """
 
     strikes: list[Strike]
@@ -119,7 +119,7 @@ class Design:
 
     @property
     def frequencies(self) -> Array:
-        """Frequencies (N,) [Hz] of the elastic modes: of the fine solid, where they are known."""
+        """Frequencies (N,) [Hz] of the elastic modes: of the fine solid, if they are known."""
         return self.coarse_frequencies if self.fine is None else self.fine.hertz
 
     @property
@@ -135,7 +135,7 @@ class Design:
 
     @property
     def dampings(self) -> Array:
-        """Dampings (N,) [1/s] that the elastic modes sound with: the clips' (§5), or own ones."""
+        """Dampings (N,) [1/s] of the elastic modes: of the clips (§5), or of the material."""
         source = self.settings.get("damping", {}).get("source", "clips")
         if self.damping is None or source == "clips":
             return self.targets.dampings
@@ -149,12 +149,12 @@ class Design:
         return np.asarray(self.young[cKDTree(centres).query(positions)[1]])
 
     def damped_by(self, source: str | None) -> Design:
-        """The same design that sounds with dampings of `clips`, of the `material`, or as it is.
+        """The design with dampings of the `clips` or of the `material`; unchanged if None.
 
         Raises
         ------
         UserError
-            If it does not tell loss factors of its material.
+            If it has no loss factors of its material.
         """
         if source is None:
             return self
@@ -168,7 +168,7 @@ class Design:
 
 
 def fault(design: Design) -> str:
-    """What does not fit together in a design, in a few words; nothing if all does."""
+    """The first inconsistency of a design, in a few words; empty if there is none."""
     if said := _fault_of_texts(design):
         return said
     targets = design.targets
@@ -223,17 +223,17 @@ _SETTINGS: Mapping[str, tuple[str, Callable[[Any], bool]]] = {
     "material": ("keys and values", lambda value: isinstance(value, Mapping)),
     "damping": ("keys and values", lambda value: isinstance(value, Mapping)),
 }
-"""Settings of a design that are used: what each is to be, and a test of it."""
+"""Settings of a design that are used: expected kind, and test of each."""
 SOURCES = ("clips", "material")
-"""Places that a design's dampings may come from."""
+"""Sources of a design's dampings."""
 
 
 def _fault_of_texts(design: Design) -> str:
-    """What cannot be used of settings and evidence, which are JSON of any kind in a file."""
+    """The first unusable value of settings and evidence, which are arbitrary JSON in a file."""
     texts: dict[str, Any] = {"settings": design.settings, "evidence": design.evidence}
-    for name, found in texts.items():
-        if not isinstance(found, Mapping):
-            return f"holds {name} {found!r:.100}, expected keys and values"
+    for name, value in texts.items():
+        if not isinstance(value, Mapping):
+            return f"holds {name} {value!r:.100}, expected keys and values"
     for key, (expected, is_such) in _SETTINGS.items():
         value = design.settings.get(key)
         if key in design.settings and not is_such(value):

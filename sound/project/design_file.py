@@ -1,4 +1,4 @@
-"""The file `design.h5`, which holds a design."""
+"""The file of a design, `design.h5`."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def write_design(path: str | Path, design: Design) -> None:
 
 
 def put_object(file: h5py.File, design: Design) -> None:
-    """Write what does not depend on the analysis: struck points, targets, surface, fine cells."""
+    """Write struck points, targets, surface and fine cells, which do not depend on the analysis."""
     _put_strikes(file.create_group("strikes"), design.strikes)
     _put_targets(file.create_group("targets"), design.targets)
     put(file, "surface/vertices", design.surface_vertices, "m", "vertices of the surface")
@@ -108,7 +108,7 @@ def read_design(path: str | Path) -> Design:
 
 
 def _get_fine(group: h5py.Group) -> FineFrequencies | None:
-    """Of the fine solid, which not every design tells."""
+    """Frequencies of the fine solid, if the design has them."""
     if "frequencies" not in group:
         return None
     return FineFrequencies(group["frequencies"][()], group["order"][()])

@@ -1,4 +1,4 @@
-"""How the material of a design damps its modes, in the file of the design."""
+"""Dampings of a design's modes by its material, and their place in the design's file."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class MaterialDamping:
-    """Dampings that follow from loss factors of the material, not from clips.
+    """Dampings by loss factors of the material.
 
     Attributes
     ----------
     loss_factors : (M,) [1]
-        Of the fine cells.
+        Loss factors of the fine cells.
     mass_per_second : float [1/s]
-        What damps all modes alike, as air does; half of it is part of every damping.
+        Coefficient of mass damping, as by air; half of it is part of every damping.
     dampings : (N,) [1/s]
         d of the elastic modes, in the order of `Design.frequencies`.
     """
@@ -33,7 +33,7 @@ class MaterialDamping:
 
 
 def put_damping(group: h5py.Group, damping: MaterialDamping) -> None:
-    """Write it beside the fine cells."""
+    """Write dampings beside the fine cells."""
     put(group, "loss_factors", damping.loss_factors, "1", "loss factor of the fine cells")
     mass = np.array([damping.mass_per_second])
     put(group, "mass_per_second", mass, "1/s", "twice the damping that all modes have in common")
@@ -41,7 +41,7 @@ def put_damping(group: h5py.Group, damping: MaterialDamping) -> None:
 
 
 def get_damping(group: h5py.Group) -> MaterialDamping | None:
-    """Read it; designs that were made before there was any have none."""
+    """Read dampings; None in an old design without them."""
     if "loss_factors" not in group:
         return None
     mass = float(group["mass_per_second"][0])

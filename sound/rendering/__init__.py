@@ -1,1 +1,1 @@
-"""Sounds of strikes: a bank of damped modes, and the noise of the clips."""
+"""Sounds of strikes: damped modes, and the noise of the clips."""

@@ -1,4 +1,4 @@
-"""A solid that can be struck: of a design or of modes, with its loudness and its surface."""
+"""A solid to be struck, of a design or of modes, with its loudness and its surface."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ Places = Callable[[Iterable[tuple[str, Point]]], list[tuple[Array, Array, float]
 
 @dataclass(frozen=True)
 class HeardSolid:
-    """A solid and how it is heard.
+    """A solid with its loudness and its surface.
 
     Attributes
     ----------
     solid
-        What sounds.
+        Modes.
     listening
         Loudness and noise of a design's clips; None for modes of no design.
     places
-        Position (3,) [m], inward normal (3,) and distance from what was named [m] of points of the
-        surface, each given with what messages call it.
+        Function from points of the surface, each with its name in messages, to positions (3,) [m],
+        inward normals (3,) and distances [m] from the points named.
     """
 
     solid: SoundingSolid
@@ -45,7 +45,7 @@ class HeardSolid:
     places: Places
 
     def hits(self, path: str | Path, strikes: Sequence[ListedStrike], strength: float) -> list[Hit]:
-        """The strikes of a list, read from `path`; `strength` [N s] where a line names none.
+        """The strikes of a list, read from `path`; `strength` [N s] is that of lines without one.
 
         Raises
         ------

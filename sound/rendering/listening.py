@@ -1,4 +1,4 @@
-"""How loud a strike is heard, and what noise goes with it, anywhere on the surface."""
+"""Loudness and noise of a strike anywhere on the surface, from the clips of a design."""
 
 from __future__ import annotations
 
@@ -18,26 +18,25 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Listening:
-    """What the clips tell about loudness and noise at the points where they were assigned.
+    """Loudness and noise of a design's clips at the struck points.
 
-    A clip does not tell how hard its object was struck: it is taken for the sound of 1 N s along
-    the inward normal, and the gain of its point lets the loudest mode there be as loud as the
-    clip's, which is how Eq. 2 compares them.  Elsewhere gains and noise are averages weighted by
-    the inverse square of the distance.  Of the residuals their noise alone is heard: partials that
-    were missed belong to the clip, not to the material.
+    A clip counts as the sound of 1 N s along the inward normal.  The gain of its point makes the
+    loudest mode there as loud as the clip's, as Eq. 2 compares them.  Elsewhere gains and noise are
+    averages weighted by the inverse square of the distance.  Only the noise of a residual is heard:
+    partials that were missed belong to the clip, not to the material.
 
     Attributes
     ----------
     positions : (T, 3) [m]
-        Of the struck points.
+        Struck points.
     gains : (T,) [kg^1/2 N^-1 s^-1]
         Samples of full scale per amplitude.
     residuals : T arrays (s,)
-        The clips less their modes, after 1 N s.
+        The clips without their modes, after 1 N s.
     rates : T integers [Hz]
         Sampling rates of the residuals.
     energies : (T,)
-        Squared samples of the clips' modes, summed over all time.
+        Energies of the clips' modes: squared samples summed over all time.
     """
 
     positions: Array
@@ -64,7 +63,7 @@ class Listening:
 
     @property
     def missed(self) -> Array:
-        """Shares (T,) of the clips' energies in tones that are no modes, which are not heard."""
+        """Shares (T,) of the clips' energies in tones of the residuals, which are not heard."""
         rests = np.array([rest @ rest for rest in self.residuals])
         lacking = np.array([share for _, share in self._noise]) * rests
         whole = self.energies + rests
@@ -79,7 +78,7 @@ class Listening:
         return float(self.weights(position) @ self.gains)
 
     def noise(self, rate: int) -> list[Array]:
-        """T residuals (s,) without their tones, after 1 N s, sampled at `rate` [Hz]."""
+        """T residuals (s,) without their tones, after 1 N s, at the sampling rate `rate` [Hz]."""
         return [resampled(noise, own, rate) for (noise, _), own in zip(self._noise, self.rates)]
 
 
@@ -99,7 +98,7 @@ def near_weights(points: Array, positions: Array) -> Array:
 
 
 def resampled(samples: Array, own: int, rate: int) -> Array:
-    """Samples taken at the rate `own`, at another `rate`."""
+    """Samples resampled from the rate `own` to `rate`."""
     if own == rate or not len(samples):
         return samples
     from scipy.signal import resample_poly

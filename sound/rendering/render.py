@@ -1,4 +1,4 @@
-"""From strikes to samples."""
+"""Samples of strikes."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ from sound.synthesis.bank import Bank, ring
 Array = NDArray[np.float64]
 
 DECAY_NEPERS = np.log(1e3)
-"""Decay by 60 dB."""
+"""Decay by 60 dB [nepers]."""
 LONGEST_SECONDS = 6.0
+"""Greatest length of a sound whose length is not given [s]."""
 
 
 @dataclass(frozen=True)
 class Hit:
     """A strike at a time [s], at a point (3,) [m] of the surface, by an impulse (3,) [N s].
 
-    `distance` is that of the point from the one that was named [m].
+    `distance` [m] is that of the point from the one that was named.
     """
 
     seconds: float
@@ -59,25 +60,25 @@ def rendered_parts(
     listening: Listening | None = None,
     residual: bool = True,
 ) -> tuple[Array, Array]:
-    """What modes sound (s,) after one strike or many, and the noise (s,) that goes with it.
+    """Sound (s,) of the modes after one strike or many, and noise (s,) of the clips.
 
     Parameters
     ----------
     solid
-        What sounds.
+        Modes.
     hits
-        Its strikes.
+        Strikes.
     seconds : float [s]
         Length.
     rate : int [Hz]
-        Samples per second.  Modes from half of it on are left out.
+        Samples per second; modes from half of it on are left out.
     contact_seconds : float [s]
-        Duration of the force, half a sine; 0 is an impulse.  A force that takes longer excites
-        high modes less.  It does not change the noise, which comes from a recording.
+        Duration of the force, half a sine; 0 is an impulse.  A longer force excites high modes
+        less.  The noise, which is recorded, does not depend on it.
     listening
-        Loudness and noise of a design's clips: samples are then of full scale as the clips' are
-        and noise comes in proportion to |impulse| over 1 N s.  Without it samples are the plain
-        sum of the modes' amplitudes [kg^-1/2 N s], and there is no noise.
+        Loudness and noise of a design's clips: full scale is then the clips', and noise is
+        proportional to the impulse over 1 N s.  Without it samples are sums of the modes'
+        amplitudes [kg^-1/2 N s], and there is no noise.
     residual : bool
         Whether there is noise.
     """
@@ -89,7 +90,7 @@ def rendered_parts(
     bank = Bank(solid.frequencies, solid.dampings, rate)
     modes = ring(bank, zip([hit.seconds for hit in hits], amplitudes), count)
     if contact_seconds > 0.0:
-        from scipy.signal import fftconvolve  # Loaded where it is needed: it takes long.
+        from scipy.signal import fftconvolve  # Slow to load.
 
         modes = fftconvolve(modes, half_sine(contact_seconds, rate))[:count]
     noise = np.zeros(count)
@@ -99,7 +100,7 @@ def rendered_parts(
 
 
 def residual_share(modes: Array, noise: Array) -> float:
-    """Share of a sound's energy that is noise of its clips, no mode; 0 of silence."""
+    """Share of the noise in a sound's energy; 0 of silence."""
     own, other = float(noise @ noise), float(modes @ modes)
     return own / (own + other) if own > 0.0 else 0.0
 

@@ -1,4 +1,4 @@
-"""A solid as something that sounds: its elastic modes, how they decay, how strikes excite them."""
+"""Elastic modes of a solid: frequencies, dampings, and excitation by strikes."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ class SoundingSolid:
     Attributes
     ----------
     frequencies : (k,) [Hz]
-        Of the sound, as in Eq. 3 of the appendix.
+        Frequencies f of Eq. 3 of the appendix.
     dampings : (k,) [1/s]
-        The same.
+        Dampings d of that equation.
     model
-        The solid whose nodes the modes are given on.
+        Solid whose nodes the modes are given on.
     modes : (n_dofs, k) [kg^-1/2]
         Mass-normalised.
     """
@@ -42,9 +42,9 @@ class SoundingSolid:
 
     @classmethod
     def of_design(cls, design: Design) -> SoundingSolid:
-        """A design: shapes of its coarse solid, frequencies of the fine one where they are known.
+        """A design: shapes of its coarse solid, frequencies of the fine one if they are known.
 
-        Its modes are damped as the clips' (§5), or as its material says.
+        Its dampings are those of the clips (§5) or of its material.
         """
         return cls(design.frequencies, design.dampings, design.model, design.elastic_modes)
 
@@ -58,7 +58,7 @@ class SoundingSolid:
     def damped(
         cls, model: Solid, eigenvalues: Array, modes: Array, damping: Damping
     ) -> SoundingSolid:
-        """A solid with Rayleigh damping; rigid modes and those too damped to oscillate are out.
+        """A solid with Rayleigh damping, without rigid modes and overdamped ones.
 
         Parameters
         ----------
@@ -84,7 +84,8 @@ class SoundingSolid:
 
     @classmethod
     def of_truth(cls, file: ModesFile, design: Design) -> SoundingSolid:
-        """The same object by other modes, for instance of the fine mesh, damped as the design's.
+        """A design's object by modes of a file, for instance of the fine mesh, damped as the
+        design.
 
         Raises
         ------
@@ -120,10 +121,10 @@ class SoundingSolid:
 def struck_amplitudes(pushed: Array, frequencies: Array) -> Array:
     """Amplitudes a_k (p, k) of modes that impulses f push by u_k^T f (p, k) [kg^-1/2 N s].
 
-    a_k = |u_k^T f|: every mode sets out in the direction that it is pushed to, so its sign does
-    not matter.  Within a cluster of equal frequencies (k,) [Hz], which ascend, it is (u_k^T f)^2
-    over the root of the sum of these squares: together the cluster then is as loud as |U^T f|,
-    however its modes are mixed.
+    a_k = |u_k^T f|: every mode starts in the direction of the push, so its sign does not matter.
+    Within a cluster of equal frequencies (k,) [Hz], which ascend, it is (u_k^T f)^2 over the root
+    of the sum of these squares: the whole cluster then is as loud as |U^T f|, whatever the basis of
+    its modes.
     """
     groups = clusters(frequencies**2)
     square = pushed**2
@@ -133,7 +134,7 @@ def struck_amplitudes(pushed: Array, frequencies: Array) -> Array:
 
 
 def _require_same_object(mesh: HexMesh, designed: HexMesh) -> None:
-    """Refuse a mesh that fills another box than that of the design, by more than a cell."""
+    """Refuse a mesh whose bounding box differs from the design's by more than a cell."""
     boxes = [mesh.bounds, designed.bounds]
     if np.abs(boxes[0] - boxes[1]).max() > max(mesh.edge, designed.edge):
         sizes = [" x ".join(f"{side:.3g}" for side in np.ptp(box, axis=0)) for box in boxes]

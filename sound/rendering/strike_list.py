@@ -1,4 +1,4 @@
-"""Lists of strikes: a table (CSV) that says when, where and how hard a solid is struck."""
+"""Lists of strikes: tables (CSV) of times, places and impulses."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from carillon.files.paths import cause, require_file
 from sound.bounds import LARGEST_IMPULSE, LEAST_IMPULSE, LONGEST_SOUND
 
 MOST_STRIKES = 10_000
-"""In a list; each of a melody has a note of its own."""
+"""Greatest number of strikes in a list."""
 MOST_BYTES = 1 << 22
-"""Of a list's file."""
+"""Greatest size of a list's file [bytes]."""
 FARTHEST = 1e9
-"""Coordinate that somebody may write."""
+"""Greatest magnitude of a coordinate."""
 TIME, TARGET, VERTEX, STRENGTH = "time_seconds", "target", "vertex", "strength_newton_seconds"
 AT = ("x", "y", "z")
 COLUMNS = (TIME, TARGET, VERTEX, *AT, STRENGTH)
-"""Of a table, in any order; those that no line needs may be left out, the time may not."""
+"""Columns of a list, in any order; all but the time may be left out."""
 
 
 class Point(NamedTuple):
-    """Where a solid is struck, one of the three: a target's name, a vertex, a position (3,).
+    """A struck point: one of a target's name, a vertex, and a position (3,).
 
-    Positions are in the mesh's own coordinates, those in modes of no design in metres.
+    Positions are in the mesh's own coordinates; for modes of no design, in metres.
     """
 
     target: str | None = None

@@ -1,8 +1,8 @@
-"""Convex parts that together fill a solid: what engines of rigid bodies collide.
+"""Convex parts of a solid, for the collisions of rigid bodies.
 
 CoACD (Wei et al. 2022, Approximate convex decomposition for 3D meshes with collision-aware
-concavity and tree search) cuts closed surfaces.  It runs in a process of its own: it prints, it
-cannot be interrupted, and of what it does not expect it dies.
+concavity and tree search) cuts closed surfaces.  It runs in a process of its own, since it prints,
+cannot be interrupted, and crashes on unexpected surfaces.
 """
 
 from __future__ import annotations
@@ -48,19 +48,20 @@ Array = NDArray[np.float64]
 Faces = NDArray[np.integer]
 
 MOST_VERTICES = 64
-"""Of a hull; engines slow down with them."""
+"""Greatest number of vertices of a hull; more slow the engine down."""
 SEARCH = {
     "resolution": 500,
     "mcts_nodes": 10,
     "mcts_iterations": 60,
     "mcts_max_depth": 2,
 }
-"""How hard CoACD searches for cuts; its defaults take thrice as long for a few parts fewer."""
+"""Effort of CoACD's search for cuts; its defaults take three times as long for a few parts
+fewer."""
 CONCAVITIES = (0.01, 1.0)
-"""Bounds of how far hulls may reach; with less CoACD hardly comes to an end."""
+"""Bounds of `concavity`; below them CoACD hardly ends."""
 _KIND, _SCHEMA = "convex parts", 1  # counted up, too, when other parts are found than before
 _DIRECTIONS = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if way > (0, 0, 0)])
-"""Of edges, diagonals of faces, and diagonals of a cube, one way each."""
+"""Directions of a cube's edges, diagonals of faces, and diagonals, one sense each."""
 
 
 def convex_parts(
@@ -68,25 +69,24 @@ def convex_parts(
 ) -> list[Array]:
     """Convex hulls that together fill a solid.
 
-    Closed parts of the surface that are not connected are cut one by one.  If one is not closed,
-    the solid is what is inside by winding numbers, on a grid, see `GRIDS`.  What was cut once is in
-    the user's cache.
+    Closed components of the surface are cut one by one.  If a component is open, the solid is the
+    inside by winding numbers on a grid, see `GRIDS`.  Parts are kept in the user's cache.
 
     Parameters
     ----------
     vertices : (V, 3) [m]
-        Of the surface.
+        Vertices of the surface.
     faces : (F, 3)
-        Vertices of triangles.
+        Triangles.
     concavity : float [1]
-        About how far hulls may reach beyond the solid, over half its longest side.
+        Approximate distance of hulls beyond the solid, over half its longest side.
     seed : int
-        Of CoACD's search.
+        Seed of CoACD's search.
 
     Returns
     -------
     hulls : list of (n, 3) [m]
-        Vertices of each, `MOST_VERTICES` at most; one hull for a solid that is convex.
+        Vertices of each hull, at most `MOST_VERTICES`; a convex solid has one hull.
 
     Raises
     ------
@@ -122,9 +122,9 @@ def _cut(solids: Sequence[trimesh.Trimesh], concavity: float, seed: int) -> list
 
 
 def hull_of(points: Array) -> Array:
-    """At most `MOST_VERTICES` of the points (p, 3), by which their hull is kept best.
+    """At most `MOST_VERTICES` of the points (p, 3) that span their hull best.
 
-    One by one those are taken that are farthest outside of the hull of those taken before.
+    Each point added is the one farthest outside of the hull of those before.
     """
     from scipy.spatial import ConvexHull
 
@@ -142,9 +142,9 @@ def hull_of(points: Array) -> Array:
 
 
 def _searched(solids: Sequence[Cuttable], reach: float, seed: int) -> list[Array]:
-    """Points (p, 3) of the parts that CoACD finds; their hulls reach `reach` [m] beyond a solid.
+    """Points (p, 3) of CoACD's parts, whose hulls reach `reach` [m] beyond a solid.
 
-    It has one thread: of several the order of the parts would depend on which one is faster.
+    CoACD has one thread, as with several the order of the parts depends on which one is faster.
     """
     with TemporaryDirectory() as folder:
         task, result = Path(folder, "task.npz"), Path(folder, "result.npz")
@@ -165,7 +165,7 @@ def _searched(solids: Sequence[Cuttable], reach: float, seed: int) -> list[Array
 
 
 def _search(task: str, result: str) -> None:
-    """What the process of its own does: read solids, let CoACD cut them, write the parts."""
+    """In the child process: read solids, cut them by CoACD, write the parts."""
     import coacd
 
     spare_the_machine()

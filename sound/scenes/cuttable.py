@@ -1,4 +1,4 @@
-"""Closed surfaces that can be cut into convex parts: open ones closed, fine ones made coarser."""
+"""Preparation of surfaces for convex decomposition: open ones are closed, fine ones coarsened."""
 
 from __future__ import annotations
 
@@ -16,35 +16,33 @@ Array = NDArray[np.float64]
 Faces = NDArray[np.integer]
 
 HOLLOW = 0.02
-"""Share of its hull that a solid may leave empty and still be taken for convex."""
+"""Greatest share of its hull that a convex solid leaves empty."""
 GRIDS = ((40, 0.0), (40, 0.38), (80, 0.38), (160, 0.38))
-"""Grids in which what is not closed is made into a solid: cells along the longest side, and by how
-many the surface lies within the grid.  The first one that shows a closed surface is taken.
+"""Grids that close an open surface: number of cells along the longest side, and offset of the
+surface in cells.  The first grid that gives a closed surface is taken.
 
-Where a grid begins with the surface, flat walls may lie on points, which are neither inside nor
-outside then.
+Without an offset, flat walls may lie on grid points, which are neither inside nor outside then.
 """
 MOST_FACES = (800, 1600)
-"""Of a surface that is cut; finer ones are made coarser before, as coarse as goes well."""
+"""Numbers of faces that a surface is coarsened to, the first that works."""
 JITTER = 1e-4
-"""By which vertices are displaced at random for that, over the longest side.
-
-In a plane triangles fold over each other, as nothing speaks against it, unless vertices are off it.
+"""Random displacement of vertices before coarsening, over the longest side; in an exact plane,
+triangles would fold over each other.
 """
 EDGES_AT_ONCE = 256
-"""Of which it is tried whether they go through triangles."""
+"""Number of edges that are tested against all triangles at once."""
 
 
 class Cuttable(NamedTuple):
-    """A closed surface, and whether CoACD shall see to it that it crosses itself nowhere.
+    """A closed surface, and CoACD's preprocessing of it.
 
     Attributes
     ----------
     surface
-        Of a solid.
+        Surface of a solid.
     preprocessing
-        "off", or "auto": CoACD then takes for crossing, too, what merely is narrow, and makes a
-        surface of its own of that, which is thicker and takes far longer to cut.
+        "off", or "auto" for a surface that may cross itself: CoACD then remeshes crossings and
+        narrow gaps, into a thicker surface that takes far longer to cut.
     """
 
     surface: trimesh.Trimesh
@@ -52,10 +50,10 @@ class Cuttable(NamedTuple):
 
 
 def components(surface: trimesh.Trimesh) -> list[trimesh.Trimesh]:
-    """Closed surfaces of a solid: its pieces, or all at once if it has cavities.
+    """Closed surfaces of a solid: its pieces, or the whole if it has cavities.
 
-    Pieces that share places but no vertices, as boards of a box at its corners, are apart.  None if
-    something is open, or inside out.
+    Pieces that touch but share no vertices, as boards of a box, are separate.  The list is empty if
+    a surface is open or inside out.
     """
     import trimesh
 
@@ -80,17 +78,17 @@ def _volume(surface: trimesh.Trimesh) -> float:
 
 
 def is_convex(solid: trimesh.Trimesh) -> bool:
-    """Whether a closed surface hardly differs from its hull, see `HOLLOW`."""
+    """Whether a closed surface leaves at most the share `HOLLOW` of its hull empty."""
     return bool(_volume(solid) >= (1.0 - HOLLOW) * solid.convex_hull.volume)
 
 
 def remeshed(surface: trimesh.Trimesh) -> list[trimesh.Trimesh]:
-    """Closed surfaces about the inside of one that is open, inside out or runs through itself.
+    """Closed surfaces around the inside of one that is open, inside out or crosses itself.
 
     Raises
     ------
     UserError
-        If nothing is inside.
+        If the inside is empty.
     """
     for grid in GRIDS if surface.area > 0.0 else ():
         solids = components(_boundary(surface, *grid))
@@ -103,7 +101,7 @@ def remeshed(surface: trimesh.Trimesh) -> list[trimesh.Trimesh]:
 
 
 def _boundary(surface: trimesh.Trimesh, cells: int, within: float) -> trimesh.Trimesh:
-    """The closed surface between points of a grid that are inside and those that are outside."""
+    """The closed surface between the inner and the outer points of a grid."""
     import igl
     import trimesh
 
@@ -129,7 +127,7 @@ def _distances(surface: trimesh.Trimesh, points: Array) -> Array:
 
 
 def coarser(solid: trimesh.Trimesh) -> Cuttable:
-    """A solid of few faces that crosses itself nowhere, or else the solid as it is."""
+    """A coarser solid that does not cross itself, or else the solid as it is."""
     for faces in MOST_FACES:
         if len(solid.faces) <= faces:
             break
@@ -140,7 +138,7 @@ def coarser(solid: trimesh.Trimesh) -> Cuttable:
 
 
 def _decimated(solid: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
-    """By collapsing edges that matter least (Garland and Heckbert 1997)."""
+    """A coarser surface by edge collapses (Garland and Heckbert 1997)."""
     import igl
     import trimesh
 
@@ -151,7 +149,7 @@ def _decimated(solid: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
 
 
 def crosses_itself(surface: trimesh.Trimesh) -> bool:
-    """Whether an edge goes through a triangle that it does not end at."""
+    """Whether an edge intersects a triangle that it does not touch."""
     parts = max(1, len(surface.edges_unique) // EDGES_AT_ONCE)
     return any(
         _cross(surface, edges).any() for edges in np.array_split(surface.edges_unique, parts)
@@ -159,7 +157,7 @@ def crosses_itself(surface: trimesh.Trimesh) -> bool:
 
 
 def _cross(surface: trimesh.Trimesh, edges: Faces) -> NDArray[np.bool_]:
-    """Of edges (e, 2) and triangles on whose two sides their ends are, whether they meet."""
+    """Which of the edges (e, 2) and triangles on whose two sides their ends lie intersect."""
     first, along, across = np.moveaxis(surface.triangles, 1, 0)
     along, across = along - first, across - first
     normals = np.cross(along, across)

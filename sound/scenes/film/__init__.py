@@ -1,1 +1,1 @@
-"""The film of a scene, traced by rays."""
+"""Films of scenes by ray tracing."""

@@ -1,4 +1,4 @@
-"""Films of scenes: what is seen and what is heard, in one file."""
+"""Films of scenes: video files with picture and sound."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 FRAMES_PER_SECOND = 30
 SIZE = (960, 540)
-"""Width and height [pixels]."""
+"""Width and height of a film [pixels]."""
 SOUND_RATE = 48_000
-"""Samples per second where a format does not take those of the sound [Hz]."""
+"""Sampling rate of formats that do not support the sound's own [Hz]."""
 COLOURS = 1
 """Number of ITU-R BT.709 among colour spaces, primaries and transfer curves (ITU-T H.273)."""
 LIMITED_RANGE = 1
@@ -36,7 +36,7 @@ LIMITED_RANGE = 1
 
 @dataclass(frozen=True)
 class FilmFormat:
-    """How a film is written: the container, and codecs with FFmpeg's options for each of them."""
+    """Format of a film: container and codecs, with FFmpeg's options for each."""
 
     container: str
     container_options: dict[str, str]
@@ -54,9 +54,9 @@ FORMATS = {
         {
             "preset": "medium",
             "crf": "19",
-            # Without frames that refer to later ones: the first is the first in the file.
+            # Without frames that refer to later ones, so the first frame is the first in the file.
             "bf": "0",
-            # What x264 has for AVX2 rounds otherwise, and one film in some thirty otherwise again.
+            # x264's code for AVX2 rounds differently, and for one film in thirty not reproducibly.
             "x264-params": "asm=SSE4.2",
         },
         "aac",
@@ -88,9 +88,9 @@ def write_film(
     Parameters
     ----------
     performance
-        What is seen and heard.
+        Picture and sound.
     frames_per_second : int [1/s]
-        How many frames there are.
+        Frame rate.
     size
         Width and height [pixels], even numbers.
 
@@ -104,7 +104,7 @@ def write_film(
     _require_frames(frames_per_second, size)
     av = scene_package("av")
     form = FORMATS[path.suffix.lower()]
-    # What products of matrices round to may depend on the number of threads.
+    # The rounding of matrix products may depend on the number of threads.
     with atomic_path(path) as temporary, blas_threads(1):
         stage = Stage(performance.picture, size)
         with av.open(str(temporary), "w", form.container, form.container_options) as container:
@@ -139,7 +139,7 @@ def _picture_stream(
 
 
 def _sound_stream(container: OutputContainer, form: FilmFormat, rate: int) -> AudioStream:
-    """A stereo stream with the sound's own samples per second, if the codec knows these."""
+    """A stereo stream at the sound's own sampling rate, if the codec supports it."""
     codec = scene_package("av").codec.Codec(form.sound, "w")
     taken = not codec.audio_rates or rate in codec.audio_rates
     added = container.add_stream(form.sound, rate if taken else SOUND_RATE)
@@ -156,7 +156,7 @@ def _encode(
     stage: Stage,
     performance: Performance,
 ) -> None:
-    """Write frames, and after each the sound until the next one."""
+    """Write the frames, each followed by the sound until the next one."""
     av = scene_package("av")
     per_second = int(picture.codec_context.framerate)
     samples, rate = performance.sound.astype(np.float32), performance.rate

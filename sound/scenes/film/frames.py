@@ -1,4 +1,4 @@
-"""Frames of a scene: solids on tiles, under the sun and a sky, as rays see them."""
+"""Ray-traced frames of a scene: solids on tiles under the sun and the sky."""
 
 from __future__ import annotations
 
@@ -16,30 +16,31 @@ Bytes = NDArray[np.uint8]
 Numbers = NDArray[np.intp]
 
 GROUNDLIGHT = np.array([1.0, 0.96, 0.92], np.float32) * 0.20
+"""Light from the ground on surfaces that face down."""
 SHEEN = 0.14
-"""Light of the highlights, beside what the colour reflects."""
+"""Brightness of the highlights, added to the diffuse light."""
 SHARPNESS = 40.0
-"""Exponent of the highlights' falling off (Blinn and Phong)."""
+"""Exponent of the highlights (Blinn and Phong)."""
 
 EDGE_PLACES = np.array([[-0.375, -0.125], [0.125, -0.375], [0.375, 0.125], [-0.125, 0.375]])
-"""Where rays go through pixels at edges [pixels from their centres]."""
+"""Positions of the rays through a pixel at an edge [pixels from its centre]."""
 EDGE_CONTRAST = 6
-"""Difference of green, of 255, between neighbours that makes an edge."""
+"""Least difference of green, of 255, between neighbouring pixels at an edge."""
 LIFT = 0.004
-"""How far off a solid's surface rays to the sun begin, in its radii."""
+"""Distance from the surface at which rays to the sun begin, over the solid's radius."""
 TONES = 4096
-"""Steps of brightness that are told apart before they are brought to 256."""
-
+"""Number of steps of brightness in the table of sRGB values."""
 NOBODY = -1
+"""Number that stands for no solid."""
 
 
 class Stage:
-    """A scene as it is painted.
+    """A scene with camera, lights and colours.
 
     Parameters
     ----------
     picture
-        What there is to see.
+        Visible part of the scene.
     size
         Width and height [pixels].
     """
@@ -54,7 +55,7 @@ class Stage:
         self.colours = [linear_light(each.colour).astype(np.float32) for each in picture.objects]
 
     def frame(self, seconds: float) -> Bytes:
-        """What is seen at a time: (H, W, 3), sRGB."""
+        """Frame (H, W, 3), sRGB, at a time."""
         moment = _Moment(self, self._placed(seconds))
         ground = self.ground.lit(moment.placed)
         light, owners = ground.copy(), np.full(self.view.shape, NOBODY)
@@ -84,7 +85,7 @@ class _Moment:
         self.windows = [stage.view.window(each.points(each.surface.vertices)) for each in placed]
 
     def covered(self) -> Flags:
-        """Pixels (H, W) where solids may be seen."""
+        """Pixels (H, W) that may show solids."""
         covered = np.zeros(self.stage.view.shape, bool)
         for window in self.windows:
             covered[window] = True
@@ -96,7 +97,7 @@ class _Moment:
         Parameters
         ----------
         behind : (n, 3)
-            What is seen where there is no solid, which has the number `NOBODY`.
+            Light where there is no solid; the number there is `NOBODY`.
         """
         directions = self.stage.view.directions(places)
         owners, ways, normals = self._met(places, directions)
@@ -110,7 +111,7 @@ class _Moment:
     def _met(
         self, places: NDArray[np.floating], directions: Floats
     ) -> tuple[Numbers, Floats, Floats]:
-        """Numbers (n,) of the solids that are met first, ways (n,) there, normals (n, 3) there."""
+        """Numbers (n,) of the first solids on rays, ways (n,) to them, normals (n, 3) there."""
         ways = self.stage.ground.ways(directions)
         owners, normals = np.full(len(places), NOBODY), np.zeros_like(directions)
         for number, (solid, window) in enumerate(zip(self.placed, self.windows)):
@@ -123,7 +124,7 @@ class _Moment:
         return owners, ways, normals
 
     def _shaded(self, number: int, points: Floats, normals: Floats, directions: Floats) -> Floats:
-        """Light (n, 3) from points of a solid in the direction from where rays came."""
+        """Light (n, 3) from points of a solid towards the eye."""
         sun = self.stage.sun
         direct = np.maximum(normals @ sun, 0.0) * self._sunny(number, points, normals)
         upwards = 0.5 + 0.5 * normals[:, 2:]
@@ -135,7 +136,7 @@ class _Moment:
         return (diffuse + gleam[:, None] * SUNLIGHT).astype(np.float32)
 
     def _sunny(self, number: int, points: Floats, normals: Floats) -> Flags:
-        """Whether the sun is seen from points (n, 3) of a solid, unless it is turned away."""
+        """Whether the sun shines on points (n, 3) of a solid."""
         sun, solid = self.stage.sun, self.placed[number]
         sunny = normals @ sun > 0.0
         for other in self.placed:
@@ -153,13 +154,13 @@ def _centres(pixels: tuple[Numbers, ...]) -> NDArray[np.float64]:
 
 
 def _within(places: NDArray[np.floating], window: Window) -> Flags:
-    """Which places (n, 2) lie in a part of the picture."""
+    """Which positions (n, 2) lie in a window of the picture."""
     (x, y), (rows, columns) = places.T, window
     return (columns.start <= x) & (x < columns.stop) & (rows.start <= y) & (y < rows.stop)
 
 
 def _edges(owners: Numbers, tones: Bytes) -> Flags:
-    """Pixels (H, W) beside which there is another solid, or that differ much from it."""
+    """Pixels (H, W) next to another solid or to a much different pixel."""
     edges = np.zeros(owners.shape, bool)
     for first, second in (
         (np.s_[:-1, :], np.s_[1:, :]),
@@ -174,7 +175,7 @@ def _edges(owners: Numbers, tones: Bytes) -> Flags:
 
 
 def _toned(light: Floats) -> Bytes:
-    """Colours in sRGB from 0 to 255 of light from 0 to 1 (IEC 61966-2-1)."""
+    """sRGB values from 0 to 255 of light from 0 to 1 (IEC 61966-2-1)."""
     steps = np.arange(TONES) / (TONES - 1)
     curve = np.where(steps <= 0.0031308, 12.92 * steps, 1.055 * steps ** (1 / 2.4) - 0.055)
     table = np.rint(255.0 * curve).astype(np.uint8)

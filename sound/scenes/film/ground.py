@@ -1,4 +1,4 @@
-"""The ground of a film: tiles under a sun and a sky, and the shadows that solids throw on them."""
+"""Tiled ground of a film under sun and sky, with the shadows of solids."""
 
 from __future__ import annotations
 
@@ -11,49 +11,53 @@ from scipy.ndimage import uniform_filter
 from sound.scenes.film.rays import Flags, Floats, PlacedSurface, View, Window
 
 SUN_AZIMUTH_DEGREES = 68.0
-"""Where the sun stands: to the left from behind the camera, and how high."""
+"""Azimuth of the sun, to the left from behind the camera."""
 SUN_ELEVATION_DEGREES = 52.0
+"""Elevation of the sun above the horizon."""
 SUN_RADIUS_DEGREES = 2.5
-"""Half of what it spans: shadows get softer the farther away they are thrown."""
+"""Angular radius of the sun, which softens shadows with their distance."""
 SKY_RADIUS_DEGREES = 65.0
-"""How far from the zenith the sky's light comes from that solids keep off the ground."""
+"""Angle from the zenith within which solids shade the ground from the sky."""
 SUNLIGHT = np.array([1.0, 0.96, 0.90], np.float32) * 0.80
-"""What a white surface reflects of each light that falls on it squarely."""
+"""Light that a white surface facing the sun reflects of it."""
 SKYLIGHT = np.array([0.84, 0.91, 1.0], np.float32) * 0.36
+"""Light that a white surface facing up reflects of the sky."""
 
 TILES = np.array([[0.82, 0.82, 0.81], [0.72, 0.72, 0.71]], np.float32)
 """Reflectances of the two kinds of tiles on the ground."""
 TILES_AHEAD = 9.0
-"""About how many tiles lie between the camera and what it looks at."""
+"""Approximate number of tiles between the camera and its target."""
 HORIZON = np.array([0.80, 0.84, 0.88], np.float32)
+"""Light of the sky at the horizon."""
 ABOVE_HORIZON = np.array([-0.38, -0.30, -0.18], np.float32)
-"""What is seen behind the ground, and how it differs at the zenith."""
+"""Light of the sky at the zenith minus that at the horizon."""
 FADING = 4.0
-"""Where the ground fades into the horizon, in distances of what the camera looks at."""
+"""Distance at which the ground fades into the horizon, over that of the camera's target."""
 
 SUN_SIDE, SKY_SIDE = 4, 6
-"""Pixels along the squares in which each pixel looks for another part of the light."""
+"""Sides of the squares of pixels that together sample a light, a direction in each pixel."""
 GROUND_SIDE = 4
-"""Rays along a pixel by which the ground without shadows is painted, once."""
+"""Number of rays along each side of a pixel of the ground without shadows."""
 
 UP = np.array([0.0, 0.0, 1.0], np.float32)
+"""Unit vector upwards."""
 GOLDEN_ANGLE = np.pi * (3.0 - 5.0**0.5)
 
 
 class Light:
     """A light that falls on the ground from many directions.
 
-    Each pixel of a square looks in another one of them; the mean over the pixels around is then
-    smooth, at the price of one ray a pixel (interleaved sampling, Keller and Heidrich 2001).
+    Each pixel of a square samples another direction, and the mean over the pixels around it is
+    smooth, for one ray a pixel (interleaved sampling, Keller and Heidrich 2001).
 
     Parameters
     ----------
     colour : (3,)
-        What white ground reflects of it if nothing is in its way.
+        Light that unshaded white ground reflects.
     directions : (s * s, 3)
         Unit vectors towards the light, of equal weight.
     step : int
-        Pixels from one that looks to the next.
+        Distance of sampled pixels.
     """
 
     def __init__(self, colour: Floats, directions: Floats, step: int) -> None:
@@ -61,10 +65,7 @@ class Light:
         self.side = round(len(directions) ** 0.5)
 
     def kept_off(self, placed: Sequence[PlacedSurface], ground: Ground) -> tuple[Window, Floats]:
-        """Part of the picture, and share (h, w) of the light that does not reach the ground there.
-
-        All of the light reaches the ground elsewhere.
-        """
+        """Window of the picture with shadows, and shaded share (h, w) of the light in it."""
         looking = np.s_[:: self.step, :: self.step]
         points, seen = ground.points[looking], ground.seen[looking]
         dark = np.zeros(seen.shape, bool)
@@ -77,11 +78,11 @@ class Light:
         return self._smooth(dark, ground.seen.shape)
 
     def _thinned(self, span: slice) -> slice:
-        """Those of a row's or column's pixels that look, in their own count."""
+        """Numbers of the sampled pixels in a span of pixels."""
         return slice(-(-span.start // self.step), -(-span.stop // self.step))
 
     def _smooth(self, dark: Flags, shape: tuple[int, ...]) -> tuple[Window, Floats]:
-        """What `kept_off` returns, by which of the pixels that look see no light."""
+        """Result of `kept_off`, from the sampled pixels in the dark."""
         rows, columns = _bounds(dark, margin=self.side)
         share = uniform_filter(dark[rows, columns].astype(np.float32), self.side)
         share = uniform_filter(share, self.side).repeat(self.step, axis=0)
@@ -91,28 +92,28 @@ class Light:
         return window, share[:height, :width]
 
     def _window(self, solid: PlacedSurface, ground: Ground) -> Window:
-        """Where the solid's shadows lie in the picture."""
+        """Window of the picture that contains a solid's shadow."""
         corners = solid.points(solid.surface.corners)[:, None]
         ways = (corners[..., 2] - ground.height) / self.directions[:, 2]
         return ground.view.window((corners - ways[..., None] * self.directions).reshape(-1, 3))
 
 
 class Ground:
-    """Tiles under the scene, and what is behind them, as the camera sees them.
+    """Tiled ground and sky in the picture.
 
     Parameters
     ----------
     height : float [m]
-        Where it lies; minus infinity if there is none.
+        Height; minus infinity without a ground.
 
     Attributes
     ----------
     seen : (H, W)
         Whether a pixel shows the ground.
     points : (H, W, 3) [m]
-        Of the ground, where it is seen.
+        Points of the ground where it is visible.
     reflectance : (H, W, 3)
-        Of the ground, less where it fades into what is behind it.
+        Reflectance of the ground, which fades towards the horizon.
     bright : (H, W, 3)
         The picture without shadows.
     """
@@ -137,13 +138,13 @@ class Ground:
         self.bright += self.reflectance * sum(light.colour for light in self.lights)
 
     def ways(self, directions: Floats) -> Floats:
-        """How far (n,) rays (n, 3) from the eye get to the ground; infinite if they never do."""
+        """Ways (n,) of rays (n, 3) from the eye to the ground; infinite if they miss it."""
         with np.errstate(divide="ignore", invalid="ignore"):
             ways = (self.height - self.view.eye[2]) / directions[:, 2]
         return np.where(ways > 0.0, ways, np.inf).astype(np.float32)
 
     def lit(self, placed: Sequence[PlacedSurface]) -> Floats:
-        """The picture (H, W, 3) of it, with shadows but without what throws them."""
+        """Picture (H, W, 3) of the ground with shadows, without the solids."""
         picture = self.bright.copy()
         for light in self.lights if self.seen.any() else ():
             window, share = light.kept_off(placed, self)
@@ -151,7 +152,7 @@ class Ground:
         return picture
 
     def _second_tiles(self) -> Floats:
-        """Share (H * W,) of the second kind of tiles within pixels."""
+        """Share (H * W,) of the second kind of tiles in each pixel."""
         centres = self.view.centres()
         share = np.zeros(len(centres), np.float32)
         offsets = (np.arange(GROUND_SIDE, dtype=np.float32) + 0.5) / GROUND_SIDE - 0.5
@@ -162,13 +163,13 @@ class Ground:
         return share / GROUND_SIDE**2
 
     def _ends(self, directions: Floats, ways: Floats) -> Floats:
-        """Where rays (n, 3) from the eye end; those that never do stay there."""
+        """End points (n, 3) of rays from the eye; the eye itself for endless ones."""
         reach = np.where(np.isfinite(ways), ways, np.float32(0.0))
         return self.view.eye + reach[:, None] * directions
 
 
 def sun_behind(view: View) -> Floats:
-    """Unit vector (3,) to the sun, which stands behind the camera."""
+    """Unit vector (3,) to the sun, behind the camera."""
     right = view.axes[0]
     back = np.cross(right, UP)
     azimuth, elevation = np.radians([SUN_AZIMUTH_DEGREES, SUN_ELEVATION_DEGREES])
@@ -177,10 +178,10 @@ def sun_behind(view: View) -> Floats:
 
 
 def _around(axis: Floats, count: int, degrees: float) -> Floats:
-    """Unit vectors (count, 3) within an angle around another one, even seen along it.
+    """Unit vectors (count, 3) within an angle around an axis, evenly spread in its projection.
 
-    They lie on a spiral of equal areas (Vogel 1979), so that a matt surface across the axis gets
-    the same light from each.
+    They lie on a spiral of equal areas (Vogel 1979), so a matt surface across the axis receives the
+    same light from each.
     """
     numbers = np.arange(count)
     radii = np.sin(np.radians(degrees)) * np.sqrt((numbers + 0.5) / count)
@@ -192,7 +193,7 @@ def _around(axis: Floats, count: int, degrees: float) -> Floats:
 
 
 def _round_length(length: float) -> float:
-    """The next length of the form 1, 2 or 5 times a power of ten below.
+    """The greatest length of the form 1, 2 or 5 times a power of ten that is not above another.
 
     Examples
     --------
@@ -204,7 +205,7 @@ def _round_length(length: float) -> float:
 
 
 def _bounds(flags: Flags, margin: int) -> Window:
-    """The part of the picture around all that are set, and some pixels more; empty if none is."""
+    """The window around all set pixels, enlarged by a margin; empty if none is set."""
     rows, columns = (np.flatnonzero(flags.any(axis=axis)) for axis in (1, 0))
     if not len(rows):
         return slice(0, 0), slice(0, 0)
@@ -215,7 +216,7 @@ def _bounds(flags: Flags, margin: int) -> Window:
 
 
 def _scaled(span: slice, step: int, count: int) -> slice:
-    """All pixels of a row or column, of `count`, by a span of those that look."""
+    """Span of pixels, of `count`, for a span of sampled pixels."""
     return slice(min(span.start * step, count), min(span.stop * step, count))
 
 

@@ -1,4 +1,4 @@
-"""Rays through the pixels of a picture, and where they meet surfaces (by Intel's Embree)."""
+"""Rays through the pixels of a picture, and their intersections with surfaces (Intel's Embree)."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from sound.scenes.picture import Camera
 Flags = NDArray[np.bool_]
 Floats = NDArray[np.float32]
 Window = tuple[slice, slice]
-"""Rows and columns of a picture."""
+"""Part of a picture: rows and columns."""
 
 CREASE_DEGREES = 40.0
-"""Faces that meet at more than this do so at an edge, which is shaded as one."""
+"""Angle between two faces above which their edge is shaded as sharp."""
 
 
 class View:
@@ -27,7 +27,7 @@ class View:
     Parameters
     ----------
     camera
-        From where the scene is seen.
+        Camera.
     size
         Width and height [pixels].
     """
@@ -39,7 +39,7 @@ class View:
         self.distance = float(np.linalg.norm(towards))
         ahead = towards / self.distance
         across = np.cross(ahead, [0.0, 0.0, 1.0])
-        # Looking straight up or down, where it is not told what is up in the picture.
+        # Looking straight up or down, where no direction is up in the picture.
         long = float(np.linalg.norm(across))
         right = across / long if long > 1e-6 else np.array([1.0, 0.0, 0.0])
         self.axes = np.stack([right, np.cross(ahead, right), ahead]).astype(np.float32)
@@ -57,12 +57,13 @@ class View:
         return np.stack([columns.ravel(), rows.ravel()], axis=1).astype(np.float32) + 0.5
 
     def directions(self, places: NDArray[np.floating]) -> Floats:
-        """Rays (n, 3) from the eye through places (n, 2) [pixels], 1 m ahead long each."""
+        """Rays (n, 3) from the eye through positions (n, 2) [pixels], 1 m long along the camera's
+        axis."""
         aside = (places - self.centre) / self.focus
         return (aside @ self.axes[:2] + self.axes[2]).astype(np.float32)
 
     def window(self, points: NDArray[np.floating]) -> Window:
-        """The part of the picture that the convex hull of points (n, 3) [m] lies in."""
+        """The window that contains the convex hull of points (n, 3) [m]."""
         seen = (points - self.eye) @ self.axes.T
         if seen[:, 2].min() < 1e-3 * self.distance:  # beside or behind the camera
             return slice(0, self.height), slice(0, self.width)
@@ -78,16 +79,16 @@ def _span(first: float, last: float, count: int) -> slice:
 
 
 class Meetings(NamedTuple):
-    """Where rays meet a surface; those that miss it are left out.
+    """First intersections of rays with a surface, without the rays that miss it.
 
     Attributes
     ----------
     rays : (m,)
-        Their numbers.
+        Numbers of the rays.
     ways : (m,)
-        How far they get, in lengths of their directions.
+        Distances, in lengths of the rays' directions.
     normals : (m, 3)
-        Unit vectors on the side that they come from, smooth but for creases.
+        Unit normals on the rays' side, smooth but for creases.
     """
 
     rays: NDArray[np.intp]
@@ -96,21 +97,21 @@ class Meetings(NamedTuple):
 
 
 class RayedSurface:
-    """A surface that rays meet, in its own axes.
+    """A surface in its own axes, intersected by rays.
 
     Parameters
     ----------
     vertices : (V, 3) [m]
-        Where they are.
+        Vertices.
     faces : (F, 3)
-        Vertices of triangles.
+        Triangles.
 
     Attributes
     ----------
     radius : float [m]
-        Of the sphere around it, from the origin of its axes.
+        Radius of the sphere around it, about the origin of its axes.
     corners : (8, 3) [m]
-        Of the box around it.
+        Corners of the box around it.
     """
 
     def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.integer]) -> None:
@@ -125,7 +126,7 @@ class RayedSurface:
         )
 
     def meet(self, origins: Floats, directions: Floats) -> Meetings:
-        """Where rays (n, 3) first meet it."""
+        """First intersections with rays (n, 3)."""
         found = self._scene.run(origins, directions, output=1)
         rays = np.flatnonzero(found["primID"] >= 0)
         u, v, faces, outwards = (found[key][rays] for key in ("u", "v", "primID", "Ng"))
@@ -137,7 +138,7 @@ class RayedSurface:
         return Meetings(rays, found["tfar"][rays], normals)
 
     def hides(self, origins: Floats, directions: Floats) -> Flags:
-        """Which rays (n,) meet the surface."""
+        """Which rays (n,) hit the surface."""
         return np.asarray(self._scene.run(origins, directions, query="OCCLUDED") >= 0)
 
 
@@ -148,11 +149,11 @@ class PlacedSurface:
     Attributes
     ----------
     surface
-        In its own axes.
+        Surface in its own axes.
     position : (3,) [m]
-        Of their origin.
+        Position of the axes' origin.
     rotation : (3, 3)
-        From its axes to those of the scene.
+        Rotation from its axes to those of the scene.
     """
 
     surface: RayedSurface
@@ -160,22 +161,22 @@ class PlacedSurface:
     rotation: Floats
 
     def points(self, own: Floats) -> Floats:
-        """Points (n, 3) [m] of the scene by those in the surface's axes."""
+        """Points (n, 3) [m] in the scene of points in the surface's axes."""
         return own @ self.rotation.T + self.position
 
     def meet(self, eye: Floats, directions: Floats) -> Meetings:
-        """Where rays (n, 3) from one point meet it first."""
+        """First intersections with rays (n, 3) from one point."""
         origins = np.broadcast_to((eye - self.position) @ self.rotation, directions.shape)
         met = self.surface.meet(origins, directions @ self.rotation)
         return met._replace(normals=met.normals @ self.rotation.T)
 
     def hides(self, origins: Floats, directions: Floats) -> Flags:
-        """Which rays (n,) meet it."""
+        """Which rays (n,) hit the surface."""
         origins = (origins - self.position) @ self.rotation
         return self.surface.hides(origins, directions @ self.rotation)
 
     def may_shade(self, other: PlacedSurface, sun: Floats) -> bool:
-        """Whether spheres around both allow that it is between the other one and the sun."""
+        """Whether it may shade another surface from the sun, by the spheres around both."""
         between = self.position - other.position
         along, reach = float(between @ sun), self.surface.radius + other.surface.radius
         return along > -reach and float(np.linalg.norm(between - along * sun)) < reach
@@ -188,8 +189,8 @@ def corner_normals(
 ) -> NDArray[np.float64]:
     """Unit normals (F, 3, 3) at the corners of triangles.
 
-    The mean of the normals of those faces around the vertex, weighted by their areas, that the
-    corner's own face meets at less than the crease's angle.
+    Each is the mean, weighted by areas, of the normals of the faces around the vertex that differ
+    from the corner's own face by less than the crease's angle.
 
     Examples
     --------
@@ -216,7 +217,7 @@ def corner_normals(
 
 
 def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit vectors (n, 3); those without length stay so."""
+    """Vectors (n, 3) normalised; zero vectors stay zero."""
     lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
     return vectors / np.where(lengths > 0.0, lengths, 1.0)
 
@@ -224,7 +225,7 @@ def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
 def _sharing(
     faces: NDArray[np.integer], count: int
 ) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
-    """All pairs of corners that lie at one vertex; corners count through `faces.ravel()`."""
+    """All pairs of corners at the same vertex, numbered as in `faces.ravel()`."""
     corners = np.arange(faces.size)
     at = csr_matrix((np.ones(faces.size), (corners, faces.ravel())), (faces.size, count))
     pairs = (at @ at.T).tocoo()
