@@ -1,11 +1,9 @@
-"""One timed run of each method, from moduli to modes."""
+"""Timed runs of solvers on one solid, from moduli to modes."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -111,28 +109,27 @@ class Methods:
         self._exact: Array | None = None
         self._warm: tuple[ModalSolver, Modes] | None = None
 
-    def slepc(self, coarsening: str = "none", changed: bool = False) -> MethodRun:
-        """SLEPc's Krylov-Schur in shift-and-invert mode."""
-        with self.configuration.in_force(self.modes):
-            run = self._rival("slepc", *self._model(coarsening, changed))
-        if coarsening == "none":
+    def general(
+        self,
+        package: str,
+        coarsening: str = "none",
+        tolerance: float = RIVAL_TOLERANCE,
+        changed: bool = False,
+    ) -> MethodRun:
+        """Shift-and-invert by SLEPc's Krylov-Schur (`slepc`) or ARPACK (`arpack`).
+
+        It is given the rigid motions, finds a few modes to spare, and is charged for one search.
+        Modes that this missed, by the count of eigenvalues, are found by others off the clock: its
+        eigenvalues are a reference, which must be complete, and its time is favoured.
+        """
+        slepc = package == "slepc"
+        setup = self.configuration.in_force(self.modes) if slepc else without_purification()
+        with setup:
+            run = self.solve(coarsening, changed, method=package, tolerance=tolerance)
+        if slepc and coarsening == "none" and tolerance == RIVAL_TOLERANCE:
             self._exact = run.values
-        return run
-
-    def slepc_rough(self) -> MethodRun:
-        """SLEPc's Krylov-Schur to the rough tolerance."""
-        with self.configuration.in_force(self.modes):
-            return self._rival("slepc", *self._model("none"), ROUGH_TOLERANCE)
-
-    def ddfem_rough(self) -> MethodRun:
-        """SLEPc's Krylov-Schur on the coarse mesh, to the interactive tolerance."""
-        with self.configuration.in_force(self.modes):
-            return self._rival("slepc", *self._model("ddfem"), INTERACTIVE_TOLERANCE)
-
-    def arpack(self) -> MethodRun:
-        """ARPACK in shift-and-invert mode."""
-        with without_purification():
-            return self._rival("arpack", *self._model("none"))
+        # It needs nothing of what is prepared of the mesh.
+        return replace(run, before=0.0)
 
     def arpack_regular(self) -> MethodRun:
         """ARPACK without a factorisation, on the fine mesh with a diagonal mass."""
@@ -144,7 +141,7 @@ class Methods:
     def further(self, name: str) -> MethodRun:
         """One of `RIVALS`, asked for what SLEPc is asked for, on the fine mesh.
 
-        Modes that it missed are found off the clock, see `_rival`.
+        Modes that it missed are found off the clock, see `general`.
 
         Raises
         ------
@@ -153,7 +150,7 @@ class Methods:
         """
         rival = RIVALS[name]
         rival.require(self.comm.size)
-        exact = self.slepc().values if self._exact is None else self._exact
+        exact = self.general("slepc").values if self._exact is None else self._exact
         model = self._root.lumped() if rival.lumped else self._root.fine
         local_mesh = distribute(model, None, self.seed, self.comm)
         layout = Layout.of_local_mesh(local_mesh, self.comm)
@@ -178,39 +175,33 @@ class Methods:
             search.system.destroy()
         return MethodRun(seconds, values, added=added)
 
-    def hcms(self) -> MethodRun:
-        """Component mode synthesis alone."""
-        return self._cold(*self._model("none"), self._options(method="hcms", corrections=0))
+    def solve(
+        self,
+        coarsening: str = "none",
+        changed: bool = False,
+        from_coarse: bool = False,
+        **options: Any,
+    ) -> MethodRun:
+        """This project's solver with such `SolverOptions`, maybe from modes of the coarse mesh."""
+        model, coarsened = self._model(coarsening, changed)
+        begin = self._now()
+        solver = ModalSolver(model, self._options(**options), self.comm)
+        prepared = self._now()
+        start = None
+        if from_coarse:
+            forest = None if self.solid is None else self.solid.forest
+            start = coarse_start(solver, model, forest)
+        result = solver.solve(initial_modes=start)
+        return replace(self._run(result, prepared, coarsened), before=prepared - begin)
 
-    def hcms_ec(self) -> MethodRun:
-        """Component mode synthesis and error correction."""
-        options = self._options(method="hcms", tolerance=CORRECTED_TOLERANCE)
-        return self._cold(*self._model("none"), options)
-
-    def fastest(self) -> MethodRun:
-        """What `--method auto` takes: block Lanczos from random vectors."""
-        return self._cold(*self._model("none"), self._options(tolerance=CORRECTED_TOLERANCE))
-
-    def fastest_rough(self) -> MethodRun:
-        """The same to the rough tolerance."""
-        return self._cold(*self._model("none"), self._options(tolerance=ROUGH_TOLERANCE))
-
-    def refined(self) -> MethodRun:
-        """The same from the modes of the solid coarsened by forests."""
-        options = self._options(tolerance=ROUGH_TOLERANCE)
-        return self._cold(*self._model("none"), options, from_coarse=True)
-
-    def ddfem_ec_accurate(self) -> MethodRun:
-        """The same on the mesh coarsened by forests."""
-        return self._cold(*self._model("ddfem"), self._options(tolerance=CORRECTED_TOLERANCE))
-
-    def ddfem_ec(self) -> MethodRun:
-        """The same on the mesh coarsened by forests, to the interactive tolerance."""
-        return self._cold(*self._model("ddfem"), self._interactive)
-
-    def ddfem_ec_warm(self) -> MethodRun:
-        """The same for the changed material, from the modes of the unchanged one."""
-        solver, start = self._prepared()
+    def solve_warm(self) -> MethodRun:
+        """The changed material on the coarse mesh, from the modes of the unchanged one."""
+        if self._warm is None:
+            model, _ = self._model("ddfem")
+            options = self._options(tolerance=INTERACTIVE_TOLERANCE)
+            solver = ModalSolver(model, options, self.comm)
+            self._warm = solver, solver.solve()
+        solver, start = self._warm
         model, coarsened = self._model("ddfem", changed=True)
         begin = self._now()
         result = solver.solve_coarse(None if model is None else model.young, start)
@@ -221,17 +212,6 @@ class Methods:
         if self._warm is not None:
             self._warm[1].system.destroy()
             self._warm = None
-
-    def _prepared(self) -> tuple[ModalSolver, Modes]:
-        if self._warm is None:
-            model, _ = self._model("ddfem")
-            solver = ModalSolver(model, self._interactive, self.comm)
-            self._warm = solver, solver.solve()
-        return self._warm
-
-    @property
-    def _interactive(self) -> SolverOptions:
-        return self._options(tolerance=INTERACTIVE_TOLERANCE)
 
     def _options(self, **changes: Any) -> SolverOptions:
         options = SolverOptions(modes=self.modes, seed=self.seed, **changes)
@@ -254,39 +234,6 @@ class Methods:
         model, seconds = made or (None, 0.0)
         return model, self.comm.bcast(seconds)
 
-    def _cold(
-        self,
-        model: Solid | None,
-        coarsened: float,
-        options: SolverOptions,
-        from_coarse: bool = False,
-    ) -> MethodRun:
-        begin = self._now()
-        solver = ModalSolver(model, options, self.comm)
-        prepared = self._now()
-        start = None
-        if from_coarse:
-            forest = None if self.solid is None else self.solid.forest
-            start = coarse_start(solver, model, forest)
-        result = solver.solve(initial_modes=start)
-        return replace(self._run(result, prepared, coarsened), before=prepared - begin)
-
-    def _rival(
-        self,
-        method: str,
-        model: Solid | None,
-        coarsened: float,
-        tolerance: float = RIVAL_TOLERANCE,
-    ) -> MethodRun:
-        """A general eigensolver, which needs nothing of what is prepared of the mesh.
-
-        It is given the rigid motions, finds a few modes to spare, and is charged for one search.
-        Modes that this missed, by the count of eigenvalues, are found by others off the clock: its
-        eigenvalues are a reference, which must be complete, and its time is favoured.
-        """
-        options = self._options(method=method, tolerance=tolerance)
-        return replace(self._cold(model, coarsened, options), before=0.0)
-
     def _run(self, result: Modes, begin: float, coarsened: float) -> MethodRun:
         elapsed = self._now() - begin
         phases = {name: time for name, time in result.seconds.items() if name not in CHECKS}
@@ -302,24 +249,3 @@ class Methods:
         """Time at which all ranks are here."""
         self.comm.barrier()
         return time.perf_counter()
-
-
-def named(methods: Methods) -> dict[str, Callable[[], MethodRun]]:
-    """The methods of the table by name, in its order."""
-    return {
-        "arpack": methods.arpack,
-        "slepc": methods.slepc,
-        "ddfem": partial(methods.slepc, "ddfem"),
-        "ddfem_rough": methods.ddfem_rough,
-        "hcms": methods.hcms,
-        "hcms_ec": methods.hcms_ec,
-        "fastest": methods.fastest,
-        "slepc_rough": methods.slepc_rough,
-        "fastest_rough": methods.fastest_rough,
-        "refined": methods.refined,
-        "ddfem_ec_accurate": methods.ddfem_ec_accurate,
-        "ddfem_ec": methods.ddfem_ec,
-        "ddfem_ec_warm": methods.ddfem_ec_warm,
-        "arpack_regular": methods.arpack_regular,
-        **{name: partial(methods.further, name) for name in RIVALS},
-    }

@@ -8,13 +8,7 @@ from carillon.parameters import OneOf, option, parameters
 from carillon.parameters.quantities import NumberOfModes, Positive, between
 from studies.benchmark.further import ALL, RIVALS
 from studies.benchmark.methods import RIVAL_SECONDS
-
-SLOW = ("arpack", "arpack_regular", *RIVALS)
-ROUGH = ("slepc_rough", "fastest_rough", "refined")
-COARSE = ("ddfem", "ddfem_rough", "ddfem_ec_accurate", "ddfem_ec", "ddfem_ec_warm")
-"""Methods on the coarse mesh; all others are on the fine one."""
-BESIDE_DESIGN = ("arpack", "hcms", "hcms_ec")
-"""What `design` leaves out."""
+from studies.benchmark.table import METHODS
 
 Rounds = Annotated[int, between(1, 10_000)]
 """A number of rounds."""
@@ -53,12 +47,12 @@ class BenchmarkOptions:
     @property
     def left_out(self) -> tuple[str, ...]:
         """Methods that the options leave out."""
-        choices = {"arpack": self.arpack, "arpack_regular": self.arpack_regular}
-        choices |= dict.fromkeys(ROUGH, self.rough)
-        choices |= {name: name in self.further for name in RIVALS}
-        if self.design:
-            choices |= dict.fromkeys(BESIDE_DESIGN, False)
-        return tuple(name for name, runs in choices.items() if not runs)
+        asked = {**dict.fromkeys(RIVALS, False), **dict.fromkeys(self.further, True), **vars(self)}
+        return tuple(
+            name
+            for name, method in METHODS.items()
+            if not asked.get(method.option or "", True) or (self.design and not method.design)
+        )
 
     @property
     def further(self) -> tuple[str, ...]:
@@ -66,11 +60,11 @@ class BenchmarkOptions:
         asked = self.rivals or ()
         return tuple(name for name in RIVALS if name in asked or ALL in asked)
 
-    def rounds(self, method: str) -> int:
+    def rounds(self, name: str) -> int:
         """Runs of a method."""
         limits = [self.runs]
-        if method in SLOW and self.slow_runs is not None:
+        if METHODS[name].slow and self.slow_runs is not None:
             limits.append(self.slow_runs)
-        if method not in COARSE and self.fine_runs is not None:
+        if not METHODS[name].coarse and self.fine_runs is not None:
             limits.append(self.fine_runs)
         return min(limits)

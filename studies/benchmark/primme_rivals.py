@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import scipy.sparse.linalg as sla
 
 from carillon.errors import ConvergenceError
 from carillon.fem.model import RIGID_MODES
@@ -37,18 +36,11 @@ def davidson_direct(search: RivalSearch) -> Pairs:
 
 def davidson_multigrid(search: RivalSearch) -> Pairs:
     """With a V-cycle of PyAMG's smoothed aggregation."""
-    cycle = multigrid(search)
-    return _davidson(search, cycle.matmat)
+    return _davidson(search, multigrid(search).matmat)
 
 
 def _davidson(search: RivalSearch, precondition: Callable[[Array], Array]) -> Pairs:
     import primme
-
-    size = search.K.shape[0]
-
-    def apply(block: Array) -> Array:
-        search.limit.check()
-        return np.asarray(search.K @ block)
 
     def converged(value: float, _: Array, residual: float) -> bool:
         return residual <= search.tolerance * abs(value)
@@ -56,16 +48,14 @@ def _davidson(search: RivalSearch, precondition: Callable[[Array], Array]) -> Pa
     block = min(BLOCK, search.count)
     try:
         values, modes = primme.eigsh(
-            sla.LinearOperator((size, size), matvec=apply, matmat=apply, dtype=float),
+            search.stiffness,
             search.count,
             search.M,
             which="SA",
-            OPinv=sla.LinearOperator(
-                (size, size), matvec=precondition, matmat=precondition, dtype=float
-            ),
+            OPinv=search.operator(precondition),
             lock=search.rigid,
             v0=search.start(block),
-            ncv=min(round(BASIS * search.count) + 2 * block, size - RIGID_MODES),
+            ncv=min(round(BASIS * search.count) + 2 * block, len(search.scale) - RIGID_MODES),
             maxBlockSize=block,
             method=METHOD,
             convtest=converged,

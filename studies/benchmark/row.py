@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 from typing import Any, cast
 
@@ -17,31 +17,19 @@ from solver.analysis.problem import ProblemOptions
 from solver.distribution.collective import bcast_from_root, compute_on_root
 from solver.verification.errors import AUDIBLE_LAST
 from studies.benchmark.further import RIVALS
-from studies.benchmark.methods import MethodRun, Methods, named
-from studies.benchmark.options import COARSE, ROUGH, BenchmarkOptions
+from studies.benchmark.methods import MethodRun, Methods
+from studies.benchmark.options import BenchmarkOptions
 from studies.benchmark.rivals import SlepcConfiguration, configurations
-from studies.benchmark.scores import BASES, median, spectrum_error, speedups, spread, tone_error
+from studies.benchmark.scores import median, spectrum_error, speedups, spread, tone_error
 from studies.benchmark.solid import BenchmarkSolid, make_solid
+from studies.benchmark.table import METHODS
 
 logger = logging.getLogger(__name__)
 
 Runs = dict[str, list[MethodRun]]
 
-NEED_FORESTS = ("refined", *COARSE)
-LUMPED = tuple(name for name, rival in RIVALS.items() if rival.lumped)
-NEED_VOXELS = (*NEED_FORESTS, "arpack_regular", *LUMPED)
 WARM_UP_MODES = 20
 """Modes of the runs that compile the kernels and load what they need."""
-
-_LUMPED_MASS = (
-    "fine mesh with a row-sum lumped mass, which {} needs to do without any factorisation; its "
-    "spectrum is another than that of the consistent mass"
-)
-PROBLEMS = {
-    "arpack_regular": _LUMPED_MASS.format("ARPACK"),
-    **{name: _LUMPED_MASS.format("a filter") for name in LUMPED},
-}
-"""What a method solves, where it is another problem than its name says."""
 
 MEANING = {
     "seconds": "median wall time from moduli to modes: coarsening, assembly and solution; what "
@@ -51,17 +39,11 @@ MEANING = {
     "speedup": "seconds of the inner name over seconds of the outer name",
     "speedup_with_precompute": "the same, with the partition, sparsity and elimination plan of the "
     "outer name added to its seconds, and nothing to those of the inner name",
-    "ddfem": "coarsened by forests, then SLEPc on the coarse model (DDFEM* alone)",
-    "ddfem_rough": "the same to a residual of 1e-2",
-    "fastest": "what --method auto takes: block Lanczos from random vectors",
-    "slepc_rough": "SLEPc to a residual of 1e-3",
-    "fastest_rough": "the fastest to an eigenvalue error of 1e-3",
-    "refined": "the same from the modes of the solid coarsened by forests, which is solved before",
-    "ddfem_ec_accurate": "coarsened by forests, then the fastest to the same accuracy as on the "
-    "fine mesh",
-    "ddfem_ec": "coarsened by forests, then the fastest to the interactive tolerance, from nothing",
-    "ddfem_ec_warm": "the same for moduli that differ by a smooth field of 5 %, starting from "
-    "the modes of the unchanged ones",
+    **{
+        name: method.meaning
+        for name, method in METHODS.items()
+        if method.meaning and name not in RIVALS
+    },
     "eigenvalue_error": "relative to SLEPc's eigenvalues of the same operator, fine or coarse",
     "missed": "modes that a general eigensolver's search missed in some run, found by further "
     "searches that it is not charged for",
@@ -98,11 +80,12 @@ def benchmark_row(
     if comm.rank == 0 and reason:
         logger.warning(reason)
     left_out = benchmark.left_out
+    absent = {"forests"} if voxels else {"forests", "voxels"}
     if reason:
-        left_out += NEED_FORESTS if voxels else NEED_VOXELS
+        left_out += tuple(name for name, method in METHODS.items() if method.needs in absent)
     default = SlepcConfiguration.default(comm.size)
     # Rivals may fail, and compile nothing.
-    brief = Methods(solid, _few(benchmark.modes), default, options.seed, comm, True)
+    brief = Methods(solid, min(WARM_UP_MODES, benchmark.modes), default, options.seed, comm, True)
     _run_once(brief, (*left_out, *RIVALS))
     methods = Methods(
         solid,
@@ -120,8 +103,8 @@ def benchmark_row(
     row = {
         **bcast_from_root(comm, lambda: _describe(options, cast(BenchmarkSolid, solid))),
         "modes": benchmark.modes,
-        **_times(runs, comm.bcast(None if solid is None else solid.seconds), benchmark.further),
-        **_errors(runs, spectra, benchmark.further),
+        **_times(runs, comm.bcast(None if solid is None else solid.seconds), benchmark),
+        **_errors(runs, spectra),
         "slepc_configuration": methods.configuration.as_dict(),
         "slepc_configurations_tried": [
             {**configuration.as_dict(), "seconds": seconds}
@@ -133,7 +116,11 @@ def benchmark_row(
         "ranks": comm.size,
         "threads": max((int(library["num_threads"]) for library in loaded_blas()), default=1),
         "blas": blas_name(),
-        "problem": {name: text for name, text in PROBLEMS.items() if name not in left_out},
+        "problem": {
+            name: method.problem
+            for name, method in METHODS.items()
+            if method.problem and name not in left_out
+        },
         "meaning": MEANING | {name: RIVALS[name].meaning for name in benchmark.further},
     }
     methods.release()
@@ -165,18 +152,11 @@ def row_lines(row: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def _few(modes: int) -> int:
-    return min(WARM_UP_MODES, modes)
-
-
-def _chosen(methods: Methods, left_out: tuple[str, ...]) -> dict[str, Callable[[], MethodRun]]:
-    return {name: run for name, run in named(methods).items() if name not in left_out}
-
-
 def _run_once(methods: Methods, left_out: tuple[str, ...]) -> None:
     """Compile and load what every method needs."""
-    for run in _chosen(methods, left_out).values():
-        run()
+    for name, method in METHODS.items():
+        if name not in left_out:
+            method.run(methods)
     methods.release()
 
 
@@ -186,7 +166,7 @@ def _tune(methods: Methods) -> dict[SlepcConfiguration, float]:
     tried = {}
     for configuration in track(configurations(methods.comm.size), "tuning", visible=visible):
         methods.configuration = configuration
-        tried[configuration] = methods.comm.bcast(methods.slepc().seconds)
+        tried[configuration] = methods.comm.bcast(methods.general("slepc").seconds)
         if visible:
             logger.info(f"SLEPc with {configuration}: {tried[configuration]:.2f} s")
     return tried
@@ -196,7 +176,7 @@ def _alternate(
     methods: Methods, benchmark: BenchmarkOptions, left_out: tuple[str, ...]
 ) -> tuple[Runs, dict[str, str]]:
     """Runs of every method, one a round, and why a method has none."""
-    chosen = _chosen(methods, left_out)
+    chosen = [name for name in METHODS if name not in left_out]
     runs: Runs = {name: [] for name in chosen}
     plan = [
         name
@@ -209,7 +189,7 @@ def _alternate(
         if name in failed:
             continue
         try:
-            runs[name].append(chosen[name]())
+            runs[name].append(METHODS[name].run(methods))
         except ConvergenceError as error:
             # The others are worth knowing; without SLEPc's there is nothing to compare with.
             if name == "slepc" or not error.collective:
@@ -227,10 +207,11 @@ def _references(
     """Spectra by SLEPc that the others are compared with."""
     spectra = {"fine": runs["slepc"][0]}
     if averages:
-        spectra["average"] = methods.slepc("average")
+        spectra["average"] = methods.general("slepc", "average")
     if forests:
-        spectra["coarse"] = runs["ddfem"][0] if "ddfem" in runs else methods.slepc("ddfem")
-        spectra["coarse_changed"] = methods.slepc("ddfem", changed=True)
+        coarse = runs["ddfem"][0] if "ddfem" in runs else methods.general("slepc", "ddfem")
+        spectra["coarse"] = coarse
+        spectra["coarse_changed"] = methods.general("slepc", "ddfem", changed=True)
     return spectra
 
 
@@ -253,7 +234,7 @@ def _describe(options: ProblemOptions, solid: BenchmarkSolid) -> dict[str, Any]:
     }
 
 
-def _times(runs: Runs, before: dict[str, float], further: tuple[str, ...]) -> dict[str, Any]:
+def _times(runs: Runs, before: dict[str, float], benchmark: BenchmarkOptions) -> dict[str, Any]:
     """Medians, spreads and ratios; `before` is what the mesh alone needed."""
     seconds = {name: median([run.seconds for run in results]) for name, results in runs.items()}
     planned = {
@@ -264,11 +245,14 @@ def _times(runs: Runs, before: dict[str, float], further: tuple[str, ...]) -> di
         "fine_solver": planned.get("fastest", 0.0),
         "coarse_solver": planned.get("ddfem_ec", 0.0),
     }
-    asked = [name for name in (*BASES, "slepc_rough") if name not in ROUGH or name in seconds]
-    names = ["arpack", "slepc", *asked]
-    if "arpack_regular" in seconds:
-        names.append("arpack_regular")
-    names += further
+    # What only some rows have is not among the methods of the others.
+    optional = ("rough", "arpack_regular", *RIVALS)
+    names = [
+        name
+        for name, method in METHODS.items()
+        if name in seconds or name in benchmark.further or method.option not in optional
+    ]
+    bases = {name: method.over for name, method in METHODS.items() if method.over}
     return {
         "seconds": {
             "precompute": sum(parts.values()),
@@ -279,32 +263,20 @@ def _times(runs: Runs, before: dict[str, float], further: tuple[str, ...]) -> di
         },
         "precompute_parts": parts,
         "phases": {name: results[-1].phases for name, results in runs.items()},
-        "speedup": speedups(seconds),
-        "speedup_with_precompute": speedups(seconds, planned),
+        "speedup": speedups(seconds, bases),
+        "speedup_with_precompute": speedups(seconds, bases, planned),
     }
 
 
-def _errors(runs: Runs, spectra: dict[str, MethodRun], further: tuple[str, ...]) -> dict[str, Any]:
-    same_operator = {
-        "arpack": "fine",
-        "hcms": "fine",
-        "hcms_ec": "fine",
-        "fastest": "fine",
-        **dict.fromkeys(ROUGH, "fine"),
-        "ddfem_rough": "coarse",
-        "ddfem_ec_accurate": "coarse",
-        "ddfem_ec": "coarse",
-        "ddfem_ec_warm": "coarse_changed",
-        **{name: "fine" for name in further if name not in LUMPED},
-    }
+def _errors(runs: Runs, spectra: dict[str, MethodRun]) -> dict[str, Any]:
     fine = spectra["fine"].values
     names = {"average": "average", "ddfem": "coarse"}
     coarse = {name: spectra[key].values for name, key in names.items() if key in spectra}
     return {
         "eigenvalue_error": {
-            name: spectrum_error(runs[name][-1].values, spectra[operator].values)
-            for name, operator in same_operator.items()
-            if name in runs
+            name: spectrum_error(runs[name][-1].values, spectra[method.reference].values)
+            for name, method in METHODS.items()
+            if method.reference is not None and name in runs
         },
         "frequency_error": {name: tone_error(values, fine) for name, values in coarse.items()},
     }

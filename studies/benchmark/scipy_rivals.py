@@ -10,7 +10,7 @@ import scipy.sparse.linalg as sla
 
 from carillon.errors import ConvergenceError
 from carillon.fem.model import RIGID_MODES
-from studies.benchmark.search import Array, Pairs, RivalSearch, ascending
+from studies.benchmark.search import Pairs, RivalSearch, ascending
 
 LANCZOS_VECTORS = 1.5
 """Lanczos vectors for each mode wanted."""
@@ -26,18 +26,12 @@ MISSED = 10.0
 
 def arpack_superlu(search: RivalSearch) -> Pairs:
     """`eigsh` in shift-and-invert mode, with SuperLU told that the matrix is symmetric."""
-    size = search.K.shape[0]
     factor = sla.splu(
         search.shifted.tocsc(),
         permc_spec="MMD_AT_PLUS_A",
         diag_pivot_thresh=0.0,
         options={"SymmetricMode": True},
     )
-
-    def solve(rhs: Array) -> Array:
-        search.limit.check()
-        return np.asarray(factor.solve(rhs))
-
     wanted = search.count + RIGID_MODES
     vectors = max(round(LANCZOS_VECTORS * wanted), wanted + FEWEST_MORE)
     values, modes = sla.eigsh(
@@ -45,9 +39,9 @@ def arpack_superlu(search: RivalSearch) -> Pairs:
         wanted,
         search.M,
         sigma=-search.shift,
-        OPinv=sla.LinearOperator((size, size), matvec=solve, dtype=float),
+        OPinv=search.operator(factor.solve),
         v0=search.start(1)[:, 0],
-        ncv=min(vectors, size),
+        ncv=min(vectors, len(search.scale)),
         tol=search.tolerance,
     )
     values, modes = ascending(values, modes)
@@ -59,23 +53,15 @@ def lobpcg_multigrid(search: RivalSearch) -> Pairs:
 
     Its tolerance is one residual for all pairs, that of the highest.
     """
-    preconditioner = multigrid(search)
-
-    def apply(block: Array) -> Array:
-        search.limit.check()
-        return np.asarray(search.K @ block)
-
-    size = search.K.shape[0]
-    stiffness = sla.LinearOperator((size, size), matvec=apply, matmat=apply, dtype=float)
     largest = search.tolerance * search.interval[1]
     with warnings.catch_warnings():
         # It warns of what is an error here.
         warnings.simplefilter("ignore", UserWarning)
         values, modes, history = sla.lobpcg(
-            stiffness,
+            search.stiffness,
             search.start(search.count),
             B=search.M,
-            M=preconditioner,
+            M=multigrid(search),
             Y=search.rigid,
             tol=largest,
             maxiter=LOBPCG_STEPS,

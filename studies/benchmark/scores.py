@@ -14,20 +14,6 @@ from solver.verification.errors import AUDIBLE_LAST, eigenvalue_errors, frequenc
 
 Array = NDArray[np.float64]
 
-BASES = {
-    "hcms": ("arpack", "slepc"),
-    "hcms_ec": ("arpack", "slepc"),
-    "fastest": ("arpack", "slepc", "hcms_ec"),
-    "fastest_rough": ("slepc_rough",),
-    "refined": ("slepc_rough", "fastest_rough"),
-    "ddfem": ("arpack", "slepc"),
-    "ddfem_rough": ("arpack", "slepc"),
-    "ddfem_ec_accurate": ("arpack", "slepc", "ddfem"),
-    "ddfem_ec": ("arpack", "slepc", "ddfem", "ddfem_rough", "fastest"),
-    "ddfem_ec_warm": ("arpack", "slepc", "ddfem", "ddfem_rough", "ddfem_ec"),
-}
-"""Methods that a speed-up is told of, and what it may be told over."""
-
 
 def median(seconds: Sequence[float]) -> float | None:
     """Median, None of nothing."""
@@ -59,7 +45,9 @@ def tone_error(values: Array, exact: Array) -> dict[str, float]:
 
 
 def speedups(
-    seconds: Mapping[str, float | None], added: Mapping[str, float] | None = None
+    seconds: Mapping[str, float | None],
+    bases: Mapping[str, Sequence[str]],
+    added: Mapping[str, float] | None = None,
 ) -> dict[str, Any]:
     """Time of a base over the time of a method, by method and base.
 
@@ -67,21 +55,24 @@ def speedups(
     ----------
     seconds
         Medians by method.
+    bases
+        Methods that a method's speed-up is told over.
     added
         What is added to a method's own time, such as its precomputation.
 
     Examples
     --------
-    >>> speedups({"slepc": 8.0, "arpack": None, "hcms_ec": 2.0})
+    >>> bases = {"hcms_ec": ("arpack", "slepc")}
+    >>> speedups({"slepc": 8.0, "arpack": None, "hcms_ec": 2.0}, bases)
     {'hcms_ec': {'slepc': 4.0}}
     """
     ratios = {}
-    for method, bases in BASES.items():
+    for method, others in bases.items():
         own = seconds.get(method)
         if own is None:
             continue
         own += (added or {}).get(method, 0.0)
-        over = {base: time / own for base in bases if (time := seconds.get(base)) is not None}
+        over = {base: time / own for base in others if (time := seconds.get(base)) is not None}
         if over:
             ratios[method] = over
     return ratios

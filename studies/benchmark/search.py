@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+import scipy.sparse.linalg as sla
 from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
@@ -108,6 +110,20 @@ class RivalSearch:
     def shifted(self) -> sp.csr_matrix:
         """K + sigma M."""
         return self.K + self.shift * self.M
+
+    @property
+    def stiffness(self) -> sla.LinearOperator:
+        """Products with `K`, refused when the time is up."""
+        return self.operator(lambda block: self.K @ block)
+
+    def operator(self, product: Callable[[Array], Array]) -> sla.LinearOperator:
+        """A product with a vector or block (n, k) as SciPy's operator, within the time limit."""
+
+        def checked(block: Array) -> Array:
+            self.limit.check()
+            return np.asarray(product(block))
+
+        return sla.LinearOperator(self.K.shape, matvec=checked, matmat=checked, dtype=float)
 
     def start(self, columns: int) -> Array:
         """Random vectors (n, columns) to start from."""

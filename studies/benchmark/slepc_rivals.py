@@ -1,9 +1,10 @@
-"""SLEPc's eigensolvers beside Krylov-Schur in shift-and-invert mode."""
+"""SLEPc's eigensolvers beside Krylov-Schur in shift-and-invert mode, by options of its database."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from functools import partial
+from typing import Any
 
 import numpy as np
 import scipy.sparse.linalg as sla
@@ -14,6 +15,8 @@ from carillon.processes.petsc import PETSc
 from carillon.processes.slepc import SLEPc
 from solver.assembly.petsc_matrix import distributed_matrix
 from solver.linear.factorisation import definite_packages
+from solver.linear.petsc_options import OPTIONS_PREFIX
+from studies.benchmark.rivals import petsc_options
 from studies.benchmark.search import Array, Pairs, RivalSearch, TimeLimit, ascending
 
 STANDARD = (SLEPc.EPS.Type.KRYLOVSCHUR, SLEPc.EPS.Type.EVSL)
@@ -31,6 +34,15 @@ ITERATIONS = 100_000
 """Iterations allowed, of which the time limit leaves fewer."""
 MOMENTS = 8
 """Moments of the contour integrals."""
+CHOLESKY = {
+    "st_type": "precond",
+    "st_ksp_type": "preonly",
+    "st_pc_type": "cholesky",
+    "st_pc_factor_mat_solver_type": definite_packages(1)[0],
+}
+"""Preconditioner: a Cholesky factorisation of K + sigma M."""
+
+Options = Mapping[str, Any]
 
 
 def lobpcg(search: RivalSearch) -> Pairs:
@@ -39,41 +51,31 @@ def lobpcg(search: RivalSearch) -> Pairs:
     Its basis of three blocks is not kept independent: SLEPc 3.18 ends with an error of LAPACK for
     blocks of a dozen vectors and more, whatever the preconditioner, and crawls with smaller ones.
     """
-
-    def prepare(solver: SLEPc.EPS) -> None:
-        solver.setLOBPCGBlockSize(min(BLOCK, search.count))
-
-    return _preconditioned(search, SLEPc.EPS.Type.LOBPCG, prepare)
+    block = {"eps_lobpcg_blocksize": min(BLOCK, search.count)}
+    return _solve(search, SLEPc.EPS.Type.LOBPCG, CHOLESKY | block)
 
 
 def davidson(search: RivalSearch) -> Pairs:
     """Generalised Davidson, preconditioned likewise; blocks of vectors make it slower."""
-    return _preconditioned(search, SLEPc.EPS.Type.GD, lambda _: None)
+    return _solve(search, SLEPc.EPS.Type.GD, CHOLESKY)
 
 
 def jacobi_davidson(search: RivalSearch) -> Pairs:
     """Jacobi-Davidson, whose correction equation is preconditioned likewise."""
-
-    def prepare(solver: SLEPc.EPS) -> None:
-        inner = solver.getST().getKSP()
-        inner.setType(PETSc.KSP.Type.BCGSL)
-        inner.setTolerances(max_it=INNER_STEPS)
-
-    return _preconditioned(search, SLEPc.EPS.Type.JD, prepare)
+    inner = {"st_ksp_type": "bcgsl", "st_ksp_max_it": INNER_STEPS}
+    return _solve(search, SLEPc.EPS.Type.JD, CHOLESKY | inner)
 
 
 def contour_integrals(search: RivalSearch) -> Pairs:
     """Sakurai-Sugiura contour integrals over the interval that holds the eigenvalues."""
-
-    def prepare(solver: SLEPc.EPS) -> None:
-        region = solver.getRG()
-        region.setType(SLEPc.RG.Type.INTERVAL)
-        region.setIntervalEndpoints(*search.interval, 0.0, 0.0)
-        solver.setWhichEigenpairs(SLEPc.EPS.Which.ALL)
-        block = -(-2 * search.count // MOMENTS)
-        solver.setCISSSizes(bs=block, ms=MOMENTS, bsmax=2 * block)
-
-    return _solve(search, SLEPc.EPS.Type.CISS, prepare)
+    block = -(-2 * search.count // MOMENTS)
+    sizes = {
+        "eps_ciss_blocksize": block,
+        "eps_ciss_moments": MOMENTS,
+        "eps_ciss_maxblocksize": 2 * block,
+    }
+    region = {"rg_type": "interval", "rg_interval_endpoints": _ends(*search.interval, 0.0, 0.0)}
+    return _solve(search, SLEPc.EPS.Type.CISS, {"eps_all": None, **sizes, **region})
 
 
 def filtered(search: RivalSearch) -> Pairs:
@@ -82,17 +84,14 @@ def filtered(search: RivalSearch) -> Pairs:
     The rigid motions are among them: a filter with one edge needs a lower degree than with two.
     """
     high = search.interval[1]
-    bound = sla.norm(search.K, np.inf)
-
-    def prepare(solver: SLEPc.EPS) -> None:
-        transform = solver.getST()
-        transform.setType(SLEPc.ST.Type.FILTER)
-        transform.setFilterRange(-high, bound)
-        transform.setFilterDegree(round(DEGREE * np.sqrt(bound / high)))
-        solver.setWhichEigenpairs(SLEPc.EPS.Which.ALL)
-        solver.setInterval(-high, high)
-
-    values, vectors = _solve(search, SLEPc.EPS.Type.KRYLOVSCHUR, prepare)
+    bound = float(sla.norm(search.K, np.inf))
+    options = {
+        "st_type": "filter",
+        "st_filter_range": _ends(-high, bound),
+        "st_filter_degree": round(DEGREE * np.sqrt(bound / high)),
+        "eps_interval": _ends(-high, high),
+    }
+    values, vectors = _solve(search, SLEPc.EPS.Type.KRYLOVSCHUR, options)
     # Copies of the sixfold zero may be missing, so that they are known by their vectors alone.
     elastic = np.square(search.rigid.T @ vectors).sum(axis=0) < HALF
     return values[elastic], vectors[:, elastic]
@@ -100,48 +99,32 @@ def filtered(search: RivalSearch) -> Pairs:
 
 def evsl(search: RivalSearch) -> Pairs:
     """EVSL's filtered Lanczos method for the interval of the elastic eigenvalues."""
-
-    def prepare(solver: SLEPc.EPS) -> None:
-        solver.setWhichEigenpairs(SLEPc.EPS.Which.ALL)
-        solver.setInterval(*search.interval)
-
-    return _solve(search, SLEPc.EPS.Type.EVSL, prepare)
+    return _solve(search, SLEPc.EPS.Type.EVSL, {"eps_interval": _ends(*search.interval)})
 
 
-def _preconditioned(search: RivalSearch, kind: str, prepare: Callable[[SLEPc.EPS], None]) -> Pairs:
-    def prepare_all(solver: SLEPc.EPS) -> None:
-        shifted = distributed_matrix(search.shifted, MPI.COMM_SELF)
-        shifted.setOption(PETSc.Mat.Option.SPD, True)
-        rigid = [PETSc.Vec().createWithArray(column.copy()) for column in search.rigid.T]
-        solver.setDeflationSpace(rigid)
-        solver.setDimensions(search.count)
-        solver.setWhichEigenpairs(SLEPc.EPS.Which.SMALLEST_REAL)
-        transform = solver.getST()
-        transform.setType(SLEPc.ST.Type.PRECOND)
-        transform.setPreconditionerMat(shifted)
-        inner = transform.getKSP()
-        inner.setType(PETSc.KSP.Type.PREONLY)
-        inner.getPC().setType(PETSc.PC.Type.CHOLESKY)
-        inner.getPC().setFactorSolverType(definite_packages(1)[0])
-        prepare(solver)
-
-    return _solve(search, kind, prepare_all)
+def _ends(*numbers: float) -> str:
+    return ",".join(repr(float(number)) for number in numbers)
 
 
-def _solve(search: RivalSearch, kind: str, prepare: Callable[[SLEPc.EPS], None]) -> Pairs:
+def _solve(search: RivalSearch, kind: str, options: Options) -> Pairs:
+    """Elastic pairs by an eigensolver with such options, without SLEPc's prefix."""
     generalised = kind not in STANDARD
-    K, M = (distributed_matrix(matrix, MPI.COMM_SELF) for matrix in (search.K, search.M))
+    matrices = [distributed_matrix(matrix, MPI.COMM_SELF) for matrix in (search.K, search.M)]
     problem = SLEPc.EPS.ProblemType
     solver = SLEPc.EPS().create(MPI.COMM_SELF)
     try:
+        solver.setOptionsPrefix(OPTIONS_PREFIX)
         solver.setType(kind)
-        solver.setOperators(K, M if generalised else None)
+        solver.setOperators(matrices[0], matrices[1] if generalised else None)
         solver.setProblemType(problem.GHEP if generalised else problem.HEP)
         solver.setTolerances(search.tolerance, ITERATIONS)
         if kind != SLEPc.EPS.Type.CISS:  # which knows no test of its own
             solver.setStoppingTest(partial(_stop, search.limit))
-        prepare(solver)
-        solver.solve()
+        if options.get("st_type") == "precond":
+            _deflate(search, solver)
+        with petsc_options(options):
+            solver.setFromOptions()
+            solver.solve()
         found = solver.getConverged()
         if found < search.count:
             search.limit.check()
@@ -150,13 +133,27 @@ def _solve(search: RivalSearch, kind: str, prepare: Callable[[SLEPc.EPS], None])
                 f"{solver.getIterationNumber()} iterations"
             )
         values = [solver.getEigenvalue(index).real for index in range(found)]
-        return ascending(values, _vectors(solver, K, found))
+        return ascending(values, _vectors(solver, matrices[0], found))
     except PETSc.Error as error:
         said = str(error).strip().splitlines()[-1].split("] ", 1)[-1]
         raise ConvergenceError(f"SLEPc: {said}") from None
     finally:
-        for used in (solver, K, M):
+        for used in (solver, *matrices):
             used.destroy()
+
+
+def _deflate(search: RivalSearch, solver: SLEPc.EPS) -> None:
+    """Give the rigid motions to a solver for the lowest pairs, and K + sigma M to precondition."""
+    shifted = distributed_matrix(search.shifted, MPI.COMM_SELF)
+    shifted.setOption(PETSc.Mat.Option.SPD, True)
+    solver.setDeflationSpace(
+        [PETSc.Vec().createWithArray(column.copy()) for column in search.rigid.T]
+    )
+    solver.setDimensions(search.count)
+    solver.setWhichEigenpairs(SLEPc.EPS.Which.SMALLEST_REAL)
+    transform = solver.getST()
+    transform.setType(SLEPc.ST.Type.PRECOND)
+    transform.setPreconditionerMat(shifted)
 
 
 def _stop(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,15 +13,17 @@ import solver.reference.truth as truth
 from carillon.errors import ConvergenceError
 from solver.analysis.problem import ProblemOptions
 from studies.benchmark.methods import MethodRun, Methods
-from studies.benchmark.options import COARSE, BenchmarkOptions
+from studies.benchmark.options import BenchmarkOptions
 from studies.benchmark.rivals import SlepcConfiguration, configurations, smallest_without_factor
 from studies.benchmark.row import _alternate, benchmark_row, row_lines
-from studies.benchmark.scores import BASES, median, speedups, spread, tone_error
+from studies.benchmark.scores import median, speedups, spread, tone_error
 from studies.benchmark.solid import CHANGE, make_solid
+from studies.benchmark.table import METHODS
 from tests import solids
 
 BAR = ProblemOptions("builtin:bar", 20, "smooth")
 MODES = 24
+COARSE = tuple(name for name, method in METHODS.items() if method.coarse)
 TIMED = (
     "arpack",
     "slepc",
@@ -86,7 +89,7 @@ def test_every_method_finds_what_it_promises(row):
 def test_speedups_name_their_base(row):
     seconds = row["seconds"]
     for method, ratios in row["speedup"].items():
-        assert tuple(ratios) == BASES[method]
+        assert tuple(ratios) == METHODS[method].over
         for base, ratio in ratios.items():
             assert ratio == pytest.approx(seconds[base] / seconds[method])
             assert row["speedup_with_precompute"][method][base] <= ratio
@@ -116,16 +119,14 @@ def test_finite_cells_have_no_coarse_models(caplog):
     assert caplog.messages == [found["without_forest"]]
 
 
-def test_methods_alternate():
+def test_methods_alternate(monkeypatch):
     order = []
-
-    class Noted(Methods):
-        def __getattribute__(self, name):
-            if name in (*TIMED, "arpack_regular"):
-                return lambda *_: order.append(name) or MethodRun(1.0, np.empty(0))
-            return super().__getattribute__(name)
-
-    noted = Noted(None, MODES, SlepcConfiguration.default(1))
+    for name, method in METHODS.items():
+        noted = replace(
+            method, run=lambda _, name=name: order.append(name) or MethodRun(1.0, np.empty(0))
+        )
+        monkeypatch.setitem(METHODS, name, noted)
+    noted = Methods(None, MODES, SlepcConfiguration.default(1))
     options = BenchmarkOptions(MODES, runs=3, slow_runs=1)
     runs, failed = _alternate(noted, options, options.left_out)
     assert order[:2] == ["arpack", "slepc"] and order.count("arpack") == 1
@@ -148,7 +149,7 @@ def test_a_method_that_fails_is_told_and_the_others_go_on(monkeypatch):
     def fail(_):
         raise ConvergenceError("planted")
 
-    monkeypatch.setattr(Methods, "ddfem_ec", fail)
+    monkeypatch.setitem(METHODS, "ddfem_ec", replace(METHODS["ddfem_ec"], run=fail))
     monkeypatch.setattr("studies.benchmark.row._run_once", lambda *_: None)
     found = benchmark_row(BAR, BenchmarkOptions(MODES, runs=2, arpack=False))
     assert found["failed"] == {"ddfem_ec": "planted"}
@@ -167,10 +168,10 @@ def test_modes_that_a_rival_misses_are_found_off_its_clock(monkeypatch):
         return values[lost], vectors[:, lost], iterations
 
     methods = Methods(make_solid(BAR, MODES), MODES, SlepcConfiguration.default(1))
-    exact = methods.slepc()
+    exact = methods.general("slepc")
     assert exact.added == 0
     monkeypatch.setattr(truth, "smallest_eigenpairs", lose_the_first)
-    for run in (methods.slepc(), methods.arpack()):
+    for run in (methods.general("slepc"), methods.general("arpack")):
         assert run.added == 1
         assert not {"inertia", "completion", "verification"} & set(run.phases)
         assert np.abs(run.values[6:] / exact.values[6:] - 1.0).max() < 1e-9
@@ -194,7 +195,7 @@ def test_moduli_of_the_warm_start_differ_smoothly_and_little():
 
 def test_scores_of_nothing_are_none():
     assert median([]) is None and spread([]) is None
-    assert speedups({"slepc": 1.0, "hcms": None}) == {}
+    assert speedups({"slepc": 1.0, "hcms": None}, {"hcms": ("slepc",)}) == {}
 
 
 def test_frequency_errors_have_signs():
