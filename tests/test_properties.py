@@ -27,7 +27,6 @@ from tests.hostile.fuzzing import damaged, examples, or_refused, values, yaml_te
 from tests.hostile.zoo import CONFIGURATION, PROJECT
 from workflow.commands.validate import _tolerance
 from workflow.configuration.whole import completed
-from workflow.estimate.rates import PACKAGED, checked
 
 NUMBERS = st.one_of(
     st.text(max_size=30),
@@ -196,17 +195,6 @@ def clips(tmp_path_factory):
 def test_any_value_in_a_configuration_fits_or_is_refused(place, value):
     config = replaced(yaml.safe_load(CONFIGURATION), place, value)
     or_refused(lambda: completed(config))
-
-
-@examples(60)
-@given(
-    place=st.sampled_from(
-        [(key,) for key in json.loads(PACKAGED.read_text())] + [("made", "cores"), ("laws", "x")]
-    ),
-    value=values(),
-)
-def test_any_value_in_rates_fits_or_is_refused(place, value):
-    or_refused(lambda: checked(replaced(json.loads(PACKAGED.read_text()), place, value), "rates"))
 
 
 def test_the_memory_of_a_reader_is_bounded():

@@ -9,7 +9,8 @@ from tests.configuration_keys import every_key
 from workflow import settings
 from workflow.commands.estimate import CONFIGURATIONS, load
 from workflow.configuration.whole import limits
-from workflow.estimate.rates import load_rates
+from workflow.estimate.measured import START, load_measured
+from workflow.estimate.work import FIT_COSTS
 
 PRESETS = ("tiny", "laptop", "cluster", "paper")
 
@@ -58,8 +59,10 @@ def test_the_papers_counts():
 
 def test_a_shard_of_the_papers_data_is_about_an_hour():
     dataset = preset("paper")["dataset"]
-    each = dataset["samples"] / dataset["shards"]
-    assert 0.5 < each / load_rates()["fits_per_second"][dataset["objective"]] / 3600.0 < 2.0
+    fits = FIT_COSTS[dataset["objective"]] * dataset["samples"] / dataset["shards"]
+    drawn = load_measured().loc[("generate_shard", "")]
+    hours = fits * (drawn["seconds"] - START) / drawn["work"] / 3600.0
+    assert 0.5 < hours < 2.0
 
 
 def test_the_page_has_every_key():

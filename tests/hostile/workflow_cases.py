@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from tests.hostile.cases import NO_NUMBERS, NO_WHOLE_NUMBERS, Copy, Place, Table
+from tests.hostile.cases import NO_NUMBERS, NO_WHOLE_NUMBERS, Place, Table
 from tests.hostile.zoo import CONFIGURATION
 from tests.hostile.zoo_texts import hostile_yaml
 
@@ -47,20 +47,15 @@ hostile("no such preset", "estimate --preset gigantic", "gigantic")
 hostile("preset and file", "estimate --preset tiny --configfile ZOO/config.yaml", "--configfile")
 hostile("no such objective", "estimate --preset tiny --objective best", "best")
 each(
-    "rates",
-    "estimate --preset tiny --rates VALUE",
-    [
-        *(f"ZOO/{name}.json" for name in ("not", "list", "empty", "number", "wrong", "deep")),
-        *("nowhere.json", "ZOO/metal.wav", "ZOO/odd/pipe.json", "ZOO/odd/folder.json", ""),
-    ],
+    "results of a run",
+    "estimate --preset tiny --results VALUE",
+    ["nowhere", "ZOO/metal.wav", "ZOO/odd", "ZOO", ""],
 )
-hostile("rates written into nowhere", "estimate --preset tiny --measure --rates no/r.json", "no/")
 hostile(
-    "rates that may not be read",
-    "estimate --preset tiny --rates r.json",
-    "permission",
-    files={"r.json": Copy("not.json", rights=0)},
-    plain=True,
+    "results without benchmarks",
+    "estimate --preset tiny --results .",
+    "benchmark",
+    files={"config.yaml": CONFIGURATION},
 )
 
 # compare ------------------------------------------------------------------------------------------

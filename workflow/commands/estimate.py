@@ -9,24 +9,18 @@ from typing import Annotated, Any
 
 import pandas as pd
 
-from carillon.fem.geometry import surface_name
-from carillon.files.atomic import atomic_path
-from carillon.files.paths import require_writable
 from carillon.parameters.command_line import reader
 from carillon.parameters.quantities import between
 from carillon.processes.cores import allowed_cores
 from dataset_gen.objectives import DATASET_OBJECTIVES
 from workflow import settings
-from workflow.estimate import summary
-from workflow.estimate.costs import Machine, costs
-from workflow.estimate.laws import Rates
+from workflow.estimate.measured import load_measured
 from workflow.estimate.plan import plan
-from workflow.estimate.rates import PACKAGED, checked, load_rates
-from workflow.estimate.sizes import is_solved_in_full, options_of, solid_of
-from workflow.estimate.solids import NamedSolid, Size, size_of
+from workflow.estimate.summary import Machine, as_text, summarised, with_costs
+from workflow.estimate.work import with_work
 
 CONFIGURATIONS = Path(__file__).parent.parent / "config"
-DEFAULT_PRESET, PAPER = "laptop", "paper"
+DEFAULT_PRESET = "laptop"
 MOST_NODES, MOST_CORES = 100_000, 10_000
 
 
@@ -34,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     parser.description = (
         "Core-hours, wall time, memory and storage of the default run and of target figures, from "
-        "rates that were measured on one core. Jobs, ranks and shards are as the rules make them."
+        "what the jobs of earlier runs took. Jobs, ranks and shards are as the rules make them."
     )
     chosen = parser.add_mutually_exclusive_group()
     chosen.add_argument(
@@ -59,11 +53,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="CORES",
         help="(default: those of this machine)",
     )
-    parser.add_argument("--rates", metavar="FILE", help="rates to use, or to write with --measure")
     parser.add_argument(
-        "--measure", action="store_true", help="measure the rates here first, in some minutes"
+        "--results",
+        metavar="FOLDER",
+        action="append",
+        default=[],
+        help="results of a run here, whose times count in place of those that come along",
     )
-    parser.add_argument("--json", action="store_true", help="with the basis of every number")
+    parser.add_argument("--json", action="store_true", help="with the medians it goes by")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -72,25 +69,20 @@ def run(arguments: argparse.Namespace) -> int:
     Raises
     ------
     UserError
-        For a bad configuration or bad rates, or if a solid cannot be voxelised.
+        For a bad configuration or bad results, or if a mesh cannot be read.
     """
     preset = CONFIGURATIONS / f"{arguments.preset or DEFAULT_PRESET}.yaml"
     path = preset if arguments.configfile is None else Path(arguments.configfile)
     config = load(path, arguments.objective)
-    rates = _rates(arguments.rates, arguments.measure)
     machine = Machine(arguments.nodes, arguments.cores_per_node)
-    jobs, solids = estimate(config, rates, machine)
     run_name = "make run" if path == CONFIGURATIONS / f"{DEFAULT_PRESET}.yaml" else "target all"
     result = {
         "configuration": str(path),
         "run_name": run_name,
-        **summary.plain(jobs, solids, rates, machine),
+        **estimate(config, machine, load_measured(arguments.results)),
     }
-    if path.stem == PAPER:
-        result["paper"] = summary.beside_the_paper(jobs, machine)
-    objective = config["dataset"]["objective"]
-    text = summary.as_text(result, f"{path.stem}, objective {objective},")
-    print(json.dumps(result, indent=2) if arguments.json else text)
+    title = f"{path.stem}, objective {config['dataset']['objective']},"
+    print(json.dumps(result, indent=2) if arguments.json else as_text(result, title))
     return 0
 
 
@@ -105,38 +97,13 @@ def load(path: Path, objective: str | None = None) -> dict[str, Any]:
     return settings.complete([path], {"dataset": {"objective": objective}} if objective else {})
 
 
-def estimate(
-    config: dict[str, Any], rates: Rates, machine: Machine
-) -> tuple[pd.DataFrame, dict[str, Size]]:
-    """What every job takes, see `costs`, and the unknowns of all solids by name and resolution.
+def estimate(config: dict[str, Any], machine: Machine, measured: pd.DataFrame) -> dict[str, Any]:
+    """What the jobs of a configuration take, see `summarised`.
 
     Raises
     ------
     UserError
-        If a solid cannot be voxelised, or the rules do not accept the configuration.
+        If a mesh cannot be read, or the rules do not accept the configuration.
     """
-    jobs = plan(config, machine.cores_per_node, machine.cores)
-    solids = filter(None, dict.fromkeys(map(solid_of, jobs["command"])))
-    named = {f"{surface_name(each.mesh)} {each.resolution}": _sized(each, jobs) for each in solids}
-    return costs(jobs, rates, machine), named
-
-
-def _sized(solid: NamedSolid, jobs: pd.DataFrame) -> Size:
-    """Unknowns of a solid, and the materials with which its coarsening would not pay."""
-    commands = [each for each in jobs["command"] if solid_of(each) == solid]
-    in_full = {options_of(each)["material"] for each in commands if is_solved_in_full(each)}
-    return size_of(solid)._replace(in_full=tuple(sorted(in_full)))
-
-
-def _rates(path: str | None, here: bool) -> Rates:
-    if not here:
-        return load_rates(PACKAGED if path is None else path)
-    from workflow.estimate.measure import measure
-
-    if path is not None:
-        require_writable(path)
-    rates = checked(measure(), "the rates measured")
-    if path is not None:
-        with atomic_path(path) as temporary:
-            temporary.write_text(json.dumps(rates, indent=2) + "\n")
-    return rates
+    jobs = with_work(plan(config, machine.cores_per_node, machine.cores), config)
+    return summarised(with_costs(jobs, measured), measured, machine)

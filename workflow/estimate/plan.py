@@ -20,6 +20,9 @@ from carillon.errors import UserError, one_line
 from carillon.fem.materials import NAMES as MATERIALS
 from workflow import settings, solids
 
+RESULTS = "results"
+"""Folder of results of a planned run."""
+
 TARGETS = ("all", "figures")
 """Targets of Snakemake that are estimated; what both need belongs to the first."""
 
@@ -27,9 +30,9 @@ TARGETS = ("all", "figures")
 def plan(config: Mapping[str, Any], cores_per_node: int, cores: int | None = None) -> pd.DataFrame:
     """Jobs of a complete configuration in an order in which they can run; meshes may be absent.
 
-    Columns are `rule`, `variant` (of a model's modes, or empty), `target` and `local` (whether it
-    runs where Snakemake does); `cores` and `ranks`; `memory_mb` and `minutes`, the limits if there
-    are any; `command` (of a shell, or empty); `inputs`, `outputs` and `benchmark`, its files.
+    Columns are `rule`, `variant` (of a model's modes, or empty), `model` (or empty) and `target`;
+    `cores`; `memory_mb` and `minutes`, the limits if there are any; `command` (of a shell, or
+    empty); `outputs` and `benchmark`, its files below the folder `results`.
 
     Parameters
     ----------
@@ -59,7 +62,7 @@ def plan(config: Mapping[str, Any], cores_per_node: int, cores: int | None = Non
 
 def _placeless(config: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], dict[str, str]]:
     """The same configuration on files that are there, with the meshes by what stands for them."""
-    values = copy.deepcopy(dict(config)) | {"results_dir": "results", "baseline": None}
+    values = copy.deepcopy(dict(config)) | {"results_dir": RESULTS, "baseline": None}
     meshes: dict[str, str] = {}
     for part in (values, *(values[section] for section in solids.studied(values))):
         for model in part["models"].values():
@@ -95,21 +98,19 @@ def _planned(file: Path, cores: int) -> list[dict[str, Any]]:
             rules.dag(types.DAGSettings(targets=set(TARGETS))).printd3dag()
         except WorkflowError as error:
             raise UserError(f"the jobs cannot be planned: {one_line(str(error))}") from None
-        dag, local = rules._workflow.dag, rules._workflow._localrules
+        dag = rules._workflow.dag
         main = [job for job in dag.jobs if job.rule.name == TARGETS[0]]
         needed = set(dag.bfs(dag.dependencies, *main))
         return [
             {
                 "rule": job.rule.name,
                 "variant": job.wildcards_dict.get("variant", ""),
+                "model": job.wildcards_dict.get("model", ""),
                 "target": TARGETS[job not in needed],
-                "local": job.rule.name in local,
                 "cores": job.threads,
-                "ranks": job.resources.get("tasks", 1),
                 "memory_mb": job.resources.get("mem_mb"),
                 "minutes": job.resources.get("runtime"),
                 "command": job.shellcmd or "",
-                "inputs": list(map(str, job.input)),
                 "outputs": list(map(str, job.output)),
                 "benchmark": str(job.benchmark or ""),
             }

@@ -1,131 +1,142 @@
-"""The estimate by stages, as plain values and as text."""
+"""What the jobs of a configuration take: by stage, in all, and how far off it may be."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
-from jinja2 import Environment, StrictUndefined
 
-from workflow.estimate.costs import Machine, serial_share
-from workflow.estimate.laws import KNOWN, QUANTITIES, Rates
+from workflow.estimate.measured import KEY, expected_megabytes, expected_seconds
 from workflow.estimate.plan import TARGETS
-from workflow.estimate.solids import Size
+from workflow.estimate.work import STAGES
 
-SUMMED, LARGEST = ["jobs", "core_hours", "wall_hours", "kept_gb"], ["memory_gb", "scratch_gb"]
+OTHER_SECONDS = 4.0
+"""Seconds of a job without a benchmark file, such as one that draws a picture."""
+
+FAR = 5.0
+"""How many times the work that was measured is far beyond it."""
+
+SUMMED = ["jobs", "core_hours", "wall_hours", "kept_gb"]
+HEADER = f"{'stage':<25}  jobs  core-hours  wall time    memory     files"
+RECKONED = """\
+figures belong to target figures, all else to {run_name}
+core-hours are of the cores that jobs occupy: what the median job of earlier runs took, scaled by
+the size of solids and data, times the jobs of Snakemake's dry run; in all this may be off by a
+factor of three, and single jobs of those runs were by one of {off:.0f}, where they compiled kernels
+memory is the most that the largest job may take (resources), not what it takes; files stay, and
+data take as much again in journals while they are drawn"""
 
 
-def plain(
-    jobs: pd.DataFrame, solids: Mapping[str, Size], rates: Rates, machine: Machine
-) -> dict[str, Any]:
-    """The jobs of `costs` by stage; each stage says under `basis` where its numbers come from."""
-    by_stage = dict(list(jobs.groupby("stage")))
-    stages = [by_stage[name] for name in KNOWN["stages"] if name in by_stage]
-    rows = pd.DataFrame([_row(same, rates, machine) for same in stages])
-    cautions = [caution for same in stages for caution in _cautions(same, rates)]
-    made, laws = rates["made"], rates["laws"]
-    if rates["serial_share"] is None:
-        cautions.append(KNOWN["cautions"]["busy"].format(share=serial_share(rates), **made))
+class Machine(NamedTuple):
+    """Equal nodes."""
+
+    nodes: int
+    cores_per_node: int
+
+    @property
+    def cores(self) -> int:
+        """All cores."""
+        return self.nodes * self.cores_per_node
+
+
+def with_costs(jobs: pd.DataFrame, measured: pd.DataFrame) -> pd.DataFrame:
+    """The jobs of `with_work` with `known`, `core_hours`, `hours`, `memory_gb` and `kept_gb`.
+
+    A job that is not known takes a few seconds, or the limit of its rule if that has one.
+    """
+    seconds = expected_seconds(jobs, measured)
+    limits = (60.0 * jobs["minutes"].astype(float)).fillna(OTHER_SECONDS)
+    hours = seconds.fillna(limits) / 3600.0
+    return jobs.assign(
+        known=seconds.notna() | jobs["minutes"].isna(),
+        hours=hours,
+        core_hours=hours * jobs["cores"],
+        memory_gb=jobs["memory_mb"].astype(float).fillna(0.0) / 1000.0,
+        kept_gb=expected_megabytes(jobs, measured).fillna(0.0) / 1000.0,
+    )
+
+
+def summarised(jobs: pd.DataFrame, measured: pd.DataFrame, machine: Machine) -> dict[str, Any]:
+    """The jobs of `with_costs` by stage, with totals of the default run and of all."""
+    stages = jobs["stage"].where(jobs["target"] == TARGETS[0], TARGETS[1])
+    order = [*STAGES, TARGETS[1]]
+    by_stage = sorted(jobs.groupby(stages), key=lambda each: order.index(each[0]))
+    rows = pd.DataFrame([{"stage": name, **_row(same, machine)} for name, same in by_stage])
+    used = measured[measured.index.isin(pd.MultiIndex.from_frame(jobs[KEY]))]
     return {
         "machine": machine._asdict(),
-        "solids": {name: size._asdict() for name, size in solids.items()},
         "stages": rows.to_dict("records"),
         "totals": _totals(rows),
         "run_totals": _totals(rows[rows["target"] == TARGETS[0]]),
-        "cautions": cautions,
-        "rates": {
-            "origin": KNOWN["origin"].format(**made),
-            "made": made,
-            "how": {name: f"{law['jobs']} jobs of measured runs" for name, law in laws.items()},
-            "up_to": {name: law["up_to"] for name, law in laws.items()},
-        },
+        "cautions": list(_cautions(jobs, measured)),
+        "measured": used.reset_index().to_dict("records"),
+        "off": used["off"].max(),
+    }
+
+
+def _row(jobs: pd.DataFrame, machine: Machine) -> dict[str, Any]:
+    """What the jobs of a stage take together; its rules run one after the other."""
+    rules = jobs.groupby("rule")
+    return {
+        "target": jobs["target"].iloc[0],
+        "jobs": len(jobs),
+        "core_hours": jobs["core_hours"].sum(),
+        "wall_hours": sum(
+            max(same["hours"].max(), same["core_hours"].sum() / machine.cores) for _, same in rules
+        ),
+        "longest_job_hours": jobs["hours"].max(),
+        "memory_gb": jobs["memory_gb"].max(),
+        "kept_gb": jobs["kept_gb"].sum(),
     }
 
 
 def _totals(rows: pd.DataFrame) -> dict[str, Any]:
-    """What stages take together."""
-    return {
-        **{name: rows[name].sum().item() for name in SUMMED},
-        **{name: rows[name].max() for name in LARGEST},
+    return {name: rows[name].sum().item() for name in SUMMED} | {
+        "memory_gb": rows["memory_gb"].max()
     }
 
 
-def _row(jobs: pd.DataFrame, rates: Rates, machine: Machine) -> dict[str, Any]:
-    """What the jobs of a stage take together."""
-    at_a_time = machine.slots(jobs["granted"].min())
-    basis = {name: _basis(jobs, rates, name) for name in QUANTITIES}
-    return {
-        "stage": jobs["stage"].iloc[0],
-        "target": jobs["target"].iloc[0],
-        "jobs": len(jobs),
-        "core_hours": jobs["core_hours"].sum(),
-        "wall_hours": wall_hours(jobs, machine),
-        "longest_job_hours": jobs["hours"].max(),
-        "memory_gb": jobs["memory_gb"].max(),
-        "kept_gb": jobs["kept_gb"].sum(),
-        "scratch_gb": jobs["journal_gb"].nlargest(at_a_time).sum(),
-        "basis": {name: text.format(**basis) for name, text in KNOWN["basis"].items()},
-    }
+def _cautions(jobs: pd.DataFrame, measured: pd.DataFrame) -> Iterator[str]:
+    """What is not measured, or far beyond what is."""
+    for rule, same in jobs[~jobs["known"]].groupby("rule"):
+        minutes = same["minutes"].max()
+        yield (
+            f"{rule}: not measured; the {minutes:g} min that each of its jobs may take are "
+            "counted, an upper bound"
+        )
+    times = jobs["work"] / jobs.join(measured["work"], on=KEY, rsuffix="_measured")["work_measured"]
+    for stage, most in times.groupby(jobs["stage"]).max().items():
+        if most > FAR:
+            yield f"{stage}: the largest job is {most:,.0f} times the work that was measured"
 
 
-def wall_hours(jobs: pd.DataFrame, machine: Machine) -> float:
-    """Wall time of jobs whose rules run one after the other."""
-    rules = jobs.groupby("rule")
-    return sum(machine.wall(zip(same["hours"], same["granted"])) for _, same in rules)
+def as_text(result: Mapping[str, Any], title: str) -> str:
+    """The result of `summarised` as lines."""
+    nodes, cores = result["machine"].values()
+    run_name = result["run_name"]
+    rows = [row for row in result["stages"] if row["target"] == TARGETS[0]]
+    rows.append({**result["run_totals"], "stage": f"total of {run_name}"})
+    further = [row for row in result["stages"] if row["target"] != TARGETS[0]]
+    if further:
+        rows += [*further, {**result["totals"], "stage": "total with figures"}]
+    return "\n".join(
+        [
+            f"{title} on {nodes} x {cores} = {nodes * cores:,} cores, nothing done yet",
+            HEADER,
+            *map(_line, rows),
+            RECKONED.format(run_name=run_name, off=result["off"]),
+            *(f"note: {caution}" for caution in result["cautions"]),
+        ]
+    )
 
 
-def _basis(jobs: pd.DataFrame, rates: Rates, quantity: str) -> str:
-    parts = []
-    for name in sorted(set(jobs["law"]) - {""}):
-        law = rates["laws"][name][quantity]
-        powers = "".join(f" x {size}^{power:.2f}" for size, power in law["powers"].items())
-        parts.append(f"{name} on one core {law['start']:.2g} + {law['factor']:.2g}{powers}")
-    others = jobs.loc[jobs["law"] == "", "local"]
-    parts += [f"{serial_share(rates):.0%} of a solver run stays on more cores"] if parts else []
-    parts += ["others as a solver run without work, files not counted"] if others.any() else []
-    parts += ["not measured: the limit of the rule, an upper bound"] if not others.all() else []
-    return "; ".join(parts)
-
-
-def _cautions(jobs: pd.DataFrame, rates: Rates) -> Iterator[str]:
-    """What is not measured, or far beyond what is, in a stage."""
-    stage, texts = jobs["stage"].iloc[0], KNOWN["cautions"]
-    for rule, same in jobs[(jobs["law"] == "") & ~jobs["local"]].groupby("rule"):
-        yield texts["unmeasured"].format(rule=rule, minutes=same["minutes"].max())
-    beyond: dict[str, tuple[float, ...]] = {}
-    for job in jobs[jobs["law"] != ""].itertuples():
-        for size, most in rates["laws"][job.law]["up_to"].items():
-            value = job.granted if size == "cores" else job.sizes[size]
-            beyond[size] = max(beyond.get(size, (0.0,)), (value / most, value, most))
-    for size, (times, value, most) in beyond.items():
-        if times > KNOWN["far"]:
-            numbers = {"size": size.replace("_", " "), "value": value, "most": most, "times": times}
-            yield texts["cores" if size == "cores" else "beyond"].format(stage=stage, **numbers)
-    long = jobs[(jobs["rule"] == "generate_shard") & (jobs["hours"] > KNOWN["long"])]
-    for job in long.head(1).itertuples():
-        shards = job.sizes["shards"] * job.hours
-        yield texts["shards"].format(stage=stage, hours=job.hours, shards=shards)
-
-
-def as_text(values: Mapping[str, Any], name: str) -> str:
-    """The result of `plain` as lines, see `estimate.txt.j2`."""
-    environment = Environment(trim_blocks=True, undefined=StrictUndefined)
-    environment.filters |= {"number": _number, "duration": duration, "size": _size}
-    template = environment.from_string(Path(__file__).with_name("estimate.txt.j2").read_text())
-    return template.render({"name": name, "paper": "", **values}).rstrip()
-
-
-def beside_the_paper(jobs: pd.DataFrame, machine: Machine) -> str:
-    """The paper's training times beside those estimated, also on as many nodes as it used."""
-    parts = []
-    for stage, took in KNOWN["paper"].items():
-        same = jobs[jobs["stage"] == stage]
-        machines = (machine, Machine(12, machine.cores_per_node))
-        here, there = (duration(wall_hours(same, each)) for each in machines)
-        parts.append(f"{stage} {here}, on twelve such nodes {there} (the paper: {took})")
-    return f"beside the paper's twelve computers: {'; '.join(parts)}"
+def _line(row: Mapping[str, Any]) -> str:
+    hours = f"{_number(row['core_hours']):>12}{duration(row['wall_hours']):>11}"
+    return (
+        f"{row['stage']:<25}{row['jobs']:>6,}{hours}{_size(row['memory_gb']):>10}"
+        f"{_size(row['kept_gb']):>10}"
+    )
 
 
 def duration(hours: float) -> str:
