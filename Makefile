@@ -9,7 +9,7 @@ MAKEFLAGS += --no-print-directory
 VENV ?= .venv
 PYTHON_OF_VENV = $(VENV)/bin/python
 # One job of as many cores as there are, or as many as fit: Snakemake adds up the threads of its
-# jobs, and every MPI rank takes its share of them (carillon.processes.cores.limit_threads).
+# jobs, and every MPI rank takes its share of them (carillon.processes.threads.limit_threads).
 CORES ?= all
 TARGETS ?= all
 PYTEST_OPTIONS ?=

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from carillon.processes import mpi_environment
-from carillon.processes.cores import allowed_threads
+from carillon.processes.threads import allowed_threads
 from studies.recordings.packages import SOUNDS
 from tests import tiers
 from tests.chromium import chromium

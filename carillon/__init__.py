@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from carillon import lazy_exports as _lazy_exports
 from carillon.processes import kernel_cache as _kernel_cache
 from carillon.processes import mpi_environment as _mpi_environment
-from carillon.processes import openblas as _openblas
 from carillon.processes import present_folder as _present_folder
 
 if TYPE_CHECKING:
@@ -36,7 +35,10 @@ if TYPE_CHECKING:
     from carillon.errors import ConvergenceError, UserError
 
 # Before anything loads numpy, and with it OpenBLAS, or numba, or MPI.
-_openblas.configure(_os.environ)
+# numpy, scipy and PETSc have a copy of OpenBLAS each. An idle thread of one copy spins for 2^26
+# cycles beside those of the others, which halves the speed of code that calls them in turn; with
+# this value, unless the user has set one, it goes to sleep at once.
+_os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
 _present_folder.ignore_settings()
 _kernel_cache.configure(_os.environ)
 _mpi_environment.keep_off_networks()

@@ -14,8 +14,7 @@ import pytest
 from mpi4py import MPI
 
 from carillon.errors import UserError
-from carillon.processes.cores import memory_bytes
-from carillon.processes.memory import FIRST_TO_GO
+from carillon.processes.memory import FIRST_TO_GO, memory_bytes
 from studio.processes.worker import Worker
 from tests.listening import listening
 from tests.patience import HANG_SECONDS, wait_for

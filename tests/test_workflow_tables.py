@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from carillon.processes.cores import memory_bytes
+from carillon.processes.memory import memory_bytes
 from carillon.records.measurement import measured
 from studies.base.conditions import LABELS, ONE_COLD_RUN, Conditions, conditions
 from studies.base.numbers import MISSING

@@ -9,7 +9,7 @@ import sys
 from typing import Any
 
 from carillon.errors import UserError
-from carillon.processes import cores
+from carillon.processes import blas
 from carillon.records import provenance
 
 
@@ -39,9 +39,9 @@ def describe() -> dict[str, Any]:
         "mumps": bool(PETSc.Sys.hasExternalPackage("mumps")),
         "cholmod": bool(PETSc.Sys.hasExternalPackage("suitesparse")),
         "arpack": bool(SLEPc.Sys.hasExternalPackage("arpack")),
-        "blas": cores.blas_name(),
-        "blas_by_user": cores.blas_by_user(),
-        "reference_blas": cores.is_reference_blas(),
+        "blas": blas.blas_name(),
+        "blas_by_user": blas.blas_by_user(),
+        "reference_blas": blas.is_reference_blas(),
         "processor": provenance.processor(),
         "cores": len(os.sched_getaffinity(0)),
     }
@@ -82,4 +82,4 @@ def run(arguments: argparse.Namespace) -> None:
         print(json.dumps(description, indent=2))
     else:
         _print_table(description)
-    cores.warn_about_reference_blas()
+    blas.warn_about_reference_blas()

@@ -8,7 +8,7 @@ from annotated_types import Ge, Gt, Interval, Le, Lt
 
 from carillon.limits import DENSITIES, MODULI, POISSON, RESOLUTIONS, UNITS
 from carillon.parameters.model import OneOf
-from carillon.processes.cores import allowed_cores
+from carillon.processes.threads import allowed_cores
 
 LARGEST = 2**63 - 1
 """Largest whole number that files and compiled code can hold."""

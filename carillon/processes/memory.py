@@ -1,17 +1,72 @@
-"""What a process may do to the memory of its machine."""
+"""Memory of the machine, and what a process may do to it."""
 
 from __future__ import annotations
 
+import ctypes
+import os
 import resource
 from contextlib import suppress
 from pathlib import Path
-
-from carillon.processes.cores import memory_bytes
 
 FIRST_TO_GO = 500
 """Kernel score of the process, at most 1000: the highest is ended first without memory."""
 LEAST_ROOM = 8 << 30
 """Least limit of a process's data in bytes: threads of large machines reserve some each."""
+GROUP_LIMIT = Path("/sys/fs/cgroup/memory.max")
+"""File with the most memory that the control group of this process may use."""
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
+_LARGEST_THRESHOLD = 1 << 30
+_NEVER = (1 << 31) - 1
+
+
+def memory_bytes(group_limit: Path = GROUP_LIMIT) -> int:
+    """Memory of the machine, or what the control group of this process allows if that is less."""
+    machine = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    try:
+        return min(machine, int(group_limit.read_text()))
+    except (OSError, ValueError):
+        return machine
+
+
+def available_memory() -> int | None:
+    """Bytes that this process may still use: of the machine, and of its control group if limited.
+
+    None where the system does not tell.
+    """
+    limits = [_memory_of_machine(), _memory_of_group()]
+    known = [each for each in limits if each is not None]
+    return min(known) if known else None
+
+
+def _memory_of_machine() -> int | None:
+    with suppress(OSError, ValueError):
+        return _field("/proc/meminfo", "MemAvailable:")
+    return None
+
+
+def _memory_of_group() -> int | None:
+    """What a limit of version 2 leaves; cached files make room when memory is asked for."""
+    group = Path("/sys/fs/cgroup")
+    try:
+        limit = int((group / "memory.max").read_text())
+        used = int((group / "memory.current").read_text())
+        lines = (group / "memory.stat").read_text().splitlines()
+        cached = next(int(line.split()[1]) for line in lines if line.startswith("file "))
+    except (OSError, ValueError, StopIteration):
+        return None
+    return max(0, limit - used + cached)
+
+
+def reuse_freed_memory() -> None:
+    """Keep freed memory in the process instead of giving it back to the system after every use.
+
+    Blocks of vectors are made and freed many times a second; mapping their pages anew takes as long
+    as a sparse product.  Only the GNU C library is told; elsewhere nothing happens.
+    """
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is not None:
+        mallopt(_M_MMAP_THRESHOLD, _LARGEST_THRESHOLD)
+        mallopt(_M_TRIM_THRESHOLD, _NEVER)
 
 
 def spare_the_machine() -> None:

@@ -1,7 +1,13 @@
-"""Sharing work among the threads of one process, each with a single-threaded BLAS."""
+"""Threads of this process: how many it may use, those of BLAS, and work shared among them.
+
+Work is shared at the highest level only: where threads share it, BLAS has one thread in each. What
+must be the same bits on any machine runs with one thread of BLAS, too (`@blas_threads(1)`), since a
+sum that threads share rounds differently.
+"""
 
 from __future__ import annotations
 
+import importlib
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
@@ -12,6 +18,33 @@ from typing import Any, TypeVar
 from threadpoolctl import ThreadpoolController
 
 Result = TypeVar("Result")
+
+
+def allowed_cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def allowed_threads() -> int:
+    """Threads that this process may use: its cores, or fewer if `OMP_NUM_THREADS` says so."""
+    cores = allowed_cores()
+    requested = os.environ.get("OMP_NUM_THREADS", "")
+    return min(cores, int(requested)) if requested.isdigit() and int(requested) > 0 else cores
+
+
+def limit_threads(ranks: int) -> int:
+    """Give this rank its share of the cores, so that ranks x threads never exceed the cores.
+
+    Returns the number of BLAS threads now allowed in this process.
+    """
+    cores = allowed_cores()
+    threads = max(1, cores // max(1, ranks))
+    requested = os.environ.get("OMP_NUM_THREADS", "")
+    if requested.isdigit() and int(requested) > 0:
+        threads = min(threads, int(requested))
+    ThreadpoolController().limit(limits=threads)
+    os.environ["OMP_NUM_THREADS"] = str(threads)
+    return threads
 
 
 def split(count: int, threads: int, largest: int) -> list[tuple[int, int]]:
@@ -88,7 +121,7 @@ def in_tree(
 
 @contextmanager
 def blas_threads(count: int) -> Iterator[None]:
-    """Every BLAS of this process on so many threads within the body."""
+    """Every BLAS of this process on so many threads within the body, or within a function."""
     with _controller().limit(limits=count, user_api="blas"):
         yield
 
@@ -115,4 +148,5 @@ def _pool(threads: int) -> ThreadPoolExecutor:
 
 @cache
 def _controller() -> ThreadpoolController:
+    importlib.import_module("scipy.linalg")  # whose own BLAS is only found once it is there
     return ThreadpoolController()

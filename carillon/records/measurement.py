@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Any
 
-from carillon.processes.cores import allowed_threads, memory_bytes
+from carillon.processes.memory import memory_bytes
+from carillon.processes.threads import allowed_threads
 from carillon.records.provenance import compiled_for, record
 
 

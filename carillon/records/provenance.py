@@ -18,7 +18,8 @@ import h5py
 from llvmlite import binding
 
 from carillon import __version__
-from carillon.processes.cores import allowed_cores, blas_name
+from carillon.processes.blas import blas_name
+from carillon.processes.threads import allowed_cores
 
 _PACKAGES = (
     "numpy",

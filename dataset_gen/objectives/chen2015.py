@@ -15,7 +15,7 @@ import numpy as np
 from carillon.fem.block import CORNER_NODES, degrees_of_freedom
 from carillon.fem.element import Array
 from carillon.numerics.simd import LANES, empty, spread, store
-from carillon.processes.serial import serial_blas
+from carillon.processes.threads import blas_threads
 from dataset_gen.objectives import flops
 from dataset_gen.objectives.compiled import compiled
 from dataset_gen.objectives.elimination import TILE, elimination_of
@@ -102,7 +102,7 @@ def corner_selection(mask: int, poisson: float) -> Array:
 
 
 @cache
-@serial_blas
+@blas_threads(1)
 def corners_of(mask: int, poisson: float) -> Corners:
     """Tables of the pattern whose filled cells are the set bits of `mask` (1..255)."""
     pattern, motions = pattern_of(mask, poisson), straining_motions()

@@ -14,7 +14,7 @@ from scipy.linalg import solve_triangular
 
 from carillon.fem.element import Array
 from carillon.numerics.simd import LANES, empty, load, root, spread, store
-from carillon.processes.serial import serial_blas
+from carillon.processes.threads import blas_threads
 from dataset_gen.objectives.compiled import compiled
 from dataset_gen.objectives.descent import CURVATURE, GRADIENT
 from dataset_gen.objectives.elimination import Sum, elimination_of, lower_tiles_of, sum_of
@@ -82,7 +82,7 @@ class CoarseResponse(NamedTuple):
 
 
 @cache
-@serial_blas
+@blas_threads(1)
 def coarse_of(mask: int, poisson: float) -> Coarse:
     """Tables of the pattern whose filled cells are the set bits of `mask` (1..255)."""
     pattern, motions = pattern_of(mask, poisson), straining_motions()

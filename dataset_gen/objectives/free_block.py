@@ -15,7 +15,7 @@ from scipy.linalg import qr
 from carillon.fem.block import cell_stiffness
 from carillon.fem.element import Array
 from carillon.numerics.simd import Vector, empty, load, spread, store
-from carillon.processes.serial import serial_blas
+from carillon.processes.threads import blas_threads
 from dataset_gen.objectives.compiled import compiled
 from dataset_gen.objectives.elimination import (
     FactorStructure,
@@ -55,7 +55,7 @@ class FreeBlock(NamedTuple):
 
 
 @cache
-@serial_blas
+@blas_threads(1)
 def free_block_of(mask: int, poisson: float) -> FreeBlock:
     """Block of the pattern whose filled cells are the set bits of `mask` (1..255)."""
     pattern, elimination = pattern_of(mask, poisson), elimination_of(mask)

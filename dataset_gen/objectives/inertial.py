@@ -9,7 +9,7 @@ import numpy as np
 
 from carillon.fem.element import Array
 from carillon.numerics.simd import LANES, empty
-from carillon.processes.serial import serial_blas
+from carillon.processes.threads import blas_threads
 from dataset_gen.objectives import flops
 from dataset_gen.objectives.compiled import compiled
 from dataset_gen.objectives.elimination import TILE, elimination_of
@@ -74,7 +74,7 @@ class InertialTables(NamedTuple):
         )
 
 
-@serial_blas
+@blas_threads(1)
 def inertia_loads(mask: int, poisson: float) -> Array:
     """Loads F (a, 24): inertia of the mass-normalised trilinear motions, in self-equilibrium.
 
@@ -90,7 +90,7 @@ def inertia_loads(mask: int, poisson: float) -> Array:
 
 
 @cache
-@serial_blas
+@blas_threads(1)
 def inertia_of(mask: int, poisson: float) -> InertialTables:
     """Tables of the pattern whose filled cells are the set bits of `mask` (1..255)."""
     pattern = pattern_of(mask, poisson)

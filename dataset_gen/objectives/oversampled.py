@@ -15,7 +15,7 @@ import numpy as np
 from carillon.fem.block import COARSE_EDGE, NODES, cell_stiffness, degrees_of_freedom
 from carillon.fem.element import CORNERS, Array, shape_functions, uniform_stiffness
 from carillon.numerics.simd import LANES, empty, spread
-from carillon.processes.serial import serial_blas
+from carillon.processes.threads import blas_threads
 from dataset_gen.objectives import flops
 from dataset_gen.objectives.compiled import compiled
 from dataset_gen.objectives.elimination import (
@@ -110,7 +110,7 @@ class Patch(NamedTuple):
 
 
 @cache
-@serial_blas
+@blas_threads(1)
 def octants(poisson: float) -> tuple[Array, Array]:
     """Stiffness (8, 81, 81) and load (8, 81, 18) on the block's nodes from each octant."""
     block = degrees_of_freedom((NODES + 1) @ (1, 5, 25))
@@ -129,7 +129,7 @@ def octants(poisson: float) -> tuple[Array, Array]:
 
 
 @cache
-@serial_blas
+@blas_threads(1)
 def patch_of(mask: int, poisson: float) -> Patch:
     """Patch of the pattern whose filled cells are the set bits of `mask` (1..255)."""
     pattern, elimination = pattern_of(mask, poisson), elimination_of(mask)

@@ -26,7 +26,7 @@ from carillon.fem.element import (
     shape_gradients,
     strain_displacement,
 )
-from carillon.processes.serial import serial_blas
+from carillon.processes.threads import blas_threads
 
 NULL_TOLERANCE = 1e-10
 """Eigenvalues below this share of the largest count as motions without strain."""
@@ -86,7 +86,7 @@ class VoidPattern:
 
 
 @cache
-@serial_blas
+@blas_threads(1)
 def pattern_of(mask: int, poisson: float) -> VoidPattern:
     """Matrices of the pattern whose filled cells are the set bits of `mask` (1..255)."""
     filled = (mask >> np.arange(8) & 1).astype(bool)
@@ -111,7 +111,7 @@ def pattern_of(mask: int, poisson: float) -> VoidPattern:
 
 
 @cache
-@serial_blas
+@blas_threads(1)
 def corner_strains(poisson: float) -> Array:
     """S (48, 24) with `K_q = S_q^T S_q` of the coarse element of edge 2, S_q = S[6 q : 6 q + 6]."""
     strain = strain_displacement(shape_gradients(GAUSS_POINTS))
@@ -120,7 +120,7 @@ def corner_strains(poisson: float) -> Array:
 
 
 @cache
-@serial_blas
+@blas_threads(1)
 def straining_motions() -> Array:
     """Orthonormal complement Z (24, 18) of the rigid motions of the coarse corners."""
     rigid = rigid_motions(CORNERS.astype(float))

@@ -12,7 +12,7 @@ import numpy as np
 
 from carillon.fem.element import DEFAULT_POISSON, Array
 from carillon.numerics.simd import LANES, add_product, empty, load, spread, store, store_tile, zeros
-from carillon.processes.serial import serial_blas
+from carillon.processes.threads import blas_threads
 from dataset_gen.objectives.coarse_response import (
     Coarse,
     CoarseResponse,
@@ -83,7 +83,7 @@ class Room(NamedTuple):
     bent: Array
 
 
-@serial_blas
+@blas_threads(1)
 def draw_forces(young: Array, directions: int, generator: np.random.Generator) -> Array:
     """Self-equilibrated unit forces (a, directions) on the active nodes of the block `young` (8,).
 

@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES, Solid
-from carillon.processes.cores import available_memory
+from carillon.processes.memory import available_memory
 from solver.analysis.options import SolverOptions
 from solver.correction.correction import FEWEST_GUARDS, default_guard
 from solver.distribution.collective import bcast_from_root, ranks_of_machine

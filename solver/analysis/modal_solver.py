@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from carillon.command_line.progress import say
 from carillon.fem.model import RIGID_MODES, Solid
 from carillon.fem.moduli import require_coarse_moduli
-from carillon.processes.cores import limit_threads, reuse_freed_memory
+from carillon.processes.memory import reuse_freed_memory
+from carillon.processes.threads import limit_threads
 from carillon.processes.waiting import leave_cores
 from solver.analysis.bounds import check_mode_count, require_memory
 from solver.analysis.components import ComponentModes, elastic_part, lowest_pairs

@@ -13,8 +13,9 @@ from mpi4py import MPI
 from carillon.command_line import outputs
 from carillon.files.atomic import atomic_path
 from carillon.parameters.command_line import add_options
-from carillon.processes.cores import limit_threads, warn_about_reference_blas
+from carillon.processes.blas import warn_about_reference_blas
 from carillon.processes.petsc import PETSc
+from carillon.processes.threads import limit_threads
 from solver.analysis.problem import ProblemOptions
 from solver.distribution.collective import bcast_from_root, ranks_of_machine
 from solver.linear import petsc_options

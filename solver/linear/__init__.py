@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from carillon.processes.cores import available_memory
+from carillon.processes.memory import available_memory
 from solver.distribution.collective import bcast_from_root, ranks_of_machine
 
 if TYPE_CHECKING:

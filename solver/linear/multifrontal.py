@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from carillon.errors import LocalConvergenceError
 from carillon.numerics.small_gemm import block, lanes_of
-from carillon.processes.cores import available_memory
+from carillon.processes.memory import available_memory
 from carillon.processes.threads import in_parallel, in_tree, split
 from solver.linear.elimination import eliminate_fronts
 from solver.linear.plan import Part, Plan

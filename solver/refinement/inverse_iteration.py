@@ -19,7 +19,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.fem.model import RIGID_MODES, ElasticModel
-from carillon.processes.cores import limit_threads
+from carillon.processes.threads import limit_threads
 from solver.analysis.prepared import Prepared
 from solver.distribution.collective import ranks_of_machine
 from solver.files.initial_modes import scatter_rows

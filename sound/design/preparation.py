@@ -13,7 +13,7 @@ from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.geometry import HexMesh
 from carillon.fem.geometry.size import doubt_unit
 from carillon.fem.geometry.surface import load_surface, surface_name
-from carillon.processes.cores import allowed_cores
+from carillon.processes.threads import allowed_cores
 from solver.analysis.problem import ProblemOptions, discretised
 from sound.clips.files import extract_file
 from sound.clips.targets import Targets, share_frequencies, without_modes

@@ -41,7 +41,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.fem.element import Array
-from carillon.processes.serial import serial_blas
+from carillon.processes.threads import blas_threads
 from dataset_gen.objectives.chen2015 import corner_selection
 from dataset_gen.objectives.patterns import corner_strains, pattern_of, straining_motions
 
@@ -136,7 +136,7 @@ class Errors(NamedTuple):
 
 
 @cache
-@serial_blas
+@blas_threads(1)
 def tables_of(mask: int, poisson: float) -> ErrorTables:
     """Tables of the pattern whose filled cells are the set bits of `mask` (1..255)."""
     pattern, motions = pattern_of(mask, poisson), straining_motions()
@@ -149,7 +149,7 @@ def tables_of(mask: int, poisson: float) -> ErrorTables:
     load = pattern.mass @ pattern.interpolation @ motions
     moved = pattern.mass @ pattern.null
     balance = moved @ np.linalg.solve(pattern.null.T @ moved, pattern.null.T @ load)
-    inertia = complement.T @ (load - balance)
+    inertia: Array = complement.T @ (load - balance)
     corners = complement.T @ corner_selection(mask, poisson).T @ motions
     unit = np.eye(motions.shape[1])
     loads = {
@@ -186,7 +186,7 @@ def fine_responses(young: Array, mask: int, poisson: float) -> dict[str, FineRes
 
 
 @cache
-@serial_blas
+@blas_threads(1)
 def _quadrature_forms(poisson: float) -> Array:
     """Z^T K_q Z (8, 18 * 18) of the coarse element of edge 2, flattened."""
     strains = (corner_strains(poisson) @ straining_motions()).reshape(8, 6, -1)
@@ -212,7 +212,7 @@ def pattern_rows(young: Array, at_most: int) -> Iterator[tuple[int, NDArray[np.i
             yield int(mask), rows[first : first + at_most]
 
 
-@serial_blas
+@blas_threads(1)
 def pattern_errors(
     young: Array, coarse: Sequence[Array], mask: int, poisson: float
 ) -> list[Errors]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from carillon.fem.element import DEFAULT_POISSON, Array
 from carillon.numerics.simd import LANES, empty
-from carillon.processes.serial import serial_blas
+from carillon.processes.threads import blas_threads
 from dataset_gen.objectives.chen2015 import Corners, corners_of
 from dataset_gen.objectives.compiled import compiled
 from dataset_gen.objectives.elimination import TILE
@@ -49,7 +49,7 @@ def _flexibility(corners: Corners, young: Array, out: Array) -> None:
                 out[row, n] = answer[n, row - first]
 
 
-@serial_blas
+@blas_threads(1)
 def corner_flexibility(young: ArrayLike, poisson: float = DEFAULT_POISSON) -> Array:
     """Flexibility (n, 18, 18) of blocks (n, 8) in the straining motions of their corners.
 
@@ -65,7 +65,7 @@ def corner_flexibility(young: ArrayLike, poisson: float = DEFAULT_POISSON) -> Ar
     return flexibility
 
 
-@serial_blas
+@blas_threads(1)
 def condense(young: ArrayLike, poisson: float = DEFAULT_POISSON) -> Array:
     """Condensed stiffness (n, 24, 24) of blocks (n, 8), fine edge 1, in the unit of the moduli.
 

@@ -11,8 +11,7 @@ import numpy as np
 from carillon.errors import UserError
 from carillon.fem.element import Array
 from carillon.files.paths import require_writable
-from carillon.processes.cores import allowed_threads
-from carillon.processes.threads import in_parallel
+from carillon.processes.threads import allowed_threads, in_parallel
 from dataset_gen.objectives import closed_form, fit
 from forests.baselines import average, galerkin
 from forests.default import default_path

@@ -20,7 +20,7 @@ from carillon.command_line.progress import track
 from carillon.fem.element import Array
 from carillon.parameters import option, parameters
 from carillon.parameters.quantities import Number, between
-from carillon.processes.serial import serial_blas
+from carillon.processes.threads import blas_threads
 from forests.evaluate import MOST_BLOCKS
 from forests.model import Model
 from studies.blocks.block_error import AT_ONCE, Errors, displacement_errors
@@ -124,7 +124,7 @@ def _joined(pieces: Sequence[Errors]) -> Errors:
     return Errors(*fields)
 
 
-@serial_blas
+@blas_threads(1)
 def table(
     models: dict[str, Model],
     options: TableOptions,

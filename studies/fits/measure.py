@@ -14,7 +14,7 @@ from carillon.fem.element import DEFAULT_POISSON, Array
 from carillon.numerics.simd import LANES, add_product, empty, load_tile, store_tile
 from carillon.parameters import OneOf, option, parameters
 from carillon.parameters.quantities import PoissonRatio, between
-from carillon.processes.serial import serial_blas
+from carillon.processes.threads import blas_threads
 from carillon.records.provenance import compiled_for, processor
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, OBJECTIVES, fit, flops, sampled_energy
 from dataset_gen.objectives.compiled import PANEL, compiled
@@ -75,7 +75,7 @@ def _sampled_rate(young: Array, poisson: float) -> Rate:
     return _rate(*_runs((work, len(young))))
 
 
-@serial_blas
+@blas_threads(1)
 def _multiply_by_blas(matrix: Array) -> None:
     matrix @ matrix
 

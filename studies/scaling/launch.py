@@ -17,7 +17,7 @@ from typing import Any
 from carillon.command_line.progress import track
 from carillon.errors import UserError
 from carillon.processes.children import run_child
-from carillon.processes.cores import allowed_cores
+from carillon.processes.threads import allowed_cores
 
 logger = logging.getLogger(__name__)
 

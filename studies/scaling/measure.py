@@ -14,7 +14,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.fem.model import RIGID_MODES, Solid
-from carillon.processes.cores import reuse_freed_memory
+from carillon.processes.memory import reuse_freed_memory
 from solver.analysis.bounds import check_mode_count, default_keep
 from solver.analysis.components import elastic_part
 from solver.analysis.options import SolverOptions

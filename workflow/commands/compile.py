@@ -19,7 +19,7 @@ from pathlib import Path
 from carillon.command_line.progress import say
 from carillon.errors import UserError
 from carillon.files.atomic import atomic_path
-from carillon.processes.cores import allowed_cores
+from carillon.processes.threads import allowed_cores
 from carillon.records.provenance import compiled_for
 
 EXAMPLES = """examples:

@@ -11,7 +11,7 @@ import pandas as pd
 
 from carillon.parameters.command_line import reader
 from carillon.parameters.quantities import between
-from carillon.processes.cores import allowed_cores
+from carillon.processes.threads import allowed_cores
 from dataset_gen.objectives import DATASET_OBJECTIVES
 from workflow import settings
 from workflow.estimate.measured import load_measured

@@ -26,7 +26,7 @@ from carillon.parameters import REQUIRED, option, parameters
 from carillon.parameters.command_line import add_options, collect, reader
 from carillon.parameters.fields import parameters_of
 from carillon.parameters.quantities import NonNegative, Point, Positive, Workers, between
-from carillon.processes.cores import allowed_cores
+from carillon.processes.threads import allowed_cores
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.coarsening.forest import load_forest
 from solver.correction.correction import EIGENVALUE_TOLERANCE

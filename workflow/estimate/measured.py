@@ -12,7 +12,7 @@ from pathlib import Path
 import pandas as pd
 
 from carillon.errors import UserError
-from carillon.processes.cores import allowed_cores
+from carillon.processes.threads import allowed_cores
 from workflow import settings
 from workflow.estimate.plan import RESULTS, plan
 from workflow.estimate.work import with_work

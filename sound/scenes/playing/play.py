@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from carillon.command_line.progress import say
 from carillon.errors import UserError
-from carillon.processes.cores import allowed_threads
-from carillon.processes.serial import serial_blas
+from carillon.processes.threads import allowed_threads, blas_threads
 from sound.scenes.audible.loudness import voice
 from sound.scenes.bodies import bodies_of
 from sound.scenes.contact.engine import simulate
@@ -29,7 +28,7 @@ FULL = 0.99
 """Largest magnitude of a sound that is scaled to full scale; rounding does not take it to 1."""
 
 
-@serial_blas
+@blas_threads(1)
 def perform(scene: Scene, threads: int | None = None, visible: bool = True) -> Performance:
     """Play a scene from its beginning to its end.
 

@@ -1,11 +1,10 @@
-"""The numerical runtime: which BLAS is loaded, how many threads each rank may use."""
+"""Which BLAS numpy, scipy and PETSc have loaded in this process."""
 
 from __future__ import annotations
 
 import ctypes
 import os
 import sys
-from pathlib import Path
 
 from threadpoolctl import ThreadpoolController
 
@@ -18,9 +17,6 @@ _BLAS_FILES = (
     "libflexiblas",
     "libatlas",
 )
-_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
-_LARGEST_THRESHOLD = 1 << 30
-_NEVER = (1 << 31) - 1
 _MAKERS_SYMBOLS = (
     "openblas_get_config",
     "MKL_Get_Version",
@@ -28,9 +24,6 @@ _MAKERS_SYMBOLS = (
     "flexiblas_current_backend",
     "ATL_buildinfo",
 )
-
-GROUP_LIMIT = Path("/sys/fs/cgroup/memory.max")
-"""File with the most memory that the control group of this process may use."""
 
 
 def loaded_blas() -> list[dict[str, str]]:
@@ -120,85 +113,3 @@ def warn_about_reference_blas() -> None:
             "than OpenBLAS; install libopenblas0-pthread (Debian/Ubuntu) or select another BLAS",
             file=sys.stderr,
         )
-
-
-def reuse_freed_memory() -> None:
-    """Keep freed memory in the process instead of giving it back to the system after every use.
-
-    Blocks of vectors are made and freed many times a second; mapping their pages anew takes as long
-    as a sparse product.  Only the GNU C library is told; elsewhere nothing happens.
-    """
-    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
-    if mallopt is not None:
-        mallopt(_M_MMAP_THRESHOLD, _LARGEST_THRESHOLD)
-        mallopt(_M_TRIM_THRESHOLD, _NEVER)
-
-
-def allowed_cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0))
-
-
-def allowed_threads() -> int:
-    """Threads that this process may use: its cores, or fewer if `OMP_NUM_THREADS` says so."""
-    cores = allowed_cores()
-    requested = os.environ.get("OMP_NUM_THREADS", "")
-    return min(cores, int(requested)) if requested.isdigit() and int(requested) > 0 else cores
-
-
-def limit_threads(ranks: int) -> int:
-    """Give this rank its share of the cores, so that ranks x threads never exceed the cores.
-
-    Returns the number of BLAS threads now allowed in this process.
-    """
-    cores = allowed_cores()
-    threads = max(1, cores // max(1, ranks))
-    requested = os.environ.get("OMP_NUM_THREADS", "")
-    if requested.isdigit() and int(requested) > 0:
-        threads = min(threads, int(requested))
-    ThreadpoolController().limit(limits=threads)
-    os.environ["OMP_NUM_THREADS"] = str(threads)
-    return threads
-
-
-def memory_bytes(group_limit: Path = GROUP_LIMIT) -> int:
-    """Memory of the machine, or what the control group of this process allows if that is less."""
-    machine = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    try:
-        return min(machine, int(group_limit.read_text()))
-    except (OSError, ValueError):
-        return machine
-
-
-def available_memory() -> int | None:
-    """Bytes that this process may still use: of the machine, and of its control group if limited.
-
-    None where the system does not tell.
-    """
-    limits = [_memory_of_machine(), _memory_of_group()]
-    known = [each for each in limits if each is not None]
-    return min(known) if known else None
-
-
-def _memory_of_machine() -> int | None:
-    try:
-        lines = Path("/proc/meminfo").read_text().splitlines()
-    except OSError:
-        return None
-    for line in lines:
-        if line.startswith("MemAvailable:"):
-            return 1024 * int(line.split()[1])
-    return None
-
-
-def _memory_of_group() -> int | None:
-    """What a limit of version 2 leaves; cached files make room when memory is asked for."""
-    group = Path("/sys/fs/cgroup")
-    try:
-        limit = int((group / "memory.max").read_text())
-        used = int((group / "memory.current").read_text())
-        lines = (group / "memory.stat").read_text().splitlines()
-        cached = next(int(line.split()[1]) for line in lines if line.startswith("file "))
-    except (OSError, ValueError, StopIteration):
-        return None
-    return max(0, limit - used + cached)
