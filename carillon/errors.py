@@ -1,5 +1,8 @@
 """Errors that are addressed to the person at the terminal."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 LONGEST_MESSAGE = 1200
 """Longest message in characters; a longer one loses its middle, so that it fits on a screen."""
 
@@ -30,7 +33,7 @@ class UserError(Exception):
 
     Of several faults that are told together each is an argument: a sentence on a line of its own.
     Command-line programs print the sentences and exit with status 2, without a traceback.  Under
-    MPI all ranks raise it together.
+    MPI it is taken for one rank's own, and ends the other ranks, unless `on_all_ranks` marks it.
 
     Examples
     --------
@@ -39,7 +42,7 @@ class UserError(Exception):
     no file b.wav; name another
     """
 
-    collective = True
+    collective: bool = False
 
     def __str__(self) -> str:
         return "\n".join(one_line(str(fault)) for fault in self.args)
@@ -60,7 +63,24 @@ class LocalConvergenceError(ConvergenceError):
     collective = False
 
 
-class LocalUserError(UserError):
-    """Input that one rank finds unusable while the others are at work; they do not know."""
+@contextmanager
+def on_all_ranks() -> Iterator[None]:
+    """Mark a UserError raised in the body, or in a decorated function, as one that all ranks raise.
 
-    collective = False
+    So it is where all of them do the same with the same values, such as with the command line: each
+    returns by itself, and the first one tells the error.
+
+    Examples
+    --------
+    >>> try:
+    ...     with on_all_ranks():
+    ...         raise UserError("8 ranks for 4 subdomains; start 4")
+    ... except UserError as error:
+    ...     print(error.collective)
+    True
+    """
+    try:
+        yield
+    except UserError as error:
+        error.collective = True
+        raise

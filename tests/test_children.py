@@ -6,11 +6,13 @@ import os
 import signal
 import subprocess
 import sys
+import time
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import pytest
 
-from carillon.processes.children import run_child
+from carillon.processes.children import ProcessPool, run_child
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 
@@ -45,3 +47,76 @@ def test_a_child_ends_when_its_parent_is_killed(how, tmp_path):
         parent.send_signal(how)
         parent.wait()
         assert stream.read() == ""  # comes to an end, since the child does, who has it open
+
+
+# Processes ---------------------------------------------------------------------------------------
+
+
+def late_for_even(task):
+    time.sleep(0.02 * (task % 2 == 0))
+    return task
+
+
+def begun_and_yielded(pool, window):
+    """The largest number of tasks that were begun and not yielded, and all results."""
+    begun, results, largest = [], [], 0
+
+    def tasks():
+        for task in range(30):
+            begun.append(task)
+            yield task
+
+    for result in pool.in_order(late_for_even, tasks(), window):
+        largest = max(largest, len(begun) - len(results))
+        results.append(result)
+    return largest, results
+
+
+def test_results_come_in_order_and_no_more_than_a_window_is_begun():
+    pool = ProcessPool(2)
+    try:
+        assert begun_and_yielded(pool, 8) == (8, list(range(30)))
+    finally:
+        pool.close()
+
+
+def signals_and_ranks(_):
+    held = signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    return {signal.SIGINT, signal.SIGTERM} <= held, os.environ.get("OMPI_COMM_WORLD_RANK")
+
+
+def test_processes_hear_no_signal_to_stop_and_are_no_ranks(monkeypatch):
+    monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "1")
+    pool = ProcessPool(1)
+    try:
+        assert pool.submit(signals_and_ranks, None).result() == (True, None)
+    finally:
+        pool.close()
+    assert os.environ["OMPI_COMM_WORLD_RANK"] == "1"
+    assert not signal.pthread_sigmask(signal.SIG_BLOCK, ()) & {signal.SIGINT, signal.SIGTERM}
+
+
+def test_a_program_started_where_signals_are_held_still_ends_with_its_parent():
+    sleeping = [sys.executable, "-c", "import signal; print(signal.pthread_sigmask(0, ()))"]
+    former = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGTERM,))
+    try:
+        assert "SIGTERM" not in run_child(sleeping, os.environ).stdout
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, former)
+
+
+@pytest.mark.parametrize("code", [7, -9])
+def test_a_process_that_dies_is_told_by_its_code(code):
+    pool = ProcessPool(2)
+    try:
+        with pytest.raises(BrokenProcessPool):
+            pool.submit(die, code).result()
+        assert pool.failure() == code
+    finally:
+        pool.close()
+
+
+def die(code):
+    if code < 0:
+        os.kill(os.getpid(), -code)
+    os._exit(code)

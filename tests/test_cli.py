@@ -17,8 +17,9 @@ from carillon import __version__
 from carillon.command_line import exit_status
 from carillon.command_line.arguments import Parser
 from carillon.command_line.commands import run_program
-from carillon.errors import ConvergenceError, LocalUserError, UserError
+from carillon.errors import ConvergenceError, UserError, on_all_ranks
 from carillon.fem.geometry.builtin import builtin_surface
+from tests.rank_counts import SEVERAL
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 
@@ -142,20 +143,56 @@ def test_a_fault_of_the_program_keeps_its_traceback():
 def test_what_all_ranks_raise_is_told_by_the_first_and_aborts_nothing(capsys):
     for rank in range(3):
         ranks = Ranks(rank, 3)
-        assert exit_status.run("program", raising(UserError("bad")), ranks) == 2
+        main = on_all_ranks()(raising(UserError("bad")))
+        assert exit_status.run("program", main, ranks) == 2
         assert ranks.aborted is None
     assert capsys.readouterr().err == "program: bad\n"
 
 
 @pytest.mark.parametrize(
     ("error", "status"),
-    [(LocalUserError("bad"), 2), (MemoryError(), 2), (KeyboardInterrupt(), 130), (KeyError(), 1)],
+    [(UserError("bad"), 2), (MemoryError(), 2), (KeyboardInterrupt(), 130), (KeyError(), 1)],
 )
 def test_what_one_rank_alone_raises_ends_the_others(error, status, capsys):
     ranks = Ranks(1, 2)
     exit_status.run("program", raising(error), ranks)
     assert ranks.aborted == status
     assert capsys.readouterr().err
+
+
+REFUSING = """
+import sys
+from mpi4py import MPI
+from carillon.command_line import exit_status
+from carillon.errors import UserError, on_all_ranks
+
+comm = MPI.COMM_WORLD
+
+def on_one():
+    if comm.rank == comm.size - 1:
+        raise UserError("bad on one rank")
+    comm.Barrier()
+
+@on_all_ranks()
+def on_all():
+    raise UserError("bad on all")
+
+sys.exit(exit_status.run("program", {"one": on_one, "all": on_all}[sys.argv[1]], comm))
+"""
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("ranks", SEVERAL)
+@pytest.mark.parametrize(("who", "sentence"), [("one", "bad on one rank"), ("all", "bad on all")])
+def test_an_error_on_any_rank_is_one_sentence_and_leaves_none_waiting(
+    who, sentence, ranks, mpiexec, tmp_path
+):
+    program = tmp_path / "program.py"
+    program.write_text(REFUSING)
+    done = mpiexec(ranks, program, who)
+    assert done.returncode == 2
+    lines = [line for line in done.stderr.splitlines() if line.startswith("program")]
+    assert lines == [f"program: {sentence}"]
 
 
 # Standard streams ---------------------------------------------------------------------------------

@@ -24,7 +24,6 @@ from dataset_gen.journal import Journal, journal_of
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, SAMPLED, fit, fit_samples
 from dataset_gen.settings import ShardOptions, settings_of
 from dataset_gen.shards import origin_of
-from dataset_gen.task_farm import OrderedQueue
 from dataset_gen.tasks import ROW, ShardPlan
 from dataset_gen.workers import in_this_process
 from tests.patience import HANG_SECONDS, wait_for
@@ -446,19 +445,3 @@ def test_no_failed_write_leaves_half_a_task(path, monkeypatch, number):
     assert again.tasks == 1
     assert [len(work) for work in again.work()] == [TASK * ROW.itemsize]
     again.close(remove=True)
-
-
-# Ordered queue -----------------------------------------------------------------------------------
-
-
-def test_results_come_in_order_and_no_more_than_a_window_is_kept():
-    generator = np.random.default_rng(1)
-    queue, out, seen, largest = OrderedQueue(range(3, 200), window=8), [], [], 0
-    while not queue.finished:
-        while (task := queue.next_task()) is not None:
-            out.append(task)
-        largest = max(largest, len(out) + len(queue._results))
-        task = out.pop(int(generator.integers(len(out))))
-        queue.put(task, str(task).encode())
-        seen += [int(work) for work in queue.ready()]
-    assert seen == list(range(3, 200)) and largest <= 8

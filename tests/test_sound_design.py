@@ -301,7 +301,7 @@ def test_a_worker_that_dies_is_told(problem):
     z = np.zeros(problem.setting.material.dimensions)
     try:
         processes.run([Task(z)] * 2)
-        process = next(iter(processes._executor._processes.values()))
+        process = next(iter(processes._pool._processes.values()))
         threading.Timer(0.2, process.kill).start()
         with pytest.raises(UserError, match="died"):
             while True:

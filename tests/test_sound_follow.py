@@ -94,7 +94,7 @@ def test_a_round_is_broken_off_while_tasks_are_sent(problem):
 def test_processes_are_ended_in_the_midst_of_what_they_tell(problem, tmp_path):
     processes = Pool(problem.setting, 2)
     written = tmp_path / "written"
-    processes._executor.submit(write_half_a_result, str(written))
+    processes._pool.submit(write_half_a_result, str(written))
     wait_for(written.exists, "half a result")
     manager = processes._executor._executor_manager_thread
     # By now it waits for the rest.

@@ -16,7 +16,7 @@ from carillon import __version__
 from carillon.command_line import exit_status
 from carillon.command_line.arguments import Parser
 from carillon.command_line.progress import say
-from carillon.errors import UserError
+from carillon.errors import UserError, on_all_ranks
 from carillon.processes import mpi_environment, present_folder
 from carillon.processes.ranks import world
 from carillon.processes.waiting import leave_cores
@@ -88,6 +88,7 @@ def run_program(
 
     everything = {**commands, **unlisted}
 
+    @on_all_ranks()
     def parse() -> None:
         chosen.append(_parser(name, description, commands, unlisted, given).parse_args(given))
         command = chosen[0].command

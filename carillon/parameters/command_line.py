@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
+from carillon.errors import on_all_ranks
 from carillon.parameters.fields import Parameter, ValueDomain, domain_of, parameters_of
 from carillon.parameters.model import REQUIRED, adapter
 
@@ -40,6 +41,7 @@ def add_options(
             _add(parser, each, each.name in positional)
 
 
+@on_all_ranks()
 def collect(model: type[T], arguments: argparse.Namespace) -> T:
     """The dataclass from what a command line gave, its defaults for what the command leaves out."""
     known = parameters_of(model)  # type: ignore[arg-type]

@@ -210,10 +210,32 @@ def lonely_among(environment: Mapping[str, str]) -> str | None:
     return None
 
 
+@contextmanager
+def no_rank(environment: MutableMapping[str, str]) -> Iterator[None]:
+    """Hide in the body what a launcher told a rank: a process started there is none.
+
+    Examples
+    --------
+    >>> environment = {"OMPI_COMM_WORLD_RANK": "1", "HOME": "/"}
+    >>> with no_rank(environment):
+    ...     environment
+    {'HOME': '/'}
+    >>> sorted(environment)
+    ['HOME', 'OMPI_COMM_WORLD_RANK']
+    """
+    hidden = {name: environment.pop(name) for name in list(environment) if _tells_rank(name)}
+    try:
+        yield
+    finally:
+        environment.update(hidden)
+
+
+def _tells_rank(name: str) -> bool:
+    return name.startswith(_LAUNCHERS) and not name.startswith(_SETTINGS)
+
+
 def _launched(environment: Mapping[str, str]) -> bool:
-    return any(
-        name.startswith(_LAUNCHERS) and not name.startswith(_SETTINGS) for name in environment
-    )
+    return any(map(_tells_rank, environment))
 
 
 def _on_one_machine(environment: Mapping[str, str]) -> bool:

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
-from carillon.errors import LocalUserError, UserError
+from carillon.errors import UserError
 
 Comm = Any
 """mpi4py's communicator; mpi4py is imported only where a launcher started several ranks."""
@@ -35,18 +33,3 @@ def world() -> Comm | None:
             "with --workers"
         ) from None
     return MPI.COMM_WORLD if MPI.COMM_WORLD.size > 1 else None
-
-
-@contextmanager
-def alone() -> Iterator[None]:
-    """Work of one rank of which the others do not know: input refused in it ends all ranks.
-
-    Raises
-    ------
-    LocalUserError
-        If the body raises UserError.
-    """
-    try:
-        yield
-    except UserError as error:
-        raise LocalUserError(str(error)) from error

@@ -9,7 +9,7 @@ import argparse
 
 from carillon.command_line.progress import say
 from carillon.files.paths import require_writable
-from carillon.processes.ranks import alone, world
+from carillon.processes.ranks import world
 from forests.commands.training import add_training, add_workers, training_of
 from forests.model import save_model
 from forests.training.dataset import Dataset, open_dataset
@@ -50,17 +50,6 @@ def run(arguments: argparse.Namespace) -> None:
     """Train and write the model, together with the other ranks of the job if there are any."""
     ranks = Ranks(world())
     training, dataset, grown = ranks.agree(lambda: _opened(arguments))
-    with alone():
-        _train(arguments, ranks, training, dataset, grown)
-
-
-def _train(
-    arguments: argparse.Namespace,
-    ranks: Ranks,
-    training: TrainingOptions,
-    dataset: Dataset,
-    grown: Grown | None,
-) -> None:
     trained = train_trees(dataset, training, ranks, arguments.workers, grown=grown)
     if trained is None:
         return

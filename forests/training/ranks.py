@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-from carillon.errors import UserError
+from carillon.errors import UserError, on_all_ranks
 from dataset_gen.shards import PIECE_ROWS
 from forests.training.leaves import Sums
 
@@ -80,5 +80,6 @@ class Ranks:
             refusal = str(error)
         refusals = [each for each in self._comm.allgather(refusal) if each is not None]
         if refusals:
-            raise UserError(refusals[0])
+            with on_all_ranks():
+                raise UserError(refusals[0])
         return cast(T, result)

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from mpi4py import MPI
 
-from carillon.errors import UserError
+from carillon.errors import UserError, on_all_ranks
 from carillon.fem.materials import NAMES
 from carillon.fem.model import ElasticModel, Solid, fine_model
 from solver.accuracy.divide import DividedCells
@@ -142,26 +142,31 @@ def solve_accurately(
     """
     while True:
         solved = solve_solid(described, solve, wishes, comm, report)
-        if f"{FROM_SOLID}_rms" not in solved.achieved:
-            raise UserError("--accuracy needs a distance from the solid, which could not be told")
-        rms, worst = (solved.achieved[f"{FROM_SOLID}_{name}"] for name in ("rms", "worst"))
-        excess = max(rms, abs(worst) / WORST) / accuracy
+        with on_all_ranks():
+            if f"{FROM_SOLID}_rms" not in solved.achieved:
+                raise UserError(
+                    "--accuracy needs a distance from the solid, which could not be told"
+                )
+            rms, worst = (solved.achieved[f"{FROM_SOLID}_{name}"] for name in ("rms", "worst"))
+            excess = max(rms, abs(worst) / WORST) / accuracy
+            if excess > 1.0 and described.material not in NAMES:
+                raise UserError(
+                    f"--accuracy {accuracy:g} needs a higher --resolution than "
+                    f"{described.resolution}, and {described.material} is of the voxels of that one"
+                )
         if excess <= 1.0:
             # Cells need not be divided as far as without an accuracy.
             solved.achieved.pop("missed_accuracy", None)
             return described, solved
-        if described.material not in NAMES:
-            raise UserError(
-                f"--accuracy {accuracy:g} needs a higher --resolution than "
-                f"{described.resolution}, and {described.material} is of the voxels of that one"
-            )
         unknowns = comm.bcast(None if solved.model is None else solved.model.n_dofs)
         factor = float(np.clip(np.sqrt(excess), LEAST_STEP, LARGEST_STEP))
         if unknowns * factor**2 > MOST_UNKNOWNS:
-            raise UserError(
-                f"--accuracy {accuracy:g} needs more than {MOST_UNKNOWNS:,} unknowns; --resolution "
-                f"{described.resolution} is expected to be {rms:.2g} off, worst {worst:+.2g}"
-            )
+            with on_all_ranks():
+                raise UserError(
+                    f"--accuracy {accuracy:g} needs more than {MOST_UNKNOWNS:,} unknowns; "
+                    f"--resolution {described.resolution} is expected to be {rms:.2g} off, worst "
+                    f"{worst:+.2g}"
+                )
         solved.modes.destroy()
         described = replace(described, resolution=int(np.ceil(factor * described.resolution)))
 

@@ -6,7 +6,7 @@ from typing import cast
 
 from mpi4py import MPI
 
-from carillon.errors import UserError
+from carillon.errors import UserError, on_all_ranks
 from carillon.fem.model import RIGID_MODES, Solid
 from carillon.processes.memory import available_memory
 from solver.analysis.options import SolverOptions
@@ -25,6 +25,7 @@ FEWEST_BLOCKS, FEWEST_SQUARES = 2, 2
 """Blocks of all vectors, and matrices of their products, that any method keeps at a time."""
 
 
+@on_all_ranks()
 def check_mode_count(modes: int, n_dofs: int) -> None:
     """Raise UserError unless there is an elastic mode among `modes` and unknowns for all."""
     if modes <= RIGID_MODES:

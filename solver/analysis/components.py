@@ -8,7 +8,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.errors import UserError
+from carillon.errors import UserError, on_all_ranks
 from carillon.fem.model import RIGID_MODES
 from solver.analysis.bounds import FEWEST_SPARE, default_keep
 from solver.analysis.options import SolverOptions
@@ -60,6 +60,7 @@ class ComponentModes:
         return synthesis
 
 
+@on_all_ranks()
 def _modes_to_keep(local_mesh: LocalMesh, options: SolverOptions, together: bool) -> int:
     keep = options.retained_modes
     if keep is None:
@@ -74,6 +75,7 @@ def _modes_to_keep(local_mesh: LocalMesh, options: SolverOptions, together: bool
     return keep
 
 
+@on_all_ranks()
 def lowest_pairs(synthesis: Synthesis, count: int) -> tuple[Array, Array]:
     """The `count` lowest values and vectors, uncorrected.
 

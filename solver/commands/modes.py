@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.command_line.progress import say
-from carillon.errors import UserError
+from carillon.errors import UserError, on_all_ranks
 from carillon.fem.geometry.size import sizes_in_words
 from carillon.fem.model import Solid
 from carillon.parameters.command_line import add_options, collect, reader
@@ -187,6 +187,7 @@ def _for_estimate(options: SolverOptions, modes: int) -> SolverOptions:
     )
 
 
+@on_all_ranks()
 def _resolution(arguments: argparse.Namespace) -> int:
     if arguments.resolution is not None:
         return int(arguments.resolution)

@@ -87,6 +87,7 @@ def _attempt(comm: MPI.Comm, compute: Callable[[], T]) -> tuple[T | None, Except
         try:
             return compute(), None
         except Exception as error:
-            error.collective = True  # type: ignore[attr-defined]
+            if comm.size > 1:  # else others may be at work that do not know
+                error.collective = True  # type: ignore[attr-defined]
             return None, error
     return None, None

@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.errors import LocalUserError, UserError
+from carillon.errors import UserError
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.model import Solid
 from carillon.files.datasets import INTEGER, find, finite, read
@@ -72,14 +72,11 @@ def modes_from_file(
 
 
 def _read_columns(path: str | Path, count: int) -> Iterator[Array]:
-    """Modes of the file in blocks; what goes wrong now, after the check, this rank alone knows."""
-    try:
-        with open_h5(path, KIND, SCHEMA, sealed=True) as file:
-            modes = find(file, "modes", (None, count))
-            for first in range(0, count, COLUMNS):
-                yield modes[:, first : first + COLUMNS]
-    except UserError as error:
-        raise LocalUserError(str(error)) from None
+    """Modes of the file in blocks."""
+    with open_h5(path, KIND, SCHEMA, sealed=True) as file:
+        modes = find(file, "modes", (None, count))
+        for first in range(0, count, COLUMNS):
+            yield modes[:, first : first + COLUMNS]
 
 
 def scatter_rows(

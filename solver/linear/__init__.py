@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.errors import UserError
+from carillon.errors import UserError, on_all_ranks
 from carillon.processes.memory import available_memory
 from solver.distribution.collective import bcast_from_root, ranks_of_machine
 
@@ -148,15 +148,9 @@ class LinearSolver:
     """
 
     def __init__(self, method: str, layout: Layout) -> None:
-        if method not in METHODS:
-            raise UserError(f"linear solver {method!r}, expected one of {', '.join(METHODS)}")
         self._layout = layout
         self._together = ranks_of_machine(layout.comm) == layout.comm.size
-        if method == "multifrontal" and not self._together:
-            raise UserError(
-                "the linear solver multifrontal runs on one machine, the ranks are on several; "
-                "use mumps"
-            )
+        _require_method(method, self._together)
         if method == "auto" and self._together and layout.comm.size <= MOST_LED:
             method = "multifrontal" if self._fits() else "amg-cg"
         elif method == "auto":
@@ -214,3 +208,15 @@ class LinearSolver:
 
             return MumpsInverse(system, shift)
         return self.iterative(system, shift)
+
+
+@on_all_ranks()
+def _require_method(method: str, together: bool) -> None:
+    """Refuse a method that is none, or runs only where the ranks are together on one machine."""
+    if method not in METHODS:
+        raise UserError(f"linear solver {method!r}, expected one of {', '.join(METHODS)}")
+    if method == "multifrontal" and not together:
+        raise UserError(
+            "the linear solver multifrontal runs on one machine, the ranks are on several; "
+            "use mumps"
+        )

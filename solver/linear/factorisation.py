@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from carillon.errors import ConvergenceError, UserError
+from carillon.errors import ConvergenceError, UserError, on_all_ranks
 from carillon.processes.petsc import PETSc
 
 ROOM = (50, 200, 800)
@@ -16,6 +16,7 @@ _TOO_LITTLE_ROOM = (-8, -9, -17, -20)
 """What MUMPS's INFOG(1) says then."""
 
 
+@on_all_ranks()
 def factor_package(ranks: int) -> str:
     """PETSc's name of the sparse Cholesky to use: MUMPS, or PETSc's own on one rank without it.
 

@@ -6,7 +6,7 @@ import ctypes
 from contextlib import suppress
 from pathlib import Path
 
-from carillon.errors import LocalUserError, UserError
+from carillon.errors import UserError, on_all_ranks
 from carillon.processes.petsc import PETSc
 
 OPTIONS_PREFIX = "carillon_"
@@ -24,6 +24,7 @@ GENERAL = ("slepc", "arpack")
 _inserted: list[str] = []
 
 
+@on_all_ranks()
 def insert_options(text: str | None, method: str = "slepc") -> None:
     """Put options like `-carillon_eps_ncv 400` into PETSc's database; earlier ones leave it.
 
@@ -52,6 +53,7 @@ def insert_options(text: str | None, method: str = "slepc") -> None:
     _inserted[:] = _names(text)
 
 
+@on_all_ranks()
 def require_known_options() -> None:
     """Check, once an eigensolver is set up and before it solves, that it knows all options.
 
@@ -109,5 +111,6 @@ def meaning(error: PETSc.Error, text: str | None) -> Exception:
         return MemoryError(said)
     if text is None:
         return error
-    refusal = LocalUserError if error.ierr == OTHER_LIBRARY else UserError
-    return refusal(f"PETSc refuses --petsc {text!r}: {said}")
+    refusal = UserError(f"PETSc refuses --petsc {text!r}: {said}")
+    refusal.collective = error.ierr != OTHER_LIBRARY
+    return refusal

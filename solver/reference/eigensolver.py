@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.errors import UserError
+from carillon.errors import UserError, on_all_ranks
 from carillon.processes.petsc import PETSc
 from carillon.processes.slepc import SLEPc
 from solver.assembly.system import System
@@ -103,9 +103,10 @@ def _search(
         try:
             solver.setType(TYPES[method])
         except PETSc.Error:
-            raise UserError(
-                f"this SLEPc was built without {method}; use slepc or rebuild SLEPc with it"
-            ) from None
+            with on_all_ranks():
+                raise UserError(
+                    f"this SLEPc was built without {method}; use slepc or rebuild SLEPc with it"
+                ) from None
         solver.setOperators(system.K, system.M)
         solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
         solver.setTolerances(tolerance, MAX_ITERATIONS)

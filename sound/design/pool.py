@@ -8,26 +8,21 @@ from __future__ import annotations
 
 import os
 import pickle
-import signal
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_EXCEPTION, ProcessPoolExecutor, wait
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_EXCEPTION, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from dataclasses import replace
 from functools import cache
-from multiprocessing import get_context
-from multiprocessing.connection import Connection
 from multiprocessing.queues import SimpleQueue
 from tempfile import TemporaryFile
 from threading import Thread
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError, UserError
-from carillon.processes.children import end_with_parent
-from carillon.processes.mpi_environment import leave_nothing
+from carillon.processes import children
 from carillon.processes.threads import one_thread
 from sound.design.descent import (
     DesignDescent,
@@ -45,7 +40,6 @@ from sound.design.tasks import FAILED, SearchStep, Setting, Task, Trial
 
 Array = NDArray[np.float64]
 
-_PIPE_BYTES = 1 << 20
 LISTEN_SECONDS = 0.1
 """Time between two looks whether somebody asked to stop, while processes work."""
 
@@ -66,17 +60,15 @@ class Pool:
     def __init__(
         self, setting: Setting, workers: int, tell: Callable[[SearchStep], None] | None = None
     ) -> None:
-        self._executor: ProcessPoolExecutor | None = None
+        self._pool: children.ProcessPool | None = None
         self._held = ExitStack()
         if workers == 1:
             self._held.enter_context(one_thread())
             _prepare(setting, tell)
             return
-        # Not forked, as MPI and threads do not survive that.
-        context = get_context("spawn")
         told = None
         if tell is not None:
-            told = context.SimpleQueue()
+            told = children.CONTEXT.SimpleQueue()
             Thread(target=_pass_on, args=(told, tell), daemon=True).start()
         # What processes are started with has to fit into a pipe, or one that died before it had
         # read all would be waited for. So they read the setting from a file, which has no name.
@@ -84,7 +76,7 @@ class Pool:
         pickle.dump(setting, file)
         file.flush()
         path = f"/proc/{os.getpid()}/fd/{file.fileno()}"
-        self._executor = ProcessPoolExecutor(workers, context, _prepare_apart, (path, told))
+        self._pool = children.ProcessPool(workers, _prepare_apart, path, told)
 
     def run(
         self, tasks: Sequence[Task], interrupted: Callable[[], bool] | None = None
@@ -103,11 +95,10 @@ class Pool:
         UserError
             If a process died.
         """
-        if self._executor is None:
+        if self._pool is None:
             return [_run(task) for task in tasks]
         try:
-            with _signals_held():  # submitting starts the processes
-                futures = [self._executor.submit(_run, task) for task in tasks]
+            futures = [self._pool.submit(_run, task) for task in tasks]
             while wait(futures, LISTEN_SECONDS, FIRST_EXCEPTION).not_done:
                 if interrupted is not None and interrupted():
                     self.close()
@@ -120,58 +111,16 @@ class Pool:
             ) from None
 
     def close(self) -> None:
-        """End the processes, whatever they are doing: they own nothing."""
+        """End the processes, whatever they are doing."""
         self._held.close()
-        executor: Any = self._executor
-        if executor is None or executor._result_queue is None:  # ended before
-            return
-        processes = list(executor._processes.values())
-        for process in processes:
-            process.kill()
-        manager, queue = executor._executor_manager_thread, executor._call_queue
-        # The thread that manages them may be reading a result that one of them has half written. It
-        # waits for the rest as long as anybody could write it, and this process could.
-        executor._result_queue._writer.close()
-        executor.shutdown(wait=False, cancel_futures=True)
-        if manager is not None:
-            _join(manager, queue._reader)
-        for process in processes:
-            leave_nothing(os.environ, process.pid)
-
-
-def _join(manager: Thread, tasks: Connection) -> None:
-    """Wait for the thread that manages processes which were killed.
-
-    It waits for tasks to be written that nobody reads any more, so these are read here; Python does
-    that itself from 3.12 on.
-    """
-    while manager.is_alive():
-        try:
-            if tasks.poll(LISTEN_SECONDS):
-                os.read(tasks.fileno(), _PIPE_BYTES)
-        except OSError:  # closed by the thread
-            break
-    manager.join()
+        if self._pool is not None:
+            self._pool.close()
 
 
 _setting: Setting
 _simulation: Simulation
 _tell: Callable[[SearchStep], None] | None
 _for_good = ExitStack()
-
-
-@contextmanager
-def _signals_held() -> Iterator[None]:
-    """Hold back what asks to stop; processes that begin meanwhile will never hear it.
-
-    Ctrl-C and the signals of schedulers go to all processes; it is for the one that started the
-    others to say when they end.
-    """
-    former = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, former)
 
 
 def _pass_on(told: SimpleQueue[SearchStep], tell: Callable[[SearchStep], None]) -> None:
@@ -181,7 +130,6 @@ def _pass_on(told: SimpleQueue[SearchStep], tell: Callable[[SearchStep], None]) 
 
 
 def _prepare_apart(path: str, told: SimpleQueue[SearchStep] | None) -> None:
-    end_with_parent()
     _for_good.enter_context(one_thread())
     with open(path, "rb") as file:
         setting = pickle.load(file)

@@ -149,7 +149,7 @@ def tables_of(mask: int, poisson: float) -> ErrorTables:
     load = pattern.mass @ pattern.interpolation @ motions
     moved = pattern.mass @ pattern.null
     balance = moved @ np.linalg.solve(pattern.null.T @ moved, pattern.null.T @ load)
-    inertia: Array = complement.T @ (load - balance)
+    inertia: Array = np.asarray(complement.T @ (load - balance), dtype=np.float64)
     corners = complement.T @ corner_selection(mask, poisson).T @ motions
     unit = np.eye(motions.shape[1])
     loads = {

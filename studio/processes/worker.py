@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import os
-import signal
 import sys
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
 from itertools import count
-from multiprocessing import get_context
+from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
@@ -20,9 +19,8 @@ from typing import Any
 
 from carillon.command_line.exit_status import meaning
 from carillon.errors import UserError, one_line
-from carillon.processes.children import end_with_parent
+from carillon.processes.children import end_process, start_process
 from carillon.processes.memory import spare_the_machine
-from carillon.processes.mpi_environment import leave_nothing
 
 # Processes are ended at once, whatever they hold. That this is then cleaned up need not be
 # told.
@@ -128,9 +126,7 @@ class Worker:
         process, pipe = self._process, self._pipe
         self._process = self._pipe = None
         if process is not None and pipe is not None:
-            process.kill()
-            process.join()
-            leave_nothing(os.environ, process.pid or 0)
+            end_process(process)
         self._give_up()
 
     def start(self) -> None:
@@ -138,10 +134,8 @@ class Worker:
         if self._process is not None:
             return
         loop = asyncio.get_running_loop()
-        context = get_context("spawn")
-        self._pipe, other = context.Pipe()
-        process = context.Process(target=_serve, args=(other, self._work), daemon=False)
-        process.start()
+        self._pipe, other = Pipe()
+        process = start_process(_serve, other, self._work)
         other.close()
         self._process = process
         Thread(target=self._listen, args=(loop, self._pipe, process), daemon=True).start()
@@ -194,10 +188,6 @@ class Worker:
 
 def _serve(pipe: Connection, work: str) -> None:
     """What the process does: it calls methods until its parent is gone."""
-    end_with_parent()
-    # Ctrl-C is for the server, which ends this process when it is time.
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.SIG_IGN)
     os.nice(NICER)
     os.environ["OMP_NUM_THREADS"] = "1"
     module, name = work.split(":")
