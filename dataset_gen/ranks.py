@@ -23,10 +23,7 @@ def run_on_ranks(comm: Comm, make: Callable[[Engine], int]) -> int:
         On every rank if `make` raises it before the ranks have begun to work; later, on the one
         rank that failed, see `exit_status.run`, which ends all of them.
     """
-    from carillon.processes.waiting import leave_cores
-
     _warn_about_cores(comm)
-    leave_cores(comm)
     if comm.rank > 0:
         return _follow(comm)
     at_work: list[ShardPlan] = []
