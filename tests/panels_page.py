@@ -12,7 +12,9 @@ from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 
-from sound.project.schema import project_schema, with_defaults
+from carillon.parameters.documents import with_defaults
+from carillon.parameters.schema import schema_of
+from sound.project.project import Project
 from studio.binary import pack
 from studio.server.page_files import page_policy
 
@@ -98,7 +100,7 @@ def target(name: str, vertex: int, clip: str | None) -> dict[str, Any]:
 
 def state(**changes: Any) -> dict[str, Any]:
     """A state of two targets, the first one of which has a clip with four modes."""
-    settings = with_defaults({}, project_schema())
+    settings = with_defaults({}, Project)
     made = {
         "event": "state",
         "revision": 1,
@@ -262,7 +264,7 @@ class Panels:
             content = SILENT.get(name) or (PAGE / name).read_bytes()
             route.fulfill(body=content, headers={"Content-Type": TYPES[Path(name).suffix]})
         elif path == "/schema.json":
-            route.fulfill(json=project_schema())
+            route.fulfill(json=schema_of(Project))
         elif path == "/clip":
             self.uploads.append(parse_qs(url.query)["name"][0])
             route.fulfill(json={"clip": f"c{9 + len(self.uploads)}"})

@@ -18,7 +18,8 @@ import numpy as np
 
 from carillon.errors import UserError
 from carillon.fem.geometry import builtin_surface
-from sound.project.schema import project_schema, with_defaults
+from carillon.parameters.documents import with_defaults
+from sound.project.project import Project
 from studio.binary import pack
 from studio.feed import Feed
 from studio.interface import Download, NotFoundError
@@ -44,7 +45,7 @@ class StubStudio:
         self._history: list[dict[str, float]] = []
         self._targets: list[dict[str, Any]] = []
         self._clips = [self._clip("c1", "bell.wav")]
-        self._settings = with_defaults({}, project_schema())
+        self._settings = with_defaults({}, Project)
         self._phase = "idle"
         self._heard: str | None = None
         self.uploads: list[tuple[str, str, int]] = []

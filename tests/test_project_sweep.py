@@ -13,9 +13,9 @@ import pytest
 import yaml
 
 from carillon.errors import UserError
+from carillon.parameters.schema import schema_of
 from sound.clips.wav import read_wav
 from sound.project.project import Project, load_project, project_of
-from sound.project.schema import project_schema
 from studio.session import open_studio
 
 LEAST = {"mesh": "builtin:bar", "targets": [{"name": "end", "vertex": 3, "clip": "end.wav"}]}
@@ -86,7 +86,7 @@ def shown(value: Any) -> str:
 
 
 def cases() -> Iterator[tuple[str, Any]]:
-    for path in keys(project_schema()):
+    for path in keys(schema_of(Project)):
         for value in VALUES:
             yield f"{path}: {shown(value)}", put(LEAST, path, value)
 
@@ -123,7 +123,7 @@ def test_a_project_is_taken_or_refused_in_one_sentence(tmp_path):
 
 def test_the_studio_takes_settings_or_refuses_them_in_one_sentence(tmp_path):
     """All that a page may send, and then the state is one that it can be told."""
-    schema = project_schema()
+    schema = schema_of(Project)
 
     async def play() -> None:
         studio, taken = open_studio("builtin:bar", tmp_path), 0

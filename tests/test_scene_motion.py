@@ -147,7 +147,7 @@ def test_hertz_contact_lasts_as_long_as_its_equation_of_motion_says():
 def test_impacts_last_as_hertz_says_of_both_materials():
     described = scene(ball(position=[0, 0, 0.06]), ground_material="glass", seconds=0.3)
     (body,), impacts, _ = struck(described)
-    glass, steel = described.ground_material, body.entry.material
+    glass, steel = described.ground_material, body.entry.made_of
     giving = (1 - glass.poisson**2) / glass.young + (1 - steel.poisson**2) / steel.young
     expected = bounce_seconds(body.mass, 0.01, 1 / giving, np.sqrt(2 * G * 0.05))
     assert impacts[0].impact.duration == pytest.approx(expected, rel=0.01)

@@ -33,7 +33,7 @@ def block(*sides):
 def test_a_thin_rod_sounds_as_beam_theory_says(tmp_path):
     rod = written(trimesh.creation.cylinder(0.01, 0.25, sections=32), tmp_path / "rod.obj")
     found = body(mesh=rod, **ALUMINIUM, count=3)
-    material = found.entry.material
+    material = found.entry.made_of
     # A prism of 32 sides is 0.3 % less stiff against bending for its mass than a round rod.
     wanted = rod_frequencies(0.25, 0.01, material.young, material.poisson, material.density)[0]
     assert found.solid.frequencies[:2] == pytest.approx(wanted, rel=0.01)
@@ -44,7 +44,7 @@ def test_a_thin_rod_sounds_as_beam_theory_says(tmp_path):
 def test_a_sheet_thinner_than_a_spacing_sounds_as_a_thin_plate(tmp_path):
     sheet = written(block(0.2, 0.2, 0.0008), tmp_path / "sheet.obj")
     found = body(mesh=sheet, material="steel", count=3, resolution=20, collision="hull")
-    material = found.entry.material
+    material = found.entry.made_of
     wanted = plate_frequencies(0.2, 0.0008, material.young, material.density)[0]
     assert found.solid.frequencies[0] == pytest.approx(wanted, rel=0.02)
     assert found.mass == pytest.approx(material.density * 0.2**2 * 0.0008, rel=1e-6)
@@ -100,7 +100,7 @@ def test_voxels_are_as_they_were_and_told_how_far_off_they_are(count):
         mesh="builtin:bar", **ALUMINIUM, resolution=12, count=count, discretisation="voxel"
     )
     volume = mesh.n_cells * mesh.edge**3
-    assert found.mass == pytest.approx(volume * found.entry.density, rel=1e-9)
+    assert found.mass == pytest.approx(volume * found.entry.made_of.density, rel=1e-9)
     if count:
         assert found.accuracy["discretisation"] == "voxel"
         # Voxels at this resolution make the bar thicker: the estimate says so.
@@ -134,7 +134,7 @@ def test_refusals_name_keys_of_a_scene_and_what_helps(tmp_path):
     with pytest.raises(UserError, match="components: largest"):
         body(mesh=pieces, material="steel", count=0, resolution=12)
     one = body(mesh=pieces, material="steel", count=0, resolution=12, components="largest")
-    assert one.mass == pytest.approx(one.entry.density, rel=1e-6)
+    assert one.mass == pytest.approx(one.entry.made_of.density, rel=1e-6)
 
 
 def boards(overlap):
@@ -158,7 +158,7 @@ def test_a_box_of_boards_is_a_solid_of_six_parts(tmp_path, overlap):
     found = body(mesh=path, material="wood", count=0, resolution=16)
     assert len(found.parts) == 6
     hollow = 0.4 * 0.3 * 0.25 - 0.38 * 0.28 * 0.23
-    assert found.mass == pytest.approx(found.entry.density * hollow, rel=1e-6)
+    assert found.mass == pytest.approx(found.entry.made_of.density * hollow, rel=1e-6)
 
 
 class TestUp:

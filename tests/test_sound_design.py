@@ -31,7 +31,8 @@ from sound.design.search import HistoryEntry
 from sound.design.tasks import Task, Trial
 from sound.project.design import HISTORY_TYPE
 from sound.project.design_file import read_design, write_design
-from sound.project.project import Weights, project_of
+from sound.project.project import project_of
+from sound.project.settings import Weights
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
 from tests import small_project
@@ -78,7 +79,7 @@ def test_hybrid_finds_a_material_that_sounds_alike(designed):
 def test_a_design_of_finite_cells(tmp_path):
     """Modes and their derivatives of the solid as it is lead to a material as well."""
     made = small_project.project(tmp_path, evaluations=60)
-    made = replace(made, solid=replace(made.solid, resolution=12, discretisation="finite-cell"))
+    made = replace(made, resolution=12, discretisation="finite-cell")
     designed = optimise(prepare(made, small_project.targets(made)))
     assert designed.evidence["cost"] < 0.1 * designed.evidence["cost_start"]
     test_written_modes_are_those_of_the_written_model(designed, tmp_path)
@@ -98,7 +99,7 @@ def test_written_modes_are_those_of_the_written_model(designed, tmp_path):
 def test_density_gives_way_to_bounds_of_the_moduli(tmp_path, discretisation):
     """Frequencies stay, as do the gains of the struck points times the modes there."""
     made = small_project.project(tmp_path, evaluations=1)
-    made = replace(made, solid=replace(made.solid, discretisation=discretisation))
+    made = replace(made, discretisation=discretisation)
     targets = small_project.targets(made)
     free = optimise(prepare(made, targets))
     bounds = [1e3 * free.young.max(), 1e6 * free.young.max()]
@@ -118,9 +119,8 @@ def test_poissons_ratio_is_found_and_gone_on_from(tmp_path, discretisation):
     """Targets of a bar whose Poisson's ratio is another than that of the start."""
     made = small_project.project(tmp_path, evaluations=60)
     resolution = 16 if discretisation == "voxel" else 12
-    solid = replace(made.solid, discretisation=discretisation, resolution=resolution)
-    made = replace(made, solid=solid)
-    targets = small_project.targets(replace(made, solid=replace(solid, poisson=0.42)))
+    made = replace(made, discretisation=discretisation, resolution=resolution)
+    targets = small_project.targets(replace(made, poisson=0.42))
     fixed = optimise(prepare(made, targets))
     free = replace(made, material=replace(made.material, poisson_bounds=[0.0, 0.45]))
     designed = optimise(prepare(free, targets))
@@ -240,9 +240,9 @@ def test_design_of_other_voxels_is_refused(problem, designed):
 
 def test_voxels_are_those_that_the_solver_fills(problem):
     # A resolution at which the middle of a voxel lies on the surface.
-    solid = replace(problem.project.solid, resolution=36)
-    made = prepare(replace(problem.project, solid=solid), problem.setting.objective.targets)
-    filled = build_problem(ProblemOptions(solid.mesh, solid.resolution)).fine
+    project = replace(problem.project, resolution=36)
+    made = prepare(project, problem.setting.objective.targets)
+    filled = build_problem(ProblemOptions(project.mesh, project.resolution)).fine
     np.testing.assert_array_equal(made.setting.mesh.grid, filled.grid)
 
 

@@ -16,7 +16,7 @@ from sound.design.modal_truncation import lies_between, shift_between
 from sound.design.objective import Objective
 from sound.design.poisson import FreePoisson
 from sound.design.simulation import Simulation
-from sound.project.project import Weights
+from sound.project.settings import Weights
 from sound.strikes import Strike
 from tests import cut_solids
 

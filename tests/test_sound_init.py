@@ -10,14 +10,15 @@ from pathlib import Path
 import pytest
 import yaml
 
+from carillon.parameters.documents import with_defaults
+from carillon.parameters.schema import schema_of
 from sound.__main__ import main
 from sound.clips.targets import MOST_MODES
 from sound.design.preparation import targets_of
 from sound.project.design_file import read_design
-from sound.project.project import load_project, project_of
-from sound.project.schema import project_schema, with_defaults
+from sound.project.project import Project, load_project, project_of
 
-SCHEMA = project_schema()
+SCHEMA = schema_of(Project)
 _KEY_BEHIND_A_MARK = re.compile(r"^( *)#( *[a-z_]+:)", re.MULTILINE)
 
 
@@ -51,7 +52,7 @@ def without_marks(text: str) -> str:
 
 def test_what_is_not_asked_for_has_its_default(here):
     described = yaml.safe_load(written(here / "bar.yaml", "--clips", "metal.wav"))
-    defaults = with_defaults({key: described[key] for key in ("mesh", "targets")}, SCHEMA)
+    defaults = with_defaults({key: described[key] for key in ("mesh", "targets")}, Project)
     filled = load_project(here / "bar.yaml").as_dict()
     for key in SCHEMA["properties"]:
         if key not in ("mesh", "targets", "coarsen"):

@@ -23,8 +23,9 @@ from websockets.sync.client import connect
 
 from carillon.__main__ import main
 from carillon.errors import UserError
+from carillon.parameters.schema import schema_of
 from sound.project.design_file import write_design
-from sound.project.schema import project_schema
+from sound.project.project import Project
 from studio.binary import pack, unpack
 from studio.feed import LONGEST_FEED, Feed
 from studio.interface import CLIP_PARTS, EXPORTS
@@ -114,7 +115,7 @@ def test_designs_are_taken_home_as_files(server: Served, kind):
 
 
 def test_the_schema_of_projects_is_told(server: Served):
-    assert server.ask("/schema.json").json == json.loads(json.dumps(project_schema()))
+    assert server.ask("/schema.json").json == json.loads(json.dumps(schema_of(Project)))
 
 
 def test_what_is_sent_arrives(server: Served):

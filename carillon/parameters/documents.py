@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 from carillon.errors import UserError
 from carillon.files.yaml_input import line_of, read_marked
-from carillon.parameters.fields import ValueDomain
+from carillon.parameters.fields import ValueDomain, parameters_of
 from carillon.parameters.model import adapter
-from carillon.parameters.sentences import ParameterError, Place, mistake_of
+from carillon.parameters.sentences import ParameterError, Place, mistake_of, no_key
 
 T = TypeVar("T")
 
@@ -69,12 +69,53 @@ def parameters_from(document: Mapping[str, Any], model: type[T]) -> T:
     return made
 
 
+def require_values(document: Mapping[str, Any], model: type, leave_out: Sequence[str] = ()) -> None:
+    """Check some of the keys of a document, each by itself.
+
+    Raises
+    ------
+    ParameterError
+        With one sentence about the first that is unknown or `leave_out`, or whose value is wrong.
+    """
+    from pydantic import ValidationError
+
+    known = {name: each for name, each in parameters_of(model).items() if name not in leave_out}
+    for name, value in document.items():
+        if name not in known:
+            raise ParameterError((), no_key(str(name), list(known)))
+        text = json.dumps(_plain(value, (name,)))
+        try:
+            adapter(known[name].annotation).validate_json(text, strict=True)
+        except ValidationError as error:
+            mistake = mistake_of(error, known[name].domain)
+            raise ParameterError((name, *mistake.place), mistake.reason, mistake.meaning) from None
+
+
+def document_of(parameters: Any) -> dict[str, Any]:
+    """Plain keys and values of parameters, as YAML and JSON have them."""
+    model: Any = type(parameters)
+    plain: dict[str, Any] = adapter(model).dump_python(parameters, mode="json")
+    return plain
+
+
+def with_defaults(document: Mapping[str, Any], model: type) -> dict[str, Any]:
+    """Keys and values with the defaults of those that are left out; None where there is none."""
+    result = {}
+    for name, each in parameters_of(model).items():
+        if each.domain.is_section:
+            result[name] = with_defaults(document.get(name) or {}, each.domain.kind)
+        else:
+            result[name] = document.get(name, each.plain_default)
+    return result
+
+
 def _plain(value: Any, place: Place) -> Any:
     """The value with whole numbers for floats that are such, fit to be written as JSON."""
     if isinstance(value, Mapping):
         for key in value:
             if not isinstance(key, str):
-                raise ParameterError(place, f"found the key {key!r}, expected a text")
+                shown = repr(_plain(key, place))
+                raise ParameterError(place, f"found the key {shown}, expected a text")
         return {key: _plain(each, (*place, key)) for key, each in value.items()}
     if isinstance(value, str) and any("\ud800" <= character <= "\udfff" for character in value):
         raise ParameterError(place, f"found {value!r}, which has half a character")

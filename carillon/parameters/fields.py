@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 from annotated_types import Ge, GroupedMetadata, Gt, Le, Lt, MaxLen, MinLen
 
-from carillon.parameters.model import REQUIRED, OneOf
+from carillon.parameters.model import REQUIRED, Check, OneOf
 
 _LIMITS = {Ge: "ge", Gt: "gt", Le: "le", Lt: "lt", MinLen: "min_length", MaxLen: "max_length"}
 
@@ -24,7 +24,7 @@ class ValueDomain:
     Attributes
     ----------
     kind
-        int, float, str, bool, tuple, dict, or a dataclass.
+        int, float, str, bool, tuple, dict, or a dataclass; str if a check makes it of a text.
     meaning
         What they are, with the unit in brackets; empty if the annotation does not say.
     limits
@@ -87,8 +87,18 @@ class Parameter:
     default: Any
     domain: ValueDomain
     meaning: str
+    annotation: Any
     metavar: str | tuple[str, ...] | None = None
     read: Any = None
+
+    @property
+    def plain_default(self) -> Any:
+        """Default as documents have it; None if there is none."""
+        if self.default is REQUIRED:
+            return None
+        if self.domain.is_section or self.domain.kind is dict:
+            return {}
+        return list(self.default) if isinstance(self.default, tuple) else self.default
 
 
 @cache
@@ -111,6 +121,7 @@ def _parameter(each: dataclasses.Field[Any], annotation: Any) -> Parameter:
         REQUIRED if default is dataclasses.MISSING else default,
         domain,
         meaning,
+        annotation,
         metadata.get("metavar"),
         metadata.get("read"),
     )
@@ -158,6 +169,8 @@ def _marked(domain: ValueDomain, marks: tuple[Any, ...]) -> ValueDomain:
         for each in mark if isinstance(mark, GroupedMetadata) else [mark]:
             if isinstance(each, str):
                 domain = replace(domain, meaning=each)
+            elif isinstance(each, Check) and each.before:
+                domain = replace(domain, kind=str, items=())
             elif isinstance(each, OneOf):
                 domain = replace(domain, choices=each.names)
             elif type(each) in _LIMITS:

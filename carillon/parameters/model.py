@@ -19,8 +19,8 @@ T = TypeVar("T")
 
 REQUIRED: Any = dataclasses.MISSING
 """Default of an option that has none."""
-CONFIG: ConfigDict = {"extra": "forbid", "allow_inf_nan": False}
-"""pydantic's settings for all parameters: no unknown keys, finite numbers."""
+CONFIG: ConfigDict = {"extra": "forbid", "allow_inf_nan": False, "validate_default": True}
+"""pydantic's settings for all parameters: no unknown keys, finite numbers, defaults as given."""
 
 
 class OneOf:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, TypeVar
 
-from annotated_types import Ge, Gt, Interval, Le, Lt
+from annotated_types import Ge, Gt, Interval, Le, Len, Lt
 
 from carillon.limits import DENSITIES, MODULI, POISSON, RESOLUTIONS, UNITS
 from carillon.parameters.model import OneOf
 from carillon.processes.threads import allowed_cores
+
+T = TypeVar("T")
 
 LARGEST = 2**63 - 1
 """Largest whole number that files and compiled code can hold."""
@@ -26,8 +28,12 @@ def between(low: float, high: float) -> Interval:
     return Interval(ge=low, le=high)
 
 
+Pair = tuple[T, T]
+Triple = tuple[T, T, T]
+File = Annotated[str, Len(1, 4000)]
+"""Path of a file."""
 Coordinate = Annotated[float, between(-1e18, 1e18)]
-Point = Annotated[tuple[Coordinate, Coordinate, Coordinate], "a position [m]"]
+Point = Annotated[Triple[Coordinate], "a position [m]"]
 Count = Annotated[int, Ge(1), Le(LARGEST)]
 """A number of things, one at least."""
 Number = Annotated[int, Ge(0), Le(LARGEST)]

@@ -30,6 +30,7 @@ _RULES = {
     "string_too_long": "at most {max_length} characters",
     "finite_number": "a finite number",
 }
+_LIMITS = ("ge", "gt", "le", "lt", "min_length", "max_length")
 _UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
 
 Place = tuple[str | int, ...]
@@ -44,12 +45,15 @@ class ParameterError(UserError):
         Keys and numbers that lead to it in its document.
     reason
         What is wrong with it, without its place and meaning.
+    meaning
+        What the parameter is.
     """
 
     def __init__(self, place: Place, reason: str, meaning: str = "") -> None:
         super().__init__(": ".join(part for part in (in_words(place), reason, meaning) if part))
         self.place = place
         self.reason = reason
+        self.meaning = meaning
 
 
 def mistake_of(error: ValidationError, domain: ValueDomain) -> ParameterError:
@@ -63,7 +67,7 @@ def mistake_of(error: ValidationError, domain: ValueDomain) -> ParameterError:
     kind, found = mistake["type"], mistake.get("input")
     place, domain, parent = _followed(mistake["loc"], domain)
     if kind in _UNKNOWN:
-        unknown = _no_key(str(place[-1]), list(parameters_of(parent.kind)))
+        unknown = no_key(str(place[-1]), list(parameters_of(parent.kind)))
         mistyped = ParameterError(place[:-1], unknown)
         mistyped.place = place  # Of the line, which names the key.
         return mistyped
@@ -119,7 +123,8 @@ def _followed(
     return tuple(place), domain, parent
 
 
-def _no_key(name: str, known: list[str]) -> str:
+def no_key(name: str, known: list[str]) -> str:
+    """What is wrong with a key that is not among those that are known."""
     suggestion = alike(name, known)
     hint = f"; did you mean {suggestion}?" if suggestion else ""
     return f"there is no key {name!r}, only {', '.join(known)}{hint}"
@@ -128,7 +133,9 @@ def _no_key(name: str, known: list[str]) -> str:
 def _expected(kind: str, context: dict[str, Any], domain: ValueDomain) -> str:
     """What would fit the rule that was broken."""
     if kind in _RULES:
-        bound = _RULES[kind].format(**{key: _limit(value) for key, value in context.items()})
+        bound = _RULES[kind].format(
+            **{key: _limit(value) for key, value in context.items() if key in _LIMITS}
+        )
         if "than" in kind and domain.unit:
             bound += f" {domain.unit}"
         return f"{bound}, or {' or '.join(domain.words)}" if domain.words else bound

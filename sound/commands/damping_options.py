@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from carillon.parameters import OneOf, option, parameters
+from carillon.parameters import option, parameters
+from sound.project.settings import Dampings
 
 
 @parameters
 class DampingOptions:
     """Whose dampings sound."""
 
-    damping_from: Annotated[str, OneOf("clips", "material")] | None = option(
+    damping_from: Dampings | None = option(
         None,
         "dampings of the clips, or those that loss factors of the material make, not as the "
         "project says",

@@ -54,17 +54,13 @@ def run(arguments: argparse.Namespace) -> int:
     from carillon.files.yaml_input import parse_yaml
     from sound.outputs import require_output
     from sound.project.project import project_of
-    from sound.project.schema import check, project_schema
     from sound.project.template import project_text
 
     options = collect(InitOptions, arguments)
     path = require_output(_file_of(options.path or "."), ENDINGS)
     values = _values(options, path.parent)
     text = project_text(values)
-    described = parse_yaml(text)
-    check(described, project_schema())
-    if options.clips is not None:
-        project_of(described, path.parent)
+    project_of(parse_yaml(text), path.parent)
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
     print(_sentence(options, path))

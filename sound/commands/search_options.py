@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from carillon.parameters import OneOf, option, parameters
+from carillon.parameters import option, parameters
 from carillon.parameters.quantities import Count, Positive, Workers
+from sound.project.settings import OptimiserMethod
 
 
 @parameters
@@ -16,7 +15,5 @@ class SearchOptions:
     evaluations: Count | None = option(
         None, "modal analyses of a search at most, not the project's"
     )
-    method: Annotated[str, OneOf("hybrid", "cma", "bfgs")] | None = option(
-        None, "not the project's"
-    )
+    method: OptimiserMethod | None = option(None, "not the project's")
     workers: Workers | None = option(None, "processes, not the project's")

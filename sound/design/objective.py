@@ -25,7 +25,7 @@ from sound.design.bark import bark, bark_slope
 
 if TYPE_CHECKING:
     from sound.clips.targets import Targets
-    from sound.project.project import Weights
+    from sound.project.settings import Weights
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -22,7 +22,8 @@ from sound.design.objective import Objective
 from sound.design.poisson import FreePoisson
 from sound.design.tasks import Setting
 from sound.project.design import Design
-from sound.project.project import MaterialSettings, Project
+from sound.project.project import Project
+from sound.project.settings import MaterialSettings
 from sound.project.usable import usable_strikes
 
 if TYPE_CHECKING:

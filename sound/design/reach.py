@@ -26,7 +26,7 @@ from sound.design.preparation import DesignProblem, coordinates_of
 from sound.design.reduced_model import TrustRegion
 from sound.design.tasks import Task, Trial
 from sound.project.design import Design
-from sound.project.project import Weights
+from sound.project.settings import Weights
 
 Array = NDArray[np.float64]
 

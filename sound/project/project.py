@@ -3,15 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import KW_ONLY, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from annotated_types import Len
 
 from carillon.builtin_names import BUILTIN_PREFIX
-from carillon.errors import UserError
-from carillon.files.yaml_input import read_yaml
-from solver.analysis.problem import ProblemOptions
-from sound.project.schema import check, project_schema, with_defaults
+from carillon.fem.element import DEFAULT_POISSON
+from carillon.fem.model import DEFAULT_DENSITY
+from carillon.parameters import REQUIRED, OneOf, option, parameters
+from carillon.parameters.documents import document_of, parameters_from, read_parameters
+from carillon.parameters.quantities import (
+    Components,
+    Density,
+    Discretisation,
+    File,
+    Fill,
+    MetresPerUnit,
+    PoissonRatio,
+    Resolution,
+    between,
+)
+from carillon.parameters.sentences import ParameterError
+from solver.analysis.problem import AUTO, ProblemOptions
+from solver.coarsening.forest import FOREST
+from solver.coarsening.linear import LINEAR
+from sound.project.settings import (
+    DampingSettings,
+    MaterialSettings,
+    OptimiserSettings,
+    TargetEntry,
+    Weights,
+)
 from sound.strikes import Place, Strike, locate_all
 from sound.surface import struck_surface
 
@@ -30,98 +54,76 @@ _SOLID = (
     "forest",
     "discretisation",
 )
-LEAST_WEIGHT = 1e-12
-"""Of frequencies or of amplitudes: what is smaller leaves a search with nothing to lower."""
 
 
-@dataclass(frozen=True)
-class TargetEntry:
-    """A struck point, `at` a position (3,) [mesh unit] or a `vertex`, and the clip it sounds like.
-
-    `modes` are taken from the clip, its strongest; None takes all that it has.  Of these, modes at
-    the frequencies `without` [Hz] are left out.  It may be clipped if that is allowed.
-    """
-
-    name: str
-    clip: str
-    at: tuple[float, float, float] | None
-    vertex: int | None
-    modes: int | None
-    allow_clipped: bool
-    without: tuple[float, ...] = ()
-
-
-@dataclass(frozen=True)
-class MaterialSettings:
-    """Modulus to start from [Pa], eigenvectors that make the field, and how they do.
-
-    `young_bounds` [Pa] are those that moduli are brought into by another density, `poisson_bounds`
-    those that Poisson's ratio is sought between; None leaves these as they are.
-    """
-
-    young: float
-    dimensions: int
-    law: str
-    young_bounds: list[float] | None
-    poisson_bounds: list[float] | None
-
-
-@dataclass(frozen=True)
-class DampingSettings:
-    """What modes are damped by when they sound, and regions that have loss factors of their own."""
-
-    source: str
-    regions: int
-
-
-@dataclass(frozen=True)
-class Weights:
-    """Weights of the parts of the cost (Eq. 4)."""
-
-    frequency: float
-    amplitude: float
-    regulariser: float
-
-
-@dataclass(frozen=True)
-class OptimiserSettings:
-    """How the material is sought; None leaves it to the method, or sets no limit."""
-
-    method: str
-    seconds: float | None
-    evaluations: int | None
-    seed: int
-    population: int | None
-    workers: int | None
-    fine_check: bool
-
-
-@dataclass(frozen=True)
+@parameters
 class Project:
-    """A solid, targets at points of its surface, and how a material is sought.
+    """A solid, what its struck points shall sound like, and how a material is sought.
 
-    Every key is described in `project.schema.yaml`, which also has the defaults.  Paths are
-    no longer relative to the project's file: they hold in the working directory.  `modes` is a
-    number once the clips are known, see `sound.design.preparation`.
+    Once it is loaded, its paths hold in the working directory, and its coarsening is the one that
+    auto stands for.  `modes` is a number once the clips are known, see `sound.design.preparation`.
     """
 
-    solid: ProblemOptions
-    modes: int | Literal["auto"]
-    targets: tuple[TargetEntry, ...]
-    material: MaterialSettings
-    damping: DampingSettings
-    weights: Weights
-    optimiser: OptimiserSettings
+    _: KW_ONLY
+    mesh: File = option(REQUIRED, "either builtin:NAME or a mesh file, relative to the project")
+    resolution: Resolution = option(32)
+    unit: MetresPerUnit = option(1.0)
+    fill: Fill = option("winding")
+    components: Components = option("error")
+    poisson: PoissonRatio = option(DEFAULT_POISSON)
+    density: Density = option(DEFAULT_DENSITY)
+    coarsen: Annotated[str, OneOf(AUTO, "none", *LINEAR, FOREST)] = option(
+        AUTO,
+        "how the mesh that is simulated is made from the voxels; none simulates them all, auto is "
+        "ddfem for voxels and none for finite cells",
+    )
+    discretisation: Discretisation = option("voxel")
+    forest: File | None = option(
+        None, "file of forests for ddfem, relative to the project; those of the package if null"
+    )
+    modes: Annotated[int, between(2, 10_000)] | Literal["auto"] = option(
+        "auto",
+        "elastic modes whose frequencies and amplitudes are controlled, relative to the first; "
+        "auto takes those of the clips that stand apart and are heard, the 30 strongest at most "
+        "[1]",
+    )
+    targets: Annotated[tuple[TargetEntry, ...], Len(1, 100)] = option(
+        REQUIRED, "struck points and the clips that they shall sound like"
+    )
+    material: MaterialSettings = option(
+        MaterialSettings, "the Young's modulus field that is sought"
+    )
+    damping: DampingSettings = option(DampingSettings, "how the modes of a design are damped")
+    weights: Weights = option(Weights, "weights of the parts of the cost")
+    optimiser: OptimiserSettings = option(
+        OptimiserSettings, "how the material is sought and when the search stops"
+    )
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "coarsen", self.solid.coarsen)
+        bounds = self.material.poisson_bounds
+        place = ("material", "poisson_bounds")
+        if bounds is not None and self.coarsen == FOREST:
+            raise ParameterError(
+                place,
+                "found coarsen ddfem, whose forests hold for one Poisson's ratio; choose coarsen "
+                "none or average, or discretisation finite-cell",
+            )
+        if bounds is not None and not bounds[0] < self.poisson < bounds[1]:
+            raise ParameterError(
+                place,
+                f"found {list(bounds)}, expected poisson, which the search starts from, between "
+                f"them; it is {self.poisson:g}",
+            )
+
+    @property
+    def solid(self) -> ProblemOptions:
+        """The solid to analyse."""
+        return ProblemOptions(**{key: getattr(self, key) for key in _SOLID})
 
     def as_dict(self) -> dict[str, Any]:
         """The project as its file has it, with all defaults and its paths as they are here."""
-        described = asdict(self)
-        solid = described.pop("solid")
-        described["targets"] = [asdict(target) for target in self.targets]
-        for target in described["targets"]:
-            target["at"] = None if target["at"] is None else list(target["at"])
-            target["without"] = list(target["without"])
-        return {key: solid[key] for key in _SOLID} | described
+        return document_of(self)
 
     def surface(self) -> trimesh.Trimesh:
         """Surface that is struck, in metres.
@@ -153,12 +155,7 @@ def load_project(path: str | Path) -> Project:
     UserError
         With one sentence about the first thing that is wrong with it.
     """
-    path = Path(path)
-    described = read_yaml(path, "a project")
-    try:
-        return project_of(described, path.parent)
-    except UserError as error:
-        raise UserError(f"{path}: {error}") from None
+    return _in_folder(read_parameters(path, Project, "a project"), Path(path).parent)
 
 
 def project_of(described: Mapping[str, Any], folder: Path) -> Project:
@@ -169,28 +166,7 @@ def project_of(described: Mapping[str, Any], folder: Path) -> Project:
     UserError
         With one sentence about the first thing that is wrong.
     """
-    check(described, project_schema())
-    filled = with_defaults(described, project_schema())
-    targets = tuple(_target(number, each, folder) for number, each in enumerate(filled["targets"]))
-    _require_something_to_lower(filled["weights"])
-    for key in ("young_bounds", "poisson_bounds"):
-        _require_ascending(f"material.{key}", filled["material"][key])
-    solid = {key: filled[key] for key in _SOLID}
-    if not solid["mesh"].startswith(BUILTIN_PREFIX):
-        solid["mesh"] = str(folder / solid["mesh"])
-    if solid["forest"] is not None:
-        solid["forest"] = str(folder / solid["forest"])
-    options = ProblemOptions(**solid)
-    _require_free(options, filled["material"]["poisson_bounds"])
-    return Project(
-        options,
-        filled["modes"],
-        targets,
-        MaterialSettings(**filled["material"]),
-        DampingSettings(**filled["damping"]),
-        Weights(**filled["weights"]),
-        OptimiserSettings(**filled["optimiser"]),
-    )
+    return _in_folder(parameters_from(described, Project), folder)
 
 
 def with_optimiser(project: Project, **given: Any) -> Project:
@@ -199,53 +175,18 @@ def with_optimiser(project: Project, **given: Any) -> Project:
     Raises
     ------
     UserError
-        If one is beyond what the schema allows.
+        If one is beyond what projects may have.
     """
     changes = {key: value for key, value in given.items() if value is not None}
-    check(changes, project_schema()["properties"]["optimiser"])
     return replace(project, optimiser=replace(project.optimiser, **changes))
 
 
-def _target(number: int, entry: Mapping[str, Any], folder: Path) -> TargetEntry:
-    at, vertex = entry["at"], entry["vertex"]
-    if (at is None) == (vertex is None):
-        given = "neither" if at is None else "both"
-        raise UserError(f"targets[{number}]: expected at or vertex, found {given}")
-    name = entry["name"]
-    if name.isspace() or not name.isprintable():
-        raise UserError(
-            f"targets[{number}].name: found {name!r}, expected characters that can be printed, and "
-            "not blanks alone"
-        )
-    clip = str(folder / entry["clip"])
-    places = {"at": None if at is None else tuple(at), "without": tuple(entry["without"])}
-    return TargetEntry(**{**entry, "clip": clip, **places})
-
-
-def _require_ascending(key: str, bounds: list[float] | None) -> None:
-    if bounds is not None and not bounds[0] < bounds[1]:
-        raise UserError(f"{key}: found {bounds}, expected the lower one first")
-
-
-def _require_free(solid: ProblemOptions, bounds: list[float] | None) -> None:
-    """Refuse bounds of a Poisson's ratio that the forests fix, or that is not between them."""
-    if bounds is None:
-        return
-    if solid.coarsen == "ddfem":
-        raise UserError(
-            "material.poisson_bounds: found coarsen ddfem, whose forests hold for one Poisson's "
-            "ratio; choose coarsen none or average, or discretisation finite-cell"
-        )
-    if not bounds[0] < solid.poisson < bounds[1]:
-        raise UserError(
-            f"material.poisson_bounds: found {bounds}, expected poisson, which the search starts "
-            f"from, between them; it is {solid.poisson:g}"
-        )
-
-
-def _require_something_to_lower(weights: Mapping[str, float]) -> None:
-    if max(weights["frequency"], weights["amplitude"]) < LEAST_WEIGHT:
-        raise UserError(
-            f"weights: found {weights['frequency']:g} for frequency and {weights['amplitude']:g} "
-            f"for amplitude, expected at least one of them to be {LEAST_WEIGHT:g} or more"
-        )
+def _in_folder(project: Project, folder: Path) -> Project:
+    """The project with its paths, which are relative to a folder, as the working directory has."""
+    is_file = not project.mesh.startswith(BUILTIN_PREFIX)
+    return replace(
+        project,
+        mesh=str(folder / project.mesh) if is_file else project.mesh,
+        forest=None if project.forest is None else str(folder / project.forest),
+        targets=tuple(replace(each, clip=str(folder / each.clip)) for each in project.targets),
+    )

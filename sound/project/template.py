@@ -1,4 +1,4 @@
-"""A project file with all keys, each with what the schema says of it."""
+"""A project file with all keys, each with what it means."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import Any
 
 import yaml
 
-from sound.project.schema import project_schema
+from carillon.parameters.schema import schema_of
+from sound.project.project import Project
 
 _STEP = "  "
 
@@ -22,7 +23,7 @@ def project_text(values: Mapping[str, Any]) -> str:
     values
         Keys and values of a project; those of a section or of a list's entries as a mapping.
     """
-    schema = project_schema()
+    schema = schema_of(Project)
     lines = [f"# {schema['description']}", "# Keys behind a # have the value that stands there."]
     for key, part in schema["properties"].items():
         lines += ["", *_entry(key, part, values)]

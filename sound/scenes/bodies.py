@@ -33,7 +33,7 @@ def bodies_of(objects: Sequence[ObjectEntry]) -> list[Body]:
     bodies = []
     for entry in objects:
         alike = replace(
-            entry, name="", position=origin, rotation=origin, velocity=origin, spin=origin
+            entry, name="any", position=origin, rotation=origin, velocity=origin, spin=origin
         )
         if alike not in made:
             made[alike] = body_of(entry)

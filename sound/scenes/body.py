@@ -65,7 +65,8 @@ class Body:
     @property
     def volume(self) -> float:
         """Volume of the material [m^3]."""
-        return self.mass / (self.entry.density if self.solid is None else self.solid.model.density)
+        silent = self.entry.made_of.density
+        return self.mass / (silent if self.solid is None else self.solid.model.density)
 
     def motion(self, places: Array) -> Array:
         """Displacement (p, 3, k) [kg^-1/2] in each mode at places (p, 3) [m], in own axes."""

@@ -81,7 +81,7 @@ def object_solid(entry: ObjectEntry) -> ObjectSolid:
     if entry.design is not None:
         return _of_design(entry.design)
     if entry.modes is not None:
-        return _of_modes(entry.modes, entry.heard_modes, Damping(*entry.damping))
+        return _of_modes(entry.modes, entry.heard_modes, entry.made_of.damping)
     if entry.radius is not None:
         return _of_ball(entry, entry.radius)
     assert entry.mesh is not None
@@ -166,17 +166,17 @@ def _of_ball(entry: ObjectEntry, radius: float) -> ObjectSolid:
     if entry.count:
         ball, factor = _uniform(sphere, entry, radius)
         radius *= factor
-        sounding, accuracy = ball.sounding(Damping(*entry.damping)), ball.accuracy
+        sounding, accuracy = ball.sounding(entry.made_of.damping), ball.accuracy
     sphere.apply_scale(radius)
-    mass = 4.0 / 3.0 * np.pi * radius**3 * entry.density
+    mass = 4.0 / 3.0 * np.pi * radius**3 * entry.made_of.density
     moments = np.full(3, 0.4 * mass * radius**2)
     rigid = MassProperties(mass, np.zeros(3), moments, np.eye(3))
     return ObjectSolid(
         rigid,
         np.asarray(sphere.vertices),
         np.asarray(sphere.faces),
-        np.full(len(sphere.vertices), entry.material.young),
-        entry.material.poisson,
+        np.full(len(sphere.vertices), entry.made_of.young),
+        entry.made_of.poisson,
         sounding,
         radius=radius,
         accuracy=accuracy,
@@ -198,9 +198,9 @@ def _of_mesh(entry: ObjectEntry, mesh: str) -> ObjectSolid:
         mass_properties(solid.model),
         np.asarray(surface.vertices),
         np.asarray(surface.faces),
-        np.full(len(surface.vertices), entry.material.young),
-        entry.material.poisson,
-        solid.sounding(Damping(*entry.damping)),
+        np.full(len(surface.vertices), entry.made_of.young),
+        entry.made_of.poisson,
+        solid.sounding(entry.made_of.damping),
         mesh,
         accuracy=solid.accuracy if entry.count else None,
     )
@@ -210,9 +210,9 @@ def _uniform(
     surface: trimesh.Trimesh, entry: ObjectEntry, size: float
 ) -> tuple[UniformSolid, float]:
     """The solid inside a surface of size 1, at a size; and the factor of the entry's pitch."""
-    material = entry.material
+    material = entry.made_of
     how = Discretised(
         entry.discretisation, entry.resolution, entry.components, material.poisson, entry.count
     )
     solid = uniform_solid(surface, entry.name, how)
-    return solid.sized(size, material.young, entry.density, entry.pitch)
+    return solid.sized(size, material.young, material.density, entry.pitch)

@@ -4,99 +4,258 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import KW_ONLY, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from annotated_types import Len
 
 from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
-from carillon.files.yaml_input import read_own_yaml, read_yaml
-from sound.project.schema import check, with_defaults
+from carillon.parameters import REQUIRED, Check, OneOf, option, parameters
+from carillon.parameters.documents import parameters_from, read_parameters
+from carillon.parameters.fields import parameters_of
+from carillon.parameters.quantities import (
+    Components,
+    Density,
+    File,
+    MetresPerUnit,
+    Pair,
+    Resolution,
+    Triple,
+    between,
+)
+from sound.project.settings import ShownName
 from sound.scenes.materials import NamedMaterial, named_material
 
-SCHEMA = Path(__file__).parent / "scene.schema.yaml"
 SOURCES = ("design", "modes", "mesh", "radius")
 """What an object may be, one of them."""
 FILES = ("design", "modes", "mesh", "heard_modes")
 """Keys of an object that name files."""
 STANDARD_MATERIAL = "plastic"
-"""Of designs and modes files, for what these do not tell."""
-Vector = tuple[float, float, float]
+"""Name of the material of designs and modes files, for what these do not tell."""
+_SUITS = {
+    "unit": ("mesh",),
+    "pitch": ("mesh", "radius"),
+    "density": ("mesh", "radius"),
+    "heard_modes": ("modes",),
+    "damping": ("modes", "mesh", "radius"),
+    "discretisation": ("mesh", "radius"),
+    "components": ("mesh", "radius"),
+}
+"""Keys of an object that have a meaning for some sources alone."""
+
+_Coordinate = Annotated[float, between(-1000.0, 1000.0)]
+Vector = Triple[_Coordinate]
 
 
-@dataclass(frozen=True)
+def _material(name: Any) -> Any:
+    if not isinstance(name, str):
+        return name
+    try:
+        return named_material(name)
+    except UserError as error:
+        raise ValueError(str(error)) from None
+
+
+def _in_time(path: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
+    if any(later[0] <= before[0] for before, later in zip(path, path[1:])):
+        raise ValueError("expected times that ascend")
+    return path
+
+
+Material = Annotated[NamedMaterial, Check(_material, before=True)]
+"""A material by its name."""
+
+
+@parameters
 class ObjectEntry:
-    """An object as its scene describes it; see `scene.schema.yaml` for every key.
+    """A solid."""
 
-    One of `design`, `modes`, `mesh` and `radius` is not None.  Files hold in the working directory.
-    What an object leaves to its material has the material's values already.
-    """
+    name: ShownName = option(REQUIRED, "what messages and pages call it")
+    design: File | None = option(None, "design that it is (HDF5), relative to the scene")
+    modes: File | None = option(
+        None, "modes file of the solver that it is (HDF5), relative to the scene"
+    )
+    heard_modes: File | None = option(
+        None,
+        "modes file of the same solid by which it sounds in place of its own, so that two kinds of "
+        "modes are heard of one motion",
+    )
+    mesh: File | None = option(
+        None,
+        "either builtin:NAME or a mesh file, relative to the scene, of one material; the y of glTF "
+        "points up and becomes z, of all other files z points up",
+    )
+    radius: Annotated[float, between(1e-4, 100.0)] | None = option(
+        None, "radius of a ball of one material [m]"
+    )
+    material: Material | None = option(
+        None,
+        "name of what it is made of; of a design or of modes it tells damping, roughness, friction "
+        "and bounce alone",
+    )
+    unit: MetresPerUnit = option(1.0)
+    pitch: Annotated[float, between(20.0, 20_000.0)] | None = option(
+        None, "frequency of its first mode, to which a mesh is scaled [Hz]; null leaves its size"
+    )
+    resolution: Resolution = option(
+        28,
+        "lattice spacings, or voxels, along the longest side of a mesh or ball whose modes are "
+        "computed [1]; the summary tells how far frequencies are expected to be from the solid's",
+    )
+    discretisation: Annotated[str, OneOf("auto", "finite-cell", "voxel")] = option(
+        "auto",
+        "how a mesh or ball is discretised, as by `carillon modes`: finite-cell takes walls "
+        "thinner than a spacing, voxel makes them as thick as one; auto is finite-cell, or voxel "
+        "where finite cells refuse the mesh",
+    )
+    components: Components = option(
+        "error", "what comes of a mesh in several pieces; largest keeps the largest"
+    )
+    count: Annotated[int, between(0, 1000)] = option(
+        40, "elastic modes of a mesh or ball that sound [1]; 0 for a silent one"
+    )
+    density: Density | None = option(None, "mass density in place of the material's own [kg/m^3]")
+    position: Vector = option((0.0, 0.0, 0.0), "where its centre of mass is at the start [m]")
+    rotation: Triple[Annotated[float, between(-3600.0, 3600.0)]] = option(
+        (0.0, 0.0, 0.0),
+        "turns about the axes x, y, z of the scene, one after the other [degrees]",
+    )
+    velocity: Triple[Annotated[float, between(-100.0, 100.0)]] = option(
+        (0.0, 0.0, 0.0), "how fast it moves at the start [m/s]"
+    )
+    spin: Vector = option(
+        (0.0, 0.0, 0.0), "how fast it turns about the axes of the scene at the start [rad/s]"
+    )
+    fixed: bool = option(False, "whether it stays where it is; it sounds as a free one does")
+    friction: Annotated[float, between(0.0, 10.0)] | None = option(
+        None,
+        "Coulomb's coefficient in place of the material's [1]; of two that touch, the larger one "
+        "counts",
+    )
+    restitution: Annotated[float, between(0.02, 1.0)] | None = option(
+        None,
+        "share of the speed that a bounce leaves, in place of the material's [1]; of two that "
+        "touch, the smaller one counts",
+    )
+    roughness: Annotated[float, between(0.0, 0.01)] | None = option(
+        None,
+        "height (rms) of what its surface has beside its shape, in place of the material's [m]",
+    )
+    damping: Pair[Annotated[float, between(0.0, 1e9)]] | None = option(
+        None,
+        "Rayleigh's coefficients of mass [1/s] and stiffness [s] in place of the material's; not "
+        "of a design",
+    )
+    collision: Annotated[str, OneOf("parts", "hull")] = option(
+        "parts",
+        "shape by which it touches others; parts are convex and leave hollows open, hull is one "
+        "convex part",
+    )
+    level: Annotated[float, between(-120.0, 120.0)] = option(
+        0.0, "how much louder it is than it would be [dB]"
+    )
+    colour: Triple[Annotated[float, between(0.0, 1.0)]] | None = option(
+        None, "red, green and blue from 0 to 1; those of its material if null"
+    )
 
-    name: str
-    design: str | None
-    modes: str | None
-    heard_modes: str | None
-    mesh: str | None
-    radius: float | None
-    material: NamedMaterial
-    unit: float
-    pitch: float | None
-    resolution: int
-    discretisation: str
-    components: str
-    count: int
-    density: float
-    position: Vector
-    rotation: Vector
-    velocity: Vector
-    spin: Vector
-    fixed: bool
-    friction: float
-    restitution: float
-    roughness: float
-    damping: tuple[float, float]
-    collision: str
-    level: float
-    colour: Vector
+    def __post_init__(self) -> None:
+        given = [key for key in SOURCES if getattr(self, key) is not None]
+        if len(given) != 1:
+            found = " and ".join(given) or "none of them"
+            raise ValueError(f"expected one of {', '.join(SOURCES)}, found {found}")
+        (source,) = given
+        for key, sources in _SUITS.items():
+            default = parameters_of(ObjectEntry)[key].default
+            if source not in sources and getattr(self, key) != default:
+                raise ValueError(f"{key} goes with {' or '.join(sources)}, found a {source}")
+        if self.pitch is not None and self.count == 0:
+            raise ValueError("pitch goes with a count of modes above 0; what is silent has none")
+        if self.material is None and source in ("mesh", "radius"):
+            raise ValueError(f"a {source} needs a material; name one")
+
+    @cached_property
+    def made_of(self) -> NamedMaterial:
+        """Its material, with the numbers that the object has in place of the material's."""
+        material = self.material or named_material(STANDARD_MATERIAL)
+        alpha, beta = self.damping or (material.alpha, material.beta)
+        keys = ("density", "friction", "restitution", "roughness", "colour")
+        given = {key: getattr(self, key) for key in keys if getattr(self, key) is not None}
+        return replace(material, alpha=alpha, beta=beta, **given)
 
 
-@dataclass(frozen=True)
+@parameters
 class ListenerEntry:
-    """A head at a `position`, or on a `path` of times and places; None leaves it to the camera."""
+    """Who hears a scene."""
 
-    position: Vector | None
-    facing: Vector | None
-    path: tuple[tuple[float, float, float, float], ...] | None
+    position: Vector | None = option(
+        None, "where the middle of the head is [m]; where the camera is if null"
+    )
+    facing: Vector | None = option(
+        None, "point that the nose is turned to [m]; what the camera looks at if null"
+    )
+    path: (
+        Annotated[
+            tuple[tuple[_Coordinate, _Coordinate, _Coordinate, _Coordinate], ...],
+            Len(1, 10_000),
+            Check(_in_time),
+        ]
+        | None
+    ) = option(
+        None,
+        "lines of time [s] and x, y, z [m] that the head moves along, in place of the position",
+    )
+
+    def __post_init__(self) -> None:
+        if self.path is not None and self.position is not None:
+            raise ValueError("expected position or path, found both")
 
 
-@dataclass(frozen=True)
+@parameters
 class CameraEntry:
-    """Where the camera is and looks; None leaves it to what there is to see."""
+    """From where a scene is seen."""
 
-    position: Vector | None
-    target: Vector | None
-    degrees: float
+    position: Vector | None = option(None, "where the camera is [m]; a place that sees all if null")
+    target: Vector | None = option(None, "what it looks at [m]; the middle of all objects if null")
+    degrees: Annotated[float, between(1.0, 170.0)] = option(
+        36.0, "vertical field of view [degrees]"
+    )
 
 
-@dataclass(frozen=True)
+@parameters
 class SoundEntry:
     """How a scene sounds."""
 
-    rate: int
-    full_scale: float | None
-    radiation: bool
-    space: bool
-    contact_damping: bool
-    noise: bool
+    rate: Annotated[int, between(8000, 192_000)] = option(44_100, "samples per second [Hz]")
+    full_scale: Annotated[float, between(1e-12, 1e12)] | Literal["auto"] = option(
+        "auto",
+        "sound pressure of full scale [Pa]; auto lets the loudest sample just reach it",
+    )
+    radiation: bool = option(
+        True,
+        "whether modes and the motion of the whole body are heard as they move the air; without, "
+        "modes are as loud as they are struck, as by sound render",
+    )
+    space: bool = option(
+        True,
+        "whether distance and direction are heard; without, all is one metre away, alike in both "
+        "ears",
+    )
+    contact_damping: bool = option(True, "whether what a solid lies on damps it")
+    noise: bool = option(True, "whether what clips of designs hold besides modes is heard")
 
 
-@dataclass(frozen=True)
+@parameters
 class EngineEntry:
-    """Duration of the engine's contacts [s], and steps in it."""
+    """How contacts are followed in time."""
 
-    contact_seconds: float
-    steps: int
+    contact_seconds: Annotated[float, between(1e-4, 0.02)] = option(
+        0.002,
+        "how long a bounce takes for the engine [s]; what is heard takes as long as Hertz says",
+    )
+    steps: Annotated[int, between(8, 200)] = option(16, "steps in that time [1]")
 
     @property
     def step_seconds(self) -> float:
@@ -104,37 +263,41 @@ class EngineEntry:
         return self.contact_seconds / self.steps
 
 
-@dataclass(frozen=True)
+@parameters
 class Scene:
-    """Solids that move under gravity, above a ground or without.
+    """Solids that fall, roll and strike each other, where they are heard and seen.
 
-    Every key is described in `scene.schema.yaml`, which also has the defaults.
+    Once it is loaded, its files hold in the working directory.
     """
 
-    title: str
-    seconds: float
-    gravity: Vector
-    ground: float | None
-    ground_material: NamedMaterial
-    objects: tuple[ObjectEntry, ...]
-    listener: ListenerEntry
-    camera: CameraEntry
-    sound: SoundEntry
-    engine: EngineEntry
-    seed: int
+    _: KW_ONLY
+    title: Annotated[str, Len(1, 200)] = option("Scene", "what pages call the scene")
+    seconds: Annotated[float, between(0.01, 600.0)] = option(5.0, "how long it lasts [s]")
+    gravity: Vector = option(
+        (0.0, 0.0, -9.81),
+        "acceleration of what falls, x, y, z, of which z points up [m/s^2]",
+    )
+    ground: _Coordinate | None = option(0.0, "height of a floor without end [m]; null for none")
+    ground_material: Material = option("concrete", "what the floor is made of, a material by name")
+    objects: Annotated[tuple[ObjectEntry, ...], Len(1, 1000)] = option(
+        REQUIRED, "solids of the scene"
+    )
+    listener: ListenerEntry = option(ListenerEntry, "who hears it")
+    camera: CameraEntry = option(CameraEntry, "from where it is seen")
+    sound: SoundEntry = option(SoundEntry, "how it sounds")
+    engine: EngineEntry = option(EngineEntry, "how contacts are followed in time")
+    seed: Annotated[int, between(0, 2**32 - 1)] = option(0, "seed of the roughness of surfaces")
+
+    def __post_init__(self) -> None:
+        counts = Counter(each.name for each in self.objects)
+        if twice := [name for name, count in counts.items() if count > 1]:
+            raise ValueError(f"several objects are named {twice[0]!r}; give each a name of its own")
 
     @property
     def files(self) -> list[str]:
         """Files that it is made from."""
         named = [getattr(each, key) for each in self.objects for key in FILES]
         return [name for name in named if name and not name.startswith(BUILTIN_PREFIX)]
-
-
-@cache
-def scene_schema() -> dict[str, Any]:
-    """The schema of a scene."""
-    loaded: dict[str, Any] = read_own_yaml(SCHEMA)
-    return loaded
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -145,12 +308,7 @@ def load_scene(path: str | Path) -> Scene:
     UserError
         With one sentence about the first thing that is wrong with it.
     """
-    path = Path(path)
-    described = read_yaml(path, "a scene")
-    try:
-        return scene_of(described, path.parent)
-    except UserError as error:
-        raise UserError(f"{path}: {error}") from None
+    return _in_folder(read_parameters(path, Scene, "a scene"), Path(path).parent)
 
 
 def scene_of(described: Mapping[str, Any], folder: Path) -> Scene:
@@ -161,116 +319,18 @@ def scene_of(described: Mapping[str, Any], folder: Path) -> Scene:
     UserError
         With one sentence about the first thing that is wrong.
     """
-    check(described, scene_schema())
-    filled = with_defaults(described, scene_schema())
-    objects = tuple(
-        _object(f"objects[{number}]", entry, folder)
-        for number, entry in enumerate(filled["objects"])
-    )
-    twice = [name for name, count in Counter(each.name for each in objects).items() if count > 1]
-    if twice:
-        raise UserError(f"several objects are named {twice[0]!r}; give each a name of its own")
-    sound = filled["sound"]
-    scale = sound["full_scale"]
-    return Scene(
-        filled["title"],
-        filled["seconds"],
-        _vector(filled["gravity"]),
-        filled["ground"],
-        _material("ground_material", filled["ground_material"]),
-        objects,
-        _listener(filled["listener"]),
-        CameraEntry(
-            _place(filled["camera"]["position"]),
-            _place(filled["camera"]["target"]),
-            filled["camera"]["degrees"],
-        ),
-        SoundEntry(**{**sound, "full_scale": None if scale == "auto" else scale}),
-        EngineEntry(**filled["engine"]),
-        filled["seed"],
-    )
+    return _in_folder(parameters_from(described, Scene), folder)
 
 
-def _object(where: str, entry: Mapping[str, Any], folder: Path) -> ObjectEntry:
-    given = [key for key in SOURCES if entry[key] is not None]
-    if len(given) != 1:
-        found = " and ".join(given) or "none of them"
-        raise UserError(f"{where}: expected one of {', '.join(SOURCES)}, found {found}")
-    if not entry["name"].isprintable() or entry["name"].isspace():
-        raise UserError(
-            f"{where}.name: found {entry['name']!r}, expected characters that can be printed, and "
-            "not blanks alone"
-        )
-    _require_suiting(where, entry, given[0])
-    if entry["material"] is None and given[0] in ("mesh", "radius"):
-        raise UserError(f"{where}: a {given[0]} needs a material; name one")
-    material = _material(f"{where}.material", entry["material"] or STANDARD_MATERIAL)
-    own = {
-        key: getattr(material, key) if entry[key] is None else entry[key]
-        for key in ("density", "friction", "restitution", "roughness")
-    }
-    damping = entry["damping"] or (material.alpha, material.beta)
-    files = {key: _file(entry[key], folder) for key in FILES}
-    vectors = {key: _vector(entry[key]) for key in ("position", "rotation", "velocity", "spin")}
-    colour = _vector(entry["colour"] or material.colour)
-    return ObjectEntry(
-        **{
-            **entry,
-            **own,
-            **files,
-            **vectors,
-            "material": material,
-            "damping": (float(damping[0]), float(damping[1])),
-            "colour": colour,
+def _in_folder(scene: Scene, folder: Path) -> Scene:
+    """The scene with its files, which are relative to a folder, as the working directory has."""
+    objects = []
+    for each in scene.objects:
+        named = {key: getattr(each, key) for key in FILES}
+        files: Any = {
+            key: str(folder / name)
+            for key, name in named.items()
+            if name is not None and not name.startswith(BUILTIN_PREFIX)
         }
-    )
-
-
-def _require_suiting(where: str, entry: Mapping[str, Any], source: str) -> None:
-    """Refuse keys that have no meaning for what an object is."""
-    suits = {"unit": ("mesh",), "pitch": ("mesh", "radius"), "density": ("mesh", "radius")}
-    suits["heard_modes"] = ("modes",)
-    suits["damping"] = ("modes", "mesh", "radius")
-    suits["discretisation"] = suits["components"] = ("mesh", "radius")
-    standard = scene_schema()["properties"]["objects"]["items"]["properties"]
-    for key, sources in suits.items():
-        if source not in sources and entry[key] != standard[key]["default"]:
-            raise UserError(f"{where}.{key}: goes with {' or '.join(sources)}, found a {source}")
-    if entry["pitch"] is not None and entry["count"] == 0:
-        raise UserError(
-            f"{where}.pitch: goes with a count of modes above 0; what is silent has none"
-        )
-
-
-def _material(where: str, name: str) -> NamedMaterial:
-    try:
-        return named_material(name)
-    except UserError as error:
-        raise UserError(f"{where}: {error}") from None
-
-
-def _listener(entry: Mapping[str, Any]) -> ListenerEntry:
-    path = entry["path"]
-    if path is None:
-        return ListenerEntry(_place(entry["position"]), _place(entry["facing"]), None)
-    if entry["position"] is not None:
-        raise UserError("listener: expected position or path, found both")
-    times = [line[0] for line in path]
-    if any(later <= before for before, later in zip(times, times[1:])):
-        raise UserError("listener.path: expected times that ascend")
-    lines = tuple((float(t), float(x), float(y), float(z)) for t, x, y, z in path)
-    return ListenerEntry(None, _place(entry["facing"]), lines)
-
-
-def _file(name: str | None, folder: Path) -> str | None:
-    is_file = name is not None and not name.startswith(BUILTIN_PREFIX)
-    return str(folder / name) if is_file and name else name
-
-
-def _place(values: list[float] | None) -> Vector | None:
-    return None if values is None else _vector(values)
-
-
-def _vector(values: Any) -> Vector:
-    x, y, z = (float(value) for value in values)
-    return x, y, z
+        objects.append(replace(each, **files))
+    return replace(scene, objects=tuple(objects))

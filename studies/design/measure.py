@@ -125,8 +125,7 @@ def time_sizes(
     for resolution in resolutions:
         if report is not None:
             report(f"evaluations at resolution {resolution}")
-        solid = replace(project.solid, resolution=resolution)
-        problem = prepare(replace(project, solid=solid), targets)
+        problem = prepare(replace(project, resolution=resolution), targets)
         targets = problem.setting.objective.targets
         times = time_evaluations(problem, runs, project.optimiser.seed)
         rows.append({"resolution": resolution, **asdict(times)})

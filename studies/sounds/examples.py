@@ -85,7 +85,7 @@ class Example:
     name, title, figure, about
         Short name, heading, what it follows in the paper, and a sentence.
     mesh, resolution, density, modes, dimensions, seconds
-        See `sound/project/project.schema.yaml`.
+        See `sound.project.project.Project`.
     targets
         In the order of their edits.
     elsewhere

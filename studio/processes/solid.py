@@ -35,7 +35,8 @@ from sound.design.simulation import Evaluation, Simulation
 from sound.design.tasks import Setting
 from sound.project.design import Design
 from sound.project.design_file import read_design, write_design
-from sound.project.project import MaterialSettings, Project
+from sound.project.project import Project
+from sound.project.settings import MaterialSettings
 from sound.strikes import Place, Strike, inward_normals, locate_all
 from sound.surface import longest_side, struck_surface
 from studio.binary import pack

@@ -14,7 +14,8 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from carillon.errors import UserError
-from sound.project.schema import project_schema
+from carillon.parameters.schema import schema_of
+from sound.project.project import Project
 from studio.interface import CLIP_PARTS, EXPORTS, NotFoundError, Studio
 from studio.server.answers import fault
 from studio.server.guard import Guard, Keys
@@ -91,7 +92,7 @@ class _Routes:
         return fault("the page has no such file", 404) if found is None else found
 
     async def schema(self, request: Request) -> Response:
-        return JSONResponse(project_schema())
+        return JSONResponse(schema_of(Project))
 
     async def mesh(self, request: Request) -> Response:
         content, name = await self._upload(request, "a mesh", self._limits.mesh_bytes, MESH_ENDINGS)

@@ -9,7 +9,8 @@ from typing import Any
 from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
 from carillon.fem.geometry.surface import surface_name
-from sound.project.schema import check, project_schema
+from carillon.parameters.documents import require_values
+from sound.project.project import Project
 from studio.interface import NotFoundError
 from studio.session import designs
 from studio.session.document import Document, Target, merged
@@ -83,9 +84,7 @@ def remove_target(state: StudioState, target: str) -> None:
 
 def change_settings(state: StudioState, settings: Mapping[str, Any]) -> None:
     """Change keys of the project but its targets."""
-    schema = project_schema()
-    parts = {k: v for k, v in schema["properties"].items() if k not in ("mesh", "targets")}
-    check(settings, {**schema, "properties": parts, "required": []})
+    require_values(settings, Project, leave_out=("mesh", "targets"))
     if settings.get("forest") is not None:
         state.workspace.path(settings["forest"])
     document = state.document

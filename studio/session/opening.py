@@ -13,8 +13,9 @@ from carillon.errors import UserError, one_line
 from carillon.fem.geometry.surface import surface_name
 from carillon.files.hdf5 import kind_of
 from carillon.limits import MESH_BYTES
+from carillon.parameters.documents import parameters_from
 from sound.project.design_file import read_design
-from sound.project.schema import check, project_schema
+from sound.project.project import Project
 from studio.session.document import Document, document_of, files_of
 from studio.session.projects import fit_name, opened, with_design
 from studio.session.restoring import NONSENSE
@@ -134,7 +135,7 @@ def _of_design(path: Path, workspace: Workspace) -> Document:
         raise UserError(f"{path}: is no design, expected one that carillon design wrote")
     settings = dict(read_design(path).settings)
     try:
-        check(settings, project_schema())
+        parameters_from(settings, Project)
     except UserError as error:
         raise UserError(
             f"{path}: tells no project that it was made for ({error}); open its project or its "

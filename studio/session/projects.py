@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from sound.project.schema import check, project_schema
+from carillon.parameters.documents import parameters_from
+from sound.project.project import Project
 from studio.session.document import Document, Material, document_of, files_of
 from studio.session.workspace import Workspace
 
@@ -19,7 +20,7 @@ def opened(workspace: Workspace, name: str) -> Document:
         If it is none, or names files outside of the workspace.
     """
     described = workspace.read_project(name)
-    check(described, project_schema())
+    parameters_from(described, Project)
     document = document_of(described)
     for file in files_of(document):
         workspace.path(file)

@@ -7,7 +7,8 @@ from dataclasses import asdict
 from typing import Any
 
 from carillon.fem.geometry.builtin import BUILTINS
-from sound.project.schema import project_schema, with_defaults
+from carillon.parameters.documents import with_defaults
+from sound.project.project import Project
 from studio.session.examples import EXAMPLES
 from studio.session.restoring import kept, restored, restored_name
 from studio.session.state import StudioState
@@ -16,7 +17,7 @@ from studio.session.state import StudioState
 def state_event(state: StudioState) -> dict[str, Any]:
     """The event `state`, as docs/contributing/studio.md describes it."""
     document, news = state.document, state.solid.news
-    settings = with_defaults({**document.settings, "targets": []}, project_schema())
+    settings = with_defaults(document.settings, Project)
     return {
         "event": "state",
         "revision": state.revision,

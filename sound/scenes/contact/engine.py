@@ -176,7 +176,7 @@ def _add_body(mujoco: ModuleType, spec: Any, engine: EngineEntry, number: int, b
     )
     if not entry.fixed:
         added.add_freejoint()
-    contact = _contact_options(engine, entry.friction, entry.restitution)
+    contact = _contact_options(engine, entry.made_of.friction, entry.made_of.restitution)
     if body.radius is not None:
         size = [body.radius, 0.0, 0.0]
         added.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=size, **contact)

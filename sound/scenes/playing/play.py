@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,7 +89,9 @@ def perform(scene: Scene, threads: int | None = None, visible: bool = True) -> P
     ]
     clock.lap("voices")
     surfaces = [
-        Appearance(each.entry.name, each.shape.vertices, each.shape.faces, each.entry.colour)
+        Appearance(
+            each.entry.name, each.shape.vertices, each.shape.faces, each.entry.made_of.colour
+        )
         for each in bodies
     ]
     return Performance(
@@ -119,11 +122,11 @@ class Clock:
         self._last = now
 
 
-def _scale(full_scale: float | None, peak: float) -> float:
+def _scale(full_scale: float | Literal["auto"], peak: float) -> float:
     """Full scale per pascal, from the pressure [Pa] of full scale and of the loudest sample."""
     if peak == 0.0:
         return 1.0
-    if full_scale is None:
+    if full_scale == "auto":
         return FULL / peak
     if peak > FULL * full_scale:
         say(

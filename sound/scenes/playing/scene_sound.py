@@ -134,7 +134,8 @@ def sustained_forces(
 
     def roughness(pair: tuple[int, int]) -> float:
         one, other = (
-            ground.roughness if each == GROUND else bodies[each].entry.roughness for each in pair
+            ground.roughness if each == GROUND else bodies[each].entry.made_of.roughness
+            for each in pair
         )
         return float(np.hypot(one, other))
 

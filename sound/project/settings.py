@@ -1,0 +1,155 @@
+"""Sections of a project: its targets, and how a material is sought that sounds like them."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from annotated_types import Interval, Len, MaxLen
+
+from carillon.parameters import REQUIRED, Check, OneOf, option, parameters
+from carillon.parameters.quantities import File, Pair, Point, YoungsModulus, between
+
+LEAST_WEIGHT = 1e-12
+"""Weight of frequencies or of amplitudes below which a search has nothing to lower."""
+
+
+def _printable(name: str) -> str:
+    if name.isspace() or not name.isprintable():
+        raise ValueError(
+            f"found {name!r}, expected characters that can be printed, and not blanks alone"
+        )
+    return name
+
+
+def _ascending(bounds: tuple[float, float]) -> tuple[float, float]:
+    if not bounds[0] < bounds[1]:
+        raise ValueError(f"found {list(bounds)}, expected the lower one first")
+    return bounds
+
+
+ShownName = Annotated[str, Len(1, 100), Check(_printable)]
+"""A name that messages and pages show."""
+ModeCount = Annotated[int, between(1, 10_000)]
+Dampings = Annotated[str, OneOf("clips", "material")]
+"""Where dampings of a design come from."""
+OptimiserMethod = Annotated[str, OneOf("hybrid", "cma", "bfgs")]
+Weight = Annotated[float, between(0.0, 1e9)]
+
+
+@parameters
+class TargetEntry:
+    """One struck point, by its position or the number of its vertex."""
+
+    name: ShownName = option(REQUIRED, "name of the point")
+    clip: File = option(REQUIRED, "file of the sound (WAV), relative to the project")
+    at: Point | None = option(
+        None,
+        "position on the surface in the mesh's own coordinates, as viewers of meshes show them; "
+        "the vertex nearest to it is struck [mesh unit]",
+    )
+    vertex: Annotated[int, between(0, 10**9)] | None = option(
+        None, "number of the surface's vertex, from 0"
+    )
+    modes: ModeCount | None = option(
+        None, "modes taken from this clip, its strongest; as many as it has if null [1]"
+    )
+    allow_clipped: bool = option(
+        False, "whether the clip may be clipped; its samples at full scale are left out then"
+    )
+    without: Annotated[tuple[Annotated[float, Interval(gt=0.0, le=1e6)], ...], MaxLen(1000)] = (
+        option(
+            (),
+            "frequencies of modes of the clip that are left out, such as those of a room or a hand "
+            "[Hz]",
+        )
+    )
+
+    def __post_init__(self) -> None:
+        if (self.at is None) == (self.vertex is None):
+            given = "neither" if self.at is None else "both"
+            raise ValueError(f"expected at or vertex, found {given}")
+
+
+@parameters
+class MaterialSettings:
+    """The Young's modulus field that is sought."""
+
+    young: YoungsModulus = option(
+        1e9, "modulus of the uniform material that the search starts from [Pa]"
+    )
+    dimensions: Annotated[int, between(2, 10_000)] = option(
+        48, "eigenvectors of the volumetric Laplacian that the field is made from [1]"
+    )
+    law: Annotated[str, OneOf("linear", "exponential")] = option(
+        "exponential", "how the field follows from their sum; the exponential one reaches further"
+    )
+    young_bounds: Annotated[Pair[YoungsModulus], Check(_ascending)] | None = option(
+        None,
+        "lowest and highest modulus of the design, as far as another density of the whole brings "
+        "them there, which frequencies do not feel; the density is kept if null [Pa]",
+    )
+    poisson_bounds: (
+        Annotated[Pair[Annotated[float, between(-0.9, 0.49)]], Check(_ascending)] | None
+    ) = option(
+        None,
+        "lowest and highest Poisson's ratio of the whole, which is then sought, too, from the one "
+        "of poisson on; not with forests, which hold for one. It is kept if null [1]",
+    )
+
+
+@parameters
+class DampingSettings:
+    """How the modes of a design are damped."""
+
+    source: Dampings = option(
+        "clips",
+        "where the dampings that sound come from, clips or material; the latter are those of loss "
+        "factors that are found after the search and come as near to the clips' as they can",
+    )
+    regions: Annotated[int, between(1, 100)] = option(
+        4, "regions of the solid that have a loss factor each [1]"
+    )
+
+
+@parameters
+class Weights:
+    """Weights of the parts of the cost (Eq. 4)."""
+
+    frequency: Weight = option(1.0, "weight of the differences of frequencies [1]")
+    amplitude: Weight = option(10.0, "weight of the differences of amplitudes [1]")
+    regulariser: Weight = option(1e-5, "weight of the roughness of the material [1]")
+
+    def __post_init__(self) -> None:
+        if max(self.frequency, self.amplitude) < LEAST_WEIGHT:
+            raise ValueError(
+                f"found {self.frequency:g} for frequency and {self.amplitude:g} for amplitude, "
+                f"expected at least one of them to be {LEAST_WEIGHT:g} or more"
+            )
+
+
+@parameters
+class OptimiserSettings:
+    """How the material is sought and when the search stops."""
+
+    method: OptimiserMethod = option(
+        "hybrid", "either hybrid, or one of its two parts alone, cma or bfgs"
+    )
+    seconds: Annotated[float, Interval(gt=0.0, le=1e8)] | None = option(
+        60.0, "wall time of the search; no limit if null [s]"
+    )
+    evaluations: Annotated[int, between(1, 10**9)] | None = option(
+        None,
+        "evaluations that the search makes at most, each the modal analysis of one material, that "
+        "of the start included, checks aside; no limit if null [1]",
+    )
+    seed: Annotated[int, between(0, 2**32 - 2)] = option(0, "seed of the search")
+    population: Annotated[int, between(2, 10_000)] | None = option(
+        None, "offspring of a generation; the strategy's choice if null [1]"
+    )
+    workers: Annotated[int, between(1, 1024)] | None = option(
+        None, "processes that evaluate candidates; one per core if null [1]"
+    )
+    fine_check: bool = option(
+        True,
+        "whether what is found on the coarse solid is checked, and aimed at anew, on the fine one",
+    )
