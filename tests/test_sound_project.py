@@ -243,7 +243,7 @@ def test_a_mistake_is_answered_in_one_sentence(folder, keys, says):
         ("modes: 1e400\nmesh: a\ntargets: []", "modes: found inf, expected a whole number or auto"),
         ("mesh: 2020-01-01\ntargets: []", "targets: found"),
         (f"? 0x{'f' * 5000}\n: 1", "found a whole number of 20,000 bits"),
-        ("1: 2", "there is no key '1', only mesh"),
+        ("1: 2", "found the key 1, expected a text"),
     ],
 )
 def test_a_file_that_is_no_project_is_answered_in_one_sentence(folder, text, says):

@@ -84,7 +84,7 @@ ARROWS = {
     "sound": "",
     "sound.synthesis": "solver.response",
     "sound.clips": "sound sound.synthesis",
-    "sound.project": "solver.analysis solver.files sound sound.clips",
+    "sound.project": "solver.analysis solver.coarsening solver.files sound sound.clips",
     "sound.design": """solver.analysis solver.coarsening solver.distribution solver.files
         solver.linear solver.response solver.subspace sound sound.clips sound.project""",
     "sound.rendering": """solver.files solver.response solver.subspace sound sound.clips
