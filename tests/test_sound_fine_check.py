@@ -16,7 +16,7 @@ from carillon.fem.model import fine_model
 from solver import solve
 from sound.__main__ import main
 from sound.design.cents import cents, common_factor, rms_cents
-from sound.design.descent import DescentLimits
+from sound.design.descent import Descent
 from sound.design.fine_check import ShapeMatch, fine_frequencies
 from sound.design.optimise import optimise
 from sound.design.outcome import Outcome
@@ -93,11 +93,10 @@ def test_result_does_not_depend_on_the_number_of_workers(problem, checked):
 
 def test_descents_by_a_reduced_model_lower_the_cost(problem):
     simulation = problem.setting.fine().simulation()
-    objective, limits = problem.setting.objective, DescentLimits()
-    descent = descend_by_model(
-        simulation, objective, np.zeros(problem.setting.material.dimensions), None, 6, 0.3, limits
-    )
-    costs = [point.cost.total for point in descent.costs]
+    descent = Descent(simulation, problem.setting.objective)
+    z = np.zeros(problem.setting.material.dimensions)
+    record = descend_by_model(descent, z, None, 6, 0.3)
+    costs = [point.cost.total for point in record.costs]
     assert costs == sorted(costs, reverse=True)
     assert costs[-1] < 0.05 * costs[0]
 

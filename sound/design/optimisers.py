@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sound.design.descent import LimitedMemory, StepOptions
+from sound.design.gauss_newton import StepOptions
+from sound.design.limited_memory import LimitedMemory
 from sound.design.reduced_model import TrustRegion
 from sound.design.search import Search
 from sound.design.tasks import Task, Trial

@@ -24,15 +24,9 @@ from numpy.typing import NDArray
 from carillon.errors import ConvergenceError, UserError
 from carillon.processes import children
 from carillon.processes.threads import one_thread
-from sound.design.descent import (
-    DesignDescent,
-    LimitedMemory,
-    StepOptions,
-    cost_of,
-    descend,
-    descend_by_gradients,
-    squares_of,
-)
+from sound.design.descent import Descent, DesignDescent, cost_of, normal_equations
+from sound.design.gauss_newton import StepOptions, descend
+from sound.design.limited_memory import LimitedMemory, descend_by_gradients
 from sound.design.objective import DesignCost
 from sound.design.reduced_model import TrustRegion, descend_by_model
 from sound.design.simulation import Evaluation, Simulation
@@ -181,14 +175,15 @@ def _telling(fine: bool) -> Callable[[Evaluation, DesignCost], None] | None:
 def _descent(
     simulation: Simulation, task: Task, options: StepOptions | LimitedMemory | TrustRegion
 ) -> DesignDescent:
-    parts = (simulation, task.objective or _setting.objective, task.z, task.start)
-    task = replace(task, limits=replace(task.limits, tell=_telling(task.fine)))
+    limits = replace(task.limits, tell=_telling(task.fine))
+    descent = Descent(simulation, task.objective or _setting.objective, limits)
     if isinstance(options, LimitedMemory):
-        return descend_by_gradients(*parts, task.steps * options.evaluations, task.limits)
+        evaluations = task.steps * options.evaluations
+        return descend_by_gradients(descent, task.z, task.start, evaluations)
     if isinstance(options, TrustRegion):
         radius = task.damping[0] if task.damping else options.radius
-        return descend_by_model(*parts, task.steps, radius, task.limits)
-    return descend(*parts, options, task.steps, task.damping, task.limits)
+        return descend_by_model(descent, task.z, task.start, task.steps, radius)
+    return descend(descent, task.z, task.start, options, task.steps, task.damping)
 
 
 def _done(simulation: Simulation, task: Task) -> Trial:
@@ -209,6 +204,6 @@ def _done(simulation: Simulation, task: Task) -> Trial:
     cost = cost_of(objective, simulation.material, evaluation)
     if not task.gradient:
         return Trial(task.z, cost, 1, eigenvalues=evaluation.eigenvalues)
-    gradient = squares_of(objective, simulation.material, evaluation).gradient
+    gradient = normal_equations(objective, simulation.material, evaluation)[1]
     start = evaluation.modes.start()
     return Trial(task.z, cost, 1, gradient, start=start, eigenvalues=evaluation.eigenvalues)

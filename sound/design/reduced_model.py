@@ -1,53 +1,50 @@
 """Descent by steps of a reduced model, whose modes may cross and mix as those of the solid do.
 
-Near a material with modes U the eigenpairs follow from the small matrix diag(lambda) + U^T dK U,
-in which dK is linear in the coordinates.  Derivatives of eigenvalues one by one say nothing of two
-that are about to cross, which ends the steps of Gauss and Newton between modes that are close; the
-small matrix has both.  Steps minimise the cost of the reduced model within a radius, which grows
-and shrinks with how well the model foretold [CGT00].
+Near a material with modes U the eigenpairs are those of the small matrix diag(lambda) + U^T dK U,
+where dK is linear in the coordinates.  Derivatives of single eigenvalues fail near crossings, where
+Gauss-Newton steps end; the small matrix describes crossings.  Steps minimise the cost of the
+reduced model within a trust region, whose radius depends on the quality of the prediction [CGT00].
 """
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg as la
 from numpy.typing import NDArray
 
-from carillon.errors import ConvergenceError
-from sound.design.descent import CostPoint, DescentLimits, DesignDescent, cost_of, squares_of
-from sound.design.objective import Objective, Sensitivity
-from sound.design.simulation import Evaluation, Simulation
+from sound.design.descent import Descent, DesignDescent
+from sound.design.objective import Sensitivity
+from sound.design.simulation import Evaluation
 
 Array = NDArray[np.float64]
 
 INNER_STEPS = 12
-"""Steps on the reduced model, each of which costs a small eigenproblem."""
+"""Greatest number of steps on the reduced model, each of which solves a small eigenproblem."""
 INNER_DAMPING, HARDEST = 1e-3, 1e4
-"""Damping of the first of these, and beyond which they end, as shares of the mean curvature."""
+"""First and greatest damping of these steps, over the mean curvature."""
 HARDER, SOFTER = 4.0, 0.25
-"""Factors of the damping after a step that failed, and after one that did not."""
+"""Factors of the damping after a step that failed, and after one that succeeded."""
 LITTLE = 1e-3
-"""Share of the cost below which a step on the reduced model is the last, and one on the solid is
-not worth going on."""
+"""Relative decrease of the cost below which a step on the reduced model is the last one."""
 GOOD, POOR = 0.6, 0.25
-"""Shares of the foretold fall from which the radius grows, and below which it shrinks."""
+"""Ratios of actual to predicted decrease above which the radius grows, and below which it
+shrinks."""
 WIDER, NARROWER = 1.5, 0.4
-"""Factors of a step's length that are the radius then."""
+"""New radius over the length of the step, when the radius grows and when it shrinks."""
 SMALLEST = 1e-4
-"""Radius at which a descent has stalled."""
+"""Radius below which a descent has stalled."""
 
 
 @dataclass(frozen=True)
 class TrustRegion:
-    """A descent by steps of a reduced model.
+    """Options of a descent by steps of a reduced model.
 
     Attributes
     ----------
     radius
-        Largest root mean square change of Phi z in the first step.
+        Greatest root mean square change of Phi z in the first step.
     """
 
     radius: float
@@ -59,7 +56,7 @@ class ReducedModel:
     Parameters
     ----------
     evaluation
-        Of the material, with derivatives of all pairs of modes.
+        Modes of the material, with derivatives of all pairs.
     """
 
     def __init__(self, evaluation: Evaluation) -> None:
@@ -95,18 +92,15 @@ class ReducedModel:
             sensitivity=sensitivity,
         )
 
-    def best_move(
-        self, simulation: Simulation, objective: Objective, radius: float
-    ) -> tuple[Array, float]:
-        """A move (m,) no longer than `radius` to a low cost of the model, and that cost."""
-        material, size = simulation.material, len(self.centre.z)
+    def best_move(self, descent: Descent, radius: float) -> tuple[Array, float]:
+        """A move (m,), at most `radius` long, to a low cost of the model, and that cost."""
+        size = len(self.centre.z)
         move, damping = np.zeros(size), INNER_DAMPING
         here = self.at(move)
         assert here is not None
-        cost = cost_of(objective, material, here).total
+        cost = descent.cost_of(here).total
         for _ in range(INNER_STEPS):
-            squares = squares_of(objective, material, here)
-            curvature, gradient = squares.curvature, squares.gradient
+            curvature, gradient = descent.normal_equations(here)
             unit = max(np.trace(curvature) / size, np.finfo(float).tiny) * np.eye(size)
             lower, last = None, cost
             while lower is None and damping <= HARDEST:
@@ -114,7 +108,7 @@ class ReducedModel:
                 tried *= min(1.0, radius / max(float(np.linalg.norm(tried)), 1e-300))
                 there = self.at(tried)
                 if there is not None:
-                    total = cost_of(objective, material, there).total
+                    total = descent.cost_of(there).total
                     lower = there if total < cost else None
                 if lower is None:
                     damping *= HARDER
@@ -128,64 +122,47 @@ class ReducedModel:
 
 
 def descend_by_model(
-    simulation: Simulation,
-    objective: Objective,
-    z: Array,
-    start: Array | None,
-    steps: int,
-    radius: float,
-    limits: DescentLimits,
+    descent: Descent, z: Array, start: Array | None, steps: int, radius: float
 ) -> DesignDescent:
     """Up to `steps` steps from z, each of which lowers the whole of Eq. (4) or the radius.
 
-    The damping of the result holds the radius to go on with.
+    The damping of the result is the radius of the next step.
 
     Raises
     ------
     ConvergenceError
-        If z itself has no modes.
+        If the first material has no modes.
     """
-    evaluation = simulation.evaluate(z, start)
-    cost = cost_of(objective, simulation.material, evaluation)
-    here = DesignDescent(evaluation, [CostPoint(time.monotonic(), 1, cost)], 1, (radius,))
+    descent.begin(z, start, (radius,), derivatives=False)
+    record = descent.record
     for _ in range(steps):
-        if limits.reached(here.evaluations):
+        if descent.is_over:
             break
-        assert here.last is not None
-        if here.last.sensitivity is None:
-            here.last = simulation.differentiate(here.last, whole=True)
-            model = ReducedModel(here.last)
-        radius = _step(simulation, objective, here, model, radius, limits)
-        here.damping = (radius,)
-        here.stalled = radius < SMALLEST
-        if here.stalled:
+        if descent.last.sensitivity is None:
+            record.last = descent.simulation.differentiate(descent.last, whole=True)
+            model = ReducedModel(record.last)
+        radius = _step(descent, model, radius)
+        record.damping = (radius,)
+        record.stalled = radius < SMALLEST
+        if record.stalled:
             break
-    return here
+    return record
 
 
-def _step(
-    simulation: Simulation,
-    objective: Objective,
-    here: DesignDescent,
-    model: ReducedModel,
-    radius: float,
-    limits: DescentLimits,
-) -> float:
-    """Try one step, and take it if it lowers the cost; the radius of the next."""
-    before = here.cost.total
-    move, foretold = model.best_move(simulation, objective, radius)
+def _step(descent: Descent, model: ReducedModel, radius: float) -> float:
+    """Try a step, and take it if it lowers the cost; the radius of the next one."""
+    before = descent.record.cost.total
+    move, predicted = model.best_move(descent, radius)
     length = float(np.linalg.norm(move))
-    if before - foretold <= 1e-6 * before:
+    if before - predicted <= 1e-6 * before:
         return 0.0
-    here.evaluations += 1
-    try:
-        tried = simulation.evaluate(model.centre.z + move, model.centre.modes)
-        cost = cost_of(objective, simulation.material, tried)
-    except ConvergenceError:
+    tried = descent.tried(model.centre.z + move, model.centre.modes)
+    if tried is None:
         return NARROWER * length
+    evaluation, cost = tried
     fall = before - cost.total
     if fall > 0.0:
-        here.come_to(tried, cost, limits)
-    if fall < POOR * (before - foretold):
+        descent.come_to(evaluation, cost)
+    if fall < POOR * (before - predicted):
         return NARROWER * length
-    return max(radius, WIDER * length) if fall > GOOD * (before - foretold) else radius
+    return max(radius, WIDER * length) if fall > GOOD * (before - predicted) else radius

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.geometry import HexMesh
 from solver.analysis.problem import ProblemOptions
-from sound.design.descent import DescentLimits, DesignDescent, LimitedMemory, StepOptions
+from sound.design.descent import DescentLimits, DesignDescent
+from sound.design.gauss_newton import StepOptions
+from sound.design.limited_memory import LimitedMemory
 from sound.design.material import ReducedMaterial
 from sound.design.objective import DesignCost, Objective
 from sound.design.reduced_model import TrustRegion
