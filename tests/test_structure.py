@@ -114,8 +114,8 @@ ARROWS = {
     #
     "workflow.configuration": "dataset_gen dataset_gen.objectives",
     "workflow": "forests workflow.configuration",
-    "workflow.report": "solver.files solver.hcms solver.refinement workflow studies.base",
     "workflow.estimate": "workflow",
+    "workflow.report": "solver.files solver.hcms solver.refinement workflow studies.base",
     "workflow.scripts": "workflow.report studies.base",
     "workflow.validation": """solver.files solver.refinement solver.response solver.verification
         workflow workflow.report studies.base""",

@@ -14,7 +14,7 @@ from carillon.parameters import REQUIRED, option, parameters
 from carillon.parameters.command_line import add_options, collect
 
 ENDINGS = (".yaml", ".yml")
-"""Of projects."""
+"""Endings of the names of project files."""
 DEFAULT_NAME = "project.yaml"
 PLACEHOLDER = "clip.wav"
 """File name of the clip in a project without clips."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, astuple, dataclass
 from functools import cached_property
 from typing import Any
 
@@ -164,17 +164,5 @@ class Outcome:
 
 def history_rows(history: Sequence[HistoryEntry]) -> NDArray[np.void]:
     """Rows of a design's history."""
-    return np.array(
-        [
-            (
-                entry.seconds,
-                entry.evaluations,
-                entry.cost.total,
-                entry.cost.frequency,
-                entry.cost.amplitude,
-                entry.cost.regulariser,
-            )
-            for entry in history
-        ],
-        HISTORY_TYPE,
-    )
+    rows = [(each.seconds, each.evaluations, *astuple(each.cost)) for each in history]
+    return np.array(rows, HISTORY_TYPE)

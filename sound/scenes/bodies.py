@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError, UserError
-from sound.scenes.axes import upright
 from sound.scenes.body import Body
 from sound.scenes.convex import convex_parts, hull_of
 from sound.scenes.hertz import compliance
@@ -14,8 +17,14 @@ from sound.scenes.object_solid import ObjectSolid, object_solid
 from sound.scenes.scene import ObjectEntry
 from sound.scenes.shape import Shape
 
+Array = NDArray[np.float64]
+
 LIGHTEST = 1e-9
 """Least mass [kg] of a body that the engine of rigid bodies can move."""
+Y_UP = (".gltf", ".glb")
+"""Endings of mesh files whose y points up.  In all other files z is taken to point up."""
+_Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+"""Rotation from axes whose y points up to axes whose z does (glTF 2.0, section 3.4)."""
 
 
 def bodies_of(objects: Sequence[ObjectEntry]) -> list[Body]:
@@ -100,3 +109,16 @@ def _upright_body(entry: ObjectEntry, solid: ObjectSolid) -> Body:
         turn,
         solid.accuracy,
     )
+
+
+def upright(mesh: str) -> Array | None:
+    """Rotation (3, 3) from the coordinates of a mesh file to axes whose z points up, None if none.
+
+    Examples
+    --------
+    >>> upright("bar.GLB") @ [0.0, 1.0, 0.0]
+    array([0., 0., 1.])
+    >>> upright("bar.obj") is None
+    True
+    """
+    return _Y_TO_Z if Path(mesh).suffix.lower() in Y_UP else None

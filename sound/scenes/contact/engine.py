@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from sound.scenes.contact.bounce import damping_ratio
 from sound.scenes.contact.contact_log import ContactLog
 from sound.scenes.contact.contacts import ContactPoints
 from sound.scenes.contact.start import start
-from sound.scenes.ground_plane import GroundPlane
+from sound.scenes.materials import NamedMaterial
 from sound.scenes.packages import scene_package
 from sound.scenes.picture import Motion
 from sound.scenes.scene import EngineEntry, Vector
@@ -40,6 +40,13 @@ MOST_KEPT = 12_000_000
 """Greatest number of contact points in a whole scene; they take 3 GB."""
 _IMPEDANCE = [0.999, 0.999, 0.001, 0.5, 2.0]
 """MuJoCo's `solimp` of every contact: a constraint that hardly yields beyond its spring."""
+
+
+class GroundPlane(NamedTuple):
+    """The ground at a `height` [m], or no ground if that is None, and its material."""
+
+    height: float | None
+    material: NamedMaterial
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,9 @@ from carillon.errors import UserError
 from carillon.processes.threads import allowed_threads, blas_threads
 from sound.scenes.audible.loudness import voice
 from sound.scenes.bodies import bodies_of
-from sound.scenes.contact.engine import simulate
+from sound.scenes.contact.engine import GroundPlane, simulate
 from sound.scenes.contact.impacts import split_impacts
 from sound.scenes.contact.touch import Touch
-from sound.scenes.ground_plane import GroundPlane
 from sound.scenes.performance import Performance
 from sound.scenes.picture import Appearance, Picture
 from sound.scenes.playing.scene_sound import SceneSound, gains_of, sustained_forces
