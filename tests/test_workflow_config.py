@@ -225,5 +225,5 @@ def test_a_built_in_solid_that_there_is_not_is_named_with_its_key(section):
     models = (config[section] if section else config)["models"]
     models["gong"] = {**next(iter(models.values())), "mesh": "builtin:gong"}
     where = f"{section}.models" if section else "models"
-    with pytest.raises(UserError, match=rf"{where}\.gong\.mesh: there is no builtin:gong"):
+    with pytest.raises(UserError, match=rf"{where}\.gong\.mesh: builtin:gong: no such built-in"):
         completed(config)

@@ -6,11 +6,10 @@ import itertools
 import json
 import re
 import shutil
-import subprocess
-import sys
 from dataclasses import asdict
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -20,14 +19,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from carillon.command_line import exit_status
+from carillon.errors import UserError
 from solver.response.response_file import StrikeOptions, read_response, respond, write_response
 from solver.verification.audit import audit_files
 from solver.verification.comparison import compare_each
 from studies.base.table import read_table
 from tests.edited_files import edited
 from tests.pages import Page, assert_self_contained
+from workflow import snakemake_run
 from workflow.__main__ import main
-from workflow.commands import validate
 from workflow.validation.criteria import Criterion
 from workflow.validation.distance import distance_in_words
 from workflow.validation.evidence import COARSENED, Evidence
@@ -223,59 +223,48 @@ def test_bad_input_is_answered_in_one_sentence(words, says, solid, tmp_path, mon
     assert not (tmp_path / "out").exists()
 
 
-def printing(said, status):
-    """In place of Popen: Snakemake that prints this and ends."""
-
-    class Printing(subprocess.Popen):
-        def __init__(self, command, env, cwd, stdout, stderr):
-            program = f"import sys; print({said!r}, end=''); sys.exit({status})"
-            super().__init__([sys.executable, "-c", program], stdout=stdout, stderr=stderr)
-
-    return Printing
-
-
 @given(done=st.lists(st.integers(1, 6), max_size=6), total=st.integers(1, 40))
-def test_steps_are_counted_as_they_are_done(tmp_path_factory, done, total):
-    log = tmp_path_factory.mktemp("steps") / "log"
+def test_steps_are_counted_as_they_are_done(done, total):
     numbers = list(itertools.accumulate(done))
-    looks = iter(numbers)
+    messages = [{"total": total}, *({"done": number} for number in numbers), {"error": "a fault"}]
+    shown: list[int] = []
 
-    class Run:
-        def wait(self, _):
-            """One more line a look, the last of which sees the end."""
-            if (number := next(looks, None)) is None:
-                return
-            with log.open("a") as file:
-                file.write(f"{number} of {total} steps (50%) done\n")
-            raise subprocess.TimeoutExpired("snakemake", 0.5)
+    def track(steps, *words):
+        assert words == ("validation", total, "steps")
+        shown.extend(steps)
+        return shown
 
-    log.write_text(f"job  count\n---- -----\ntotal  {total}\n")
-    assert validate._number(validate._PLANNED, log) == total
-    assert list(validate._steps(Run(), log)) == list(range(1, sum(done) + 1))
+    with patch.object(snakemake_run, "track", track):
+        assert snakemake_run.followed(iter(messages), "validation") == "a fault"
+    assert shown == list(range(1, sum(done) + 1))
 
 
 @pytest.mark.parametrize(
-    ("said", "says"),
+    ("rules", "says"),
     [
         (
-            'WorkflowError in file "Snakefile", line 28:\nmodels.c.mesh: there is no builtin:gong\n'
-            '  File "Snakefile", line 28, in <module>\n',
-            "the run failed, Snakemake says: models.c.mesh: there is no builtin:gong; all that",
+            "raise WorkflowError('models.c.mesh: names none')",
+            "the run failed, Snakemake says: .*models.c.mesh: names none; all that it said is in",
         ),
-        ("LockException:\nError: Directory cannot be locked.\n", "Directory cannot be locked; all"),
         (
-            "Error in rule find_modes:\n    jobid: 2\nLogfile modes.log:\n====\n"
-            "solver modes: error correction stagnates\n====\n",
-            "the run failed, solver modes: error correction stagnates; all that it said is in",
+            "rule validation:\n  shell: 'python -m solver audit none.h5 --out a.json'",
+            "the run failed, solver audit: none.h5: ",
         ),
-        ("Error in rule audit_spectra:\n    jobid: 7\n", "rule audit_spectra ended without a word"),
-        ("", "Snakemake said nothing"),
+        (
+            "rule validation:\n  shell: 'kill -9 $$'",
+            "the run failed, rule validation ended without a word, as jobs do that are killed; all",
+        ),
+        ("rule other:\n  output: 'a'", "the run failed, Snakemake says: .*validation"),
     ],
 )
-def test_what_snakemake_says_of_a_run_that_failed_comes_through(
-    said, says, tmp_path, monkeypatch, capsys
-):
-    monkeypatch.setattr("workflow.commands.validate.subprocess.Popen", printing(said, status=1))
-    out = tmp_path / "out"
-    assert call("builtin:box", "--resolution", 4, "--modes", 12, "--out", out) == 2
-    assert says in capsys.readouterr().err
+def test_why_a_run_failed_comes_through(rules, says, tmp_path):
+    (tmp_path / "Snakefile").write_text(rules)
+    (tmp_path / "config.yaml").write_text("{}")
+    with pytest.raises(UserError, match=says):
+        snakemake_run.run_target(
+            "validation",
+            tmp_path / "config.yaml",
+            cores=1,
+            log=tmp_path / "log",
+            snakefile=tmp_path / "Snakefile",
+        )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import select
 import sys
@@ -18,6 +19,11 @@ from carillon.files.paths import cause
 EXIT_BAD_INPUT = 2
 EXIT_NOT_CONVERGED = 3
 EXIT_INTERRUPTED = 130
+REPORT = "CARILLON_ERRORS"
+"""Environment variable with the name of a file, to which programs append their errors.
+
+A line of the file is a sentence in JSON; who starts programs need not look for it in what they say.
+"""
 
 Comm = Any
 """mpi4py's communicator; this module does without MPI."""
@@ -60,11 +66,21 @@ def run(program: str, main: Callable[[], int | None], comm: Comm = None) -> int:
             traceback.print_exc()
         collective = getattr(error, "collective", False)
         if sentence is not None and (comm is None or comm.rank == 0 or not collective):
-            say("\n".join(f"{program}: {line}" for line in sentence.split("\n")))
+            said = "\n".join(f"{program}: {line}" for line in sentence.split("\n"))
+            say(said)
+            report(said)
     _drop_unwritten()
     if comm is not None and comm.size > 1 and not collective:
         comm.Abort(status)
     return status
+
+
+def report(sentence: str) -> None:
+    """Append a sentence to the file that `REPORT` names, if it names one that can be written."""
+    path = os.environ.get(REPORT)
+    if path:
+        with suppress(OSError), open(path, "a", encoding="utf-8") as file:
+            file.write(json.dumps(sentence) + "\n")
 
 
 def meaning(error: BaseException) -> tuple[int, str | None]:

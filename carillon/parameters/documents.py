@@ -126,4 +126,6 @@ def _plain(value: Any, place: Place) -> Any:
         raise ParameterError(place, f"{reason} at most")
     if isinstance(value, float) and value.is_integer() and abs(value) < _EXACT:
         return int(value)
+    if value is not None and not isinstance(value, str | int | float):
+        raise ParameterError(place, f"found {value!r}, expected a text, a number, a list or keys")
     return value

@@ -11,6 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from carillon.command_line import exit_status
 from studies.base.entry import Entry, tables_of
 from workflow import solids
 
@@ -125,9 +126,10 @@ def named(package: str, reference: str) -> Any:
 
 @contextmanager
 def logged(log: Sequence[str | Path]) -> Iterator[None]:
-    """Write what goes wrong into the log of a rule as well."""
+    """Write what goes wrong into the log of a rule as well, and report it in a sentence."""
     try:
         yield
-    except Exception:
+    except Exception as error:
         Path(log[0]).write_text(traceback.format_exc())
+        exit_status.report(exit_status.meaning(error)[1] or f"{type(error).__name__}: {error}")
         raise

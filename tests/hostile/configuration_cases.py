@@ -89,7 +89,7 @@ hostile("no launcher", "solver: {", "solver: {launcher: '', ", "launcher")
 
 for value in (
     "0",
-    "3",
+    "1",
     "1.5",
     "nan",
     ".nan",

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import os
 import re
-import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,8 +13,7 @@ import yaml
 from annotated_types import Ge
 
 from carillon.builtin_names import BUILTIN_PREFIX
-from carillon.command_line.progress import say, track
-from carillon.errors import UserError
+from carillon.command_line.progress import say
 from carillon.fem.geometry import surface_name
 from carillon.fem.geometry.size import sizes_in_words
 from carillon.fem.materials import NAMES as MATERIALS
@@ -32,13 +28,12 @@ from solver.coarsening.forest import load_forest
 from solver.correction.correction import EIGENVALUE_TOLERANCE
 from solver.response.surface import surface_of
 from studies.base.table import read_table
-from workflow import settings
 from workflow.configuration.run import TolerancesSection
 from workflow.configuration.whole import completed
 from workflow.disk_space import make_folder, require_own
-from workflow.failure import cause
 from workflow.report.findings import headline
 from workflow.settings import DEFAULT_FORESTS
+from workflow.snakemake_run import run_target
 
 CONFIGURATION = "validate.yaml"
 """File in the folder of the results that the run is started with."""
@@ -46,11 +41,6 @@ FAILED = 1
 """Exit status if a criterion is missed."""
 LONGEST_NAME = 64
 """Characters of a model's name; a title may be longer."""
-LOOK_SECONDS = 0.5
-"""Time between two looks at what Snakemake has done."""
-_PLANNED = re.compile(r"^total\s+(\d+)$", re.MULTILINE)
-_DONE = re.compile(r"^(\d+) of \d+ steps \(", re.MULTILINE)
-"""Snakemake's words for how many steps there are, and are done."""
 TOLERANCES = tuple(parameters_of(TolerancesSection))
 """Names of the limits of the criteria."""
 
@@ -124,9 +114,9 @@ def run(arguments: argparse.Namespace) -> int:
         If the solid cannot be made, or the run fails.
     """
     config = configuration(arguments)
+    completed(config)
     say("reading the mesh, making its voxels", sys.stderr.isatty())
     size = _checked_size(arguments)
-    completed(config)
     name = next(iter(config["models"]))
     folder = Path(arguments.out).resolve()
     make_folder(folder)
@@ -134,7 +124,7 @@ def run(arguments: argparse.Namespace) -> int:
     with atomic_path(folder / CONFIGURATION) as temporary:
         temporary.write_text(yaml.safe_dump(config, sort_keys=False))
     say(size)
-    _run_rules(folder, arguments.cores)
+    run_target("validation", folder / CONFIGURATION, arguments.cores, folder / "validate.log")
     page = folder / "validation" / f"{name}.html"
     criteria, told = (
         read_table(folder / "validation" / "tables" / f"{name}-{table}.json").rows
@@ -195,67 +185,3 @@ def _checked_size(arguments: argparse.Namespace) -> str:
             surface_of(solid.model).nearest(arguments.unit * np.array(point), name)
     sizes = sizes_in_words(solid.extents, solid.voxel_extents)
     return f"{sizes}: {solid.fine.n_cells:,} voxels, {solid.fine.n_dofs:,} unknowns"
-
-
-def _run_rules(folder: Path, cores: int) -> None:
-    """Snakemake's target `validation`, with its own files in the folder of the results."""
-    command = [
-        *(sys.executable, "-m", "snakemake", "validation"),
-        *("--snakefile", str(settings.FOLDER / "Snakefile"), "--directory", str(folder)),
-        *("--configfile", str(folder / CONFIGURATION), "--cores", str(cores)),
-        *("--profile", str(settings.FOLDER / "profiles" / "default")),
-        # None of the present folder, where anybody may have written it.
-        *("--workflow-profile", "none"),
-    ]
-    environment = {**os.environ, "PYTHONPATH": str(settings.FOLDER.parent)}
-    log = folder / "validate.log"
-    say(f"running on {cores} cores, see {log}")
-    with (
-        open(log, "w") as stream,
-        # In the folder of the results, as its jobs are.
-        subprocess.Popen(command, env=environment, cwd=folder, stdout=stream, stderr=stream) as run,
-    ):
-        try:
-            _show_steps(run, log)
-        except BaseException:
-            run.kill()
-            raise
-    if run.returncode:
-        raise UserError(f"the run failed, {cause(log.read_text())}; all that it said is in {log}")
-
-
-def _show_steps(run: subprocess.Popen[bytes], log: Path) -> None:
-    """Show how many of Snakemake's steps are done, until it ends."""
-    say("planning the steps", sys.stderr.isatty())
-    total = None
-    while total is None and _goes_on(run):
-        total = _number(_PLANNED, log)
-    if total is not None:
-        for _ in track(_steps(run, log), "validation", total, "steps"):
-            pass
-    run.wait()
-
-
-def _steps(run: subprocess.Popen[bytes], log: Path) -> Iterator[int]:
-    """Numbers of Snakemake's steps as they are done."""
-    told, going = 0, True
-    while going:
-        going = _goes_on(run)
-        done = _number(_DONE, log) or 0
-        yield from range(told + 1, done + 1)
-        told = max(told, done)
-
-
-def _goes_on(run: subprocess.Popen[bytes]) -> bool:
-    """Whether a program still runs after a while."""
-    try:
-        run.wait(LOOK_SECONDS)
-    except subprocess.TimeoutExpired:
-        return True
-    return False
-
-
-def _number(pattern: re.Pattern[str], log: Path) -> int | None:
-    """The number that a log named last, if it did."""
-    found = pattern.findall(log.read_text(errors="replace"))
-    return int(found[-1]) if found else None
