@@ -21,11 +21,12 @@ from solver.analysis.problem import ProblemOptions, build_problem
 from solver.coarsening.choice import make_coarsening
 from solver.files.modes_file import FINE_TAKEN, read_modes
 from solver.refinement import coarse_or_fine, work
-from solver.refinement.coarse_or_fine import by_options, solve_coarsened
+from solver.refinement.coarse_or_fine import solve_coarsened
 from solver.refinement.energies import element_energies, fine_energies
 from solver.refinement.errors import ExpectedErrors
 from solver.refinement.estimate import estimate_errors, mean_shares
 from solver.refinement.inverse_iteration import InverseIteration
+from solver.refinement.model_solver import SolveByOptions
 from solver.refinement.options import ALLOWED_ERROR, RefinementOptions
 from solver.refinement.refined_model import RefinedModel
 from solver.refinement.work import analysis_work, is_followed, variation
@@ -240,7 +241,7 @@ def taken(mesh, resolution, material, **options):
     """What is found for a solid, whose coarse model is weighed as for 250 modes unless told."""
     problem = build_problem(ProblemOptions(f"builtin:{mesh}", resolution, material))
     weighed = SolverOptions(**{"modes": 250, **options})
-    solve = by_options(SolverOptions(modes=20), COMM)
+    solve = SolveByOptions(SolverOptions(modes=20), COMM)
     refined = RefinedModel(problem.model, make_coarsening("ddfem"))
     return problem, solve_coarsened(solve, refined, 0.05, weighed, COMM)
 
@@ -274,7 +275,7 @@ def test_the_coarse_model_stands_where_the_fine_solid_cannot_be_solved(
         RefinedModel(problem.model, make_coarsening("ddfem")),
         SolverOptions(modes=20),
     )
-    alone = by_options(options, COMM)
+    alone = SolveByOptions(options, COMM)
 
     def solve(model, *, start=None):
         if model.n_dofs == problem.model.n_dofs:

@@ -12,7 +12,7 @@ from carillon.errors import UserError
 from carillon.fem.finite_cells.covering import Covering
 from carillon.fem.finite_cells.model import FiniteCellModel
 from solver.accuracy.estimate import CellErrors, estimate_cell_errors
-from solver.refinement.refine import RefinementStep
+from solver.refinement.refine import DIVIDED_CELLS, RefinementStep
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -44,7 +44,7 @@ class DividedCells:
     def advance(self, values: Array, modes: Array, tolerance: float) -> tuple[RefinementStep, bool]:
         """See `Refinable.advance`; cells are divided unless too many of them would have to be."""
         found = estimate_cell_errors(self.model, values, modes)
-        step = RefinementStep(self.model.n_dofs, len(self._places), found.errors)
+        step = RefinementStep(self.model.n_dofs, DIVIDED_CELLS, len(self._places), found.errors)
         above = found.errors.excess(tolerance)
         if above <= 1.0 or self._steps == MOST_STEPS:
             return step, True

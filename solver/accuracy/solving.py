@@ -1,11 +1,11 @@
-"""Solve a solid, refine it where that is asked for, and tell how far it is from the truth."""
+"""The modes of a solid as accurate as is requested: refined, at a resolution that is enough."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -18,30 +18,27 @@ from solver.accuracy.voxels import Reference
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import Problem, ProblemOptions, build_problem
+from solver.analysis.solid_surface import SolidSurface
 from solver.distribution.collective import bcast_from_root, compute_on_root, optional
 from solver.files.modes_file import FINE_TAKEN, read_modes
-from solver.refinement.coarse_or_fine import FineStart, solve_coarsened
+from solver.refinement.coarse_or_fine import solve_coarsened
 from solver.refinement.errors import FROM_FINE, FROM_SOLID, LAST, WORST, ExpectedErrors
-from solver.refinement.refine import Refinable, RefinementStep, solve_refined
+from solver.refinement.model_solver import SolveModel
+from solver.refinement.refine import (
+    DIVIDED_CELLS,
+    FINE_BLOCKS,
+    Refinable,
+    RefinementStep,
+    solve_refined,
+)
 from solver.refinement.refined_model import RefinedModel
 
 MOST_UNKNOWNS = 400_000
 """Unknowns from which no finer lattice is tried."""
-FINE, DIVIDED = "fine_blocks", "divided_cells"
-"""Attributes that count what was refined."""
 UNTOLD = "how far frequencies are from the solid's cannot be told"
-"""What is said where the estimate fails."""
+"""Warning where the estimate fails."""
 LEAST_STEP, LARGEST_STEP = 1.2, 2.0
-"""Factors by which a resolution is raised."""
-
-
-class Solve(Protocol):
-    """Finds modes of a model, as many as are asked for, or `modes` if they are fewer."""
-
-    def __call__(
-        self, model: Solid | None, modes: int | None = None, start: FineStart | None = None
-    ) -> Modes:
-        """Collective; the model is None but on rank 0, and the start is for the fine solid."""
+"""Least and largest factor by which a resolution is raised."""
 
 
 @dataclass
@@ -50,15 +47,18 @@ class Solved:
 
     Attributes
     ----------
+    solid
+        The solid, at the resolution that was solved.
     problem, model
-        The solid, and the model of it that was solved; on rank 0, None on the others.
+        The discretised solid, and the model of it that was solved; on rank 0, None on the others.
     modes
-        Of the model.
+        Modes of the model.
     achieved
         Plain values: what is expected of the frequencies' errors; `fine_taken` is why the fine
         solid was taken for a coarse one, if that is so.
     """
 
+    solid: ProblemOptions
     problem: Problem | None
     model: Solid | None
     modes: Modes
@@ -66,167 +66,181 @@ class Solved:
 
 
 @dataclass(frozen=True)
-class Wishes:
-    """What is asked for of a solid's modes.
+class AccuracyRequest:
+    """How accurate the modes of a solid shall be.
 
     Attributes
     ----------
+    accuracy
+        Expected distance from the solid's frequencies down to which the resolution is raised; None
+        to leave it.
     refine_to
-        Expected error down to which a coarse mesh or finite cells are refined; None for as they
-        are.
+        Expected error down to which a coarse mesh or finite cells are refined; None to leave them.
     estimated
-        Whether the distance from the solid is to be told.
+        Whether the distance from the solid is estimated.
     start
         Modes file whose refined mesh is begun from.
-    options
-        What `solve` computes and how, which a coarse model is weighed by; needed to refine one.
     """
 
+    accuracy: float | None = None
     refine_to: float | None = None
     estimated: bool = False
     start: str | None = None
-    options: SolverOptions | None = None
 
 
 def solve_solid(
-    described: ProblemOptions,
-    solve: Solve,
-    wishes: Wishes,
+    solid: ProblemOptions,
+    solve: SolveModel,
+    options: SolverOptions,
+    request: AccuracyRequest,
     comm: MPI.Comm = MPI.COMM_WORLD,
-    report: Callable[[str, RefinementStep], None] | None = None,
+    report: Callable[[RefinementStep], None] | None = None,
 ) -> Solved:
-    """Modes of a solid and what they are expected to be off; collective.
+    """Modes of a solid, as accurate as requested, and their expected errors; collective.
 
     Parameters
     ----------
+    solid
+        The solid, with the resolution to begin with.
+    solve, options
+        What finds the modes of a model, and how it does, which coarse models are weighed by.
     report
-        Called on rank 0 with what was refined and each step of it.
+        Called on rank 0 with each step of a refinement.
 
     Raises
     ------
     UserError
-        For anything wrong with the solid.
+        For anything wrong with the solid, and if it would be too large to be so accurate.
     """
-    problem = compute_on_root(comm, lambda: build_problem(described))
-    cells = described.discretisation == "finite-cell"
-    tolerance = wishes.refine_to
-    if tolerance is None and cells and wishes.estimated:
-        tolerance = np.inf
-    if tolerance is None:
-        model = None if problem is None else problem.model
-        solved = Solved(problem, model, solve(model), {})
-    elif cells:
-        solved = _divided(problem, solve, tolerance, comm, report)
-    else:
-        solved = _coarsened(problem, described, solve, wishes, comm, report)
-    if wishes.estimated and described.discretisation == "voxel":
-        distance = partial(_distance_of_voxels, described, solved, solve, comm)
-        solved.achieved |= optional(comm, UNTOLD, distance) or {}
+    search = _Search(solve, options, request, comm, report)
+    solved = search.solved(solid)
+    while (resolution := search.resolution_after(solved)) is not None:
+        solved.modes.destroy()
+        surface = None if solved.problem is None else solved.problem.surface
+        solved = search.solved(replace(solved.solid, resolution=resolution), surface)
     return solved
 
 
-def solve_accurately(
-    described: ProblemOptions,
-    accuracy: float,
-    solve: Solve,
-    wishes: Wishes,
-    comm: MPI.Comm = MPI.COMM_WORLD,
-    report: Callable[[str, RefinementStep], None] | None = None,
-) -> tuple[ProblemOptions, Solved]:
-    """The same at the lowest resolution, from that described, that is expected to be accurate.
+@dataclass(frozen=True)
+class _Search:
+    """What stays the same at all resolutions, see `solve_solid`."""
 
-    Raises
-    ------
-    UserError
-        Also if that would be too large.
-    """
-    while True:
-        solved = solve_solid(described, solve, wishes, comm, report)
-        with on_all_ranks():
-            if f"{FROM_SOLID}_rms" not in solved.achieved:
-                raise UserError(
-                    "--accuracy needs a distance from the solid, which could not be told"
-                )
-            rms, worst = (solved.achieved[f"{FROM_SOLID}_{name}"] for name in ("rms", "worst"))
-            excess = max(rms, abs(worst) / WORST) / accuracy
-            if excess > 1.0 and described.material not in NAMES:
-                raise UserError(
-                    f"--accuracy {accuracy:g} needs a higher --resolution than "
-                    f"{described.resolution}, and {described.material} is of the voxels of that one"
-                )
+    solve: SolveModel
+    options: SolverOptions
+    request: AccuracyRequest
+    comm: MPI.Comm
+    report: Callable[[RefinementStep], None] | None
+
+    def solved(self, solid: ProblemOptions, surface: SolidSurface | None = None) -> Solved:
+        """Modes at one resolution; the surface on rank 0 if it was read before."""
+        problem = compute_on_root(self.comm, lambda: build_problem(solid, surface))
+        estimated, tolerance = self.request.estimated, self.request.refine_to
+        cells = solid.discretisation == "finite-cell"
+        if tolerance is None and cells and estimated:
+            tolerance = np.inf
+        if tolerance is None:
+            model = None if problem is None else problem.model
+            solved = Solved(solid, problem, model, self.solve(model), {})
+        elif cells:
+            solved = self._divided(solid, problem, tolerance)
+        else:
+            solved = self._coarsened(solid, problem, tolerance)
+        if estimated and solid.discretisation == "voxel":
+            distance = partial(self._distance_of_voxels, solved)
+            solved.achieved |= optional(self.comm, UNTOLD, distance) or {}
+        return solved
+
+    @on_all_ranks()
+    def resolution_after(self, solved: Solved) -> int | None:
+        """The next resolution to try; None if the frequencies are near enough to the solid's."""
+        accuracy, solid = self.request.accuracy, solved.solid
+        if accuracy is None:
+            return None
+        if f"{FROM_SOLID}_rms" not in solved.achieved:
+            raise UserError("--accuracy needs a distance from the solid, which could not be told")
+        rms, worst = (solved.achieved[f"{FROM_SOLID}_{name}"] for name in ("rms", "worst"))
+        excess = max(rms, abs(worst) / WORST) / accuracy
         if excess <= 1.0:
             # Cells need not be divided as far as without an accuracy.
             solved.achieved.pop("missed_accuracy", None)
-            return described, solved
-        unknowns = comm.bcast(None if solved.model is None else solved.model.n_dofs)
+            return None
+        if solid.material not in NAMES:
+            raise UserError(
+                f"--accuracy {accuracy:g} needs a higher --resolution than {solid.resolution}, and "
+                f"{solid.material} is of the voxels of that one"
+            )
+        unknowns = self.comm.bcast(None if solved.model is None else solved.model.n_dofs)
         factor = float(np.clip(np.sqrt(excess), LEAST_STEP, LARGEST_STEP))
         if unknowns * factor**2 > MOST_UNKNOWNS:
-            with on_all_ranks():
-                raise UserError(
-                    f"--accuracy {accuracy:g} needs more than {MOST_UNKNOWNS:,} unknowns; "
-                    f"--resolution {described.resolution} is expected to be {rms:.2g} off, worst "
-                    f"{worst:+.2g}"
-                )
-        solved.modes.destroy()
-        described = replace(described, resolution=int(np.ceil(factor * described.resolution)))
+            raise UserError(
+                f"--accuracy {accuracy:g} needs more than {MOST_UNKNOWNS:,} unknowns; --resolution "
+                f"{solid.resolution} is expected to be {rms:.2g} off, worst {worst:+.2g}"
+            )
+        return int(np.ceil(factor * solid.resolution))
+
+    def _divided(self, solid: ProblemOptions, problem: Problem | None, tolerance: float) -> Solved:
+        """Finite cells that are divided where it matters."""
+        start: Refinable[Any] | None = compute_on_root(self.comm, lambda: _undivided(problem))
+        model, modes, steps = solve_refined(self.solve, start, tolerance, self.comm, self.report)
+        achieved: dict[str, Any] = {}
+        if steps:
+            achieved = steps[-1].errors.attributes(FROM_SOLID)
+            achieved |= {DIVIDED_CELLS: steps[-1].refined, "refinement_steps": len(steps) - 1}
+            if steps[-1].errors.excess(tolerance) > 1.0:
+                achieved["missed_accuracy"] = tolerance
+        return Solved(solid, problem, model, modes, achieved)
+
+    def _coarsened(
+        self, solid: ProblemOptions, problem: Problem | None, tolerance: float
+    ) -> Solved:
+        """A coarse model, refined as in the file to start from, or the fine one."""
+        comm, start = self.comm, self.request.start
+        refined = compute_on_root(comm, lambda: _coarse(solid, problem, start))
+        result = solve_coarsened(self.solve, refined, tolerance, self.options, comm, self.report)
+        achieved = {} if result.errors is None else result.errors.attributes(FROM_FINE)
+        achieved |= {"refinement_steps": max(len(result.steps) - 1, 0)}
+        if result.reason is not None:
+            blocks = comm.bcast(None if refined is None else refined.all_blocks)
+            achieved |= {FINE_BLOCKS: blocks, FINE_TAKEN: result.reason}
+        elif result.errors is not None:
+            achieved |= {FINE_BLOCKS: result.steps[-1].refined}
+        else:
+            achieved |= {FINE_BLOCKS: comm.bcast(None if refined is None else refined.fine_blocks)}
+        return Solved(solid, problem, result.model, result.modes, achieved)
+
+    def _distance_of_voxels(self, solved: Solved) -> dict[str, Any]:
+        """Distance of voxels from the solid, as attributes."""
+        cells = compute_on_root(self.comm, lambda: _reference(solved))
+        reference = self.solve(None if cells is None else cells.model, LAST)
+        modes = reference.system.gather(reference.vectors)
+
+        def errors() -> ExpectedErrors:
+            assert cells is not None and modes is not None
+            return cells.errors(solved.modes.values, reference.values, modes)
+
+        try:
+            return bcast_from_root(self.comm, errors).attributes(FROM_SOLID)
+        finally:
+            reference.destroy()
 
 
-def _divided(
-    problem: Problem | None,
-    solve: Solve,
-    tolerance: float,
-    comm: MPI.Comm,
-    report: Callable[[str, RefinementStep], None] | None,
-) -> Solved:
-    """Finite cells that are divided where it matters."""
-
-    def cells() -> DividedCells:
-        assert problem is not None and problem.covering is not None
-        return DividedCells(problem.covering, problem.finite_cells)
-
-    told = None if report is None else partial(report, DIVIDED)
-    start: Refinable[Any] | None = compute_on_root(comm, cells)
-    model, modes, steps = solve_refined(solve, start, tolerance, comm, told)
-    achieved: dict[str, Any] = {}
-    if steps:
-        achieved = steps[-1].errors.attributes(FROM_SOLID)
-        achieved |= {DIVIDED: steps[-1].refined, "refinement_steps": len(steps) - 1}
-        if steps[-1].errors.excess(tolerance) > 1.0:
-            achieved["missed_accuracy"] = tolerance
-    return Solved(problem, model, modes, achieved)
+def _reference(solved: Solved) -> Reference:
+    assert solved.problem is not None
+    return Reference.of_voxels(solved.solid, solved.problem)
 
 
-def _coarsened(
-    problem: Problem | None,
-    described: ProblemOptions,
-    solve: Solve,
-    wishes: Wishes,
-    comm: MPI.Comm,
-    report: Callable[[str, RefinementStep], None] | None,
-) -> Solved:
-    """A coarse model, with those blocks fine that are so in the file to start from, or the fine."""
-    assert wishes.refine_to is not None and wishes.options is not None
+def _undivided(problem: Problem | None) -> DividedCells:
+    assert problem is not None and problem.covering is not None
+    return DividedCells(problem.covering, problem.finite_cells)
 
-    def coarse() -> RefinedModel:
-        assert problem is not None
-        coarsening = described.coarsening()
-        assert coarsening is not None
-        mesh = None if wishes.start is None else read_modes(wishes.start, with_modes=False).mesh
-        return RefinedModel(_fine(problem), coarsening, mesh)
 
-    told = None if report is None else partial(report, FINE)
-    refined = compute_on_root(comm, coarse)
-    found = solve_coarsened(solve, refined, wishes.refine_to, wishes.options, comm, told)
-    achieved = {} if found.errors is None else found.errors.attributes(FROM_FINE)
-    achieved |= {"refinement_steps": max(len(found.steps) - 1, 0)}
-    if found.reason is not None:
-        blocks = comm.bcast(None if refined is None else refined.all_blocks)
-        achieved |= {FINE: blocks, FINE_TAKEN: found.reason}
-    elif found.errors is not None:
-        achieved |= {FINE: found.steps[-1].refined}
-    else:
-        achieved |= {FINE: comm.bcast(None if refined is None else refined.fine_blocks)}
-    return Solved(problem, found.model, found.modes, achieved)
+def _coarse(solid: ProblemOptions, problem: Problem | None, start: str | None) -> RefinedModel:
+    """The coarse model to begin with, with those blocks fine that are in the file `start`."""
+    assert problem is not None
+    coarsening = solid.coarsening()
+    assert coarsening is not None
+    mesh = None if start is None else read_modes(start, with_modes=False).mesh
+    return RefinedModel(_fine(problem), coarsening, mesh)
 
 
 def _fine(problem: Problem) -> ElasticModel:
@@ -238,26 +252,3 @@ def _fine(problem: Problem) -> ElasticModel:
         density=coarse.density,
         lumped=coarse.lumped,
     )
-
-
-def _distance_of_voxels(
-    described: ProblemOptions, solved: Solved, solve: Solve, comm: MPI.Comm
-) -> dict[str, Any]:
-    """Distance of voxels from the solid, as attributes."""
-
-    def reference() -> Reference:
-        assert solved.problem is not None
-        return Reference.of_voxels(described, solved.problem)
-
-    cells = compute_on_root(comm, reference)
-    found = solve(None if cells is None else cells.model, LAST)
-    modes = found.system.gather(found.vectors)
-
-    def errors() -> ExpectedErrors:
-        assert cells is not None and modes is not None
-        return cells.errors(solved.modes.values, found.values, modes)
-
-    try:
-        return bcast_from_root(comm, errors).attributes(FROM_SOLID)
-    finally:
-        found.destroy()

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
-from carillon.fem.geometry import load_surface, surface_name
 from carillon.fem.model import RIGID_MODES
 from solver.accuracy.estimate import estimate_cell_errors
 from solver.accuracy.lattices import covering_on, voxel_lattice
@@ -26,28 +26,27 @@ class Reference:
     Attributes
     ----------
     model
-        Of cells on the voxels' lattice.
+        Model of finite cells on the voxels' lattice.
     """
 
     model: FiniteCellModel
 
     @classmethod
-    def of_voxels(cls, described: ProblemOptions, problem: Problem) -> Reference:
-        """That of the problem with this description.
+    def of_voxels(cls, options: ProblemOptions, problem: Problem) -> Self:
+        """Finite cells on the lattice of a problem's voxels, which `options` describe.
 
         Raises
         ------
         UserError
             If the solid is lost between the lines of the lattice.
         """
-        surface = load_surface(described.mesh, described.unit)
-        lattice = voxel_lattice(surface, described.resolution)
-        name = surface_name(described.mesh)
-        cells = covering_on(surface, lattice, "largest", name).cells
-        gradual = described.material in INTERPOLATED
+        surface = problem.surface
+        lattice = voxel_lattice(surface.triangles, options.resolution)
+        cells = covering_on(surface.triangles, lattice, "largest", surface.name).cells
+        gradual = options.material in INTERPOLATED
         material = PlacedMaterial.of_voxels(lattice, problem.fine, problem.young, gradual)
         young = material.on(cells.mesh)
-        return cls(finite_cell_model(cells, young, described.poisson, described.density))
+        return cls(finite_cell_model(cells, young, options.poisson, options.density))
 
     def errors(self, voxels: Array, values: Array, modes: Array) -> ExpectedErrors:
         """Expected errors of the frequencies of the voxels, or of coarse elements of them.
@@ -55,7 +54,7 @@ class Reference:
         Parameters
         ----------
         voxels
-            (k,) their eigenvalues [rad^2/s^2].
+            (k,) eigenvalues [rad^2/s^2] of the voxels or coarse elements.
         values, modes
             (l,) eigenvalues and (n_dofs, l) modes of the finite cells.
         """

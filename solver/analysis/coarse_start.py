@@ -45,45 +45,47 @@ def coarse_start(
         For a model that is not coarsened, or too few coarse unknowns.
     """
     comm = solver.comm
-    blocks: Blocks | None = None
+    coarsened = compute_on_root(comm, lambda: _coarsened(model, coarsening))
+    blocks, coarse = (None, None) if coarsened is None else coarsened
+    requested = solver.options.modes
+    options = SolverOptions(
+        modes=requested + default_guard(requested), tolerance=TOLERANCE, seed=solver.options.seed
+    )
+    modes = ModalSolver(coarse, options, comm).solve()
+    whole = modes.system.gather(modes.vectors[:, RIGID_MODES:])
+    modes.destroy()
+    values = modes.values[RIGID_MODES:]
+    rows = scatter_rows(prolonged(blocks, whole), len(values), solver.local_mesh, comm)
+    return Approximation(values, rows)
 
-    def coarsened() -> ElasticModel:
-        nonlocal blocks
-        assert model is not None and coarsening is not None
-        if (
-            not isinstance(model, ElasticModel)
-            or model.mesh.span is not None
-            or not model.filled.all()
-        ):
-            raise UserError(
-                "--refine starts from the coarsened solid; expected voxels that are not coarsened"
-            )
-        blocks = blocks_from_mesh(model.mesh)
-        moduli = element_moduli(blocks, model.young[:, 0], coarsening)
-        return coarse_model(
-            blocks,
-            moduli,
-            coarsening.lumped_fraction,
-            poisson=model.poisson,
-            density=model.density,
-            lumped=model.lumped,
+
+def _coarsened(model: Solid | None, coarsening: Coarsening | None) -> tuple[Blocks, ElasticModel]:
+    """Blocks of a model of voxels, and the coarse model of them."""
+    assert model is not None and coarsening is not None
+    if not isinstance(model, ElasticModel) or model.mesh.span is not None or not model.filled.all():
+        raise UserError(
+            "--refine starts from the coarsened solid; expected voxels that are not coarsened"
         )
+    blocks = blocks_from_mesh(model.mesh)
+    moduli = element_moduli(blocks, model.young[:, 0], coarsening)
+    coarse = coarse_model(
+        blocks,
+        moduli,
+        coarsening.lumped_fraction,
+        poisson=model.poisson,
+        density=model.density,
+        lumped=model.lumped,
+    )
+    return blocks, coarse
 
-    coarse = compute_on_root(comm, coarsened)
-    wanted = solver.options.modes
-    modes = wanted + default_guard(wanted)
-    options = SolverOptions(modes=modes, tolerance=TOLERANCE, seed=solver.options.seed)
-    found = ModalSolver(coarse, options, comm).solve()
-    whole = found.system.gather(found.vectors[:, RIGID_MODES:])
-    found.destroy()
-    count = len(found.values) - RIGID_MODES
-    columns = prolonged(blocks, whole) if blocks is not None and whole is not None else []
-    rows = scatter_rows(columns, count, solver.local_mesh, comm)
-    return Approximation(found.values[RIGID_MODES:], rows)
 
+def prolonged(blocks: Blocks | None, modes: Array | None) -> Iterator[Array]:
+    """Coarse modes (coarse n_dofs, k) on the fine nodes (n_dofs, c), a few at a time.
 
-def prolonged(blocks: Blocks, modes: Array) -> Iterator[Array]:
-    """Coarse modes (coarse n_dofs, k) on the fine nodes (n_dofs, c), a few at a time."""
+    Nothing on ranks that do not have them.
+    """
+    if blocks is None or modes is None:
+        return
     interpolation = sp.kron(prolongation(blocks), sp.identity(3), format="csr")
     for first in range(0, modes.shape[1], COLUMNS):
         yield interpolation @ np.ascontiguousarray(modes[:, first : first + COLUMNS])

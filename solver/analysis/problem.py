@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from carillon.fem import geometry, materials
+from carillon.fem import materials
 from carillon.fem.element import DEFAULT_POISSON
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.geometry import HexMesh, hexmesh_from_voxels, voxelize
 from carillon.fem.geometry.bridges import say_bridged
-from carillon.fem.geometry.size import doubt_unit
 from carillon.fem.materials import young_modulus
 from carillon.fem.model import DEFAULT_DENSITY, ElasticModel, Solid
 from carillon.limits import require_constants
@@ -31,15 +30,14 @@ from carillon.parameters.quantities import (
     Resolution,
 )
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, OBJECTIVES
+from solver.analysis.solid_surface import SolidSurface
 from solver.coarsening.choice import METHODS as COARSENINGS
 from solver.coarsening.choice import make_coarsening
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.forest import FOREST
 from solver.coarsening.model import build_model
 
-if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
-    import trimesh
-
+if TYPE_CHECKING:  # Its import takes long.
     from carillon.fem.finite_cells.covering import Covering
 
 Array = NDArray[np.float64]
@@ -104,19 +102,38 @@ class ProblemOptions:
 
 @dataclass(frozen=True)
 class Problem:
-    """Voxels, their moduli (m,) [Pa], the model to solve, and how long making them took.
+    """A solid in pieces, with its material, and the model to solve.
 
-    `coarsening` tells what the coarse elements rest on, see `Coarsening.record`; `covering` is that
-    of finite cells; `extents` (3,) are the sides of the box around the surface [m].
+    Attributes
+    ----------
+    surface
+        The surface that it was made from.
+    fine
+        Voxels, those of finite cells too.
+    young
+        (m,) Young's moduli [Pa] of the voxels.
+    model
+        What is solved: the voxels, coarse elements of them, or finite cells.
+    seconds
+        Wall time by phase.
+    coarsening
+        What the coarse elements rest on, see `Coarsening.record`.
+    covering
+        The covering by finite cells, if these are solved.
     """
 
+    surface: SolidSurface
     fine: HexMesh
     young: Array
     model: Solid
     seconds: dict[str, float]
     coarsening: dict[str, str] = field(default_factory=dict)
     covering: Covering | None = None
-    extents: tuple[float, ...] = ()
+
+    @property
+    def extents(self) -> tuple[float, ...]:
+        """Sides (3,) of the box around the surface [m]."""
+        return self.surface.extents
 
     @property
     def voxel_extents(self) -> tuple[float, ...] | None:
@@ -138,8 +155,13 @@ class Problem:
         return self.model
 
 
-def build_problem(options: ProblemOptions) -> Problem:
+def build_problem(options: ProblemOptions, surface: SolidSurface | None = None) -> Problem:
     """Discretise the solid, assign the material and coarsen.
+
+    Parameters
+    ----------
+    surface
+        The surface of the mesh that `options` name; read if not given.
 
     Raises
     ------
@@ -148,19 +170,18 @@ def build_problem(options: ProblemOptions) -> Problem:
     """
     require_constants(options.poisson, options.density)
     begin = time.perf_counter()
-    surface = geometry.load_surface(options.mesh, options.unit)
-    extents = tuple(float(side) for side in surface.extents)
-    name = geometry.surface_name(options.mesh)
-    mesh, cells = discretised(surface, options, name)
-    doubt_unit(options.mesh, extents, options.unit)
+    if surface is None:
+        surface = SolidSurface.read(options.mesh, options.unit)
+    mesh, covering = discretised(surface, options)
+    surface.doubt_unit()
     meshed = time.perf_counter()
-    label = f"mesh '{name}', resolution {options.resolution}"
+    label = f"mesh '{surface.name}', resolution {options.resolution}"
     young = young_modulus(options.material, mesh, options.seed, label)
     assigned = time.perf_counter()
     seconds = {"mesh": meshed - begin, "material": assigned - meshed}
-    if cells is not None:
-        model = finite_cell_model(cells.cells, young, options.poisson, options.density)
-        return Problem(mesh, young, model, seconds, covering=cells, extents=extents)
+    if covering is not None:
+        cells = finite_cell_model(covering.cells, young, options.poisson, options.density)
+        return Problem(surface, mesh, young, cells, seconds, covering=covering)
     coarsening = options.coarsening()
     elements = build_model(
         mesh,
@@ -171,31 +192,30 @@ def build_problem(options: ProblemOptions) -> Problem:
         lumped=options.lumped,
     )
     if coarsening is None:
-        return Problem(mesh, young, elements, seconds, extents=extents)
+        return Problem(surface, mesh, young, elements, seconds)
     seconds["coarsening"] = time.perf_counter() - assigned
-    return Problem(mesh, young, elements, seconds, coarsening.record(), extents=extents)
+    return Problem(surface, mesh, young, elements, seconds, coarsening.record())
 
 
-def discretised(
-    surface: trimesh.Trimesh, options: ProblemOptions, name: str
-) -> tuple[HexMesh, Covering | None]:
-    """Voxels of a surface in metres, and the finite cells that they belong to, if it shall be such.
+def discretised(surface: SolidSurface, options: ProblemOptions) -> tuple[HexMesh, Covering | None]:
+    """Voxels of a solid, and the covering by finite cells that they belong to, if there is one.
 
     Raises
     ------
     UserError
         If the surface or the options are of no use.
     """
+    triangles, name = surface.triangles, surface.name
     match options.discretisation:
         case "voxel":
-            voxels = voxelize(surface, options.resolution, options.fill, options.components, name)
-            say_bridged(surface, voxels)
+            voxels = voxelize(triangles, options.resolution, options.fill, options.components, name)
+            say_bridged(triangles, voxels)
             return hexmesh_from_voxels(voxels), None
         case "finite-cell":
             from carillon.fem.finite_cells.build import covering  # Its import takes long.
 
             _require_nothing_for_voxels(options)
-            cells = covering(surface, options.resolution, options.components, name)
+            cells = covering(triangles, options.resolution, options.components, name)
             return cells.cells.mesh, cells
         case other:
             raise UserError(

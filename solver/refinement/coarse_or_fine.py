@@ -14,94 +14,28 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.fem.geometry import Blocks
 from carillon.fem.model import RIGID_MODES, ElasticModel
-from solver.analysis.coarse_start import prolonged
-from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Modes
-from solver.analysis.options import RANDOM, SolverOptions
-from solver.analysis.prepared import Prepared
-from solver.correction.random_start import Approximation
-from solver.correction.shift import is_amid
+from solver.analysis.options import SolverOptions
 from solver.distribution.collective import bcast_from_root, compute_on_root, optional
-from solver.files.initial_modes import scatter_rows
-from solver.refinement import work
-from solver.refinement.errors import LAST, WORST, ExpectedErrors
-from solver.refinement.estimate import ErrorEstimate, estimate_errors, mean_shares
+from solver.refinement.errors import LAST, ExpectedErrors
+from solver.refinement.estimate import ErrorEstimate, estimate_errors
+from solver.refinement.fine_start import FineStart
 from solver.refinement.inverse_iteration import InverseIteration
+from solver.refinement.model_solver import SolveModel
 from solver.refinement.refine import RefinementStep
 from solver.refinement.refined_model import RefinedModel
+from solver.refinement.weighing import Weighing
 
 Array = NDArray[np.float64]
 
 UNTOLD = "how far frequencies are off cannot be told"
 """Why the fine solid is taken where an estimate fails."""
-
-
-@dataclass
-class FineStart:
-    """What a coarse model that was not good enough leaves for the fine analysis.
-
-    Attributes
-    ----------
-    solid
-        The fine solid that it was rated by.
-    values
-        (q,) elastic eigenvalues [rad^2/s^2] of the coarse model.
-    blocks, modes
-        The coarse mesh, and its modes (coarse n_dofs, q), on rank 0.
-    """
-
-    solid: InverseIteration
-    values: Array
-    blocks: Blocks | None
-    modes: Array | None
-
-    @property
-    def prepared(self) -> Prepared:
-        """Partition and analysis of the fine mesh."""
-        return self.solid.prepared
-
-    def begin(self, solver: ModalSolver) -> Approximation | None:
-        """What an analysis of the fine solid may start from; None if it has no use for it."""
-        requested = solver.options.modes - RIGID_MODES
-        if solver.options.method not in RANDOM or solver.options.check_inertia:
-            return None
-        given = self.blocks is not None and self.modes is not None
-        columns = prolonged(self.blocks, self.modes) if given else []  # type: ignore[arg-type]
-        rows = scatter_rows(columns, len(self.values), solver.local_mesh, solver.comm)
-        inverse = self.solid.inverse
-        if solver.local_mesh is not self.prepared.local_mesh or inverse is None:
-            inverse = None
-        elif not self.prepared.linear.indefinite or not is_amid(inverse, requested):
-            inverse = None
-        else:
-            self.solid.inverse = None  # The analysis frees it.
-        return Approximation(self.values, rows, inverse)
-
-
-class SolveCoarse(Protocol):
-    """Finds the modes of a coarse model, or of the fine one with a start if there is one."""
-
-    def __call__(self, model: ElasticModel | None, *, start: FineStart | None = None) -> Modes:
-        """Collective; the model is None but on rank 0."""
-
-
-def by_options(options: SolverOptions, comm: MPI.Comm = MPI.COMM_WORLD) -> SolveCoarse:
-    """Finds modes as these options say."""
-
-    def solve(model: ElasticModel | None, *, start: FineStart | None = None) -> Modes:
-        prepared = None if start is None else start.prepared
-        solver = ModalSolver(model, options, comm, prepared=prepared)
-        return solver.solve(initial_modes=None if start is None else start.begin(solver))
-
-    return solve
 
 
 @dataclass
@@ -111,15 +45,15 @@ class CoarseOrFine:
     Attributes
     ----------
     model
-        That was solved last, on rank 0.
+        The model that was solved last, on rank 0.
     modes
-        Of the model.
+        Modes of that model.
     steps
         Coarse models that were rated; none if the fine solid was taken at once.
     reason
         Why the fine solid was taken, as a clause; None for a coarse model.
     errors
-        Expected of the frequencies; None if they cannot be told.
+        Expected errors of the frequencies; None if they could not be estimated.
     """
 
     model: ElasticModel | None
@@ -130,7 +64,7 @@ class CoarseOrFine:
 
 
 def solve_coarsened(
-    solve: SolveCoarse,
+    solve: SolveModel,
     refined: RefinedModel | None,
     tolerance: float,
     options: SolverOptions,
@@ -159,160 +93,84 @@ def solve_coarsened(
     >>> from carillon.fem.model import fine_model
     >>> from solver import SolverOptions
     >>> from solver.coarsening.choice import make_coarsening
+    >>> from solver.refinement.model_solver import SolveByOptions
     >>> mesh = hexmesh_from_voxels(voxelize(builtin_surface("bar"), 16))
     >>> fine = fine_model(mesh, np.full(mesh.n_cells, 1e9))
     >>> coarse = RefinedModel(fine, make_coarsening("ddfem"))
     >>> options = SolverOptions(modes=20)
-    >>> found = solve_coarsened(by_options(options), coarse, 0.05, options)
-    >>> found.reason
+    >>> result = solve_coarsened(SolveByOptions(options), coarse, 0.05, options)
+    >>> result.reason
     'the fine solid has so few unknowns that a coarse one and its check would save little'
-    >>> found.model.n_dofs == fine.n_dofs, found.errors.rms
+    >>> result.model.n_dofs == fine.n_dofs, result.errors.rms
     (True, 0.0)
     """
-    choice = None if refined is None else _Weighing(refined, tolerance, options)
+    weighing = None if refined is None else Weighing(refined, tolerance, options)
+    fine = None if refined is None else refined.fine
     solid: InverseIteration | None = None
     start: FineStart | None = None
     coarse: CoarseOrFine | None = None
     steps: list[RefinementStep] = []
-    reason = bcast_from_root(comm, lambda: _of(choice).before())
+    reason = bcast_from_root(comm, lambda: _on_root(weighing).before())
     while reason is None:
         model = None if refined is None else refined.model
-        found = solve(model)
+        modes = solve(model)
         if solid is None:
-            solid = InverseIteration(None if refined is None else refined.fine, comm)
+            solid = InverseIteration(fine, comm)
         blocks = None if refined is None else refined.blocks
-        rating = partial(estimate_errors, solid, blocks, found)
+        rating = partial(estimate_errors, solid, blocks, modes)
         estimate = optional(comm, f"the fine solid is taken, since {UNTOLD}", rating)
         if estimate is None:
-            coarse = CoarseOrFine(model, found, steps, None, None)
+            coarse = CoarseOrFine(model, modes, steps, None, None)
             reason = UNTOLD
             break
-        step = bcast_from_root(comm, partial(_step, choice, estimate))
+        step, done, reason = bcast_from_root(comm, partial(_weighed, weighing, estimate))
         steps.append(step)
         if report is not None and comm.rank == 0:
             report(step)
-        done, reason = bcast_from_root(comm, partial(_after, choice, estimate))
         if done:
             solid.destroy()
-            return CoarseOrFine(model, found, steps, None, estimate.errors)
+            return CoarseOrFine(model, modes, steps, None, estimate.errors)
         if reason is None:
-            reason = _refined(choice, solid, estimate, comm)
+            reason = _refine(weighing, solid, estimate, comm)
         if reason is not None:
-            whole = found.system.gather(np.ascontiguousarray(found.vectors[:, RIGID_MODES:]))
-            start = FineStart(solid, found.values[RIGID_MODES:], blocks, whole)
-            coarse = CoarseOrFine(model, found, steps, None, estimate.errors)
+            whole = modes.system.gather(np.ascontiguousarray(modes.vectors[:, RIGID_MODES:]))
+            start = FineStart(solid, modes.values[RIGID_MODES:], blocks, whole)
+            coarse = CoarseOrFine(model, modes, steps, None, estimate.errors)
         else:
-            found.destroy()
-    fine = None if refined is None else refined.fine
+            modes.destroy()
     solve_fine = partial(solve, fine, start=start)
     if coarse is None:
-        found = solve_fine()
+        modes = solve_fine()
     else:
         better = optional(comm, "the modes are those of the coarse model", solve_fine)
         if better is None:
             return coarse
         coarse.modes.destroy()
-        found = better
+        modes = better
     if solid is not None:
         solid.destroy()
-    none = np.zeros(max(min(LAST, len(found.values)) - RIGID_MODES, 1))
-    return CoarseOrFine(fine, found, steps, reason, ExpectedErrors(none))
+    none = np.zeros(max(min(LAST, len(modes.values)) - RIGID_MODES, 1))
+    return CoarseOrFine(fine, modes, steps, reason, ExpectedErrors(none))
 
 
-def _refined(
-    choice: _Weighing | None, solid: InverseIteration, estimate: ErrorEstimate, comm: MPI.Comm
+def _weighed(
+    weighing: Weighing | None, estimate: ErrorEstimate
+) -> tuple[RefinementStep, bool, str | None]:
+    """The model that was rated, whether it is good enough, and why it cannot be refined if not."""
+    weighing = _on_root(weighing)
+    return weighing.step(estimate.errors), *weighing.after(estimate)
+
+
+def _refine(
+    weighing: Weighing | None, solid: InverseIteration, estimate: ErrorEstimate, comm: MPI.Comm
 ) -> str | None:
-    """Keep blocks fine; why not, if that is so."""
+    """Keep blocks fine; why the refined model is not worth solving, if that is so."""
     count = len(estimate.errors.errors)
     vectors = solid.whole(estimate.fine.vectors[:, :count])
-    compute_on_root(comm, lambda: _of(choice).refine(estimate, vectors))
-    return bcast_from_root(comm, lambda: _of(choice).after_refining())
+    compute_on_root(comm, lambda: _on_root(weighing).refine(estimate, vectors))
+    return bcast_from_root(comm, lambda: _on_root(weighing).after_refining())
 
 
-def _step(choice: _Weighing | None, estimate: ErrorEstimate) -> RefinementStep:
-    return _of(choice).step(estimate.errors)
-
-
-def _after(choice: _Weighing | None, estimate: ErrorEstimate) -> tuple[bool, str | None]:
-    return _of(choice).after(estimate)
-
-
-def _of(choice: _Weighing | None) -> _Weighing:
-    assert choice is not None
-    return choice
-
-
-class _Weighing:
-    """What rank 0 decides, and the work that was spent so far."""
-
-    def __init__(self, refined: RefinedModel, tolerance: float, options: SolverOptions) -> None:
-        self._refined = refined
-        self._tolerance = tolerance
-        self._options = options
-        self._fine_work = self._analysis_work(refined.fine.n_dofs)
-        self._spent = 0.0
-        self._excuse = ""
-
-    def before(self) -> str | None:
-        """Why the fine solid is to be solved at once."""
-        refined = self._refined
-        if refined.is_fine_given:
-            return "the modes to start from are those of the fine solid"
-        if refined.is_given:
-            return None
-        if not work.is_followed(refined.blocks, refined.young):
-            ratio = work.variation(refined.blocks, refined.young)
-            return (
-                "the material varies from voxel to voxel, by a factor of "
-                f"{ratio:,.0f} in a typical block, which coarse elements cannot follow"
-            )
-        unknowns, options = (refined.fine.n_dofs, refined.n_dofs), self._options
-        if not work.is_clearly_less(*unknowns, options.modes, options.method):
-            return (
-                "the fine solid has so few unknowns that a coarse one and its check would save "
-                "little"
-            )
-        return None
-
-    def step(self, errors: ExpectedErrors) -> RefinementStep:
-        """The model as it is now, and what is expected of it."""
-        return RefinementStep(self._refined.n_dofs, self._refined.fine_blocks, errors)
-
-    def after(self, estimate: ErrorEstimate) -> tuple[bool, str | None]:
-        """Whether the model is good enough, and if not, why it cannot be refined."""
-        self._spent += self._coarse_work() + self._estimate_work()
-        missed, errors = estimate.fine.missed, estimate.errors
-        if errors.excess(self._tolerance) <= 1.0:
-            lacks = "1 mode" if missed == 1 else f"{missed} modes"
-            return (
-                not missed,
-                f"the coarse model lacks {lacks} of the fine solid" if missed else None,
-            )
-        self._excuse = (
-            f"the coarse model's frequencies are expected to be {errors.rms:.1%} off "
-            f"({100 * self._tolerance:g}% allowed), the worst {errors.worst:+.1%} "
-            f"({100 * WORST * self._tolerance:g}% allowed, mode {errors.worst_mode}), and keeping "
-            "blocks fine would save little"
-        )
-        return False, self.after_refining()
-
-    def refine(self, estimate: ErrorEstimate, vectors: Array | None) -> None:
-        """Keep fine the elements that are to blame, by modes (n_dofs, k) of the fine solid."""
-        assert vectors is not None
-        refined, values = self._refined, estimate.fine.values[: vectors.shape[1]]
-        shares = mean_shares(refined.blocks, refined.model, refined.fine, values, vectors)
-        refined.refine(shares, estimate.errors.excess(self._tolerance))
-
-    def after_refining(self) -> str | None:
-        """Why the model as it is now is not worth solving."""
-        total = self._spent + self._coarse_work() + self._estimate_work()
-        return self._excuse if total > work.REFINED * self._fine_work else None
-
-    def _coarse_work(self) -> float:
-        return self._analysis_work(self._refined.n_dofs)
-
-    def _analysis_work(self, unknowns: int) -> float:
-        return work.analysis_work(unknowns, self._options.modes, self._options.method)
-
-    def _estimate_work(self) -> float:
-        return work.estimate_work(self._refined.fine.n_dofs, again=self._spent > 0.0)
+def _on_root(weighing: Weighing | None) -> Weighing:
+    assert weighing is not None
+    return weighing

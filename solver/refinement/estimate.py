@@ -41,7 +41,7 @@ class ErrorEstimate:
     Attributes
     ----------
     errors
-        Of the frequencies.
+        Expected errors of the frequencies.
     fine
         The fine modes that they were compared with, as many as are rated or more.
     """
@@ -84,8 +84,7 @@ def estimate_errors(solid: InverseIteration, blocks: Blocks | None, modes: Modes
     values = modes.values[RIGID_MODES:LAST]
     start = modes.start()[:, :COLUMNS_USED]
     whole = modes.system.gather(np.ascontiguousarray(start))
-    columns = prolonged(blocks, whole) if blocks is not None and whole is not None else []
-    fine = solid.lowest(values, columns, start.shape[1])
+    fine = solid.lowest(values, prolonged(blocks, whole), start.shape[1])
     count = min(len(values), len(fine.values))
     ratio = np.maximum(values[:count], 0.0) / fine.values[:count]
     return ErrorEstimate(ExpectedErrors(np.sqrt(ratio) - 1.0), fine)

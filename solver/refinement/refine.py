@@ -22,6 +22,10 @@ Model = TypeVar("Model", bound=Solid)
 Refined = TypeVar("Refined", bound=Solid, covariant=True)
 
 
+FINE_BLOCKS, DIVIDED_CELLS = "fine_blocks", "divided_cells"
+"""What is counted as refined: blocks that stay fine, and cells that are divided."""
+
+
 @dataclass(frozen=True)
 class RefinementStep:
     """A model that was tried.
@@ -29,14 +33,15 @@ class RefinementStep:
     Attributes
     ----------
     unknowns
-        Of the model.
-    refined
-        Number of its blocks that stay fine, or of its cells that are divided.
+        Number of unknowns.
+    counted, refined
+        `FINE_BLOCKS` or `DIVIDED_CELLS`, and how many of these the model has.
     errors
-        That its frequencies are expected to have.
+        Expected errors of the frequencies.
     """
 
     unknowns: int
+    counted: str
     refined: int
     errors: ExpectedErrors
 
@@ -74,7 +79,7 @@ def solve_refined(
     Parameters
     ----------
     solve
-        Finds the modes of a model, which is None but on rank 0.
+        Finds the modes of a model, which is None except on rank 0.
     refined
         On rank 0, which estimates; None on the others.
     tolerance

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from carillon.errors import UserError
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.geometry import HexMesh
-from carillon.fem.geometry.size import doubt_unit
-from carillon.fem.geometry.surface import load_surface, surface_name
 from carillon.processes.threads import allowed_cores
 from solver.analysis.problem import ProblemOptions, discretised
+from solver.analysis.solid_surface import SolidSurface
 from sound.clips.files import extract_file
 from sound.clips.targets import Targets, share_frequencies, without_modes
 from sound.design.material import ReducedMaterial
@@ -98,9 +97,9 @@ def prepared_solid(
         For anything wrong with the mesh or the numbers.
     """
     # Not the struck surface, whose cuts round: the voxels shall be those of the solver.
-    loaded = load_surface(solid.mesh, solid.unit)
-    mesh, cells = discretised(loaded, solid, surface_name(solid.mesh))
-    doubt_unit(solid.mesh, loaded.extents, solid.unit)
+    loaded = SolidSurface.read(solid.mesh, solid.unit)
+    mesh, cells = discretised(loaded, solid)
+    loaded.doubt_unit()
     bounds = material.poisson_bounds
     free_poisson = None if bounds is None else FreePoisson(bounds[0], bounds[1], solid.poisson)
     reduced = ReducedMaterial.of_mesh(

@@ -23,13 +23,13 @@ from carillon.fem.geometry.trials import TRIALS
 from carillon.fem.model import RIGID_MODES, Solid
 from carillon.parameters import option, parameters
 from solver.accuracy.estimate import estimate_cell_errors
-from solver.accuracy.solving import Solved, Wishes, solve_solid
+from solver.accuracy.solving import AccuracyRequest, Solved, solve_solid
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
-from solver.refinement.coarse_or_fine import FineStart
 from solver.refinement.errors import FROM_SOLID
+from solver.refinement.fine_start import FineStart
 from solver.verification.errors import frequency_errors
 from studies.accuracy.solids import ANGLES
 
@@ -150,7 +150,8 @@ def _solved(described: ProblemOptions, refine_to: float | None) -> Solved:
         asked = SolverOptions(modes=MODES if modes is None else min(modes, MODES))
         return modal_analysis(model, asked, MPI.COMM_SELF)
 
-    return solve_solid(described, solve, Wishes(refine_to, estimated=True), MPI.COMM_SELF)
+    request = AccuracyRequest(refine_to=refine_to, estimated=True)
+    return solve_solid(described, solve, SolverOptions(modes=MODES), request, MPI.COMM_SELF)
 
 
 def _hertz(modes: Modes) -> Array:

@@ -16,6 +16,7 @@ from solver.accuracy.estimate import estimate_cell_errors
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import DISCRETISATIONS, ProblemOptions, discretised
+from solver.analysis.solid_surface import SolidSurface
 from studies.accuracy.solids import DENSITY, POISSON, YOUNG
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
@@ -75,7 +76,7 @@ def cells(surface: trimesh.Trimesh, name: str, spacing: float, kind: str, modes:
 
 
 def _model(surface: trimesh.Trimesh, options: ProblemOptions) -> Solid:
-    mesh, cells = discretised(surface, options, options.mesh)
+    mesh, cells = discretised(SolidSurface(options.mesh, surface), options)
     young = np.full(mesh.n_cells, YOUNG)
     if cells is None:
         return fine_model(mesh, young, poisson=POISSON, density=DENSITY)

@@ -13,7 +13,8 @@ from carillon.fem.model import ElasticModel
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.coarsening.coarsening import Coarsening
-from solver.refinement.coarse_or_fine import CoarseOrFine, by_options, solve_coarsened
+from solver.refinement.coarse_or_fine import CoarseOrFine, solve_coarsened
+from solver.refinement.model_solver import SolveByOptions
 from solver.refinement.refined_model import RefinedModel
 
 T = TypeVar("T")
@@ -66,7 +67,7 @@ def take(
         Method and number of modes.
     """
     refined = RefinedModel(fine, coarsening)
-    solve = by_options(options, MPI.COMM_SELF)
+    solve = SolveByOptions(options, MPI.COMM_SELF)
     return Taken(refined, solve_coarsened(solve, refined, tolerance, options, MPI.COMM_SELF))
 
 

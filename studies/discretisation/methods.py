@@ -24,7 +24,8 @@ from solver.analysis.options import SolverOptions
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.model import build_model
 from solver.files.modes_file import CHECKS, frequencies
-from solver.refinement.coarse_or_fine import by_options, solve_coarsened
+from solver.refinement.coarse_or_fine import solve_coarsened
+from solver.refinement.model_solver import SolveByOptions
 from solver.refinement.options import ALLOWED_DISTANCE, ALLOWED_ERROR
 from solver.refinement.refine import Refinable, solve_refined
 from solver.refinement.refined_model import RefinedModel
@@ -137,7 +138,7 @@ class Ways:
         refined = RefinedModel(fine, self._coarsening)
         clock.end("model")
         options = self._options
-        solve = by_options(options, MPI.COMM_SELF)
+        solve = SolveByOptions(options, MPI.COMM_SELF)
         found = solve_coarsened(solve, refined, ALLOWED_ERROR, options, MPI.COMM_SELF)
         clock.end("solve", _checks(found.modes))
         assert found.model is not None

@@ -1,0 +1,50 @@
+"""The surface of a solid, read once for all that is made of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+from carillon.fem.geometry import load_surface, surface_name
+from carillon.fem.geometry.size import doubt_unit
+
+if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
+    import trimesh
+
+
+@dataclass(frozen=True)
+class SolidSurface:
+    """Triangles around a solid.
+
+    Attributes
+    ----------
+    mesh
+        Path of the file, or `builtin:NAME`.
+    triangles
+        The surface in metres.
+    unit
+        Metres per unit of the mesh's own coordinates.
+    """
+
+    mesh: str
+    triangles: trimesh.Trimesh
+    unit: float = 1.0
+
+    @classmethod
+    def read(cls, mesh: str, unit: float = 1.0) -> Self:
+        """Read the mesh, see `carillon.fem.geometry.load_surface` also for the errors."""
+        return cls(mesh, load_surface(mesh, unit), unit)
+
+    @property
+    def name(self) -> str:
+        """Short name for messages and files."""
+        return surface_name(self.mesh)
+
+    @property
+    def extents(self) -> tuple[float, ...]:
+        """Sides (3,) of the bounding box [m]."""
+        return tuple(float(side) for side in self.triangles.extents)
+
+    def doubt_unit(self) -> None:
+        """Log a hint, once, if the size suggests that the unit is mistaken."""
+        doubt_unit(self.mesh, self.extents, self.unit)

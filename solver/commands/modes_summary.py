@@ -1,0 +1,107 @@
+"""What `modes` says of its result: attributes of the file, JSON, and a few lines of text."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from carillon.fem.geometry.size import sizes_in_words
+from solver.accuracy.solving import AccuracyRequest, Solved
+from solver.analysis.options import SolverOptions
+from solver.files.modes_file import ESTIMATE, FINE_TAKEN, frequencies
+from solver.refinement.errors import FROM_FINE, FROM_SOLID, in_words
+from solver.refinement.refine import DIVIDED_CELLS, FINE_BLOCKS
+
+REFINED = {FINE_BLOCKS: "blocks fine", DIVIDED_CELLS: "cells divided"}
+"""Words for what is counted as refined."""
+EXPECTED = {FROM_FINE: "error against the voxels", FROM_SOLID: "distance from the solid"}
+"""Words for the expected errors."""
+
+
+def attributes_of(
+    solved: Solved, solver: SolverOptions, accuracy: AccuracyRequest, elapsed: float
+) -> dict[str, Any]:
+    """Plain values for the modes file, on rank 0; none on the others.
+
+    Parameters
+    ----------
+    elapsed
+        Wall time [s] of all that was solved and estimated on the way.
+    """
+    problem, solid, modes = solved.problem, solved.solid, solved.modes
+    if problem is None:
+        return {}
+    seconds = {**problem.seconds, **modes.seconds}
+    if solved.achieved:
+        refined = accuracy.refine_to is not None or accuracy.accuracy is not None
+        rest = max(elapsed - sum(problem.seconds.values()) - sum(modes.seconds.values()), 0.0)
+        seconds["refinement" if refined else ESTIMATE] = rest
+    attributes: dict[str, Any] = {
+        "method": solver.method,
+        "discretisation": solid.discretisation,
+        "coarsen": solid.coarsen,
+        "mesh": solid.mesh,
+        "resolution": solid.resolution,
+        "material": solid.material,
+        "seed": solid.seed,
+        "interface": solver.interface,
+        "fine_n_dofs": problem.fine.n_dofs,
+        **problem.coarsening,
+        **modes.evidence,
+        **solved.achieved,
+        "timings": seconds,
+    }
+    if solver.tolerance is not None:
+        attributes["tolerance"] = solver.tolerance
+    return attributes
+
+
+def print_json(attributes: dict[str, Any], solved: Solved, out: str) -> None:
+    """Print attributes, sizes and frequencies as one JSON object."""
+    assert solved.problem is not None
+    summary = {
+        **attributes,
+        "extents_m": solved.problem.extents,
+        "voxel_extents_m": solved.problem.voxel_extents,
+        "frequencies_hz": frequencies(solved.modes.values).tolist(),
+        "out": out,
+    }
+    print(json.dumps(summary))
+
+
+def print_summary(attributes: dict[str, Any], solved: Solved, out: str) -> None:
+    """Print the main figures in words."""
+    assert solved.problem is not None
+    problem, hertz = solved.problem, frequencies(solved.modes.values)
+    total = sum(attributes["timings"].values())
+    elastic = hertz[6:]
+    span = f"{elastic[0]:.2f} to {elastic[-1]:.2f} Hz" if len(elastic) else "none elastic"
+    added = attributes.get("modes_added", 0)
+    late = f", {added} found after the first search" if added else ""
+    print(
+        f"{out}: {len(hertz)} modes of {attributes['n_dofs']:,} unknowns, {span}{late}; "
+        f"{sizes_in_words(problem.extents, problem.voxel_extents)}; "
+        f"{attributes['rigid_modes']} rigid, largest 2-norm residual "
+        f"{attributes['residual_max']:.1e}, orthogonal to {attributes['orthogonality']:.1e}, "
+        f"{total:.1f} s on {attributes['ranks']} rank{'s' if attributes['ranks'] > 1 else ''}"
+    )
+    if "missed_tolerance" in attributes:
+        print(
+            f"tolerance missed: {attributes['corrections']} corrections reached an eigenvalue "
+            f"error of {attributes['eigenvalue_error_estimate']:.1e}, "
+            f"{attributes['missed_tolerance']:.1e} was asked for"
+        )
+    if FINE_TAKEN in attributes:
+        print(f"the fine solid was solved: {attributes[FINE_TAKEN]}")
+        attributes = {k: v for k, v in attributes.items() if not k.startswith(FROM_FINE)}
+    counts = "".join(
+        f"; {attributes[what]:,} {words}" for what, words in REFINED.items() if what in attributes
+    )
+    for prefix, words in EXPECTED.items():
+        if f"{prefix}_rms" in attributes:
+            print(f"expected {words} {in_words(attributes, prefix)}{counts}")
+    if "missed_accuracy" in attributes:
+        print(
+            f"{100 * attributes['missed_accuracy']:g}% rms was aimed at, which dividing some cells "
+            "does not reach: raise --resolution"
+        )

@@ -1,0 +1,97 @@
+"""Modes of the models that discretising, refining and rating a solid make."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Protocol
+
+from mpi4py import MPI
+
+from carillon.fem.model import Solid
+from solver.analysis.modal_solver import ModalSolver
+from solver.analysis.modes import Initial, Modes
+from solver.analysis.options import SolverOptions
+from solver.refinement.fine_start import FineStart
+
+ESTIMATE_TOLERANCE = 1e-4
+"""Relative error of the eigenvalues that voxels are compared with."""
+
+
+class SolveModel(Protocol):
+    """Finds the modes of one model after another."""
+
+    def __call__(
+        self, model: Solid | None, modes: int | None = None, start: FineStart | None = None
+    ) -> Modes:
+        """Modes of a model; collective.
+
+        Parameters
+        ----------
+        model
+            The model on rank 0, None on the others.
+        modes
+            Number of modes if they serve an estimate of errors alone.
+        start
+            What a coarse model leaves for the analysis of the fine solid.
+        """
+
+
+class SolveByOptions:
+    """Finds modes as options say, see `SolveModel`.
+
+    Parameters
+    ----------
+    options
+        What to compute and how.
+    comm
+        Ranks that share the work.
+    verbose
+        Whether to show each phase and its time.
+    begin
+        Gives what the analysis of a model starts from, but for models of an estimate.
+    """
+
+    def __init__(
+        self,
+        options: SolverOptions,
+        comm: MPI.Comm = MPI.COMM_WORLD,
+        verbose: bool = False,
+        begin: Callable[[ModalSolver, Solid | None], Initial | None] | None = None,
+    ) -> None:
+        self.options = options
+        self._comm = comm
+        self._verbose = verbose
+        self._begin = begin
+
+    def __call__(
+        self, model: Solid | None, modes: int | None = None, start: FineStart | None = None
+    ) -> Modes:
+        """See `SolveModel`."""
+        options = self.options if modes is None else for_estimate(self.options, modes)
+        prepared = None if start is None else start.prepared
+        solver = ModalSolver(model, options, self._comm, self._verbose, prepared)
+        begin: Initial | None = None
+        if start is not None:
+            begin = start.begin(solver)
+        elif self._begin is not None and modes is None:
+            begin = self._begin(solver, model)
+        result = solver.solve(initial_modes=begin)
+        result.seconds = {**solver.seconds, **result.seconds}
+        return result
+
+
+def for_estimate(options: SolverOptions, modes: int) -> SolverOptions:
+    """The options with few modes at most, no more accurate than an estimate of errors needs."""
+    fewer = replace(options, modes=min(modes, options.modes))
+    if options.is_general or options.tolerance == 0.0:
+        return fewer
+    # The method is left to `auto`, and incomplete factors are none for cells cut by a surface.
+    incomplete = options.linear_solver == "icc-pcg"
+    return SolverOptions(
+        method="auto",
+        modes=fewer.modes,
+        tolerance=max(options.tolerance or 0.0, ESTIMATE_TOLERANCE),
+        seed=options.seed,
+        linear_solver="auto" if incomplete else options.linear_solver,
+    )
